@@ -1,0 +1,2 @@
+//! Text in, checked [`model::Model`] out.
+pub mod model;

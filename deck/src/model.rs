@@ -1,0 +1,47 @@
+//! Model: what a run needs, free of any file format.
+
+use mechanics::{mesh::Mesh, setup::Setup};
+use serde::{Deserialize, Serialize};
+
+/// A checked problem in one consistent set of units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// Title of the deck.
+    pub title: String,
+    /// Name of the consistent set of units, as the deck wrote it: `SI`, `cm-g-us`, `mm-ms-kg`, `mm-s-t`.
+    pub units: String,
+    /// Parts, nodes, elements; coincident nodes of joined parts already merged.
+    pub mesh: Mesh,
+    /// Initial velocity by global node index (mass-weighted at merged nodes).
+    pub velocity: Vec<[f64; 3]>,
+    /// Index into `setup.constraints` by global node index; 0 is free.
+    pub constraint: Vec<u16>,
+    /// Kinetic energy lost where joined nodes of different velocity merged.
+    pub join_energy: f64,
+    /// Materials, contact, boundaries, control.
+    pub setup: Setup,
+    /// What to write and when.
+    pub output: Output,
+}
+
+/// What to write and when. Times in the deck's unit of time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Output {
+    /// Time between results files; none: only the first and the last state.
+    pub period: Option<f64>,
+    /// Cycles between rows of history.csv; at least 1.
+    pub history_cycles: u32,
+    /// Element and node fields to write, by name; empty means the default set.
+    pub fields: Vec<String>,
+    /// Gauges: histories at nodes.
+    pub gauges: Vec<Gauge>,
+}
+
+/// A history at one node.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gauge {
+    /// Name: prefix of its columns.
+    pub name: String,
+    /// Global node index; a gauge given by a point is the nearest node of the initial mesh.
+    pub node: u32,
+}

@@ -1,0 +1,2 @@
+//! The `bolide` binary.
+fn main() {}

@@ -1,0 +1,96 @@
+//! Exact sums: terms rounded once to a multiple of a quantum add in any order to the same bits.
+//!
+//! Addition of `f64` is exact, hence associative, while every term is a multiple of one quantum `q` (a power
+//! of two) and every partial sum stays below `2^53 q`. This is the one-bin form of the reproducible sums of
+//! Demmel and Nguyen (2013). A term is rounded by adding and taking away `M = 1.5 * 2^52 * q`, which is right
+//! for `|x| < 2^51 q`.
+
+use serde::{Deserialize, Serialize};
+
+/// A power of two to whose multiples terms of one kind are rounded before they are added.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quantum {
+    q: f64,
+}
+
+impl Quantum {
+    /// The quantum at which a reference magnitude is `2^bits` quanta.
+    ///
+    /// Forces use 42 bits: a term may then reach 32 references (`2^47 q`) and 64 terms add without overflow.
+    ///
+    /// # Panics
+    /// If `reference` is not a positive finite number or the quantum would leave the range of normal numbers.
+    pub fn for_reference(reference: f64, bits: i32) -> Self {
+        assert!(reference.is_finite() && reference > 0.0, "reference magnitude {reference} must be positive");
+        let exponent = ((reference.to_bits() >> 52) & 0x7ff) as i32 - 1022 - bits;
+        assert!((-1000..900).contains(&exponent), "quantum 2^{exponent} out of range for reference {reference}");
+        Self { q: power_of_two(exponent) }
+    }
+
+    /// The quantum itself.
+    pub fn value(self) -> f64 {
+        self.q
+    }
+
+    /// The number `M` that rounds when added and taken away.
+    pub fn magic(self) -> f64 {
+        self.q * (1.5 * 4_503_599_627_370_496.0)
+    }
+
+    /// `x` rounded to the nearest multiple, ties to even. Right for `|x| < 2^51 q`.
+    #[inline(always)]
+    pub fn round(self, x: f64) -> f64 {
+        let m = self.magic();
+        (x + m) - m
+    }
+
+    /// Largest magnitude a single term may have: `2^47 q`.
+    pub fn term_bound(self) -> f64 {
+        self.q * 140_737_488_355_328.0
+    }
+
+    /// Magnitude at which a coarser quantum is asked for: `2^44 q`.
+    pub fn rescale_bound(self) -> f64 {
+        self.q * 17_592_186_044_416.0
+    }
+}
+
+/// `2^exponent` for exponents of normal numbers.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((exponent + 1023) as u64) << 52)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounded_terms_add_to_the_same_bits_in_any_order() {
+        let q = Quantum::for_reference(3.7e9, 42);
+        let mut seed = 88172645463325252_u64;
+        let mut terms: Vec<f64> = (0..64)
+            .map(|_| {
+                seed ^= seed << 13;
+                seed ^= seed >> 7;
+                seed ^= seed << 17;
+                q.round((seed as f64 / u64::MAX as f64 - 0.5) * 1e11)
+            })
+            .collect();
+        let forward: f64 = terms.iter().sum();
+        terms.reverse();
+        let backward: f64 = terms.iter().sum();
+        terms.sort_by(f64::total_cmp);
+        let sorted: f64 = terms.iter().sum();
+        assert_eq!(forward.to_bits(), backward.to_bits());
+        assert_eq!(forward.to_bits(), sorted.to_bits());
+    }
+
+    #[test]
+    fn reference_stands_between_half_and_whole_of_two_to_the_bits() {
+        for reference in [1.0, 1.5, 1.99, 2.0, 1e-12, 7e17] {
+            let q = Quantum::for_reference(reference, 42);
+            let quanta = reference / q.value();
+            assert!((2f64.powi(41)..=2f64.powi(42)).contains(&quanta), "{reference}: {quanta}");
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! What never changes in a run: parts, their index space or connectivity, and which nodes they share.
+
+use serde::{Deserialize, Serialize};
+
+/// The whole mesh of a problem. Owned by the master; workers get pieces of it.
+///
+/// Elements are numbered through all parts in order: the global element index of element `e` of part `p`
+/// is the number of elements of parts `0..p` plus `e`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Mesh {
+    /// Initial position by global node index (length).
+    pub positions: Vec<[f64; 3]>,
+    /// The user's number of each node.
+    pub node_ids: Vec<u32>,
+    /// Parts in deck order.
+    pub parts: Vec<Part>,
+}
+
+/// One part: a body or a piece of one, of one material.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// Unique name from the deck.
+    pub name: String,
+    /// Index into [`crate::setup::Setup::materials`].
+    pub material: u32,
+    /// Index space or connectivity.
+    pub topology: Topology,
+    /// Global node index of each node of the part. Structured: I fastest, then J, then K,
+    /// `(ni+1)(nj+1)(nk+1)` of them. Joined parts name the same global node.
+    pub nodes: Vec<u32>,
+    /// The user's number of each element, in element order.
+    pub element_ids: Vec<u32>,
+}
+
+/// How the elements of a part are connected.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Topology {
+    /// An I,J,K grid of hexahedra, `cells` elements along each index; element order I fastest.
+    Structured {
+        /// Elements along I, J, K.
+        cells: [u32; 3],
+    },
+    /// Explicit hexahedra: eight indices into [`Part::nodes`] each.
+    Explicit {
+        /// Corner nodes, in the order of the crate's documentation.
+        hexahedra: Vec<[u32; 8]>,
+    },
+}
+
+impl Part {
+    /// Number of elements.
+    pub fn n_elements(&self) -> usize {
+        match &self.topology {
+            Topology::Structured { cells } => cells.iter().map(|&c| c as usize).product(),
+            Topology::Explicit { hexahedra } => hexahedra.len(),
+        }
+    }
+
+    /// Corners of element `e` of this part as global node indices.
+    pub fn corners(&self, e: usize) -> [u32; 8] {
+        match &self.topology {
+            Topology::Structured { cells } => {
+                let [ni, nj, _] = cells.map(|c| c as usize);
+                let (i, j, k) = (e % ni, e / ni % nj, e / ni / nj);
+                let row = ni + 1;
+                let plane = row * (nj + 1);
+                let n = i + j * row + k * plane;
+                [n, n + 1, n + 1 + row, n + row, n + plane, n + 1 + plane, n + 1 + row + plane, n + row + plane]
+                    .map(|local| self.nodes[local])
+            }
+            Topology::Explicit { hexahedra } => hexahedra[e].map(|local| self.nodes[local as usize]),
+        }
+    }
+}
+
+impl Mesh {
+    /// Number of elements of all parts.
+    pub fn n_elements(&self) -> usize {
+        self.parts.iter().map(Part::n_elements).sum()
+    }
+
+    /// Number of nodes after joins.
+    pub fn n_nodes(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Global index of the first element of each part, and at the end the number of elements.
+    pub fn element_offsets(&self) -> Vec<usize> {
+        let mut offsets = vec![0];
+        for part in &self.parts {
+            offsets.push(offsets[offsets.len() - 1] + part.n_elements());
+        }
+        offsets
+    }
+}

@@ -1,0 +1,64 @@
+//! Everything a cycle needs beside the mesh and the state: small, sent whole to every worker.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{contact, material::Material};
+
+/// The rules of a run. Equal on every worker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setup {
+    /// Materials, indexed by [`crate::mesh::Part::material`].
+    pub materials: Vec<Material>,
+    /// Time step, viscosity, hourglass, ends.
+    pub control: Control,
+    /// Contact, or none.
+    pub contact: Option<contact::Settings>,
+    /// Node constraints, indexed by [`crate::state::GlobalState::constraint`]; entry 0 is "free".
+    pub constraints: Vec<Constraint>,
+    /// Planar rigid walls.
+    pub walls: Vec<RigidWall>,
+}
+
+/// Prescribed velocity by component (length per time); `None` is free. `Some(0.0)` is fixed, and one fixed
+/// axis is a symmetry plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Constraint {
+    /// Per axis x, y, z.
+    pub velocity: [Option<f64>; 3],
+}
+
+/// A fixed plane that no node of the named parts crosses.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RigidWall {
+    /// A point of the plane.
+    pub point: [f64; 3],
+    /// Unit normal, pointing to the side where material may be.
+    pub normal: [f64; 3],
+    /// Coulomb coefficient; 0 slides freely.
+    pub friction: f64,
+    /// Parts that feel the wall, by part index; true for each that does.
+    pub parts: Vec<bool>,
+}
+
+/// Time step, damping and ends.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Control {
+    /// Run until this time (time).
+    pub end_time: f64,
+    /// Run at most this many cycles.
+    pub end_cycle: u64,
+    /// Factor on the Courant limit; AUTODYN's default 0.6666 keeps isolated elements stable.
+    pub safety_factor: f64,
+    /// Greatest growth of the time step from one cycle to the next; 1.05.
+    pub growth: f64,
+    /// Linear artificial viscosity coefficient; default 0.2.
+    pub linear_viscosity: f64,
+    /// Quadratic artificial viscosity coefficient; default 1.0 (enters squared).
+    pub quadratic_viscosity: f64,
+    /// Viscous hourglass coefficient; default 0.1.
+    pub hourglass: f64,
+    /// Cycles from the trigger of a sort to the cycle it acts at.
+    pub sort_lag: u32,
+    /// Longest distance between plan boundaries (cycles).
+    pub plan_interval: u32,
+}

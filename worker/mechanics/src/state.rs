@@ -1,0 +1,61 @@
+//! What a cycle changes, by global index: the form in which the master holds, stores and hashes a run.
+
+use serde::{Deserialize, Serialize};
+
+/// Element state fields in their order inside [`GlobalState::elements`] and inside a block.
+///
+/// Deviatoric stress (zz is minus the sum of xx and yy), pressure, internal energy per initial volume,
+/// effective plastic strain, temperature, and current volume over initial volume.
+pub const FIELDS: [&str; 10] = [
+    "stress_xx", "stress_yy", "stress_xy", "stress_yz", "stress_zx", "pressure", "energy", "plastic_strain",
+    "temperature", "relative_volume",
+];
+
+/// Number of element state fields.
+pub const N_FIELDS: usize = FIELDS.len();
+
+/// Indices into [`FIELDS`].
+pub mod field {
+    /// Deviatoric stress xx.
+    pub const SXX: usize = 0;
+    /// Deviatoric stress yy.
+    pub const SYY: usize = 1;
+    /// Deviatoric stress xy.
+    pub const SXY: usize = 2;
+    /// Deviatoric stress yz.
+    pub const SYZ: usize = 3;
+    /// Deviatoric stress zx.
+    pub const SZX: usize = 4;
+    /// Pressure, artificial viscosity not included.
+    pub const PRESSURE: usize = 5;
+    /// Internal energy per initial volume.
+    pub const ENERGY: usize = 6;
+    /// Effective plastic strain.
+    pub const PLASTIC_STRAIN: usize = 7;
+    /// Temperature (K).
+    pub const TEMPERATURE: usize = 8;
+    /// Volume over initial volume.
+    pub const RELATIVE_VOLUME: usize = 9;
+}
+
+/// The whole state of a run at the start of a cycle. Node arrays by global node index, element arrays by
+/// global element index.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GlobalState {
+    /// Cycles completed.
+    pub cycle: u64,
+    /// Time at `x` (time).
+    pub time: f64,
+    /// Position `x_n` (length).
+    pub x: Vec<[f64; 3]>,
+    /// Velocity `v_{n-1/2}` (length per time).
+    pub v: Vec<[f64; 3]>,
+    /// Nodal mass.
+    pub mass: Vec<f64>,
+    /// Index into [`crate::setup::Setup::constraints`] by node.
+    pub constraint: Vec<u16>,
+    /// Initial volume by element.
+    pub initial_volume: Vec<f64>,
+    /// One array per entry of [`FIELDS`], each by global element index.
+    pub elements: [Vec<f64>; N_FIELDS],
+}
