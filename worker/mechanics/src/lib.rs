@@ -20,9 +20,16 @@
 
 pub mod block;
 pub mod contact;
+pub mod cycle;
+pub mod digest;
 pub mod exact;
+pub mod initial;
 pub mod lanes;
 pub mod material;
 pub mod mesh;
+pub mod nodes;
+pub mod piece;
 pub mod setup;
 pub mod state;
+pub mod volume;
+pub mod vote;

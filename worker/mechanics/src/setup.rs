@@ -19,13 +19,19 @@ pub struct Setup {
     pub walls: Vec<RigidWall>,
 }
 
-/// Prescribed velocity by component (length per time); `None` is free. `Some(0.0)` is fixed, and one fixed
-/// axis is a symmetry plane.
+/// What holds a node: prescribed velocities and walls. A node's constraint is the same on every holder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Constraint {
-    /// Per axis x, y, z.
+    /// Prescribed velocity by axis x, y, z (length per time); `None` is free, `Some(0.0)` is fixed, and one
+    /// fixed axis is a symmetry plane.
     pub velocity: [Option<f64>; 3],
+    /// Walls that the node feels, one bit per entry of [`Setup::walls`]. Decks leave it 0: the start of a run
+    /// derives it from the parts that each wall names ([`crate::initial::bind_walls`]).
+    pub walls: u32,
 }
+
+/// Most walls in a run: one bit each in [`Constraint::walls`].
+pub const MAX_WALLS: usize = 32;
 
 /// A fixed plane that no node of the named parts crosses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

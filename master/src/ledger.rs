@@ -1,0 +1,121 @@
+//! The ledger of a run: energies and momentum from votes, the worst ratios, rows of history.
+
+use deck::model::Model;
+use mechanics::vote::Vote;
+use serde::{Deserialize, Serialize};
+
+use crate::results::history::{GaugeRow, HistoryRow, PartEnergy};
+
+/// Sums over all cycles so far; stored in a snapshot as it stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ledger {
+    /// Hourglass work so far.
+    pub hourglass: f64,
+    /// Work of artificial viscosity so far (part of internal energy).
+    pub viscosity: f64,
+    /// Energy lost to friction so far.
+    pub friction: f64,
+    /// Work of supports and walls so far.
+    pub external: f64,
+    /// Total energy less external work after the first cycle; none before it.
+    pub initial_total: Option<f64>,
+    /// Greatest kinetic energy so far.
+    pub greatest_kinetic: f64,
+    /// Momentum before the first cycle.
+    pub initial_momentum: [f64; 3],
+    /// Greatest momentum of a part before the first cycle.
+    pub part_momentum: f64,
+    /// Largest `dt` over the true Courant limit.
+    pub worst_courant: f64,
+    /// Largest travel of a contact node in one cycle, in gaps.
+    pub worst_gap_travel: f64,
+    /// Deepest contact, in gaps.
+    pub worst_penetration: f64,
+    /// The last row.
+    pub last: HistoryRow,
+}
+
+impl Ledger {
+    /// Before the first cycle of a run.
+    pub fn new(model: &Model, mass: &[f64]) -> Self {
+        let momentum_of = |nodes: &mut dyn Iterator<Item = usize>| {
+            nodes.fold([0.0; 3], |mut sum, n| {
+                for (s, v) in sum.iter_mut().zip(model.velocity[n]) {
+                    *s += mass[n] * v;
+                }
+                sum
+            })
+        };
+        let norm = |p: [f64; 3]| (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+        let part_momentum = model
+            .mesh
+            .parts
+            .iter()
+            .map(|part| norm(momentum_of(&mut part.nodes.iter().map(|&n| n as usize))))
+            .fold(0.0, f64::max);
+        Self {
+            hourglass: 0.0,
+            viscosity: 0.0,
+            friction: 0.0,
+            external: 0.0,
+            initial_total: None,
+            greatest_kinetic: 0.0,
+            initial_momentum: momentum_of(&mut (0..model.mesh.n_nodes())),
+            part_momentum,
+            worst_courant: 0.0,
+            worst_gap_travel: 0.0,
+            worst_penetration: 0.0,
+            last: HistoryRow::default(),
+        }
+    }
+
+    /// Books the whole vote of a cycle that began at `time` with step `dt`; `gap` where there is contact.
+    pub fn book(&mut self, vote: &Vote, cycle: u64, time: f64, dt: f64, gap: Option<f64>) {
+        let sum = |f: &dyn Fn(&mechanics::vote::PartVote) -> f64| vote.parts.iter().map(f).sum::<f64>();
+        self.hourglass += sum(&|p| p.hourglass);
+        self.viscosity += sum(&|p| p.viscosity);
+        self.friction += vote.friction;
+        self.external += vote.external;
+        let kinetic = sum(&|p| p.kinetic);
+        let internal = sum(&|p| p.internal);
+        let total = kinetic + internal + self.hourglass + vote.contact + self.friction;
+        let initial = *self.initial_total.get_or_insert(total - self.external);
+        self.greatest_kinetic = self.greatest_kinetic.max(kinetic);
+        let scale = initial.abs().max(self.greatest_kinetic);
+        let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
+        self.worst_courant = self.worst_courant.max(dt / vote.courant);
+        if let Some(gap) = gap {
+            self.worst_gap_travel = self.worst_gap_travel.max(vote.contact_speed_squared.sqrt() * dt / gap);
+            self.worst_penetration = self.worst_penetration.max(vote.worst_depth);
+        }
+        self.last = HistoryRow {
+            cycle,
+            time,
+            dt,
+            kinetic,
+            internal,
+            hourglass: self.hourglass,
+            contact: vote.contact,
+            friction: self.friction,
+            external: self.external,
+            total,
+            error,
+            momentum: vote.momentum,
+            parts: vote.parts.iter().map(|p| PartEnergy { kinetic: p.kinetic, internal: p.internal }).collect(),
+            gauges: vote
+                .gauges
+                .iter()
+                .map(|(_, g)| GaugeRow { x: [g[0], g[1], g[2]], v: [g[3], g[4], g[5]] })
+                .collect(),
+        };
+    }
+
+    /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
+    pub fn momentum_error(&self) -> f64 {
+        if self.part_momentum == 0.0 {
+            return 0.0;
+        }
+        let change: f64 = (0..3).map(|a| (self.last.momentum[a] - self.initial_momentum[a]).powi(2)).sum();
+        change.sqrt() / self.part_momentum
+    }
+}

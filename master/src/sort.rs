@@ -1,0 +1,97 @@
+//! Sort: from gathered positions to the next plan. Pure computation, run beside the cycles.
+//!
+//! The sort itself is mechanics'; here its units are dealt to workers and become batches and an exchange.
+
+use mechanics::{
+    contact::{self, Batch, Census, Exclusions, Surface},
+    state::GlobalState,
+};
+
+use crate::{
+    balance,
+    exchange::{Exchange, Holdings},
+};
+
+/// All that a sort needs and that stays the same between two decompositions.
+pub struct Sorter {
+    surface: Surface,
+    settings: contact::Settings,
+    exclusions: Exclusions,
+    speeds: Vec<f64>,
+    /// By worker: surface node index of each gathered position.
+    gather: Vec<Vec<u32>>,
+}
+
+/// What came of a sort.
+pub struct Sorted {
+    /// The next plan of every worker.
+    pub exchange: Exchange,
+    /// The census of the work units.
+    pub census: Census,
+    /// Interactions by worker.
+    pub interactions: Vec<u64>,
+}
+
+impl Sorter {
+    /// `gather` lists, by worker, the global surface nodes whose positions it sends, in its order.
+    pub fn new(
+        surface: Surface,
+        settings: contact::Settings,
+        exclusions: Exclusions,
+        speeds: Vec<f64>,
+        gather: &[Vec<u32>],
+    ) -> Self {
+        let gather = gather
+            .iter()
+            .map(|nodes| nodes.iter().filter_map(|&node| surface.node_index(node)).collect())
+            .collect();
+        Self { surface, settings, exclusions, speeds, gather }
+    }
+
+    /// The surface it sorts.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// Numbers that a worker's gathering has.
+    pub fn n_gathered(&self, worker: usize) -> usize {
+        3 * self.gather[worker].len()
+    }
+
+    /// Positions by surface node from what each worker gathered.
+    pub fn positions(&self, gathered: &[Vec<f64>]) -> Vec<[f64; 3]> {
+        let mut x = vec![[0.0; 3]; self.surface.nodes.len()];
+        for (slots, values) in self.gather.iter().zip(gathered) {
+            for (&slot, position) in slots.iter().zip(values.chunks_exact(3)) {
+                x[slot as usize].copy_from_slice(position);
+            }
+        }
+        x
+    }
+
+    /// Positions by surface node from the global state.
+    pub fn positions_of(&self, state: &GlobalState) -> Vec<[f64; 3]> {
+        self.surface.nodes.iter().map(|&node| state.x[node as usize]).collect()
+    }
+
+    /// Sorts, balances, plans. `x` by surface node; of `state` only masses and constraints are read.
+    pub fn run(&self, x: &[[f64; 3]], holdings: &Holdings, state: &GlobalState) -> Sorted {
+        let units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
+        let census = Census::of(&units);
+        let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
+        let worker_of = balance::assign(&units, &self.speeds, &owner);
+        let n = self.speeds.len();
+        let mut mine: Vec<Vec<&contact::WorkUnit>> = vec![Vec::new(); n];
+        let mut interactions = vec![0; n];
+        for (unit, &worker) in units.iter().zip(&worker_of) {
+            mine[worker].push(unit);
+            interactions[worker] += unit.interactions;
+        }
+        let mass = |node: u32| state.mass[node as usize];
+        let batches = mine
+            .iter()
+            .map(|units| (!units.is_empty()).then(|| Batch::gather(&self.surface, units, &mass, &self.exclusions)))
+            .collect();
+        Sorted { exchange: Exchange::new(holdings, batches, state), census, interactions }
+    }
+}

@@ -1,0 +1,163 @@
+//! Every message: who sends it, when, and what comes back.
+//!
+//! A run, seen from one worker: `Assign` -> `Ready`; `Start`; then per cycle `Cycle` -> `Totals`; at a sort,
+//! `Plan` arrives ahead of its cycle and `Transfer` goes both ways at that cycle; `Image` when asked; at the end
+//! `Image` with `last`, then `Release`.
+//!
+//! Orders act with a lag that is the same on every route: the orders that answer cycle `n` give the time step of
+//! cycle `n + 1` and what happens at the start of cycle `n + 2`.
+
+use mechanics::{
+    block::Piece,
+    cycle::{Plan, Subdomain},
+    exact::Quantum,
+    setup::Setup,
+    vote::{Quanta, Vote},
+};
+use serde::{Deserialize, Serialize};
+
+/// From the master to a worker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum ToWorker {
+    /// First of a job: all that the worker holds. Answered by `Ready`.
+    Assign(Box<Assign>),
+    /// When every worker is ready: the orders for the first cycle and the one after.
+    Start {
+        /// `orders[0].next + 1` is the first cycle.
+        orders: [Orders; 2],
+    },
+    /// A new plan, sent before the cycle it acts at.
+    Plan {
+        /// Start of this cycle.
+        acts_at: u64,
+        /// Whom this worker shares nodes with and what it computes.
+        plan: Box<Plan>,
+        /// Hash of the whole exchange plan; each frame of its cycles carries it.
+        hash: u64,
+    },
+    /// The answer to every worker's `Cycle` of one cycle.
+    Totals {
+        /// The cycle.
+        cycle: u64,
+        /// What comes next.
+        orders: Orders,
+        /// Total forces of this worker's exchange nodes, three numbers each.
+        totals: Vec<f64>,
+    },
+    /// State of the guests of a plan that starts to act, six numbers each.
+    Transfer {
+        /// The cycle at which the plan acts.
+        cycle: u64,
+        /// x, y, z, vx, vy, vz by guest.
+        state: Vec<f64>,
+    },
+    /// The job is over or given up; the worker forgets it.
+    Release,
+}
+
+/// All that a worker holds of a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Assign {
+    /// Materials, contact, boundaries, control.
+    pub setup: Setup,
+    /// Number of parts of the problem.
+    pub n_parts: u32,
+    /// Quanta of the sums.
+    pub quanta: Quanta,
+    /// Sub-domains with their state.
+    pub subdomains: Vec<Subdomain>,
+    /// Global node of each gauge.
+    pub gauges: Vec<u32>,
+    /// Lane width to use: `scalar`, `avx2`, `avx512`; none for the best of the machine.
+    pub lanes: Option<String>,
+    /// The cycle to start at.
+    pub cycle: u64,
+    /// `dt` of the cycle before it; 0 at the start of a run.
+    pub dt_previous: f64,
+    /// The first plan.
+    pub plan: Plan,
+    /// Its hash.
+    pub plan_hash: u64,
+    /// State of its guests.
+    pub guest_state: Vec<f64>,
+}
+
+/// What the next cycles do; the same on every worker.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Orders {
+    /// The cycle whose time step `dt` is.
+    pub next: u64,
+    /// `dt` of cycle `next` (time).
+    pub dt: f64,
+    /// Quantum of forces from cycle `next + 1` on.
+    pub force_quantum: Quantum,
+    /// At the start of cycle `next + 1`, the positions of surface nodes travel; the plan sorted from them acts a sort
+    /// lag later.
+    pub gather: bool,
+    /// At the start of cycle `next + 1`, images are sent.
+    pub collect: bool,
+    /// The run ends at the start of cycle `next + 1`.
+    pub stop: bool,
+}
+
+/// From a worker to the master.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum ToMaster {
+    /// The assignment stands; the vote of a preparing pass (none when the run resumes).
+    Ready {
+        /// Vote of the state as it is.
+        vote: Option<Box<Vote>>,
+        /// Lane width in use.
+        lanes: String,
+    },
+    /// Once per cycle, when contact and border elements are done.
+    Cycle {
+        /// The cycle.
+        cycle: u64,
+        /// The vote of the whole of the cycle before; none in the first cycle.
+        vote: Option<Box<Vote>>,
+        /// Partial forces of the exchange nodes, three numbers each.
+        partials: Vec<f64>,
+        /// Positions of owned surface nodes where this cycle gathers; else empty.
+        gathered: Vec<f64>,
+    },
+    /// State of the nodes that others will have as guests.
+    Transfer {
+        /// The cycle at which the plan acts.
+        cycle: u64,
+        /// Six numbers by node of the plan's send list.
+        state: Vec<f64>,
+    },
+    /// State of all sub-domains at the start of a cycle.
+    Image {
+        /// The cycle.
+        cycle: u64,
+        /// Version of the form of a piece.
+        version: u32,
+        /// The state.
+        pieces: Vec<Piece>,
+        /// Set at the end of the run, with the vote of the last cycle.
+        last: Option<Box<Vote>>,
+        /// What this worker's compute threads have used so far.
+        work: Work,
+    },
+    /// The worker cannot go on.
+    Failed {
+        /// The cycle.
+        cycle: u64,
+        /// Why: a sentence for the user.
+        reason: String,
+    },
+}
+
+/// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
+pub const IMAGE_VERSION: u32 = 1;
+
+/// Thread-CPU time of a worker's compute threads (ns).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Work {
+    /// All phases.
+    pub compute_ns: u64,
+    /// Of that, contact.
+    pub contact_ns: u64,
+}

@@ -1,0 +1,575 @@
+//! One cycle of a worker: contact, border elements, interior, totals, integrate.
+//!
+//! A [`Domain`] is all that a worker holds: blocks with their own copies of their nodes, the contact nodes and
+//! faces of its work units, and *guests* (contact nodes that no block here has). Which nodes have several
+//! copies, here or on other workers, is said by a [`Plan`]; their total forces are exact sums, so the
+//! steps below give the same bits however blocks, workers and threads are cut.
+//!
+//! Between two plans a cycle is, in this order: [`Domain::contact`], [`Domain::elements`] (border),
+//! [`Domain::partials`], [`Domain::elements`] (interior), [`Domain::integrate`].
+
+use std::{
+    collections::{HashMap, VecDeque},
+    ops::Range,
+};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    block::{Block, ElementVote, Piece, Step},
+    contact::{Batch, Contact, reach::Extent},
+    lanes::Width,
+    nodes::{Advance, Booked, Nodes},
+    setup::Setup,
+    vote::{Quanta, Vote},
+};
+
+/// Measures the work of compute threads; the physics knows no clock of its own.
+pub trait Meter: Sync {
+    /// A mark on the calling thread.
+    fn start(&self) -> u64;
+    /// Books what the calling thread did since the mark.
+    fn stop(&self, mark: u64, contact: bool);
+}
+
+/// A sub-domain as the master hands it out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Subdomain {
+    /// Number of the sub-domain; the lowest that has a node owns it.
+    pub id: u32,
+    /// Its state, cut for the threads of its worker.
+    pub pieces: Vec<Piece>,
+    /// Global nodes of it that another sub-domain owns, ascending.
+    pub unowned: Vec<u32>,
+    /// Global nodes of it on the contact surface, ascending.
+    pub surface: Vec<u32>,
+}
+
+/// Which nodes this worker shares with others and which work units it computes; from one plan boundary to the next.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Global nodes whose partial forces travel, in the order of the packed arrays.
+    pub exchange: Vec<u32>,
+    /// Work units.
+    pub batch: Option<Batch>,
+    /// Contact nodes that no sub-domain here has.
+    pub guests: Vec<Guest>,
+    /// Global nodes whose state this worker sends to others when the plan starts to act.
+    pub send: Vec<u32>,
+}
+
+/// What integrating a guest needs beside its position and velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Guest {
+    /// Global node index.
+    pub node: u32,
+    /// Nodal mass.
+    pub mass: f64,
+    /// Index into the setup's constraints.
+    pub constraint: u16,
+}
+
+/// Which element sets a pass computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Sets {
+    /// Those that touch nodes of the exchange.
+    Border,
+    /// The others.
+    Interior,
+    /// All.
+    All,
+}
+
+/// No index.
+const NONE: u32 = u32::MAX;
+
+/// A block and what the domain keeps beside it.
+struct Room {
+    block: Block,
+    border: Vec<Range<u32>>,
+    interior: Vec<Range<u32>>,
+    booked: Vec<bool>,
+    /// Local nodes on the contact surface.
+    surface: Vec<u32>,
+    /// Their positions at the sort in force.
+    reference: Vec<[f64; 3]>,
+    /// Their positions at gatherings whose sorts do not act yet, oldest first.
+    gathered: VecDeque<Vec<[f64; 3]>>,
+    vote: ElementVote,
+    sums: Booked,
+    extent: Extent,
+    speed_squared: f64,
+}
+
+/// Copies of one node: a range of `Domain::copies`, its contact node and its guest.
+struct Shared {
+    copies: Range<u32>,
+    contact: u32,
+    guest: u32,
+}
+
+/// Contact nodes, packed, and where their positions come from.
+struct ContactRoom {
+    contact: Contact,
+    /// (block, local node), or (NONE, guest).
+    sources: Vec<(u32, u32)>,
+    x: [Vec<f64>; 3],
+    v: [Vec<f64>; 3],
+    f: [Vec<f64>; 3],
+}
+
+/// Guests by index.
+#[derive(Default)]
+struct Guests {
+    node: Vec<u32>,
+    x: [Vec<f64>; 3],
+    v: [Vec<f64>; 3],
+    f: [Vec<f64>; 3],
+    mass: Vec<f64>,
+    constraint: Vec<u16>,
+    booked: Vec<bool>,
+}
+
+/// Everything a worker computes on.
+pub struct Domain {
+    setup: Setup,
+    n_parts: usize,
+    quanta: Quanta,
+    width: Width,
+    rooms: Vec<Room>,
+    guests: Guests,
+    contact: Option<ContactRoom>,
+    exchange: Vec<Shared>,
+    local: Vec<Shared>,
+    copies: Vec<(u32, u32)>,
+    home: HashMap<u32, Vec<(u32, u32)>>,
+    gather: Vec<(u32, u32)>,
+    gauges: Vec<(u32, u32, u32)>,
+    vote: Vote,
+}
+
+impl Domain {
+    /// Builds the blocks of the sub-domains. `gauges` are global node indices by gauge.
+    pub fn new(
+        setup: Setup,
+        n_parts: usize,
+        quanta: Quanta,
+        subdomains: &[Subdomain],
+        gauges: &[u32],
+        width: Width,
+    ) -> Self {
+        let mut rooms: Vec<Room> = Vec::new();
+        let mut home: HashMap<u32, Vec<(u32, u32)>> = HashMap::new();
+        let mut gather = Vec::new();
+        for subdomain in subdomains {
+            let first = rooms.len();
+            for piece in &subdomain.pieces {
+                let block = Block::new(piece, &setup.materials[piece.material as usize]);
+                for (local, &node) in piece.nodes.iter().enumerate() {
+                    home.entry(node).or_default().push((rooms.len() as u32, local as u32));
+                }
+                let n = block.nodes.len();
+                let all = 0..block.n_sets();
+                rooms.push(Room {
+                    block,
+                    border: Vec::new(),
+                    interior: vec![all],
+                    booked: vec![false; n],
+                    surface: Vec::new(),
+                    reference: Vec::new(),
+                    gathered: VecDeque::new(),
+                    vote: ElementVote::default(),
+                    sums: Booked::default(),
+                    extent: Extent::empty(),
+                    speed_squared: 0.0,
+                });
+            }
+            let own = first as u32..rooms.len() as u32;
+            let first_copy = |node: u32| {
+                home.get(&node).and_then(|copies| copies.iter().copied().find(|(block, _)| own.contains(block)))
+            };
+            for room in own.clone() {
+                for local in 0..rooms[room as usize].block.nodes.len() as u32 {
+                    let node = rooms[room as usize].block.nodes[local as usize];
+                    let owned = subdomain.unowned.binary_search(&node).is_err();
+                    rooms[room as usize].booked[local as usize] = owned && first_copy(node) == Some((room, local));
+                }
+            }
+            for &node in &subdomain.surface {
+                if let Some((room, local)) = first_copy(node) {
+                    if subdomain.unowned.binary_search(&node).is_err() {
+                        gather.push((room, local));
+                    }
+                    rooms[room as usize].surface.push(local);
+                }
+            }
+        }
+        for room in &mut rooms {
+            room.reference = positions(&room.block, &room.surface);
+        }
+        let gauges = gauges
+            .iter()
+            .enumerate()
+            .filter_map(|(g, node)| {
+                let &(room, local) = home.get(node)?.iter().find(|&&(r, l)| rooms[r as usize].booked[l as usize])?;
+                Some((g as u32, room, local))
+            })
+            .collect();
+        Self {
+            vote: Vote::empty(n_parts),
+            setup,
+            n_parts,
+            quanta,
+            width,
+            rooms,
+            guests: Guests::default(),
+            contact: None,
+            exchange: Vec::new(),
+            local: Vec::new(),
+            copies: Vec::new(),
+            home,
+            gather,
+            gauges,
+        }
+    }
+
+    /// Number of elements held.
+    pub fn n_elements(&self) -> usize {
+        self.rooms.iter().map(|r| r.block.elements.len()).sum()
+    }
+
+    /// A pass with a step of zero: changes nothing and gives the vote a run starts from.
+    pub fn prepare(&mut self, meter: &dyn Meter) -> Vote {
+        self.vote = Vote::empty(self.n_parts);
+        self.elements(Sets::All, 0.0, meter);
+        for room in &mut self.rooms {
+            room.block.clear_forces();
+            let Room { block, surface, .. } = room;
+            let v = &block.v;
+            let top = surface.iter().map(|&i| speed_squared(v, i as usize)).fold(0.0, f64::max);
+            self.vote.contact_speed_squared = self.vote.contact_speed_squared.max(top);
+        }
+        self.finish_vote()
+    }
+
+    /// Starts to act by `plan`. `guest_state` is x, y, z, vx, vy, vz of each guest, in the plan's order.
+    ///
+    /// # Errors
+    /// If the plan names a node that is neither held nor a guest, or the state has the wrong length.
+    pub fn install(&mut self, plan: &Plan, guest_state: &[f64]) -> Result<(), String> {
+        if guest_state.len() != 6 * plan.guests.len() {
+            return Err(format!("{} numbers of guest state for {} guests, expected 6 each", guest_state.len(), plan.guests.len()));
+        }
+        let n_guests = plan.guests.len();
+        self.guests = Guests {
+            node: plan.guests.iter().map(|g| g.node).collect(),
+            x: std::array::from_fn(|a| guest_state.chunks_exact(6).map(|s| s[a]).collect()),
+            v: std::array::from_fn(|a| guest_state.chunks_exact(6).map(|s| s[3 + a]).collect()),
+            f: std::array::from_fn(|_| vec![0.0; n_guests]),
+            mass: plan.guests.iter().map(|g| g.mass).collect(),
+            constraint: plan.guests.iter().map(|g| g.constraint).collect(),
+            booked: vec![false; n_guests],
+        };
+        let guest_of: HashMap<u32, u32> = self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
+        let mut contact_of = HashMap::new();
+        self.contact = None;
+        if let (Some(batch), Some(settings)) = (&plan.batch, &self.setup.contact) {
+            let mut sources = Vec::with_capacity(batch.nodes.len());
+            for (i, node) in batch.nodes.iter().enumerate() {
+                let source = match (self.home.get(&node.global), guest_of.get(&node.global)) {
+                    (Some(copies), _) => copies[0],
+                    (None, Some(&guest)) => (NONE, guest),
+                    (None, None) => return Err(format!("contact node {} is neither held nor a guest", node.global)),
+                };
+                sources.push(source);
+                contact_of.insert(node.global, i as u32);
+            }
+            let n = sources.len();
+            let zeros = || std::array::from_fn(|_| vec![0.0; n]);
+            let (mut x, mut v) = (zeros(), zeros());
+            pack(&self.rooms, &self.guests, &sources, &mut x, &mut v);
+            let contact = Contact::new(batch, settings, &x);
+            self.contact = Some(ContactRoom { contact, sources, x, v, f: zeros() });
+        }
+        // Every node with more than one copy, here or elsewhere, and every contact node.
+        self.copies.clear();
+        self.exchange.clear();
+        self.local.clear();
+        let mut exchanged = std::collections::HashSet::with_capacity(plan.exchange.len());
+        for &node in &plan.exchange {
+            exchanged.insert(node);
+            let shared = self.shared(node, &contact_of, &guest_of);
+            if shared.copies.is_empty() && shared.guest == NONE {
+                return Err(format!("node {node} of the exchange is neither held nor a guest"));
+            }
+            self.exchange.push(shared);
+        }
+        let mut inner: Vec<u32> = self
+            .home
+            .iter()
+            .filter(|(node, copies)| copies.len() > 1 || contact_of.contains_key(node))
+            .map(|(&node, _)| node)
+            .filter(|node| !exchanged.contains(node))
+            .collect();
+        inner.sort_unstable();
+        for node in inner {
+            let shared = self.shared(node, &contact_of, &guest_of);
+            self.local.push(shared);
+        }
+        for room in &mut self.rooms {
+            let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
+            (room.border, room.interior) = room.block.sets_by_nodes(&touched);
+            if let Some(gathered) = room.gathered.pop_front() {
+                room.reference = gathered;
+            }
+        }
+        Ok(())
+    }
+
+    fn shared(&mut self, node: u32, contact_of: &HashMap<u32, u32>, guest_of: &HashMap<u32, u32>) -> Shared {
+        let first = self.copies.len() as u32;
+        self.copies.extend(self.home.get(&node).into_iter().flatten());
+        Shared {
+            copies: first..self.copies.len() as u32,
+            contact: contact_of.get(&node).copied().unwrap_or(NONE),
+            guest: guest_of.get(&node).copied().unwrap_or(NONE),
+        }
+    }
+
+    /// Position and velocity of `nodes` (global), six numbers each, for workers that will have them as guests.
+    ///
+    /// # Errors
+    /// If a node is not held here.
+    pub fn transfer(&self, nodes: &[u32]) -> Result<Vec<f64>, String> {
+        let mut out = Vec::with_capacity(6 * nodes.len());
+        for node in nodes {
+            let (room, local) = *self
+                .home
+                .get(node)
+                .and_then(|copies| copies.first())
+                .ok_or_else(|| format!("node {node} to transfer is not held"))?;
+            let (block, i) = (&self.rooms[room as usize].block, local as usize);
+            out.extend((0..3).map(|a| block.x[a][i]));
+            out.extend((0..3).map(|a| block.v[a][i]));
+        }
+        Ok(out)
+    }
+
+    /// Positions of the owned surface nodes in the order the master expects; a sort will use them.
+    pub fn gather(&mut self) -> Vec<f64> {
+        for room in &mut self.rooms {
+            room.gathered.push_back(positions(&room.block, &room.surface));
+        }
+        let mut out = Vec::with_capacity(3 * self.gather.len());
+        for &(room, local) in &self.gather {
+            let block = &self.rooms[room as usize].block;
+            out.extend((0..3).map(|a| block.x[a][local as usize]));
+        }
+        out
+    }
+
+    /// A coarser quantum of forces, from an order.
+    pub fn set_force_quantum(&mut self, quantum: crate::exact::Quantum) {
+        self.quanta.force = quantum;
+    }
+
+    /// Contact forces of the work units at `x_n`; `dt` is `dt_{n-1}`.
+    pub fn contact(&mut self, dt: f64, meter: &dyn Meter) {
+        let mark = meter.start();
+        if let Some(room) = &mut self.contact {
+            pack(&self.rooms, &self.guests, &room.sources, &mut room.x, &mut room.v);
+            for f in &mut room.f {
+                f.fill(0.0);
+            }
+            let vote = room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
+            self.vote.add_contact(&vote);
+        }
+        meter.stop(mark, true);
+    }
+
+    /// Forces of element sets at `x_n`; `dt` is `dt_{n-1}`. Border and All start from cleared forces.
+    pub fn elements(&mut self, sets: Sets, dt: f64, meter: &dyn Meter) {
+        let control = &self.setup.control;
+        let step = Step {
+            dt,
+            safety_factor: control.safety_factor,
+            linear_viscosity: control.linear_viscosity,
+            quadratic_viscosity: control.quadratic_viscosity,
+            hourglass: control.hourglass,
+            force_quantum: self.quanta.force,
+            energy_quantum: self.quanta.energy,
+        };
+        let (materials, width) = (&self.setup.materials, self.width);
+        let work = |room: &mut Room| {
+            let mark = meter.start();
+            let material = &materials[room.block.material as usize];
+            if sets != Sets::Interior {
+                room.block.clear_forces();
+                room.vote = ElementVote::default();
+            }
+            if sets != Sets::Interior {
+                room.block.compute(material, &room.border, &step, width, &mut room.vote);
+            }
+            if sets != Sets::Border {
+                room.block.compute(material, &room.interior, &step, width, &mut room.vote);
+            }
+            meter.stop(mark, false);
+        };
+        each(&mut self.rooms, work);
+    }
+
+    /// Partial forces of the nodes of the exchange, three numbers each.
+    pub fn partials(&self, meter: &dyn Meter) -> Vec<f64> {
+        let mark = meter.start();
+        let mut out = Vec::with_capacity(3 * self.exchange.len());
+        for shared in &self.exchange {
+            out.extend(self.sum(shared));
+        }
+        meter.stop(mark, false);
+        out
+    }
+
+    fn sum(&self, shared: &Shared) -> [f64; 3] {
+        let mut total = [0.0; 3];
+        for &(room, local) in &self.copies[shared.copies.start as usize..shared.copies.end as usize] {
+            let f = &self.rooms[room as usize].block.f;
+            for a in 0..3 {
+                total[a] += f[a][local as usize];
+            }
+        }
+        if shared.contact != NONE
+            && let Some(contact) = &self.contact
+        {
+            for a in 0..3 {
+                total[a] += contact.f[a][shared.contact as usize];
+            }
+        }
+        total
+    }
+
+    fn set(&mut self, index: usize, of_exchange: bool, total: [f64; 3]) {
+        let shared = if of_exchange { &self.exchange[index] } else { &self.local[index] };
+        for &(room, local) in &self.copies[shared.copies.start as usize..shared.copies.end as usize] {
+            for a in 0..3 {
+                self.rooms[room as usize].block.f[a][local as usize] = total[a];
+            }
+        }
+        if shared.guest != NONE {
+            for a in 0..3 {
+                self.guests.f[a][shared.guest as usize] = total[a];
+            }
+        }
+    }
+
+    /// Puts the total forces in place, integrates all nodes from `x_n` to `x_{n+1}` and gives the vote of the cycle.
+    ///
+    /// # Errors
+    /// If `totals` has not three numbers for each node of the exchange.
+    pub fn integrate(&mut self, totals: &[f64], dt_previous: f64, dt: f64, meter: &dyn Meter) -> Result<Vote, String> {
+        if totals.len() != 3 * self.exchange.len() {
+            return Err(format!("{} numbers of total forces for {} shared nodes, expected 3 each", totals.len(), self.exchange.len()));
+        }
+        let mark = meter.start();
+        for (i, total) in totals.chunks_exact(3).enumerate() {
+            self.set(i, true, [total[0], total[1], total[2]]);
+        }
+        for i in 0..self.local.len() {
+            let total = self.sum(&self.local[i]);
+            self.set(i, false, total);
+        }
+        meter.stop(mark, false);
+        let advance = Advance {
+            dt_previous,
+            dt,
+            constraints: &self.setup.constraints,
+            walls: &self.setup.walls,
+            quanta: self.quanta,
+        };
+        each(&mut self.rooms, |room| {
+            let mark = meter.start();
+            let block = &mut room.block;
+            room.sums = advance.run(&mut Nodes {
+                x: &mut block.x,
+                v: &mut block.v,
+                f: &block.f,
+                mass: &block.mass,
+                constraint: &block.constraint,
+                booked: &room.booked,
+            });
+            room.extent = Extent::empty();
+            room.speed_squared = 0.0;
+            for (&i, from) in room.surface.iter().zip(&room.reference) {
+                let i = i as usize;
+                room.extent.include(std::array::from_fn(|a| block.x[a][i] - from[a]));
+                room.speed_squared = room.speed_squared.max(speed_squared(&block.v, i));
+            }
+            meter.stop(mark, false);
+        });
+        advance.run(&mut Nodes {
+            x: &mut self.guests.x,
+            v: &mut self.guests.v,
+            f: &self.guests.f,
+            mass: &self.guests.mass,
+            constraint: &self.guests.constraint,
+            booked: &self.guests.booked,
+        });
+        Ok(self.finish_vote())
+    }
+
+    fn finish_vote(&mut self) -> Vote {
+        let mut vote = std::mem::replace(&mut self.vote, Vote::empty(self.n_parts));
+        for room in &self.rooms {
+            let part = room.block.part as usize;
+            vote.add_elements(part, &room.vote);
+            vote.parts[part].kinetic += room.sums.kinetic;
+            vote.external += room.sums.external;
+            for a in 0..3 {
+                vote.momentum[a] += room.sums.momentum[a];
+            }
+            vote.extents[part].merge(&room.extent);
+            vote.contact_speed_squared = vote.contact_speed_squared.max(room.speed_squared);
+        }
+        for &(gauge, room, local) in &self.gauges {
+            let (block, i) = (&self.rooms[room as usize].block, local as usize);
+            let values = [block.x[0][i], block.x[1][i], block.x[2][i], block.v[0][i], block.v[1][i], block.v[2][i]];
+            vote.gauges.push((gauge, values));
+        }
+        vote
+    }
+
+    /// The state of all blocks, to be put back into a global state.
+    pub fn pieces(&self) -> Vec<Piece> {
+        self.rooms.iter().map(|room| room.block.piece()).collect()
+    }
+}
+
+/// Runs `work` on each room, in parallel on the current pool when there are several.
+fn each(rooms: &mut [Room], work: impl Fn(&mut Room) + Sync) {
+    match rooms {
+        [one] => work(one),
+        many => many.par_iter_mut().with_max_len(1).for_each(work),
+    }
+}
+
+fn positions(block: &Block, local: &[u32]) -> Vec<[f64; 3]> {
+    local.iter().map(|&i| std::array::from_fn(|a| block.x[a][i as usize])).collect()
+}
+
+fn speed_squared(v: &[Vec<f64>; 3], i: usize) -> f64 {
+    v[0][i] * v[0][i] + v[1][i] * v[1][i] + v[2][i] * v[2][i]
+}
+
+fn pack(rooms: &[Room], guests: &Guests, sources: &[(u32, u32)], x: &mut [Vec<f64>; 3], v: &mut [Vec<f64>; 3]) {
+    for (i, &(room, local)) in sources.iter().enumerate() {
+        let local = local as usize;
+        let (from_x, from_v) = match room {
+            NONE => (&guests.x, &guests.v),
+            room => (&rooms[room as usize].block.x, &rooms[room as usize].block.v),
+        };
+        for a in 0..3 {
+            x[a][i] = from_x[a][local];
+            v[a][i] = from_v[a][local];
+        }
+    }
+}

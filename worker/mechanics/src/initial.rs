@@ -1,0 +1,138 @@
+//! The state a run starts from: masses by eighths of element masses, stress-free elements at rest volume.
+
+use crate::{
+    exact::Quantum,
+    mesh::Mesh,
+    setup::{Constraint, MAX_WALLS, Setup},
+    state::{GlobalState, N_FIELDS, field},
+    vote::Quanta,
+    volume,
+};
+
+/// The state at time zero.
+///
+/// Nodal masses are exact sums of rounded eighths, so that the order of elements and the joins do not matter.
+///
+/// # Errors
+/// Names the first element without a positive volume.
+pub fn state(mesh: &Mesh, setup: &Setup, velocity: &[[f64; 3]], constraint: &[u16]) -> Result<GlobalState, String> {
+    let n_elements = mesh.n_elements();
+    let mut state = GlobalState {
+        cycle: 0,
+        time: 0.0,
+        x: mesh.positions.clone(),
+        v: velocity.to_vec(),
+        mass: vec![0.0; mesh.n_nodes()],
+        constraint: constraint.to_vec(),
+        initial_volume: Vec::with_capacity(n_elements),
+        elements: std::array::from_fn(|_: usize| vec![0.0; n_elements]),
+    };
+    let mut mass_of = Vec::with_capacity(n_elements);
+    for part in &mesh.parts {
+        let material = &setup.materials[part.material as usize];
+        for e in 0..part.n_elements() {
+            let v = volume::hexahedron(&part.corners(e).map(|n| mesh.positions[n as usize]));
+            if v <= 0.0 || !v.is_finite() {
+                return Err(format!("element {} of part `{}`: volume {v:e}, must be positive", part.element_ids[e], part.name));
+            }
+            let index = state.initial_volume.len();
+            state.initial_volume.push(v);
+            state.elements[field::TEMPERATURE][index] = material.initial_temperature();
+            state.elements[field::RELATIVE_VOLUME][index] = 1.0;
+            mass_of.push(material.density * v);
+        }
+    }
+    debug_assert_eq!(state.elements.len(), N_FIELDS);
+    let heaviest = mass_of.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let quantum = Quantum::for_reference(heaviest, 46);
+    let mut index = 0;
+    for part in &mesh.parts {
+        for e in 0..part.n_elements() {
+            let eighth = quantum.round(mass_of[index] * 0.125);
+            for n in part.corners(e) {
+                state.mass[n as usize] += eighth;
+            }
+            index += 1;
+        }
+    }
+    Ok(state)
+}
+
+/// The quanta of a run's sums, from the deck's data alone.
+///
+/// Force: `F_ref = A max(K + 4G/3, rho v^2)` with A the largest initial face, 42 bits. Energy: the initial kinetic
+/// energy plus a thousandth of the bulk modulus over the whole volume, 46 bits. Momentum: all mass at the greatest
+/// initial or prescribed speed, or a thousandth of the fastest sound, 50 bits.
+pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
+    let speed2 = state.v.iter().map(|v| v.iter().map(|c| c * c).sum::<f64>()).fold(0.0, f64::max);
+    let prescribed2 = setup
+        .constraints
+        .iter()
+        .map(|c| c.velocity.iter().map(|v| v.map_or(0.0, |v| v * v)).sum::<f64>())
+        .fold(0.0, f64::max);
+    let top_speed2 = speed2.max(prescribed2);
+    let (mut force, mut stored, mut sound) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut index = 0;
+    for part in &mesh.parts {
+        let material = &setup.materials[part.material as usize];
+        let modulus = material.bulk() + 4.0 / 3.0 * material.shear();
+        sound = sound.max((modulus / material.density).sqrt());
+        let strength = modulus.max(material.density * top_speed2);
+        for e in 0..part.n_elements() {
+            let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+            force = force.max(largest_face(&x) * strength);
+            stored += 1e-3 * material.bulk() * state.initial_volume[index];
+            index += 1;
+        }
+    }
+    let kinetic: f64 =
+        state.v.iter().zip(&state.mass).map(|(v, m)| 0.5 * m * v.iter().map(|c| c * c).sum::<f64>()).sum();
+    let total_mass: f64 = state.mass.iter().sum();
+    Quanta {
+        force: Quantum::for_reference(force, 42),
+        energy: Quantum::for_reference(kinetic + stored, 46),
+        momentum: Quantum::for_reference(total_mass * top_speed2.sqrt().max(1e-3 * sound), 50),
+    }
+}
+
+/// Area of the largest face of a hexahedron.
+fn largest_face(x: &[[f64; 3]; 8]) -> f64 {
+    use nalgebra::Vector3;
+    crate::mesh::FACES
+        .iter()
+        .map(|f| {
+            let p = f.map(|c| Vector3::from(x[c]));
+            0.5 * (p[2] - p[0]).cross(&(p[3] - p[1])).norm()
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Gives each node of a part that feels a wall a constraint that says so.
+///
+/// # Errors
+/// If there are more than [`MAX_WALLS`] walls or more kinds of constraint than an index can tell apart.
+pub fn bind_walls(mesh: &Mesh, setup: &mut Setup, constraint: &mut [u16]) -> Result<(), String> {
+    if setup.walls.len() > MAX_WALLS {
+        return Err(format!("{} rigid walls, at most {MAX_WALLS} fit a run; join some", setup.walls.len()));
+    }
+    let mut mask = vec![0_u32; mesh.n_nodes()];
+    for (w, wall) in setup.walls.iter().enumerate() {
+        for (part, _) in mesh.parts.iter().zip(&wall.parts).filter(|(_, feels)| **feels) {
+            for &n in &part.nodes {
+                mask[n as usize] |= 1 << w;
+            }
+        }
+    }
+    let mut index_of = std::collections::BTreeMap::new();
+    for (n, &walls) in mask.iter().enumerate().filter(|(_, walls)| **walls != 0) {
+        let held = constraint[n];
+        let next = setup.constraints.len();
+        let index = *index_of.entry((held, walls)).or_insert(next);
+        if index == next {
+            let velocity = setup.constraints[held as usize].velocity;
+            setup.constraints.push(Constraint { velocity, walls });
+        }
+        constraint[n] = u16::try_from(index).map_err(|_| "more than 65,535 kinds of constraint".to_owned())?;
+    }
+    Ok(())
+}

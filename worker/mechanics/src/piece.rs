@@ -1,0 +1,157 @@
+//! Pieces: what part of a mesh a sub-domain holds, cut out of the global state and put back into it.
+//!
+//! A piece is the state image of a sub-domain: it travels, is stored, and is enough to restart that
+//! sub-domain anywhere.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    block::Piece,
+    mesh::{Mesh, Topology},
+    state::{GlobalState, N_FIELDS},
+};
+
+/// Which elements of a part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Region {
+    /// Elements `low <= (i, j, k) < high` of a structured part.
+    Cells {
+        /// First element along I, J, K.
+        low: [u32; 3],
+        /// One past the last.
+        high: [u32; 3],
+    },
+    /// Elements of an explicit part by their number within the part, ascending.
+    List(Vec<u32>),
+}
+
+impl Region {
+    /// Number of elements.
+    pub fn n_elements(&self) -> usize {
+        match self {
+            Self::Cells { low, high } => (0..3).map(|a| (high[a] - low[a]) as usize).product(),
+            Self::List(elements) => elements.len(),
+        }
+    }
+
+    /// Cuts into `n` regions of nearly equal size (fewer when it is too small), for the threads of a worker:
+    /// structured along the slowest index that is long enough, lists in their order.
+    pub fn split(&self, n: usize) -> Vec<Self> {
+        match self {
+            Self::Cells { low, high } => {
+                let axis = if (high[2] - low[2]) as usize >= n {
+                    2
+                } else {
+                    (0..3).max_by_key(|&a| (high[a] - low[a], a)).unwrap_or(2)
+                };
+                let length = (high[axis] - low[axis]) as usize;
+                let n = n.clamp(1, length.max(1));
+                (0..n)
+                    .map(|i| {
+                        let (mut l, mut h) = (*low, *high);
+                        l[axis] = low[axis] + (length * i / n) as u32;
+                        h[axis] = low[axis] + (length * (i + 1) / n) as u32;
+                        Self::Cells { low: l, high: h }
+                    })
+                    .collect()
+            }
+            Self::List(elements) => {
+                let n = n.clamp(1, elements.len().max(1));
+                (0..n)
+                    .map(|i| Self::List(elements[elements.len() * i / n..elements.len() * (i + 1) / n].to_vec()))
+                    .collect()
+            }
+        }
+    }
+}
+
+/// Cuts the piece of `region` of part `part` out of the global state.
+///
+/// # Panics
+/// If the region does not fit the part's topology: a fault of the caller, not of any input.
+pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Piece {
+    let offset = mesh.element_offsets()[part];
+    let mesh_part = &mesh.parts[part];
+    let (topology, local_nodes, local_elements) = match (&mesh_part.topology, region) {
+        (Topology::Structured { cells }, Region::Cells { low, high }) => {
+            let row = cells[0] + 1;
+            let plane = row * (cells[1] + 1);
+            let mut nodes = Vec::new();
+            for k in low[2]..=high[2] {
+                for j in low[1]..=high[1] {
+                    nodes.extend((low[0]..=high[0]).map(|i| i + j * row + k * plane));
+                }
+            }
+            let mut elements = Vec::new();
+            for k in low[2]..high[2] {
+                for j in low[1]..high[1] {
+                    elements.extend((low[0]..high[0]).map(|i| i + (j + k * cells[1]) * cells[0]));
+                }
+            }
+            (Topology::Structured { cells: std::array::from_fn(|a| high[a] - low[a]) }, nodes, elements)
+        }
+        (Topology::Explicit { hexahedra }, Region::List(list)) => {
+            // Local nodes are numbered by first use, which keeps an element's corners close together.
+            let mut local_of = std::collections::BTreeMap::new();
+            let mut nodes = Vec::new();
+            let corners = list
+                .iter()
+                .map(|&e| {
+                    hexahedra[e as usize].map(|n| {
+                        *local_of.entry(n).or_insert_with(|| {
+                            nodes.push(n);
+                            (nodes.len() - 1) as u32
+                        })
+                    })
+                })
+                .collect();
+            (Topology::Explicit { hexahedra: corners }, nodes, list.clone())
+        }
+        (topology, region) => panic!("region {region:?} does not fit part `{}` ({topology:?})", mesh_part.name),
+    };
+    let nodes: Vec<u32> = local_nodes.iter().map(|&n| mesh_part.nodes[n as usize]).collect();
+    let elements: Vec<u32> = local_elements.iter().map(|&e| e + offset as u32).collect();
+    Piece {
+        part: part as u32,
+        material: mesh_part.material,
+        topology,
+        x: nodes.iter().map(|&n| state.x[n as usize]).collect(),
+        v: nodes.iter().map(|&n| state.v[n as usize]).collect(),
+        mass: nodes.iter().map(|&n| state.mass[n as usize]).collect(),
+        constraint: nodes.iter().map(|&n| state.constraint[n as usize]).collect(),
+        initial_volume: elements.iter().map(|&e| state.initial_volume[e as usize]).collect(),
+        fields: std::array::from_fn(|k: usize| elements.iter().map(|&e| state.elements[k][e as usize]).collect()),
+        nodes,
+        elements,
+    }
+}
+
+/// Writes what a cycle changes of a piece back into the global state.
+///
+/// # Errors
+/// If an index or a length of the piece does not fit the state; the state is then untouched.
+pub fn put_back(piece: &Piece, state: &mut GlobalState) -> Result<(), String> {
+    let (n_nodes, n_elements) = (state.x.len(), state.initial_volume.len());
+    let lengths_fit = piece.x.len() == piece.nodes.len()
+        && piece.v.len() == piece.nodes.len()
+        && (0..N_FIELDS).all(|k| piece.fields[k].len() == piece.elements.len());
+    if !lengths_fit {
+        return Err(format!("image of part {}: array lengths do not fit its {} nodes and {} elements", piece.part, piece.nodes.len(), piece.elements.len()));
+    }
+    if let Some(n) = piece.nodes.iter().find(|&&n| n as usize >= n_nodes) {
+        return Err(format!("image of part {}: node index {n}, the problem has {n_nodes} nodes", piece.part));
+    }
+    if let Some(e) = piece.elements.iter().find(|&&e| e as usize >= n_elements) {
+        return Err(format!("image of part {}: element index {e}, the problem has {n_elements} elements", piece.part));
+    }
+    for (i, &n) in piece.nodes.iter().enumerate() {
+        state.x[n as usize] = piece.x[i];
+        state.v[n as usize] = piece.v[i];
+    }
+    for (k, values) in piece.fields.iter().enumerate() {
+        for (&e, &value) in piece.elements.iter().zip(values) {
+            state.elements[k][e as usize] = value;
+        }
+    }
+    Ok(())
+}

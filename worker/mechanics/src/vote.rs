@@ -1,0 +1,169 @@
+//! What a worker reports of a whole cycle: minima, maxima and exact sums, merged in any order.
+//!
+//! A vote of cycle `n` travels with the frame of cycle `n + 1` and takes effect a fixed lag later, on one
+//! worker as on sixteen. Nothing here depends on how elements and nodes were dealt to workers.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{block::ElementVote, contact::reach::Extent, contact::ContactVote};
+
+/// The vote of one cycle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Vote {
+    /// Least true Courant limit of all elements (time), at the positions of the cycle.
+    pub courant: f64,
+    /// Global index of the element that has it; the lowest of equals.
+    pub courant_element: u32,
+    /// Least `0.1 / |rate of volume|` (time).
+    pub volume_limit: f64,
+    /// Least limit from the stiffness of contacts (time).
+    pub contact_limit: f64,
+    /// Greatest squared speed of a contact node after integration.
+    pub contact_speed_squared: f64,
+    /// Bound on every force term of the cycle.
+    pub force_bound: f64,
+    /// Deepest contact in gaps.
+    pub worst_depth: f64,
+    /// Global node index and surface face index of the deepest contact.
+    pub worst_pair: (u32, u32),
+    /// Node-face pairs tested.
+    pub pairs: u64,
+    /// Contacts in force.
+    pub hits: u64,
+    /// Energy stored in contacts.
+    pub contact: f64,
+    /// Energy lost to friction in this cycle.
+    pub friction: f64,
+    /// Work of prescribed velocities and walls in this cycle.
+    pub external: f64,
+    /// Momentum of all nodes, `m v_{n+1/2}`.
+    pub momentum: [f64; 3],
+    /// Energies by part.
+    pub parts: Vec<PartVote>,
+    /// Displacement extents of surface nodes since the sorted positions, by part.
+    pub extents: Vec<Extent>,
+    /// Position and velocity of gauge nodes: gauge index, then x, y, z, vx, vy, vz.
+    pub gauges: Vec<(u32, [f64; 6])>,
+    /// The first element that went wrong, if any: global index and its volume.
+    pub fault: Option<(u32, f64)>,
+}
+
+/// Energies of one part in one cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PartVote {
+    /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`: the kinetic energy that central differences conserve.
+    pub kinetic: f64,
+    /// Internal energy of the elements.
+    pub internal: f64,
+    /// Hourglass work of this cycle.
+    pub hourglass: f64,
+    /// Work of artificial viscosity in this cycle (part of `internal`).
+    pub viscosity: f64,
+}
+
+impl Vote {
+    /// The vote of a worker that holds nothing.
+    pub fn empty(n_parts: usize) -> Self {
+        Self {
+            courant: f64::INFINITY,
+            courant_element: u32::MAX,
+            volume_limit: f64::INFINITY,
+            contact_limit: f64::INFINITY,
+            contact_speed_squared: 0.0,
+            force_bound: 0.0,
+            worst_depth: 0.0,
+            worst_pair: (u32::MAX, u32::MAX),
+            pairs: 0,
+            hits: 0,
+            contact: 0.0,
+            friction: 0.0,
+            external: 0.0,
+            momentum: [0.0; 3],
+            parts: vec![PartVote::default(); n_parts],
+            extents: vec![Extent::empty(); n_parts],
+            gauges: Vec::new(),
+            fault: None,
+        }
+    }
+
+    /// Joins the vote of other elements and nodes of the same cycle; the order of merging is no matter.
+    pub fn merge(&mut self, other: &Self) {
+        if (other.courant, other.courant_element) < (self.courant, self.courant_element) {
+            (self.courant, self.courant_element) = (other.courant, other.courant_element);
+        }
+        self.volume_limit = self.volume_limit.min(other.volume_limit);
+        self.contact_limit = self.contact_limit.min(other.contact_limit);
+        self.contact_speed_squared = self.contact_speed_squared.max(other.contact_speed_squared);
+        self.force_bound = self.force_bound.max(other.force_bound);
+        self.deepest(other.worst_depth, other.worst_pair);
+        self.pairs += other.pairs;
+        self.hits += other.hits;
+        self.contact += other.contact;
+        self.friction += other.friction;
+        self.external += other.external;
+        for axis in 0..3 {
+            self.momentum[axis] += other.momentum[axis];
+        }
+        for (mine, theirs) in self.parts.iter_mut().zip(&other.parts) {
+            mine.kinetic += theirs.kinetic;
+            mine.internal += theirs.internal;
+            mine.hourglass += theirs.hourglass;
+            mine.viscosity += theirs.viscosity;
+        }
+        for (mine, theirs) in self.extents.iter_mut().zip(&other.extents) {
+            mine.merge(theirs);
+        }
+        self.gauges.extend_from_slice(&other.gauges);
+        self.gauges.sort_by_key(|g| g.0);
+        self.note_fault(other.fault);
+    }
+
+    /// Joins what the elements of one block of part `part` said.
+    pub fn add_elements(&mut self, part: usize, vote: &ElementVote) {
+        if (vote.courant, vote.courant_element) < (self.courant, self.courant_element) {
+            (self.courant, self.courant_element) = (vote.courant, vote.courant_element);
+        }
+        self.volume_limit = self.volume_limit.min(vote.volume_limit);
+        self.force_bound = self.force_bound.max(vote.force_bound);
+        self.parts[part].internal += vote.internal;
+        self.parts[part].hourglass += vote.hourglass;
+        self.parts[part].viscosity += vote.viscosity;
+        self.note_fault(vote.fault.as_ref().map(|f| (f.element, f.volume)));
+    }
+
+    /// Joins what the contacts of a worker said.
+    pub fn add_contact(&mut self, vote: &ContactVote) {
+        self.contact_limit = self.contact_limit.min(vote.dt);
+        self.force_bound = self.force_bound.max(vote.force_bound);
+        self.deepest(vote.worst_depth, vote.worst_pair);
+        self.pairs += vote.pairs;
+        self.hits += vote.hits;
+        self.contact += vote.energy;
+        self.friction += vote.friction;
+    }
+
+    fn deepest(&mut self, depth: f64, pair: (u32, u32)) {
+        if depth > self.worst_depth || (depth == self.worst_depth && pair < self.worst_pair) {
+            (self.worst_depth, self.worst_pair) = (depth, pair);
+        }
+    }
+
+    fn note_fault(&mut self, fault: Option<(u32, f64)>) {
+        if let Some(new) = fault
+            && self.fault.is_none_or(|old| new.0 < old.0)
+        {
+            self.fault = Some(new);
+        }
+    }
+}
+
+/// The quanta of a run's sums.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quanta {
+    /// Forces; may be made coarser by an order.
+    pub force: crate::exact::Quantum,
+    /// Energies.
+    pub energy: crate::exact::Quantum,
+    /// Momenta.
+    pub momentum: crate::exact::Quantum,
+}

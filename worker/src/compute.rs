@@ -1,0 +1,135 @@
+//! Does what a session asks: the domain, the lanes, the clock of compute threads.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use mechanics::{
+    cycle::{Domain, Meter, Sets},
+    lanes::Width,
+};
+use protocol::message::{Assign, Work};
+
+use crate::session::{Outcome, Task};
+
+/// Counts thread-CPU time of compute threads (ns).
+#[derive(Debug, Default)]
+pub struct ThreadClock {
+    all: AtomicU64,
+    contact: AtomicU64,
+}
+
+impl Meter for ThreadClock {
+    fn start(&self) -> u64 {
+        thread_cpu_ns()
+    }
+
+    fn stop(&self, mark: u64, contact: bool) {
+        let used = thread_cpu_ns().saturating_sub(mark);
+        self.all.fetch_add(used, Ordering::Relaxed);
+        if contact {
+            self.contact.fetch_add(used, Ordering::Relaxed);
+        }
+    }
+}
+
+impl ThreadClock {
+    /// What has been counted so far.
+    pub fn work(&self) -> Work {
+        Work { compute_ns: self.all.load(Ordering::Relaxed), contact_ns: self.contact.load(Ordering::Relaxed) }
+    }
+}
+
+fn thread_cpu_ns() -> u64 {
+    let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
+}
+
+/// A worker's domain and clock. `run` is called by one thread at a time; blocks spread over the current rayon pool.
+#[derive(Default)]
+pub struct Machine {
+    domain: Option<Domain>,
+    clock: ThreadClock,
+}
+
+impl Machine {
+    /// Without a job.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Drops the domain.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Does one task. Failures are outcomes.
+    pub fn run(&mut self, task: Task) -> Outcome {
+        self.try_run(task).unwrap_or_else(Outcome::Failed)
+    }
+
+    fn try_run(&mut self, task: Task) -> Result<Outcome, String> {
+        if let Task::Load { assign, prepare } = task {
+            return self.load(*assign, prepare);
+        }
+        let clock = &self.clock;
+        let domain = self.domain.as_mut().ok_or("a task without an assignment")?;
+        Ok(match task {
+            Task::Load { .. } => return Err("a second assignment".to_owned()),
+            Task::Transfer { nodes } => Outcome::Transferred(domain.transfer(&nodes)?),
+            Task::Elements { dt_previous, quantum } => {
+                domain.set_force_quantum(quantum);
+                domain.elements(Sets::All, dt_previous, clock);
+                Outcome::Computed
+            }
+            Task::Install { plan, guest_state, dt_previous, gather } => {
+                let gathered = if gather { domain.gather() } else { Vec::new() };
+                let mark = clock.start();
+                domain.install(&plan, &guest_state)?;
+                clock.stop(mark, true);
+                domain.contact(dt_previous, clock);
+                Outcome::Forces { partials: domain.partials(clock), gathered }
+            }
+            Task::Border { dt_previous, quantum, gather } => {
+                let gathered = if gather { domain.gather() } else { Vec::new() };
+                domain.set_force_quantum(quantum);
+                domain.contact(dt_previous, clock);
+                domain.elements(Sets::Border, dt_previous, clock);
+                Outcome::Forces { partials: domain.partials(clock), gathered }
+            }
+            Task::Interior { dt_previous } => {
+                domain.elements(Sets::Interior, dt_previous, clock);
+                Outcome::Computed
+            }
+            Task::Integrate { totals, dt_previous, dt } => {
+                Outcome::Integrated(Box::new(domain.integrate(&totals, dt_previous, dt, clock)?))
+            }
+            Task::Image => Outcome::Image { pieces: domain.pieces(), work: clock.work() },
+        })
+    }
+
+    fn load(&mut self, assign: Assign, prepare: bool) -> Result<Outcome, String> {
+        let width = match &assign.lanes {
+            Some(name) => {
+                let width: Width = name.parse().map_err(|e| format!("{e}"))?;
+                if !width.available() {
+                    return Err(format!("lanes {width}: this machine lacks them; it has {}", Width::best()));
+                }
+                width
+            }
+            None => Width::best(),
+        };
+        let mut domain = Domain::new(
+            assign.setup,
+            assign.n_parts as usize,
+            assign.quanta,
+            &assign.subdomains,
+            &assign.gauges,
+            width,
+        );
+        drop(assign.subdomains);
+        domain.install(&assign.plan, &assign.guest_state)?;
+        let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
+        self.clock = ThreadClock::default();
+        self.domain = Some(domain);
+        Ok(Outcome::Loaded { vote, lanes: width.to_string() })
+    }
+}

@@ -1,0 +1,416 @@
+//! The worker's session: a pure state machine, `apply(event) -> actions`.
+//!
+//! It knows no socket, clock or thread. Computation is an action whose outcome comes back as an event; at most one
+//! is under way. The steps of a cycle, in order: images if ordered; at a plan boundary transfer, all elements, install;
+//! else contact and border; send; interior; totals; integrate.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use mechanics::{
+    block::Piece,
+    cycle::Plan,
+    exact::Quantum,
+    vote::Vote,
+};
+use protocol::message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToWorker, Work};
+
+/// What happens to a session.
+#[derive(Debug)]
+pub enum Event {
+    /// A message from the master, in the order it was sent.
+    Message(ToWorker),
+    /// A task is done.
+    Done(Outcome),
+}
+
+/// What a session wants done.
+#[derive(Debug)]
+pub enum Action {
+    /// Send to the master.
+    Send(ToMaster),
+    /// Compute; exactly one [`Event::Done`] answers it.
+    Compute(Task),
+    /// The job is over: drop the domain.
+    Forget,
+}
+
+/// Work on the domain.
+#[derive(Debug)]
+pub enum Task {
+    /// Build the domain and install the first plan; `prepare` asks for the vote of a preparing pass.
+    Load { assign: Box<Assign>, prepare: bool },
+    /// State of these nodes for other workers.
+    Transfer { nodes: Vec<u32> },
+    /// All element sets at `x_n`, before a new plan is in force.
+    Elements { dt_previous: f64, quantum: Quantum },
+    /// Install a plan; contact; partial forces. Gather positions first if asked.
+    Install { plan: Box<Plan>, guest_state: Vec<f64>, dt_previous: f64, gather: bool },
+    /// Contact, border elements, partial forces. Gather positions first if asked.
+    Border { dt_previous: f64, quantum: Quantum, gather: bool },
+    /// Interior elements.
+    Interior { dt_previous: f64 },
+    /// Totals in place, integrate.
+    Integrate { totals: Vec<f64>, dt_previous: f64, dt: f64 },
+    /// State of all sub-domains.
+    Image,
+}
+
+/// What came of a task.
+#[derive(Debug)]
+pub enum Outcome {
+    /// Of `Load`.
+    Loaded { vote: Option<Box<Vote>>, lanes: String },
+    /// Of `Transfer`.
+    Transferred(Vec<f64>),
+    /// Of `Elements` and `Interior`.
+    Computed,
+    /// Of `Install` and `Border`.
+    Forces { partials: Vec<f64>, gathered: Vec<f64> },
+    /// Of `Integrate`.
+    Integrated(Box<Vote>),
+    /// Of `Image`.
+    Image { pieces: Vec<Piece>, work: Work },
+    /// The task failed: a sentence for the user.
+    Failed(String),
+}
+
+/// Where a session stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// No job.
+    Idle,
+    /// Building the domain.
+    Loading,
+    /// Waiting for `Start`.
+    Ready,
+    /// Computing images at the start of the cycle; more of the cycle follows unless it is the last.
+    Imaging,
+    /// At a plan boundary: packing the transfer.
+    Packing,
+    /// At a plan boundary: all elements.
+    Elements,
+    /// At a plan boundary: waiting for the plan or the guests.
+    AwaitGuests,
+    /// Contact and border, or install and contact.
+    Border,
+    /// Interior elements.
+    Interior,
+    /// Waiting for totals or orders.
+    AwaitTotals,
+    /// Integrating.
+    Integrating,
+    /// Failed or finished; only `Release` or `Assign` is heard.
+    Over,
+}
+
+/// Most cycles whose totals may wait here.
+const MAX_BUFFERED: usize = 2;
+
+/// The state of a worker's part in one job.
+#[derive(Debug)]
+pub struct Session {
+    phase: Phase,
+    cycle: u64,
+    first_cycle: u64,
+    sort_lag: u64,
+    dt_previous: f64,
+    dt: f64,
+    quantum: Option<Quantum>,
+    /// Orders by the cycle whose step they give.
+    orders: BTreeMap<u64, Orders>,
+    totals: VecDeque<(u64, Vec<f64>)>,
+    /// Cycles at which plans act, from gatherings, and the plans that have come.
+    boundaries: VecDeque<u64>,
+    plans: VecDeque<(u64, u64, Box<Plan>)>,
+    guests: Option<(u64, Vec<f64>)>,
+    n_exchange: usize,
+    plan_hash: u64,
+    vote: Option<Box<Vote>>,
+    resumed: bool,
+    imaged: bool,
+    /// The interior was computed with the border: at a plan boundary.
+    whole: bool,
+}
+
+impl Default for Session {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Session {
+    /// A session without a job.
+    pub fn new() -> Self {
+        Self {
+            phase: Phase::Idle,
+            cycle: 0,
+            first_cycle: 0,
+            sort_lag: 0,
+            dt_previous: 0.0,
+            dt: 0.0,
+            quantum: None,
+            orders: BTreeMap::new(),
+            totals: VecDeque::new(),
+            boundaries: VecDeque::new(),
+            plans: VecDeque::new(),
+            guests: None,
+            n_exchange: 0,
+            plan_hash: 0,
+            vote: None,
+            resumed: false,
+            imaged: false,
+            whole: false,
+        }
+    }
+
+    /// The cycle it is in.
+    pub fn cycle(&self) -> u64 {
+        self.cycle
+    }
+
+    /// Hash of the plan in force; every frame of a cycle carries it.
+    pub fn plan_hash(&self) -> u64 {
+        self.plan_hash
+    }
+
+    /// Takes an event, says what to do.
+    pub fn apply(&mut self, event: Event) -> Vec<Action> {
+        let mut actions = Vec::new();
+        if let Err(reason) = self.step(event, &mut actions) {
+            self.fail(reason, &mut actions);
+        }
+        actions
+    }
+
+    fn fail(&mut self, reason: String, actions: &mut Vec<Action>) {
+        self.phase = Phase::Over;
+        actions.push(Action::Send(ToMaster::Failed { cycle: self.cycle, reason }));
+    }
+
+    fn step(&mut self, event: Event, actions: &mut Vec<Action>) -> Result<(), String> {
+        match event {
+            Event::Message(message) => self.hear(message, actions),
+            Event::Done(Outcome::Failed(reason)) => Err(reason),
+            Event::Done(outcome) => self.done(outcome, actions),
+        }
+    }
+
+    fn hear(&mut self, message: ToWorker, actions: &mut Vec<Action>) -> Result<(), String> {
+        match message {
+            ToWorker::Release => {
+                *self = Self::new();
+                actions.push(Action::Forget);
+                Ok(())
+            }
+            ToWorker::Assign(assign) => match self.phase {
+                Phase::Idle | Phase::Over => {
+                    *self = Self::new();
+                    self.phase = Phase::Loading;
+                    self.cycle = assign.cycle;
+                    self.first_cycle = assign.cycle;
+                    self.dt_previous = assign.dt_previous;
+                    self.sort_lag = u64::from(assign.setup.control.sort_lag);
+                    self.quantum = Some(assign.quanta.force);
+                    self.n_exchange = assign.plan.exchange.len();
+                    self.plan_hash = assign.plan_hash;
+                    self.resumed = assign.cycle > 0;
+                    let prepare = !self.resumed;
+                    actions.push(Action::Compute(Task::Load { assign, prepare }));
+                    Ok(())
+                }
+                phase => Err(format!("an assignment while {phase:?}: a job is in hand")),
+            },
+            _ if self.phase == Phase::Over || self.phase == Phase::Idle => Ok(()),
+            ToWorker::Start { orders } => {
+                for order in orders {
+                    self.orders.insert(order.next, order);
+                }
+                match self.phase {
+                    Phase::Ready => self.begin_cycle(actions),
+                    phase => Err(format!("start while {phase:?}, expected Ready")),
+                }
+            }
+            ToWorker::Plan { acts_at, plan, hash } => {
+                if self.plans.len() as u64 > self.sort_lag + 1 {
+                    return Err(format!("plan for cycle {acts_at} while {} others wait", self.plans.len()));
+                }
+                self.plans.push_back((acts_at, hash, plan));
+                self.resume_waiting(actions)
+            }
+            ToWorker::Transfer { cycle, state } => {
+                self.guests = Some((cycle, state));
+                self.resume_waiting(actions)
+            }
+            ToWorker::Totals { cycle, orders, totals } => {
+                if self.totals.len() >= MAX_BUFFERED {
+                    return Err(format!("totals of cycle {cycle} while {} cycles wait, at most {MAX_BUFFERED}", self.totals.len()));
+                }
+                self.orders.insert(orders.next, orders);
+                if !totals.is_empty() {
+                    self.totals.push_back((cycle, totals));
+                }
+                self.resume_waiting(actions)
+            }
+        }
+    }
+
+    fn resume_waiting(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+        match self.phase {
+            Phase::AwaitGuests => self.try_boundary(actions),
+            Phase::AwaitTotals => self.try_integrate(actions),
+            _ => Ok(()),
+        }
+    }
+
+    fn done(&mut self, outcome: Outcome, actions: &mut Vec<Action>) -> Result<(), String> {
+        match (self.phase, outcome) {
+            (Phase::Over | Phase::Idle, _) => Ok(()),
+            (Phase::Loading, Outcome::Loaded { vote, lanes }) => {
+                self.phase = Phase::Ready;
+                actions.push(Action::Send(ToMaster::Ready { vote, lanes }));
+                Ok(())
+            }
+            (Phase::Imaging, Outcome::Image { pieces, work }) => {
+                let stop = self.flags()?.stop;
+                let last = if stop { Some(self.vote.take().unwrap_or_else(|| Box::new(Vote::empty(0)))) } else { None };
+                actions.push(Action::Send(ToMaster::Image { cycle: self.cycle, version: IMAGE_VERSION, pieces, last, work }));
+                if stop {
+                    self.phase = Phase::Over;
+                    return Ok(());
+                }
+                self.imaged = true;
+                self.begin_cycle(actions)
+            }
+            (Phase::Packing, Outcome::Transferred(state)) => {
+                if !state.is_empty() {
+                    actions.push(Action::Send(ToMaster::Transfer { cycle: self.cycle, state }));
+                }
+                self.phase = Phase::Elements;
+                let quantum = self.force_quantum()?;
+                actions.push(Action::Compute(Task::Elements { dt_previous: self.dt_previous, quantum }));
+                Ok(())
+            }
+            (Phase::Elements, Outcome::Computed) => {
+                self.phase = Phase::AwaitGuests;
+                self.whole = true;
+                self.try_boundary(actions)
+            }
+            (Phase::Border, Outcome::Forces { partials, gathered }) => {
+                let vote = self.vote.take();
+                actions.push(Action::Send(ToMaster::Cycle { cycle: self.cycle, vote, partials, gathered }));
+                if std::mem::take(&mut self.whole) {
+                    self.phase = Phase::AwaitTotals;
+                    return self.try_integrate(actions);
+                }
+                self.phase = Phase::Interior;
+                actions.push(Action::Compute(Task::Interior { dt_previous: self.dt_previous }));
+                Ok(())
+            }
+            (Phase::Interior, Outcome::Computed) => {
+                self.phase = Phase::AwaitTotals;
+                self.try_integrate(actions)
+            }
+            (Phase::Integrating, Outcome::Integrated(vote)) => {
+                self.vote = Some(vote);
+                self.dt_previous = self.dt;
+                self.cycle += 1;
+                self.imaged = false;
+                self.begin_cycle(actions)
+            }
+            (phase, outcome) => Err(format!("outcome {outcome:?} while {phase:?}")),
+        }
+    }
+
+    /// The orders whose flags act at the start of this cycle.
+    fn flags(&self) -> Result<Orders, String> {
+        let before = self.cycle.wrapping_sub(1);
+        self.orders.get(&before).copied().ok_or_else(|| format!("no orders for the start of cycle {}", self.cycle))
+    }
+
+    fn force_quantum(&mut self) -> Result<Quantum, String> {
+        let quantum = self.flags()?.force_quantum;
+        self.quantum = Some(quantum);
+        Ok(quantum)
+    }
+
+    fn begin_cycle(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+        let flags = self.flags()?;
+        while let Some(entry) = self.orders.first_entry()
+            && entry.key().wrapping_add(1) < self.cycle
+        {
+            entry.remove();
+        }
+        if (flags.stop || flags.collect) && !self.imaged {
+            self.phase = Phase::Imaging;
+            actions.push(Action::Compute(Task::Image));
+            return Ok(());
+        }
+        if flags.gather {
+            self.boundaries.push_back(self.cycle + self.sort_lag);
+        }
+        if self.boundaries.front() == Some(&self.cycle) {
+            self.phase = Phase::AwaitGuests;
+            self.whole = false;
+            return self.try_boundary(actions);
+        }
+        self.phase = Phase::Border;
+        let quantum = self.force_quantum()?;
+        actions.push(Action::Compute(Task::Border { dt_previous: self.dt_previous, quantum, gather: flags.gather }));
+        Ok(())
+    }
+
+    /// At a plan boundary: with the plan in hand the transfer and the elements go first, then, with the guests in hand,
+    /// the plan is installed.
+    fn try_boundary(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+        let Some((acts_at, _, plan)) = self.plans.front() else { return Ok(()) };
+        if *acts_at != self.cycle {
+            return Err(format!("the next plan acts at cycle {acts_at}, this is cycle {}", self.cycle));
+        }
+        if !self.whole {
+            self.phase = Phase::Packing;
+            actions.push(Action::Compute(Task::Transfer { nodes: plan.send.clone() }));
+            return Ok(());
+        }
+        let guest_state = match (&self.guests, plan.guests.is_empty()) {
+            (_, true) => Vec::new(),
+            (Some((cycle, _)), false) if *cycle == self.cycle => match self.guests.take() {
+                Some((_, state)) => state,
+                None => return Ok(()),
+            },
+            _ => return Ok(()),
+        };
+        let gather = self.flags()?.gather;
+        if let Some((_, hash, plan)) = self.plans.pop_front() {
+            self.boundaries.pop_front();
+            self.n_exchange = plan.exchange.len();
+            self.plan_hash = hash;
+            self.phase = Phase::Border;
+            actions.push(Action::Compute(Task::Install { plan, guest_state, dt_previous: self.dt_previous, gather }));
+        }
+        Ok(())
+    }
+
+    /// A worker that shares no node needs only the orders of the cycle before.
+    fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+        let Some(orders) = self.orders.get(&self.cycle).copied() else { return Ok(()) };
+        while self.totals.front().is_some_and(|(cycle, _)| *cycle < self.cycle) {
+            self.totals.pop_front();
+        }
+        let totals = if self.n_exchange == 0 {
+            Vec::new()
+        } else {
+            match self.totals.front() {
+                Some((cycle, _)) if *cycle == self.cycle => match self.totals.pop_front() {
+                    Some((_, totals)) => totals,
+                    None => return Ok(()),
+                },
+                Some((cycle, _)) => return Err(format!("totals of cycle {cycle} before those of cycle {}", self.cycle)),
+                None => return Ok(()),
+            }
+        };
+        self.dt = orders.dt;
+        self.phase = Phase::Integrating;
+        actions.push(Action::Compute(Task::Integrate { totals, dt_previous: self.dt_previous, dt: self.dt }));
+        Ok(())
+    }
+}
