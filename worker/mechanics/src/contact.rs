@@ -1,6 +1,43 @@
 //! The words of contact, and the order of its stages; nothing is computed here.
+//!
+//! A *surface* is the outer faces of the elements that are alive, and their nodes ([`surface`]). Every so
+//! often the surface is *sorted* into *work units* ([`sort`], [`work_unit`]): virtual cubes of which each
+//! holds the nodes inside it and every face those may meet before the next sort. When that next sort is due
+//! is a rule on displacements ([`reach`]). A worker gets a *batch* of units and each cycle
+//! ([`cycle`]):
+//! 1. takes the node-face pairs that can meet before the next sort ([`search`], once per batch);
+//! 2. drops those whose boxes are apart ([`search`]);
+//! 3. finds the closest point of each face to its node: the contact detection zone ([`zone`]);
+//! 4. reduces the hits of a node to distinct closest features with a side ([`joint`]);
+//! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
+//!
+//! Search, geometry (zone and joint) and force know nothing of each other; only [`cycle`] knows all three.
 
 use serde::{Deserialize, Serialize};
+
+pub mod cycle;
+pub mod force;
+pub mod joint;
+pub mod reach;
+pub mod search;
+pub mod sort;
+pub mod surface;
+pub mod work_unit;
+pub mod zone;
+
+pub use cycle::{Contact, initial_pairs};
+pub use force::ContactVote;
+pub use reach::Extent;
+pub use search::Exclusions;
+pub use sort::sort;
+pub use surface::{Face, Surface};
+pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
+
+/// Distance, in gaps, within which a pair votes on the time step although only those within one gap push.
+///
+/// Votes take effect some cycles late, and a node crosses at most a fifth of the gap in one: from here it
+/// needs five cycles to its first push.
+pub const WARNING: f64 = 2.0;
 
 /// Contact settings of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,4 +55,26 @@ pub struct Settings {
     /// Velocity over which friction is regularised (length per time): below it the force is proportional to
     /// the sliding velocity, so bodies creep instead of sticking.
     pub friction_velocity: f64,
+}
+
+impl Settings {
+    /// Number of parts: the side of the matrices.
+    pub fn n_parts(&self) -> usize {
+        self.interacts.len().isqrt()
+    }
+
+    /// Whether nodes of part `a` interact with faces of part `b`.
+    #[inline(always)]
+    pub fn permits(&self, a: u32, b: u32) -> bool {
+        self.interacts[a as usize * self.n_parts() + b as usize]
+    }
+
+    /// Reach of the sort (length): the zone of warning plus the slack.
+    ///
+    /// The paper's proximity test is the size of the detection zone plus the slack. Pairs between one gap and
+    /// [`WARNING`] gaps vote on the time step, so they must be on the lists as surely as those that push:
+    /// else the vote, and with it every bit, would depend on the cycle of the last sort.
+    pub fn reach(&self) -> f64 {
+        WARNING.mul_add(self.gap, self.slack)
+    }
 }

@@ -23,7 +23,10 @@ impl Quantum {
     pub fn for_reference(reference: f64, bits: i32) -> Self {
         assert!(reference.is_finite() && reference > 0.0, "reference magnitude {reference} must be positive");
         let exponent = ((reference.to_bits() >> 52) & 0x7ff) as i32 - 1022 - bits;
-        assert!((-1000..900).contains(&exponent), "quantum 2^{exponent} out of range for reference {reference}");
+        assert!(
+            (-1000..900).contains(&exponent),
+            "quantum 2^{exponent} out of range for reference {reference}"
+        );
         Self { q: power_of_two(exponent) }
     }
 

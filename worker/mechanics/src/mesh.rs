@@ -65,8 +65,17 @@ impl Part {
                 let row = ni + 1;
                 let plane = row * (nj + 1);
                 let n = i + j * row + k * plane;
-                [n, n + 1, n + 1 + row, n + row, n + plane, n + 1 + plane, n + 1 + row + plane, n + row + plane]
-                    .map(|local| self.nodes[local])
+                [
+                    n,
+                    n + 1,
+                    n + 1 + row,
+                    n + row,
+                    n + plane,
+                    n + 1 + plane,
+                    n + 1 + row + plane,
+                    n + row + plane,
+                ]
+                .map(|local| self.nodes[local])
             }
             Topology::Explicit { hexahedra } => hexahedra[e].map(|local| self.nodes[local as usize]),
         }

@@ -7,8 +7,16 @@ use serde::{Deserialize, Serialize};
 /// Deviatoric stress (zz is minus the sum of xx and yy), pressure, internal energy per initial volume,
 /// effective plastic strain, temperature, and current volume over initial volume.
 pub const FIELDS: [&str; 10] = [
-    "stress_xx", "stress_yy", "stress_xy", "stress_yz", "stress_zx", "pressure", "energy", "plastic_strain",
-    "temperature", "relative_volume",
+    "stress_xx",
+    "stress_yy",
+    "stress_xy",
+    "stress_yz",
+    "stress_zx",
+    "pressure",
+    "energy",
+    "plastic_strain",
+    "temperature",
+    "relative_volume",
 ];
 
 /// Number of element state fields.

@@ -1,0 +1,249 @@
+//! One cycle of contact: from the candidate list through the zone to forces.
+//!
+//! The only place that knows search, geometry and force. Gather: corners of faces to boxes; compute: near
+//! faces, hits, reactions; scatter: into the force arrays, in any order because all terms are exact.
+
+use super::{
+    ContactVote, Exclusions, Settings, WARNING, force,
+    joint::{self, Hit, Near},
+    search::{self, Bounds, Candidates},
+    sort::sort,
+    surface::Surface,
+    work_unit::Batch,
+    zone,
+};
+use crate::exact::Quantum;
+
+/// A pair at exactly one gap is outside the zone, rounding or not: only nearer ones by this fraction are
+/// inside it at time zero.
+const INSIDE: f64 = 1e-9;
+
+/// Pairs that interact and are inside the zone already: surface node, surface face, distance, by node then
+/// face. `x` by surface node. Pairs of one part are to be excluded ([`Exclusions`]); between parts the deck is
+/// at fault.
+pub fn initial_pairs(surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> Vec<(u32, u32, f64)> {
+    let mut pairs = Vec::new();
+    for unit in sort(surface, x, settings, &Exclusions::default()) {
+        for &f in &unit.faces {
+            let face = &surface.faces[f as usize];
+            let corners = face.nodes.map(|n| x[n as usize]);
+            let bounds = Bounds::of(&corners, settings.gap);
+            for &n in &unit.nodes {
+                let p = x[n as usize];
+                if bounds.holds(p)
+                    && settings.permits(surface.node_part[n as usize], face.part)
+                    && !face.own.contains(&n)
+                {
+                    let distance = zone::closest(&corners, p).distance;
+                    if distance < settings.gap * (1.0 - INSIDE) {
+                        pairs.push((n, f, distance));
+                    }
+                }
+            }
+        }
+    }
+    pairs.sort_unstable_by_key(|&(n, f, _)| (n, f));
+    pairs
+}
+
+/// A face that has candidates, as the cycle needs it.
+#[derive(Clone, Copy, Debug)]
+struct ActiveFace {
+    /// Batch nodes.
+    nodes: [u32; 4],
+    /// Global nodes of the same corners.
+    corners: [u32; 4],
+    id: u32,
+    part: u32,
+    stiffness: f64,
+}
+
+/// The contact of one batch, from one sort to the next.
+#[derive(Clone, Debug)]
+pub struct Contact {
+    settings: Settings,
+    n_parts: usize,
+    /// Pairs that can meet; `faces` are indices into `active`.
+    candidates: Candidates,
+    active: Vec<ActiveFace>,
+    /// By batch node.
+    global: Vec<u32>,
+    part: Vec<u32>,
+    stiffness: Vec<f64>,
+    inverse_mass: Vec<f64>,
+    /// Boxes of the active faces, and work space of one node.
+    bounds: Vec<Bounds>,
+    near: Vec<Near>,
+    hits: Vec<Hit>,
+}
+
+/// Arrays of one cycle, by batch node index.
+struct Cycle<'a> {
+    x: &'a [Vec<f64>; 3],
+    v: &'a [Vec<f64>; 3],
+    dt: f64,
+    force_quantum: Quantum,
+    energy_quantum: Quantum,
+    f: &'a mut [Vec<f64>; 3],
+}
+
+impl Contact {
+    /// Takes the pairs of a batch that can meet before the next sort. `x` by batch node, at any moment at
+    /// which no spread since the sort exceeds the slack.
+    ///
+    /// # Panics
+    /// If an index of the batch is out of range: a batch is made by [`Batch::gather`] or checked on arrival.
+    pub fn new(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3]) -> Self {
+        let mut candidates = search::candidates(batch, settings, x);
+        let mut index = vec![u32::MAX; batch.faces.len()];
+        for &f in &candidates.faces {
+            index[f as usize] = 0;
+        }
+        let mut active = Vec::new();
+        for (index, face) in index.iter_mut().zip(&batch.faces).filter(|(index, _)| **index == 0) {
+            *index = active.len() as u32;
+            active.push(ActiveFace {
+                nodes: face.nodes,
+                corners: face.nodes.map(|n| batch.nodes[n as usize].global),
+                id: face.id,
+                part: face.part,
+                stiffness: face.stiffness,
+            });
+        }
+        for f in &mut candidates.faces {
+            *f = index[*f as usize];
+        }
+        let most = candidates.starts.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0);
+        Self {
+            n_parts: settings.n_parts(),
+            settings: settings.clone(),
+            candidates,
+            bounds: Vec::with_capacity(active.len()),
+            active,
+            global: batch.nodes.iter().map(|n| n.global).collect(),
+            part: batch.nodes.iter().map(|n| n.part).collect(),
+            stiffness: batch.nodes.iter().map(|n| n.stiffness).collect(),
+            inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
+            near: Vec::with_capacity(most),
+            hits: Vec::with_capacity(most),
+        }
+    }
+
+    /// Number of node-face pairs on the candidate list.
+    pub fn n_pairs(&self) -> usize {
+        self.candidates.faces.len()
+    }
+
+    /// Adds the contact forces at positions `x` into `f`, and says what they mean for the cycle.
+    ///
+    /// `v` is the velocity of half a step ago and serves friction only. Arrays by batch node.
+    #[expect(clippy::too_many_arguments, reason = "the arrays of a cycle, as the worker holds them")]
+    pub fn forces(
+        &mut self,
+        x: &[Vec<f64>; 3],
+        v: &[Vec<f64>; 3],
+        dt: f64,
+        force_quantum: Quantum,
+        energy_quantum: Quantum,
+        f: &mut [Vec<f64>; 3],
+    ) -> ContactVote {
+        let cycle = Cycle { x, v, dt, force_quantum, energy_quantum, f };
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("fma") {
+            // SAFETY: the feature has just been detected.
+            return unsafe { self.forces_with_fma(cycle) };
+        }
+        self.forces_with(cycle)
+    }
+
+    /// [`Contact::forces_with`] compiled with fused multiply-add, which without it is a slow library call of
+    /// the same bits.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "fma")]
+    fn forces_with_fma(&mut self, cycle: Cycle) -> ContactVote {
+        self.forces_with(cycle)
+    }
+
+    #[inline(always)]
+    fn forces_with(&mut self, mut cycle: Cycle) -> ContactVote {
+        let at = |n: u32| cycle.x.each_ref().map(|x| x[n as usize]);
+        let warning = WARNING * self.settings.gap;
+        self.bounds.clear();
+        self.bounds.extend(self.active.iter().map(|face| Bounds::of(&face.nodes.map(at), warning)));
+        let mut vote = ContactVote { pairs: self.candidates.faces.len() as u64, ..ContactVote::default() };
+        for i in 0..self.candidates.nodes.len() {
+            let node = self.candidates.nodes[i];
+            let p = cycle.x.each_ref().map(|x| x[node as usize]);
+            self.near.clear();
+            let range = self.candidates.starts[i] as usize..self.candidates.starts[i + 1] as usize;
+            for &f in &self.candidates.faces[range] {
+                if self.bounds[f as usize].holds(p) {
+                    let face = &self.active[f as usize];
+                    let closest =
+                        zone::closest(&face.nodes.map(|n| cycle.x.each_ref().map(|x| x[n as usize])), p);
+                    if closest.distance < warning {
+                        self.near.push(Near { face: f, id: face.id, corners: face.corners, closest });
+                    }
+                }
+            }
+            if !self.near.is_empty() {
+                self.node(node, &mut cycle, &mut vote);
+            }
+        }
+        vote
+    }
+
+    /// Forces and votes of one node and its near faces.
+    #[inline(always)]
+    fn node(&mut self, node: u32, cycle: &mut Cycle, vote: &mut ContactVote) {
+        let n = node as usize;
+        joint::reduce(&mut self.near, self.settings.gap, &mut self.hits);
+        let stacking = joint::stacking(&self.hits);
+        for near in &self.near {
+            let face = &self.active[near.face as usize];
+            let k = force::stiffness(self.settings.stiffness, self.stiffness[n], face.stiffness);
+            let inverse_mass = self.pair_inverse_mass(n, face, &near.closest.weights);
+            let dt = force::time_step(k, stacking, inverse_mass);
+            vote.dt = if dt < vote.dt { dt } else { vote.dt };
+        }
+        for hit in &self.hits {
+            let near = &self.near[hit.near as usize];
+            let face = &self.active[near.face as usize];
+            vote.deepest(hit.depth / self.settings.gap, (self.global[n], face.id));
+            let k = force::stiffness(self.settings.stiffness, self.stiffness[n], face.stiffness);
+            let weights = near.closest.weights;
+            let push =
+                force::Push { stiffness: k * hit.share, depth: hit.depth, direction: hit.direction, weights };
+            let coefficient =
+                self.settings.friction[self.part[n] as usize * self.n_parts + face.part as usize];
+            let sliding = (coefficient > 0.0).then(|| force::Sliding {
+                coefficient,
+                regular: self.settings.friction_velocity,
+                velocity: [0, 1, 2].map(|a| {
+                    let v = &cycle.v[a];
+                    (0..4).fold(v[n], |sum, i| (-weights[i]).mul_add(v[face.nodes[i] as usize], sum))
+                }),
+                inverse_mass: self.pair_inverse_mass(n, face, &weights),
+                dt: cycle.dt,
+            });
+            let reaction = force::react(&push, sliding.as_ref(), cycle.force_quantum, cycle.energy_quantum);
+            vote.count(&reaction);
+            for a in 0..3 {
+                let f = &mut cycle.f[a];
+                f[n] += reaction.node[a];
+                for i in 0..4 {
+                    f[face.nodes[i] as usize] += reaction.corners[i][a];
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn pair_inverse_mass(&self, node: usize, face: &ActiveFace, weights: &[f64; 4]) -> f64 {
+        force::inverse_mass(
+            self.inverse_mass[node],
+            face.nodes.map(|n| self.inverse_mass[n as usize]),
+            weights,
+        )
+    }
+}

@@ -1,0 +1,189 @@
+//! What a hit does: penalty force, friction, time-step vote and energies of one node against one face.
+//!
+//! The force is `k depth` along the line of node and closest point, so it has no moment about either, and goes
+//! back to the face's corners by its shape functions. `k` comes from static data of the pair alone. All terms
+//! are multiples of a quantum, so they add in any order to the same bits; the node gets exactly minus what the
+//! corners get, so momentum is conserved to the bit.
+
+use serde::{Deserialize, Serialize};
+
+use crate::exact::Quantum;
+
+/// `omega dt` of a node between all its springs at most: the energy of a bounce is then right to 2.6 %.
+pub const OMEGA_DT: f64 = 0.4;
+
+/// Springs on a node for each of its own: while it pushes a face, the face's nodes push its own faces.
+const BOTH_SIDES: f64 = 2.0;
+
+/// A node in the zone of a face.
+#[derive(Clone, Copy, Debug)]
+pub struct Push {
+    /// Penalty stiffness, the share of the hit included (force per length).
+    pub stiffness: f64,
+    /// Depth in the zone (length).
+    pub depth: f64,
+    /// Unit vector of the force on the node.
+    pub direction: [f64; 3],
+    /// Shape functions of the face's corners at the closest point.
+    pub weights: [f64; 4],
+}
+
+/// Sliding of a node over a face.
+#[derive(Clone, Copy, Debug)]
+pub struct Sliding {
+    /// Coulomb coefficient, positive.
+    pub coefficient: f64,
+    /// Velocity over which friction is regularised.
+    pub regular: f64,
+    /// Velocity of the node against the closest point.
+    pub velocity: [f64; 3],
+    /// Inverse of the mass that the pair moves: `1/m + sum w_i^2/m_i`.
+    pub inverse_mass: f64,
+    /// Time step, over which work is done.
+    pub dt: f64,
+}
+
+/// Forces of one hit, and the energies to book.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reaction {
+    /// Force on each corner of the face, in multiples of the force quantum.
+    pub corners: [[f64; 3]; 4],
+    /// Force on the node: exactly minus the sum of the corners'.
+    pub node: [f64; 3],
+    /// Energy in the spring, `k depth^2 / 2`, in multiples of the energy quantum.
+    pub energy: f64,
+    /// Energy that friction takes out in this cycle, in multiples of the energy quantum.
+    pub friction: f64,
+}
+
+/// Penalty stiffness of a pair: factor times the harmonic mean of both sides (force per length).
+#[inline(always)]
+pub fn stiffness(factor: f64, node: f64, face: f64) -> f64 {
+    let sum = node + face;
+    if sum > 0.0 { factor * (2.0 * node * face / sum) } else { 0.0 }
+}
+
+/// Inverse of the mass that a pair moves: `1/m + sum w_i^2/m_i`, from inverse masses.
+#[inline(always)]
+pub fn inverse_mass(node: f64, corners: [f64; 4], weights: &[f64; 4]) -> f64 {
+    (0..4).fold(node, |sum, i| (weights[i] * weights[i]).mul_add(corners[i], sum))
+}
+
+/// Longest time step for `stacking` springs of this stiffness on one node: `0.4 / omega`.
+#[inline(always)]
+pub fn time_step(stiffness: f64, stacking: f64, inverse_mass: f64) -> f64 {
+    OMEGA_DT / (BOTH_SIDES * stacking * stiffness * inverse_mass).sqrt()
+}
+
+/// Force, energy and friction of one hit.
+///
+/// Friction is Coulomb's, regularised: `F_t = -mu F_n v_t / max(|v_t|, v_reg)`. It creeps instead of sticking.
+/// So that friction never turns sliding round within a step, `v_reg` is at least `2 mu F_n dt (1/m + ...)`. It
+/// acts at the closest point on the face and at the node, a moment of `F_t` times their distance.
+#[inline(always)]
+pub fn react(
+    push: &Push,
+    sliding: Option<&Sliding>,
+    force_quantum: Quantum,
+    energy_quantum: Quantum,
+) -> Reaction {
+    let normal = push.stiffness * push.depth;
+    let mut force = [0, 1, 2].map(|a| normal * push.direction[a]);
+    let mut friction = 0.0;
+    if let Some(s) = sliding {
+        let n = push.direction;
+        let across = n[2].mul_add(s.velocity[2], n[1].mul_add(s.velocity[1], n[0] * s.velocity[0]));
+        let v = [0, 1, 2].map(|a| (-across).mul_add(n[a], s.velocity[a]));
+        let speed2 = v[2].mul_add(v[2], v[1].mul_add(v[1], v[0] * v[0]));
+        let limit = s.coefficient * normal;
+        let least = s.regular.max(BOTH_SIDES * limit * s.dt * s.inverse_mass);
+        let divisor = speed2.sqrt().max(least);
+        if divisor > 0.0 {
+            let drag = limit / divisor;
+            force = [0, 1, 2].map(|a| (-drag).mul_add(v[a], force[a]));
+            friction = energy_quantum.round(drag * speed2 * s.dt);
+        }
+    }
+    let corners = push.weights.map(|w| force.map(|f| force_quantum.round(-(w * f))));
+    let node = [0, 1, 2].map(|a| -((corners[0][a] + corners[1][a]) + (corners[2][a] + corners[3][a])));
+    let energy = energy_quantum.round(0.5 * normal * push.depth);
+    Reaction { corners, node, energy, friction }
+}
+
+/// What the contact of a batch says about the cycle. Merging does not depend on the order.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactVote {
+    /// Energy in all penalty springs, an exact sum.
+    pub energy: f64,
+    /// Energy that friction takes out this cycle, an exact sum.
+    pub friction: f64,
+    /// Greatest depth of any hit over the gap; from 0.9 the run must stop.
+    pub worst_depth: f64,
+    /// Global node and face id of the deepest hit, the lowest of equals; `u32::MAX` without hits.
+    pub worst_pair: (u32, u32),
+    /// Longest time step the penalty springs allow; infinite without a pair near.
+    pub dt: f64,
+    /// Greatest component of any force term, for the rescale vote.
+    pub force_bound: f64,
+    /// Pairs on the candidate list.
+    pub pairs: u64,
+    /// Hits: distinct closest features with a node in their zone.
+    pub hits: u64,
+}
+
+impl Default for ContactVote {
+    fn default() -> Self {
+        Self {
+            energy: 0.0,
+            friction: 0.0,
+            worst_depth: 0.0,
+            worst_pair: (u32::MAX, u32::MAX),
+            dt: f64::INFINITY,
+            force_bound: 0.0,
+            pairs: 0,
+            hits: 0,
+        }
+    }
+}
+
+impl ContactVote {
+    /// Takes in the vote of another batch.
+    pub fn merge(&mut self, other: &Self) {
+        self.energy += other.energy;
+        self.friction += other.friction;
+        self.deepest(other.worst_depth, other.worst_pair);
+        self.dt = self.dt.min(other.dt);
+        self.force_bound = self.force_bound.max(other.force_bound);
+        self.pairs += other.pairs;
+        self.hits += other.hits;
+    }
+
+    /// Takes in the depth over the gap of one pair.
+    #[inline(always)]
+    pub fn deepest(&mut self, depth: f64, pair: (u32, u32)) {
+        if depth > self.worst_depth || (depth == self.worst_depth && pair < self.worst_pair) {
+            self.worst_depth = depth;
+            self.worst_pair = pair;
+        }
+    }
+
+    /// Takes in the forces and energies of one hit.
+    #[inline(always)]
+    pub fn count(&mut self, reaction: &Reaction) {
+        self.energy += reaction.energy;
+        self.friction += reaction.friction;
+        for a in 0..3 {
+            for term in [
+                reaction.node,
+                reaction.corners[0],
+                reaction.corners[1],
+                reaction.corners[2],
+                reaction.corners[3],
+            ] {
+                let magnitude = term[a].abs();
+                self.force_bound = if magnitude > self.force_bound { magnitude } else { self.force_bound };
+            }
+        }
+        self.hits += 1;
+    }
+}

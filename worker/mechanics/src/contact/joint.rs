@@ -1,0 +1,159 @@
+//! A joint counts once, and every hit has a side.
+//!
+//! The zones of adjacent faces overlap, so a node near a joint lies in several. Its *near* faces are reduced to
+//! distinct closest features. All faces that share a feature are among the near ones: the feature is a part of
+//! each, so none of them is farther from the node than the feature, and the candidate list is complete up to
+//! the zone of warning.
+//!
+//! Going through the near faces by distance, then id, a face is dropped if an earlier one shares its feature
+//! (its own closest point lies on the earlier face too, which is at least as near: either at the same point,
+//! then the joint is already counted, or at another, then the joint is not closest for all who share it), or
+//! if its face holds the feature of an earlier one (the same point but for rounding).
+//!
+//! What is left is distinct: one hit over a flat or convex surface; several in a concave corner, or between
+//! bodies.
+
+use super::zone::{Closest, Feature, Vector, dot, unit};
+
+/// A face near a node.
+#[derive(Clone, Copy, Debug)]
+pub struct Near {
+    /// The caller's index of the face.
+    pub face: u32,
+    /// Face id: the order of equals.
+    pub id: u32,
+    /// Global nodes of the face's corners.
+    pub corners: [u32; 4],
+    /// Closest point of the face.
+    pub closest: Closest,
+}
+
+/// One push on a node.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Index into the near faces.
+    pub near: u32,
+    /// Depth of the node in the zone: gap minus signed distance, positive, up to twice the gap (length).
+    pub depth: f64,
+    /// Unit vector along the line of node and closest point, out of the solid.
+    pub direction: Vector,
+    /// Share of the push this hit has, in (0, 1]; see [`share`].
+    pub share: f64,
+    /// Whether the node is on the outer side.
+    outer: bool,
+}
+
+/// Whether the feature of `near`, an edge or a corner, belongs to the face with these corners.
+#[inline(always)]
+fn belongs(near: &Near, corners: &[u32; 4]) -> bool {
+    match near.closest.feature {
+        Feature::Face => false,
+        Feature::Corner(i) => corners.contains(&near.corners[i as usize]),
+        Feature::Edge(i) => {
+            let (a, b) = (near.corners[i as usize], near.corners[(i as usize + 1) & 3]);
+            (0..4).any(|j| {
+                let (c, d) = (corners[j], corners[(j + 1) & 3]);
+                (c == a && d == b) || (c == b && d == a)
+            })
+        }
+    }
+}
+
+/// Reduces the near faces of one node to its hits. Sorts `near` by distance, then id; `hits` is cleared first.
+/// The result does not depend on the order of `near`.
+pub fn reduce(near: &mut [Near], gap: f64, hits: &mut Vec<Hit>) {
+    hits.clear();
+    near.sort_unstable_by(|a, b| a.closest.distance.total_cmp(&b.closest.distance).then(a.id.cmp(&b.id)));
+    for (i, face) in near.iter().enumerate() {
+        if face.closest.distance >= gap {
+            break;
+        }
+        let counted = near[..i]
+            .iter()
+            .all(|earlier| !belongs(face, &earlier.corners) && !belongs(earlier, &face.corners));
+        if counted && let Some(hit) = hit(near, i, gap) {
+            hits.push(hit);
+        }
+    }
+    if hits.len() > 1 {
+        agree(near, hits);
+        share(hits);
+    }
+}
+
+/// The hit of near face `i`: its side by the pseudonormal of its feature, the sum over all near faces that
+/// share it, in order of distance. None for a face of no area with the node on it.
+#[inline(always)]
+fn hit(near: &[Near], i: usize, gap: f64) -> Option<Hit> {
+    let closest = &near[i].closest;
+    let mut normal = closest.normal;
+    if closest.feature != Feature::Face {
+        for (j, other) in near.iter().enumerate() {
+            if j != i && belongs(&near[i], &other.corners) {
+                let n = other.closest.normal;
+                normal = [normal[0] + n[0], normal[1] + n[1], normal[2] + n[2]];
+            }
+        }
+    }
+    let d = closest.distance;
+    let outer = dot(closest.vector, normal) >= 0.0;
+    let (direction, signed) = if d > 1e-9 * gap {
+        let s = if outer { 1.0 / d } else { -1.0 / d };
+        ([s * closest.vector[0], s * closest.vector[1], s * closest.vector[2]], if outer { d } else { -d })
+    } else {
+        // On the feature the line has no direction.
+        let direction = unit(normal);
+        if direction == [0.0; 3] {
+            return None;
+        }
+        (direction, 0.0)
+    };
+    Some(Hit { near: i as u32, depth: gap - signed, direction, share: 1.0, outer })
+}
+
+/// Drops hits on the wrong side of a patch: beside an acute edge the node lies outside by the nearer face and
+/// behind the other's plane. Of hits whose faces share a node the nearest one knows the side.
+fn agree(near: &[Near], hits: &mut Vec<Hit>) {
+    for j in 1..hits.len() {
+        let of = |h: &Hit| &near[h.near as usize].corners;
+        let wrong = hits[..j]
+            .iter()
+            .any(|h| h.outer != hits[j].outer && of(h).iter().any(|n| of(&hits[j]).contains(n)));
+        if wrong {
+            hits[j].share = 0.0;
+        }
+    }
+    hits.retain(|h| h.share > 0.0);
+}
+
+/// Shares the push among hits that push the same way.
+///
+/// `share_i = 1 / sum_j max(0, n_i . n_j) min(1, depth_j / depth_i)`: two faces of a right-angled corner push
+/// in full, and so do two bodies from both sides; over a joint that is concave by a small angle two slabs
+/// overlap in a strip, and their pushes count as one, as on the flat patch that the angle tends to. A hit that
+/// begins takes nothing from the others at once. The stiffness in any direction stays below that of one hit
+/// from each side.
+fn share(hits: &mut [Hit]) {
+    for i in 0..hits.len() {
+        let mut sum = 1.0;
+        for j in (0..hits.len()).filter(|&j| j != i) {
+            let cosine = dot(hits[i].direction, hits[j].direction);
+            if cosine > 0.0 {
+                let ratio = hits[j].depth / hits[i].depth;
+                sum += cosine.min(1.0) * ratio.min(1.0);
+            }
+        }
+        hits[i].share = 1.0 / sum;
+    }
+}
+
+/// How many hits' stiffness can add up along one direction: the greatest row sum of shares times cosines, an
+/// upper bound of the norm of `sum share_i n_i n_i^T`; at least 1.
+pub fn stacking(hits: &[Hit]) -> f64 {
+    let mut most = 1.0_f64;
+    for a in hits {
+        let row: f64 = hits.iter().map(|b| b.share * dot(a.direction, b.direction).abs()).sum();
+        most = most.max(row);
+    }
+    most
+}

@@ -1,0 +1,122 @@
+//! Search: which node-face pairs of a batch can meet. No distances, no forces; the candidate list is all that
+//! leaves.
+//!
+//! The filter, in its order, each check with its reason:
+//! 1. the parts interact (the deck's matrix);
+//! 2. the node is no corner of the face's element (a node touches its own faces for ever);
+//! 3. the pair is not excluded (it was inside the zone at time zero);
+//! 4. the face's box, grown by the zone of warning and twice the slack, holds the node (stage zero, once per
+//!    batch: a batch may begin to act some cycles after the sort, and between any two moments within the
+//!    slack of the sorted positions lies at most twice the slack);
+//! 5. the face's box, grown by the zone of warning, holds the node (stage one, every cycle).
+
+use serde::{Deserialize, Serialize};
+
+use super::{Settings, WARNING, surface::Surface, work_unit::Batch};
+
+/// Pairs that never interact because they were inside the zone at time zero.
+///
+/// Kept by global node and face key, so they survive a change of surface.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Exclusions {
+    /// (face key, global node), ascending.
+    pairs: Vec<(u64, u32)>,
+}
+
+impl Exclusions {
+    /// Excludes pairs given as [`super::initial_pairs`] gives them.
+    pub fn new(surface: &Surface, pairs: &[(u32, u32, f64)]) -> Self {
+        let mut pairs: Vec<_> = pairs
+            .iter()
+            .map(|&(node, face, _)| (surface.faces[face as usize].key(), surface.nodes[node as usize]))
+            .collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        Self { pairs }
+    }
+
+    /// The excluded pairs (surface node, surface face) of which both are on the surface.
+    pub fn on<'a>(&'a self, surface: &'a Surface) -> impl Iterator<Item = (u32, u32)> + 'a {
+        self.pairs
+            .iter()
+            .filter_map(|&(key, node)| Some((surface.node_index(node)?, surface.face_index(key)?)))
+    }
+}
+
+/// Node-face pairs that can meet, by node.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Candidates {
+    /// Batch nodes with at least one candidate.
+    pub nodes: Vec<u32>,
+    /// Where the faces of each of `nodes` begin in `faces`, and their end.
+    pub starts: Vec<u32>,
+    /// Batch faces, ascending for each node.
+    pub faces: Vec<u32>,
+}
+
+/// Axis-parallel box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Lowest corner (length).
+    pub min: [f64; 3],
+    /// Highest corner (length).
+    pub max: [f64; 3],
+}
+
+impl Bounds {
+    /// Box of four corners, grown on all sides.
+    #[inline(always)]
+    pub fn of(corners: &[[f64; 3]; 4], grow: f64) -> Self {
+        let lower = |a: f64, b: f64| if a < b { a } else { b };
+        let upper = |a: f64, b: f64| if a > b { a } else { b };
+        let [p, q, r, s] = corners;
+        Self {
+            min: [0, 1, 2].map(|a| lower(lower(p[a], q[a]), lower(r[a], s[a])) - grow),
+            max: [0, 1, 2].map(|a| upper(upper(p[a], q[a]), upper(r[a], s[a])) + grow),
+        }
+    }
+
+    /// Whether a point lies inside or on the border.
+    #[inline(always)]
+    pub fn holds(&self, p: [f64; 3]) -> bool {
+        (p[0] >= self.min[0])
+            & (p[0] <= self.max[0])
+            & (p[1] >= self.min[1])
+            & (p[1] <= self.max[1])
+            & (p[2] >= self.min[2])
+            & (p[2] <= self.max[2])
+    }
+}
+
+/// Stage zero: the pairs of each unit that can meet before the next sort (checks 1 to 4). `x` by batch node.
+pub fn candidates(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3]) -> Candidates {
+    let n_parts = settings.n_parts();
+    let grow = 2.0_f64.mul_add(settings.slack, WARNING * settings.gap);
+    let at = |n: u32| [x[0][n as usize], x[1][n as usize], x[2][n as usize]];
+    let bounds: Vec<Bounds> = batch.faces.iter().map(|f| Bounds::of(&f.nodes.map(at), grow)).collect();
+    let mut found = Candidates { nodes: Vec::new(), starts: vec![0], faces: Vec::new() };
+    for unit in &batch.units {
+        for &n in &unit.nodes {
+            let (p, node) = (at(n), &batch.nodes[n as usize]);
+            let permitted = &settings.interacts[node.part as usize * n_parts..][..n_parts];
+            let first = found.faces.len();
+            for &f in &unit.faces {
+                let face = &batch.faces[f as usize];
+                if bounds[f as usize].holds(p)
+                    && permitted[face.part as usize]
+                    && !face.corners.contains(&node.global)
+                    && (batch.excluded.is_empty()
+                        || batch.excluded.binary_search(&(node.global, face.id)).is_err())
+                {
+                    found.faces.push(f);
+                }
+            }
+            if found.faces.len() > first {
+                found.faces[first..].sort_unstable();
+                found.nodes.push(n);
+                found.starts.push(found.faces.len() as u32);
+            }
+        }
+    }
+    found
+}

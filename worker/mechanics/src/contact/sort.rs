@@ -1,0 +1,345 @@
+//! The bucket sort: surface nodes and faces into virtual cubes (the paper's section 2).
+//!
+//! Cubes have twice the smallest dimension of all interacting faces as their side, but at least twice the
+//! reach, so one crushed face cannot shrink them without limit. They are *virtual*: only those that hold nodes
+//! exist, found through a hash table. The first pass puts each node into the cube that contains it and makes
+//! the cube if need be; the second puts each face into every existing cube that holds nodes it may interact
+//! with: those that its box, grown by the reach, touches. (The paper tests the nodes of the face; the box also
+//! finds cubes in the middle of a face much larger than a cube.) Then interactions are counted and units
+//! without any are removed.
+//!
+//! Cubes are counted from the lowest corner of all interacting nodes, so that a translation changes nothing.
+
+use super::{Settings, search::Exclusions, surface::Surface, work_unit::WorkUnit};
+
+/// Greatest cube index along an axis: three of them fit one key.
+const MAX_CUBE: f64 = 2_097_000.0;
+
+/// Sorts a surface into work units, in the order in which its nodes first touch them. `x` by surface node.
+///
+/// Every pair that interacts and of which the node lies in the face's box grown by the reach is in exactly one
+/// unit. Nodes and faces of parts that interact with nothing are left out.
+pub fn sort(
+    surface: &Surface,
+    x: &[[f64; 3]],
+    settings: &Settings,
+    exclusions: &Exclusions,
+) -> Vec<WorkUnit> {
+    let n_parts = settings.n_parts();
+    let interacting: Vec<bool> =
+        settings.interacts.chunks(n_parts.max(1)).map(|row| row.contains(&true)).collect();
+    let Some(grid) = Grid::new(surface, x, settings, &interacting) else { return Vec::new() };
+    let (table, unit_of) = sort_nodes(surface, x, &grid, &interacting);
+    let census = PartCensus::new(surface, &unit_of, table.cubes.len());
+    let mut interactions = vec![0_u64; table.cubes.len()];
+    let incidences =
+        sort_faces(surface, x, settings, &grid, &table, &unit_of, &census, &interacting, &mut interactions);
+    assemble(surface, settings, exclusions, &table.cubes, &unit_of, &incidences, interactions)
+}
+
+/// The virtual grid.
+struct Grid {
+    origin: [f64; 3],
+    inverse_side: f64,
+    reach: f64,
+    /// Highest cube index that can hold a node, per axis.
+    last: [i32; 3],
+}
+
+impl Grid {
+    /// The grid for these positions; none if nothing interacts.
+    fn new(surface: &Surface, x: &[[f64; 3]], settings: &Settings, interacting: &[bool]) -> Option<Self> {
+        let mut min = [f64::INFINITY; 3];
+        let mut max = [f64::NEG_INFINITY; 3];
+        for (p, _) in x.iter().zip(&surface.node_part).filter(|(_, part)| interacting[**part as usize]) {
+            for a in 0..3 {
+                min[a] = if p[a] < min[a] { p[a] } else { min[a] };
+                max[a] = if p[a] > max[a] { p[a] } else { max[a] };
+            }
+        }
+        if !(min[0] <= max[0]) {
+            return None;
+        }
+        let reach = settings.reach();
+        let smallest = surface.smallest_dimension_of(x, &|part| interacting[part as usize]);
+        let floor = (0..3).map(|a| (max[a] - min[a]) / MAX_CUBE).fold(2.0 * reach, f64::max);
+        // Without a reach and with faces of no size any side will do.
+        let side = if smallest.is_finite() { floor.max(2.0 * smallest) } else { floor };
+        let inverse_side = if side > 0.0 { 1.0 / side } else { 1.0 };
+        let mut grid = Self { origin: min, inverse_side, reach, last: [0; 3] };
+        grid.last = grid.cube(max);
+        Some(grid)
+    }
+
+    /// Cube of a point; monotonic in each coordinate, rounding included, so a box test and a cube test agree.
+    #[inline(always)]
+    fn cube(&self, p: [f64; 3]) -> [i32; 3] {
+        [0, 1, 2].map(|a| {
+            let c = (p[a] - self.origin[a]) * self.inverse_side;
+            let truncated = c as i32;
+            truncated - i32::from(c < f64::from(truncated))
+        })
+    }
+}
+
+/// Existing cubes, by hash of their index: open addressing over a power of two of slots.
+struct Table {
+    /// Key and unit of each slot.
+    slots: Vec<(u64, u32)>,
+    mask: usize,
+    cubes: Vec<[i32; 3]>,
+}
+
+impl Table {
+    const FREE: u64 = u64::MAX;
+
+    /// A table that is at most half full.
+    fn with_room(units: usize) -> Self {
+        let slots = (2 * units.max(8)).next_power_of_two();
+        Self { slots: vec![(Self::FREE, 0); slots], mask: slots - 1, cubes: Vec::new() }
+    }
+
+    #[inline(always)]
+    fn key(cube: [i32; 3]) -> u64 {
+        (cube[0] as u64) | (cube[1] as u64) << 21 | (cube[2] as u64) << 42
+    }
+
+    /// Fibonacci hashing: the upper bits of a product with 2^64 over the golden ratio.
+    #[inline(always)]
+    fn slot(&self, key: u64) -> usize {
+        (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & self.mask
+    }
+
+    /// Unit of a cube, if it exists.
+    #[inline(always)]
+    fn find(&self, cube: [i32; 3]) -> Option<u32> {
+        let key = Self::key(cube);
+        let mut slot = self.slot(key);
+        loop {
+            let (found, unit) = self.slots[slot];
+            if found == key {
+                return Some(unit);
+            }
+            if found == Self::FREE {
+                return None;
+            }
+            slot = (slot + 1) & self.mask;
+        }
+    }
+
+    /// Unit of a cube, made if need be.
+    #[inline(always)]
+    fn find_or_create(&mut self, cube: [i32; 3]) -> u32 {
+        let key = Self::key(cube);
+        let mut slot = self.slot(key);
+        loop {
+            let (found, unit) = self.slots[slot];
+            if found == key {
+                return unit;
+            }
+            if found == Self::FREE {
+                let unit = self.cubes.len() as u32;
+                self.cubes.push(cube);
+                self.slots[slot] = (key, unit);
+                if 2 * self.cubes.len() > self.slots.len() {
+                    self.grow();
+                }
+                return unit;
+            }
+            slot = (slot + 1) & self.mask;
+        }
+    }
+
+    /// Doubles the slots.
+    fn grow(&mut self) {
+        let old = std::mem::take(&mut self.slots);
+        self.slots = vec![(Self::FREE, 0); 2 * old.len()];
+        self.mask = self.slots.len() - 1;
+        for entry in old.into_iter().filter(|entry| entry.0 != Self::FREE) {
+            let mut slot = self.slot(entry.0);
+            while self.slots[slot].0 != Self::FREE {
+                slot = (slot + 1) & self.mask;
+            }
+            self.slots[slot] = entry;
+        }
+    }
+}
+
+/// Unit of a node that interacts with nothing.
+const NO_UNIT: u32 = u32::MAX;
+
+/// First pass: the cubes that hold nodes, and the unit of each surface node.
+fn sort_nodes(surface: &Surface, x: &[[f64; 3]], grid: &Grid, interacting: &[bool]) -> (Table, Vec<u32>) {
+    let mut table = Table::with_room(surface.nodes.len() / 4);
+    let unit_of = x
+        .iter()
+        .zip(&surface.node_part)
+        .map(
+            |(&p, &part)| {
+                if interacting[part as usize] { table.find_or_create(grid.cube(p)) } else { NO_UNIT }
+            },
+        )
+        .collect();
+    (table, unit_of)
+}
+
+/// How many nodes of which part each unit holds.
+struct PartCensus {
+    starts: Vec<u32>,
+    /// Part and count.
+    counts: Vec<(u32, u32)>,
+}
+
+impl PartCensus {
+    fn new(surface: &Surface, unit_of: &[u32], n_units: usize) -> Self {
+        let (starts, nodes) = group(n_units, unit_of.iter().zip(0..).map(|(&unit, node)| (unit, node)));
+        let mut census = Self { starts: vec![0], counts: Vec::with_capacity(n_units) };
+        for bounds in starts.windows(2) {
+            let first = census.counts.len();
+            for &node in &nodes[bounds[0] as usize..bounds[1] as usize] {
+                let part = surface.node_part[node as usize];
+                match census.counts[first..].iter_mut().find(|(p, _)| *p == part) {
+                    Some((_, count)) => *count += 1,
+                    None => census.counts.push((part, 1)),
+                }
+            }
+            census.starts.push(census.counts.len() as u32);
+        }
+        census
+    }
+
+    /// Nodes of a unit that interact with a part.
+    #[inline(always)]
+    fn permitted(&self, unit: u32, permitted: &[bool]) -> u32 {
+        self.counts[self.starts[unit as usize] as usize..self.starts[unit as usize + 1] as usize]
+            .iter()
+            .map(|&(part, count)| if permitted[part as usize] { count } else { 0 })
+            .sum()
+    }
+}
+
+/// Second pass: (unit, face) for each existing cube that holds nodes a face may interact with, by ascending
+/// face; adds up the interactions of each unit.
+#[expect(clippy::too_many_arguments, reason = "one pass over everything the first pass left behind")]
+fn sort_faces(
+    surface: &Surface,
+    x: &[[f64; 3]],
+    settings: &Settings,
+    grid: &Grid,
+    table: &Table,
+    unit_of: &[u32],
+    census: &PartCensus,
+    interacting: &[bool],
+    interactions: &mut [u64],
+) -> Vec<(u32, u32)> {
+    let n_parts = settings.n_parts();
+    let mut incidences = Vec::with_capacity(6 * surface.faces.len());
+    for (f, face) in surface.faces.iter().enumerate() {
+        if !interacting[face.part as usize] {
+            continue;
+        }
+        let permitted = &settings.interacts[face.part as usize * n_parts..][..n_parts];
+        let corners = face.nodes.map(|n| x[n as usize]);
+        let (mut min, mut max) = (corners[0], corners[0]);
+        for c in &corners[1..] {
+            for a in 0..3 {
+                min[a] = if c[a] < min[a] { c[a] } else { min[a] };
+                max[a] = if c[a] > max[a] { c[a] } else { max[a] };
+            }
+        }
+        let mut low = grid.cube(min.map(|m| m - grid.reach));
+        let mut high = grid.cube(max.map(|m| m + grid.reach));
+        for a in 0..3 {
+            low[a] = low[a].max(0);
+            high[a] = high[a].min(grid.last[a]);
+        }
+        // Own corners that can be in a unit and are permitted: to be taken off its count.
+        let own = face.own.map(|node| {
+            if node != u32::MAX && permitted[surface.node_part[node as usize] as usize] {
+                unit_of[node as usize]
+            } else {
+                NO_UNIT
+            }
+        });
+        let mut put = |unit: u32| {
+            let all = census.permitted(unit, permitted);
+            if all > 0 {
+                let own = own.iter().filter(|&&u| u == unit).count() as u64;
+                interactions[unit as usize] += u64::from(all) - own;
+                incidences.push((unit, f as u32));
+            }
+        };
+        let cells: f64 = (0..3).map(|a| f64::from(high[a]) - f64::from(low[a]) + 1.0).product();
+        if cells <= table.cubes.len() as f64 {
+            for k in low[2]..=high[2] {
+                for j in low[1]..=high[1] {
+                    for i in low[0]..=high[0] {
+                        if let Some(unit) = table.find([i, j, k]) {
+                            put(unit);
+                        }
+                    }
+                }
+            }
+        } else {
+            // A face larger than the whole problem's cubes: look at those that exist.
+            for (unit, cube) in table.cubes.iter().enumerate() {
+                if (0..3).all(|a| (low[a]..=high[a]).contains(&cube[a])) {
+                    put(unit as u32);
+                }
+            }
+        }
+    }
+    incidences
+}
+
+/// Gathers units from what the passes found; takes excluded pairs off and drops units without interactions.
+fn assemble(
+    surface: &Surface,
+    settings: &Settings,
+    exclusions: &Exclusions,
+    cubes: &[[i32; 3]],
+    unit_of: &[u32],
+    incidences: &[(u32, u32)],
+    mut interactions: Vec<u64>,
+) -> Vec<WorkUnit> {
+    let (node_starts, nodes) = group(cubes.len(), unit_of.iter().zip(0..).map(|(&unit, node)| (unit, node)));
+    let (face_starts, faces) = group(cubes.len(), incidences.iter().copied());
+    let slice = |starts: &[u32], unit: usize| starts[unit] as usize..starts[unit + 1] as usize;
+    for (node, face) in exclusions.on(surface) {
+        let (unit, f) = (unit_of[node as usize], &surface.faces[face as usize]);
+        let counted = unit != NO_UNIT
+            && settings.permits(surface.node_part[node as usize], f.part)
+            && !f.own.contains(&node)
+            && faces[slice(&face_starts, unit as usize)].binary_search(&face).is_ok();
+        if counted {
+            interactions[unit as usize] -= 1;
+        }
+    }
+    (0..cubes.len())
+        .filter(|&unit| interactions[unit] > 0)
+        .map(|unit| WorkUnit {
+            cube: cubes[unit],
+            nodes: nodes[slice(&node_starts, unit)].to_vec(),
+            faces: faces[slice(&face_starts, unit)].to_vec(),
+            interactions: interactions[unit],
+        })
+        .collect()
+}
+
+/// Counting sort of (unit, item): where the items of each unit begin, and the items in the order given.
+fn group(n_units: usize, items: impl Iterator<Item = (u32, u32)> + Clone) -> (Vec<u32>, Vec<u32>) {
+    let mut starts = vec![0_u32; n_units + 1];
+    for (unit, _) in items.clone().filter(|item| item.0 != NO_UNIT) {
+        starts[unit as usize + 1] += 1;
+    }
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    let mut next = starts.clone();
+    let mut grouped = vec![0; starts[n_units] as usize];
+    for (unit, item) in items.filter(|item| item.0 != NO_UNIT) {
+        grouped[next[unit as usize] as usize] = item;
+        next[unit as usize] += 1;
+    }
+    (starts, grouped)
+}

@@ -1,0 +1,265 @@
+//! Surface: which faces of the elements that are alive lie outside, and their nodes.
+//!
+//! A face is outside if no second element that is alive has the same corner nodes; faces between joined parts
+//! are therefore inside. A face of a degenerate element counts with its distinct nodes and vanishes with fewer
+//! than three. The surface holds static data only; positions come from the caller, by surface node.
+
+use crate::{material::Material, mesh::Mesh};
+
+/// Corners of each side of a hexahedron, outward by the right-hand rule.
+pub const SIDES: [[usize; 4]; 6] =
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
+/// The outer faces of a mesh and their nodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// Global node index of each surface node, ascending.
+    pub nodes: Vec<u32>,
+    /// Part of each surface node; the lowest of them where joined parts share it.
+    pub node_part: Vec<u32>,
+    /// Mean of the stiffness of the faces around each surface node (force per length).
+    pub node_stiffness: Vec<f64>,
+    /// Faces by element, then side.
+    pub faces: Vec<Face>,
+}
+
+/// One outer face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Face {
+    /// Surface node indices, outward by the right-hand rule.
+    pub nodes: [u32; 4],
+    /// Global element index.
+    pub element: u32,
+    /// Side of the element, an index into [`SIDES`].
+    pub side: u32,
+    /// Part of the element.
+    pub part: u32,
+    /// `K A^2 / V` of the element in its initial geometry (force per length).
+    pub stiffness: f64,
+    /// Global nodes of the element: nodes that never interact with this face.
+    pub corners: [u32; 8],
+    /// Surface nodes among those, each once, and `u32::MAX` in the other places.
+    pub own: [u32; 8],
+}
+
+impl Face {
+    /// A number that stays with this face when the surface is redefined.
+    pub fn key(&self) -> u64 {
+        u64::from(self.element) * 6 + u64::from(self.side)
+    }
+}
+
+/// One side of one element on the way to the surface.
+#[derive(Clone, Copy)]
+struct Side {
+    key: [u32; 3],
+    element: u32,
+    side: u32,
+}
+
+impl Surface {
+    /// Collects the outer faces of the elements for which `alive` (by global element index) holds.
+    ///
+    /// # Panics
+    /// If a part names a material or a node that does not exist: the deck has checked both.
+    pub fn new(mesh: &Mesh, materials: &[Material], alive: &dyn Fn(u32) -> bool) -> Self {
+        let mut outer = outer_sides(mesh, alive);
+        outer.sort_unstable();
+        let offsets = mesh.element_offsets();
+        let mut index = vec![u32::MAX; mesh.n_nodes()];
+        let mut part = 0;
+        let mut faces = Vec::with_capacity(outer.len());
+        for (element, side) in outer {
+            while element as usize >= offsets[part + 1] {
+                part += 1;
+            }
+            let corners = mesh.parts[part].corners(element as usize - offsets[part]);
+            let bulk = materials[mesh.parts[part].material as usize].bulk();
+            let nodes = SIDES[side as usize].map(|c| corners[c]);
+            let area = area(nodes.map(|n| mesh.positions[n as usize]));
+            let volume = volume(&corners.map(|n| mesh.positions[n as usize]));
+            for n in nodes {
+                index[n as usize] = 0;
+            }
+            let stiffness = if volume > 0.0 { bulk * area * area / volume } else { 0.0 };
+            let part = part as u32;
+            faces.push(Face { nodes, element, side, part, stiffness, corners, own: [u32::MAX; 8] });
+        }
+        let nodes: Vec<u32> = (0..mesh.n_nodes() as u32).filter(|&n| index[n as usize] == 0).collect();
+        for (i, &n) in nodes.iter().enumerate() {
+            index[n as usize] = i as u32;
+        }
+        let mut node_part = vec![u32::MAX; nodes.len()];
+        let mut node_stiffness = vec![0.0; nodes.len()];
+        let mut count = vec![0_u32; nodes.len()];
+        for face in &mut faces {
+            face.nodes = face.nodes.map(|n| index[n as usize]);
+            for (i, n) in face.corners.into_iter().enumerate() {
+                if !face.corners[..i].contains(&n) {
+                    face.own[i] = index[n as usize];
+                }
+            }
+            for n in face.nodes.map(|n| n as usize) {
+                node_part[n] = node_part[n].min(face.part);
+                node_stiffness[n] += face.stiffness;
+                count[n] += 1;
+            }
+        }
+        for (stiffness, &count) in node_stiffness.iter_mut().zip(&count) {
+            *stiffness /= f64::from(count);
+        }
+        Self { nodes, node_part, node_stiffness, faces }
+    }
+
+    /// Number of elements with at least one outer face.
+    pub fn n_elements(&self) -> usize {
+        self.faces.chunk_by(|a, b| a.element == b.element).count()
+    }
+
+    /// Shortest edge of any face (length); infinite without faces. `x` by surface node.
+    pub fn smallest_dimension(&self, x: &[[f64; 3]]) -> f64 {
+        self.smallest_dimension_of(x, &|_| true)
+    }
+
+    /// Shortest edge of the faces of the parts that `keep` names (length).
+    pub(crate) fn smallest_dimension_of(&self, x: &[[f64; 3]], keep: &dyn Fn(u32) -> bool) -> f64 {
+        let mut smallest = f64::INFINITY;
+        for face in &self.faces {
+            if !keep(face.part) {
+                continue;
+            }
+            for i in 0..4 {
+                let (a, b) = (face.nodes[i], face.nodes[(i + 1) & 3]);
+                if a != b {
+                    let (a, b) = (x[a as usize], x[b as usize]);
+                    let e = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+                    smallest = smallest.min(e[2].mul_add(e[2], e[1].mul_add(e[1], e[0] * e[0])));
+                }
+            }
+        }
+        smallest.sqrt()
+    }
+
+    /// Surface node index of a global node, if it is on the surface.
+    pub fn node_index(&self, global: u32) -> Option<u32> {
+        self.nodes.binary_search(&global).ok().map(|i| i as u32)
+    }
+
+    /// Face index of a key ([`Face::key`]), if that face is outside.
+    pub fn face_index(&self, key: u64) -> Option<u32> {
+        self.faces.binary_search_by_key(&key, Face::key).ok().map(|i| i as u32)
+    }
+}
+
+/// Element and side of every outer face, in no order. Sides are bucketed by their lowest node, so that each
+/// is compared with a few others only.
+fn outer_sides(mesh: &Mesh, alive: &dyn Fn(u32) -> bool) -> Vec<(u32, u32)> {
+    let mut starts = vec![0_u32; mesh.n_nodes() + 1];
+    for_each_side(mesh, alive, &mut |lowest, _| starts[lowest as usize + 1] += 1);
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    let empty = Side { key: [0; 3], element: 0, side: 0 };
+    let mut sides = vec![empty; starts[starts.len() - 1] as usize];
+    let mut next = starts.clone();
+    for_each_side(mesh, alive, &mut |lowest, side| {
+        sides[next[lowest as usize] as usize] = side;
+        next[lowest as usize] += 1;
+    });
+    let mut outer = Vec::new();
+    for bucket in starts.windows(2) {
+        let bucket = &sides[bucket[0] as usize..bucket[1] as usize];
+        for (i, side) in bucket.iter().enumerate() {
+            if !bucket.iter().enumerate().any(|(j, other)| j != i && other.key == side.key) {
+                outer.push((side.element, side.side));
+            }
+        }
+    }
+    outer
+}
+
+/// Calls `visit` with the lowest node of every side of every element alive, and the rest of its key.
+fn for_each_side(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, visit: &mut dyn FnMut(u32, Side)) {
+    let mut element = 0;
+    for part in &mesh.parts {
+        for e in 0..part.n_elements() {
+            if alive(element) {
+                let corners = part.corners(e);
+                for (side, local) in SIDES.iter().enumerate() {
+                    let mut key = local.map(|c| corners[c]);
+                    key.sort_unstable();
+                    for i in 1..4 {
+                        if key[i] == key[i - 1] {
+                            key[i - 1] = u32::MAX;
+                        }
+                    }
+                    key.sort_unstable();
+                    if key[2] != u32::MAX {
+                        visit(key[0], Side { key: [key[1], key[2], key[3]], element, side: side as u32 });
+                    }
+                }
+            }
+            element += 1;
+        }
+    }
+}
+
+/// Magnitude of the vector area of a quadrilateral: half the cross product of its diagonals.
+fn area(x: [[f64; 3]; 4]) -> f64 {
+    let d = |a: [f64; 3], b: [f64; 3]| [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+    let (p, q) = (d(x[0], x[2]), d(x[1], x[3]));
+    let c = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+    0.5 * (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt()
+}
+
+/// Trilinear volume of a hexahedron by 2 x 2 x 2 Gauss points, which is exact for it.
+fn volume(x: &[[f64; 3]; 8]) -> f64 {
+    const SIGNS: [[f64; 3]; 8] = [
+        [-1., -1., -1.],
+        [1., -1., -1.],
+        [1., 1., -1.],
+        [-1., 1., -1.],
+        [-1., -1., 1.],
+        [1., -1., 1.],
+        [1., 1., 1.],
+        [-1., 1., 1.],
+    ];
+    let g = 1.0 / 3.0_f64.sqrt();
+    let mut volume = 0.0;
+    for point in SIGNS {
+        let mut j = [[0.0; 3]; 3];
+        for (corner, s) in x.iter().zip(SIGNS) {
+            let h = [0, 1, 2].map(|a| (g * s[a]).mul_add(point[a], 1.0));
+            let derivative = [s[0] * h[1] * h[2], s[1] * h[0] * h[2], s[2] * h[0] * h[1]];
+            for a in 0..3 {
+                for b in 0..3 {
+                    j[a][b] += 0.125 * derivative[a] * corner[b];
+                }
+            }
+        }
+        volume += j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1])
+            - j[0][1] * (j[1][0] * j[2][2] - j[1][2] * j[2][0])
+            + j[0][2] * (j[1][0] * j[2][1] - j[1][1] * j[2][0]);
+    }
+    volume
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn volume_of_a_skewed_hexahedron_is_exact() {
+        let x = [
+            [0., 0., 0.],
+            [1., 0., 0.],
+            [1.2, 1.1, 0.1],
+            [0., 1., 0.2],
+            [0.1, 0., 1.],
+            [1., 0.2, 1.3],
+            [1.1, 1., 1.],
+            [-0.1, 1., 0.9],
+        ];
+        assert!((volume(&x) - 1.014).abs() < 1e-13, "{}", volume(&x));
+    }
+}

@@ -1,0 +1,164 @@
+//! Work unit: one cube of the sort with its nodes and faces, and a batch of them as a worker gets it.
+//!
+//! A work unit speaks in surface indices and lives on the master; a [`Batch`] is compact, numbers its own
+//! nodes and faces, and carries the static data that computing contact needs.
+
+use serde::{Deserialize, Serialize};
+
+use super::{search::Exclusions, surface::Surface};
+
+/// One cube that holds nodes, and what is to be tested in it. Every interacting node is in exactly one unit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WorkUnit {
+    /// Cube along each axis, counted from the lowest corner of all interacting nodes.
+    pub cube: [i32; 3],
+    /// Surface node indices, ascending.
+    pub nodes: Vec<u32>,
+    /// Surface face indices, ascending.
+    pub faces: Vec<u32>,
+    /// Node-face pairs to be tested: the unit's weight in the balance.
+    pub interactions: u64,
+}
+
+/// How units came out of a sort.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Census {
+    /// Number of units.
+    pub units: usize,
+    /// Least, mean and greatest number of nodes of a unit.
+    pub nodes: (usize, f64, usize),
+    /// Least, mean and greatest number of faces of a unit.
+    pub faces: (usize, f64, usize),
+    /// Interactions of all units.
+    pub interactions: u64,
+}
+
+impl Census {
+    /// Counts the units of a sort; all zero without any.
+    pub fn of(units: &[WorkUnit]) -> Self {
+        let range = |count: &dyn Fn(&WorkUnit) -> usize| {
+            let least = units.iter().map(count).min().unwrap_or(0);
+            let greatest = units.iter().map(count).max().unwrap_or(0);
+            let sum: usize = units.iter().map(count).sum();
+            (least, sum as f64 / units.len().max(1) as f64, greatest)
+        };
+        Self {
+            units: units.len(),
+            nodes: range(&|unit| unit.nodes.len()),
+            faces: range(&|unit| unit.faces.len()),
+            interactions: units.iter().map(|unit| unit.interactions).sum(),
+        }
+    }
+}
+
+/// The units of one worker: everything contact needs of their nodes and faces except position and velocity.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Batch {
+    /// Nodes of the units and of their faces, by ascending global index.
+    pub nodes: Vec<BatchNode>,
+    /// Faces of the units, by ascending id.
+    pub faces: Vec<BatchFace>,
+    /// What is to be tested against what, in batch indices.
+    pub units: Vec<BatchUnit>,
+    /// Pairs (global node, face id) that never interact, ascending.
+    pub excluded: Vec<(u32, u32)>,
+}
+
+/// One node of a batch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BatchNode {
+    /// Global node index.
+    pub global: u32,
+    /// Part of the node.
+    pub part: u32,
+    /// Nodal mass.
+    pub mass: f64,
+    /// Mean `K A^2 / V` of its faces (force per length).
+    pub stiffness: f64,
+}
+
+/// One face of a batch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BatchFace {
+    /// Batch node indices, outward by the right-hand rule.
+    pub nodes: [u32; 4],
+    /// Surface face index: the same number on every worker.
+    pub id: u32,
+    /// Part of its element.
+    pub part: u32,
+    /// `K A^2 / V` of its element (force per length).
+    pub stiffness: f64,
+    /// Global nodes of its element.
+    pub corners: [u32; 8],
+}
+
+/// One unit of a batch.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BatchUnit {
+    /// Batch node indices.
+    pub nodes: Vec<u32>,
+    /// Batch face indices.
+    pub faces: Vec<u32>,
+}
+
+impl Batch {
+    /// Gathers units into a batch. `mass` gives the mass of a global node.
+    pub fn gather(
+        surface: &Surface,
+        units: &[&WorkUnit],
+        mass: &dyn Fn(u32) -> f64,
+        exclusions: &Exclusions,
+    ) -> Self {
+        const NONE: u32 = u32::MAX;
+        let mut face_index = vec![NONE; surface.faces.len()];
+        let mut node_index = vec![NONE; surface.nodes.len()];
+        for unit in units {
+            for &node in &unit.nodes {
+                node_index[node as usize] = 0;
+            }
+            for &face in &unit.faces {
+                face_index[face as usize] = 0;
+                for node in surface.faces[face as usize].nodes {
+                    node_index[node as usize] = 0;
+                }
+            }
+        }
+        let mut nodes = Vec::new();
+        for (n, index) in node_index.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
+            *index = nodes.len() as u32;
+            let global = surface.nodes[n];
+            nodes.push(BatchNode {
+                global,
+                part: surface.node_part[n],
+                mass: mass(global),
+                stiffness: surface.node_stiffness[n],
+            });
+        }
+        let mut faces = Vec::new();
+        for (f, index) in face_index.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
+            *index = faces.len() as u32;
+            let face = &surface.faces[f];
+            faces.push(BatchFace {
+                nodes: face.nodes.map(|n| node_index[n as usize]),
+                id: f as u32,
+                part: face.part,
+                stiffness: face.stiffness,
+                corners: face.corners,
+            });
+        }
+        let mut excluded: Vec<(u32, u32)> = exclusions
+            .on(surface)
+            .filter(|&(node, face)| node_index[node as usize] != NONE && face_index[face as usize] != NONE)
+            .map(|(node, face)| (surface.nodes[node as usize], face))
+            .collect();
+        excluded.sort_unstable();
+        let units = units
+            .iter()
+            .map(|unit| BatchUnit {
+                nodes: unit.nodes.iter().map(|&n| node_index[n as usize]).collect(),
+                faces: unit.faces.iter().map(|&f| face_index[f as usize]).collect(),
+            })
+            .collect();
+        Self { nodes, faces, units, excluded }
+    }
+}
