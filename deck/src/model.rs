@@ -3,6 +3,10 @@
 use mechanics::{mesh::Mesh, setup::Setup};
 use serde::{Deserialize, Serialize};
 
+/// Node fields that [`Output::fields`] may name beside the element fields of
+/// [`mechanics::state::FIELDS`].
+pub const NODE_FIELDS: [&str; 3] = ["displacement", "velocity", "mass"];
+
 /// A checked problem in one consistent set of units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Model {

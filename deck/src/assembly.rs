@@ -1,0 +1,384 @@
+//! Putting the parts together: one numbering, joins, volumes, masses, velocities.
+
+use std::collections::{BTreeMap, HashMap};
+
+use mechanics::{
+    material::Material,
+    mesh::{Mesh, Part, Topology},
+};
+
+use crate::{
+    fault::Faults,
+    format::{MAX_ENTRIES, Names, PartDraft},
+    geometry::{EDGES, dot, norm, sub, volume},
+    table::{Range, Table},
+};
+
+/// One `[[join]]`.
+pub(crate) struct Join {
+    at: usize,
+    parts: Vec<usize>,
+    /// Greatest distance of nodes that merge, over the smallest edge of the joined parts.
+    tolerance: f64,
+}
+
+/// The mesh of all parts and what was measured on the way.
+pub(crate) struct Assembly {
+    pub(crate) mesh: Mesh,
+    /// Initial velocity by global node.
+    pub(crate) velocity: Vec<[f64; 3]>,
+    /// Kinetic energy lost in joins.
+    pub(crate) join_energy: f64,
+    /// Named faces of each part: their global nodes.
+    pub(crate) faces: Vec<Vec<(&'static str, Vec<u32>)>>,
+    /// Smallest edge of each part; infinite for a part without elements.
+    pub(crate) smallest_edge: Vec<f64>,
+    /// Largest edge of each part.
+    pub(crate) largest_edge: Vec<f64>,
+    /// Volume by global element.
+    pub(crate) volumes: Vec<f64>,
+    /// Pairs of parts that share nodes, lower index first.
+    pub(crate) joined: Vec<(usize, usize)>,
+    /// The global node of each user's number.
+    pub(crate) node_of_id: BTreeMap<u32, u32>,
+    /// The initial velocity each part was given.
+    pub(crate) part_velocity: Vec<[f64; 3]>,
+}
+
+/// Reads every `[[join]]`.
+pub(crate) fn read_joins(deck: &Table<'_>, names: &Names) -> Vec<Join> {
+    let mut joins = Vec::new();
+    for table in deck.tables("join", MAX_ENTRIES) {
+        let value = table.require("parts", "\"all\" or a list of at least two part names");
+        let parts = value.and_then(|v| names.several(v));
+        let tolerance =
+            table.number_or("tolerance", 1e-3, Range::Within(0.0, 0.5, "a number above 0 and at most 0.5"));
+        let at = value.map_or(table.at, |v| v.at);
+        table.finish();
+        let Some(parts) = parts else { continue };
+        if parts.len() < 2 {
+            deck.faults.add(
+                at,
+                "a join of one part",
+                "at least two different parts",
+                "name another part or remove the join",
+            );
+            continue;
+        }
+        joins.push(Join { at, parts, tolerance });
+    }
+    joins
+}
+
+/// One mesh of all parts.
+pub(crate) fn assemble(
+    drafts: &[PartDraft],
+    joins: &[Join],
+    materials: &[Material],
+    faults: &Faults<'_>,
+) -> Assembly {
+    let mut mesh = number(drafts, faults);
+    let mut smallest_edge = Vec::new();
+    let mut largest_edge = Vec::new();
+    for part in &mesh.parts {
+        let (low, high) = edges(&mesh.positions, part);
+        smallest_edge.push(low);
+        largest_edge.push(high);
+    }
+    let node_of_id = mesh.node_ids.iter().zip(0..).map(|(id, node)| (*id, node)).collect();
+    let mut assembly = Assembly {
+        mesh: Mesh::default(),
+        velocity: Vec::new(),
+        join_energy: 0.0,
+        faces: Vec::new(),
+        smallest_edge,
+        largest_edge,
+        volumes: Vec::new(),
+        joined: Vec::new(),
+        node_of_id,
+        part_velocity: drafts.iter().map(|d| d.velocity).collect(),
+    };
+    if !joins.is_empty() {
+        merge(&mut mesh, joins, &mut assembly, faults);
+    }
+    assembly.faces = drafts.iter().zip(&mesh.parts).map(|(draft, part)| global_faces(draft, part)).collect();
+    for part in &mesh.parts {
+        for e in 0..part.n_elements() {
+            let corners = part.corners(e).map(|node| mesh.positions[node as usize]);
+            assembly.volumes.push(volume(&corners));
+        }
+    }
+    assembly.mesh = mesh;
+    velocities(&mut assembly, materials);
+    assembly
+}
+
+/// Numbers nodes and elements part by part, without joins.
+fn number(drafts: &[PartDraft], faults: &Faults<'_>) -> Mesh {
+    let mut mesh = Mesh::default();
+    let explicit = || drafts.iter().filter_map(|d| d.explicit.as_ref().map(|e| (d, e)));
+    let mut next_node = explicit().flat_map(|(_, e)| e.node_ids.iter().copied()).max().unwrap_or(0) + 1;
+    let mut next_element = explicit().flat_map(|(_, e)| e.element_ids.iter().copied()).max().unwrap_or(0) + 1;
+    // Numbers of different parts may not meet; inside a part this was looked at when it was read.
+    let mut node_owner: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut element_owner: BTreeMap<u32, usize> = BTreeMap::new();
+    for draft in drafts {
+        let (positions, topology) = match &draft.block {
+            Some(block) => (block.positions.as_slice(), block.topology.clone()),
+            None => (&[][..], Topology::Explicit { hexahedra: Vec::new() }),
+        };
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend_from_slice(positions);
+        let mut part = Part {
+            name: draft.name.clone(),
+            material: draft.material.unwrap_or(0),
+            topology,
+            nodes: (first..mesh.positions.len() as u32).collect(),
+            element_ids: Vec::new(),
+        };
+        match &draft.explicit {
+            Some(own) => {
+                for (ids, places, owner, what) in [
+                    (&own.node_ids, &own.node_places, &mut node_owner, "node"),
+                    (&own.element_ids, &own.element_places, &mut element_owner, "element"),
+                ] {
+                    for (id, place) in ids.iter().zip(places) {
+                        if let Some(other) = owner.insert(*id, *place) {
+                            let (line, _) = faults.place(other);
+                            faults.add(
+                                *place,
+                                format!("{what} {id} of part \"{}\"", draft.name),
+                                format!("a number other than {id}, which line {line} has"),
+                                "renumber one; nodes shared by parts are listed in both and joined",
+                            );
+                        }
+                    }
+                }
+                mesh.node_ids.extend(&own.node_ids);
+                part.element_ids = own.element_ids.clone();
+            }
+            None => {
+                let n_elements = part.n_elements() as u32;
+                mesh.node_ids.extend(next_node..next_node + part.nodes.len() as u32);
+                next_node += part.nodes.len() as u32;
+                part.element_ids = (next_element..next_element + n_elements).collect();
+                next_element += n_elements;
+            }
+        }
+        mesh.parts.push(part);
+    }
+    mesh
+}
+
+/// Smallest and largest edge of a part.
+fn edges(positions: &[[f64; 3]], part: &Part) -> (f64, f64) {
+    let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+    for e in 0..part.n_elements() {
+        let corners = part.corners(e);
+        for [a, b] in EDGES {
+            let long = norm(sub(positions[corners[a] as usize], positions[corners[b] as usize]));
+            low = low.min(long);
+            high = high.max(long);
+        }
+    }
+    (low, high)
+}
+
+/// Merges coincident nodes of joined parts: a merged node keeps the lowest index, the others close up.
+fn merge(mesh: &mut Mesh, joins: &[Join], assembly: &mut Assembly, faults: &Faults<'_>) {
+    let n_nodes = mesh.n_nodes();
+    let mut part_of = vec![0u32; n_nodes];
+    for (p, part) in mesh.parts.iter().enumerate() {
+        for node in &part.nodes {
+            part_of[*node as usize] = p as u32;
+        }
+    }
+    // Each node points to one of lower or equal index; following them ends at the node that stays.
+    let mut root: Vec<u32> = (0..n_nodes as u32).collect();
+    for join in joins {
+        let edge = join.parts.iter().map(|&p| assembly.smallest_edge[p]).fold(f64::INFINITY, f64::min);
+        let tolerance = join.tolerance * edge;
+        let empty = join.parts.iter().any(|&p| mesh.parts[p].nodes.is_empty());
+        if !tolerance.is_finite() || tolerance <= 0.0 || empty {
+            continue;
+        }
+        let merged = merge_pairs(mesh, join, tolerance, &part_of, &mut root);
+        if merged == 0 {
+            let names: Vec<String> =
+                join.parts.iter().map(|&p| format!("\"{}\"", mesh.parts[p].name)).collect();
+            faults.add(
+                join.at,
+                format!("a join of parts {} that share no nodes", names.join(", ")),
+                format!("coincident nodes within {tolerance:e}"),
+                "move or mesh the parts so that nodes coincide, or raise the tolerance",
+            );
+        }
+    }
+    for node in 0..n_nodes as u32 {
+        root[node as usize] = find(&root, node);
+    }
+    collapsed(mesh, &root, &part_of, joins, faults);
+    // Close up the numbering.
+    let mut new = vec![0u32; n_nodes];
+    let mut kept = 0;
+    for node in 0..n_nodes {
+        if root[node] == node as u32 {
+            new[node] = kept;
+            mesh.positions[kept as usize] = mesh.positions[node];
+            mesh.node_ids[kept as usize] = mesh.node_ids[node];
+            kept += 1;
+        }
+    }
+    mesh.positions.truncate(kept as usize);
+    mesh.node_ids.truncate(kept as usize);
+    for node in 0..n_nodes {
+        new[node] = new[root[node] as usize];
+        if root[node] != node as u32 {
+            let (a, b) = (part_of[root[node] as usize] as usize, part_of[node] as usize);
+            assembly.joined.push((a.min(b), a.max(b)));
+        }
+    }
+    for part in &mut mesh.parts {
+        for node in &mut part.nodes {
+            *node = new[*node as usize];
+        }
+    }
+    for node in assembly.node_of_id.values_mut() {
+        *node = new[*node as usize];
+    }
+    assembly.joined.sort_unstable();
+    assembly.joined.dedup();
+}
+
+/// The node that `node` is merged into so far.
+fn find(root: &[u32], mut node: u32) -> u32 {
+    while root[node as usize] != node {
+        node = root[node as usize];
+    }
+    node
+}
+
+/// Unites every pair of nodes of different parts of a join within `tolerance`; the number of pairs. The
+/// result does not depend on the order in which pairs are met.
+fn merge_pairs(mesh: &Mesh, join: &Join, tolerance: f64, part_of: &[u32], root: &mut [u32]) -> usize {
+    let cell = |p: [f64; 3]| p.map(|x| (x / (2.0 * tolerance)).floor() as i64);
+    let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let mut merged = 0;
+    for &p in &join.parts {
+        let part = &mesh.parts[p];
+        for &node in &part.nodes {
+            let x = mesh.positions[node as usize];
+            // The cells that the ball around the node touches: one or two along each axis.
+            let low = cell(x.map(|c| c - tolerance));
+            let high = cell(x.map(|c| c + tolerance));
+            for i in low[0]..=high[0] {
+                for j in low[1]..=high[1] {
+                    for k in low[2]..=high[2] {
+                        for &other in cells.get(&[i, j, k]).map_or(&[][..], Vec::as_slice) {
+                            let near = norm(sub(mesh.positions[other as usize], x)) <= tolerance;
+                            if near && part_of[other as usize] != part_of[node as usize] {
+                                let (a, b) = (find(root, node), find(root, other));
+                                root[a.max(b) as usize] = a.min(b);
+                                merged += 1;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        for &node in &part.nodes {
+            cells.entry(cell(mesh.positions[node as usize])).or_default().push(node);
+        }
+    }
+    merged
+}
+
+/// Reports parts of which a join would merge two nodes of their own.
+fn collapsed(mesh: &Mesh, root: &[u32], part_of: &[u32], joins: &[Join], faults: &Faults<'_>) {
+    let mut last: HashMap<(u32, u32), u32> = HashMap::new();
+    let mut reported = vec![false; mesh.parts.len()];
+    for node in 0..root.len() {
+        let part = part_of[node];
+        if let Some(other) = last.insert((root[node], part), node as u32)
+            && !std::mem::replace(&mut reported[part as usize], true)
+        {
+            let at = joins.iter().find(|j| j.parts.contains(&(part as usize))).map_or(0, |j| j.at);
+            faults.add(
+                at,
+                format!(
+                    "a join that merges nodes {} and {} of the same part \"{}\"",
+                    mesh.node_ids[other as usize], mesh.node_ids[node], mesh.parts[part as usize].name
+                ),
+                "at most one node of each part in one place",
+                "lower the tolerance",
+            );
+        }
+    }
+}
+
+/// Named faces of a part by global node.
+fn global_faces(draft: &PartDraft, part: &Part) -> Vec<(&'static str, Vec<u32>)> {
+    let Some(block) = &draft.block else { return Vec::new() };
+    block
+        .faces
+        .iter()
+        .map(|(name, nodes)| (*name, nodes.iter().map(|local| part.nodes[*local as usize]).collect()))
+        .collect()
+}
+
+/// Initial velocities, mass-weighted where parts share a node, and the kinetic energy that this loses.
+fn velocities(assembly: &mut Assembly, materials: &[Material]) {
+    let mesh = &assembly.mesh;
+    assembly.velocity = vec![[0.0; 3]; mesh.n_nodes()];
+    for (part, velocity) in mesh.parts.iter().zip(&assembly.part_velocity) {
+        for node in &part.nodes {
+            assembly.velocity[*node as usize] = *velocity;
+        }
+    }
+    if assembly.joined.is_empty() {
+        return;
+    }
+    let mut holders: BTreeMap<u32, Vec<(usize, f64)>> = BTreeMap::new();
+    let mut count = vec![0u32; mesh.n_nodes()];
+    for part in &mesh.parts {
+        for node in &part.nodes {
+            count[*node as usize] += 1;
+        }
+    }
+    let mut element = 0;
+    for (p, part) in mesh.parts.iter().enumerate() {
+        let density = materials.get(part.material as usize).map_or(1.0, |m| m.density);
+        for e in 0..part.n_elements() {
+            let mass = density * assembly.volumes[element] / 8.0;
+            element += 1;
+            for node in part.corners(e) {
+                if count[node as usize] > 1 {
+                    let list = holders.entry(node).or_default();
+                    match list.iter_mut().find(|(q, _)| *q == p) {
+                        Some((_, m)) => *m += mass,
+                        None => list.push((p, mass)),
+                    }
+                }
+            }
+        }
+    }
+    for (node, list) in holders {
+        let first = assembly.part_velocity[list[0].0];
+        if list.iter().all(|(p, _)| assembly.part_velocity[*p] == first) {
+            assembly.velocity[node as usize] = first;
+            continue;
+        }
+        let total: f64 = list.iter().map(|(_, m)| m).sum();
+        let mut velocity = [0.0; 3];
+        let mut before = 0.0;
+        for (p, m) in &list {
+            let v = assembly.part_velocity[*p];
+            for (sum, component) in velocity.iter_mut().zip(v) {
+                *sum += m * component / total;
+            }
+            before += 0.5 * m * dot(v, v);
+        }
+        assembly.join_energy += before - 0.5 * total * dot(velocity, velocity);
+        assembly.velocity[node as usize] = velocity;
+    }
+}

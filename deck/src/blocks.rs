@@ -1,0 +1,184 @@
+//! Mesh blocks: the shapes a deck can ask for, as nodes and hexahedra of one part.
+//!
+//! A shape is first read ([`Shape`]), its size checked against the limits, and only then built, so that no
+//! deck allocates more than the limits allow. Every shape gives hexahedra of positive volume, which the
+//! whole-mesh check confirms again.
+
+mod o_grid;
+mod structured;
+
+pub(crate) use structured::graded;
+
+use mechanics::mesh::Topology;
+
+use crate::geometry::{add, cross, dot, scaled, sub};
+
+/// Nodes and elements of one part, before parts are put together.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    pub(crate) positions: Vec<[f64; 3]>,
+    pub(crate) topology: Topology,
+    /// Named outer faces: the local nodes of each.
+    pub(crate) faces: Vec<(&'static str, Vec<u32>)>,
+}
+
+/// A shape with all its numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Shape {
+    /// A brick with node planes at these coordinates.
+    Brick {
+        /// Ascending coordinates along x, y, z.
+        coordinates: [Vec<f64>; 3],
+    },
+    /// A solid cylinder as an O-grid: a square core of `2 core` cells across inside rings.
+    Cylinder {
+        axis: usize,
+        base: [f64; 3],
+        radius: f64,
+        length: f64,
+        sector: Sector,
+        /// Half width of the core over the radius.
+        core_fraction: f64,
+        /// Cells across half the core, through the rings, along the axis.
+        cells: [u32; 3],
+    },
+    /// A solid sphere as a cube of cells inside layers.
+    Sphere {
+        centre: [f64; 3],
+        radius: f64,
+        sector: Sector,
+        core_fraction: f64,
+        /// Cells across half the core, through the layers.
+        cells: [u32; 2],
+    },
+    /// A hollow cylinder or a piece of one; I is radial, J goes round, K along the axis.
+    Tube {
+        axis: usize,
+        base: [f64; 3],
+        /// Inner and outer radius.
+        radii: [f64; 2],
+        length: f64,
+        /// First angle and angle covered (degrees); 360 closes the tube.
+        degrees: [f64; 2],
+        cells: [u32; 3],
+    },
+}
+
+/// How much of a round body is meshed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
+pub(crate) enum Sector {
+    Full,
+    /// Where the second local axis is not negative (sphere: z).
+    Half,
+    /// Where both local axes are not negative (sphere: y and z).
+    Quarter,
+    /// Sphere only: where x, y and z are not negative.
+    Octant,
+}
+
+impl Shape {
+    /// Number of nodes and elements that [`Shape::build`] makes; `None` past 2^63.
+    pub(crate) fn size(&self) -> Option<(u64, u64)> {
+        let wide = |c: u32| u64::from(c);
+        match self {
+            Self::Brick { coordinates } => {
+                let nodes = coordinates.iter().try_fold(1u64, |n, c| n.checked_mul(c.len() as u64))?;
+                let cells = coordinates.iter().try_fold(1u64, |n, c| n.checked_mul(c.len() as u64 - 1))?;
+                Some((nodes, cells))
+            }
+            Self::Cylinder { sector, cells: [core, ring, length], .. } => {
+                // No more than the full disc, which has (2c+1)^2 core nodes and 8c nodes a ring.
+                let quarters: u64 = if *sector == Sector::Full {
+                    4
+                } else if *sector == Sector::Half {
+                    2
+                } else {
+                    1
+                };
+                let core = wide(*core);
+                let layer = quarters.checked_mul(
+                    core.checked_mul(core)?.checked_add(core.checked_mul(wide(*ring))?.checked_mul(2)?)?,
+                )?;
+                let rim = core.checked_mul(8)?.checked_add(wide(*ring).checked_mul(2)?)?.checked_add(1)?;
+                let nodes = layer.checked_add(rim)?.checked_mul(wide(*length) + 1)?;
+                Some((nodes, layer.checked_mul(wide(*length))?))
+            }
+            Self::Sphere { sector, cells: [core, layers], .. } => {
+                let octants: u64 = match sector {
+                    Sector::Full => 8,
+                    Sector::Half => 4,
+                    Sector::Quarter => 2,
+                    Sector::Octant => 1,
+                };
+                let square = wide(*core).checked_mul(wide(*core))?;
+                let cells = octants.checked_mul(
+                    square
+                        .checked_mul(wide(*core))?
+                        .checked_add(square.checked_mul(wide(*layers))?.checked_mul(3)?)?,
+                )?;
+                // A convex grid of hexahedra has at most eight nodes a cell.
+                Some((cells.checked_mul(8)?, cells))
+            }
+            Self::Tube { cells, .. } => {
+                let nodes = cells.iter().try_fold(1u64, |n, &c| n.checked_mul(wide(c) + 1))?;
+                let elements = cells.iter().try_fold(1u64, |n, &c| n.checked_mul(wide(c)))?;
+                Some((nodes, elements))
+            }
+        }
+    }
+
+    /// The nodes and elements of this shape.
+    pub(crate) fn build(&self) -> Block {
+        match self {
+            Self::Brick { coordinates } => structured::brick(coordinates),
+            Self::Cylinder { axis, base, radius, length, sector, core_fraction, cells } => {
+                let mut block = o_grid::cylinder(*radius, *length, *sector, *core_fraction, *cells);
+                block.place(*axis, *base);
+                block
+            }
+            Self::Sphere { centre, radius, sector, core_fraction, cells } => {
+                let mut block = o_grid::sphere(*radius, *sector, *core_fraction, *cells);
+                block.place(2, *centre);
+                block
+            }
+            Self::Tube { axis, base, radii, length, degrees, cells } => {
+                let mut block = structured::tube(*radii, *length, *degrees, *cells);
+                block.place(*axis, *base);
+                block
+            }
+        }
+    }
+}
+
+impl Block {
+    /// Turns a block built along z so that its z axis becomes `axis` (x and y follow in cyclic order), then
+    /// moves its origin to `base`.
+    fn place(&mut self, axis: usize, base: [f64; 3]) {
+        for p in &mut self.positions {
+            let mut turned = [0.0; 3];
+            for (local, x) in p.iter().enumerate() {
+                turned[(local + axis + 1) % 3] = *x;
+            }
+            *p = add(turned, base);
+        }
+    }
+
+    /// Turns the block about an axis of unit length through `point` (Rodrigues), `degrees` counted by the
+    /// right hand.
+    pub(crate) fn rotate(&mut self, point: [f64; 3], axis: [f64; 3], degrees: f64) {
+        let [cosine, sine] = structured::cosine_and_sine(degrees);
+        for p in &mut self.positions {
+            let r = sub(*p, point);
+            let parallel = scaled(axis, dot(axis, r) * (1.0 - cosine));
+            let turned = add(add(scaled(r, cosine), scaled(cross(axis, r), sine)), parallel);
+            *p = add(turned, point);
+        }
+    }
+
+    /// Moves the block.
+    pub(crate) fn translate(&mut self, by: [f64; 3]) {
+        for p in &mut self.positions {
+            *p = add(*p, by);
+        }
+    }
+}

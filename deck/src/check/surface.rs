@@ -1,0 +1,84 @@
+//! The outer faces of parts, as far as the checks need them.
+
+use mechanics::mesh::Topology;
+
+use crate::{
+    assembly::Assembly,
+    geometry::{FACES, norm, sub},
+};
+
+/// An outer face of a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Face {
+    pub(crate) part: u32,
+    /// Global nodes, outward by the right hand.
+    pub(crate) nodes: [u32; 4],
+    /// Whether another part has the same face: joined bodies touch there and contact does not see it.
+    pub(crate) inside: bool,
+}
+
+/// Faces that one element of their part has, in the order of parts and elements.
+pub(crate) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
+    let mut keyed: Vec<([u32; 4], u64, Face)> = Vec::new();
+    let mut order = 0;
+    for (p, part) in assembly.mesh.parts.iter().enumerate() {
+        let first = keyed.len();
+        for e in 0..part.n_elements() {
+            let corners = part.corners(e);
+            for (f, face) in FACES.iter().enumerate() {
+                if let Topology::Structured { cells } = &part.topology
+                    && !on_side(*cells, e, f)
+                {
+                    continue;
+                }
+                let nodes = face.map(|c| corners[c]);
+                let mut key = nodes;
+                key.sort_unstable();
+                keyed.push((key, order, Face { part: p as u32, nodes, inside: false }));
+                order += 1;
+            }
+        }
+        if matches!(part.topology, Topology::Explicit { .. }) {
+            let mut own = keyed.split_off(first);
+            own.sort_unstable_by_key(|(key, order, _)| (*key, *order));
+            keyed.extend(own.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0]));
+        }
+    }
+    if !assembly.joined.is_empty() {
+        keyed.sort_unstable_by_key(|(key, order, _)| (*key, *order));
+        for same in keyed.chunk_by_mut(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
+            for (_, _, face) in same {
+                face.inside = true;
+            }
+        }
+    }
+    keyed.sort_unstable_by_key(|(_, order, _)| *order);
+    keyed.into_iter().map(|(_, _, face)| face).collect()
+}
+
+/// Whether face `f` of element `e` of a grid lies on the grid's side.
+fn on_side(cells: [u32; 3], e: usize, f: usize) -> bool {
+    let [ni, nj, nk] = cells.map(|c| c as usize);
+    let (i, j, k) = (e % ni, e / ni % nj, e / ni / nj);
+    // In the order of FACES.
+    [k == 0, k == nk - 1, j == 0, j == nj - 1, i == ni - 1, i == 0][f]
+}
+
+/// The shortest edge of the outer faces of parts that meet any part; none where there is no such face.
+pub(crate) fn smallest_face_dimension(
+    assembly: &Assembly,
+    faces: &[Face],
+    interacts: &[bool],
+) -> Option<f64> {
+    let n = assembly.mesh.parts.len();
+    let meets: Vec<bool> = (0..n).map(|p| interacts[p * n..(p + 1) * n].contains(&true)).collect();
+    let mut smallest = f64::INFINITY;
+    for face in faces.iter().filter(|face| meets[face.part as usize] && !face.inside) {
+        for side in 0..4 {
+            let [a, b] =
+                [side, (side + 1) % 4].map(|corner| assembly.mesh.positions[face.nodes[corner] as usize]);
+            smallest = smallest.min(norm(sub(a, b)));
+        }
+    }
+    (smallest > 0.0 && smallest.is_finite()).then_some(smallest)
+}

@@ -1,0 +1,209 @@
+//! Contact zones that overlap at the start: a node of one part inside another part, or nearer than the gap
+//! to a face of it.
+//!
+//! The gap lies outside the bodies, so parts that touch in reality start one gap apart in the deck. Pairs
+//! that do not interact, and pairs that joins make one body, are not looked at. Each pair is reported once,
+//! with its worst node.
+
+use std::collections::BTreeMap;
+
+use super::Face;
+use crate::{
+    assembly::Assembly,
+    fault::Faults,
+    format::{ContactDraft, PartDraft},
+    geometry::{add, scaled, triangle_distance},
+};
+
+/// A gap that the deck rounded is still a gap.
+const ROUNDING: f64 = 1e-6;
+
+/// The least distance found for a pair, and whether a node is inside.
+#[derive(Clone, Copy)]
+struct Worst {
+    node: u32,
+    distance: f64,
+    inside: bool,
+}
+
+/// Reports every pair of parts whose zones overlap.
+pub(crate) fn overlaps(
+    parts: &[PartDraft],
+    assembly: &Assembly,
+    contact: &ContactDraft,
+    faults: &Faults<'_>,
+) {
+    let n = parts.len();
+    let surfaces: Vec<Surface> = (0..n).map(|p| Surface::of(p as u32, assembly, &contact.faces)).collect();
+    let gap = contact.settings.gap;
+    let mut found: BTreeMap<(usize, usize), Worst> = BTreeMap::new();
+    for (a, nodes) in surfaces.iter().enumerate() {
+        for (b, faces) in surfaces.iter().enumerate() {
+            let pair = (a.min(b), a.max(b));
+            let apart = a == b || !contact.settings.interacts[a * n + b] || assembly.joined.contains(&pair);
+            if apart || !nodes.meets(faces, gap) {
+                continue;
+            }
+            if let Some(worst) = worst_node(nodes, faces, assembly, gap) {
+                let deeper = |old: &Worst| {
+                    (worst.inside && !old.inside)
+                        || (worst.inside == old.inside && worst.distance < old.distance)
+                };
+                let entry = found.entry(pair).or_insert(worst);
+                if deeper(entry) {
+                    *entry = worst;
+                }
+            }
+        }
+    }
+    for ((a, b), worst) in found {
+        let (line, _) = faults.place(parts[a].at);
+        let id = assembly.mesh.node_ids[worst.node as usize];
+        let how = if worst.inside {
+            format!("node {id} inside the other part")
+        } else {
+            format!("node {id} only {} from the other part", worst.distance)
+        };
+        faults.add(
+            parts[b].at,
+            format!("part \"{}\" that meets part \"{}\" (line {line}): {how}", parts[b].name, parts[a].name),
+            format!("parts at least one gap ({gap}) apart at the start"),
+            "move one of them, join them, or switch the pair off in [[contact.pair]]",
+        );
+    }
+}
+
+/// The outer faces and nodes of one part, and the box around them.
+struct Surface<'a> {
+    faces: Vec<&'a Face>,
+    nodes: Vec<u32>,
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+impl<'a> Surface<'a> {
+    fn of(part: u32, assembly: &Assembly, faces: &'a [Face]) -> Self {
+        let faces: Vec<&Face> = faces.iter().filter(|f| f.part == part).collect();
+        let mut nodes: Vec<u32> = faces.iter().flat_map(|f| f.nodes).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for node in &nodes {
+            for (axis, x) in assembly.mesh.positions[*node as usize].into_iter().enumerate() {
+                low[axis] = low[axis].min(x);
+                high[axis] = high[axis].max(x);
+            }
+        }
+        Self { faces, nodes, low, high }
+    }
+
+    /// Whether the boxes come within `reach`.
+    fn meets(&self, other: &Self, reach: f64) -> bool {
+        (0..3).all(|a| self.low[a] <= other.high[a] + reach && other.low[a] <= self.high[a] + reach)
+    }
+}
+
+/// The worst node of one surface against the faces of another.
+fn worst_node(nodes: &Surface<'_>, faces: &Surface<'_>, assembly: &Assembly, gap: f64) -> Option<Worst> {
+    let position = |node: u32| assembly.mesh.positions[node as usize];
+    let candidates: Vec<u32> = nodes
+        .nodes
+        .iter()
+        .copied()
+        .filter(|&node| {
+            let x = position(node);
+            (0..3).all(|a| x[a] >= faces.low[a] - gap && x[a] <= faces.high[a] + gap)
+        })
+        .collect();
+    // Columns along z: a face can only be above or near a node whose column it reaches.
+    let columns = Columns::of(&candidates, assembly, faces, gap);
+    let mut nearest = vec![f64::INFINITY; candidates.len()];
+    let mut above = vec![0u32; candidates.len()];
+    for face in &faces.faces {
+        let corners = face.nodes.map(position);
+        let middle = scaled(add(add(corners[0], corners[1]), add(corners[2], corners[3])), 0.25);
+        for &c in columns.of_face(&corners, gap).iter() {
+            let x = position(candidates[c as usize]);
+            for side in 0..4 {
+                let (p, q) = (corners[side], corners[(side + 1) % 4]);
+                nearest[c as usize] = nearest[c as usize].min(triangle_distance(x, p, q, middle));
+                above[c as usize] += u32::from(crosses(columns.beside(x), p, q, middle));
+            }
+        }
+    }
+    let worst = (0..candidates.len())
+        .map(|c| Worst { node: candidates[c], distance: nearest[c], inside: above[c] % 2 == 1 })
+        .filter(|w| w.inside || w.distance < gap * (1.0 - ROUNDING))
+        .min_by(|a, b| b.inside.cmp(&a.inside).then(a.distance.total_cmp(&b.distance)))?;
+    Some(worst)
+}
+
+/// Whether the ray from `x` along +z crosses the triangle.
+fn crosses(x: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> bool {
+    let turn =
+        |p: [f64; 3], q: [f64; 3]| (q[0] - p[0]).mul_add(x[1] - p[1], -((q[1] - p[1]) * (x[0] - p[0])));
+    let (u, v, w) = (turn(b, c), turn(c, a), turn(a, b));
+    if !((u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0)) {
+        return false;
+    }
+    let sum = u + v + w;
+    (u / sum).mul_add(a[2], (v / sum).mul_add(b[2], (w / sum) * c[2])) > x[2]
+}
+
+/// Nodes sorted into columns along z.
+struct Columns {
+    /// Nodes (by index among the candidates) of each column.
+    columns: BTreeMap<[i64; 2], Vec<u32>>,
+    width: f64,
+    /// How far rays stand beside their node, so that they miss edges of aligned meshes.
+    aside: [f64; 2],
+}
+
+impl Columns {
+    fn of(candidates: &[u32], assembly: &Assembly, faces: &Surface<'_>, gap: f64) -> Self {
+        let part = faces.faces.first().map_or(0, |f| f.part as usize);
+        let edge = assembly.smallest_edge[part];
+        let width = assembly.largest_edge[part].max(gap);
+        let mut this = Self {
+            columns: BTreeMap::new(),
+            width,
+            aside: [0.618_033_988e-4 * edge, 0.414_213_562e-4 * edge],
+        };
+        for (c, node) in candidates.iter().enumerate() {
+            let x = assembly.mesh.positions[*node as usize];
+            let column = this.column(x[0], x[1]);
+            this.columns.entry(column).or_default().push(c as u32);
+        }
+        this
+    }
+
+    fn column(&self, x: f64, y: f64) -> [i64; 2] {
+        [x, y].map(|c| (c / self.width).floor() as i64)
+    }
+
+    /// The start of a node's ray.
+    fn beside(&self, x: [f64; 3]) -> [f64; 3] {
+        [x[0] + self.aside[0], x[1] + self.aside[1], x[2]]
+    }
+
+    /// The nodes in the columns that a face reaches; a face is at most one width across, so these are a
+    /// few columns.
+    fn of_face(&self, corners: &[[f64; 3]; 4], gap: f64) -> Vec<u32> {
+        let end = |axis: usize, pick: fn(f64, f64) -> f64, start: f64| {
+            corners.iter().map(|c| c[axis]).fold(start, pick)
+        };
+        let low = self.column(
+            end(0, f64::min, f64::INFINITY) - gap - self.aside[0],
+            end(1, f64::min, f64::INFINITY) - gap - self.aside[1],
+        );
+        let high =
+            self.column(end(0, f64::max, f64::NEG_INFINITY) + gap, end(1, f64::max, f64::NEG_INFINITY) + gap);
+        let mut nodes = Vec::new();
+        for i in low[0]..=high[0] {
+            for (_, column) in self.columns.range([i, low[1]]..=[i, high[1]]) {
+                nodes.extend_from_slice(column);
+            }
+        }
+        nodes
+    }
+}

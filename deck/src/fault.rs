@@ -1,0 +1,184 @@
+//! A fault of a deck: where it stands, what was read, what was expected, what to do.
+//!
+//! Reading never stops at the first fault: every stage adds to one [`Faults`] and goes on with what it
+//! has, so a user sees the whole list at once.
+
+use std::{cell::RefCell, fmt};
+
+/// Most faults reported for one deck; the list ends with the number left out.
+pub const MAX_FAULTS: usize = 500;
+
+/// Longest piece of deck text quoted in a fault (characters).
+const MAX_QUOTE: usize = 60;
+
+/// One fault. Displayed as `file:line:column: read X; expected Y; do Z`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Name of the deck as its caller gave it.
+    pub file: String,
+    /// Line, from 1.
+    pub line: u32,
+    /// Column in characters, from 1.
+    pub column: u32,
+    /// What stands in the deck.
+    pub read: String,
+    /// What should stand there.
+    pub expected: String,
+    /// What the user can do.
+    pub advice: String,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, line, column, read, expected, advice } = self;
+        write!(f, "{file}:{line}:{column}: read {read}; expected {expected}; {advice}")
+    }
+}
+
+impl std::error::Error for Fault {}
+
+/// The faults found so far, with the text that turns offsets into lines and columns.
+pub(crate) struct Faults<'a> {
+    file: &'a str,
+    text: &'a str,
+    line_starts: Vec<usize>,
+    list: RefCell<Vec<Fault>>,
+}
+
+impl<'a> Faults<'a> {
+    /// No faults yet.
+    pub(crate) fn new(file: &'a str, text: &'a str) -> Self {
+        let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
+        Self { file, text, line_starts, list: RefCell::new(Vec::new()) }
+    }
+
+    /// Adds a fault at byte offset `at` of the text.
+    pub(crate) fn add(
+        &self,
+        at: usize,
+        read: impl Into<String>,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) {
+        let (line, column) = self.place(at);
+        self.list.borrow_mut().push(Fault {
+            file: self.file.to_string(),
+            line,
+            column,
+            read: read.into(),
+            expected: expected.into(),
+            advice: advice.into(),
+        });
+    }
+
+    /// Line and column of a byte offset, both from 1. Offsets past the end or inside a character are
+    /// moved back to the nearest character.
+    pub(crate) fn place(&self, at: usize) -> (u32, u32) {
+        let mut at = at.min(self.text.len());
+        while !self.text.is_char_boundary(at) {
+            at -= 1;
+        }
+        let line = self.line_starts.partition_point(|&start| start <= at);
+        let start = self.line_starts[line - 1];
+        (line as u32, self.text[start..at].chars().count() as u32 + 1)
+    }
+
+    /// The deck's own words between two offsets, on one line and cut to a readable length.
+    pub(crate) fn quote(&self, from: usize, to: usize) -> String {
+        let piece = self.text.get(from..to).unwrap_or_default();
+        let mut words = String::new();
+        for (n, c) in piece.split_whitespace().flat_map(|w| w.chars().chain([' '])).enumerate() {
+            if n >= MAX_QUOTE {
+                return words.trim_end().to_string() + "...";
+            }
+            words.push(c);
+        }
+        words.trim_end().to_string()
+    }
+
+    /// Number of faults so far.
+    pub(crate) fn count(&self) -> usize {
+        self.list.borrow().len()
+    }
+
+    /// The faults in the order of their places, at most [`MAX_FAULTS`] and then one with the rest.
+    pub(crate) fn into_list(self) -> Vec<Fault> {
+        let mut list = self.list.into_inner();
+        list.sort_by_key(|fault| (fault.line, fault.column));
+        if list.len() > MAX_FAULTS {
+            let rest = list.len() - MAX_FAULTS;
+            list.truncate(MAX_FAULTS);
+            list.push(Fault {
+                file: self.file.to_string(),
+                line: 1,
+                column: 1,
+                read: format!("{rest} more faults"),
+                expected: "none".to_string(),
+                advice: "mend those above and check again".to_string(),
+            });
+        }
+        list
+    }
+}
+
+/// The known word nearest to `word`, if it is near enough to be what was meant.
+pub(crate) fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
+    if word.chars().count() > MAX_QUOTE {
+        return None;
+    }
+    let lower = word.to_lowercase();
+    known
+        .into_iter()
+        .map(|k| (edit_distance(&lower, &k.to_lowercase()), k))
+        .filter(|&(d, k)| d <= 1 + k.chars().count() / 3)
+        .min_by_key(|&(d, _)| d)
+        .map(|(_, k)| k)
+}
+
+/// Least number of insertions, deletions and replacements between two words (Levenshtein).
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &cb) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(ca != cb);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_count_characters_not_bytes() {
+        let faults = Faults::new("a.toml", "title = \"é\" x\ny");
+        assert_eq!(faults.place(12), (1, 12));
+        assert_eq!(faults.place(14), (1, 14));
+        assert_eq!(faults.place(15), (2, 1));
+        assert_eq!(faults.place(1000), (2, 2));
+    }
+
+    #[test]
+    fn nearest_finds_a_misspelt_key_and_ignores_a_foreign_one() {
+        assert_eq!(nearest("velocty", ["velocity", "material"]), Some("velocity"));
+        assert_eq!(nearest("banana", ["velocity", "material"]), None);
+    }
+
+    #[test]
+    fn faults_are_listed_in_the_order_of_their_places() {
+        let faults = Faults::new("a.toml", "a\nb\nc");
+        faults.add(4, "c", "d", "write d");
+        faults.add(0, "a", "b", "write b");
+        let text: Vec<String> = faults.into_list().iter().map(Fault::to_string).collect();
+        assert_eq!(
+            text,
+            ["a.toml:1:1: read a; expected b; write b", "a.toml:3:1: read c; expected d; write d"]
+        );
+    }
+}

@@ -1,0 +1,409 @@
+//! `[[part]]`: name, material, velocity, and its mesh as a block or as nodes and elements.
+
+use std::collections::BTreeMap;
+
+use mechanics::mesh::Topology;
+
+use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials};
+use crate::{
+    blocks::{Block, Sector, Shape, graded},
+    geometry::{norm, scaled},
+    table::{Range, Table, Value},
+};
+
+/// Most cells along one direction of a block.
+const MAX_CELLS: u64 = 10_000_000;
+/// Greatest node or element number a deck may give; generated numbers go on above.
+const MAX_ID: u64 = 2_000_000_000;
+
+/// A part as the deck describes it.
+pub(crate) struct PartDraft {
+    pub(crate) name: String,
+    /// Offset of the part in the text.
+    pub(crate) at: usize,
+    /// Index into the materials in use; none after a fault.
+    pub(crate) material: Option<u32>,
+    pub(crate) velocity: [f64; 3],
+    /// None after a fault.
+    pub(crate) block: Option<Block>,
+    /// Numbers and places of an explicit mesh.
+    pub(crate) explicit: Option<Explicit>,
+}
+
+/// What the deck says about nodes and elements of its own.
+pub(crate) struct Explicit {
+    pub(crate) node_ids: Vec<u32>,
+    pub(crate) element_ids: Vec<u32>,
+    /// Offset of each node in the text.
+    pub(crate) node_places: Vec<usize>,
+    /// Offset of each element in the text.
+    pub(crate) element_places: Vec<usize>,
+}
+
+/// Reads every part. A part with a fault keeps its place in the list, so that others may refer to it.
+pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials) -> Vec<PartDraft> {
+    let tables = deck.tables("part", MAX_PARTS);
+    if tables.is_empty() && !deck.has("part") {
+        deck.faults.add(0, "a deck without [[part]]", "at least one part", "add a [[part]]");
+    }
+    let mut parts: Vec<PartDraft> = Vec::new();
+    let mut budget = Budget { nodes: MAX_NODES, elements: MAX_ELEMENTS };
+    for (n, table) in tables.into_iter().enumerate() {
+        let value = table.require("name", "a name in quotes");
+        let name = value.and_then(|v| v.name());
+        let at = value.map_or(table.at, |v| v.at);
+        if let (Some(name), Some(value)) = (&name, value) {
+            if let Some(first) = parts.iter().find(|p| p.name == *name) {
+                let (line, _) = deck.faults.place(first.at);
+                value.fault(
+                    &format!("a name that the part at line {line} does not use"),
+                    "choose another name",
+                );
+            }
+            if name == "all" {
+                value.fault("a name other than \"all\", which stands for every part", "choose another name");
+            }
+        }
+        let name = name.unwrap_or_else(|| format!("part {}", n + 1));
+        let material = table
+            .require("material", "a material by name or as an inline table")
+            .and_then(|v| materials.resolve(v, &name));
+        let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
+        let (mut block, explicit) = read_mesh(&table, &name, &mut budget);
+        if let Some(block) = &mut block {
+            transform(&table, block);
+        } else {
+            // The keys are known even where there is nothing to move.
+            let _ = (table.get("rotate"), table.get("translate"));
+        }
+        table.finish();
+        parts.push(PartDraft { name, at, material, velocity, block, explicit });
+    }
+    parts
+}
+
+/// Nodes and elements that may still be made.
+struct Budget {
+    nodes: u64,
+    elements: u64,
+}
+
+impl Budget {
+    /// Takes a mesh of that size from the budget, or reports that it is too large.
+    fn take(&mut self, size: Option<(u64, u64)>, at: usize, title: &str, table: &Table<'_>) -> Option<()> {
+        let (nodes, elements) = size.unwrap_or((u64::MAX, u64::MAX));
+        if nodes > self.nodes || elements > self.elements {
+            table.faults.add(
+                at,
+                format!("{title} with some {nodes} nodes and {elements} elements"),
+                format!("at most {MAX_NODES} nodes and {MAX_ELEMENTS} elements in all parts together"),
+                "use fewer cells",
+            );
+            return None;
+        }
+        self.nodes -= nodes;
+        self.elements -= elements;
+        Some(())
+    }
+}
+
+/// The mesh of a part: exactly one of the blocks, or `mesh`.
+fn read_mesh(table: &Table<'_>, name: &str, budget: &mut Budget) -> (Option<Block>, Option<Explicit>) {
+    const KINDS: [&str; 5] = ["box", "cylinder", "sphere", "tube", "mesh"];
+    let present: Vec<(&'static str, Value<'_>)> =
+        KINDS.iter().filter_map(|kind| table.get(kind).map(|v| (*kind, v))).collect();
+    let [(kind, value)] = present[..] else {
+        let found: Vec<&str> = present.iter().map(|(kind, _)| *kind).collect();
+        let read = if found.is_empty() { "no mesh".to_string() } else { found.join(" and ") };
+        table.faults.add(
+            table.at,
+            format!("{read} in {}", table.title),
+            format!("exactly one of {}", KINDS.join(", ")),
+            "give each part one mesh, for instance [part.box]",
+        );
+        return (None, None);
+    };
+    let Some(inner) = value.table(format!("{kind} of \"{name}\"")) else { return (None, None) };
+    if kind == "mesh" {
+        return match read_explicit(inner, budget) {
+            Some((block, explicit)) => (Some(block), Some(explicit)),
+            None => (None, None),
+        };
+    }
+    let shape = match kind {
+        "box" => read_box(&inner),
+        "cylinder" => read_cylinder(&inner),
+        "sphere" => read_sphere(&inner),
+        _ => read_tube(&inner),
+    };
+    let (at, title) = (inner.at, inner.title.clone());
+    inner.finish();
+    let block = shape.and_then(|shape| {
+        budget.take(shape.size(), at, &title, table)?;
+        Some(shape.build())
+    });
+    (block, None)
+}
+
+const CELLS: &str = "three whole numbers [I, J, K] of at least 1";
+
+fn read_box(table: &Table<'_>) -> Option<Shape> {
+    if ["x", "y", "z"].iter().any(|key| table.has(key)) {
+        let coordinates = ["x", "y", "z"].map(|key| read_coordinates(table, key));
+        let [Some(x), Some(y), Some(z)] = coordinates else { return None };
+        return Some(Shape::Brick { coordinates: [x, y, z] });
+    }
+    let origin = table.vector("origin");
+    let size = table
+        .require("size", "[x, y, z]")
+        .and_then(|v| v.numbers::<3>("three lengths [x, y, z]", Range::Positive));
+    let cells = table.require("cells", CELLS).and_then(|v| v.integers::<3>(CELLS, 1, MAX_CELLS));
+    let grading = match table.get("grading") {
+        None => Some([1.0; 3]),
+        Some(v) => v.numbers::<3>(
+            "three ratios of last to first cell [x, y, z]",
+            Range::Within(1e-3, 1e3, "a ratio from 0.001 to 1000"),
+        ),
+    };
+    let (origin, size, cells, grading) = (origin?, size?, cells?, grading?);
+    // The planes are made here, so the count is looked at before.
+    let planes: u64 = cells.iter().try_fold(1u64, |n, c| n.checked_mul(c + 1)).unwrap_or(u64::MAX);
+    if planes > MAX_NODES {
+        table.faults.add(
+            table.at,
+            format!("{} with cells = {cells:?}", table.title),
+            format!("at most {MAX_NODES} nodes"),
+            "use fewer cells",
+        );
+        return None;
+    }
+    let coordinates = [0, 1, 2].map(|a| graded(origin[a], size[a], cells[a] as u32, grading[a]));
+    Some(Shape::Brick { coordinates })
+}
+
+/// A list of ascending coordinates.
+fn read_coordinates(table: &Table<'_>, key: &'static str) -> Option<Vec<f64>> {
+    let value = table.require(key, "a list of ascending coordinates (x, y and z together)")?;
+    let mut list = Vec::new();
+    for item in value.items()? {
+        list.push(item.number(Range::Any)?);
+    }
+    if list.len() < 2 || list.windows(2).any(|w| w[0] >= w[1]) {
+        value.fault("at least two coordinates, each above the one before", "sort them and remove doubles");
+        return None;
+    }
+    Some(list)
+}
+
+/// Axis letter, default z.
+fn read_axis(table: &Table<'_>) -> Option<usize> {
+    match table.get("axis") {
+        None => Some(2),
+        Some(value) => value.one_of(&["x", "y", "z"]),
+    }
+}
+
+fn read_sector(table: &Table<'_>, words: &[&'static str]) -> Option<Sector> {
+    let index = match table.get("sector") {
+        None => 0,
+        Some(value) => value.one_of(words)?,
+    };
+    Some([Sector::Full, Sector::Half, Sector::Quarter, Sector::Octant][index])
+}
+
+const CORE: Range = Range::Within(0.1, 0.9, "a number above 0.1 and at most 0.9");
+
+fn read_cylinder(table: &Table<'_>) -> Option<Shape> {
+    let axis = read_axis(table);
+    let base = table.vector("base");
+    let radius = table.number("radius", Range::Positive);
+    let length = table.number("length", Range::Positive);
+    let sector = read_sector(table, &["full", "half", "quarter"]);
+    let core_fraction = table.number_or("core_fraction", 0.5, CORE);
+    let words = "three whole numbers [core, ring, length] of at least 1";
+    let cells = table.require("cells", words).and_then(|v| v.integers::<3>(words, 1, MAX_CELLS));
+    Some(Shape::Cylinder {
+        axis: axis?,
+        base: base?,
+        radius: radius?,
+        length: length?,
+        sector: sector?,
+        core_fraction,
+        cells: cells?.map(|c| c as u32),
+    })
+}
+
+fn read_sphere(table: &Table<'_>) -> Option<Shape> {
+    let centre = table.vector("centre");
+    let radius = table.number("radius", Range::Positive);
+    let sector = read_sector(table, &["full", "half", "quarter", "octant"]);
+    let core_fraction = table.number_or("core_fraction", 0.5, CORE);
+    let words = "two whole numbers [core, layers] of at least 1";
+    let cells = table.require("cells", words).and_then(|v| v.integers::<2>(words, 1, MAX_CELLS));
+    Some(Shape::Sphere {
+        centre: centre?,
+        radius: radius?,
+        sector: sector?,
+        core_fraction,
+        cells: cells?.map(|c| c as u32),
+    })
+}
+
+fn read_tube(table: &Table<'_>) -> Option<Shape> {
+    let axis = read_axis(table);
+    let base = table.vector("base");
+    let inner = table.number("inner_radius", Range::Positive);
+    let outer = table.number("outer_radius", Range::Positive);
+    let length = table.number("length", Range::Positive);
+    let start = table.number_or("start_degrees", 0.0, Range::Any);
+    let angle = table.number_or(
+        "angle_degrees",
+        360.0,
+        Range::Within(0.0, 360.0, "an angle above 0 and at most 360 degrees"),
+    );
+    let words = "three whole numbers [radial, angular, length] of at least 1";
+    let cells = table.require("cells", words).and_then(|v| v.integers::<3>(words, 1, MAX_CELLS));
+    let (inner, outer, cells) = (inner?, outer?, cells?);
+    if outer <= inner {
+        table.faults.add(
+            table.at,
+            format!("inner_radius = {inner} and outer_radius = {outer}"),
+            "an outer radius above the inner one",
+            "change one of them",
+        );
+        return None;
+    }
+    if cells[1] as f64 * 120.0 < angle {
+        table.faults.add(
+            table.at,
+            format!("{} cells over {angle} degrees", cells[1]),
+            "cells of at most 120 degrees",
+            "use more cells round the tube",
+        );
+        return None;
+    }
+    Some(Shape::Tube {
+        axis: axis?,
+        base: base?,
+        radii: [inner, outer],
+        length: length?,
+        degrees: [start, angle],
+        cells: cells.map(|c| c as u32),
+    })
+}
+
+/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`.
+fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explicit)> {
+    let nodes = table.require("nodes", "a list of [id, x, y, z]").and_then(|v| v.items());
+    let elements = table.require("elements", "a list of [id, n1, ..., n8]").and_then(|v| v.items());
+    let (nodes, elements) = (nodes?, elements?);
+    let size = Some((nodes.len() as u64, elements.len() as u64));
+    budget.take(size, table.at, &table.title, &table)?;
+    let before = table.faults.count();
+    let mut explicit = Explicit {
+        node_ids: Vec::new(),
+        element_ids: Vec::new(),
+        node_places: Vec::new(),
+        element_places: Vec::new(),
+    };
+    let mut positions = Vec::new();
+    let mut index: BTreeMap<u32, u32> = BTreeMap::new();
+    for node in &nodes {
+        let Some([id, x, y, z]) = node.fixed::<4>("[id, x, y, z]") else { continue };
+        let id = id.integer(1, MAX_ID);
+        let at = [x, y, z].map(|v| v.number(Range::Any));
+        let (Some(id), [Some(x), Some(y), Some(z)]) = (id, at) else { continue };
+        if let Some(first) = index.get(&(id as u32)) {
+            let (line, _) = table.faults.place(explicit.node_places[*first as usize]);
+            node.fault(&format!("a node number other than {id}, which line {line} has"), "renumber one");
+            continue;
+        }
+        index.insert(id as u32, positions.len() as u32);
+        explicit.node_ids.push(id as u32);
+        explicit.node_places.push(node.at);
+        positions.push([x, y, z]);
+    }
+    let mut hexahedra = Vec::new();
+    let mut seen: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut used = vec![false; positions.len()];
+    for element in &elements {
+        let Some(numbers) = element.integers::<9>("[id, n1, ..., n8]", 1, MAX_ID) else { continue };
+        let id = numbers[0] as u32;
+        if let Some(first) = seen.insert(id, element.at) {
+            let (line, _) = table.faults.place(first);
+            element
+                .fault(&format!("an element number other than {id}, which line {line} has"), "renumber one");
+        }
+        let mut corners = [0; 8];
+        let mut complete = true;
+        for (corner, number) in corners.iter_mut().zip(&numbers[1..]) {
+            match index.get(&(*number as u32)) {
+                Some(node) => {
+                    *corner = *node;
+                    used[*node as usize] = true;
+                }
+                None => {
+                    complete = false;
+                    table.faults.add(
+                        element.at,
+                        format!("element {id} with node {number}"),
+                        "nodes of this part",
+                        "add the node to nodes, or correct the element",
+                    );
+                }
+            }
+        }
+        if complete {
+            hexahedra.push(corners);
+            explicit.element_ids.push(id);
+            explicit.element_places.push(element.at);
+        }
+    }
+    if elements.is_empty() {
+        table.faults.add(
+            table.at,
+            format!("{} without elements, hence without mass", table.title),
+            "at least one element",
+            "add elements or remove the part",
+        );
+    }
+    // A node that a faulty element might have used is not called unused.
+    if table.faults.count() == before {
+        for (n, used) in used.iter().enumerate() {
+            if !used {
+                table.faults.add(
+                    explicit.node_places[n],
+                    format!("node {} of no element, hence without mass", explicit.node_ids[n]),
+                    "nodes that elements use",
+                    "remove the node",
+                );
+            }
+        }
+    }
+    let clean = table.faults.count() == before;
+    table.finish();
+    let block = Block { positions, topology: Topology::Explicit { hexahedra }, faces: Vec::new() };
+    clean.then_some((block, explicit))
+}
+
+/// `rotate`, then `translate`.
+fn transform(table: &Table<'_>, block: &mut Block) {
+    if let Some(rotate) = table.get("rotate").and_then(|v| v.table(format!("rotate of {}", table.title))) {
+        let axis = rotate.vector("axis");
+        let degrees = rotate.number("degrees", Range::Any);
+        let point = rotate.get("point").map_or(Some([0.0; 3]), |v| v.vector());
+        if let (Some(axis), Some(degrees), Some(point)) = (axis, degrees, point) {
+            let long = norm(axis);
+            if long > 0.0 && long.is_finite() {
+                block.rotate(point, scaled(axis, 1.0 / long), degrees);
+            } else {
+                let (read, expected) = (format!("axis = {axis:?}"), "an axis of some length");
+                rotate.faults.add(rotate.at, read, expected, "give a direction such as [0, 0, 1]");
+            }
+        }
+        rotate.finish();
+    }
+    if let Some(by) = table.get("translate").and_then(|v| v.vector()) {
+        block.translate(by);
+    }
+}

@@ -1,0 +1,346 @@
+//! Tables and values of a parsed deck that know their place and report their own faults.
+//!
+//! A [`Table`] remembers which keys were asked for; [`Table::finish`] reports the others with the nearest
+//! known key. Readers return `None` after reporting, so a caller may go on with the next entry.
+
+use std::{cell::RefCell, collections::BTreeSet};
+
+use toml::de::{DeTable, DeValue};
+
+use crate::fault::{Faults, nearest};
+
+/// Longest name of a part, material or gauge (characters).
+pub const MAX_NAME: usize = 64;
+
+/// A table of the deck.
+pub(crate) struct Table<'a> {
+    table: &'a DeTable<'a>,
+    /// Offset of its header or opening brace.
+    pub(crate) at: usize,
+    /// What it is called in messages, for instance `[control]`.
+    pub(crate) title: String,
+    pub(crate) faults: &'a Faults<'a>,
+    known: RefCell<BTreeSet<&'static str>>,
+}
+
+/// A value of the deck and the key it stands under.
+#[derive(Clone, Copy)]
+pub(crate) struct Value<'a> {
+    value: &'a DeValue<'a>,
+    /// Offset of its first character.
+    pub(crate) at: usize,
+    end: usize,
+    key: &'static str,
+    pub(crate) faults: &'a Faults<'a>,
+}
+
+impl<'a> Table<'a> {
+    /// A table called `title`, its header at offset `at`.
+    pub(crate) fn new(table: &'a DeTable<'a>, at: usize, title: String, faults: &'a Faults<'a>) -> Self {
+        Self { table, at, title, faults, known: RefCell::new(BTreeSet::new()) }
+    }
+
+    /// The value under `key`, if the deck has one.
+    pub(crate) fn get(&self, key: &'static str) -> Option<Value<'a>> {
+        self.known.borrow_mut().insert(key);
+        let spanned = self.table.get(key)?;
+        let span = spanned.span();
+        Some(Value { value: spanned.get_ref(), at: span.start, end: span.end, key, faults: self.faults })
+    }
+
+    /// The value under `key`; its absence is a fault. `expected` says what belongs there.
+    pub(crate) fn require(&self, key: &'static str, expected: &str) -> Option<Value<'a>> {
+        let value = self.get(key);
+        if value.is_none() {
+            self.faults.add(
+                self.at,
+                format!("{} without \"{key}\"", self.title),
+                expected,
+                format!("add {key} = ..."),
+            );
+        }
+        value
+    }
+
+    /// A number under `key` that passes `range`, or `default` where the key is absent or faulty (a faulty
+    /// one is reported).
+    pub(crate) fn number_or(&self, key: &'static str, default: f64, range: Range) -> f64 {
+        self.get(key).and_then(|v| v.number(range)).unwrap_or(default)
+    }
+
+    /// An integer under `key` between `min` and `max`, or `default` where it is absent or faulty.
+    pub(crate) fn integer_or(&self, key: &'static str, default: u64, min: u64, max: u64) -> u64 {
+        self.get(key).and_then(|v| v.integer(min, max)).unwrap_or(default)
+    }
+
+    /// A required number.
+    pub(crate) fn number(&self, key: &'static str, range: Range) -> Option<f64> {
+        self.require(key, range.words())?.number(range)
+    }
+
+    /// A required point or vector.
+    pub(crate) fn vector(&self, key: &'static str) -> Option<[f64; 3]> {
+        self.require(key, "[x, y, z]")?.vector()
+    }
+
+    /// The tables of an array of tables such as `[[part]]`; empty where the key is absent.
+    pub(crate) fn tables(&self, key: &'static str, max: usize) -> Vec<Table<'a>> {
+        let Some(value) = self.get(key) else { return Vec::new() };
+        let DeValue::Array(array) = value.value else {
+            value.fault(&format!("an array of tables [[{key}]]"), &format!("write [[{key}]] before each"));
+            return Vec::new();
+        };
+        if array.len() > max {
+            value.faults.add(
+                value.at,
+                format!("{} [[{key}]] entries", array.len()),
+                format!("at most {max}"),
+                "merge or split the deck",
+            );
+            return Vec::new();
+        }
+        let mut tables = Vec::new();
+        for (n, item) in array.iter().enumerate() {
+            let title = format!("[[{key}]] {}", n + 1);
+            match item.get_ref() {
+                DeValue::Table(table) => {
+                    tables.push(Table::new(table, item.span().start, title, self.faults));
+                }
+                _ => Value { value: item.get_ref(), at: item.span().start, end: item.span().end, ..value }
+                    .fault("a table", &format!("write [[{key}]] before each")),
+            }
+        }
+        tables
+    }
+
+    /// Whether the deck has `key`, without making it known.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
+    /// Reports every key that nobody asked for.
+    pub(crate) fn finish(self) {
+        let known = self.known.into_inner();
+        for key in self.table.keys() {
+            let name = key.get_ref().as_ref();
+            if known.contains(name) {
+                continue;
+            }
+            let advice = match nearest(name, known.iter().copied()) {
+                Some(near) => format!("write \"{near}\", or remove it"),
+                None => "remove it".to_string(),
+            };
+            let words: Vec<&str> = known.iter().copied().collect();
+            let span = key.span();
+            self.faults.add(
+                span.start,
+                format!("unknown key \"{}\" in {}", self.faults.quote(span.start, span.end), self.title),
+                format!("one of {}", words.join(", ")),
+                advice,
+            );
+        }
+    }
+}
+
+/// Which numbers a key takes.
+#[derive(Clone, Copy)]
+pub(crate) enum Range {
+    /// Any finite number.
+    Any,
+    /// Above zero.
+    Positive,
+    /// Zero or above.
+    NotNegative,
+    /// Above the first and at most the second; the words say so.
+    Within(f64, f64, &'static str),
+}
+
+impl Range {
+    fn admits(self, x: f64) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Positive => x > 0.0,
+            Self::NotNegative => x >= 0.0,
+            Self::Within(low, high, _) => x > low && x <= high,
+        }
+    }
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::Any => "a finite number",
+            Self::Positive => "a number above 0",
+            Self::NotNegative => "a number of 0 or more",
+            Self::Within(_, _, words) => words,
+        }
+    }
+}
+
+impl<'a> Value<'a> {
+    /// What the deck says here, as `key = value`.
+    pub(crate) fn words(&self) -> String {
+        format!("{} = {}", self.key, self.faults.quote(self.at, self.end))
+    }
+
+    /// Reports this value.
+    pub(crate) fn fault(&self, expected: &str, advice: &str) {
+        self.faults.add(self.at, self.words(), expected, advice);
+    }
+
+    /// A finite number in `range`.
+    pub(crate) fn number(&self, range: Range) -> Option<f64> {
+        let number = match self.value {
+            DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
+            DeValue::Integer(integer) => {
+                i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64)
+            }
+            _ => None,
+        };
+        // Subnormal magnitudes are read as what they are; infinities and NaN are not numbers of a deck.
+        let number = number.filter(|x| x.is_finite() && range.admits(*x));
+        if number.is_none() {
+            self.fault(range.words(), &format!("change {}", self.key));
+        }
+        number.map(|x| x + 0.0)
+    }
+
+    /// An integer from `min` to `max`.
+    pub(crate) fn integer(&self, min: u64, max: u64) -> Option<u64> {
+        let number = match self.value {
+            DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix()).ok(),
+            _ => None,
+        };
+        let number = number.filter(|n| (min..=max).contains(n));
+        if number.is_none() {
+            self.fault(&format!("a whole number from {min} to {max}"), &format!("change {}", self.key));
+        }
+        number
+    }
+
+    /// A text.
+    pub(crate) fn text(&self) -> Option<&'a str> {
+        match self.value {
+            DeValue::String(text) => Some(text.as_ref()),
+            _ => {
+                self.fault("a text in quotes", "put it in double quotes");
+                None
+            }
+        }
+    }
+
+    /// A name: letters, digits, space, dash and underscore, at most [`MAX_NAME`]; it becomes a column
+    /// heading or a file name.
+    pub(crate) fn name(&self) -> Option<String> {
+        let text = self.text()?;
+        let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, ' ' | '-' | '_');
+        if text.is_empty() || text.len() > MAX_NAME || !text.chars().all(fits) || text.trim() != text {
+            self.fault(
+                &format!("1 to {MAX_NAME} letters, digits, spaces, dashes or underscores"),
+                "choose another name",
+            );
+            return None;
+        }
+        Some(text.to_string())
+    }
+
+    /// One of a few words; the index of the word.
+    pub(crate) fn one_of(&self, words: &[&'static str]) -> Option<usize> {
+        let text = self.text()?;
+        let found = words.iter().position(|w| *w == text);
+        if found.is_none() {
+            let advice = match nearest(text, words.iter().copied()) {
+                Some(near) => format!("write \"{near}\""),
+                None => "choose one of them".to_string(),
+            };
+            self.fault(&format!("one of {}", words.join(", ")), &advice);
+        }
+        found
+    }
+
+    /// True or false.
+    pub(crate) fn boolean(&self) -> Option<bool> {
+        match self.value {
+            DeValue::Boolean(b) => Some(*b),
+            _ => {
+                self.fault("true or false", "write true or false without quotes");
+                None
+            }
+        }
+    }
+
+    /// A point or vector `[x, y, z]` of finite numbers.
+    pub(crate) fn vector(&self) -> Option<[f64; 3]> {
+        self.numbers::<3>("[x, y, z]", Range::Any)
+    }
+
+    /// Exactly `N` numbers in `range`.
+    pub(crate) fn numbers<const N: usize>(&self, expected: &str, range: Range) -> Option<[f64; N]> {
+        let items = self.fixed::<N>(expected)?;
+        let read = items.map(|item| item.number(range));
+        if read.iter().any(Option::is_none) {
+            return None;
+        }
+        Some(read.map(|x| x.unwrap_or_default()))
+    }
+
+    /// Exactly `N` whole numbers from `min` to `max`.
+    pub(crate) fn integers<const N: usize>(&self, expected: &str, min: u64, max: u64) -> Option<[u64; N]> {
+        let items = self.fixed::<N>(expected)?;
+        let read = items.map(|item| item.integer(min, max));
+        if read.iter().any(Option::is_none) {
+            return None;
+        }
+        Some(read.map(|x| x.unwrap_or_default()))
+    }
+
+    /// Exactly `N` values.
+    pub(crate) fn fixed<const N: usize>(&self, expected: &str) -> Option<[Value<'a>; N]> {
+        let items = match self.value {
+            DeValue::Array(array) if array.len() == N => self.items()?,
+            _ => {
+                self.fault(expected, &format!("write {N} values in square brackets"));
+                return None;
+            }
+        };
+        items.try_into().ok()
+    }
+
+    /// The items of an array.
+    pub(crate) fn items(&self) -> Option<Vec<Value<'a>>> {
+        let DeValue::Array(array) = self.value else {
+            self.fault("a list in square brackets", "write [ ... ]");
+            return None;
+        };
+        Some(
+            array
+                .iter()
+                .map(|item| Value {
+                    value: item.get_ref(),
+                    at: item.span().start,
+                    end: item.span().end,
+                    ..*self
+                })
+                .collect(),
+        )
+    }
+
+    /// Whether this is a text (rather than a list or table).
+    pub(crate) fn is_text(&self) -> bool {
+        matches!(self.value, DeValue::String(_))
+    }
+
+    /// Whether this is a table.
+    pub(crate) fn is_table(&self) -> bool {
+        matches!(self.value, DeValue::Table(_))
+    }
+
+    /// A table called `title`.
+    pub(crate) fn table(&self, title: String) -> Option<Table<'a>> {
+        match self.value {
+            DeValue::Table(table) => Some(Table::new(table, self.at, title, self.faults)),
+            _ => {
+                self.fault("a table", &format!("write {} = {{ ... }} or a [table] heading", self.key));
+                None
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! The named consistent sets of units, and conversion of library values from SI.
+//!
+//! Each unit is a power of ten of its SI unit, so that a conversion is one correctly rounded
+//! multiplication or division by an exact power of ten.
+
+use mechanics::material::{Eos, Material, Strength};
+
+/// A consistent set: one deck unit is ten to this power of the SI unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Units {
+    /// The name a deck writes.
+    pub name: &'static str,
+    length: i32,
+    mass: i32,
+    time: i32,
+    /// Names of the units of length, mass, time, velocity and stress, for readers of results.
+    pub symbols: [&'static str; 5],
+}
+
+/// Every set a deck may name.
+pub const SETS: [Units; 4] = [
+    Units { name: "SI", length: 0, mass: 0, time: 0, symbols: ["m", "kg", "s", "m/s", "Pa"] },
+    Units { name: "cm-g-us", length: -2, mass: -3, time: -6, symbols: ["cm", "g", "us", "cm/us", "Mbar"] },
+    Units { name: "mm-ms-kg", length: -3, mass: 0, time: -3, symbols: ["mm", "kg", "ms", "m/s", "GPa"] },
+    Units { name: "mm-s-t", length: -3, mass: 3, time: 0, symbols: ["mm", "t", "s", "mm/s", "MPa"] },
+];
+
+impl Units {
+    fn velocity(&self) -> i32 {
+        self.length - self.time
+    }
+
+    fn density(&self) -> i32 {
+        self.mass - 3 * self.length
+    }
+
+    fn stress(&self) -> i32 {
+        self.mass - self.length - 2 * self.time
+    }
+
+    fn specific_energy(&self) -> i32 {
+        2 * self.velocity()
+    }
+
+    /// A material with SI constants, in this set. Temperatures stay in K.
+    pub fn from_si(&self, material: &Material) -> Material {
+        let stress = |x| scale(x, self.stress());
+        Material {
+            name: material.name.clone(),
+            density: scale(material.density, self.density()),
+            eos: match material.eos {
+                Eos::Linear { bulk } => Eos::Linear { bulk: stress(bulk) },
+                Eos::Shock { c0, s, gamma } => Eos::Shock { c0: scale(c0, self.velocity()), s, gamma },
+            },
+            strength: match material.strength {
+                Strength::Hydro => Strength::Hydro,
+                Strength::Elastic { shear } => Strength::Elastic { shear: stress(shear) },
+                Strength::VonMises { shear, yield_stress, hardening } => Strength::VonMises {
+                    shear: stress(shear),
+                    yield_stress: stress(yield_stress),
+                    hardening: stress(hardening),
+                },
+                Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => {
+                    Strength::JohnsonCook {
+                        shear: stress(shear),
+                        a: stress(a),
+                        b: stress(b),
+                        n,
+                        c,
+                        m,
+                        t_melt,
+                        t_room,
+                        specific_heat: scale(specific_heat, self.specific_energy()),
+                        rate0: scale(rate0, -self.time),
+                    }
+                }
+            },
+        }
+    }
+}
+
+/// `x` SI units in units of ten to the `exponent` SI units.
+fn scale(x: f64, exponent: i32) -> f64 {
+    let mut power = 1.0;
+    for _ in 0..exponent.abs() {
+        power *= 10.0;
+    }
+    if exponent > 0 { x / power } else { x * power }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(name: &str) -> Units {
+        *SETS.iter().find(|s| s.name == name).expect("a set of the list")
+    }
+
+    #[test]
+    fn cm_g_us_measures_stress_in_megabar() {
+        let units = set("cm-g-us");
+        assert_eq!(scale(1e11, units.stress()).to_bits(), 1.0f64.to_bits());
+        assert_eq!(scale(7896.0, units.density()).to_bits(), 7.896f64.to_bits());
+        assert_eq!(scale(4569.0, units.velocity()).to_bits(), 0.4569f64.to_bits());
+    }
+
+    #[test]
+    fn mm_ms_kg_measures_stress_in_gigapascal_and_mm_s_t_in_megapascal() {
+        assert_eq!(scale(1e9, set("mm-ms-kg").stress()).to_bits(), 1.0f64.to_bits());
+        assert_eq!(scale(1e6, set("mm-s-t").stress()).to_bits(), 1.0f64.to_bits());
+        assert_eq!(scale(8000.0, set("mm-s-t").density()).to_bits(), 8e-9f64.to_bits());
+    }
+
+    #[test]
+    fn every_set_is_consistent() {
+        // Stress is density times velocity squared, whatever the units.
+        for units in SETS {
+            assert_eq!(units.stress(), units.density() + 2 * units.velocity(), "{}", units.name);
+        }
+    }
+}
