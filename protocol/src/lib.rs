@@ -10,6 +10,7 @@
 
 pub mod codec;
 pub mod frame;
+pub mod handshake;
 pub mod link;
 pub mod tls;
 
