@@ -1,0 +1,212 @@
+//! The link: frames both ways over one byte stream, neither way waiting for the other.
+//!
+//! [`split`] takes any stream (TCP, TLS, a pipe in memory) apart into a [`Sender`] and a [`Receiver`].
+//! Sending puts a frame into a bounded queue and returns; a task of the link writes it. So two peers that
+//! both send more than their sockets hold do not wait for each other, as long as each of them receives.
+//! The queue has two priorities: chunks of bulk messages go only when nothing else is queued, so a cycle
+//! frame waits for at most the bytes already handed to the system and the link's own write buffer
+//! ([`WRITE_BUFFER`]).
+//!
+//! A link ends as a whole: a bad frame, a silent peer, the receiver's drop or [`Sender::abort`] closes it
+//! both ways. Only a clean end is one-sided: when the last sender is dropped, what is queued is written
+//! and the stream's sending side closed, while the receiver goes on. What frames mean is not known here, except
+//! that heartbeats are swallowed.
+//!
+//! Set `TCP_NODELAY` on a TCP stream before splitting it: the link gathers small frames by itself.
+
+mod receiver;
+mod sender;
+
+pub use receiver::Receiver;
+pub use sender::Sender;
+
+use crate::Error;
+use crate::codec::{MESSAGE_LIMIT, OPEN_STREAMS};
+use crate::frame::Frame;
+use sender::Queue;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::sync::{Notify, watch};
+use tokio::time::Instant;
+
+/// Bytes gathered before they are handed to the stream; at most this much bulk is ahead of a cycle frame
+/// inside the link.
+pub const WRITE_BUFFER: usize = 128 << 10;
+/// Bytes asked of the stream at a time for small frames.
+pub const READ_BUFFER: usize = 64 << 10;
+/// Bytes of payload that are allocated before as many have come: a lying header costs no more.
+pub const FIRST_ALLOCATION: usize = 256 << 10;
+/// Payload buffers kept for reuse.
+pub const SPARE_BUFFERS: usize = 8;
+/// Bytes of the largest buffer kept for reuse.
+pub const SPARE_BYTES: usize = 8 << 20;
+
+/// The bounds and intervals of a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Frames other than bulk that may be queued. At most two cycles are under way toward a neighbour,
+    /// so a longer queue means a peer that does not read.
+    pub queued_frames: usize,
+    /// Bytes of those frames' payloads.
+    pub queued_bytes: usize,
+    /// Bulk messages that may be queued; [`OPEN_STREAMS`] of them take turns.
+    pub bulk_messages: usize,
+    /// Bytes of those messages.
+    pub bulk_bytes: usize,
+    /// After this long without a frame sent, a heartbeat goes out.
+    pub heartbeat: Duration,
+    /// After this long without a byte received, [`Receiver::receive`] gives [`Error::Silent`].
+    pub silence: Duration,
+}
+
+impl Default for Settings {
+    /// 1,024 frames and 256 MiB; 256 messages and 2 GiB of bulk; a heartbeat each second, and ten of
+    /// them missed before a peer counts as dead (a busy PC may swap for seconds).
+    fn default() -> Self {
+        Self {
+            queued_frames: 1024,
+            queued_bytes: 256 << 20,
+            bulk_messages: 16 * OPEN_STREAMS,
+            bulk_bytes: 2 * MESSAGE_LIMIT,
+            heartbeat: Duration::from_secs(1),
+            silence: Duration::from_secs(10),
+        }
+    }
+}
+
+/// What has passed over a link since it stood, headers and heartbeats included; bytes before encryption.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Frames handed to the stream.
+    pub frames_sent: u64,
+    /// Bytes handed to the stream.
+    pub bytes_sent: u64,
+    /// Whole frames received.
+    pub frames_received: u64,
+    /// Bytes received.
+    pub bytes_received: u64,
+}
+
+/// Takes `stream` apart and starts the task that writes to it.
+///
+/// # Panics
+/// Outside a tokio runtime with time enabled.
+pub fn split<S>(stream: S, settings: Settings) -> (Sender, Receiver)
+where
+    S: AsyncRead + AsyncWrite + Send + 'static,
+{
+    let (read, write) = tokio::io::split(stream);
+    let shared = Arc::new(Shared::new(settings));
+    let receiver = Receiver::new(Box::new(read), Arc::clone(&shared));
+    (Sender::start(write, shared), receiver)
+}
+
+/// What the two halves and the writing task know together.
+struct Shared {
+    settings: Settings,
+    start: Instant,
+    /// Microseconds from `start` to the last byte received.
+    last_seen: AtomicU64,
+    heartbeat_us: AtomicU64,
+    silence_us: AtomicU64,
+    frames_sent: AtomicU64,
+    bytes_sent: AtomicU64,
+    frames_received: AtomicU64,
+    bytes_received: AtomicU64,
+    queue: Mutex<Queue>,
+    /// There is something to write, or the interval has changed.
+    work: Notify,
+    /// Why the link ended, once it has.
+    end: watch::Sender<Option<Error>>,
+    /// Whether the writing task has stopped.
+    written: watch::Sender<bool>,
+    spare: Mutex<Vec<Vec<u8>>>,
+}
+
+impl Shared {
+    fn new(settings: Settings) -> Self {
+        Self {
+            settings,
+            start: Instant::now(),
+            last_seen: AtomicU64::new(0),
+            heartbeat_us: AtomicU64::new(micros(settings.heartbeat)),
+            silence_us: AtomicU64::new(micros(settings.silence)),
+            frames_sent: AtomicU64::new(0),
+            bytes_sent: AtomicU64::new(0),
+            frames_received: AtomicU64::new(0),
+            bytes_received: AtomicU64::new(0),
+            queue: Mutex::default(),
+            work: Notify::new(),
+            end: watch::Sender::new(None),
+            written: watch::Sender::new(false),
+            spare: Mutex::default(),
+        }
+    }
+
+    /// Ends the link; the first reason stays.
+    fn fail(&self, error: Error) {
+        self.end.send_if_modified(|end| {
+            let first = end.is_none();
+            if first {
+                *end = Some(error);
+            }
+            first
+        });
+    }
+
+    fn ended(&self) -> Option<Error> {
+        self.end.borrow().clone()
+    }
+
+    fn last_seen(&self) -> Instant {
+        self.start + Duration::from_micros(self.last_seen.load(Relaxed))
+    }
+
+    fn see(&self, bytes: usize) {
+        self.bytes_received.fetch_add(bytes as u64, Relaxed);
+        self.last_seen.store(micros(self.start.elapsed()), Relaxed);
+    }
+
+    fn counters(&self) -> Counters {
+        Counters {
+            frames_sent: self.frames_sent.load(Relaxed),
+            bytes_sent: self.bytes_sent.load(Relaxed),
+            frames_received: self.frames_received.load(Relaxed),
+            bytes_received: self.bytes_received.load(Relaxed),
+        }
+    }
+
+    /// An empty buffer, one that has been used before if there is any.
+    fn buffer(&self) -> Vec<u8> {
+        lock(&self.spare).pop().unwrap_or_default()
+    }
+
+    /// Keeps a buffer for reuse, within [`SPARE_BUFFERS`] and [`SPARE_BYTES`].
+    fn recycle(&self, mut buffer: Vec<u8>) {
+        if buffer.capacity() == 0 || buffer.capacity() > SPARE_BYTES {
+            return;
+        }
+        buffer.clear();
+        let mut spare = lock(&self.spare);
+        if spare.len() < SPARE_BUFFERS {
+            spare.push(buffer);
+        }
+    }
+
+    fn sent(&self, frame: Frame, header_and_payload: usize) {
+        self.frames_sent.fetch_add(1, Relaxed);
+        self.bytes_sent.fetch_add(header_and_payload as u64, Relaxed);
+        self.recycle(frame.payload);
+    }
+}
+
+/// Locks; nothing that holds one of the link's locks can panic half-way, so a poisoned one is sound.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn micros(duration: Duration) -> u64 {
+    u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,364 @@
+//! Proof of who is at the other end: mutual TLS 1.3 from PEM files, or loopback only.
+//!
+//! Every host holds three files ([`Paths`]): the lab's CA, its own certificate and its key. Both sides of
+//! a connection show a certificate of the same CA. A certificate carries the role of its holder as a URI
+//! among its subject's alternative names, `bolide:master`, `bolide:worker` or `bolide:client`, so that a
+//! stolen client's certificate does not pass for a master. Making certificates is not done here.
+
+use crate::{Error, Result};
+use rustls::client::WebPkiServerVerifier;
+use rustls::crypto::{CryptoProvider, aws_lc_rs};
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
+use rustls::server::WebPkiClientVerifier;
+use rustls::{AlertDescription, CertificateError, ClientConfig, RootCertStore, ServerConfig};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio_rustls::{TlsAcceptor, TlsConnector, TlsStream};
+use x509_parser::extensions::GeneralName;
+use x509_parser::prelude::{FromDer, X509Certificate};
+
+/// The longest a TLS handshake may take: a peer that dials and says nothing holds a task no longer.
+pub const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
+
+/// What a URI in a certificate starts with when it names a role.
+pub const ROLE_PREFIX: &str = "bolide:";
+
+/// What the holder of a certificate may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Role {
+    /// The master: listens, and may be anything else too.
+    Master,
+    /// A worker: dials a master, listens to and dials other workers.
+    Worker,
+    /// A client: submits, watches and cancels jobs.
+    Client,
+}
+
+impl Role {
+    /// Every role.
+    pub const ALL: [Self; 3] = [Self::Master, Self::Worker, Self::Client];
+
+    /// The role's name, as certificates and messages spell it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Master => "master",
+            Self::Worker => "worker",
+            Self::Client => "client",
+        }
+    }
+
+    /// The URI that a certificate of this role carries, such as `bolide:worker`.
+    pub fn uri(self) -> String {
+        format!("{ROLE_PREFIX}{}", self.name())
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Who a verified certificate says its holder is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// What it may be.
+    pub role: Role,
+    /// Its common name, for logs.
+    pub name: String,
+}
+
+/// The three PEM files of a host.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Paths {
+    /// The certificate of the CA that signs every host of the lab.
+    pub ca: PathBuf,
+    /// The host's certificate.
+    pub certificate: PathBuf,
+    /// The host's private key; readable by its owner only.
+    pub key: PathBuf,
+}
+
+impl Paths {
+    /// `ca.pem`, `host.pem` and `host-key.pem` in `folder`.
+    pub fn in_folder(folder: &Path) -> Self {
+        Self {
+            ca: folder.join("ca.pem"),
+            certificate: folder.join("host.pem"),
+            key: folder.join("host-key.pem"),
+        }
+    }
+}
+
+/// Passes `address` when it is within 127.0.0.0/8 or is `::1`: the rule for a daemon without certificates.
+///
+/// # Errors
+/// [`Error::Address`], which says how to make certificates.
+pub fn loopback_only(address: SocketAddr) -> Result<()> {
+    if address.ip().is_loopback() { Ok(()) } else { Err(Error::Address { address }) }
+}
+
+/// The listening side's configuration; a caller without a certificate of the same CA is turned away.
+///
+/// # Errors
+/// [`Error::Certificate`] naming the file that is missing, unreadable, open to others or out of date.
+pub fn server_config(paths: &Paths) -> Result<Arc<ServerConfig>> {
+    let files = Files::load(paths)?;
+    files.check_dates(&paths.certificate, SystemTime::now())?;
+    files.server(paths)
+}
+
+/// The dialling side's configuration.
+///
+/// # Errors
+/// As for [`server_config`].
+pub fn client_config(paths: &Paths) -> Result<Arc<ClientConfig>> {
+    let files = Files::load(paths)?;
+    files.check_dates(&paths.certificate, SystemTime::now())?;
+    files.client(paths)
+}
+
+/// Takes a connection: the TLS handshake, then the caller's identity.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Certificate`] in one line; a caller that takes longer than
+/// [`HANDSHAKE_LIMIT`].
+pub async fn accept<S>(stream: S, config: &Arc<ServerConfig>) -> Result<(TlsStream<S>, Identity)>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
+    let stream = in_time(TlsAcceptor::from(Arc::clone(config)).accept(stream)).await?;
+    let identity = peer_identity(stream.get_ref().1.peer_certificates())?;
+    Ok((TlsStream::Server(stream), identity))
+}
+
+/// Dials: the TLS handshake over `stream` with the host called `host` (a name or an address that its
+/// certificate must list), which must hold a certificate for `role`.
+///
+/// The listening side judges this side's certificate after this returns: a refusal is the first thing
+/// that reading then gives.
+///
+/// # Errors
+/// As for [`accept`], and [`Error::Certificate`] for another role.
+pub async fn connect<S>(
+    stream: S,
+    host: &str,
+    config: &Arc<ClientConfig>,
+    role: Role,
+) -> Result<(TlsStream<S>, Identity)>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
+    let name = ServerName::try_from(host.to_owned())
+        .map_err(|_| Error::Certificate(format!("{host:?} is neither a host's name nor an address")))?;
+    let stream = in_time(TlsConnector::from(Arc::clone(config)).connect(name, stream)).await?;
+    let identity = peer_identity(stream.get_ref().1.peer_certificates())?;
+    if identity.role != role {
+        return Err(Error::Certificate(format!(
+            "the certificate of {host:?} is for a {}, expected a {role}",
+            identity.role
+        )));
+    }
+    Ok((TlsStream::Client(stream), identity))
+}
+
+async fn in_time<T>(handshake: impl Future<Output = std::io::Result<T>>) -> Result<T> {
+    match tokio::time::timeout(HANDSHAKE_LIMIT, handshake).await {
+        Ok(result) => result.map_err(|error| Error::io("TLS handshake", &error)),
+        Err(_) => {
+            let kind = std::io::ErrorKind::TimedOut;
+            let why = format!("not done after {} s", HANDSHAKE_LIMIT.as_secs());
+            Err(Error::Io { doing: "TLS handshake".into(), kind, why })
+        }
+    }
+}
+
+fn peer_identity(chain: Option<&[CertificateDer<'_>]>) -> Result<Identity> {
+    match chain.and_then(<[_]>::first) {
+        Some(certificate) => identity(certificate),
+        None => Err(Error::Certificate("the peer shows no certificate; make one with `bolide certs`".into())),
+    }
+}
+
+/// Reads role and name from a certificate in DER; it must name exactly one role.
+///
+/// # Errors
+/// [`Error::Certificate`].
+pub fn identity(certificate: &[u8]) -> Result<Identity> {
+    let (_, parsed) = X509Certificate::from_der(certificate)
+        .map_err(|error| Error::Certificate(format!("certificate is not X.509: {error}")))?;
+    let name = parsed.subject().iter_common_name().find_map(|name| name.as_str().ok());
+    let name = name.unwrap_or("without a name").to_owned();
+    let alternatives = parsed
+        .subject_alternative_name()
+        .map_err(|error| Error::Certificate(format!("certificate of {name:?}: {error}")))?;
+    let names = alternatives.map_or(&[][..], |extension| &extension.value.general_names);
+    let mut roles = names.iter().filter_map(|name| match name {
+        GeneralName::URI(uri) => uri.strip_prefix(ROLE_PREFIX),
+        _ => None,
+    });
+    let (first, more) = (roles.next(), roles.next());
+    match (Role::ALL.into_iter().find(|role| Some(role.name()) == first), more) {
+        (Some(role), None) => Ok(Identity { role, name }),
+        _ => Err(Error::Certificate(format!(
+            "certificate of {name:?} names {} as its role, expected one of bolide:master, bolide:worker and \
+             bolide:client; make it with `bolide certs`",
+            first.map_or_else(|| "nothing".to_owned(), |role| format!("{role:?}"))
+        ))),
+    }
+}
+
+/// What the three files hold.
+struct Files {
+    roots: Arc<RootCertStore>,
+    chain: Vec<CertificateDer<'static>>,
+    key: PrivateKeyDer<'static>,
+}
+
+impl Files {
+    fn load(paths: &Paths) -> Result<Self> {
+        let mut roots = RootCertStore::empty();
+        for authority in certificates(&paths.ca)? {
+            roots.add(authority).map_err(|error| unusable(&paths.ca, &error))?;
+        }
+        let chain = certificates(&paths.certificate)?;
+        check_private(&paths.key)?;
+        let key = PrivateKeyDer::from_pem_file(&paths.key).map_err(|error| unusable(&paths.key, &error))?;
+        Ok(Self { roots: Arc::new(roots), chain, key })
+    }
+
+    /// Says before any connection that this host's own certificate is out of date.
+    fn check_dates(&self, path: &Path, now: SystemTime) -> Result<()> {
+        let Some(own) = self.chain.first() else { return Ok(()) };
+        let (_, parsed) = X509Certificate::from_der(own).map_err(|error| unusable(path, &error))?;
+        let now = now.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() as i64);
+        let (path, dates) = (path.display(), parsed.validity());
+        if now > dates.not_after.timestamp() {
+            let end = dates.not_after;
+            return Err(Error::Certificate(format!(
+                "{path} expired on {end}; make another with `bolide certs`"
+            )));
+        }
+        if now < dates.not_before.timestamp() {
+            let start = dates.not_before;
+            return Err(Error::Certificate(format!("{path} is valid from {start}; check this host's clock")));
+        }
+        Ok(())
+    }
+
+    fn server(self, paths: &Paths) -> Result<Arc<ServerConfig>> {
+        let verifier = WebPkiClientVerifier::builder_with_provider(self.roots, provider())
+            .build()
+            .map_err(|error| unusable(&paths.ca, &error))?;
+        let config = ServerConfig::builder_with_provider(provider())
+            .with_protocol_versions(&[&rustls::version::TLS13])
+            .and_then(|config| {
+                config.with_client_cert_verifier(verifier).with_single_cert(self.chain, self.key)
+            })
+            .map_err(|error| unusable(&paths.certificate, &error))?;
+        Ok(Arc::new(config))
+    }
+
+    fn client(self, paths: &Paths) -> Result<Arc<ClientConfig>> {
+        let verifier = WebPkiServerVerifier::builder_with_provider(self.roots, provider())
+            .build()
+            .map_err(|error| unusable(&paths.ca, &error))?;
+        let config = ClientConfig::builder_with_provider(provider())
+            .with_protocol_versions(&[&rustls::version::TLS13])
+            .and_then(|config| {
+                config.with_webpki_verifier(verifier).with_client_auth_cert(self.chain, self.key)
+            })
+            .map_err(|error| unusable(&paths.certificate, &error))?;
+        Ok(Arc::new(config))
+    }
+}
+
+fn provider() -> Arc<CryptoProvider> {
+    Arc::new(aws_lc_rs::default_provider())
+}
+
+fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>> {
+    let read =
+        CertificateDer::pem_file_iter(path).and_then(Iterator::collect::<std::result::Result<Vec<_>, _>>);
+    let certificates = read.map_err(|error| unusable(path, &error))?;
+    if certificates.is_empty() {
+        return Err(unusable(path, &"no certificate in it"));
+    }
+    Ok(certificates)
+}
+
+fn unusable(path: &Path, why: &dyn fmt::Display) -> Error {
+    Error::Certificate(format!("{}: {why}; make certificates with `bolide certs`", path.display()))
+}
+
+/// Refuses a key that others on the machine can read.
+#[cfg(unix)]
+fn check_private(path: &Path) -> Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    let mode = std::fs::metadata(path).map_err(|error| unusable(path, &error))?.permissions().mode() & 0o777;
+    if mode & 0o077 == 0 {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(Error::Certificate(format!("{path} has mode {mode:04o}, must be 0600; run chmod 600 {path}")))
+}
+
+/// Permissions are not a number here.
+#[cfg(not(unix))]
+fn check_private(_: &Path) -> Result<()> {
+    Ok(())
+}
+
+/// The words for a failed read, write or handshake: a fault of certificates on one line with what to do,
+/// anything else as the system says it.
+pub fn explain(error: &std::io::Error) -> String {
+    let fault = error.get_ref().and_then(|inner| inner.downcast_ref::<rustls::Error>());
+    match fault {
+        Some(rustls::Error::InvalidCertificate(why)) => explain_certificate(why),
+        Some(rustls::Error::AlertReceived(alert)) => explain_alert(*alert),
+        Some(rustls::Error::NoCertificatesPresented) => {
+            "the peer shows no certificate; make one with `bolide certs`".into()
+        }
+        Some(rustls::Error::InvalidMessage(_)) => {
+            "the peer does not speak TLS; it may run without certificates".into()
+        }
+        _ => error.to_string(),
+    }
+}
+
+fn explain_certificate(why: &CertificateError) -> String {
+    match why {
+        CertificateError::Expired | CertificateError::ExpiredContext { .. } => {
+            "the peer's certificate has expired; make another with `bolide certs`".into()
+        }
+        CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. } => {
+            "the peer's certificate is not valid yet; check the clocks".into()
+        }
+        CertificateError::UnknownIssuer | CertificateError::BadSignature => {
+            "the peer's certificate is from another CA than this host's ca.pem".into()
+        }
+        CertificateError::NotValidForNameContext { expected, presented } => format!(
+            "the peer's certificate is for {}, dialled was {}; make one that lists it, with `bolide certs`",
+            presented.join(" and "),
+            expected.to_str()
+        ),
+        other => format!("the peer's certificate is not accepted: {other}"),
+    }
+}
+
+fn explain_alert(alert: AlertDescription) -> String {
+    let why = match alert {
+        AlertDescription::UnknownCA | AlertDescription::DecryptError => "it is from another CA",
+        AlertDescription::CertificateExpired => "it has expired",
+        AlertDescription::CertificateRequired => "none was shown",
+        AlertDescription::BadCertificate => "it does not list the name that was dialled, or is damaged",
+        other => return format!("the peer ended TLS: {other:?}"),
+    };
+    format!("the peer does not accept this host's certificate: {why}; make one with `bolide certs`")
+}

@@ -1,0 +1,282 @@
+//! Links over pipes in memory and over TCP: both ways at once, overtaking, silence, ends.
+
+use protocol::codec::{Assembler, put_f64s};
+use protocol::frame::{CHUNK, Frame, HEADER_LEN, Header, Kind, encode_header};
+use protocol::link::{Receiver, Sender, Settings, WRITE_BUFFER, split};
+use protocol::{Error, Result};
+use std::time::Duration;
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
+use tokio::net::{TcpListener, TcpSocket, TcpStream};
+use tokio::time::{Instant, advance, timeout};
+
+const SIX_MB: usize = 6_000_000;
+
+fn frame(kind: Kind, cycle: u64, payload: Vec<u8>) -> Frame {
+    Frame::new(Header { cycle, ..Header::new(kind) }, payload)
+}
+
+fn pair(bytes: usize) -> ((Sender, Receiver), DuplexStream) {
+    let (near, far) = duplex(bytes);
+    (split(near, Settings::default()), far)
+}
+
+/// Settings under which a slow machine adds no heartbeats to the counters.
+fn no_heartbeats() -> Settings {
+    Settings { heartbeat: Duration::from_secs(600), silence: Duration::from_secs(600), ..Settings::default() }
+}
+
+/// Sends a 6 MB cycle frame and a 6 MB bulk message, and takes as much from the other side.
+async fn exchange((sender, mut receiver): (Sender, Receiver), mine: u8, theirs: u8) {
+    sender.send(frame(Kind::Cycle, 1, vec![mine; SIX_MB])).expect("queued");
+    sender.send_bulk(Header::new(Kind::Bulk), 1, vec![mine; SIX_MB]).expect("queued");
+    let mut assembler = Assembler::new(SIX_MB as u64, 1);
+    let cycle = receiver.receive().await.expect("the cycle frame comes first");
+    assert_eq!((cycle.header.kind, cycle.header.cycle), (Kind::Cycle, 1));
+    assert!(cycle.payload == vec![theirs; SIX_MB]);
+    receiver.recycle(cycle.payload);
+    let message = loop {
+        let chunk = receiver.receive().await.expect("a chunk");
+        if let Some(message) = assembler.accept(&chunk).expect("in order") {
+            break message;
+        }
+    };
+    assert!(message.bytes == vec![theirs; SIX_MB]);
+    sender.finish().await.expect("all is written");
+    assert_eq!(receiver.receive().await, Err(Error::Closed));
+
+    let counters = sender.counters();
+    let chunks = SIX_MB.div_ceil(CHUNK);
+    let bytes = (2 * SIX_MB + HEADER_LEN + chunks * (HEADER_LEN + 16)) as u64;
+    assert_eq!((counters.frames_sent, counters.bytes_sent), (1 + chunks as u64, bytes));
+    assert_eq!((counters.frames_received, counters.bytes_received), (1 + chunks as u64, bytes));
+}
+
+#[tokio::test]
+async fn two_peers_that_both_send_megabytes_finish_over_a_pipe_of_a_kilobyte() {
+    let (a, b) = duplex(1024);
+    let (a, b) = (split(a, no_heartbeats()), split(b, no_heartbeats()));
+    let both = async { tokio::join!(exchange(a, 1, 2), exchange(b, 2, 1)) };
+    timeout(Duration::from_secs(60), both).await.expect("no deadlock");
+}
+
+async fn tcp_with_small_buffers() -> (TcpStream, TcpStream) {
+    let small = || {
+        let socket = TcpSocket::new_v4().expect("a socket");
+        socket.set_send_buffer_size(4096).expect("the system takes it");
+        socket.set_recv_buffer_size(4096).expect("the system takes it");
+        socket
+    };
+    let listening = small();
+    listening.bind("127.0.0.1:0".parse().expect("an address")).expect("a free port");
+    let listener: TcpListener = listening.listen(1).expect("listens");
+    let address = listener.local_addr().expect("bound");
+    let (dialled, accepted) = tokio::join!(small().connect(address), listener.accept());
+    let (dialled, accepted) = (dialled.expect("connects"), accepted.expect("accepts").0);
+    accepted.set_nodelay(true).expect("TCP");
+    dialled.set_nodelay(true).expect("TCP");
+    (dialled, accepted)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn two_peers_that_both_send_megabytes_finish_over_tcp_with_small_buffers() {
+    let (a, b) = tcp_with_small_buffers().await;
+    let a = tokio::spawn(exchange(split(a, no_heartbeats()), 1, 2));
+    let b = tokio::spawn(exchange(split(b, no_heartbeats()), 2, 1));
+    let both = async { tokio::join!(a, b) };
+    let (a, b) = timeout(Duration::from_secs(60), both).await.expect("no deadlock");
+    a.expect("one side");
+    b.expect("the other side");
+}
+
+#[tokio::test]
+async fn cycle_frames_overtake_bulk() {
+    let ((sender, _receiver), far) = pair(1024);
+    sender.send_bulk(Header::new(Kind::Bulk), 1, vec![7; 100 * CHUNK]).expect("queued");
+    // Let the writer fill its buffer and the pipe before the cycle frame is queued.
+    for _ in 0..100 {
+        tokio::task::yield_now().await;
+    }
+    let mut payload = sender.buffer();
+    put_f64s(&mut payload, &[1.0, 2.0]);
+    sender.send(frame(Kind::Cycle, 5, payload)).expect("queued");
+    let (_far_sender, mut receiver) = split(far, Settings::default());
+    let mut ahead = 0;
+    while receiver.receive().await.expect("a frame").header.kind == Kind::Bulk {
+        ahead += 1;
+    }
+    assert!((1..=WRITE_BUFFER / CHUNK + 1).contains(&ahead), "{ahead} of 100 chunks were ahead");
+}
+
+#[tokio::test]
+async fn bulk_messages_take_turns() {
+    let ((sender, _receiver), far) = pair(1024);
+    for stream in [1, 2] {
+        sender.send_bulk(Header::new(Kind::Bulk), stream, vec![0; 3 * CHUNK]).expect("queued");
+    }
+    let (_far_sender, mut receiver) = split(far, Settings::default());
+    let mut streams = Vec::new();
+    for _ in 0..6 {
+        streams.push(receiver.receive().await.expect("a chunk").payload[0]);
+    }
+    assert_eq!(streams, [1, 2, 1, 2, 1, 2]);
+}
+
+#[tokio::test]
+async fn a_stream_cut_at_any_byte_ends_with_an_error() {
+    let mut whole = frame(Kind::Control, 3, b"abc".to_vec());
+    whole.seal().expect("three bytes");
+    let mut bytes = encode_header(&whole.header).to_vec();
+    bytes.extend_from_slice(b"abc");
+    for length in 0..=bytes.len() {
+        let ((_sender, mut receiver), mut far) = pair(4096);
+        far.write_all(&bytes[..length]).await.expect("room");
+        drop(far);
+        let (found, header) = (length as u64, HEADER_LEN as u64);
+        let expected: Result<Frame> = match length {
+            0 => Err(Error::Closed),
+            1..HEADER_LEN => Err(Error::Truncated { what: "frame header", found, needed: header }),
+            HEADER_LEN..55 => Err(Error::Truncated { what: "control", found: found - header, needed: 3 }),
+            _ => Ok(whole.clone()),
+        };
+        assert_eq!(receiver.receive().await, expected, "cut after {length} bytes");
+    }
+}
+
+#[tokio::test]
+async fn a_bad_frame_ends_the_link_for_its_sender_too() {
+    let ((sender, mut receiver), mut far) = pair(4096);
+    far.write_all(b"GET / HTTP/1.1\r\nHost: 127.0.0.1:4711\r\nAccept: */*\r\n\r\n").await.expect("room");
+    let error = receiver.receive().await.expect_err("no frame");
+    assert_eq!(error, Error::Magic { found: *b"GET " });
+    assert_eq!(sender.send(frame(Kind::Cycle, 1, Vec::new())), Err(error.clone()));
+    assert_eq!(sender.finish().await, Err(error));
+    let mut rest = Vec::new();
+    drop(receiver);
+    assert_eq!(far.read_to_end(&mut rest).await.expect("closed"), 0);
+}
+
+#[tokio::test]
+async fn the_limit_before_the_handshake_holds() {
+    let ((_sender, mut receiver), mut far) = pair(4096);
+    receiver.set_limit(4096);
+    let header = Header { length: 64 << 20, ..Header::new(Kind::Cycle) };
+    far.write_all(&encode_header(&header)).await.expect("room");
+    let refused = Error::TooLong { what: "cycle", length: 64 << 20, limit: 4096 };
+    assert_eq!(receiver.receive().await, Err(refused));
+}
+
+#[tokio::test]
+async fn receiving_may_be_cancelled_at_any_byte() {
+    let ((_sender, mut receiver), mut far) = pair(4096);
+    let mut whole = frame(Kind::Control, 3, b"abc".to_vec());
+    whole.seal().expect("three bytes");
+    let mut bytes = encode_header(&whole.header).to_vec();
+    bytes.extend_from_slice(b"abc");
+    for byte in &bytes[..bytes.len() - 1] {
+        far.write_all(&[*byte]).await.expect("room");
+        tokio::select! {
+            biased;
+            got = receiver.receive() => panic!("{got:?} before the last byte"),
+            () = tokio::task::yield_now() => {}
+        }
+    }
+    far.write_all(b"c").await.expect("room");
+    assert_eq!(receiver.receive().await, Ok(whole));
+}
+
+#[tokio::test(start_paused = true)]
+async fn idle_links_send_heartbeats_and_live() {
+    let (a, b) = duplex(4096);
+    let (a, _a_receiver) = split(a, Settings::default());
+    let (b, mut receiver) = split(b, Settings::default());
+    let start = Instant::now();
+    let quiet = timeout(Duration::from_millis(60_500), receiver.receive()).await;
+    assert!(quiet.is_err(), "heartbeats are swallowed, and keep the link: {quiet:?}");
+    assert_eq!(b.counters().frames_received, 60);
+    assert_eq!(receiver.last_seen() - start, Duration::from_secs(60));
+    a.set_heartbeat(Duration::from_millis(100));
+    let quiet = timeout(Duration::from_secs(1), receiver.receive()).await;
+    assert!(quiet.is_err());
+    assert_eq!(b.counters().frames_received, 60 + 10);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_silent_peer_is_found_and_any_byte_counts_as_life() {
+    let ((sender, mut receiver), mut far) = pair(4096);
+    receiver.set_silence(Duration::from_secs(4));
+    let start = Instant::now();
+    // Half a header, a byte every three seconds, keeps the link for a while.
+    let bytes = encode_header(&Header::new(Kind::Bye));
+    let drip = async {
+        for byte in &bytes[..5] {
+            tokio::time::sleep(Duration::from_secs(3)).await;
+            far.write_all(&[*byte]).await.expect("room");
+        }
+    };
+    let (error, ()) = tokio::join!(receiver.receive(), drip);
+    assert_eq!(error, Err(Error::Silent { after_ms: 4000, limit_ms: 4000 }));
+    assert_eq!(start.elapsed(), Duration::from_secs(19));
+    assert!(matches!(sender.send(frame(Kind::Bye, 0, Vec::new())), Err(Error::Silent { .. })));
+}
+
+#[tokio::test(start_paused = true)]
+async fn bytes_that_came_while_this_process_was_stopped_are_life() {
+    let ((_sender, mut receiver), mut far) = pair(4096);
+    far.write_all(&encode_header(&Header::new(Kind::Bye))[..]).await.expect("room");
+    advance(Duration::from_secs(100)).await;
+    // The header says an empty payload, whose checksum is zero, so this is a whole frame.
+    assert_eq!(receiver.receive().await.map(|frame| frame.header.kind), Ok(Kind::Bye));
+}
+
+#[tokio::test]
+async fn queues_toward_a_peer_that_does_not_read_are_bounded() {
+    let (near, _far) = duplex(16);
+    let settings = Settings {
+        queued_frames: 3,
+        queued_bytes: 100,
+        bulk_messages: 2,
+        bulk_bytes: 1000,
+        ..Settings::default()
+    };
+    let (sender, _receiver) = split(near, settings);
+    let full = |queue, length, limit| Err(Error::QueueFull { queue, length, limit });
+    // The writer does not run between these calls, so nothing leaves the queues.
+    let send = |bytes| sender.send(frame(Kind::Cycle, 0, vec![0; bytes]));
+    assert_eq!(send(60), Ok(()));
+    assert_eq!(send(41), full("bytes of the frame queue", 101, 100));
+    assert_eq!((send(20), send(20)), (Ok(()), Ok(())));
+    assert_eq!(send(0), full("frame queue", 4, 3));
+    let bulk = |bytes| sender.send_bulk(Header::new(Kind::Bulk), 1, vec![0; bytes]);
+    assert_eq!(bulk(600), Ok(()));
+    assert_eq!(bulk(401), full("bytes of the bulk queue", 1001, 1000));
+    assert_eq!(bulk(400), Ok(()));
+    assert_eq!(bulk(0), full("bulk queue", 3, 2));
+    assert_eq!(sender.queued(), (3, 1000));
+    let over = sender.send(frame(Kind::Heartbeat, 0, vec![0]));
+    assert_eq!(over, Err(Error::TooLong { what: "heartbeat", length: 1, limit: 0 }));
+    let bulk = sender.send(frame(Kind::Bulk, 0, Vec::new()));
+    assert!(matches!(bulk, Err(Error::Unexpected { found: Kind::Bulk, .. })));
+}
+
+#[tokio::test]
+async fn what_is_queued_is_written_when_the_last_sender_is_dropped() {
+    let ((sender, _receiver), mut far) = pair(100_000);
+    let clone = sender.clone();
+    drop(sender);
+    clone.send(frame(Kind::Control, 1, vec![1; 10])).expect("one sender is left");
+    clone.send_bulk(Header::new(Kind::Bulk), 1, vec![1; 20]).expect("one sender is left");
+    drop(clone);
+    let mut bytes = Vec::new();
+    far.read_to_end(&mut bytes).await.expect("the pipe");
+    assert_eq!(bytes.len(), HEADER_LEN + 10 + HEADER_LEN + 16 + 20);
+}
+
+#[tokio::test]
+async fn finishing_refuses_later_frames_and_aborting_ends_both_ways() {
+    let ((sender, mut receiver), _far) = pair(100_000);
+    assert_eq!(sender.finish().await, Ok(()));
+    assert_eq!(sender.send(frame(Kind::Bye, 1, Vec::new())), Err(Error::Closed));
+    let reason = Error::Message("job 4 is over".into());
+    sender.abort(reason.clone());
+    assert_eq!(receiver.receive().await, Err(reason));
+}
