@@ -56,8 +56,11 @@ struct Array<'a> {
     kind: &'static str,
     /// Bytes per component.
     width: usize,
+    /// Components per tuple.
     components: usize,
     tuples: usize,
+    /// Whether the components are told to the reader; otherwise the array is one long list.
+    grouped: bool,
     put: Put<'a>,
 }
 
@@ -65,18 +68,19 @@ impl<'a> Array<'a> {
     fn f64<const N: usize>(name: &'static str, tuples: usize, of: impl Fn(usize) -> [f64; N] + 'a) -> Self {
         let put: Put =
             Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
-        Self { name, kind: "Float64", width: 8, components: N, tuples, put }
+        Self { name, kind: "Float64", width: 8, components: N, tuples, grouped: true, put }
     }
 
+    /// A list of indices, `N` per tuple; VTK refuses grouped ones.
     fn i64<const N: usize>(name: &'static str, tuples: usize, of: impl Fn(usize) -> [i64; N] + 'a) -> Self {
         let put: Put =
             Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
-        Self { name, kind: "Int64", width: 8, components: N, tuples, put }
+        Self { name, kind: "Int64", width: 8, components: N, tuples, grouped: false, put }
     }
 
     fn u32(name: &'static str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
         let put: Put = Box::new(move |i, out| out.extend_from_slice(&of(i).to_le_bytes()));
-        Self { name, kind: "UInt32", width: 4, components: 1, tuples, put }
+        Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
     }
 
     /// Size of the numbers, without the header that precedes them.
@@ -87,7 +91,7 @@ impl<'a> Array<'a> {
     /// The element that announces the array, which starts `offset` bytes into the appended data.
     fn describe(&self, out: &mut impl Write, offset: u64) -> io::Result<()> {
         write!(out, r#"        <DataArray type="{}" Name="{}""#, self.kind, self.name)?;
-        if self.components != 1 {
+        if self.grouped && self.components != 1 {
             write!(out, r#" NumberOfComponents="{}""#, self.components)?;
         }
         if self.components == 6 {
@@ -210,6 +214,7 @@ fn stream(
             width: 1,
             components: 1,
             tuples: n_elements,
+            grouped: true,
             put: Box::new(|_, out| out.push(VTK_HEXAHEDRON)),
         },
     ];
