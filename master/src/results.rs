@@ -27,8 +27,10 @@ pub const SUMMARY: &str = "summary.json";
 
 /// Every name that a deck may list under `output.fields`.
 ///
-/// `node_id`, `element_id`, `part` and `material` are written in any case.
-pub const FIELD_NAMES: [&str; 13] = [
+/// `node_id`, `element_id`, `part` and `material` are written in any case. All of
+/// [`mechanics::state::FIELDS`] are among them; `stress_xx` to `stress_zx` are deviatoric as there, while `stress` is the
+/// whole tensor.
+pub const FIELD_NAMES: [&str; 19] = [
     "velocity",
     "displacement",
     "node_id",
@@ -42,6 +44,12 @@ pub const FIELD_NAMES: [&str; 13] = [
     "density",
     "energy",
     "stress",
+    "relative_volume",
+    "stress_xx",
+    "stress_yy",
+    "stress_xy",
+    "stress_yz",
+    "stress_zx",
 ];
 
 /// Why results could not be written or read.

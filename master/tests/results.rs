@@ -265,11 +265,10 @@ fn every_array_of_a_state_reads_back_to_the_same_bits() {
     assert_eq!(array(&file, "material"), bytes_of_u32(part.iter().map(|&p| u32::from(p > 0))));
     assert_eq!(array(&file, "element_id"), bytes_of_u32((0..n as u32).map(|e| 1000 + e)));
     assert_eq!(array(&file, "worker"), bytes_of_u32(worker));
-    for (name, index) in [
-        ("pressure", field::PRESSURE),
-        ("plastic_strain", field::PLASTIC_STRAIN),
-        ("temperature", field::TEMPERATURE),
-    ] {
+    // Written as the state holds them; energy is the one that is not.
+    for (index, name) in
+        mechanics::state::FIELDS.into_iter().enumerate().filter(|(_, name)| *name != "energy")
+    {
         assert_eq!(array(&file, name), bytes_of(state.elements[index].iter().copied()), "{name}");
     }
     assert_eq!(array(&file, "density"), bytes_of(density.iter().map(|d| d / 0.5)));
@@ -301,7 +300,7 @@ fn von_mises_stress_is_the_yield_stress_in_tension_and_root_three_times_shear() 
 }
 
 #[test]
-fn deck_selects_fields_and_an_empty_list_selects_all_but_stress() {
+fn deck_selects_fields_and_an_empty_list_selects_all_but_components() {
     let model = plates(2);
     let state = dented(&model, 1, 1.0);
     let folder = Folder::create(&scratch("selection"), false).expect("fresh folder");
@@ -316,8 +315,13 @@ fn deck_selects_fields_and_an_empty_list_selects_all_but_stress() {
         results::FIELD_NAMES.into_iter().chain(["worker"]).filter(known).collect::<Vec<_>>()
     };
     assert_eq!(names_in(&["pressure"]), ["node_id", "part", "material", "element_id", "pressure"]);
-    let default: Vec<_> = results::FIELD_NAMES.into_iter().filter(|name| *name != "stress").collect();
+    let default: Vec<_> = results::FIELD_NAMES
+        .into_iter()
+        .filter(|name| !name.starts_with("stress") && *name != "relative_volume")
+        .collect();
     assert_eq!(names_in(&[]), default);
+    let state_fields = names_in(&mechanics::state::FIELDS);
+    assert!(mechanics::state::FIELDS.iter().all(|name| state_fields.contains(name)), "{state_fields:?}");
     let error = Fields::select(&["presure".into()]).expect_err("misspelt");
     assert_eq!(
         error.to_string(),

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Error, Folder, SUMMARY, Units, write_whole};
 
-/// A finished run. Shares and relative quantities are fractions of one.
+/// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no others.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Title of the deck.
@@ -54,7 +54,7 @@ pub struct Summary {
     pub bytes_per_cycle: f64,
     /// Energies at the end.
     pub energies: Energies,
-    /// Change of momentum over the largest initial momentum of a part.
+    /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
     pub momentum_error: f64,
     /// Largest time step over the true Courant limit; below 1 is stable.
     pub worst_courant: f64,

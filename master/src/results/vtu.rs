@@ -17,6 +17,10 @@ const VTK_HEXAHEDRON: u8 = 12;
 /// Fields whose numbers identify rather than measure: written whatever the deck selects.
 const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
 
+/// Fields that follow from the others: written only if the deck names them.
+const ON_REQUEST: [&str; 7] =
+    ["stress", "relative_volume", "stress_xx", "stress_yy", "stress_xy", "stress_yz", "stress_zx"];
+
 /// Which fields a state file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fields {
@@ -25,7 +29,8 @@ pub struct Fields {
 }
 
 impl Fields {
-    /// The fields of `output.fields`; an empty list selects all but `stress`.
+    /// The fields of `output.fields`; an empty list selects all but the relative volume and the
+    /// components of stress.
     ///
     /// # Errors
     /// [`Error::UnknownField`].
@@ -35,7 +40,8 @@ impl Fields {
         }
         let selected = FIELD_NAMES.map(|known| {
             IDENTITY.contains(&known)
-                || if names.is_empty() { known != "stress" } else { names.iter().any(|name| name == known) }
+                || names.iter().any(|name| name == known)
+                || names.is_empty() && !ON_REQUEST.contains(&known)
         });
         Ok(Self { selected })
     }
@@ -162,7 +168,8 @@ pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
 ///
 /// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`. Element
 /// fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
-/// `temperature` (K), `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ).
+/// `temperature` (K), `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
+/// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric).
 /// `worker` gives, by global element index, the worker that computes the element, and becomes the element
 /// field of that name. Units are the deck's.
 ///
@@ -296,6 +303,17 @@ fn data_arrays<'a>(
             [xx - p, yy - p, -(xx + yy) - p, xy, yz, zx]
         }),
     ];
+    cell.extend(
+        [
+            ("relative_volume", field::RELATIVE_VOLUME),
+            ("stress_xx", field::SXX),
+            ("stress_yy", field::SYY),
+            ("stress_xy", field::SXY),
+            ("stress_yz", field::SYZ),
+            ("stress_zx", field::SZX),
+        ]
+        .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
+    );
     if let Some(worker) = worker {
         cell.push(Array::u32("worker", n_elements, move |e| worker[e]));
     }
