@@ -1,0 +1,294 @@
+//! What a run leaves on disk: one folder with states, histories and a summary.
+//!
+//! A results folder holds `state-NNNNNN.vtu` (one file per written state, [`vtu`]), `results.pvd` (the index
+//! that ParaView opens, with the time of each state), `history.csv` ([`history`]) and `summary.json`
+//! ([`summary`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
+//! Only the history grows in place, by whole rows. So the folder of a killed run opens.
+//!
+//! Nothing here computes physics or decides when to write.
+
+use std::{
+    fmt, fs,
+    fs::File,
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+pub mod history;
+pub mod summary;
+pub mod vtu;
+
+/// Name of the index of states.
+pub const PVD: &str = "results.pvd";
+/// Name of the table of histories.
+pub const HISTORY: &str = "history.csv";
+/// Name of the summary.
+pub const SUMMARY: &str = "summary.json";
+
+/// Every name that a deck may list under `output.fields`.
+///
+/// `node_id`, `element_id`, `part` and `material` are written in any case. All of
+/// [`mechanics::state::FIELDS`] are among them; `stress_xx` to `stress_zx` are deviatoric as there, while `stress` is the
+/// whole tensor.
+pub const FIELD_NAMES: [&str; 19] = [
+    "velocity",
+    "displacement",
+    "node_id",
+    "part",
+    "material",
+    "element_id",
+    "pressure",
+    "von_mises",
+    "plastic_strain",
+    "temperature",
+    "density",
+    "energy",
+    "stress",
+    "relative_volume",
+    "stress_xx",
+    "stress_yy",
+    "stress_xy",
+    "stress_yz",
+    "stress_zx",
+];
+
+/// Why results could not be written or read.
+#[derive(Debug)]
+pub enum Error {
+    /// The folder holds something and may not be written over.
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The operating system refused: disk full, no permission, not a folder.
+    Io {
+        /// What was tried, as a verb: `create`, `write`, `read`, `rename`, `remove`.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// A file is not what a run writes.
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// What was expected and what was read.
+        what: String,
+    },
+    /// A field that [`FIELD_NAMES`] does not list.
+    UnknownField {
+        /// The name as given.
+        name: String,
+    },
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotEmpty { path } => write!(
+                f,
+                "results folder {} is not empty; name another with --out, or give --force to replace its results",
+                path.display()
+            ),
+            Self::Io { action, path, source } => {
+                write!(f, "cannot {action} {}: {source}", path.display())?;
+                match source.kind() {
+                    io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                        write!(f, "; free some space or name a folder on another disk with --out")
+                    }
+                    _ => Ok(()),
+                }
+            }
+            Self::Malformed { path, line, what } => write!(f, "{}, line {line}: {what}", path.display()),
+            Self::UnknownField { name } => {
+                write!(f, "unknown output field {name:?}; known are {}", FIELD_NAMES.join(", "))
+            }
+        }
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Io { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}
+
+impl Error {
+    /// An adapter for `map_err`: names what was tried on which path.
+    fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { action, path: path.to_owned(), source }
+    }
+}
+
+/// The results folder of one run. It exists and held no results when it was taken.
+#[derive(Clone, Debug)]
+pub struct Folder {
+    path: PathBuf,
+}
+
+impl Folder {
+    /// Creates the folder, with its parents, or takes an empty one.
+    ///
+    /// With `force` a folder that is not empty is taken too, and the files that a run writes, left there by an
+    /// earlier run, are removed first. Other files stay.
+    ///
+    /// # Errors
+    /// [`Error::NotEmpty`] without `force`; [`Error::Io`] if the folder cannot be created, listed or cleared.
+    pub fn create(path: &Path, force: bool) -> Result<Self, Error> {
+        fs::create_dir_all(path).map_err(Error::io("create", path))?;
+        for entry in fs::read_dir(path).map_err(Error::io("read", path))? {
+            let entry = entry.map_err(Error::io("read", path))?;
+            if !force {
+                return Err(Error::NotEmpty { path: path.to_owned() });
+            }
+            if entry.file_name().to_str().is_some_and(is_written_by_a_run) {
+                fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
+            }
+        }
+        Ok(Self { path: path.to_owned() })
+    }
+
+    /// Takes a folder as an earlier session of the same run left it, to go on writing.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be listed.
+    pub fn reopen(path: &Path) -> Result<Self, Error> {
+        fs::read_dir(path).map_err(Error::io("read", path))?;
+        Ok(Self { path: path.to_owned() })
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Path of a file of this folder.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+}
+
+/// Name of the file of state `index`; 16 to 20 bytes long.
+pub fn state_name(index: u32) -> String {
+    format!("state-{index:06}.vtu")
+}
+
+/// Whether a run writes files of this name: the only ones that `--force` removes.
+fn is_written_by_a_run(name: &str) -> bool {
+    let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".tmp")).unwrap_or(name);
+    let state = stem.strip_prefix("state-").and_then(|n| n.strip_suffix(".vtu"));
+    [PVD, HISTORY, SUMMARY].contains(&stem)
+        || state.is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Writes a file under the temporary name `.NAME.tmp` beside it and renames it, so that readers and killed runs
+/// see the former file or the new one.
+///
+/// # Errors
+/// [`Error::Io`] with the path of the file in question; the temporary file is then removed.
+///
+/// # Panics
+/// If `path` ends in no file name.
+pub fn write_whole(
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), Error> {
+    let name = path.file_name().unwrap_or_else(|| panic!("{} names no file", path.display()));
+    let mut hidden = std::ffi::OsString::from(".");
+    hidden.push(name);
+    hidden.push(".tmp");
+    let temporary = path.with_file_name(hidden);
+    let file = File::create(&temporary).map_err(Error::io("create", path))?;
+    let mut out = BufWriter::with_capacity(1 << 16, file);
+    // Network file systems report a full disk only when the data is synchronised.
+    let written = content(&mut out).and_then(|()| out.flush()).and_then(|()| out.get_ref().sync_data());
+    let result = match written {
+        Ok(()) => fs::rename(&temporary, path).map_err(Error::io("rename", path)),
+        Err(source) => {
+            // What could not be written must not be written again when the buffer is dropped.
+            drop(out.into_parts());
+            Err(Error::Io { action: "write", path: path.to_owned(), source })
+        }
+    };
+    if result.is_err() {
+        // The first error is the one to report; a file that stays is removed by the next run with force.
+        let _ = fs::remove_file(&temporary);
+    }
+    result
+}
+
+/// Names of the consistent units of a deck, for headers and tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Units {
+    /// Unit of length.
+    pub length: &'static str,
+    /// Unit of mass.
+    pub mass: &'static str,
+    /// Unit of time.
+    pub time: &'static str,
+    /// Unit of energy: mass length^2 / time^2.
+    pub energy: &'static str,
+}
+
+impl Units {
+    /// The units that [`deck::model::Model::units`] names; an unknown name gives the dimensions themselves.
+    pub fn named(name: &str) -> Self {
+        let (length, mass, time, energy) = match name {
+            "SI" => ("m", "kg", "s", "J"),
+            // 1 Mbar = 1e11 Pa and 1 cm3 = 1e-6 m3: 1e5 J.
+            "cm-g-us" => ("cm", "g", "us", "Mbar*cm3"),
+            "mm-ms-kg" => ("mm", "kg", "ms", "J"),
+            "mm-s-t" => ("mm", "t", "s", "mJ"),
+            _ => ("length", "mass", "time", "energy"),
+        };
+        Self { length, mass, time, energy }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn force_knows_the_names_of_a_run_and_no_others() {
+        for name in
+            ["results.pvd", "history.csv", "summary.json", ".state-000000.vtu.tmp", ".results.pvd.tmp"]
+        {
+            assert!(is_written_by_a_run(name), "{name}");
+        }
+        for index in [0, 999_999, 1_000_000, u32::MAX] {
+            assert!(is_written_by_a_run(&state_name(index)), "{index}");
+        }
+        for name in
+            ["notes.txt", "state-.vtu", "state-00000a.vtu", "state-1.vtu", "history.csv.tmp", ".tmp", ""]
+        {
+            assert!(!is_written_by_a_run(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn energy_unit_of_every_set_is_the_one_its_base_units_give() {
+        let joule = |mass_kg: f64, length_m: f64, time_s: f64| mass_kg * (length_m / time_s).powi(2);
+        let size = |unit: &str| match unit {
+            "J" => 1.0,
+            "mJ" => 1e-3,
+            "Mbar*cm3" => 1e11 * 1e-6,
+            other => panic!("no size known for {other}"),
+        };
+        for (name, expected) in [
+            ("SI", joule(1.0, 1.0, 1.0)),
+            ("cm-g-us", joule(1e-3, 1e-2, 1e-6)),
+            ("mm-ms-kg", joule(1.0, 1e-3, 1e-3)),
+            ("mm-s-t", joule(1e3, 1e-3, 1.0)),
+        ] {
+            let named = size(Units::named(name).energy);
+            assert!((named / expected - 1.0).abs() < 1e-12, "{name}: {named} J named, {expected} J derived");
+        }
+    }
+}

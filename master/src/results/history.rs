@@ -1,0 +1,288 @@
+//! Histories: one row of numbers per written cycle, as comma-separated text.
+//!
+//! Every number is the shortest decimal that reads back to the same bits, so equal bits give equal text and two
+//! runs can be compared as files.
+
+use std::{
+    fmt::Write as _,
+    fs::{self, File, OpenOptions},
+    io::{Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
+
+use deck::model::Model;
+
+use super::{Error, Folder, HISTORY, Units, write_whole};
+
+/// One row of the table. Energies and momentum of the whole problem, in the deck's units.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HistoryRow {
+    /// Cycles completed.
+    pub cycle: u64,
+    /// Time (time).
+    pub time: f64,
+    /// Time step of the cycle (time).
+    pub dt: f64,
+    /// Kinetic energy.
+    pub kinetic: f64,
+    /// Internal energy, with what artificial viscosity put in.
+    pub internal: f64,
+    /// Energy taken by hourglass forces.
+    pub hourglass: f64,
+    /// Energy held by contact springs.
+    pub contact: f64,
+    /// Energy taken by friction.
+    pub friction: f64,
+    /// Work done on the bodies from outside, by prescribed velocities and walls.
+    pub external: f64,
+    /// Sum of kinetic, internal, hourglass, contact and friction energy.
+    pub total: f64,
+    /// Energy error, relative, as in the summary.
+    pub error: f64,
+    /// Linear momentum by axis (mass length per time).
+    pub momentum: [f64; 3],
+    /// One entry per part, in deck order.
+    pub parts: Vec<PartEnergy>,
+    /// One entry per gauge, in deck order.
+    pub gauges: Vec<GaugeRow>,
+}
+
+/// Energies of one part.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PartEnergy {
+    /// Kinetic energy.
+    pub kinetic: f64,
+    /// Internal energy.
+    pub internal: f64,
+}
+
+/// What a gauge reads.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GaugeRow {
+    /// Position of its node (length).
+    pub x: [f64; 3],
+    /// Velocity of its node (length per time).
+    pub v: [f64; 3],
+}
+
+/// The growing file `history.csv` of a run.
+///
+/// It grows by whole rows: a row is one write, and what an unfinished write left is cut off again.
+#[derive(Debug)]
+pub struct History {
+    path: PathBuf,
+    file: File,
+    /// Bytes of header and whole rows.
+    length: u64,
+    n_parts: usize,
+    n_gauges: usize,
+    row: String,
+}
+
+impl History {
+    /// Starts the file with its header row: names with the units of the deck.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn create(folder: &Folder, model: &Model) -> Result<Self, Error> {
+        let path = folder.file(HISTORY);
+        let header = header(model);
+        write_whole(&path, |out| out.write_all(header.as_bytes()))?;
+        Self::open(folder, model, header.len() as u64)
+    }
+
+    /// Goes on with a file after its first `length` bytes, which a snapshot kept from [`History::length`]; what
+    /// stands behind them is cut off.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Malformed`] if the file is shorter.
+    pub fn open(folder: &Folder, model: &Model, length: u64) -> Result<Self, Error> {
+        let path = folder.file(HISTORY);
+        let file = OpenOptions::new().write(true).open(&path).map_err(Error::io("write", &path))?;
+        let found = file.metadata().map_err(Error::io("read", &path))?.len();
+        if found < length {
+            let what =
+                format!("file of {found} bytes, at least {length} were written before; start the run anew");
+            return Err(Error::Malformed { path, line: 1, what });
+        }
+        let mut history = Self {
+            path,
+            file,
+            length,
+            n_parts: model.mesh.parts.len(),
+            n_gauges: model.output.gauges.len(),
+            row: String::new(),
+        };
+        history.cut()?;
+        Ok(history)
+    }
+
+    /// Bytes of header and whole rows, which a snapshot keeps for [`History::roll_back`].
+    pub fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Goes back to an earlier length of this file.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    ///
+    /// # Panics
+    /// If the file was never that long.
+    pub fn roll_back(&mut self, length: u64) -> Result<(), Error> {
+        assert!(length <= self.length, "history of {} bytes cannot go back to {length}", self.length);
+        self.length = length;
+        self.cut()
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; the file then ends with the row before.
+    ///
+    /// # Panics
+    /// If the row has not one entry per part and per gauge of the model.
+    pub fn append(&mut self, row: &HistoryRow) -> Result<(), Error> {
+        assert_eq!(row.parts.len(), self.n_parts, "parts of the row and of the model");
+        assert_eq!(row.gauges.len(), self.n_gauges, "gauges of the row and of the model");
+        self.row.clear();
+        // Writing into a string cannot fail.
+        let _ = write!(self.row, "{}", row.cycle);
+        let numbers = [row.time, row.dt, row.kinetic, row.internal, row.hourglass, row.contact, row.friction]
+            .into_iter()
+            .chain([row.external, row.total, row.error])
+            .chain(row.momentum)
+            .chain(row.parts.iter().flat_map(|part| [part.kinetic, part.internal]))
+            .chain(row.gauges.iter().flat_map(|gauge| gauge.x.into_iter().chain(gauge.v)));
+        for number in numbers {
+            let _ = write!(self.row, ",{number:?}");
+        }
+        self.row.push('\n');
+        if let Err(source) = self.file.write_all(self.row.as_bytes()) {
+            // The full disk is the error to report, whether or not the torn row can be cut off.
+            let _ = self.cut();
+            return Err(Error::Io { action: "write", path: self.path.clone(), source });
+        }
+        self.length += self.row.len() as u64;
+        Ok(())
+    }
+
+    /// Makes the file end, and the next row start, at the known length.
+    fn cut(&mut self) -> Result<(), Error> {
+        self.file
+            .set_len(self.length)
+            .and_then(|()| self.file.seek(SeekFrom::Start(self.length)))
+            .map(|_| ())
+            .map_err(Error::io("write", &self.path))
+    }
+}
+
+/// The header row, with its line end.
+fn header(model: &Model) -> String {
+    let Units { length, mass, time, energy } = Units::named(&model.units);
+    let mut columns = vec!["cycle".to_owned(), format!("time [{time}]"), format!("dt [{time}]")];
+    let energies = ["kinetic", "internal", "hourglass", "contact", "friction", "external", "total"];
+    columns.extend(energies.iter().map(|name| format!("{name} [{energy}]")));
+    columns.push("error".to_owned());
+    columns.extend(["x", "y", "z"].iter().map(|axis| format!("momentum_{axis} [{mass}*{length}/{time}]")));
+    for part in &model.mesh.parts {
+        columns.extend(["kinetic", "internal"].iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
+    }
+    for gauge in &model.output.gauges {
+        columns.extend(["x", "y", "z"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));
+        columns
+            .extend(["vx", "vy", "vz"].iter().map(|axis| format!("{}:{axis} [{length}/{time}]", gauge.name)));
+    }
+    let mut header = columns.iter().map(|column| cell(column)).collect::<Vec<_>>().join(",");
+    header.push('\n');
+    header
+}
+
+/// A header cell: quoted where a name holds a comma or a quote (RFC 4180); control characters become spaces, so
+/// that a row is a line.
+fn cell(text: &str) -> String {
+    let text = text.replace(char::is_control, " ");
+    if text.contains([',', '"']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
+}
+
+/// A history read back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Header cells, with their units.
+    pub columns: Vec<String>,
+    /// Rows of numbers, each as long as `columns`.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// Reads a `history.csv`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Malformed`] for a row of another length than the header and for a cell that is no
+    /// number.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+        let malformed = |line: usize, what: String| Error::Malformed { path: path.to_owned(), line, what };
+        let mut lines = text.lines();
+        let header =
+            lines.next().ok_or_else(|| malformed(1, "expected a header row, found nothing".into()))?;
+        let columns = split_header(header);
+        let mut rows = Vec::new();
+        for (number, line) in (2..).zip(lines) {
+            let row = line
+                .split(',')
+                .map(|cell| {
+                    cell.parse().map_err(|_| malformed(number, format!("expected a number, found {cell:?}")))
+                })
+                .collect::<Result<Vec<f64>, _>>()?;
+            if row.len() != columns.len() {
+                return Err(malformed(
+                    number,
+                    format!("expected {} cells, found {}", columns.len(), row.len()),
+                ));
+            }
+            rows.push(row);
+        }
+        Ok(Self { columns, rows })
+    }
+
+    /// The column of this name, without its unit: `kinetic`, `plate:internal`, `tip:vx`.
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let bare =
+            |column: &String| column.rsplit_once(" [").map_or(column.as_str(), |(bare, _)| bare) == name;
+        let index = self.columns.iter().position(bare)?;
+        Some(self.rows.iter().map(|row| row[index]).collect())
+    }
+}
+
+/// The cells of a header row; undoes [`cell`].
+fn split_header(line: &str) -> Vec<String> {
+    let mut cells = vec![String::new()];
+    let mut quoted = false;
+    let mut letters = line.chars().peekable();
+    while let Some(letter) = letters.next() {
+        match letter {
+            '"' if quoted && letters.peek() == Some(&'"') => {
+                letters.next();
+                cells.last_mut().expect("starts with one cell").push('"');
+            }
+            '"' => quoted = !quoted,
+            ',' if !quoted => cells.push(String::new()),
+            _ => cells.last_mut().expect("starts with one cell").push(letter),
+        }
+    }
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn header_cells_come_back_whatever_a_part_is_called() {
+        let names = ["plate", "a,b", "say \"x\"", "\"", ",", "", "ärger [mm]"];
+        let line = names.map(cell).join(",");
+        assert_eq!(split_header(&line), names);
+        assert_eq!(cell("two\nlines\t"), "two lines ");
+    }
+}

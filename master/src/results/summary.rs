@@ -1,0 +1,264 @@
+//! What a run was and how well it went: `summary.json`, and the same for a person to read.
+//!
+//! Units and formulas of every field are stated in the deck reference.
+
+use std::{
+    fmt::{self, Write as _},
+    io::Write as _,
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{Error, Folder, SUMMARY, Units, write_whole};
+
+/// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Title of the deck.
+    pub title: String,
+    /// Elements of all parts.
+    pub elements: u64,
+    /// Nodes after joins.
+    pub nodes: u64,
+    /// Elements with at least one surface face.
+    pub surface_elements: u64,
+    /// Surface faces.
+    pub surface_faces: u64,
+    /// Nodes of surface faces.
+    pub surface_nodes: u64,
+    /// Workers at the end of the run.
+    pub workers: u32,
+    /// Compute threads of all workers together.
+    pub threads: u32,
+    /// Route of the exchange: `master` or `direct`.
+    pub route: String,
+    /// `f64` numbers in one lane set.
+    pub lanes: u32,
+    /// Cycles completed.
+    pub cycles: u64,
+    /// Time reached (time).
+    pub end_time: f64,
+    /// Wall-clock time of the cycles (s).
+    pub wall_s: f64,
+    /// Thread-CPU time per element and cycle (ns), contact and sorts included.
+    pub grind_ns: f64,
+    /// Share of `grind_ns` in contact and sorts.
+    pub contact_share: f64,
+    /// Sorts that took effect.
+    pub sorts: u64,
+    /// Contact work units of the last sort.
+    pub work_units: WorkUnits,
+    /// Largest over mean of cost over speed by worker; 1 is perfect.
+    pub imbalance: f64,
+    /// Bytes on all links over cycles.
+    pub bytes_per_cycle: f64,
+    /// Energies at the end.
+    pub energies: Energies,
+    /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
+    pub momentum_error: f64,
+    /// Largest time step over the true Courant limit; below 1 is stable.
+    pub worst_courant: f64,
+    /// Largest travel of a contact node in one cycle (gaps); at most 0.2 is asked for.
+    pub worst_gap_travel: f64,
+    /// Deepest penetration (gaps).
+    pub worst_penetration: f64,
+    /// Hash of the final state (hexadecimal).
+    pub digest: String,
+}
+
+/// Sizes of contact work units. Zero without contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WorkUnits {
+    /// Units that hold at least one interaction.
+    pub count: u64,
+    /// Fewest nodes of a unit.
+    pub nodes_min: u64,
+    /// Mean nodes of a unit.
+    pub nodes_mean: f64,
+    /// Most nodes of a unit.
+    pub nodes_max: u64,
+    /// Fewest faces of a unit.
+    pub faces_min: u64,
+    /// Mean faces of a unit.
+    pub faces_mean: f64,
+    /// Most faces of a unit.
+    pub faces_max: u64,
+    /// Node-face interactions of all units.
+    pub interactions: u64,
+}
+
+/// Energies of the whole problem in the deck's unit of energy; `error` is relative.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Energies {
+    /// Kinetic energy.
+    pub kinetic: f64,
+    /// Internal energy.
+    pub internal: f64,
+    /// Energy taken by hourglass forces.
+    pub hourglass: f64,
+    /// Part of `internal` that artificial viscosity put in.
+    pub viscosity: f64,
+    /// Energy held by contact springs and taken by friction.
+    pub contact: f64,
+    /// Work done on the bodies from outside.
+    pub external: f64,
+    /// Energy error: what appeared or vanished, relative.
+    pub error: f64,
+}
+
+impl Summary {
+    /// Writes `summary.json` into the results folder.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&self, folder: &Folder) -> Result<(), Error> {
+        write_whole(&folder.file(SUMMARY), |out| {
+            serde_json::to_writer_pretty(&mut *out, self)?;
+            out.write_all(b"\n")
+        })
+    }
+
+    /// The summary as an aligned table of a few lines, for a terminal. `units` is the deck's name of them.
+    pub fn table(&self, units: &str) -> String {
+        let mut table = String::new();
+        // Writing into a string cannot fail.
+        let _ = self.print(&mut table, Units::named(units));
+        table
+    }
+
+    fn print(&self, out: &mut String, Units { time, energy, .. }: Units) -> fmt::Result {
+        let Energies { kinetic, internal, hourglass, viscosity, contact, external, error } = self.energies;
+        writeln!(out, "{}", self.title.replace(char::is_control, " "))?;
+        writeln!(out, "  problem    {} elements, {} nodes", grouped(self.elements), grouped(self.nodes))?;
+        writeln!(
+            out,
+            "  surface    {} elements, {} faces, {} nodes",
+            grouped(self.surface_elements),
+            grouped(self.surface_faces),
+            grouped(self.surface_nodes)
+        )?;
+        writeln!(
+            out,
+            "  run        {} cycles to {} {time} in {:.2} s on {} with {} of {} lanes, route {}",
+            grouped(self.cycles),
+            significant(self.end_time),
+            self.wall_s,
+            counted(self.workers, "worker"),
+            counted(self.threads, "thread"),
+            self.lanes,
+            self.route
+        )?;
+        writeln!(
+            out,
+            "  speed      {:.1} ns of thread time per element and cycle, {:.1} % of it in contact; imbalance {:.3}",
+            self.grind_ns,
+            100.0 * self.contact_share,
+            self.imbalance
+        )?;
+        writeln!(out, "  traffic    {} bytes per cycle", grouped(self.bytes_per_cycle.round() as u64))?;
+        let WorkUnits {
+            count,
+            nodes_min,
+            nodes_mean,
+            nodes_max,
+            faces_min,
+            faces_mean,
+            faces_max,
+            interactions,
+        } = self.work_units;
+        if count > 0 {
+            writeln!(
+                out,
+                "  contact    {} sorts; {} work units of {nodes_min}-{nodes_max} nodes (mean {nodes_mean:.1}) and \
+                 {faces_min}-{faces_max} faces (mean {faces_mean:.1}), {} interactions",
+                grouped(self.sorts),
+                grouped(count),
+                grouped(interactions)
+            )?;
+            writeln!(
+                out,
+                "             worst penetration {:.3} gap, worst travel in one cycle {:.3} gap",
+                self.worst_penetration, self.worst_gap_travel
+            )?;
+        }
+        writeln!(out, "  time step  at most {:.4} of the Courant limit", self.worst_courant)?;
+        writeln!(out, "  energy     {:<10} {:>14} {energy}", "kinetic", significant(kinetic))?;
+        for (name, value) in [
+            ("internal", internal),
+            ("viscosity*", viscosity),
+            ("hourglass", hourglass),
+            ("contact", contact),
+            ("external", external),
+        ] {
+            writeln!(out, "             {name:<10} {:>14}", significant(value))?;
+        }
+        writeln!(out, "             {:<10} {:>14}   *part of internal", "error", percent(error))?;
+        writeln!(out, "  momentum   {:<10} {:>14}", "error", percent(self.momentum_error))?;
+        writeln!(out, "  digest     {}", self.digest)
+    }
+}
+
+/// `1 worker`, `4 workers`.
+fn counted(n: u32, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+/// A count with a comma every three digits.
+fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Six significant digits, with an exponent outside 0.001 to 1,000,000.
+fn significant(x: f64) -> String {
+    let magnitude = x.abs();
+    if x == 0.0 {
+        "0".to_owned()
+    } else if (1e-3..1e6).contains(&magnitude) {
+        let decimals = (5.0 - magnitude.log10().floor()).clamp(0.0, 9.0) as usize;
+        format!("{x:.decimals$}")
+    } else {
+        format!("{x:.5e}")
+    }
+}
+
+/// A relative quantity in percent, with an exponent below 0.001 %.
+fn percent(x: f64) -> String {
+    let x = 100.0 * x;
+    if x == 0.0 || x.abs() >= 1e-3 { format!("{x:.3} %") } else { format!("{x:.2e} %") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_six_digits_at_any_size() {
+        for (number, text) in [
+            (0.0, "0"),
+            (1.0, "1.00000"),
+            (-12.345678, "-12.3457"),
+            (999_999.4, "999999"),
+            (1e6, "1.00000e6"),
+            (0.001234567, "0.00123457"),
+            (-1.5e-12, "-1.50000e-12"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(significant(number), text);
+        }
+    }
+
+    #[test]
+    fn counts_are_grouped_by_thousands() {
+        for (number, text) in [(0, "0"), (999, "999"), (1000, "1,000"), (1_234_567, "1,234,567")] {
+            assert_eq!(grouped(number), text);
+        }
+    }
+}

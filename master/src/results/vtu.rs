@@ -1,0 +1,391 @@
+//! States as VTK unstructured grids, and the index of them.
+//!
+//! A file holds one piece: points, hexahedra and raw appended arrays, little-endian with 64-bit sizes, each
+//! streamed from the state as it is written. The corner order of [`mechanics`] is that of VTK's cell type 12.
+//! Format: the VTK file format documentation, section "XML file formats".
+
+use std::{io, io::Write, path::Path};
+
+use deck::model::Model;
+use mechanics::state::{GlobalState, field};
+
+use super::{Error, FIELD_NAMES, Folder, PVD, state_name, write_whole};
+
+/// Cell type of the eight-node hexahedron.
+const VTK_HEXAHEDRON: u8 = 12;
+
+/// Fields whose numbers identify rather than measure: written whatever the deck selects.
+const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
+
+/// Fields that follow from the others: written only if the deck names them.
+const ON_REQUEST: [&str; 7] =
+    ["stress", "relative_volume", "stress_xx", "stress_yy", "stress_xy", "stress_yz", "stress_zx"];
+
+/// Which fields a state file holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fields {
+    /// One flag per entry of [`FIELD_NAMES`].
+    selected: [bool; FIELD_NAMES.len()],
+}
+
+impl Fields {
+    /// The fields of `output.fields`; an empty list selects all but the relative volume and the
+    /// components of stress.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`].
+    pub fn select(names: &[String]) -> Result<Self, Error> {
+        if let Some(name) = names.iter().find(|name| !FIELD_NAMES.contains(&name.as_str())) {
+            return Err(Error::UnknownField { name: name.clone() });
+        }
+        let selected = FIELD_NAMES.map(|known| {
+            IDENTITY.contains(&known)
+                || names.iter().any(|name| name == known)
+                || names.is_empty() && !ON_REQUEST.contains(&known)
+        });
+        Ok(Self { selected })
+    }
+
+    /// Whether the field of this name is written.
+    fn contains(&self, name: &str) -> bool {
+        FIELD_NAMES.iter().zip(self.selected).any(|(known, selected)| selected && *known == name)
+    }
+}
+
+/// Puts the little-endian components of one tuple into a buffer.
+type Put<'a> = Box<dyn Fn(usize, &mut Vec<u8>) + 'a>;
+
+/// One array of the file: its description and where its numbers come from.
+struct Array<'a> {
+    name: &'static str,
+    /// VTK's name of the type.
+    kind: &'static str,
+    /// Bytes per component.
+    width: usize,
+    /// Components per tuple.
+    components: usize,
+    tuples: usize,
+    /// Whether the components are told to the reader; otherwise the array is one long list.
+    grouped: bool,
+    put: Put<'a>,
+}
+
+impl<'a> Array<'a> {
+    fn f64<const N: usize>(name: &'static str, tuples: usize, of: impl Fn(usize) -> [f64; N] + 'a) -> Self {
+        let put: Put =
+            Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
+        Self { name, kind: "Float64", width: 8, components: N, tuples, grouped: true, put }
+    }
+
+    /// A list of indices, `N` per tuple; VTK refuses grouped ones.
+    fn i64<const N: usize>(name: &'static str, tuples: usize, of: impl Fn(usize) -> [i64; N] + 'a) -> Self {
+        let put: Put =
+            Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
+        Self { name, kind: "Int64", width: 8, components: N, tuples, grouped: false, put }
+    }
+
+    fn u32(name: &'static str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
+        let put: Put = Box::new(move |i, out| out.extend_from_slice(&of(i).to_le_bytes()));
+        Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
+    }
+
+    /// Size of the numbers, without the header that precedes them.
+    fn n_bytes(&self) -> u64 {
+        self.tuples as u64 * self.components as u64 * self.width as u64
+    }
+
+    /// The element that announces the array, which starts `offset` bytes into the appended data.
+    fn describe(&self, out: &mut impl Write, offset: u64) -> io::Result<()> {
+        write!(out, r#"        <DataArray type="{}" Name="{}""#, self.kind, self.name)?;
+        if self.grouped && self.components != 1 {
+            write!(out, r#" NumberOfComponents="{}""#, self.components)?;
+        }
+        if self.components == 6 {
+            for (index, name) in ["XX", "YY", "ZZ", "XY", "YZ", "XZ"].iter().enumerate() {
+                write!(out, r#" ComponentName{index}="{name}""#)?;
+            }
+        }
+        writeln!(out, r#" format="appended" offset="{offset}"/>"#)
+    }
+
+    /// The size header and the numbers, through a buffer of bounded size.
+    fn append(&self, out: &mut impl Write) -> io::Result<()> {
+        const CHUNK: usize = 1 << 16;
+        out.write_all(&self.n_bytes().to_le_bytes())?;
+        let mut buffer = Vec::with_capacity(CHUNK + self.components * self.width);
+        for tuple in 0..self.tuples {
+            (self.put)(tuple, &mut buffer);
+            if buffer.len() >= CHUNK {
+                out.write_all(&buffer)?;
+                buffer.clear();
+            }
+        }
+        out.write_all(&buffer)
+    }
+}
+
+/// Where the elements of a model are: part and material by global element index.
+struct Elements<'a> {
+    model: &'a Model,
+    offsets: Vec<usize>,
+}
+
+impl Elements<'_> {
+    /// Part of an element, and its index within the part.
+    fn locate(&self, element: usize) -> (usize, usize) {
+        // An empty part has the offset of its successor: the last offset that is not beyond the element counts.
+        let part = self.offsets.partition_point(|&first| first <= element) - 1;
+        (part, element - self.offsets[part])
+    }
+
+    fn corners(&self, element: usize) -> [i64; 8] {
+        let (part, local) = self.locate(element);
+        self.model.mesh.parts[part].corners(local).map(i64::from)
+    }
+
+    fn element_id(&self, element: usize) -> u32 {
+        let (part, local) = self.locate(element);
+        self.model.mesh.parts[part].element_ids[local]
+    }
+
+    fn material(&self, element: usize) -> u32 {
+        self.model.mesh.parts[self.locate(element).0].material
+    }
+
+    /// Density of the undeformed element.
+    fn density(&self, element: usize) -> f64 {
+        self.model.setup.materials[self.material(element) as usize].density
+    }
+}
+
+/// Von Mises stress `sqrt(3/2 s:s)` of the deviator given by its components xx, yy, xy, yz, zx.
+pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
+    let zz = -(xx + yy);
+    (1.5 * (xx * xx + yy * yy + zz * zz) + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
+}
+
+/// Writes one state as a `.vtu` file, whole or not at all.
+///
+/// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`. Element
+/// fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
+/// `temperature` (K), `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
+/// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric).
+/// `worker` gives, by global element index, the worker that computes the element, and becomes the element
+/// field of that name. Units are the deck's.
+///
+/// # Errors
+/// [`Error::Io`] if the disk refuses.
+///
+/// # Panics
+/// If the lengths of `state` or `worker` are not those of the model's mesh.
+pub fn write_vtu(
+    path: &Path,
+    model: &Model,
+    state: &GlobalState,
+    fields: &Fields,
+    worker: Option<&[u32]>,
+) -> Result<(), Error> {
+    write_whole(path, |out| stream(out, model, state, fields, worker))
+}
+
+/// The file of [`write_vtu`] as bytes into any writer.
+fn stream(
+    out: &mut impl Write,
+    model: &Model,
+    state: &GlobalState,
+    fields: &Fields,
+    worker: Option<&[u32]>,
+) -> io::Result<()> {
+    let (n_nodes, n_elements) = (model.mesh.n_nodes(), model.mesh.n_elements());
+    assert_eq!(state.x.len(), n_nodes, "positions of the state and nodes of the mesh");
+    assert_eq!(state.v.len(), n_nodes, "velocities of the state and nodes of the mesh");
+    for (name, values) in mechanics::state::FIELDS.iter().zip(&state.elements) {
+        assert_eq!(values.len(), n_elements, "{name} of the state and elements of the mesh");
+    }
+    if let Some(worker) = worker {
+        assert_eq!(worker.len(), n_elements, "entries of worker and elements of the mesh");
+    }
+
+    let elements = Elements { model, offsets: model.mesh.element_offsets() };
+    let [point, cell] = data_arrays(&elements, state, worker).map(|mut arrays: Vec<Array>| {
+        arrays.retain(|array| array.name == "worker" || fields.contains(array.name));
+        arrays
+    });
+    let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
+    let cells = [
+        Array::i64("connectivity", n_elements, |e| elements.corners(e)),
+        Array::i64("offsets", n_elements, |e| [8 * (e as i64 + 1)]),
+        Array {
+            name: "types",
+            kind: "UInt8",
+            width: 1,
+            components: 1,
+            tuples: n_elements,
+            grouped: true,
+            put: Box::new(|_, out| out.push(VTK_HEXAHEDRON)),
+        },
+    ];
+    let sections: [(&str, &[Array]); 4] =
+        [("PointData", &point), ("CellData", &cell), ("Points", &points), ("Cells", &cells)];
+
+    writeln!(out, r#"<?xml version="1.0"?>"#)?;
+    writeln!(
+        out,
+        r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
+    )?;
+    writeln!(out, "  <UnstructuredGrid>\n    <FieldData>")?;
+    writeln!(
+        out,
+        r#"      <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{:?}</DataArray>"#,
+        state.time
+    )?;
+    writeln!(
+        out,
+        r#"      <DataArray type="Int64" Name="cycle" NumberOfTuples="1" format="ascii">{}</DataArray>"#,
+        state.cycle
+    )?;
+    writeln!(out, "    </FieldData>")?;
+    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_elements}">"#)?;
+    let mut offset = 0;
+    for (section, arrays) in sections {
+        writeln!(out, "      <{section}>")?;
+        for array in arrays {
+            array.describe(out, offset)?;
+            offset += 8 + array.n_bytes();
+        }
+        writeln!(out, "      </{section}>")?;
+    }
+    writeln!(out, "    </Piece>\n  </UnstructuredGrid>")?;
+    write!(out, "  <AppendedData encoding=\"raw\">\n_")?;
+    for array in sections.iter().flat_map(|(_, arrays)| *arrays) {
+        array.append(out)?;
+    }
+    // Some readers look for the closing tag at the start of a line.
+    writeln!(out, "\n  </AppendedData>\n</VTKFile>")
+}
+
+/// All node fields and all element fields.
+fn data_arrays<'a>(
+    elements: &'a Elements,
+    state: &'a GlobalState,
+    worker: Option<&'a [u32]>,
+) -> [Vec<Array<'a>>; 2] {
+    let mesh = &elements.model.mesh;
+    let (n_nodes, n_elements) = (mesh.n_nodes(), mesh.n_elements());
+    let value = |field: usize| move |e: usize| state.elements[field][e];
+    let (pressure, plastic_strain) = (value(field::PRESSURE), value(field::PLASTIC_STRAIN));
+    let (temperature, energy) = (value(field::TEMPERATURE), value(field::ENERGY));
+    let relative_volume = value(field::RELATIVE_VOLUME);
+    let deviator = move |e: usize| {
+        [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX].map(|f| state.elements[f][e])
+    };
+    let point = vec![
+        Array::f64("velocity", n_nodes, move |n| state.v[n]),
+        Array::f64("displacement", n_nodes, move |n| {
+            let (x, start) = (state.x[n], mesh.positions[n]);
+            std::array::from_fn::<f64, 3, _>(|axis| x[axis] - start[axis])
+        }),
+        Array::u32("node_id", n_nodes, move |n| mesh.node_ids[n]),
+    ];
+    let mut cell = vec![
+        Array::u32("part", n_elements, move |e| elements.locate(e).0 as u32),
+        Array::u32("material", n_elements, move |e| elements.material(e)),
+        Array::u32("element_id", n_elements, move |e| elements.element_id(e)),
+        Array::f64("pressure", n_elements, move |e| [pressure(e)]),
+        Array::f64("von_mises", n_elements, move |e| [von_mises(deviator(e))]),
+        Array::f64("plastic_strain", n_elements, move |e| [plastic_strain(e)]),
+        Array::f64("temperature", n_elements, move |e| [temperature(e)]),
+        Array::f64("density", n_elements, move |e| [elements.density(e) / relative_volume(e)]),
+        // Energy is held per initial volume.
+        Array::f64("energy", n_elements, move |e| [energy(e) / elements.density(e)]),
+        Array::f64("stress", n_elements, move |e| {
+            let ([xx, yy, xy, yz, zx], p) = (deviator(e), pressure(e));
+            [xx - p, yy - p, -(xx + yy) - p, xy, yz, zx]
+        }),
+    ];
+    cell.extend(
+        [
+            ("relative_volume", field::RELATIVE_VOLUME),
+            ("stress_xx", field::SXX),
+            ("stress_yy", field::SYY),
+            ("stress_xy", field::SXY),
+            ("stress_yz", field::SYZ),
+            ("stress_zx", field::SZX),
+        ]
+        .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
+    );
+    if let Some(worker) = worker {
+        cell.push(Array::u32("worker", n_elements, move |e| worker[e]));
+    }
+    [point, cell]
+}
+
+/// The states of a run in order, and their index `results.pvd`.
+///
+/// The index is written anew, whole, after each state, so it names only files that exist.
+#[derive(Debug)]
+pub struct Series {
+    folder: Folder,
+    fields: Fields,
+    /// Time of each state written.
+    times: Vec<f64>,
+}
+
+impl Series {
+    /// A series without states, with the fields that the deck selects.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`].
+    pub fn new(folder: &Folder, model: &Model) -> Result<Self, Error> {
+        Ok(Self { folder: folder.clone(), fields: Fields::select(&model.output.fields)?, times: Vec::new() })
+    }
+
+    /// Writes a state under the next number, then the index. `worker` is as in [`write_vtu`].
+    ///
+    /// # Errors
+    /// [`Error::Io`]; the index then names the states written before.
+    ///
+    /// # Panics
+    /// As [`write_vtu`].
+    pub fn write(&mut self, model: &Model, state: &GlobalState, worker: Option<&[u32]>) -> Result<(), Error> {
+        let index = u32::try_from(self.times.len()).expect("a run writes fewer than 2^32 states");
+        write_vtu(&self.folder.file(&state_name(index)), model, state, &self.fields, worker)?;
+        self.times.push(state.time);
+        let indexed = self.write_index();
+        if indexed.is_err() {
+            self.times.pop();
+        }
+        indexed
+    }
+
+    /// Times of the states written, which a snapshot keeps beside the state.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Goes back to the states of these times, as a snapshot kept them: the next state is numbered after them.
+    /// Files of later states stay until they are written again; the index does not name them.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the index cannot be written.
+    pub fn roll_back(&mut self, times: &[f64]) -> Result<(), Error> {
+        self.times = times.to_vec();
+        self.write_index()
+    }
+
+    fn write_index(&self) -> Result<(), Error> {
+        write_whole(&self.folder.file(PVD), |out| {
+            writeln!(out, r#"<?xml version="1.0"?>"#)?;
+            writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">"#)?;
+            writeln!(out, "  <Collection>")?;
+            for (index, time) in (0..).zip(&self.times) {
+                writeln!(
+                    out,
+                    r#"    <DataSet timestep="{time:?}" group="" part="0" file="{}"/>"#,
+                    state_name(index)
+                )?;
+            }
+            writeln!(out, "  </Collection>\n</VTKFile>")
+        })
+    }
+}

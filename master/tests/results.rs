@@ -1,0 +1,624 @@
+//! The results folder: what is written reads back to the same bits, and a disk that refuses loses nothing else.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use deck::model::{Gauge, Model, Output};
+use master::results::{
+    self, Error, Folder,
+    history::{GaugeRow, History, HistoryRow, PartEnergy, Table},
+    summary::{Energies, Summary, WorkUnits},
+    vtu::{Fields, Series, von_mises, write_vtu},
+};
+use mechanics::{
+    material::{Eos, Material, Strength},
+    mesh::{Mesh, Part, Topology},
+    setup::{Constraint, Control, Setup},
+    state::{GlobalState, field},
+};
+
+/// An empty place for one test, kept after it for a look.
+fn scratch(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("results").join(name);
+    if path.exists() {
+        fs::remove_dir_all(&path).expect("an earlier run of this test made it");
+    }
+    fs::create_dir_all(path.parent().expect("joined above")).expect("target is writable");
+    path
+}
+
+/// A structured block with its own nodes, numbered from where the mesh ends.
+fn block(mesh: &mut Mesh, name: &str, material: u32, cells: [u32; 3], low: [f64; 3], high: [f64; 3]) {
+    let [ni, nj, nk] = cells;
+    let first = mesh.positions.len() as u32;
+    for k in 0..=nk {
+        for j in 0..=nj {
+            for i in 0..=ni {
+                let index = [i, j, k];
+                mesh.positions.push(std::array::from_fn(|axis| {
+                    let t = f64::from(index[axis]) / f64::from(cells[axis]);
+                    low[axis] + t * (high[axis] - low[axis])
+                }));
+            }
+        }
+    }
+    let end = mesh.positions.len() as u32;
+    mesh.node_ids.extend((first..end).map(|n| n + 1));
+    let n_before = mesh.n_elements() as u32;
+    mesh.parts.push(Part {
+        name: name.into(),
+        material,
+        topology: Topology::Structured { cells },
+        nodes: (first..end).collect(),
+        element_ids: (0..ni * nj * nk).map(|e| 1000 + n_before + e).collect(),
+    });
+}
+
+fn material(name: &str, density: f64) -> Material {
+    Material { name: name.into(), density, eos: Eos::Linear { bulk: 1.0 }, strength: Strength::Hydro }
+}
+
+/// A projectile plate on a target plate, an empty part between them, and one explicit hexahedron beside.
+fn plates(cells: u32) -> Model {
+    let mut mesh = Mesh::default();
+    block(&mut mesh, "projectile", 0, [cells, cells, cells / 2], [0.0, 0.0, 20.0], [30.0, 30.0, 30.0]);
+    mesh.parts.push(Part {
+        name: "nothing".into(),
+        material: 1,
+        topology: Topology::Explicit { hexahedra: Vec::new() },
+        nodes: Vec::new(),
+        element_ids: Vec::new(),
+    });
+    block(&mut mesh, "target, lower", 1, [cells, cells, cells], [0.0, 0.0, 0.0], [30.0, 30.0, 20.0]);
+    block(&mut mesh, "chip", 1, [1, 1, 1], [32.0, 0.0, 0.0], [33.0, 1.0, 1.0]);
+    let chip = mesh.parts.last_mut().expect("just added");
+    chip.topology = Topology::Explicit { hexahedra: vec![[0, 1, 3, 2, 4, 5, 7, 6]] };
+    let n_nodes = mesh.n_nodes();
+    Model {
+        title: "plates".into(),
+        units: "cm-g-us".into(),
+        mesh,
+        velocity: vec![[0.0; 3]; n_nodes],
+        constraint: vec![0; n_nodes],
+        join_energy: 0.0,
+        setup: Setup {
+            materials: vec![material("steel", 7.896), material("aluminium", 2.703)],
+            control: Control {
+                end_time: 1.0,
+                end_cycle: 10,
+                safety_factor: 0.6666,
+                growth: 1.05,
+                linear_viscosity: 0.2,
+                quadratic_viscosity: 1.0,
+                hourglass: 0.1,
+                sort_lag: 4,
+                plan_interval: 100,
+            },
+            contact: None,
+            constraints: vec![Constraint::default()],
+            walls: Vec::new(),
+        },
+        output: Output {
+            period: None,
+            history_cycles: 1,
+            fields: Vec::new(),
+            gauges: vec![Gauge { name: "tip".into(), node: 0 }],
+        },
+    }
+}
+
+/// A made-up state: the projectile has dug a smooth dent of depth `t` into the target.
+fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
+    let dent = |[x, y, z]: [f64; 3]| {
+        let r2 = ((x - 15.0).powi(2) + (y - 15.0).powi(2)) / 40.0;
+        [0.0, 0.0, -t * (-r2).exp() * (z / 20.0).clamp(0.0, 1.0)]
+    };
+    let x = model.mesh.positions.iter().map(|&p| std::array::from_fn(|a| p[a] + dent(p)[a])).collect();
+    let n = model.mesh.n_elements();
+    let element = |scale: f64| (0..n).map(|e| scale * ((e as f64 * 0.37).sin() + 1.5)).collect::<Vec<f64>>();
+    let mut elements: [Vec<f64>; 10] = std::array::from_fn(|f| element(1e-3 / (f as f64 + 1.0)));
+    elements[field::RELATIVE_VOLUME] = vec![0.5; n];
+    elements[field::PLASTIC_STRAIN] = (0..n)
+        .map(|e| {
+            let part = model.mesh.element_offsets().partition_point(|&first| first <= e) - 1;
+            let local = e - model.mesh.element_offsets()[part];
+            let corner = model.mesh.parts[part].corners(local)[0];
+            -dent(model.mesh.positions[corner as usize])[2] / 20.0
+        })
+        .collect();
+    GlobalState {
+        cycle,
+        time: 0.1 * cycle as f64,
+        x,
+        v: model.mesh.positions.iter().map(|&p| dent(p)).collect(),
+        mass: vec![1.0; model.mesh.n_nodes()],
+        constraint: vec![0; model.mesh.n_nodes()],
+        initial_volume: vec![1.0; n],
+        elements,
+    }
+}
+
+fn summary(model: &Model) -> Summary {
+    Summary {
+        title: model.title.clone(),
+        elements: model.mesh.n_elements() as u64,
+        nodes: model.mesh.n_nodes() as u64,
+        surface_elements: 12_016,
+        surface_faces: 12_800,
+        surface_nodes: 12_804,
+        workers: 4,
+        threads: 8,
+        route: "direct".into(),
+        lanes: 8,
+        cycles: 1200,
+        end_time: 1.0 / 3.0,
+        wall_s: 12.345,
+        grind_ns: 47.3,
+        contact_share: 0.051,
+        sorts: 37,
+        work_units: WorkUnits {
+            count: 2760,
+            nodes_min: 4,
+            nodes_mean: 4.6,
+            nodes_max: 8,
+            faces_min: 16,
+            faces_mean: 18.25,
+            faces_max: 32,
+            interactions: 101_234,
+        },
+        imbalance: 1.012,
+        bytes_per_cycle: 431_234.7,
+        energies: Energies {
+            kinetic: 7.1e-1,
+            internal: 0.1 + 0.2,
+            hourglass: 1e-3,
+            viscosity: 2.2e-2,
+            contact: 5e-324,
+            external: -0.0,
+            error: -3.2e-5,
+        },
+        momentum_error: 1.6e-15,
+        worst_courant: 0.6912,
+        worst_gap_travel: 0.1631,
+        worst_penetration: 0.4312,
+        digest: "00ff".repeat(16),
+    }
+}
+
+fn row(model: &Model, cycle: u64) -> HistoryRow {
+    let x = cycle as f64;
+    HistoryRow {
+        cycle,
+        time: x / 3.0,
+        dt: f64::from_bits(0x3fb9_9999_9999_999a + cycle),
+        kinetic: 1e300 / (x + 1.0),
+        internal: 5e-324,
+        hourglass: -0.0,
+        contact: 1e-7,
+        friction: 1e16,
+        external: 2.0,
+        total: x.sqrt(),
+        error: -1.0 / 7.0,
+        momentum: [x, -x / 3.0, f64::MIN_POSITIVE],
+        parts: vec![PartEnergy { kinetic: x + 0.1, internal: x + 0.2 }; model.mesh.parts.len()],
+        gauges: vec![GaugeRow { x: [1.0, 2.0, x], v: [0.1, 0.2, 0.3] }; model.output.gauges.len()],
+    }
+}
+
+/// The numbers of one appended array, as bytes, found the way a reader finds them.
+fn array(file: &[u8], name: &str) -> Vec<u8> {
+    let marker = b"<AppendedData encoding=\"raw\">\n_";
+    let start = file.windows(marker.len()).position(|w| w == marker).expect("appended data") + marker.len();
+    let head = std::str::from_utf8(&file[..start]).expect("the head is text");
+    let tag = head.lines().find(|line| line.contains(&format!("Name=\"{name}\""))).expect(name);
+    let offset: usize =
+        tag.split("offset=\"").nth(1).and_then(|t| t.split('"').next()).expect(name).parse().expect(name);
+    let sized = &file[start + offset..];
+    let (size, numbers) = sized.split_at(8);
+    let size = u64::from_le_bytes(size.try_into().expect("split at 8"));
+    numbers[..size as usize].to_vec()
+}
+
+fn bytes_of(numbers: impl IntoIterator<Item = f64>) -> Vec<u8> {
+    numbers.into_iter().flat_map(f64::to_le_bytes).collect()
+}
+
+fn bytes_of_u32(numbers: impl IntoIterator<Item = u32>) -> Vec<u8> {
+    numbers.into_iter().flat_map(u32::to_le_bytes).collect()
+}
+
+#[test]
+fn every_array_of_a_state_reads_back_to_the_same_bits() {
+    let model = plates(4);
+    let state = dented(&model, 7, 2.0);
+    let folder = Folder::create(&scratch("arrays"), false).expect("fresh folder");
+    let path = folder.file("state.vtu");
+    let all: Vec<String> = results::FIELD_NAMES.map(String::from).to_vec();
+    let worker: Vec<u32> = (0..model.mesh.n_elements() as u32).map(|e| e % 3).collect();
+    write_vtu(&path, &model, &state, &Fields::select(&all).expect("known names"), Some(&worker))
+        .expect("written");
+    let file = fs::read(&path).expect("written");
+
+    assert_eq!(array(&file, "Points"), bytes_of(state.x.iter().flatten().copied()));
+    assert_eq!(array(&file, "velocity"), bytes_of(state.v.iter().flatten().copied()));
+    let moved =
+        state.x.iter().zip(&model.mesh.positions).flat_map(|(x, p)| [x[0] - p[0], x[1] - p[1], x[2] - p[2]]);
+    assert_eq!(array(&file, "displacement"), bytes_of(moved));
+    assert_eq!(array(&file, "node_id"), bytes_of_u32(model.mesh.node_ids.iter().copied()));
+    let corners = model.mesh.parts.iter().flat_map(|p| (0..p.n_elements()).flat_map(|e| p.corners(e)));
+    assert_eq!(
+        array(&file, "connectivity"),
+        corners.flat_map(|n| i64::from(n).to_le_bytes()).collect::<Vec<_>>()
+    );
+    let n = model.mesh.n_elements();
+    assert_eq!(
+        array(&file, "offsets"),
+        (1..=n as i64).flat_map(|e| (8 * e).to_le_bytes()).collect::<Vec<_>>()
+    );
+    assert_eq!(array(&file, "types"), vec![12; n]);
+
+    let part: Vec<u32> = (0..).zip(&model.mesh.parts).flat_map(|(i, p)| vec![i; p.n_elements()]).collect();
+    let density: Vec<f64> = part.iter().map(|&p| if p == 0 { 7.896 } else { 2.703 }).collect();
+    assert_eq!(array(&file, "part"), bytes_of_u32(part.iter().copied()));
+    assert_eq!(array(&file, "material"), bytes_of_u32(part.iter().map(|&p| u32::from(p > 0))));
+    assert_eq!(array(&file, "element_id"), bytes_of_u32((0..n as u32).map(|e| 1000 + e)));
+    assert_eq!(array(&file, "worker"), bytes_of_u32(worker));
+    // Written as the state holds them; energy is the one that is not.
+    for (index, name) in
+        mechanics::state::FIELDS.into_iter().enumerate().filter(|(_, name)| *name != "energy")
+    {
+        assert_eq!(array(&file, name), bytes_of(state.elements[index].iter().copied()), "{name}");
+    }
+    assert_eq!(array(&file, "density"), bytes_of(density.iter().map(|d| d / 0.5)));
+    assert_eq!(
+        array(&file, "energy"),
+        bytes_of(state.elements[field::ENERGY].iter().zip(&density).map(|(e, d)| e / d))
+    );
+    let s = |f: usize, e: usize| state.elements[f][e];
+    let stress = (0..n).flat_map(|e| {
+        let p = s(field::PRESSURE, e);
+        let zz = -(s(field::SXX, e) + s(field::SYY, e));
+        let normal = [s(field::SXX, e) - p, s(field::SYY, e) - p, zz - p];
+        normal.into_iter().chain([s(field::SXY, e), s(field::SYZ, e), s(field::SZX, e)])
+    });
+    assert_eq!(array(&file, "stress"), bytes_of(stress));
+    assert!(file.ends_with(b"\n  </AppendedData>\n</VTKFile>\n"));
+}
+
+#[test]
+fn von_mises_stress_is_the_yield_stress_in_tension_and_root_three_times_shear() {
+    let y = 3.0;
+    let tension = von_mises([2.0 * y / 3.0, -y / 3.0, 0.0, 0.0, 0.0]);
+    assert!((tension - y).abs() < 1e-15, "{tension}");
+    for slot in 2..5 {
+        let mut shear = [0.0; 5];
+        shear[slot] = 1.0;
+        assert!((von_mises(shear) - 3f64.sqrt()).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn deck_selects_fields_and_an_empty_list_selects_all_but_components() {
+    let model = plates(2);
+    let state = dented(&model, 1, 1.0);
+    let folder = Folder::create(&scratch("selection"), false).expect("fresh folder");
+    let names_in = |list: &[&str]| {
+        let list: Vec<String> = list.iter().map(|name| name.to_string()).collect();
+        let path = folder.file("state.vtu");
+        write_vtu(&path, &model, &state, &Fields::select(&list).expect("known names"), None)
+            .expect("written");
+        let file = fs::read(path).expect("written");
+        let text = String::from_utf8_lossy(&file);
+        let known = |name: &&str| text.contains(&format!("Name=\"{name}\""));
+        results::FIELD_NAMES.into_iter().chain(["worker"]).filter(known).collect::<Vec<_>>()
+    };
+    assert_eq!(names_in(&["pressure"]), ["node_id", "part", "material", "element_id", "pressure"]);
+    let default: Vec<_> = results::FIELD_NAMES
+        .into_iter()
+        .filter(|name| !name.starts_with("stress") && *name != "relative_volume")
+        .collect();
+    assert_eq!(names_in(&[]), default);
+    let state_fields = names_in(&mechanics::state::FIELDS);
+    assert!(mechanics::state::FIELDS.iter().all(|name| state_fields.contains(name)), "{state_fields:?}");
+    let error = Fields::select(&["presure".into()]).expect_err("misspelt");
+    assert_eq!(
+        error.to_string(),
+        format!("unknown output field \"presure\"; known are {}", results::FIELD_NAMES.join(", "))
+    );
+}
+
+#[test]
+fn index_names_every_state_with_its_time_and_goes_back_with_the_run() {
+    let model = plates(2);
+    let folder = Folder::create(&scratch("series"), false).expect("fresh folder");
+    let mut series = Series::new(&folder, &model).expect("known fields");
+    for cycle in 0..4 {
+        series.write(&model, &dented(&model, cycle, 0.1 * cycle as f64), None).expect("written");
+        let index = fs::read_to_string(folder.file(results::PVD)).expect("written after each state");
+        assert_eq!(index.matches("<DataSet").count() as u64, cycle + 1);
+        assert!(index.contains(&format!("timestep=\"{:?}\"", 0.1 * cycle as f64)), "{index}");
+        assert!(folder.file(&results::state_name(cycle as u32)).is_file());
+    }
+    let kept = series.times()[..2].to_vec();
+    series.roll_back(&kept).expect("written");
+    assert_eq!(fs::read_to_string(folder.file(results::PVD)).expect("kept").matches("<DataSet").count(), 2);
+    series.write(&model, &dented(&model, 2, 0.2), None).expect("written");
+    assert_eq!(series.times(), [0.0, 0.1, 0.2]);
+    let hidden = fs::read_dir(folder.path())
+        .expect("exists")
+        .filter(|e| e.as_ref().expect("readable").file_name().to_string_lossy().starts_with('.'));
+    assert_eq!(hidden.count(), 0, "temporary files left");
+}
+
+#[test]
+fn history_reads_back_to_the_same_bits_under_names_with_units() {
+    let model = plates(2);
+    let folder = Folder::create(&scratch("history"), false).expect("fresh folder");
+    let mut history = History::create(&folder, &model).expect("fresh folder");
+    for cycle in 0..5 {
+        history.append(&row(&model, cycle)).expect("written");
+    }
+    let path = folder.file(results::HISTORY);
+    assert_eq!(history.length(), fs::metadata(&path).expect("written").len());
+    let table = Table::read(&path).expect("well formed");
+    assert_eq!(table.columns[..4], ["cycle", "time [us]", "dt [us]", "kinetic [Mbar*cm3]"]);
+    assert!(table.columns.contains(&"momentum_x [g*cm/us]".to_owned()));
+    assert!(table.columns.contains(&"target, lower:internal [Mbar*cm3]".to_owned()));
+    assert_eq!(table.columns.last().expect("not empty"), "tip:vz [cm/us]");
+    for (cycle, read) in (0..).zip(&table.rows) {
+        let row = row(&model, cycle);
+        let mut expected = vec![row.cycle as f64, row.time, row.dt, row.kinetic, row.internal, row.hourglass];
+        expected.extend([row.contact, row.friction, row.external, row.total, row.error]);
+        expected.extend(row.momentum);
+        expected.extend(row.parts.iter().flat_map(|p| [p.kinetic, p.internal]));
+        expected.extend(row.gauges.iter().flat_map(|g| g.x.into_iter().chain(g.v)));
+        assert_eq!(bytes_of(read.iter().copied()), bytes_of(expected), "cycle {cycle}");
+    }
+    assert_eq!(table.column("tip:z"), Some(vec![0.0, 1.0, 2.0, 3.0, 4.0]));
+    assert_eq!(table.column("tip"), None);
+}
+
+#[test]
+fn history_that_goes_back_and_repeats_its_rows_is_the_same_file() {
+    let model = plates(2);
+    let folder = Folder::create(&scratch("rollback"), false).expect("fresh folder");
+    let path = folder.file(results::HISTORY);
+    let mut history = History::create(&folder, &model).expect("fresh folder");
+    history.append(&row(&model, 0)).expect("written");
+    let kept = history.length();
+    for cycle in 1..4 {
+        history.append(&row(&model, cycle)).expect("written");
+    }
+    let whole = fs::read(&path).expect("written");
+    history.roll_back(kept).expect("shorter");
+    for cycle in 1..4 {
+        history.append(&row(&model, cycle)).expect("written");
+    }
+    assert_eq!(fs::read(&path).expect("written"), whole);
+    drop(history);
+
+    // A master that was killed in a row, and starts again from its snapshot.
+    fs::write(&path, [&whole[..], b"4,0.1,0."].concat()).expect("writable");
+    let folder = Folder::reopen(folder.path()).expect("exists");
+    let mut history = History::open(&folder, &model, kept).expect("long enough");
+    for cycle in 1..4 {
+        history.append(&row(&model, cycle)).expect("written");
+    }
+    assert_eq!(fs::read(&path).expect("written"), whole);
+    let error = History::open(&folder, &model, 1 << 40).expect_err("shorter than that");
+    assert!(error.to_string().contains("history.csv, line 1: file of"), "{error}");
+}
+
+#[test]
+fn malformed_history_is_an_error_with_its_line() {
+    let folder = Folder::create(&scratch("malformed"), false).expect("fresh folder");
+    let path = folder.file("history.csv");
+    for (text, message) in [
+        ("", "line 1: expected a header row, found nothing"),
+        ("a,b\n1,2\n1\n", "line 3: expected 2 cells, found 1"),
+        ("a,b\n1,x\n", "line 2: expected a number, found \"x\""),
+    ] {
+        fs::write(&path, text).expect("writable");
+        let error = Table::read(&path).expect_err(message).to_string();
+        assert!(error.ends_with(message), "{error}");
+    }
+}
+
+#[test]
+fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
+    let model = plates(2);
+    let folder = Folder::create(&scratch("summary"), false).expect("fresh folder");
+    let summary = summary(&model);
+    summary.write(&folder).expect("written");
+    let text = fs::read_to_string(folder.file(results::SUMMARY)).expect("written");
+    let json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let keys = |value: &serde_json::Value| {
+        let mut keys: Vec<String> = value.as_object().expect("an object").keys().cloned().collect();
+        keys.sort();
+        keys.join(" ")
+    };
+    assert_eq!(
+        keys(&json),
+        "bytes_per_cycle contact_share cycles digest elements end_time energies grind_ns imbalance lanes \
+         momentum_error nodes route sorts surface_elements surface_faces surface_nodes threads title wall_s \
+         work_units workers worst_courant worst_gap_travel worst_penetration"
+    );
+    assert_eq!(keys(&json["energies"]), "contact error external hourglass internal kinetic viscosity");
+    assert_eq!(
+        keys(&json["work_units"]),
+        "count faces_max faces_mean faces_min interactions nodes_max nodes_mean nodes_min"
+    );
+    let read: Summary = serde_json::from_str(&text).expect("a summary");
+    assert_eq!(format!("{read:?}"), format!("{summary:?}"));
+    assert_eq!(read.energies.internal.to_bits(), summary.energies.internal.to_bits());
+    assert_eq!(read.energies.external.to_bits(), summary.energies.external.to_bits());
+}
+
+#[test]
+fn table_for_people_fits_a_terminal_and_names_units() {
+    let mut summary = summary(&plates(2));
+    let table = summary.table("cm-g-us");
+    for line in table.lines() {
+        assert!(line.len() <= 130, "{} columns: {line}", line.len());
+    }
+    for text in
+        ["1,200 cycles to 0.333333 us in 12.35 s on 4 workers with 8 threads", "Mbar*cm3", "0.431 gap"]
+    {
+        assert!(table.contains(text), "{text} is missing in\n{table}");
+    }
+    summary.work_units = WorkUnits::default();
+    assert!(!summary.table("SI").contains("work units"));
+}
+
+#[test]
+fn folder_with_content_is_refused_without_force_and_loses_only_results_with_it() {
+    let path = scratch("folder");
+    let folder = Folder::create(&path, false).expect("did not exist");
+    Folder::create(&path, false).expect("empty");
+    for name in ["state-000000.vtu", ".state-000001.vtu.tmp", "results.pvd", "history.csv", "summary.json"] {
+        fs::write(folder.file(name), "old").expect("writable");
+    }
+    for name in ["notes.txt", "state-mine.vtu"] {
+        fs::write(folder.file(name), "mine").expect("writable");
+    }
+    let error = Folder::create(&path, false).expect_err("not empty");
+    assert!(matches!(&error, Error::NotEmpty { path: named } if *named == path), "{error:?}");
+    assert!(error.to_string().contains("--force") && error.to_string().contains("folder"), "{error}");
+    assert_eq!(fs::read_dir(&path).expect("exists").count(), 7, "a refusal removes nothing");
+
+    Folder::create(&path, true).expect("forced");
+    let mut left: Vec<_> = fs::read_dir(&path)
+        .expect("exists")
+        .map(|e| e.expect("readable").file_name().into_string())
+        .collect();
+    left.sort();
+    assert_eq!(left, [Ok("notes.txt".to_owned()), Ok("state-mine.vtu".to_owned())]);
+}
+
+#[test]
+fn place_that_cannot_be_a_folder_is_an_error_that_names_it() {
+    let folder = Folder::create(&scratch("blocked"), false).expect("fresh folder");
+    let file = folder.file("results");
+    fs::write(&file, "a file").expect("writable");
+    for path in [file.clone(), file.join("below")] {
+        for force in [false, true] {
+            let error = Folder::create(&path, force).expect_err("a file is in the way");
+            assert!(matches!(&error, Error::Io { path: named, .. } if *named == path), "{error:?}");
+            assert!(error.to_string().contains(path.to_str().expect("UTF-8")), "{error}");
+        }
+    }
+    // A folder in the place of a file that a run writes.
+    let taken = scratch("taken");
+    fs::create_dir_all(taken.join("results.pvd")).expect("writable");
+    let error = Folder::create(&taken, true).expect_err("cannot remove a folder");
+    assert!(
+        error.to_string().starts_with(&format!("cannot remove {}", taken.join("results.pvd").display())),
+        "{error}"
+    );
+}
+
+#[test]
+fn folder_that_vanishes_during_a_run_is_an_error_that_names_the_file() {
+    let model = plates(2);
+    let path = scratch("vanished");
+    let folder = Folder::create(&path, false).expect("fresh folder");
+    let mut series = Series::new(&folder, &model).expect("known fields");
+    fs::remove_dir_all(&path).expect("just made");
+    let error = series.write(&model, &dented(&model, 0, 0.0), None).expect_err("no folder");
+    assert!(
+        error.to_string().starts_with(&format!("cannot create {}", path.join("state-000000.vtu").display())),
+        "{error}"
+    );
+    assert!(series.times().is_empty());
+    assert!(matches!(summary(&model).write(&folder), Err(Error::Io { action: "create", .. })));
+    assert!(matches!(History::create(&folder, &model), Err(Error::Io { action: "create", .. })));
+}
+
+/// Runs [`body_under_a_file_size_limit`] in a process whose files may grow to 8 KiB: further writes fail as on a
+/// full disk.
+#[test]
+#[cfg(unix)]
+fn write_that_does_not_fit_loses_nothing_that_was_written_before() {
+    let run = std::process::Command::new("bash")
+        .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" --exact --ignored body_under_a_file_size_limit"])
+        .arg(std::env::current_exe().expect("a test runs from a file"))
+        .output()
+        .expect("bash is there");
+    let text = String::from_utf8_lossy(&run.stdout);
+    assert!(
+        run.status.success() && text.contains("1 passed"),
+        "{text}{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+}
+
+#[test]
+#[cfg(unix)]
+#[ignore = "started under a limit by write_that_does_not_fit_loses_nothing_that_was_written_before"]
+fn body_under_a_file_size_limit() {
+    let folder = Folder::create(&scratch("limit"), false).expect("fresh folder");
+    let model = plates(2);
+
+    let mut history = History::create(&folder, &model).expect("the header fits");
+    let mut n_rows = 0;
+    let error = loop {
+        match history.append(&row(&model, n_rows)) {
+            Ok(()) => n_rows += 1,
+            Err(error) => break error,
+        }
+        assert!(n_rows < 1000, "8 KiB hold fewer rows");
+    };
+    assert!(
+        error.to_string().starts_with(&format!("cannot write {}", folder.file("history.csv").display())),
+        "{error}"
+    );
+    let table = Table::read(&folder.file(results::HISTORY)).expect("whole rows only");
+    assert_eq!(table.rows.len() as u64, n_rows);
+    assert!(n_rows > 5, "{n_rows} rows");
+
+    let mut series = Series::new(&folder, &model).expect("known fields");
+    let error = series.write(&model, &dented(&model, 0, 0.0), None).err();
+    assert!(error.is_none(), "a small state fits: {error:?}");
+    let index = fs::read(folder.file(results::PVD)).expect("written");
+    let large = plates(8);
+    let error = series.write(&large, &dented(&large, 1, 1.0), None).expect_err("does not fit");
+    assert!(
+        matches!(&error, Error::Io { action: "write", path, .. } if *path == folder.file("state-000001.vtu")),
+        "{error:?}"
+    );
+    assert_eq!(fs::read(folder.file(results::PVD)).expect("still there"), index);
+    assert_eq!(series.times(), [0.0]);
+    let mut names: Vec<_> = fs::read_dir(folder.path())
+        .expect("exists")
+        .map(|e| e.expect("readable").file_name().into_string())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["history.csv", "results.pvd", "state-000000.vtu"].map(|n| Ok(n.to_owned())));
+}
+
+/// A whole folder as a run leaves it, for readers outside this repository: `target/tmp/results/whole`.
+#[test]
+fn whole_folder_of_a_run_holds_states_index_history_and_summary() {
+    let model = plates(20);
+    let folder = Folder::create(&scratch("whole"), false).expect("fresh folder");
+    let mut series = Series::new(&folder, &model).expect("known fields");
+    let mut history = History::create(&folder, &model).expect("fresh folder");
+    for cycle in 0..3 {
+        series.write(&model, &dented(&model, cycle, 2.0 * cycle as f64), None).expect("written");
+        history.append(&row(&model, cycle)).expect("written");
+    }
+    let end = Summary { cycles: 2, end_time: dented(&model, 2, 0.0).time, ..summary(&model) };
+    end.write(&folder).expect("written");
+    let mut names: Vec<_> = fs::read_dir(folder.path())
+        .expect("exists")
+        .map(|e| e.expect("readable").file_name().into_string())
+        .collect();
+    names.sort();
+    let states = [0, 1, 2].map(results::state_name);
+    let mut expected = vec!["history.csv", "results.pvd"];
+    expected.extend(states.iter().map(String::as_str));
+    expected.push("summary.json");
+    assert_eq!(names, expected.into_iter().map(|n| Ok(n.to_owned())).collect::<Vec<_>>());
+}
