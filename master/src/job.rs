@@ -13,8 +13,10 @@ use mechanics::{
     block::Piece,
     contact::{Exclusions, Surface, initial_pairs, reach},
     cycle::Subdomain,
-    digest, exact::Quantum,
-    initial, mesh::Mesh,
+    digest,
+    exact::Quantum,
+    initial,
+    mesh::Mesh,
     piece,
     state::GlobalState,
     vote::{Quanta, Vote},
@@ -164,6 +166,8 @@ pub struct Outcome {
     pub imbalance: f64,
     /// Lane width of the workers.
     pub lanes: String,
+    /// Cycles of this session of the run: not those before a snapshot that it resumed from.
+    pub cycles_run: u64,
 }
 
 /// What sorts work on: fixed between two decompositions.
@@ -472,6 +476,7 @@ impl Job {
             actions.push(Action::Send(worker, ToWorker::Release));
         }
         let digest = state.as_ref().map(digest::digest).unwrap_or_default();
+        let cycles_run = state.as_ref().map_or(self.completed, |s| s.cycle) - self.first_cycle;
         actions.push(Action::Over(Box::new(Outcome {
             failure: self.failure.take(),
             stopped: self.stop_asked,
@@ -483,6 +488,7 @@ impl Job {
             work: self.work.clone(),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
+            cycles_run,
         })));
     }
 

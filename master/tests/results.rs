@@ -151,7 +151,7 @@ fn summary(model: &Model) -> Summary {
         workers: 4,
         threads: 8,
         route: "direct".into(),
-        lanes: 8,
+        lanes: "avx512".into(),
         cycles: 1200,
         end_time: 1.0 / 3.0,
         wall_s: 12.345,

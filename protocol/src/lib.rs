@@ -12,7 +12,9 @@ pub mod codec;
 pub mod frame;
 pub mod handshake;
 pub mod link;
+pub mod message;
 pub mod tls;
+pub mod wire;
 
 use frame::Kind;
 use std::fmt;

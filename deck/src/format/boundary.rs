@@ -109,7 +109,7 @@ fn number(
                     );
                     return (list, of_node);
                 };
-                list.push(Constraint { velocity });
+                list.push(Constraint { velocity, walls: 0 });
                 known.insert(key, index);
                 index
             }

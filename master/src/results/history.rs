@@ -12,10 +12,12 @@ use std::{
 
 use deck::model::Model;
 
+use serde::{Deserialize, Serialize};
+
 use super::{Error, Folder, HISTORY, Units, write_whole};
 
 /// One row of the table. Energies and momentum of the whole problem, in the deck's units.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HistoryRow {
     /// Cycles completed.
     pub cycle: u64,
@@ -48,7 +50,7 @@ pub struct HistoryRow {
 }
 
 /// Energies of one part.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartEnergy {
     /// Kinetic energy.
     pub kinetic: f64,
@@ -57,7 +59,7 @@ pub struct PartEnergy {
 }
 
 /// What a gauge reads.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GaugeRow {
     /// Position of its node (length).
     pub x: [f64; 3],

@@ -32,8 +32,8 @@ pub struct Summary {
     pub threads: u32,
     /// Route of the exchange: `master` or `direct`.
     pub route: String,
-    /// `f64` numbers in one lane set.
-    pub lanes: u32,
+    /// Lane width of the workers: `scalar`, `avx2` or `avx512`; joined by `+` where they differ.
+    pub lanes: String,
     /// Cycles completed.
     pub cycles: u64,
     /// Time reached (time).
@@ -139,7 +139,7 @@ impl Summary {
         )?;
         writeln!(
             out,
-            "  run        {} cycles to {} {time} in {:.2} s on {} with {} of {} lanes, route {}",
+            "  run        {} cycles to {} {time} in {:.2} s on {} with {}, {} lanes, route {}",
             grouped(self.cycles),
             significant(self.end_time),
             self.wall_s,

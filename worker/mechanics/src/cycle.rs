@@ -17,8 +17,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    block::{Block, ElementVote, Piece, Step},
-    contact::{Batch, Contact, reach::Extent},
+    block::{Block, Piece},
+    contact::{Batch, Contact, Extent},
+    element::{ElementVote, Step},
     lanes::Width,
     nodes::{Advance, Booked, Nodes},
     setup::Setup,
@@ -165,7 +166,7 @@ impl Domain {
         for subdomain in subdomains {
             let first = rooms.len();
             for piece in &subdomain.pieces {
-                let block = Block::new(piece, &setup.materials[piece.material as usize]);
+                let block = Block::new(piece);
                 for (local, &node) in piece.nodes.iter().enumerate() {
                     home.entry(node).or_default().push((rooms.len() as u32, local as u32));
                 }
@@ -181,7 +182,7 @@ impl Domain {
                     gathered: VecDeque::new(),
                     vote: ElementVote::default(),
                     sums: Booked::default(),
-                    extent: Extent::empty(),
+                    extent: Extent::NONE,
                     speed_squared: 0.0,
                 });
             }
@@ -319,7 +320,7 @@ impl Domain {
         }
         for room in &mut self.rooms {
             let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
-            (room.border, room.interior) = room.block.sets_by_nodes(&touched);
+            (room.border, room.interior) = split(&room.block.sets_touching(&touched));
             if let Some(gathered) = room.gathered.pop_front() {
                 room.reference = gathered;
             }
@@ -393,7 +394,6 @@ impl Domain {
         let control = &self.setup.control;
         let step = Step {
             dt,
-            safety_factor: control.safety_factor,
             linear_viscosity: control.linear_viscosity,
             quadratic_viscosity: control.quadratic_viscosity,
             hourglass: control.hourglass,
@@ -497,11 +497,11 @@ impl Domain {
                 constraint: &block.constraint,
                 booked: &room.booked,
             });
-            room.extent = Extent::empty();
+            room.extent = Extent::NONE;
             room.speed_squared = 0.0;
             for (&i, from) in room.surface.iter().zip(&room.reference) {
                 let i = i as usize;
-                room.extent.include(std::array::from_fn(|a| block.x[a][i] - from[a]));
+                room.extent.add(std::array::from_fn(|a| block.x[a][i] - from[a]));
                 room.speed_squared = room.speed_squared.max(speed_squared(&block.v, i));
             }
             meter.stop(mark, false);
@@ -545,7 +545,7 @@ impl Domain {
 }
 
 /// Runs `work` on each room, in parallel on the current pool when there are several.
-fn each(rooms: &mut [Room], work: impl Fn(&mut Room) + Sync) {
+fn each(rooms: &mut [Room], work: impl Fn(&mut Room) + Send + Sync) {
     match rooms {
         [one] => work(one),
         many => many.par_iter_mut().with_max_len(1).for_each(work),
@@ -572,4 +572,17 @@ fn pack(rooms: &[Room], guests: &Guests, sources: &[(u32, u32)], x: &mut [Vec<f6
             v[a][i] = from_v[a][local];
         }
     }
+}
+
+/// Sets that touch marked nodes and the others, as ranges.
+fn split(touching: &[bool]) -> (Vec<Range<u32>>, Vec<Range<u32>>) {
+    let mut sides = (Vec::<Range<u32>>::new(), Vec::<Range<u32>>::new());
+    for (set, &touches) in (0_u32..).zip(touching) {
+        let side = if touches { &mut sides.0 } else { &mut sides.1 };
+        match side.last_mut() {
+            Some(last) if last.end == set => last.end += 1,
+            _ => side.push(set..set + 1),
+        }
+    }
+    sides
 }

@@ -5,7 +5,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{block::ElementVote, contact::reach::Extent, contact::ContactVote};
+use crate::{
+    contact::{ContactVote, Extent},
+    element::ElementVote,
+};
 
 /// The vote of one cycle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -80,7 +83,7 @@ impl Vote {
             external: 0.0,
             momentum: [0.0; 3],
             parts: vec![PartVote::default(); n_parts],
-            extents: vec![Extent::empty(); n_parts],
+            extents: vec![Extent::NONE; n_parts],
             gauges: Vec::new(),
             fault: None,
         }

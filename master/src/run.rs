@@ -1,0 +1,384 @@
+//! `bolide run`: one deck, here, to its summary.
+
+use std::{
+    io::IsTerminal,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Instant,
+};
+
+use deck::model::Model;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::{
+    command::{JobArgs, RunArgs},
+    embedded::{self, Sink, Traffic},
+    job::{Action, ForceSorts, Hand, Job, Limit, Options, Outcome, Progress},
+    results::{
+        Folder,
+        history::{History, HistoryRow},
+        summary::{Energies, Summary, WorkUnits},
+        vtu::Series,
+    },
+    snapshot,
+};
+
+/// Reads and checks a deck.
+///
+/// # Errors
+/// Every fault of it, one per line.
+pub fn read_deck(path: &Path) -> Result<Model, String> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    deck::read(&text, &path.display().to_string()).map_err(|faults| {
+        let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
+        format!("{} fault{} in the deck\n{}", lines.len(), if lines.len() == 1 { "" } else { "s" }, lines.join("\n"))
+    })
+}
+
+/// A deck with what the flags change of it.
+///
+/// # Errors
+/// Faults of the deck or of the flags.
+pub fn model_for(deck: &Path, args: &JobArgs) -> Result<Model, String> {
+    let mut model = read_deck(deck)?;
+    if let Some(cycles) = args.cycles {
+        model.setup.control.end_cycle = model.setup.control.end_cycle.min(cycles);
+    }
+    if let Some(time) = args.end_time {
+        if !(time.is_finite() && time > 0.0) {
+            return Err(format!("--end-time {time}: a positive time in the deck's unit is needed"));
+        }
+        model.setup.control.end_time = model.setup.control.end_time.min(time);
+    }
+    Ok(model)
+}
+
+/// The options of a job from its flags.
+pub fn options_for(args: &JobArgs) -> Options {
+    Options {
+        lanes: args.lanes.map(|l| l.name()),
+        snapshot_at: args.snapshot_at,
+        states: !args.no_output,
+        force_sorts: match (args.sort_every, args.sort_seed) {
+            (Some(n), _) => ForceSorts::Every(n),
+            (None, Some(seed)) => ForceSorts::Seeded(seed),
+            (None, None) => ForceSorts::Never,
+        },
+    }
+}
+
+/// The relative speeds of `n` workers.
+///
+/// # Errors
+/// If a speed is not positive or there are more speeds than workers.
+pub fn speeds_for(n: usize, given: &[f64]) -> Result<Vec<f64>, String> {
+    if given.len() > n {
+        return Err(format!("--speeds names {} workers, --workers {n}", given.len()));
+    }
+    if let Some(bad) = given.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
+        return Err(format!("--speeds {bad}: a speed is a positive number, relative to the other workers"));
+    }
+    Ok((0..n).map(|i| given.get(i).copied().unwrap_or(1.0)).collect())
+}
+
+/// Where a run writes: `--out`, or results/<deck name>.
+pub fn folder_for(deck: &Path, args: &JobArgs) -> PathBuf {
+    args.out.clone().unwrap_or_else(|| {
+        Path::new("results").join(deck.file_stem().unwrap_or(std::ffi::OsStr::new("run")))
+    })
+}
+
+/// Runs a deck in this process.
+///
+/// # Errors
+/// Whatever kept it from its end.
+pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
+    let model = Arc::new(model_for(&args.deck, &args.job)?);
+    let n = args.workers as usize;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = args.threads.map_or(cores, |t| t as usize);
+    let hands: Vec<Hand> = speeds_for(n, &args.speeds)?
+        .into_iter()
+        .enumerate()
+        .map(|(i, speed)| Hand { name: format!("worker-{i}"), speed, threads: threads as u32 })
+        .collect();
+    let resume = args.resume.as_deref().map(snapshot::read).transpose()?;
+    let folder = if args.job.no_output { None } else { Some(folder_for(&args.deck, &args.job)) };
+    let folder = folder.map(|path| Folder::create(&path, args.job.force)).transpose().map_err(|e| e.to_string())?;
+    let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&args.job), resume)?;
+    let census = Census::of(&job, &model);
+    let mut output = Output::new(Arc::clone(&model), folder, args.job.json)?;
+    for row in job.rows_before() {
+        output.row(row)?;
+    }
+    output.state(job.start_state())?;
+    let stop = stop_on_interrupt();
+    let started = Instant::now();
+    let pool = threads.max(cores.min(n * threads));
+    let (outcome, traffic) = embedded::run(job, first, n, pool, &mut output, &stop)?;
+    let wall = started.elapsed().as_secs_f64();
+    output.finish();
+    let total_threads = (n * threads) as u32;
+    conclude(&model, &census, &outcome, traffic, n as u32, total_threads, wall, &output, args.job.json)
+}
+
+/// Counts of the surface, taken before the run.
+pub struct Census {
+    elements: u64,
+    faces: u64,
+    nodes: u64,
+}
+
+impl Census {
+    /// Of a job; without contact the surface is counted all the same.
+    pub fn of(job: &Job, model: &Model) -> Self {
+        let count = |s: &mechanics::contact::Surface| Self {
+            elements: s.n_elements() as u64,
+            faces: s.faces.len() as u64,
+            nodes: s.nodes.len() as u64,
+        };
+        match job.surface() {
+            Some(surface) => count(surface),
+            None => count(&mechanics::contact::Surface::new(&model.mesh, &model.setup.materials, &|_| true)),
+        }
+    }
+}
+
+/// Prints and writes the summary, and says how the process ends.
+///
+/// # Errors
+/// The failure of the run, after its results are written.
+#[expect(clippy::too_many_arguments, reason = "the facts of a run come from as many places")]
+pub fn conclude(
+    model: &Model,
+    census: &Census,
+    outcome: &Outcome,
+    traffic: Traffic,
+    workers: u32,
+    threads: u32,
+    wall_s: f64,
+    output: &Output,
+    json: bool,
+) -> Result<ExitCode, String> {
+    let summary = summarise(model, census, outcome, traffic, workers, threads, wall_s);
+    if let Some(folder) = &output.folder {
+        summary.write(folder).map_err(|e| e.to_string())?;
+    }
+    if json {
+        println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
+    } else {
+        println!("{}", summary.table(&model.units));
+        if let Some(folder) = &output.folder {
+            println!("results in {}", folder.path().display());
+        }
+    }
+    match (&outcome.failure, outcome.stopped) {
+        (Some(reason), _) => Err(reason.clone()),
+        (None, true) => Ok(ExitCode::from(130)),
+        (None, false) => Ok(ExitCode::SUCCESS),
+    }
+}
+
+fn summarise(
+    model: &Model,
+    census: &Census,
+    outcome: &Outcome,
+    traffic: Traffic,
+    workers: u32,
+    threads: u32,
+    wall_s: f64,
+) -> Summary {
+    let ledger = &outcome.ledger;
+    let cycles = outcome.state.as_ref().map_or(ledger.last.cycle, |s| s.cycle);
+    let elements = model.mesh.n_elements() as u64;
+    let compute: u64 = outcome.work.iter().map(|w| w.compute_ns).sum::<u64>() + traffic.sort_ns;
+    let contact: u64 = outcome.work.iter().map(|w| w.contact_ns).sum::<u64>() + traffic.sort_ns;
+    let per = |value: f64, by: f64| if by > 0.0 { value / by } else { 0.0 };
+    let run_cycles = outcome.cycles_run as f64;
+    let units = &outcome.census;
+    Summary {
+        title: model.title.clone(),
+        elements,
+        nodes: model.mesh.n_nodes() as u64,
+        surface_elements: census.elements,
+        surface_faces: census.faces,
+        surface_nodes: census.nodes,
+        workers,
+        threads,
+        route: "master".to_owned(),
+        lanes: outcome.lanes.clone(),
+        cycles,
+        end_time: outcome.state.as_ref().map_or(ledger.last.time, |s| s.time),
+        wall_s,
+        grind_ns: per(compute as f64, elements as f64 * run_cycles),
+        contact_share: per(contact as f64, compute as f64),
+        sorts: outcome.sorts,
+        work_units: WorkUnits {
+            count: units.units as u64,
+            nodes_min: units.nodes.0 as u64,
+            nodes_mean: units.nodes.1,
+            nodes_max: units.nodes.2 as u64,
+            faces_min: units.faces.0 as u64,
+            faces_mean: units.faces.1,
+            faces_max: units.faces.2 as u64,
+            interactions: units.interactions,
+        },
+        imbalance: outcome.imbalance,
+        bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
+        energies: Energies {
+            kinetic: ledger.last.kinetic,
+            internal: ledger.last.internal,
+            hourglass: ledger.hourglass,
+            viscosity: ledger.viscosity,
+            contact: ledger.last.contact + ledger.friction,
+            external: ledger.external,
+            error: ledger.last.error,
+        },
+        momentum_error: ledger.momentum_error(),
+        worst_courant: ledger.worst_courant,
+        worst_gap_travel: ledger.worst_gap_travel,
+        worst_penetration: ledger.worst_penetration,
+        digest: outcome.digest.clone(),
+    }
+}
+
+/// A flag that Ctrl-C or SIGTERM sets; a second one ends the process at once.
+pub fn stop_on_interrupt() -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    std::thread::Builder::new()
+        .name("signals".to_owned())
+        .spawn(move || {
+            let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else { return };
+            runtime.block_on(async {
+                use tokio::signal::unix::{SignalKind, signal};
+                let Ok(mut term) = signal(SignalKind::terminate()) else { return };
+                loop {
+                    tokio::select! {
+                        interrupt = tokio::signal::ctrl_c() => if interrupt.is_err() { return },
+                        _ = term.recv() => {}
+                    }
+                    if flag.swap(true, Ordering::Relaxed) {
+                        std::process::exit(130);
+                    }
+                    eprintln!("stopping after this cycle; once more to leave at once");
+                }
+            });
+        })
+        // Without the thread Ctrl-C ends the process as usual.
+        .ok();
+    stop
+}
+
+/// Writes rows and states, shows progress.
+pub struct Output {
+    model: Arc<Model>,
+    /// The results folder; none with `--no-output`.
+    pub folder: Option<Folder>,
+    history: Option<History>,
+    series: Option<Series>,
+    bar: Option<ProgressBar>,
+    started: Instant,
+    last_line: Instant,
+    last_state_time: Option<f64>,
+}
+
+impl Output {
+    /// Opens the files of a results folder.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn new(model: Arc<Model>, folder: Option<Folder>, json: bool) -> Result<Self, String> {
+        let fault = |e: crate::results::Error| e.to_string();
+        let history = folder.as_ref().map(|f| History::create(f, &model)).transpose().map_err(fault)?;
+        let series = folder.as_ref().map(|f| Series::new(f, &model)).transpose().map_err(fault)?;
+        let bar = (std::io::stderr().is_terminal() && !json).then(|| {
+            let bar = ProgressBar::new(1000);
+            if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3}% {msg}") {
+                bar.set_style(style);
+            }
+            bar
+        });
+        Ok(Self {
+            model,
+            folder,
+            history,
+            series,
+            bar,
+            started: Instant::now(),
+            last_line: Instant::now(),
+            last_state_time: None,
+        })
+    }
+
+    fn row(&mut self, row: &HistoryRow) -> Result<(), String> {
+        self.history.as_mut().map_or(Ok(()), |history| history.append(row)).map_err(|e| e.to_string())
+    }
+
+    fn state(&mut self, state: &mechanics::state::GlobalState) -> Result<(), String> {
+        if self.last_state_time == Some(state.time) {
+            return Ok(());
+        }
+        self.last_state_time = Some(state.time);
+        let model = &self.model;
+        self.series.as_mut().map_or(Ok(()), |series| series.write(model, state, None)).map_err(|e| e.to_string())
+    }
+
+    fn progress(&mut self, progress: Progress) {
+        let now = Instant::now();
+        let every = if self.bar.is_some() { 0.1 } else { 10.0 };
+        if now.duration_since(self.last_line).as_secs_f64() < every {
+            return;
+        }
+        self.last_line = now;
+        let control = &self.model.setup.control;
+        let share = (progress.time / control.end_time).max(progress.cycle as f64 / control.end_cycle as f64).min(1.0);
+        let elapsed = now.duration_since(self.started).as_secs_f64();
+        let grind = elapsed * 1e9 / (progress.cycle.max(1) as f64 * self.model.mesh.n_elements() as f64);
+        let limit = match (progress.limit, progress.element) {
+            (Limit::Courant, Some(element)) => format!("element {element}"),
+            (limit, _) => format!("{limit:?}").to_lowercase(),
+        };
+        let eta = if share > 0.0 { elapsed * (1.0 - share) / share } else { f64::NAN };
+        let units = crate::results::Units::named(&self.model.units).time;
+        let line = format!(
+            "cycle {}  t {:.4e} {units}  dt {:.3e} ({limit})  {grind:.0} ns/element wall  ETA {eta:.0} s",
+            progress.cycle, progress.time, progress.dt
+        );
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position((share * 1000.0) as u64);
+                bar.set_message(line);
+            }
+            None => eprintln!("{line}"),
+        }
+    }
+
+    fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Sink for Output {
+    fn take(&mut self, action: Action) -> Result<(), String> {
+        match action {
+            Action::Row(row) => self.row(&row),
+            Action::State(state) => self.state(&state),
+            Action::Snapshot(stored) => match &self.folder {
+                Some(folder) => snapshot::write(&folder.file("snapshot.bolide"), &stored),
+                None => Err("a snapshot needs a results folder; leave out --no-output".to_owned()),
+            },
+            Action::Progress(progress) => {
+                self.progress(progress);
+                Ok(())
+            }
+            Action::Send(..) | Action::Sort(..) | Action::Over(_) => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Messages of a run as payloads, and back.
+//!
+//! Large arrays (partial forces, totals, positions, states of guests) follow a small bincode head as raw little-endian
+//! `f64`; everything else is bincode throughout.
+
+use mechanics::vote::Vote;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Error, Result,
+    codec::{self, MESSAGE_LIMIT},
+    frame::{CHUNK, CHUNK_PREFIX, CONTROL_LIMIT, HEADER_LEN, Kind},
+    message::{Orders, ToMaster, ToWorker},
+};
+
+/// A message ready to be framed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Packed {
+    /// [`Kind::Cycle`], [`Kind::Totals`] or [`Kind::Control`]; a control message too long for one frame goes in bulk.
+    pub kind: Kind,
+    /// The cycle it belongs to, for the header; 0 outside cycles.
+    pub cycle: u64,
+    /// The payload.
+    pub bytes: Vec<u8>,
+}
+
+impl Packed {
+    /// Bytes on the wire, headers included.
+    pub fn wire_bytes(&self) -> u64 {
+        let n = self.bytes.len();
+        if self.goes_in_bulk() {
+            (n + n.div_ceil(CHUNK) * (HEADER_LEN + CHUNK_PREFIX)) as u64
+        } else {
+            (n + HEADER_LEN) as u64
+        }
+    }
+
+    /// Whether it is cut into bulk chunks.
+    pub fn goes_in_bulk(&self) -> bool {
+        self.kind == Kind::Control && self.bytes.len() > CONTROL_LIMIT as usize
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct CycleHead {
+    cycle: u64,
+    vote: Option<Box<Vote>>,
+    partials: u64,
+    gathered: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct TotalsHead {
+    cycle: u64,
+    orders: Orders,
+}
+
+/// Packs a message to a worker.
+///
+/// # Errors
+/// If it is longer than a message may be.
+pub fn pack_to_worker(message: &ToWorker) -> Result<Packed> {
+    match message {
+        ToWorker::Totals { cycle, orders, totals } => {
+            let head = codec::encode(&TotalsHead { cycle: *cycle, orders: *orders })?;
+            Ok(Packed { kind: Kind::Totals, cycle: *cycle, bytes: with_arrays(&head, &[totals]) })
+        }
+        other => Ok(Packed { kind: Kind::Control, cycle: 0, bytes: codec::encode(other)? }),
+    }
+}
+
+/// Reads a message to a worker.
+///
+/// # Errors
+/// If the bytes are not one.
+pub fn unpack_to_worker(kind: Kind, bytes: &[u8]) -> Result<ToWorker> {
+    match kind {
+        Kind::Totals => {
+            let (head, arrays) = split_head(bytes)?;
+            let head: TotalsHead = codec::decode(head, MESSAGE_LIMIT)?;
+            Ok(ToWorker::Totals { cycle: head.cycle, orders: head.orders, totals: codec::f64s(arrays)? })
+        }
+        Kind::Control => match codec::decode(bytes, MESSAGE_LIMIT)? {
+            ToWorker::Totals { .. } => Err(Error::Unexpected { found: kind, expected: "totals in a totals frame" }),
+            message => Ok(message),
+        },
+        found => Err(Error::Unexpected { found, expected: "a control or totals frame" }),
+    }
+}
+
+/// Packs a message to the master.
+///
+/// # Errors
+/// If it is longer than a message may be.
+pub fn pack_to_master(message: &ToMaster) -> Result<Packed> {
+    match message {
+        ToMaster::Cycle { cycle, vote, partials, gathered } => {
+            let head = codec::encode(&CycleHead {
+                cycle: *cycle,
+                vote: vote.clone(),
+                partials: partials.len() as u64,
+                gathered: gathered.len() as u64,
+            })?;
+            Ok(Packed { kind: Kind::Cycle, cycle: *cycle, bytes: with_arrays(&head, &[partials, gathered]) })
+        }
+        other => Ok(Packed { kind: Kind::Control, cycle: 0, bytes: codec::encode(other)? }),
+    }
+}
+
+/// Reads a message to the master.
+///
+/// # Errors
+/// If the bytes are not one.
+pub fn unpack_to_master(kind: Kind, bytes: &[u8]) -> Result<ToMaster> {
+    match kind {
+        Kind::Cycle => {
+            let (head, arrays) = split_head(bytes)?;
+            let head: CycleHead = codec::decode(head, MESSAGE_LIMIT)?;
+            let mut partials = codec::f64s(arrays)?;
+            let (found, stated) = (partials.len() as u64, head.partials.saturating_add(head.gathered));
+            if found < stated {
+                return Err(Error::Truncated { what: "arrays of a cycle", found: 8 * found, needed: stated.saturating_mul(8) });
+            }
+            if found > stated {
+                return Err(Error::Message(format!("{found} numbers in a cycle frame, its head says {stated}")));
+            }
+            let gathered = partials.split_off(head.partials as usize);
+            Ok(ToMaster::Cycle { cycle: head.cycle, vote: head.vote, partials, gathered })
+        }
+        Kind::Control => match codec::decode(bytes, MESSAGE_LIMIT)? {
+            ToMaster::Cycle { .. } => Err(Error::Unexpected { found: kind, expected: "a cycle in a cycle frame" }),
+            message => Ok(message),
+        },
+        found => Err(Error::Unexpected { found, expected: "a control or cycle frame" }),
+    }
+}
+
+fn with_arrays(head: &[u8], arrays: &[&[f64]]) -> Vec<u8> {
+    let n: usize = arrays.iter().map(|a| 8 * a.len()).sum();
+    let mut bytes = Vec::with_capacity(4 + head.len() + n);
+    bytes.extend_from_slice(&(head.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(head);
+    for array in arrays {
+        codec::put_f64s(&mut bytes, array);
+    }
+    bytes
+}
+
+fn split_head(bytes: &[u8]) -> Result<(&[u8], &[u8])> {
+    let needed = |n: usize| Error::Truncated { what: "head of arrays", found: bytes.len() as u64, needed: n as u64 };
+    let (length, rest) = bytes.split_first_chunk::<4>().ok_or_else(|| needed(4))?;
+    let length = u32::from_le_bytes(*length) as usize;
+    rest.split_at_checked(length).ok_or_else(|| needed(4 + length))
+}
