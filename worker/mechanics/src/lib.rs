@@ -20,9 +20,12 @@
 
 pub mod block;
 pub mod contact;
+pub mod element;
+mod eos;
 pub mod exact;
 pub mod lanes;
 pub mod material;
 pub mod mesh;
 pub mod setup;
 pub mod state;
+mod strength;
