@@ -1,1 +1,435 @@
 //! Element block: elements of one kind and one material with their own copies of their nodes.
+//!
+//! A [`Piece`] is the image of a sub-domain in element and node order, as it travels and is stored; a [`Block`] is
+//! the same laid out for the kernels. Elements sit in *slots*, eight to a *lane set*, the same on every lane
+//! width. In a structured block the slots of a K layer follow the local node index of their corner 0, so that the
+//! corners of a set are contiguous loads; a slot at the end of a row holds no element (a *phantom*) and is masked
+//! wherever a result leaves the kernel. A block knows nothing of other blocks: nodes that several hold are kept
+//! equal by whoever integrates them.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{avx2::Avx2, avx512::Avx512};
+use crate::{
+    element::{
+        ElementVote, Step,
+        hex8::{self, Laws, Layout, View},
+    },
+    eos::{EquationOfState, Linear, Shock},
+    lanes::{SET, Width, scalar::Scalar},
+    material::{Eos, Material, Strength},
+    mesh::Topology,
+    state::N_FIELDS,
+    strength::{Elastic, Hydro, JohnsonCook, StrengthLaw, VonMises},
+};
+
+/// State image of a sub-domain. Node arrays are by local node (structured: I fastest), element arrays by local
+/// element (structured: I fastest).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Piece {
+    /// Part index.
+    pub part: u32,
+    /// Index into [`crate::setup::Setup::materials`].
+    pub material: u32,
+    /// Index space or connectivity of the piece; explicit corners are local nodes.
+    pub topology: Topology,
+    /// Global node index of each local node.
+    pub nodes: Vec<u32>,
+    /// Global element index of each local element.
+    pub elements: Vec<u32>,
+    /// Position `x_n` (length).
+    pub x: Vec<[f64; 3]>,
+    /// Velocity `v_{n-1/2}` (length per time).
+    pub v: Vec<[f64; 3]>,
+    /// Nodal mass, that of all elements at the node.
+    pub mass: Vec<f64>,
+    /// Index into [`crate::setup::Setup::constraints`].
+    pub constraint: Vec<u16>,
+    /// Volume at time zero.
+    pub initial_volume: Vec<f64>,
+    /// One array per entry of [`crate::state::FIELDS`].
+    pub fields: [Vec<f64>; N_FIELDS],
+}
+
+/// Elements of one kind and one material, laid out for the kernels. The first `nodes.len()` entries of the node
+/// arrays are nodes; what follows is padding that wide loads may touch and nothing may rely on.
+pub struct Block {
+    /// Part index.
+    pub part: u32,
+    /// Index into [`crate::setup::Setup::materials`].
+    pub material: u32,
+    /// Global node index of each local node.
+    pub nodes: Vec<u32>,
+    /// Global element index of each local element.
+    pub elements: Vec<u32>,
+    /// Position `x_n` by axis.
+    pub x: [Vec<f64>; 3],
+    /// Velocity `v_{n-1/2}` by axis.
+    pub v: [Vec<f64>; 3],
+    /// Nodal force of this block's elements by axis.
+    pub f: [Vec<f64>; 3],
+    /// Nodal mass.
+    pub mass: Vec<f64>,
+    /// Index into [`crate::setup::Setup::constraints`].
+    pub constraint: Vec<u16>,
+    topology: Topology,
+    layout: Layout,
+    /// Slot of each local element.
+    slots: Vec<u32>,
+    fields: [Vec<f64>; N_FIELDS],
+    initial_volume: Vec<f64>,
+    alive: Vec<f64>,
+    slot_elements: Vec<u32>,
+    /// Entries of a node array that the kernels may touch.
+    reach: usize,
+}
+
+impl Block {
+    /// Lays out a piece. Forces are zero.
+    ///
+    /// # Panics
+    /// If the arrays of the piece do not fit its topology, which whoever decoded it has checked.
+    pub fn new(piece: &Piece) -> Block {
+        let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
+        let by_node = [piece.x.len(), piece.v.len(), piece.mass.len(), piece.constraint.len()];
+        assert!(by_node == [n_nodes; 4], "node arrays of {by_node:?} entries for {n_nodes} nodes");
+        assert!(piece.initial_volume.len() == n_elements, "volumes for {n_elements} elements");
+        assert!(piece.fields.iter().all(|f| f.len() == n_elements), "fields for {n_elements} elements");
+        let (layout, slots, reach) = match &piece.topology {
+            Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
+            Topology::Explicit { hexahedra } => explicit(hexahedra, n_nodes),
+        };
+        assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
+        let n_slots = match &layout {
+            Layout::Structured { base, .. } => base.len() * SET,
+            Layout::Explicit { corners } => corners[0].len(),
+        };
+        let by_slot = |values: &[f64], phantom: f64| {
+            let mut array = vec![phantom; n_slots];
+            for (&slot, &value) in slots.iter().zip(values) {
+                array[slot as usize] = value;
+            }
+            array
+        };
+        let by_axis = |values: &[[f64; 3]]| -> [Vec<f64>; 3] {
+            std::array::from_fn(|axis| {
+                let mut array: Vec<f64> = values.iter().map(|value| value[axis]).collect();
+                array.resize(reach.max(n_nodes), 0.0);
+                array
+            })
+        };
+        let mut slot_elements = vec![u32::MAX; n_slots];
+        for (&slot, &element) in slots.iter().zip(&piece.elements) {
+            slot_elements[slot as usize] = element;
+        }
+        Block {
+            part: piece.part,
+            material: piece.material,
+            nodes: piece.nodes.clone(),
+            elements: piece.elements.clone(),
+            x: by_axis(&piece.x),
+            v: by_axis(&piece.v),
+            f: std::array::from_fn(|_| vec![0.0; reach.max(n_nodes)]),
+            mass: piece.mass.clone(),
+            constraint: piece.constraint.clone(),
+            topology: piece.topology.clone(),
+            fields: std::array::from_fn(|field| by_slot(&piece.fields[field], 0.0)),
+            initial_volume: by_slot(&piece.initial_volume, 1.0),
+            alive: by_slot(&vec![1.0; n_elements], 0.0),
+            slot_elements,
+            layout,
+            slots,
+            reach,
+        }
+    }
+
+    /// The state image: what [`Block::new`] was given, to the bit, with the state of now.
+    pub fn piece(&self) -> Piece {
+        let by_element =
+            |array: &[f64]| self.slots.iter().map(|&slot| array[slot as usize]).collect::<Vec<f64>>();
+        let by_node = |arrays: &[Vec<f64>; 3]| {
+            (0..self.nodes.len()).map(|node| std::array::from_fn(|axis| arrays[axis][node])).collect()
+        };
+        Piece {
+            part: self.part,
+            material: self.material,
+            topology: self.topology.clone(),
+            nodes: self.nodes.clone(),
+            elements: self.elements.clone(),
+            x: by_node(&self.x),
+            v: by_node(&self.v),
+            mass: self.mass.clone(),
+            constraint: self.constraint.clone(),
+            initial_volume: by_element(&self.initial_volume),
+            fields: std::array::from_fn(|field| by_element(&self.fields[field])),
+        }
+    }
+
+    /// Number of lane sets.
+    pub fn n_sets(&self) -> u32 {
+        (self.alive.len() / SET) as u32
+    }
+
+    /// One state field of a local element.
+    pub fn field(&self, element: usize, field: usize) -> f64 {
+        self.fields[field][self.slots[element] as usize]
+    }
+
+    /// The lane set of a local element.
+    pub fn set_of_element(&self, element: usize) -> u32 {
+        self.slots[element] / SET as u32
+    }
+
+    /// Local nodes of the corners of a local element.
+    pub fn corners(&self, element: usize) -> [u32; 8] {
+        let slot = self.slots[element] as usize;
+        match &self.layout {
+            Layout::Structured { row, plane, base } => {
+                let n = base[slot / SET] + (slot % SET) as u32;
+                let (row, plane) = (*row as u32, *plane as u32);
+                [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| n + d)
+            }
+            Layout::Explicit { corners } => std::array::from_fn(|corner| corners[corner][slot]),
+        }
+    }
+
+    /// For each set, whether one of its elements has a node that `marked` (by local node) holds true: the sets to
+    /// compute before the forces of those nodes travel.
+    ///
+    /// # Panics
+    /// If `marked` is not by local node.
+    pub fn sets_touching(&self, marked: &[bool]) -> Vec<bool> {
+        assert!(marked.len() == self.nodes.len(), "{} marks, {} nodes", marked.len(), self.nodes.len());
+        let mut touching = vec![false; self.n_sets() as usize];
+        for element in 0..self.elements.len() {
+            let touches = self.corners(element).iter().any(|&node| marked[node as usize]);
+            touching[self.set_of_element(element) as usize] |= touches;
+        }
+        touching
+    }
+
+    /// Local nodes that the elements of a set touch, ascending.
+    pub fn nodes_of_set(&self, set: u32) -> Vec<u32> {
+        let members = (0..self.elements.len()).filter(|&element| self.set_of_element(element) == set);
+        let mut nodes: Vec<u32> = members.flat_map(|element| self.corners(element)).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    /// Sets all forces to zero.
+    pub fn clear_forces(&mut self) {
+        for f in &mut self.f {
+            f.fill(0.0);
+        }
+    }
+
+    /// Adds the corner forces of the elements of `sets` at `x_n` to [`Block::f`], brings their state from `n-1` to
+    /// `n` (unless `step.dt` is zero) and adds their votes. Each set is to be computed once a cycle.
+    ///
+    /// The result does not depend on `width`, on the order of sets, nor on how they are cut into calls.
+    ///
+    /// # Panics
+    /// If a set is out of range or the machine lacks the width, see [`Width::require`].
+    pub fn compute(
+        &mut self,
+        material: &Material,
+        sets: &[Range<u32>],
+        step: &Step,
+        width: Width,
+        vote: &mut ElementVote,
+    ) {
+        match material.eos {
+            Eos::Linear { bulk } => {
+                self.compute_with(Linear { bulk }, material, sets, step, width, vote);
+            }
+            Eos::Shock { c0, s, gamma } => {
+                let eos = Shock { bulk: material.density * c0 * c0, s, gamma };
+                self.compute_with(eos, material, sets, step, width, vote);
+            }
+        }
+    }
+
+    fn compute_with<E: EquationOfState>(
+        &mut self,
+        eos: E,
+        material: &Material,
+        sets: &[Range<u32>],
+        step: &Step,
+        width: Width,
+        vote: &mut ElementVote,
+    ) {
+        let density = material.density;
+        match material.strength {
+            Strength::Hydro => self.run(Laws { density, eos, strength: Hydro }, sets, step, width, vote),
+            Strength::Elastic { shear } => {
+                self.run(Laws { density, eos, strength: Elastic { shear } }, sets, step, width, vote);
+            }
+            Strength::VonMises { shear, yield_stress, hardening } => {
+                let strength = VonMises { shear, yield_stress, hardening };
+                self.run(Laws { density, eos, strength }, sets, step, width, vote);
+            }
+            Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => {
+                let strength = JohnsonCook {
+                    shear,
+                    a,
+                    b,
+                    n,
+                    c,
+                    m,
+                    t_room,
+                    inverse_range: 1.0 / (t_melt - t_room),
+                    heating: 1.0 / (density * specific_heat),
+                    inverse_rate0: 1.0 / rate0,
+                };
+                self.run(Laws { density, eos, strength }, sets, step, width, vote);
+            }
+        }
+    }
+
+    fn run<E: EquationOfState, S: StrengthLaw>(
+        &mut self,
+        laws: Laws<E, S>,
+        sets: &[Range<u32>],
+        step: &Step,
+        width: Width,
+        vote: &mut ElementVote,
+    ) {
+        let n_sets = self.n_sets();
+        assert!(sets.iter().all(|r| r.end <= n_sets), "sets {sets:?} of a block of {n_sets}");
+        assert!(width.available(), "lane width {width} is not on this machine");
+        let [fx, fy, fz] = &mut self.f;
+        let mut view = View {
+            layout: &self.layout,
+            x: std::array::from_fn(|axis| self.x[axis].as_slice()),
+            v: std::array::from_fn(|axis| self.v[axis].as_slice()),
+            f: [fx, fy, fz],
+            fields: self.fields.each_mut().map(Vec::as_mut_slice),
+            initial_volume: &self.initial_volume,
+            alive: &self.alive,
+            elements: &self.slot_elements,
+        };
+        let n_padded = view.x.iter().chain(&view.v).map(|a| a.len()).min().unwrap_or(0);
+        let n_forces = view.f.iter().map(|a| a.len()).min().unwrap_or(0);
+        let needed = self.reach;
+        assert!(n_padded >= needed && n_forces >= needed, "node arrays shrunk below {needed}");
+        // SAFETY: the machine has the width; sets and node arrays were checked just now, and the slots of a
+        // block are inside its state arrays since it was built.
+        unsafe {
+            match width {
+                Width::Scalar => on_scalar(&mut view, &laws, step, sets, vote),
+                #[cfg(target_arch = "x86_64")]
+                Width::Avx2 => on_avx2(&mut view, &laws, step, sets, vote),
+                #[cfg(target_arch = "x86_64")]
+                Width::Avx512 => on_avx512(&mut view, &laws, step, sets, vote),
+                #[cfg(not(target_arch = "x86_64"))]
+                Width::Avx2 | Width::Avx512 => on_scalar(&mut view, &laws, step, sets, vote),
+            }
+        }
+    }
+}
+
+/// Layout of an index space, the slot of each element, and the length that node arrays need.
+fn structured([ni, nj, nk]: [usize; 3], n_nodes: usize) -> (Layout, Vec<u32>, usize) {
+    let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
+    assert!(n_nodes == plane * (nk + 1), "{n_nodes} nodes for {ni} x {nj} x {nk} elements");
+    assert!(ni * nj * nk > 0, "{ni} x {nj} x {nk} elements");
+    let sets_per_layer = ((nj - 1) * row + ni).div_ceil(SET);
+    let n_sets = nk * sets_per_layer;
+    let base = (0..n_sets).map(|set| (set / sets_per_layer * plane + set % sets_per_layer * SET) as u32);
+    let base: Vec<u32> = base.collect();
+    let mut slots = Vec::with_capacity(ni * nj * nk);
+    for k in 0..nk {
+        for j in 0..nj {
+            slots.extend((0..ni).map(|i| (k * sets_per_layer * SET + j * row + i) as u32));
+        }
+    }
+    let last = base[n_sets - 1] as usize;
+    (Layout::Structured { row, plane, base }, slots, last + plane + row + 1 + SET)
+}
+
+/// Layout of explicit hexahedra; phantoms stand on the corners of the first.
+fn explicit(hexahedra: &[[u32; 8]], n_nodes: usize) -> (Layout, Vec<u32>, usize) {
+    assert!(!hexahedra.is_empty(), "a piece without elements");
+    assert!(
+        hexahedra.iter().flatten().all(|&node| (node as usize) < n_nodes),
+        "corners beyond {n_nodes} nodes"
+    );
+    assert!(n_nodes < 1 << 31, "{n_nodes} nodes in one block");
+    let n_slots = hexahedra.len().next_multiple_of(SET);
+    let corners = std::array::from_fn(|corner| {
+        let mut nodes: Vec<u32> = hexahedra.iter().map(|hexahedron| hexahedron[corner]).collect();
+        nodes.resize(n_slots, hexahedra[0][corner]);
+        nodes
+    });
+    let slots = (0..hexahedra.len() as u32).collect();
+    (Layout::Explicit { corners: Box::new(corners) }, slots, n_nodes)
+}
+
+/// # Safety
+/// As [`hex8::compute`].
+unsafe fn on_scalar<E: EquationOfState, S: StrengthLaw>(
+    view: &mut View<'_>,
+    laws: &Laws<E, S>,
+    step: &Step,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("fma") {
+        // SAFETY: the machine has FMA; the rest is the caller's promise.
+        unsafe { on_scalar_fma(view, laws, step, sets, vote) };
+        return;
+    }
+    // SAFETY: the caller's promise.
+    unsafe { hex8::compute::<Scalar, E, S>(view, laws, step, sets, vote) };
+}
+
+/// # Safety
+/// As [`hex8::compute`], on a machine with FMA. Without the feature a fused product is a call into the library,
+/// with the same bits.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "fma")]
+unsafe fn on_scalar_fma<E: EquationOfState, S: StrengthLaw>(
+    view: &mut View<'_>,
+    laws: &Laws<E, S>,
+    step: &Step,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
+    // SAFETY: the caller's promise.
+    unsafe { hex8::compute::<Scalar, E, S>(view, laws, step, sets, vote) };
+}
+
+/// # Safety
+/// As [`hex8::compute`], on a machine with [`Width::Avx2`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn on_avx2<E: EquationOfState, S: StrengthLaw>(
+    view: &mut View<'_>,
+    laws: &Laws<E, S>,
+    step: &Step,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
+    // SAFETY: the caller's promise.
+    unsafe { hex8::compute::<Avx2, E, S>(view, laws, step, sets, vote) };
+}
+
+/// # Safety
+/// As [`hex8::compute`], on a machine with [`Width::Avx512`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+unsafe fn on_avx512<E: EquationOfState, S: StrengthLaw>(
+    view: &mut View<'_>,
+    laws: &Laws<E, S>,
+    step: &Step,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
+    // SAFETY: the caller's promise.
+    unsafe { hex8::compute::<Avx512, E, S>(view, laws, step, sets, vote) };
+}

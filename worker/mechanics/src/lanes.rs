@@ -1,1 +1,226 @@
-//! Lanes.
+//! Lanes: one f64 calculation done on 1, 4 or 8 elements at a time, with one result on every width.
+//!
+//! [`Lane`] is the vocabulary of the kernels. A kernel is a generic `#[inline(always)]` function over `L: Lane`,
+//! called from a thin `#[target_feature]` wrapper that [`Width`] chose at run time; only inside such a wrapper do
+//! its operations become single instructions. Two rules keep the bits: lanes never mix, and a product that is
+//! added to something is written as [`Lane::mul_add`] on every width (no compiler fuses by itself).
+//! Closures do not inherit target features, so kernels have none.
+
+use std::{
+    fmt,
+    ops::{Add, Div, Mul, Neg, Sub},
+    str::FromStr,
+};
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx512;
+pub mod functions;
+pub mod scalar;
+
+/// Slots in a lane set: the grouping of elements is the same on every width, and the widest holds 8.
+pub const SET: usize = 8;
+
+/// `N` f64 values, each of which belongs to its own element.
+///
+/// Addition, subtraction, multiplication, division and square root are those of IEEE 754, rounded to nearest.
+pub trait Lane:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// Number of values; divides [`SET`].
+    const N: usize;
+    /// One truth value per lane.
+    type Mask: Copy;
+
+    /// The same value in every lane.
+    fn splat(x: f64) -> Self;
+    /// `from[at..at + N]`.
+    ///
+    /// # Safety
+    /// `at + N <= from.len()`.
+    unsafe fn load(from: &[f64], at: usize) -> Self;
+    /// Writes `to[at..at + N]`.
+    ///
+    /// # Safety
+    /// `at + N <= to.len()`.
+    unsafe fn store(self, to: &mut [f64], at: usize);
+    /// `from[indices[at]], .. from[indices[at + N - 1]]`.
+    ///
+    /// # Safety
+    /// `at + N <= indices.len()`; every index read is below `from.len()` and below 2^31.
+    unsafe fn gather(from: &[f64], indices: &[u32], at: usize) -> Self;
+
+    /// `self * b + c`, rounded once.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// `c - self * b`, rounded once.
+    fn neg_mul_add(self, b: Self, c: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+    /// `if self < other { self } else { other }`, which is x86's rule for NaN and signed zeros.
+    fn min(self, other: Self) -> Self;
+    /// `if self > other { self } else { other }`.
+    fn max(self, other: Self) -> Self;
+
+    /// `self < other`; false if either is NaN.
+    fn less(self, other: Self) -> Self::Mask;
+    /// `self <= other`; false if either is NaN.
+    fn less_equal(self, other: Self) -> Self::Mask;
+    /// Both masks.
+    fn both(one: Self::Mask, other: Self::Mask) -> Self::Mask;
+    /// `yes` where the mask is set, else `no`. What is not chosen has no influence, NaN included.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Bit `i` is lane `i`.
+    fn bits(mask: Self::Mask) -> u32;
+    /// True if any lane is set.
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        Self::bits(mask) != 0
+    }
+
+    /// `(k, m)` with `self = m 2^k` and m between sqrt(1/2) and sqrt(2); for positive normal numbers.
+    fn split(self) -> (Self, Self);
+    /// `2^self` for whole numbers between -1022 and 1023.
+    fn power_of_two(self) -> Self;
+
+    /// The lanes in order, zeros behind them.
+    #[inline(always)]
+    fn to_array(self) -> [f64; SET] {
+        let mut values = [0.0; SET];
+        // SAFETY: N divides SET, so the lanes fit.
+        unsafe { self.store(&mut values, 0) };
+        values
+    }
+}
+
+/// How many elements an instruction works on. The result does not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Width {
+    /// One element at a time.
+    Scalar,
+    /// Four, with AVX2 and FMA.
+    Avx2,
+    /// Eight, with AVX-512 F and DQ.
+    Avx512,
+}
+
+impl Width {
+    /// All widths, narrowest first.
+    pub const ALL: [Width; 3] = [Width::Scalar, Width::Avx2, Width::Avx512];
+
+    /// The widest that this machine has.
+    pub fn best() -> Width {
+        if Width::Avx512.available() {
+            Width::Avx512
+        } else if Width::Avx2.available() {
+            Width::Avx2
+        } else {
+            Width::Scalar
+        }
+    }
+
+    /// Whether this machine has the instructions.
+    pub fn available(self) -> bool {
+        match self {
+            Width::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx512 => {
+                Width::Avx2.available()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512dq")
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            Width::Avx2 | Width::Avx512 => false,
+        }
+    }
+
+    /// This width, if the machine has it.
+    ///
+    /// # Errors
+    /// [`WidthError::Unavailable`].
+    pub fn require(self) -> Result<Width, WidthError> {
+        if self.available() { Ok(self) } else { Err(WidthError::Unavailable { width: self }) }
+    }
+}
+
+impl fmt::Display for Width {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Width::Scalar => "scalar",
+            Width::Avx2 => "avx2",
+            Width::Avx512 => "avx512",
+        })
+    }
+}
+
+impl FromStr for Width {
+    type Err = WidthError;
+
+    fn from_str(text: &str) -> Result<Self, WidthError> {
+        let known = Width::ALL.into_iter().find(|width| width.to_string() == text);
+        known.ok_or_else(|| WidthError::Unknown { text: text.to_owned() })
+    }
+}
+
+/// Why a lane width cannot be had.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WidthError {
+    /// The text names no width.
+    Unknown {
+        /// What was read.
+        text: String,
+    },
+    /// The machine lacks the instructions.
+    Unavailable {
+        /// What was asked for.
+        width: Width,
+    },
+}
+
+impl fmt::Display for WidthError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            WidthError::Unknown { text } => {
+                write!(f, "lane width {text:?}, expected scalar, avx2 or avx512; name one of them")
+            }
+            WidthError::Unavailable { width } => {
+                let best = Width::best();
+                write!(
+                    f,
+                    "lane width {width} is not on this machine, whose widest is {best}; use that, the result is the same"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for WidthError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_width_reads_back_from_its_name_and_others_are_named() {
+        for width in Width::ALL {
+            assert_eq!(width.to_string().parse(), Ok(width));
+        }
+        let error = "sse".parse::<Width>().expect_err("no such width");
+        assert_eq!(
+            error.to_string(),
+            "lane width \"sse\", expected scalar, avx2 or avx512; name one of them"
+        );
+        let missing = WidthError::Unavailable { width: Width::Avx512 }.to_string();
+        assert!(missing.starts_with("lane width avx512 is not on this machine"), "{missing}");
+    }
+
+    #[test]
+    fn the_best_width_is_available_and_required_without_error() {
+        assert_eq!(Width::best().require(), Ok(Width::best()));
+        assert!(Width::Scalar.available());
+    }
+}

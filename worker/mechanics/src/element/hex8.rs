@@ -1,0 +1,607 @@
+//! The eight-node hexahedron with one integration point, exact volume and exact mean gradient, after Flanagan and
+//! Belytschko (1981), in modal form.
+//!
+//! With `x(xi, eta, zeta) = x0 + a xi + b eta + c zeta + d eta zeta + e xi zeta + f xi eta + g xi eta zeta` over the cube
+//! -1..1, that is `m = (1/8) sum_I Gamma_mI x_I`, the volume integral of the Jacobian is
+//!
+//! `V/8 = a.(b x c + f x e/3) + [c.(e x d) + b.(d x f)]/3`,
+//!
+//! its derivatives by the modes are the `G_m` of [`Gradient`] (g has none), `B_I = dV/dx_I = sum_m Gamma_mI G_m`, and
+//! the velocity gradient is `L = (8/V) sum_m v_m G_m^T`. A cycle follows the numbered steps of `compute`.
+
+use std::ops::Range;
+
+use super::{
+    ElementVote, Fault, Step,
+    hourglass::{Hourglass, amplitude},
+    rotation::rotated,
+    vector::{Tensor, Vector},
+    viscosity::{Spread, frequency},
+};
+use crate::{
+    eos::EquationOfState,
+    lanes::{Lane, SET, scalar::Scalar},
+    state::{N_FIELDS, field},
+    strength::{Deviator, History, Strain, StrengthLaw},
+};
+
+/// Volume of a hexahedron with these corners, as the kernel computes it, to the bit.
+pub fn volume(corners: &[[f64; 3]; 8]) -> f64 {
+    Gradient::of(&scalar_modes(corners)).volume().0
+}
+
+/// Derivative of the volume by each corner coordinate.
+pub fn volume_gradient(corners: &[[f64; 3]; 8]) -> [[f64; 3]; 8] {
+    let g = Gradient::of(&scalar_modes(corners));
+    let zero = Scalar(0.0);
+    let axis = |a, b, c, d, e, f| corner_values([a, b, c, d, e, f, zero]);
+    let x = axis(g.a.x, g.b.x, g.c.x, g.d.x, g.e.x, g.f.x);
+    let y = axis(g.a.y, g.b.y, g.c.y, g.d.y, g.e.y, g.f.y);
+    let z = axis(g.a.z, g.b.z, g.c.z, g.d.z, g.e.z, g.f.z);
+    std::array::from_fn(|corner| [x[corner].0, y[corner].0, z[corner].0])
+}
+
+fn scalar_modes(corners: &[[f64; 3]; 8]) -> Modes<Scalar> {
+    let axis = |axis: usize| modes_of(std::array::from_fn(|corner| Scalar(corners[corner][axis])));
+    Modes::of(axis(0), axis(1), axis(2))
+}
+
+/// The seven modes of a vector field at the corners, without its mean.
+#[derive(Clone, Copy)]
+struct Modes<L> {
+    a: Vector<L>,
+    b: Vector<L>,
+    c: Vector<L>,
+    d: Vector<L>,
+    e: Vector<L>,
+    f: Vector<L>,
+    g: Vector<L>,
+}
+
+impl<L: Lane> Modes<L> {
+    #[inline(always)]
+    fn of(x: [L; 7], y: [L; 7], z: [L; 7]) -> Self {
+        Self {
+            a: Vector { x: x[0], y: y[0], z: z[0] },
+            b: Vector { x: x[1], y: y[1], z: z[1] },
+            c: Vector { x: x[2], y: y[2], z: z[2] },
+            d: Vector { x: x[3], y: y[3], z: z[3] },
+            e: Vector { x: x[4], y: y[4], z: z[4] },
+            f: Vector { x: x[5], y: y[5], z: z[5] },
+            g: Vector { x: x[6], y: y[6], z: z[6] },
+        }
+    }
+
+    /// `x - v * half`: the positions at the middle of the step.
+    #[inline(always)]
+    fn before(x: &Self, v: &Self, half: L) -> Self {
+        Self {
+            a: v.a.neg_mul_add(half, &x.a),
+            b: v.b.neg_mul_add(half, &x.b),
+            c: v.c.neg_mul_add(half, &x.c),
+            d: v.d.neg_mul_add(half, &x.d),
+            e: v.e.neg_mul_add(half, &x.e),
+            f: v.f.neg_mul_add(half, &x.f),
+            g: v.g.neg_mul_add(half, &x.g),
+        }
+    }
+}
+
+/// The modes xi, eta, zeta, eta zeta, xi zeta, xi eta, xi eta zeta of one component at the corners, times 1/8.
+#[inline(always)]
+fn modes_of<L: Lane>(u: [L; 8]) -> [L; 7] {
+    let (s0, d0) = (u[1] + u[0], u[1] - u[0]);
+    let (s1, d1) = (u[2] + u[3], u[2] - u[3]);
+    let (s2, d2) = (u[5] + u[4], u[5] - u[4]);
+    let (s3, d3) = (u[6] + u[7], u[6] - u[7]);
+    let (low, low_eta) = (s1 + s0, s1 - s0);
+    let (low_xi, low_xi_eta) = (d1 + d0, d1 - d0);
+    let (high, high_eta) = (s3 + s2, s3 - s2);
+    let (high_xi, high_xi_eta) = (d3 + d2, d3 - d2);
+    let eighth = L::splat(0.125);
+    [
+        (high_xi + low_xi) * eighth,
+        (high_eta + low_eta) * eighth,
+        (high - low) * eighth,
+        (high_eta - low_eta) * eighth,
+        (high_xi - low_xi) * eighth,
+        (high_xi_eta + low_xi_eta) * eighth,
+        (high_xi_eta - low_xi_eta) * eighth,
+    ]
+}
+
+/// `sum_m Gamma_mI phi_m` at the corners, the way back from modes.
+#[inline(always)]
+fn corner_values<L: Lane>([a, b, c, d, e, f, g]: [L; 7]) -> [L; 8] {
+    let (eta_low, eta_high) = (b - d, b + d);
+    let (xi_low, xi_high) = (a - e, a + e);
+    let (both_low, both_high) = (f - g, f + g);
+    let (low_0, low_1) = (-c - eta_low, eta_low - c);
+    let (high_0, high_1) = (c - eta_high, c + eta_high);
+    let (xi_low_0, xi_low_1) = (xi_low - both_low, xi_low + both_low);
+    let (xi_high_0, xi_high_1) = (xi_high - both_high, xi_high + both_high);
+    [
+        low_0 - xi_low_0,
+        low_0 + xi_low_0,
+        low_1 + xi_low_1,
+        low_1 - xi_low_1,
+        high_0 - xi_high_0,
+        high_0 + xi_high_0,
+        high_1 + xi_high_1,
+        high_1 - xi_high_1,
+    ]
+}
+
+/// Volume and its derivatives by the modes.
+#[derive(Clone, Copy)]
+struct Gradient<L> {
+    a: Vector<L>,
+    b: Vector<L>,
+    c: Vector<L>,
+    d: Vector<L>,
+    e: Vector<L>,
+    f: Vector<L>,
+    eighth_volume: L,
+}
+
+impl<L: Lane> Gradient<L> {
+    #[inline(always)]
+    fn of(m: &Modes<L>) -> Self {
+        let third = L::splat(1.0 / 3.0);
+        let fe = m.f.cross(&m.e);
+        let df = m.d.cross(&m.f);
+        let ed = m.e.cross(&m.d);
+        let a = m.b.cross_add(&m.c, &fe.scaled(third));
+        let bent = m.c.dot(&ed) + m.b.dot(&df);
+        Self {
+            a,
+            b: m.c.cross_add(&m.a, &df.scaled(third)),
+            c: m.a.cross_add(&m.b, &ed.scaled(third)),
+            d: m.c.cross_add(&m.e, &m.f.cross(&m.b)).scaled(third),
+            e: m.a.cross_add(&m.f, &m.d.cross(&m.c)).scaled(third),
+            f: m.e.cross_add(&m.a, &m.b.cross(&m.d)).scaled(third),
+            eighth_volume: bent.mul_add(third, m.a.dot(&a)),
+        }
+    }
+
+    #[inline(always)]
+    fn volume(&self) -> L {
+        self.eighth_volume * L::splat(8.0)
+    }
+
+    /// `sum_m v_m G_m^T`.
+    #[inline(always)]
+    fn against(&self, v: &Modes<L>) -> Tensor<L> {
+        Tensor::outer(&v.a, &self.a)
+            .outer_add(&v.b, &self.b)
+            .outer_add(&v.c, &self.c)
+            .outer_add(&v.d, &self.d)
+            .outer_add(&v.e, &self.e)
+            .outer_add(&v.f, &self.f)
+    }
+
+    /// One component of the corner forces: `row . G_m - resist q_m` for each mode, brought to the corners.
+    #[inline(always)]
+    fn forces(&self, row: &Vector<L>, resist: L, q: [L; 4]) -> [L; 8] {
+        corner_values([
+            row.dot(&self.a),
+            row.dot(&self.b),
+            row.dot(&self.c),
+            resist.neg_mul_add(q[0], row.dot(&self.d)),
+            resist.neg_mul_add(q[1], row.dot(&self.e)),
+            resist.neg_mul_add(q[2], row.dot(&self.f)),
+            -(resist * q[3]),
+        ])
+    }
+}
+
+/// Where the corners of the slots are.
+pub(crate) enum Layout {
+    /// A slot is the local node of its corner 0, the others lie at fixed distances.
+    Structured {
+        /// Nodes along I.
+        row: usize,
+        /// Nodes in a K layer.
+        plane: usize,
+        /// Corner 0 of the first slot of each set.
+        base: Vec<u32>,
+    },
+    /// Local node of each corner by slot.
+    Explicit {
+        /// Eight arrays.
+        corners: Box<[Vec<u32>; 8]>,
+    },
+}
+
+/// The arrays of a block as a kernel sees them. State arrays are by slot, node arrays by local node and padded.
+pub(crate) struct View<'a> {
+    pub layout: &'a Layout,
+    pub x: [&'a [f64]; 3],
+    pub v: [&'a [f64]; 3],
+    pub f: [&'a mut [f64]; 3],
+    pub fields: [&'a mut [f64]; N_FIELDS],
+    /// Volume at time zero by slot; 1 in phantoms.
+    pub initial_volume: &'a [f64],
+    /// 1 for an element that takes part, 0 for a phantom.
+    pub alive: &'a [f64],
+    /// Global element index by slot.
+    pub elements: &'a [u32],
+}
+
+impl View<'_> {
+    /// A state field of the slots from `slot` on, which is inside the arrays.
+    #[inline(always)]
+    fn state<L: Lane>(&self, slot: usize, field: usize) -> L {
+        // SAFETY: the kernel keeps slots inside the state arrays.
+        unsafe { L::load(self.fields[field], slot) }
+    }
+
+    /// Writes a state field of the active lanes; the others keep theirs.
+    #[inline(always)]
+    fn set_state<L: Lane>(&mut self, slot: usize, field: usize, value: L, active: L::Mask) {
+        let kept = self.state(slot, field);
+        // SAFETY: the kernel keeps slots inside the state arrays.
+        unsafe { L::select(active, value, kept).store(self.fields[field], slot) };
+    }
+}
+
+/// A material made ready for kernels.
+#[derive(Clone, Copy)]
+pub(crate) struct Laws<E, S> {
+    pub density: f64,
+    pub eos: E,
+    pub strength: S,
+}
+
+/// Running sums and extremes by lane. Sums are exact and extremes order-free, so lanes join in any way.
+struct Tally<L> {
+    internal: L,
+    hourglass: L,
+    viscosity: L,
+    largest_force: L,
+    largest_rate: L,
+    /// Inverse of the least Courant limit so far: no element slower than this can matter.
+    frequency: L,
+}
+
+/// Elements of the sets in one cycle: forces into `view.f`, new state, votes.
+///
+/// # Safety
+/// Sets are below the number of sets of the block, and every corner of every slot, phantoms included, is
+/// inside the node arrays with [`SET`] lanes behind it in a structured layout.
+#[inline(always)]
+pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw>(
+    view: &mut View<'_>,
+    laws: &Laws<E, S>,
+    step: &Step,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
+    let zero = L::splat(0.0);
+    let mut tally = Tally {
+        internal: zero,
+        hourglass: zero,
+        viscosity: zero,
+        largest_force: zero,
+        largest_rate: zero,
+        frequency: L::splat(1.0 / vote.courant),
+    };
+    for range in sets {
+        for set in range.clone() {
+            let mut lane = 0;
+            while lane < SET {
+                let slot = set as usize * SET + lane;
+                // SAFETY: handed on from the caller.
+                unsafe { slots::<L, E, S>(view, laws, step, slot, &mut tally, vote) };
+                lane += L::N;
+            }
+        }
+    }
+    for lane in 0..L::N {
+        vote.internal += tally.internal.to_array()[lane];
+        vote.hourglass += tally.hourglass.to_array()[lane];
+        vote.viscosity += tally.viscosity.to_array()[lane];
+        vote.force_bound = vote.force_bound.max(tally.largest_force.to_array()[lane]);
+        vote.volume_limit = vote.volume_limit.min(0.1 / tally.largest_rate.to_array()[lane]);
+    }
+}
+
+/// The slots `slot..slot + N`.
+///
+/// # Safety
+/// As [`compute`].
+#[inline(always)]
+unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
+    view: &mut View<'_>,
+    laws: &Laws<E, S>,
+    step: &Step,
+    slot: usize,
+    tally: &mut Tally<L>,
+    vote: &mut ElementVote,
+) {
+    let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
+    let dt = L::splat(step.dt);
+    // SAFETY: slots are inside the state arrays, corners inside the node arrays.
+    let (x, v, initial_volume, alive) = unsafe {
+        (
+            Modes::of(
+                modes_of(corners(view.layout, view.x[0], slot)),
+                modes_of(corners(view.layout, view.x[1], slot)),
+                modes_of(corners(view.layout, view.x[2], slot)),
+            ),
+            Modes::of(
+                modes_of(corners(view.layout, view.v[0], slot)),
+                modes_of(corners(view.layout, view.v[1], slot)),
+                modes_of(corners(view.layout, view.v[2], slot)),
+            ),
+            L::load(view.initial_volume, slot),
+            L::load(view.alive, slot),
+        )
+    };
+    let alive = half.less(alive);
+
+    // 1. Velocity gradient on the geometry of the middle of the step, and what of the velocity it leaves.
+    let mid = Modes::before(&x, &v, L::splat(0.5 * step.dt));
+    let at_mid = Gradient::of(&mid);
+    let gradient = at_mid.against(&v).scaled(one / at_mid.eighth_volume);
+    let hourglass = Hourglass {
+        d: amplitude(&v.d, &gradient, &mid.d),
+        e: amplitude(&v.e, &gradient, &mid.e),
+        f: amplitude(&v.f, &gradient, &mid.f),
+        g: amplitude(&v.g, &gradient, &mid.g),
+    };
+    let volume_rate = gradient.x.x + gradient.y.y + gradient.z.z;
+
+    // 2. Geometry at the end of the step.
+    let at_end = Gradient::of(&x);
+    let volume = at_end.volume();
+    let inverse_eighth = one / at_end.eighth_volume;
+    let relative_volume = volume / initial_volume;
+
+    // 3. Deviatoric stress: rotation, elastic increment, yield; its work on the middle volume.
+    let mut history = History { plastic_strain: zero, temperature: zero };
+    let mut stress = Deviator::zero();
+    let mut deviatoric_work = zero;
+    if S::DEVIATORIC {
+        let third = volume_rate * L::splat(1.0 / 3.0);
+        let rate = Deviator {
+            xx: gradient.x.x - third,
+            yy: gradient.y.y - third,
+            zz: gradient.z.z - third,
+            xy: half * (gradient.x.y + gradient.y.x),
+            yz: half * (gradient.y.z + gradient.z.y),
+            zx: half * (gradient.z.x + gradient.x.z),
+        };
+        let half_dt = L::splat(0.5 * step.dt);
+        let spin = Vector {
+            x: half_dt * (gradient.z.y - gradient.y.z),
+            y: half_dt * (gradient.x.z - gradient.z.x),
+            z: half_dt * (gradient.y.x - gradient.x.y),
+        };
+        let (xx, yy): (L, L) = (view.state(slot, field::SXX), view.state(slot, field::SYY));
+        let before = Deviator {
+            xx,
+            yy,
+            zz: -(xx + yy),
+            xy: view.state(slot, field::SXY),
+            yz: view.state(slot, field::SYZ),
+            zx: view.state(slot, field::SZX),
+        };
+        // Half of the increment turns with the stress, half does not: second order in the spin.
+        let half_increment = L::splat(laws.strength.shear() * step.dt);
+        let turned = rotated(&rate.mul_add(half_increment, &before), &spin);
+        let trial = rate.mul_add(half_increment, &turned);
+        if S::PLASTIC {
+            history.plastic_strain = view.state(slot, field::PLASTIC_STRAIN);
+        }
+        if S::THERMAL {
+            history.temperature = view.state(slot, field::TEMPERATURE);
+        }
+        let rate_square = rate.contract(&rate);
+        let effective = (L::splat(2.0 / 3.0) * rate_square).sqrt();
+        let strain = Strain { rate: effective, increment: effective * dt };
+        stress = laws.strength.update(trial, strain, &mut history, alive);
+        // The stress before, turned, is `turned` less its half of the increment.
+        let turned_power = half_increment.neg_mul_add(rate_square, turned.contract(&rate));
+        let mean_power = half * (turned_power + stress.contract(&rate));
+        deviatoric_work = mean_power * dt * (at_mid.volume() / initial_volume);
+    }
+
+    // 4. Pressure line at the new volume and the sound speed there.
+    let (pressure_before, energy_before, volume_before): (L, L, L) = (
+        view.state(slot, field::PRESSURE),
+        view.state(slot, field::ENERGY),
+        view.state(slot, field::RELATIVE_VOLUME),
+    );
+    let volume_change = L::select(zero.less(dt), relative_volume - volume_before, zero);
+    let energy_before = energy_before + deviatoric_work;
+    let line = laws.eos.line(relative_volume);
+    let energy = line.energy_after(energy_before, pressure_before, zero, volume_change);
+    let bulk = line
+        .stiffness(relative_volume, line.pressure(energy), energy)
+        .max(L::splat(laws.eos.least_stiffness()));
+    let stiffness = bulk + L::splat(4.0 / 3.0 * laws.strength.shear());
+    let sound_square = stiffness * relative_volume * L::splat(1.0 / laws.density);
+    let sound = sound_square.sqrt();
+
+    // 5. Artificial viscosity in compression.
+    let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
+    let area = (L::splat(2.0 / 3.0) * spread.trace()).sqrt();
+    let length = volume / area;
+    let density = L::splat(laws.density) / relative_volume;
+    let closing = L::select(volume_rate.less(zero), -volume_rate, zero);
+    let quadratic = L::splat(step.quadratic_viscosity * step.quadratic_viscosity);
+    let linear = L::splat(step.linear_viscosity);
+    let damping = (quadratic * length).mul_add(closing, linear * sound) * length;
+    let viscosity = density * damping * closing;
+
+    // 6. Energy and pressure together.
+    let energy = line.energy_after(energy_before, pressure_before, viscosity, volume_change);
+    let pressure = line.pressure(energy);
+
+    // 7. Which elements count.
+    let check = energy + pressure + viscosity + hourglass.square() + stress.contract(&stress);
+    let upright = L::both(zero.less(at_mid.eighth_volume), zero.less(at_end.eighth_volume));
+    let finite = check.abs().less_equal(L::splat(f64::MAX));
+    let active = L::both(alive, L::both(upright, finite));
+    if L::bits(active) != L::bits(alive) {
+        let volumes = at_mid.volume().min(volume).to_array();
+        let bad = L::bits(alive) & !L::bits(active);
+        for (lane, &volume) in volumes.iter().enumerate().filter(|(lane, _)| bad >> lane & 1 == 1) {
+            vote.offer_fault(Fault { element: view.elements[slot + lane], volume });
+        }
+    }
+
+    // 8. Votes and energies.
+    let inverse_volume = inverse_eighth * L::splat(0.125);
+    let double_inverse_square = L::splat(2.0) * inverse_volume * inverse_volume;
+    let damping = L::select(volume_rate.less(zero), damping, zero);
+    let bound = frequency(spread.eigenvalue_bound() * double_inverse_square, damping, sound_square);
+    if L::any(L::both(tally.frequency.less_equal(bound * L::splat(1.0 + 1e-6)), active)) {
+        let exact = frequency(spread.largest_eigenvalue() * double_inverse_square, damping, sound_square);
+        let limits = (one / exact).to_array();
+        for (lane, &limit) in limits.iter().enumerate().take(L::N) {
+            if L::bits(active) >> lane & 1 == 1 {
+                vote.offer_courant(limit, view.elements[slot + lane]);
+            }
+        }
+        tally.frequency = L::splat(1.0 / vote.courant);
+    }
+    let resist = L::splat(2.0 * step.hourglass) * density * sound * area;
+    let energy_magic = L::splat(step.energy_quantum.magic());
+    let internal = energy * initial_volume;
+    let taken = L::splat(8.0 * step.dt) * resist * hourglass.square();
+    let squeezed = -(viscosity * volume_change * initial_volume);
+    tally.internal = tally.internal + L::select(active, (internal + energy_magic) - energy_magic, zero);
+    tally.hourglass = tally.hourglass + L::select(active, (taken + energy_magic) - energy_magic, zero);
+    tally.viscosity = tally.viscosity + L::select(active, (squeezed + energy_magic) - energy_magic, zero);
+    tally.largest_rate = tally.largest_rate.max(L::select(active, volume_rate.abs(), zero));
+
+    // 9. State.
+    if step.dt != 0.0 {
+        if S::DEVIATORIC {
+            view.set_state(slot, field::SXX, stress.xx, active);
+            view.set_state(slot, field::SYY, stress.yy, active);
+            view.set_state(slot, field::SXY, stress.xy, active);
+            view.set_state(slot, field::SYZ, stress.yz, active);
+            view.set_state(slot, field::SZX, stress.zx, active);
+        }
+        if S::PLASTIC {
+            view.set_state(slot, field::PLASTIC_STRAIN, history.plastic_strain, active);
+        }
+        if S::THERMAL {
+            view.set_state(slot, field::TEMPERATURE, history.temperature, active);
+        }
+        view.set_state(slot, field::PRESSURE, pressure, active);
+        view.set_state(slot, field::ENERGY, energy, active);
+        view.set_state(slot, field::RELATIVE_VOLUME, relative_volume, active);
+    }
+
+    // 10. Corner forces: minus the stress, with the correction of hourglass control, on the volume gradient.
+    let squeeze = pressure + viscosity;
+    let bent = hourglass.against(&x.d, &x.e, &x.f, &x.g).scaled(resist * inverse_eighth);
+    let rows = [
+        Vector { x: bent.x.x - (stress.xx - squeeze), y: bent.x.y - stress.xy, z: bent.x.z - stress.zx },
+        Vector { x: bent.y.x - stress.xy, y: bent.y.y - (stress.yy - squeeze), z: bent.y.z - stress.yz },
+        Vector { x: bent.z.x - stress.zx, y: bent.z.y - stress.yz, z: bent.z.z - (stress.zz - squeeze) },
+    ];
+    let Hourglass { d, e, f, g } = hourglass;
+    let amplitudes = [[d.x, e.x, f.x, g.x], [d.y, e.y, f.y, g.y], [d.z, e.z, f.z, g.z]];
+    let magic = L::splat(step.force_quantum.magic());
+    let mut axis = 0;
+    while axis < 3 {
+        let mut forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
+        let mut corner = 0;
+        while corner < 8 {
+            let force = L::select(active, forces[corner], zero);
+            tally.largest_force = tally.largest_force.max(force.abs());
+            forces[corner] = (force + magic) - magic;
+            corner += 1;
+        }
+        // SAFETY: corners are inside the node arrays.
+        unsafe { scatter(view.layout, view.f[axis], slot, forces) };
+        axis += 1;
+    }
+}
+
+/// Values of one node array at the eight corners.
+///
+/// # Safety
+/// As [`compute`].
+#[inline(always)]
+unsafe fn corners<L: Lane>(layout: &Layout, from: &[f64], slot: usize) -> [L; 8] {
+    // SAFETY: the caller's promise covers every access here.
+    unsafe {
+        match layout {
+            Layout::Structured { row, plane, base } => {
+                let n = *base.get_unchecked(slot / SET) as usize + slot % SET;
+                let (row, plane) = (*row, *plane);
+                [
+                    L::load(from, n),
+                    L::load(from, n + 1),
+                    L::load(from, n + row + 1),
+                    L::load(from, n + row),
+                    L::load(from, n + plane),
+                    L::load(from, n + plane + 1),
+                    L::load(from, n + plane + row + 1),
+                    L::load(from, n + plane + row),
+                ]
+            }
+            Layout::Explicit { corners } => [
+                L::gather(from, &corners[0], slot),
+                L::gather(from, &corners[1], slot),
+                L::gather(from, &corners[2], slot),
+                L::gather(from, &corners[3], slot),
+                L::gather(from, &corners[4], slot),
+                L::gather(from, &corners[5], slot),
+                L::gather(from, &corners[6], slot),
+                L::gather(from, &corners[7], slot),
+            ],
+        }
+    }
+}
+
+/// Adds corner values to one node array. Every value is a multiple of the quantum, so no order can show.
+///
+/// # Safety
+/// As [`compute`].
+#[inline(always)]
+unsafe fn scatter<L: Lane>(layout: &Layout, to: &mut [f64], slot: usize, values: [L; 8]) {
+    // SAFETY: the caller's promise covers every access here.
+    unsafe {
+        match layout {
+            Layout::Structured { row, plane, base } => {
+                let n = *base.get_unchecked(slot / SET) as usize + slot % SET;
+                let (row, plane) = (*row, *plane);
+                add(to, n, values[0]);
+                add(to, n + plane, values[4]);
+                add(to, n + row, values[3]);
+                add(to, n + plane + row, values[7]);
+                add(to, n + 1, values[1]);
+                add(to, n + plane + 1, values[5]);
+                add(to, n + row + 1, values[2]);
+                add(to, n + plane + row + 1, values[6]);
+            }
+            Layout::Explicit { corners } => {
+                let mut corner = 0;
+                while corner < 8 {
+                    let lanes = values[corner].to_array();
+                    let indices = &corners[corner];
+                    let mut lane = 0;
+                    while lane < L::N {
+                        let node = *indices.get_unchecked(slot + lane) as usize;
+                        *to.get_unchecked_mut(node) += lanes[lane];
+                        lane += 1;
+                    }
+                    corner += 1;
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn add<L: Lane>(to: &mut [f64], at: usize, value: L) {
+    // SAFETY: the caller keeps the lanes inside.
+    unsafe { (L::load(to, at) + value).store(to, at) };
+}

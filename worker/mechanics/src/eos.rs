@@ -1,0 +1,57 @@
+//! Equations of state on lanes: pressure as a line in the internal energy.
+//!
+//! Every law here has the form `p = a(v) + b(v) E`, with v the volume and E the internal energy, both per
+//! initial volume. The energy equation of a cycle is then solved in closed form, and one formula gives the
+//! isentropic stiffness of all of them.
+
+use crate::lanes::Lane;
+
+pub(crate) mod linear;
+pub(crate) mod shock;
+
+pub(crate) use {linear::Linear, shock::Shock};
+
+/// A law of pressure.
+pub(crate) trait EquationOfState: Copy {
+    /// The line and its slope at relative volumes `v > 0`.
+    fn line<L: Lane>(&self, v: L) -> Line<L>;
+
+    /// Least bulk stiffness used for the sound speed (stress), where tension has softened the law.
+    fn least_stiffness(&self) -> f64;
+}
+
+/// `p = a + b E` at one relative volume, and the derivatives of a and b with respect to it.
+#[derive(Clone, Copy)]
+pub(crate) struct Line<L> {
+    /// Pressure at zero energy.
+    pub a: L,
+    /// Pressure per energy per initial volume.
+    pub b: L,
+    /// `d a / d v`.
+    pub slope_a: L,
+    /// `d b / d v`.
+    pub slope_b: L,
+}
+
+impl<L: Lane> Line<L> {
+    /// Pressure at energy E per initial volume.
+    #[inline(always)]
+    pub fn pressure(&self, energy: L) -> L {
+        self.b.mul_add(energy, self.a)
+    }
+
+    /// Isentropic bulk stiffness `rho c^2 = -v dp/dv = v (b p - a' - b' E)`, since `dE = -p dv` on the isentrope.
+    #[inline(always)]
+    pub fn stiffness(&self, v: L, pressure: L, energy: L) -> L {
+        v * self.b.mul_add(pressure, -self.slope_b.mul_add(energy, self.slope_a))
+    }
+
+    /// Energy at the end of a step in which the volume changed by `dv` against the mean of the pressures at its
+    /// ends and against `viscosity`: solves `E = before - ((p_before + a + b E) / 2 + viscosity) dv`.
+    #[inline(always)]
+    pub fn energy_after(&self, before: L, pressure_before: L, viscosity: L, dv: L) -> L {
+        let half = L::splat(0.5);
+        let resistance = half.mul_add(pressure_before + self.a, viscosity);
+        resistance.neg_mul_add(dv, before) / (half * self.b).mul_add(dv, L::splat(1.0))
+    }
+}

@@ -1,0 +1,160 @@
+//! Four elements at a time, with AVX2 and FMA.
+//!
+//! Private to the crate: a value may exist only on a machine that has the instructions, and every function
+//! here becomes instructions only when it is inlined into a wrapper that enables them.
+
+use std::{
+    arch::x86_64::*,
+    ops::{Add, Div, Mul, Neg, Sub},
+};
+
+use super::Lane;
+
+/// Four f64 in a register.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2(__m256d);
+
+/// Evaluates intrinsics on register values.
+macro_rules! avx2 {
+    ($e:expr) => {
+        // SAFETY: the kernels that hold an Avx2 run inside a wrapper chosen by Width::available.
+        unsafe { $e }
+    };
+}
+
+macro_rules! operator {
+    ($name:ident, $method:ident, $intrinsic:ident) => {
+        impl $name for Avx2 {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(avx2!($intrinsic(self.0, other.0)))
+            }
+        }
+    };
+}
+operator!(Add, add, _mm256_add_pd);
+operator!(Sub, sub, _mm256_sub_pd);
+operator!(Mul, mul, _mm256_mul_pd);
+operator!(Div, div, _mm256_div_pd);
+
+impl Neg for Avx2 {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(avx2!(_mm256_xor_pd(self.0, _mm256_set1_pd(-0.0))))
+    }
+}
+
+impl Lane for Avx2 {
+    const N: usize = 4;
+    type Mask = __m256d;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self(avx2!(_mm256_set1_pd(x)))
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: &[f64], at: usize) -> Self {
+        debug_assert!(at + 4 <= from.len(), "load {at} of {}", from.len());
+        // SAFETY: the caller keeps the lanes inside; the wrapper has AVX2.
+        Self(unsafe { _mm256_loadu_pd(from.as_ptr().add(at)) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: &mut [f64], at: usize) {
+        debug_assert!(at + 4 <= to.len(), "store {at} of {}", to.len());
+        // SAFETY: the caller keeps the lanes inside; the wrapper has AVX2.
+        unsafe { _mm256_storeu_pd(to.as_mut_ptr().add(at), self.0) };
+    }
+
+    #[inline(always)]
+    unsafe fn gather(from: &[f64], indices: &[u32], at: usize) -> Self {
+        debug_assert!(at + 4 <= indices.len(), "gather {at} of {}", indices.len());
+        // SAFETY: the caller keeps the lanes and the indices inside; the wrapper has AVX2.
+        Self(unsafe {
+            let index = _mm_loadu_si128(indices.as_ptr().add(at).cast());
+            _mm256_i32gather_pd::<8>(from.as_ptr(), index)
+        })
+    }
+
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self(avx2!(_mm256_fmadd_pd(self.0, b.0, c.0)))
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        Self(avx2!(_mm256_fnmadd_pd(self.0, b.0, c.0)))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(avx2!(_mm256_sqrt_pd(self.0)))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(avx2!(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(avx2!(_mm256_min_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(avx2!(_mm256_max_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> __m256d {
+        avx2!(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn less_equal(self, other: Self) -> __m256d {
+        avx2!(_mm256_cmp_pd::<_CMP_LE_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn both(one: __m256d, other: __m256d) -> __m256d {
+        avx2!(_mm256_and_pd(one, other))
+    }
+
+    #[inline(always)]
+    fn select(mask: __m256d, yes: Self, no: Self) -> Self {
+        Self(avx2!(_mm256_blendv_pd(no.0, yes.0, mask)))
+    }
+
+    #[inline(always)]
+    fn bits(mask: __m256d) -> u32 {
+        avx2!(_mm256_movemask_pd(mask)) as u32
+    }
+
+    #[inline(always)]
+    fn split(self) -> (Self, Self) {
+        avx2!({
+            let bits = _mm256_castpd_si256(self.0);
+            let one = _mm256_set1_epi64x(0x3ff0_0000_0000_0000);
+            let from_sqrt_half = _mm256_set1_epi64x(0x3ff0_0000_0000_0000 - 0x3fe6_a09e_667f_3bcd);
+            let biased = _mm256_srli_epi64::<52>(_mm256_add_epi64(bits, from_sqrt_half));
+            let mantissa = _mm256_add_epi64(_mm256_sub_epi64(bits, _mm256_slli_epi64::<52>(biased)), one);
+            let whole = _mm256_castsi256_pd(_mm256_or_si256(biased, _mm256_set1_epi64x(0x433 << 52)));
+            let k = _mm256_sub_pd(whole, _mm256_set1_pd(4_503_599_627_370_496.0 + 1023.0));
+            (Self(k), Self(_mm256_castsi256_pd(mantissa)))
+        })
+    }
+
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        Self(avx2!({
+            let biased = _mm256_add_pd(self.0, _mm256_set1_pd(4_503_599_627_370_496.0 + 1023.0));
+            _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(biased)))
+        }))
+    }
+}

@@ -1,0 +1,160 @@
+//! Eight elements at a time, with AVX-512 F and DQ.
+//!
+//! Private to the crate: a value may exist only on a machine that has the instructions, and every function
+//! here becomes instructions only when it is inlined into a wrapper that enables them.
+
+use std::{
+    arch::x86_64::*,
+    ops::{Add, Div, Mul, Neg, Sub},
+};
+
+use super::Lane;
+
+/// Eight f64 in a register.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512(__m512d);
+
+/// Evaluates intrinsics on register values.
+macro_rules! avx512 {
+    ($e:expr) => {
+        // SAFETY: the kernels that hold an Avx512 run inside a wrapper chosen by Width::available.
+        unsafe { $e }
+    };
+}
+
+macro_rules! operator {
+    ($name:ident, $method:ident, $intrinsic:ident) => {
+        impl $name for Avx512 {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(avx512!($intrinsic(self.0, other.0)))
+            }
+        }
+    };
+}
+operator!(Add, add, _mm512_add_pd);
+operator!(Sub, sub, _mm512_sub_pd);
+operator!(Mul, mul, _mm512_mul_pd);
+operator!(Div, div, _mm512_div_pd);
+
+impl Neg for Avx512 {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(avx512!(_mm512_xor_pd(self.0, _mm512_set1_pd(-0.0))))
+    }
+}
+
+impl Lane for Avx512 {
+    const N: usize = 8;
+    type Mask = __mmask8;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self(avx512!(_mm512_set1_pd(x)))
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: &[f64], at: usize) -> Self {
+        debug_assert!(at + 8 <= from.len(), "load {at} of {}", from.len());
+        // SAFETY: the caller keeps the lanes inside; the wrapper has AVX-512.
+        Self(unsafe { _mm512_loadu_pd(from.as_ptr().add(at)) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: &mut [f64], at: usize) {
+        debug_assert!(at + 8 <= to.len(), "store {at} of {}", to.len());
+        // SAFETY: the caller keeps the lanes inside; the wrapper has AVX-512.
+        unsafe { _mm512_storeu_pd(to.as_mut_ptr().add(at), self.0) };
+    }
+
+    #[inline(always)]
+    unsafe fn gather(from: &[f64], indices: &[u32], at: usize) -> Self {
+        debug_assert!(at + 8 <= indices.len(), "gather {at} of {}", indices.len());
+        // SAFETY: the caller keeps the lanes and the indices inside; the wrapper has AVX-512.
+        Self(unsafe {
+            let index = _mm256_loadu_si256(indices.as_ptr().add(at).cast());
+            _mm512_i32gather_pd::<8>(index, from.as_ptr())
+        })
+    }
+
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self(avx512!(_mm512_fmadd_pd(self.0, b.0, c.0)))
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        Self(avx512!(_mm512_fnmadd_pd(self.0, b.0, c.0)))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(avx512!(_mm512_sqrt_pd(self.0)))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(avx512!(_mm512_andnot_pd(_mm512_set1_pd(-0.0), self.0)))
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(avx512!(_mm512_min_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(avx512!(_mm512_max_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> __mmask8 {
+        avx512!(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn less_equal(self, other: Self) -> __mmask8 {
+        avx512!(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn both(one: __mmask8, other: __mmask8) -> __mmask8 {
+        one & other
+    }
+
+    #[inline(always)]
+    fn select(mask: __mmask8, yes: Self, no: Self) -> Self {
+        Self(avx512!(_mm512_mask_blend_pd(mask, no.0, yes.0)))
+    }
+
+    #[inline(always)]
+    fn bits(mask: __mmask8) -> u32 {
+        u32::from(mask)
+    }
+
+    #[inline(always)]
+    fn split(self) -> (Self, Self) {
+        avx512!({
+            let bits = _mm512_castpd_si512(self.0);
+            let one = _mm512_set1_epi64(0x3ff0_0000_0000_0000);
+            let from_sqrt_half = _mm512_set1_epi64(0x3ff0_0000_0000_0000 - 0x3fe6_a09e_667f_3bcd);
+            let biased = _mm512_srli_epi64::<52>(_mm512_add_epi64(bits, from_sqrt_half));
+            let mantissa = _mm512_add_epi64(_mm512_sub_epi64(bits, _mm512_slli_epi64::<52>(biased)), one);
+            let whole = _mm512_castsi512_pd(_mm512_or_si512(biased, _mm512_set1_epi64(0x433 << 52)));
+            let k = _mm512_sub_pd(whole, _mm512_set1_pd(4_503_599_627_370_496.0 + 1023.0));
+            (Self(k), Self(_mm512_castsi512_pd(mantissa)))
+        })
+    }
+
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        Self(avx512!({
+            let biased = _mm512_add_pd(self.0, _mm512_set1_pd(4_503_599_627_370_496.0 + 1023.0));
+            _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(biased)))
+        }))
+    }
+}

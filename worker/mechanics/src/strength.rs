@@ -1,0 +1,106 @@
+//! Strength laws on lanes: what becomes of a trial deviator.
+//!
+//! The element turns the deviatoric stress and adds the elastic increment `2 G dev(D) dt`; a law returns this
+//! trial to its yield surface and keeps the history. Lanes whose trial lies inside the surface come back
+//! unchanged to the bit, so that leaving out the plastic branch for a set without yielding lanes changes nothing.
+
+use crate::lanes::Lane;
+
+pub(crate) mod elastic;
+pub(crate) mod johnson_cook;
+pub(crate) mod von_mises;
+
+pub(crate) use {elastic::Elastic, elastic::Hydro, johnson_cook::JohnsonCook, von_mises::VonMises};
+
+/// Deviatoric stress, or the deviator of the rate of deformation.
+#[derive(Clone, Copy)]
+pub(crate) struct Deviator<L> {
+    pub xx: L,
+    pub yy: L,
+    pub zz: L,
+    pub xy: L,
+    pub yz: L,
+    pub zx: L,
+}
+
+impl<L: Lane> Deviator<L> {
+    /// Zero.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        let zero = L::splat(0.0);
+        Self { xx: zero, yy: zero, zz: zero, xy: zero, yz: zero, zx: zero }
+    }
+
+    /// Double contraction `self : other`.
+    #[inline(always)]
+    pub fn contract(&self, other: &Self) -> L {
+        let shear = self.xy.mul_add(other.xy, self.yz.mul_add(other.yz, self.zx * other.zx));
+        let normal = self.xx.mul_add(other.xx, self.yy.mul_add(other.yy, self.zz * other.zz));
+        L::splat(2.0).mul_add(shear, normal)
+    }
+
+    /// `self * factor`.
+    #[inline(always)]
+    pub fn scaled(&self, factor: L) -> Self {
+        Self {
+            xx: self.xx * factor,
+            yy: self.yy * factor,
+            zz: self.zz * factor,
+            xy: self.xy * factor,
+            yz: self.yz * factor,
+            zx: self.zx * factor,
+        }
+    }
+
+    /// `self * factor + other`.
+    #[inline(always)]
+    pub fn mul_add(&self, factor: L, other: &Self) -> Self {
+        Self {
+            xx: self.xx.mul_add(factor, other.xx),
+            yy: self.yy.mul_add(factor, other.yy),
+            zz: self.zz.mul_add(factor, other.zz),
+            xy: self.xy.mul_add(factor, other.xy),
+            yz: self.yz.mul_add(factor, other.yz),
+            zx: self.zx.mul_add(factor, other.zx),
+        }
+    }
+}
+
+/// What a law remembers of an element.
+#[derive(Clone, Copy)]
+pub(crate) struct History<L> {
+    /// Effective plastic strain.
+    pub plastic_strain: L,
+    /// Temperature (K).
+    pub temperature: L,
+}
+
+/// The rate of a step: effective deviatoric strain rate `sqrt(2/3 D':D')` (1/time) and its product with dt.
+#[derive(Clone, Copy)]
+pub(crate) struct Strain<L> {
+    pub rate: L,
+    pub increment: L,
+}
+
+/// A strength law.
+pub(crate) trait StrengthLaw: Copy {
+    /// Whether there is a deviatoric stress at all.
+    const DEVIATORIC: bool;
+    /// Whether the plastic strain changes.
+    const PLASTIC: bool;
+    /// Whether the temperature matters and changes.
+    const THERMAL: bool;
+
+    /// Shear modulus G (stress).
+    fn shear(&self) -> f64;
+
+    /// Returns the trial deviator to the yield surface. Only lanes in `active` need be right; what the others
+    /// hold is arbitrary.
+    fn update<L: Lane>(
+        &self,
+        trial: Deviator<L>,
+        strain: Strain<L>,
+        history: &mut History<L>,
+        active: L::Mask,
+    ) -> Deviator<L>;
+}

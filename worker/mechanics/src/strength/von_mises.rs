@@ -1,0 +1,51 @@
+//! Von Mises yield with linear isotropic hardening, returned radially.
+
+use super::{Deviator, History, Strain, StrengthLaw};
+use crate::lanes::Lane;
+
+/// `Y = yield_stress + hardening * plastic strain`, not below zero.
+#[derive(Clone, Copy)]
+pub(crate) struct VonMises {
+    /// G (stress).
+    pub shear: f64,
+    /// Initial yield stress.
+    pub yield_stress: f64,
+    /// `d Y / d plastic strain` (stress).
+    pub hardening: f64,
+}
+
+impl StrengthLaw for VonMises {
+    const DEVIATORIC: bool = true;
+    const PLASTIC: bool = true;
+    const THERMAL: bool = false;
+
+    #[inline(always)]
+    fn shear(&self) -> f64 {
+        self.shear
+    }
+
+    /// The implicit return `sigma - 3 G d = Y(e + d)` is linear in d, hence exact.
+    #[inline(always)]
+    fn update<L: Lane>(
+        &self,
+        trial: Deviator<L>,
+        _strain: Strain<L>,
+        history: &mut History<L>,
+        active: L::Mask,
+    ) -> Deviator<L> {
+        let sigma = (L::splat(1.5) * trial.contract(&trial)).sqrt();
+        let yield_stress = L::splat(self.hardening)
+            .mul_add(history.plastic_strain, L::splat(self.yield_stress))
+            .max(L::splat(0.0));
+        let yields = yield_stress.less(sigma);
+        if !L::any(L::both(yields, active)) {
+            return trial;
+        }
+        let three_g = 3.0 * self.shear;
+        let slip = (sigma - yield_stress) / L::splat(three_g + self.hardening);
+        let factor = L::splat(three_g).neg_mul_add(slip, sigma) / sigma;
+        let zero = L::splat(0.0);
+        history.plastic_strain = history.plastic_strain + L::select(yields, slip, zero);
+        trial.scaled(L::select(yields, factor.max(zero), L::splat(1.0)))
+    }
+}
