@@ -601,12 +601,14 @@ fn body_under_a_file_size_limit() {
 /// A whole folder as a run leaves it, for readers outside this repository: `target/tmp/results/whole`.
 #[test]
 fn whole_folder_of_a_run_holds_states_index_history_and_summary() {
-    let model = plates(20);
+    let mut model = plates(20);
+    model.output.fields = results::FIELD_NAMES.map(String::from).to_vec();
+    let worker: Vec<u32> = (0..model.mesh.n_elements() as u32).map(|e| e / 1000).collect();
     let folder = Folder::create(&scratch("whole"), false).expect("fresh folder");
     let mut series = Series::new(&folder, &model).expect("known fields");
     let mut history = History::create(&folder, &model).expect("fresh folder");
     for cycle in 0..3 {
-        series.write(&model, &dented(&model, cycle, 2.0 * cycle as f64), None).expect("written");
+        series.write(&model, &dented(&model, cycle, 2.0 * cycle as f64), Some(&worker)).expect("written");
         history.append(&row(&model, cycle)).expect("written");
     }
     let end = Summary { cycles: 2, end_time: dented(&model, 2, 0.0).time, ..summary(&model) };
