@@ -28,8 +28,8 @@ pub const SUMMARY: &str = "summary.json";
 /// Every name that a deck may list under `output.fields`.
 ///
 /// `node_id`, `element_id`, `part` and `material` are written in any case. All of
-/// [`mechanics::state::FIELDS`] are among them; `stress_xx` to `stress_zx` are deviatoric as there, while `stress` is the
-/// whole tensor.
+/// [`mechanics::state::FIELDS`] are among them; `stress_xx` to `stress_zx` are deviatoric as there, while
+/// `stress` is the whole tensor.
 pub const FIELD_NAMES: [&str; 19] = [
     "velocity",
     "displacement",
