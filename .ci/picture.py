@@ -11,8 +11,10 @@ import os
 import pathlib
 import sys
 
-# Without a display VTK takes EGL, and with neither falls back to its own software renderer; this keeps it quiet.
+# Read when VTK is loaded: without a display it would first look for an X server and complain.
 os.environ.setdefault("PYVISTA_OFF_SCREEN", "true")
+if not os.environ.get("DISPLAY"):
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 import numpy
 import pyvista

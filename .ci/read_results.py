@@ -17,7 +17,7 @@ import sys
 import numpy
 import pyvista
 
-# Not in a summary that a run could not finish.
+# Written whatever the deck selects.
 IDENTITY = {"part", "material", "element_id"}
 
 

@@ -28,9 +28,9 @@ pub const SUMMARY: &str = "summary.json";
 /// Every name that a deck may list under `output.fields`.
 ///
 /// `node_id`, `element_id`, `part` and `material` are written in any case. All of
-/// [`mechanics::state::FIELDS`] are among them; `stress_xx` to `stress_zx` are deviatoric as there, while `stress` is the
-/// whole tensor.
-pub const FIELD_NAMES: [&str; 19] = [
+/// [`mechanics::state::FIELDS`] are among them; `stress_xx` to `stress_zx` are deviatoric as there, while
+/// `stress` is the whole tensor.
+pub const FIELD_NAMES: [&str; 20] = [
     "velocity",
     "displacement",
     "node_id",
@@ -50,6 +50,7 @@ pub const FIELD_NAMES: [&str; 19] = [
     "stress_xy",
     "stress_yz",
     "stress_zx",
+    "mass",
 ];
 
 /// Why results could not be written or read.

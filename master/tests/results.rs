@@ -133,7 +133,7 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         time: 0.1 * cycle as f64,
         x,
         v: model.mesh.positions.iter().map(|&p| dent(p)).collect(),
-        mass: vec![1.0; model.mesh.n_nodes()],
+        mass: (0..model.mesh.n_nodes()).map(|n| 1.0 / (n as f64 + 1.0)).collect(),
         constraint: vec![0; model.mesh.n_nodes()],
         initial_volume: vec![1.0; n],
         elements,
@@ -247,6 +247,7 @@ fn every_array_of_a_state_reads_back_to_the_same_bits() {
         state.x.iter().zip(&model.mesh.positions).flat_map(|(x, p)| [x[0] - p[0], x[1] - p[1], x[2] - p[2]]);
     assert_eq!(array(&file, "displacement"), bytes_of(moved));
     assert_eq!(array(&file, "node_id"), bytes_of_u32(model.mesh.node_ids.iter().copied()));
+    assert_eq!(array(&file, "mass"), bytes_of(state.mass.iter().copied()));
     let corners = model.mesh.parts.iter().flat_map(|p| (0..p.n_elements()).flat_map(|e| p.corners(e)));
     assert_eq!(
         array(&file, "connectivity"),
@@ -317,7 +318,7 @@ fn deck_selects_fields_and_an_empty_list_selects_all_but_components() {
     assert_eq!(names_in(&["pressure"]), ["node_id", "part", "material", "element_id", "pressure"]);
     let default: Vec<_> = results::FIELD_NAMES
         .into_iter()
-        .filter(|name| !name.starts_with("stress") && *name != "relative_volume")
+        .filter(|name| !name.starts_with("stress") && !["relative_volume", "mass"].contains(name))
         .collect();
     assert_eq!(names_in(&[]), default);
     let state_fields = names_in(&mechanics::state::FIELDS);
@@ -601,12 +602,14 @@ fn body_under_a_file_size_limit() {
 /// A whole folder as a run leaves it, for readers outside this repository: `target/tmp/results/whole`.
 #[test]
 fn whole_folder_of_a_run_holds_states_index_history_and_summary() {
-    let model = plates(20);
+    let mut model = plates(20);
+    model.output.fields = results::FIELD_NAMES.map(String::from).to_vec();
+    let worker: Vec<u32> = (0..model.mesh.n_elements() as u32).map(|e| e / 1000).collect();
     let folder = Folder::create(&scratch("whole"), false).expect("fresh folder");
     let mut series = Series::new(&folder, &model).expect("known fields");
     let mut history = History::create(&folder, &model).expect("fresh folder");
     for cycle in 0..3 {
-        series.write(&model, &dented(&model, cycle, 2.0 * cycle as f64), None).expect("written");
+        series.write(&model, &dented(&model, cycle, 2.0 * cycle as f64), Some(&worker)).expect("written");
         history.append(&row(&model, cycle)).expect("written");
     }
     let end = Summary { cycles: 2, end_time: dented(&model, 2, 0.0).time, ..summary(&model) };

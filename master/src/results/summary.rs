@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Error, Folder, SUMMARY, Units, write_whole};
 
-/// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no others.
+/// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no
+/// others.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Title of the deck.

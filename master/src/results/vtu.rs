@@ -17,9 +17,9 @@ const VTK_HEXAHEDRON: u8 = 12;
 /// Fields whose numbers identify rather than measure: written whatever the deck selects.
 const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
 
-/// Fields that follow from the others: written only if the deck names them.
-const ON_REQUEST: [&str; 7] =
-    ["stress", "relative_volume", "stress_xx", "stress_yy", "stress_xy", "stress_yz", "stress_zx"];
+/// Fields that follow from others or never change: written only if the deck names them.
+const ON_REQUEST: [&str; 8] =
+    ["stress", "relative_volume", "stress_xx", "stress_yy", "stress_xy", "stress_yz", "stress_zx", "mass"];
 
 /// Which fields a state file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,8 +29,8 @@ pub struct Fields {
 }
 
 impl Fields {
-    /// The fields of `output.fields`; an empty list selects all but the relative volume and the
-    /// components of stress.
+    /// The fields of `output.fields`; an empty list selects all but the relative volume,
+    /// the components of stress and the nodal mass.
     ///
     /// # Errors
     /// [`Error::UnknownField`].
@@ -166,8 +166,8 @@ pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
 
 /// Writes one state as a `.vtu` file, whole or not at all.
 ///
-/// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`. Element
-/// fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
+/// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`,
+/// `mass`. Element fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
 /// `temperature` (K), `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
 /// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric).
 /// `worker` gives, by global element index, the worker that computes the element, and becomes the element
@@ -199,6 +199,7 @@ fn stream(
     let (n_nodes, n_elements) = (model.mesh.n_nodes(), model.mesh.n_elements());
     assert_eq!(state.x.len(), n_nodes, "positions of the state and nodes of the mesh");
     assert_eq!(state.v.len(), n_nodes, "velocities of the state and nodes of the mesh");
+    assert_eq!(state.mass.len(), n_nodes, "masses of the state and nodes of the mesh");
     for (name, values) in mechanics::state::FIELDS.iter().zip(&state.elements) {
         assert_eq!(values.len(), n_elements, "{name} of the state and elements of the mesh");
     }
@@ -286,6 +287,7 @@ fn data_arrays<'a>(
             std::array::from_fn::<f64, 3, _>(|axis| x[axis] - start[axis])
         }),
         Array::u32("node_id", n_nodes, move |n| mesh.node_ids[n]),
+        Array::f64("mass", n_nodes, move |n| [state.mass[n]]),
     ];
     let mut cell = vec![
         Array::u32("part", n_elements, move |e| elements.locate(e).0 as u32),
