@@ -15,9 +15,11 @@
 //! Pass a TCP stream through [`tune`] before splitting it: otherwise the system's own send buffer holds
 //! megabytes of bulk that no cycle frame can overtake.
 
+mod greeting;
 mod receiver;
 mod sender;
 
+pub use greeting::{GREETING_LIMIT, admit, greet, hear};
 pub use receiver::Receiver;
 pub use sender::Sender;
 
@@ -43,6 +45,8 @@ pub const UNSENT_BYTES: u32 = 128 << 10;
 pub const READ_BUFFER: usize = 64 << 10;
 /// Bytes of payload that are allocated before as many have come: a lying header costs no more.
 pub const FIRST_ALLOCATION: usize = 256 << 10;
+/// Heartbeats that a peer may miss before it counts as dead: a busy PC may swap for seconds.
+pub const MISSED_HEARTBEATS: u32 = 10;
 /// Payload buffers kept for reuse.
 pub const SPARE_BUFFERS: usize = 8;
 /// Bytes of the largest buffer kept for reuse.
@@ -67,8 +71,8 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// 1,024 frames and 256 MiB; 256 messages and 2 GiB of bulk; a heartbeat each second, and ten of
-    /// them missed before a peer counts as dead (a busy PC may swap for seconds).
+    /// 1,024 frames and 256 MiB; 256 messages and 2 GiB of bulk; a heartbeat each second, of
+    /// which [`MISSED_HEARTBEATS`] may be missed.
     fn default() -> Self {
         Self {
             queued_frames: 1024,
@@ -76,7 +80,7 @@ impl Default for Settings {
             bulk_messages: 16 * OPEN_STREAMS,
             bulk_bytes: 2 * MESSAGE_LIMIT,
             heartbeat: Duration::from_secs(1),
-            silence: Duration::from_secs(10),
+            silence: MISSED_HEARTBEATS * Duration::from_secs(1),
         }
     }
 }
