@@ -4,6 +4,7 @@
 //! `daemon` with workers over TCP.
 
 pub mod balance;
+pub mod certs;
 pub mod command;
 pub mod decompose;
 pub mod embedded;

@@ -4,40 +4,49 @@
 //! Sending puts a frame into a bounded queue and returns; a task of the link writes it. So two peers that
 //! both send more than their sockets hold do not wait for each other, as long as each of them receives.
 //! The queue has two priorities: chunks of bulk messages go only when nothing else is queued, so a cycle
-//! frame waits for at most the bytes already handed to the system and the link's own write buffer
-//! ([`WRITE_BUFFER`]).
+//! frame waits for at most the link's own write buffer ([`WRITE_BUFFER`]) and what the system has taken
+//! ([`UNSENT_BYTES`]).
 //!
 //! A link ends as a whole: a bad frame, a silent peer, the receiver's drop or [`Sender::abort`] closes it
 //! both ways. Only a clean end is one-sided: when the last sender is dropped, what is queued is written
 //! and the stream's sending side closed, while the receiver goes on. What frames mean is not known here, except
 //! that heartbeats are swallowed.
 //!
-//! Set `TCP_NODELAY` on a TCP stream before splitting it: the link gathers small frames by itself.
+//! Pass a TCP stream through [`tune`] before splitting it: otherwise the system's own send buffer holds
+//! megabytes of bulk that no cycle frame can overtake.
 
+mod greeting;
 mod receiver;
 mod sender;
 
+pub use greeting::{GREETING_LIMIT, admit, greet, hear};
 pub use receiver::Receiver;
 pub use sender::Sender;
 
-use crate::Error;
 use crate::codec::{MESSAGE_LIMIT, OPEN_STREAMS};
 use crate::frame::Frame;
+use crate::{Error, Result};
 use sender::Queue;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::TcpStream;
 use tokio::sync::{Notify, watch};
 use tokio::time::Instant;
 
 /// Bytes gathered before they are handed to the stream; at most this much bulk is ahead of a cycle frame
 /// inside the link.
 pub const WRITE_BUFFER: usize = 128 << 10;
+/// Bytes that the system takes of a tuned TCP stream before it has sent what it took earlier: 10 ms of a
+/// 100 Mbit/s link.
+pub const UNSENT_BYTES: u32 = 128 << 10;
 /// Bytes asked of the stream at a time for small frames.
 pub const READ_BUFFER: usize = 64 << 10;
 /// Bytes of payload that are allocated before as many have come: a lying header costs no more.
 pub const FIRST_ALLOCATION: usize = 256 << 10;
+/// Heartbeats that a peer may miss before it counts as dead: a busy PC may swap for seconds.
+pub const MISSED_HEARTBEATS: u32 = 10;
 /// Payload buffers kept for reuse.
 pub const SPARE_BUFFERS: usize = 8;
 /// Bytes of the largest buffer kept for reuse.
@@ -62,8 +71,8 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// 1,024 frames and 256 MiB; 256 messages and 2 GiB of bulk; a heartbeat each second, and ten of
-    /// them missed before a peer counts as dead (a busy PC may swap for seconds).
+    /// 1,024 frames and 256 MiB; 256 messages and 2 GiB of bulk; a heartbeat each second, of
+    /// which [`MISSED_HEARTBEATS`] may be missed.
     fn default() -> Self {
         Self {
             queued_frames: 1024,
@@ -71,7 +80,7 @@ impl Default for Settings {
             bulk_messages: 16 * OPEN_STREAMS,
             bulk_bytes: 2 * MESSAGE_LIMIT,
             heartbeat: Duration::from_secs(1),
-            silence: Duration::from_secs(10),
+            silence: MISSED_HEARTBEATS * Duration::from_secs(1),
         }
     }
 }
@@ -87,6 +96,19 @@ pub struct Counters {
     pub frames_received: u64,
     /// Bytes received.
     pub bytes_received: u64,
+}
+
+/// Prepares a TCP stream for a link: small frames leave at once (`TCP_NODELAY`; the link gathers them by
+/// itself), and on Linux the system queues at most [`UNSENT_BYTES`] that it has not sent yet.
+///
+/// # Errors
+/// [`Error::Io`] when the system refuses an option.
+pub fn tune(stream: &TcpStream) -> Result<()> {
+    let fault = |error| Error::io("setting TCP options", &error);
+    stream.set_nodelay(true).map_err(fault)?;
+    #[cfg(any(target_os = "linux", target_os = "android"))]
+    socket2::SockRef::from(stream).set_tcp_notsent_lowat(UNSENT_BYTES).map_err(fault)?;
+    Ok(())
 }
 
 /// Takes `stream` apart and starts the task that writes to it.

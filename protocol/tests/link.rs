@@ -2,7 +2,10 @@
 
 use protocol::codec::{Assembler, put_f64s};
 use protocol::frame::{CHUNK, Frame, HEADER_LEN, Header, Kind, encode_header};
-use protocol::link::{Receiver, Sender, Settings, WRITE_BUFFER, split};
+use protocol::handshake::{Hello, Policy, Role, Welcome};
+use protocol::link::{
+    GREETING_LIMIT, Receiver, Sender, Settings, UNSENT_BYTES, WRITE_BUFFER, admit, greet, hear, split, tune,
+};
 use protocol::{Error, Result};
 use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
@@ -59,11 +62,15 @@ async fn two_peers_that_both_send_megabytes_finish_over_a_pipe_of_a_kilobyte() {
     timeout(Duration::from_secs(60), both).await.expect("no deadlock");
 }
 
-async fn tcp_with_small_buffers() -> (TcpStream, TcpStream) {
+/// Two ends of a TCP connection, the dialling one first, with receive buffers of 4 KiB and, where
+/// `small_sending` says so, send buffers too.
+async fn tcp(small_sending: bool) -> (TcpStream, TcpStream) {
     let small = || {
         let socket = TcpSocket::new_v4().expect("a socket");
-        socket.set_send_buffer_size(4096).expect("the system takes it");
         socket.set_recv_buffer_size(4096).expect("the system takes it");
+        if small_sending {
+            socket.set_send_buffer_size(4096).expect("the system takes it");
+        }
         socket
     };
     let listening = small();
@@ -72,14 +79,14 @@ async fn tcp_with_small_buffers() -> (TcpStream, TcpStream) {
     let address = listener.local_addr().expect("bound");
     let (dialled, accepted) = tokio::join!(small().connect(address), listener.accept());
     let (dialled, accepted) = (dialled.expect("connects"), accepted.expect("accepts").0);
-    accepted.set_nodelay(true).expect("TCP");
-    dialled.set_nodelay(true).expect("TCP");
+    tune(&accepted).expect("TCP");
+    tune(&dialled).expect("TCP");
     (dialled, accepted)
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn two_peers_that_both_send_megabytes_finish_over_tcp_with_small_buffers() {
-    let (a, b) = tcp_with_small_buffers().await;
+    let (a, b) = tcp(true).await;
     let a = tokio::spawn(exchange(split(a, no_heartbeats()), 1, 2));
     let b = tokio::spawn(exchange(split(b, no_heartbeats()), 2, 1));
     let both = async { tokio::join!(a, b) };
@@ -105,6 +112,30 @@ async fn cycle_frames_overtake_bulk() {
         ahead += 1;
     }
     assert!((1..=WRITE_BUFFER / CHUNK + 1).contains(&ahead), "{ahead} of 100 chunks were ahead");
+}
+
+#[tokio::test]
+async fn cycle_frames_overtake_bulk_in_the_system_too() {
+    let (near, far) = tcp(false).await;
+    let (sender, _receiver) = split(near, no_heartbeats());
+    sender.send_bulk(Header::new(Kind::Bulk), 1, vec![7; 200 * CHUNK]).expect("queued");
+    // The system takes what it will; nobody reads.
+    let mut before = u64::MAX;
+    while before != sender.counters().bytes_sent {
+        before = sender.counters().bytes_sent;
+        for _ in 0..1000 {
+            tokio::task::yield_now().await;
+        }
+    }
+    sender.send(frame(Kind::Cycle, 5, Vec::new())).expect("queued");
+    let (_far_sender, mut receiver) = split(far, no_heartbeats());
+    let mut ahead = 0;
+    while receiver.receive().await.expect("a frame").header.kind == Kind::Bulk {
+        ahead += 1;
+    }
+    // Untuned, about forty of the chunks are ahead; one segment on loopback holds 64 KiB.
+    let limit = (UNSENT_BYTES as usize + WRITE_BUFFER) / CHUNK + 4;
+    assert!((1..=limit).contains(&ahead), "{ahead} of 200 chunks were ahead, limit {limit}");
 }
 
 #[tokio::test]
@@ -139,6 +170,31 @@ async fn a_stream_cut_at_any_byte_ends_with_an_error() {
             _ => Ok(whole.clone()),
         };
         assert_eq!(receiver.receive().await, expected, "cut after {length} bytes");
+    }
+}
+
+#[tokio::test]
+async fn a_bit_flipped_anywhere_in_a_stream_never_passes() {
+    let mut frames = [frame(Kind::Control, 3, b"abc".to_vec()), frame(Kind::Cycle, 4, vec![5; 20])];
+    let mut bytes = Vec::new();
+    for frame in &mut frames {
+        frame.seal().expect("short");
+        bytes.extend_from_slice(&encode_header(&frame.header));
+        bytes.extend_from_slice(&frame.payload);
+    }
+    let first = HEADER_LEN + 3;
+    for bit in 0..bytes.len() * 8 {
+        let mut damaged = bytes.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        let ((_sender, mut receiver), mut far) = pair(4096);
+        far.write_all(&damaged).await.expect("room");
+        if bit / 8 >= first {
+            assert_eq!(receiver.receive().await.as_ref(), Ok(&frames[0]));
+        }
+        // The pipe is still open: the fault is found without waiting for more bytes.
+        let answer = timeout(Duration::from_secs(5), receiver.receive()).await.expect("at once");
+        assert!(answer.is_err(), "bit {bit} passed: {answer:?}");
+        assert_eq!(receiver.receive().await, answer, "what follows is not looked at");
     }
 }
 
@@ -279,4 +335,69 @@ async fn finishing_refuses_later_frames_and_aborting_ends_both_ways() {
     let reason = Error::Message("job 4 is over".into());
     sender.abort(reason.clone());
     assert_eq!(receiver.receive().await, Err(reason));
+}
+
+fn hello(role: Role) -> Hello {
+    Hello::new(role, "pc-1", 1.0, 2, "scalar", 7)
+}
+
+fn workers_only() -> Policy {
+    Policy { roles: vec![Role::Worker], ..Policy::default() }
+}
+
+#[tokio::test(start_paused = true)]
+async fn greetings_pass_over_a_link_and_set_its_intervals() {
+    let (a, b) = duplex(100);
+    let ((a, mut a_receiver), (b, mut b_receiver)) =
+        (split(a, Settings::default()), split(b, Settings::default()));
+    let welcome = Welcome { incarnation: 1, host: 0, heartbeat_ms: 50 };
+    let answer = async {
+        let (server, heard) = hear(&b, &mut b_receiver, workers_only()).await?;
+        admit(server, &b, &mut b_receiver, welcome).map(|()| heard)
+    };
+    let hello = hello(Role::Worker);
+    let (greeted, heard) = tokio::join!(greet(&a, &mut a_receiver, &hello), answer);
+    assert_eq!((greeted, heard), (Ok(welcome), Ok(hello)));
+    // A large frame passes now, and a peer that ends is missed after ten intervals.
+    a.send(frame(Kind::Cycle, 1, vec![0; 100_000])).expect("queued");
+    assert_eq!(b_receiver.receive().await.map(|frame| frame.payload.len()), Ok(100_000));
+    let start = Instant::now();
+    a.set_heartbeat(Duration::from_secs(3600));
+    let silent = Error::Silent { after_ms: 500, limit_ms: 500 };
+    assert_eq!(b_receiver.receive().await, Err(silent));
+    assert_eq!(start.elapsed(), Duration::from_millis(500));
+}
+
+#[tokio::test(start_paused = true)]
+async fn refusals_reach_the_caller_and_silence_is_not_waited_for() {
+    let (a, b) = duplex(100);
+    let ((a, mut a_receiver), (b, mut b_receiver)) =
+        (split(a, Settings::default()), split(b, Settings::default()));
+    let reason = "role client, this side takes worker".to_owned();
+    let hello = hello(Role::Client);
+    let (greeted, heard) =
+        tokio::join!(greet(&a, &mut a_receiver, &hello), hear(&b, &mut b_receiver, workers_only()));
+    assert_eq!(greeted, Err(Error::Refused { reason: reason.clone() }));
+    assert_eq!(heard.map(|(_, hello)| hello), Err(Error::Message(reason)));
+
+    // A caller that only keeps the connection alive is not waited for.
+    let ((sender, mut receiver), far) = pair(4096);
+    let (_far_sender, _far_receiver) = split(far, Settings::default());
+    let start = Instant::now();
+    let heard = hear(&sender, &mut receiver, workers_only()).await;
+    assert!(matches!(heard, Err(Error::Silent { limit_ms: 10_000, .. })));
+    assert_eq!(start.elapsed(), GREETING_LIMIT);
+}
+
+#[tokio::test]
+async fn callers_with_another_frame_version_see_ours() {
+    let ((sender, mut receiver), mut far) = pair(4096);
+    let mut bytes = encode_header(&Header::new(Kind::Hello));
+    bytes[4] = 3;
+    far.write_all(&bytes).await.expect("room");
+    let heard = hear(&sender, &mut receiver, workers_only()).await.map(|(_, hello)| hello);
+    assert_eq!(heard, Err(Error::FrameVersion { theirs: 3, ours: 1 }));
+    let mut answer = Vec::new();
+    far.read_to_end(&mut answer).await.expect("an answer and the end");
+    assert_eq!(answer[..7], *b"BLDE\x01\0\x03", "magic, version 1, refuse");
 }

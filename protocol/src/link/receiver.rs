@@ -49,13 +49,20 @@ impl Receiver {
     /// # Errors
     /// [`Error::Closed`] when the peer ended the stream between two frames, [`Error::Truncated`] within
     /// one; any error of [`decode_header`] and [`Frame::verify`]; [`Error::Silent`]; [`Error::Io`]; or
-    /// the reason given to [`Sender::abort`](super::Sender::abort). Every error but `Closed` ends the link;
-    /// after `Closed`, this side may still send.
+    /// the reason given to [`Sender::abort`](super::Sender::abort). Every error ends the link, except that
+    /// after `Closed` and [`Error::FrameVersion`] this side may still send.
     pub async fn receive(&mut self) -> Result<Frame> {
+        // What follows a bad frame is never looked at; a failure to write does not hide what was said.
+        if let Some(error) = self.shared.ended()
+            && !matches!(error, Error::Io { .. })
+        {
+            return Err(error);
+        }
         let result = self.next_frame().await;
         match &result {
-            // A peer that has said all it had to say may still listen.
-            Ok(_) | Err(Error::Closed) => {}
+            // A peer that has said all it had to say may still listen, and one of another version is owed
+            // an answer that shows ours.
+            Ok(_) | Err(Error::Closed | Error::FrameVersion { .. }) => {}
             Err(error) => self.shared.fail(error.clone()),
         }
         result

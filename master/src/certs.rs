@@ -1,0 +1,324 @@
+//! Certificates for a lab: one CA, and for each host a folder with the three files that TLS reads.
+//!
+//! `FOLDER/ca.pem` and `FOLDER/ca-key.pem` are the CA; the key signs hosts and never leaves this folder.
+//! `FOLDER/NAME/` holds `ca.pem`, `host.pem` and `host-key.pem` and is what is copied to the host. What
+//! the files are used for is in [`protocol::tls`].
+
+use protocol::tls::{Paths, Role};
+use rcgen::{
+    BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer,
+    KeyPair, KeyUsagePurpose, SanType, date_time_ymd,
+};
+use std::fmt;
+use std::fs::{self, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::net::IpAddr;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Days that a CA is valid.
+pub const CA_DAYS: u64 = 3650;
+/// Days that a host's certificate is valid.
+pub const HOST_DAYS: u64 = 825;
+/// How far back validity starts, for hosts whose clocks are behind.
+const CLOCK_SLACK: Duration = Duration::from_secs(24 * 3600);
+/// Most addresses in one certificate.
+const ADDRESS_LIMIT: usize = 64;
+
+/// Why certificates were not made.
+#[derive(Debug)]
+pub enum Error {
+    /// The file is there and was not to be replaced.
+    Exists(PathBuf),
+    /// The CA's key is not in the folder.
+    NoAuthority(PathBuf),
+    /// A name or an address that no certificate can hold.
+    Name {
+        /// As it was given.
+        given: String,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// The system would not read or write a file.
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's words.
+        error: std::io::Error,
+    },
+    /// A key that is no key, or a certificate that cannot be made of it.
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        error: rcgen::Error,
+    },
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exists(path) => {
+                write!(f, "{} exists; choose another folder, or force to replace it", path.display())
+            }
+            Self::NoAuthority(path) => write!(f, "{} is missing; make the CA first", path.display()),
+            Self::Name { given, expected } => write!(f, "{given:?} must be {expected}"),
+            Self::Io { path, error } => write!(f, "{}: {error}", path.display()),
+            Self::Unusable { path, error } => write!(f, "{}: {error}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// Makes a CA in `folder`: `ca.pem` and, with mode 0600, `ca-key.pem`. Gives the path of `ca.pem`.
+///
+/// With `force` an existing CA is replaced, and the certificates of all its hosts with it become useless.
+///
+/// # Errors
+/// [`Error::Exists`] when either file is there and `force` is not given; nothing is written then.
+pub fn make_ca(folder: &Path, force: bool) -> Result<PathBuf, Error> {
+    let (path, key_path) = (folder.join("ca.pem"), folder.join("ca-key.pem"));
+    check_absent(&[&path, &key_path], force)?;
+    create_folder(folder)?;
+    let unusable = |error| Error::Unusable { path: path.clone(), error };
+    let key = KeyPair::generate().map_err(unusable)?;
+    let certificate = authority().self_signed(&key).map_err(unusable)?;
+    write(&key_path, &key.serialize_pem(), 0o600)?;
+    write(&path, &certificate.pem(), 0o644)?;
+    Ok(path)
+}
+
+/// Makes the folder `folder/name` with the certificate of one host, signed by the CA in `folder`.
+///
+/// The certificate lists `name`, every one of `addresses` (names or IP addresses under which others dial
+/// it) and the loopback addresses. It serves for dialling and for listening.
+///
+/// # Errors
+/// [`Error::NoAuthority`] without a CA, [`Error::Exists`] when one of the files is there and `force` is
+/// not given (nothing is written then), [`Error::Name`] for a name that is no name of a host.
+pub fn make_host(
+    folder: &Path,
+    name: &str,
+    addresses: &[String],
+    role: Role,
+    force: bool,
+) -> Result<Paths, Error> {
+    let (authority_path, key_path) = (folder.join("ca.pem"), folder.join("ca-key.pem"));
+    let params = host(name, addresses, role)?;
+    let authority_pem = read(&authority_path)?;
+    let authority_key = KeyPair::from_pem(&read(&key_path)?)
+        .map_err(|error| Error::Unusable { path: key_path.clone(), error })?;
+
+    let host_folder = folder.join(name);
+    let paths = Paths::in_folder(&host_folder);
+    check_absent(&[&paths.ca, &paths.certificate, &paths.key], force)?;
+    let unusable = |error| Error::Unusable { path: paths.certificate.clone(), error };
+    let key = KeyPair::generate().map_err(unusable)?;
+    let issuer = Issuer::new(authority(), authority_key);
+    let certificate = params.signed_by(&key, &issuer).map_err(unusable)?;
+
+    create_folder(&host_folder)?;
+    write(&paths.key, &key.serialize_pem(), 0o600)?;
+    write(&paths.certificate, &certificate.pem(), 0o644)?;
+    write(&paths.ca, &authority_pem, 0o644)?;
+    Ok(paths)
+}
+
+/// What every CA of ours says of itself; only the key tells one from another, so that the key alone is
+/// enough to sign a host.
+fn authority() -> CertificateParams {
+    let mut params = CertificateParams::default();
+    params.distinguished_name = common_name("bolide certificate authority");
+    params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
+    params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
+    set_dates(&mut params, CA_DAYS);
+    params
+}
+
+fn host(name: &str, addresses: &[String], role: Role) -> Result<CertificateParams, Error> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    let (first, length) = (name.chars().next(), name.len());
+    if length > 64 || !first.is_some_and(|c| c.is_ascii_alphanumeric()) || !name.chars().all(plain) {
+        let expected = "1 to 64 letters, digits, - _ or ., starting with a letter or digit";
+        return Err(Error::Name { given: name.to_owned(), expected });
+    }
+    if addresses.len() > ADDRESS_LIMIT {
+        let given = format!("{} addresses", addresses.len());
+        return Err(Error::Name { given, expected: "at most 64 addresses" });
+    }
+    let mut params = CertificateParams::default();
+    params.distinguished_name = common_name(name);
+    params.extended_key_usages =
+        vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
+    params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+    set_dates(&mut params, HOST_DAYS);
+    let known = [name, "localhost", "127.0.0.1", "::1"];
+    for address in known.into_iter().chain(addresses.iter().map(String::as_str)) {
+        let alternative = alternative(address)?;
+        if !params.subject_alt_names.contains(&alternative) {
+            params.subject_alt_names.push(alternative);
+        }
+    }
+    let uri =
+        role.uri().try_into().map_err(|_| Error::Name { given: role.uri(), expected: "a URI in ASCII" })?;
+    params.subject_alt_names.push(SanType::URI(uri));
+    Ok(params)
+}
+
+fn alternative(address: &str) -> Result<SanType, Error> {
+    if let Ok(ip) = address.parse::<IpAddr>() {
+        return Ok(SanType::IpAddress(ip));
+    }
+    let expected = "an IP address or the name of a host, without port";
+    let wrong = || Error::Name { given: address.to_owned(), expected };
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    if address.is_empty() || address.len() > 253 || !address.chars().all(plain) {
+        return Err(wrong());
+    }
+    Ok(SanType::DnsName(address.to_owned().try_into().map_err(|_| wrong())?))
+}
+
+fn common_name(name: &str) -> DistinguishedName {
+    let mut distinguished = DistinguishedName::new();
+    distinguished.push(DnType::CommonName, name);
+    distinguished
+}
+
+fn set_dates(params: &mut CertificateParams, days: u64) {
+    // A clock before 1970 gives certificates of 1970, which a peer will say are out of date.
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let epoch = date_time_ymd(1970, 1, 1);
+    params.not_before = epoch + now.saturating_sub(CLOCK_SLACK);
+    params.not_after = epoch + now + Duration::from_secs(days * 24 * 3600);
+}
+
+fn check_absent(paths: &[&Path], force: bool) -> Result<(), Error> {
+    match paths.iter().find(|path| path.symlink_metadata().is_ok()) {
+        Some(path) if !force => Err(Error::Exists(path.to_path_buf())),
+        _ => Ok(()),
+    }
+}
+
+fn create_folder(path: &Path) -> Result<(), Error> {
+    fs::create_dir_all(path).map_err(|error| Error::Io { path: path.to_owned(), error })
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    fs::read_to_string(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => Error::NoAuthority(path.to_owned()),
+        _ => Error::Io { path: path.to_owned(), error },
+    })
+}
+
+/// Writes a new file that has `mode` from its first moment on; what was at `path` is removed before, so
+/// that an old mode or a link does not live on.
+fn write(path: &Path, text: &str, mode: u32) -> Result<(), Error> {
+    let fault = |error| Error::Io { path: path.to_owned(), error };
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(fault(error)),
+        _ => {}
+    }
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
+    #[cfg(not(unix))]
+    let _ = mode;
+    let mut file = options.open(path).map_err(fault)?;
+    file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(fault)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::tls;
+    use tokio::io::{AsyncReadExt, AsyncWriteExt, duplex};
+
+    fn folder() -> tempfile::TempDir {
+        tempfile::tempdir().expect("a folder for the test")
+    }
+
+    #[cfg(unix)]
+    fn mode(path: &Path) -> u32 {
+        use std::os::unix::fs::PermissionsExt;
+        fs::metadata(path).expect("the file is there").permissions().mode() & 0o777
+    }
+
+    #[tokio::test]
+    async fn hosts_of_one_ca_meet_and_know_their_roles() {
+        let folder = folder();
+        make_ca(folder.path(), false).expect("a new CA");
+        let master = make_host(folder.path(), "master", &["192.0.2.7".into()], Role::Master, false);
+        let worker = make_host(folder.path(), "pc-1", &[], Role::Worker, false);
+        let server = tls::server_config(&master.expect("a host")).expect("usable");
+        let client = tls::client_config(&worker.expect("a host")).expect("usable");
+        for dialled in ["192.0.2.7", "127.0.0.1", "::1", "localhost", "master"] {
+            let (near, far) = duplex(4096);
+            let (dialling, listening) =
+                tokio::join!(tls::connect(near, dialled, &client, Role::Master), tls::accept(far, &server));
+            let (mut near, theirs) = dialling.expect("the master lists this address");
+            let (mut far, ours) = listening.expect("the worker is of the same CA");
+            assert_eq!((theirs.role, theirs.name.as_str()), (Role::Master, "master"));
+            assert_eq!((ours.role, ours.name.as_str()), (Role::Worker, "pc-1"));
+            near.write_all(b"hit").await.expect("room");
+            near.flush().await.expect("room");
+            let mut said = [0; 3];
+            far.read_exact(&mut said).await.expect("three bytes");
+            assert_eq!(&said, b"hit");
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn keys_are_for_their_owner_only() {
+        let folder = folder();
+        let authority = make_ca(folder.path(), false).expect("a new CA");
+        let host = make_host(folder.path(), "pc", &[], Role::Client, false).expect("a host");
+        assert_eq!(mode(&folder.path().join("ca-key.pem")), 0o600);
+        assert_eq!(mode(&host.key), 0o600);
+        // Replacing a key that was open to all closes it.
+        fs::set_permissions(&host.key, std::os::unix::fs::PermissionsExt::from_mode(0o666)).expect("ours");
+        make_host(folder.path(), "pc", &[], Role::Client, true).expect("forced");
+        assert_eq!(mode(&host.key), 0o600);
+        assert_eq!(fs::read(authority).expect("CA"), fs::read(host.ca).expect("its copy"));
+    }
+
+    #[test]
+    fn nothing_is_replaced_without_force() {
+        let folder = folder();
+        make_ca(folder.path(), false).expect("a new CA");
+        let host = make_host(folder.path(), "pc", &[], Role::Worker, false).expect("a host");
+        let files = [folder.path().join("ca.pem"), folder.path().join("ca-key.pem"), host.key.clone()];
+        let before = files.each_ref().map(|path| fs::read(path).expect("written"));
+        let path = folder.path().join("ca.pem");
+        let expected = format!("{} exists; choose another folder, or force to replace it", path.display());
+        assert_eq!(make_ca(folder.path(), false).expect_err("there is one").to_string(), expected);
+        let error = make_host(folder.path(), "pc", &[], Role::Worker, false).expect_err("there is one");
+        assert!(matches!(error, Error::Exists(path) if path == host.ca));
+        fs::remove_file(&path).expect("ours");
+        assert!(make_ca(folder.path(), false).is_err(), "a key without its certificate is kept too");
+        fs::write(&path, &before[0]).expect("ours");
+        assert_eq!(files.each_ref().map(|path| fs::read(path).expect("kept")), before);
+        make_ca(folder.path(), true).expect("forced");
+        assert!(files.each_ref().map(|path| fs::read(path).expect("there"))[0] != before[0]);
+    }
+
+    #[test]
+    fn hosts_need_a_ca_and_a_name() {
+        let folder = folder();
+        let make = |name: &str, addresses: &[String]| {
+            make_host(folder.path(), name, addresses, Role::Worker, false).expect_err("a fault").to_string()
+        };
+        let expected = format!("{} is missing; make the CA first", folder.path().join("ca.pem").display());
+        assert_eq!(make("pc", &[]), expected);
+        make_ca(folder.path(), false).expect("a new CA");
+        for name in ["", "..", "a/b", "a b"] {
+            let rule = "must be 1 to 64 letters, digits, - _ or ., starting with a letter or digit";
+            assert_eq!(make(name, &[]), format!("{name:?} {rule}"));
+        }
+        let expected = "\"pc:4711\" must be an IP address or the name of a host, without port";
+        assert_eq!(make("pc", &["pc:4711".into()]), expected);
+        assert!(!folder.path().join("pc").exists(), "nothing was written");
+    }
+}
