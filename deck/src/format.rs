@@ -15,6 +15,8 @@ mod part;
 pub(crate) use contact::ContactDraft;
 pub(crate) use part::PartDraft;
 
+use std::collections::BTreeMap;
+
 use mechanics::{
     material::Material,
     setup::{Control, Setup},
@@ -36,6 +38,10 @@ pub const MAX_TEXT: usize = 64 << 20;
 pub const MAX_NODES: u64 = 64_000_000;
 /// Most elements of a mesh.
 pub const MAX_ELEMENTS: u64 = 64_000_000;
+/// Longest title (characters).
+pub const MAX_TITLE: usize = 200;
+/// Most parts of a deck with contact, whose settings hold a matrix of parts.
+pub const MAX_CONTACT_PARTS: usize = 2_000;
 /// Most parts.
 pub const MAX_PARTS: usize = 10_000;
 /// Most entries of any other array of tables.
@@ -75,9 +81,12 @@ pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
 
 fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
     let deck = Table::new(document, 0, "the deck".to_string(), faults);
-    let title = deck.require("title", "a title in quotes").and_then(|v| v.text()).unwrap_or_default();
-    if title.chars().count() > 200 || title.chars().any(char::is_control) {
-        faults.add(0, "the title", "at most 200 characters on one line", "shorten it");
+    let title = deck.require("title", "a title in quotes");
+    let text = title.and_then(|v| v.text()).unwrap_or_default();
+    if let Some(title) = title
+        && (text.chars().count() > MAX_TITLE || text.chars().any(char::is_control))
+    {
+        title.fault(&format!("at most {MAX_TITLE} characters on one line"), "shorten it");
     }
     let names = SETS.map(|set| set.name);
     let units = deck.require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t").and_then(|v| v.one_of(&names));
@@ -105,7 +114,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
         }
     }
     Some(Model {
-        title: title.to_string(),
+        title: text.to_string(),
         units: units.name.to_string(),
         mesh: assembly.mesh,
         velocity,
@@ -227,25 +236,32 @@ impl Materials {
 
 /// The names of the parts, for the tables that refer to them.
 pub(crate) struct Names {
-    names: Vec<String>,
+    index: BTreeMap<String, usize>,
+    n_parts: usize,
 }
 
 impl Names {
     fn of(parts: &[PartDraft]) -> Self {
-        Self { names: parts.iter().map(|p| p.name.clone()).collect() }
+        // Of two parts of one name, a fault already, the first is meant.
+        let mut index = BTreeMap::new();
+        for (p, part) in parts.iter().enumerate() {
+            index.entry(part.name.clone()).or_insert(p);
+        }
+        Self { index, n_parts: parts.len() }
     }
 
     /// Number of parts.
     pub(crate) fn len(&self) -> usize {
-        self.names.len()
+        self.n_parts
     }
 
     /// The part a text names.
     pub(crate) fn one(&self, value: Value<'_>) -> Option<usize> {
         let name = value.text()?;
-        let found = self.names.iter().position(|n| n == name);
+        let found = self.index.get(name).copied();
         if found.is_none() {
-            let advice = match nearest(name, self.names.iter().map(String::as_str)) {
+            let known = self.index.keys().map(String::as_str).filter(|_| !value.faults.full());
+            let advice = match nearest(name, known) {
                 Some(near) => format!("write \"{near}\""),
                 None => "add a [[part]] of that name".to_string(),
             };

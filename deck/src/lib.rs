@@ -20,7 +20,7 @@ mod table;
 pub mod units;
 
 pub use fault::{Fault, MAX_FAULTS};
-pub use format::{MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT};
+pub use format::{MAX_CONTACT_PARTS, MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT, MAX_TITLE};
 pub use model::Model;
 pub use table::MAX_NAME;
 

@@ -2,7 +2,7 @@
 
 use mechanics::{contact::Settings, material::Material};
 
-use super::{MAX_ENTRIES, Names, boundary::Conditions};
+use super::{MAX_CONTACT_PARTS, MAX_ENTRIES, Names, boundary::Conditions};
 use crate::{
     assembly::Assembly,
     check::{Face, outer_faces, smallest_face_dimension},
@@ -36,6 +36,15 @@ pub(crate) fn read(
 ) -> Option<ContactDraft> {
     let table = deck.get("contact")?.table("[contact]".to_string())?;
     let n = names.len();
+    if n > MAX_CONTACT_PARTS {
+        table.faults.add(
+            table.at,
+            format!("[contact] with {n} parts"),
+            format!("at most {MAX_CONTACT_PARTS}"),
+            "make one part of bodies of one material, with self_interaction",
+        );
+        return None;
+    }
     let friction = table.number_or("friction", 0.0, Range::NotNegative);
     let mut interacts: Vec<bool> = (0..n * n).map(|i| i / n != i % n).collect();
     let mut frictions = vec![friction; n * n];

@@ -58,6 +58,7 @@ fn read_gauge(table: Table<'_>, names: &Names, assembly: &Assembly, others: &[Ga
     {
         value.fault("a name that no other gauge has", "choose another name");
     }
+    let part = table.get("part");
     let node = match (table.get("node"), table.get("point")) {
         (Some(value), None) => value.integer(1, u64::from(u32::MAX)).and_then(|id| {
             let node = assembly.node_of_id.get(&(id as u32)).copied();
@@ -67,7 +68,7 @@ fn read_gauge(table: Table<'_>, names: &Names, assembly: &Assembly, others: &[Ga
             node
         }),
         (None, Some(value)) => {
-            let selected = match table.get("part") {
+            let selected = match part {
                 None => (0..names.len()).collect(),
                 Some(part) => names.one(part).into_iter().collect::<Vec<usize>>(),
             };

@@ -353,6 +353,12 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
                 }
             }
         }
+        let mut sorted = corners;
+        sorted.sort_unstable();
+        if complete && sorted.windows(2).any(|w| w[0] == w[1]) {
+            complete = false;
+            element.fault("eight different nodes", "list each corner once; wedges are not read");
+        }
         if complete {
             hexahedra.push(corners);
             explicit.element_ids.push(id);
