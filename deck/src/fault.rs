@@ -134,6 +134,17 @@ impl<'a> Faults<'a> {
     }
 }
 
+/// A measured number to six digits, for messages.
+pub(crate) fn short(x: f64) -> String {
+    let rounded = format!("{x:.5e}").parse().unwrap_or(x);
+    let magnitude = f64::abs(rounded);
+    if magnitude == 0.0 || (1e-4..1e7).contains(&magnitude) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
 /// The known word nearest to `word`, if it is near enough to be what was meant.
 pub(crate) fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
     if word.chars().count() > MAX_QUOTE {
@@ -175,6 +186,14 @@ mod tests {
         assert_eq!(faults.place(14), (1, 14));
         assert_eq!(faults.place(15), (2, 1));
         assert_eq!(faults.place(1000), (2, 2));
+    }
+
+    #[test]
+    fn measured_numbers_are_written_with_six_digits() {
+        assert_eq!(short(0.020000000000000018), "0.02");
+        assert_eq!(short(-1.0 + 1e-16), "-1");
+        assert_eq!(short(1.234567891e-9), "1.23457e-9");
+        assert_eq!(short(f64::NAN), "NaN");
     }
 
     #[test]

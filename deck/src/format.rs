@@ -133,9 +133,12 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
 
 /// Reads `[control]`.
 fn read_control(deck: &Table<'_>, faults: &Faults<'_>) -> Option<Control> {
-    let control = deck
-        .require("control", "a [control] table with end_time or end_cycle")?
-        .table("[control]".to_string())?;
+    let Some(control) = deck.get("control") else {
+        let expected = "a [control] table with end_time or end_cycle";
+        faults.add(0, "a deck without [control]", expected, "add [control]");
+        return None;
+    };
+    let control = control.table("[control]".to_string())?;
     if !control.has("end_time") && !control.has("end_cycle") {
         faults.add(
             control.at,
@@ -188,9 +191,11 @@ impl Materials {
         let mut materials = Self { units, own: Vec::new(), broken: Vec::new(), list: Vec::new() };
         for table in deck.tables("material", MAX_ENTRIES) {
             let value = table.require("name", "a name in quotes");
-            let Some((name, value)) = value.and_then(|v| v.name().map(|name| (name, v))) else { continue };
+            let name = value.and_then(|v| v.name()).unwrap_or_else(|| table.title.clone());
             let taken = materials.own.iter().any(|m| m.name == name) || materials.broken.contains(&name);
-            if taken || library::find(&name).is_some() {
+            if let Some(value) = value
+                && (taken || library::find(&name).is_some())
+            {
                 let by = if taken { "another [[material]]" } else { "the library" };
                 value.fault(&format!("a name that {by} does not use"), "choose another name");
             }

@@ -37,15 +37,7 @@ fn worst_corner(block: &Block) -> f64 {
 }
 
 fn cylinder(sector: Sector, cells: [u32; 3]) -> Shape {
-    Shape::Cylinder {
-        axis: 2,
-        base: [0.0; 3],
-        radius: 3.2,
-        length: 32.4,
-        sector,
-        core_fraction: 0.5,
-        cells,
-    }
+    Shape::Cylinder { axis: 2, base: [0.0; 3], radius: 3.2, length: 32.4, sector, core_fraction: 0.5, cells }
 }
 
 fn sphere(sector: Sector, cells: [u32; 2]) -> Shape {

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use super::Face;
 use crate::{
     assembly::Assembly,
-    fault::Faults,
+    fault::{Faults, short},
     format::{ContactDraft, PartDraft},
     geometry::{add, scaled, triangle_distance},
 };
@@ -40,7 +40,9 @@ pub(crate) fn overlaps(
     for (a, nodes) in surfaces.iter().enumerate() {
         for (b, faces) in surfaces.iter().enumerate() {
             let pair = (a.min(b), a.max(b));
-            let apart = a == b || !contact.settings.interacts[a * n + b] || assembly.joined.binary_search(&pair).is_ok();
+            let apart = a == b
+                || !contact.settings.interacts[a * n + b]
+                || assembly.joined.binary_search(&pair).is_ok();
             if apart || !nodes.meets(faces, gap) {
                 continue;
             }
@@ -62,12 +64,12 @@ pub(crate) fn overlaps(
         let how = if worst.inside {
             format!("node {id} inside the other part")
         } else {
-            format!("node {id} only {} from the other part", worst.distance)
+            format!("node {id} only {} from the other part", short(worst.distance))
         };
         faults.add(
             parts[b].at,
             format!("part \"{}\" that meets part \"{}\" (line {line}): {how}", parts[b].name, parts[a].name),
-            format!("parts at least one gap ({gap}) apart at the start"),
+            format!("parts at least one gap ({}) apart at the start", short(gap)),
             "move one of them, join them, or switch the pair off in [[contact.pair]]",
         );
     }

@@ -7,6 +7,7 @@ use mechanics::setup::{Constraint, RigidWall};
 use super::{MAX_ENTRIES, Names, PartDraft};
 use crate::{
     assembly::Assembly,
+    fault::short,
     geometry::{dot, norm, scaled, sub},
     table::{Range, Table, Value},
 };
@@ -327,7 +328,7 @@ fn read_wall(table: Table<'_>, names: &Names, assembly: &Assembly) -> Option<Rig
                     "{title} with node {} of part \"{}\" {} behind it",
                     assembly.mesh.node_ids[deepest as usize],
                     part.name,
-                    -height(deepest)
+                    short(-height(deepest))
                 ),
                 "every node on the side of the normal",
                 "turn the normal, move the wall or the part, or leave the part out of parts",

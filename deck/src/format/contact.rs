@@ -6,6 +6,7 @@ use super::{MAX_CONTACT_PARTS, MAX_ENTRIES, Names, boundary::Conditions};
 use crate::{
     assembly::Assembly,
     check::{Face, outer_faces, smallest_face_dimension},
+    fault::short,
     geometry::{norm, sub},
     table::{Range, Table},
 };
@@ -150,9 +151,10 @@ fn read_gap(table: &Table<'_>, smallest: Option<f64>) -> Option<f64> {
             if gap < 0.1 * face * (1.0 - 1e-9) || gap > 0.5 * face * (1.0 + 1e-9) {
                 value.fault(
                     &format!(
-                        "10 % to 50 % of the smallest face dimension {face}: {} to {}",
-                        0.1 * face,
-                        0.5 * face
+                        "10 % to 50 % of the smallest face dimension {}: {} to {}",
+                        short(face),
+                        short(0.1 * face),
+                        short(0.5 * face)
                     ),
                     "choose one between, or write gap_fraction",
                 );

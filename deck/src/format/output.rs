@@ -5,7 +5,7 @@ use mechanics::state::FIELDS;
 use super::{MAX_ENTRIES, Names};
 use crate::{
     assembly::Assembly,
-    fault::nearest,
+    fault::{nearest, short},
     geometry::{norm, sub},
     model::{Gauge, NODE_FIELDS, Output},
     table::{Range, Table},
@@ -79,8 +79,10 @@ fn read_gauge(table: Table<'_>, names: &Names, assembly: &Assembly, others: &[Ga
             {
                 value.fault(
                     &format!(
-                        "a point within one cell ({}) of a node; the nearest, {}, is {distance} away",
-                        assembly.largest_edge[part], assembly.mesh.node_ids[node as usize]
+                        "a point within one cell ({}) of a node; the nearest, {}, is {} away",
+                        short(assembly.largest_edge[part]),
+                        assembly.mesh.node_ids[node as usize],
+                        short(distance)
                     ),
                     "move the point into a part",
                 );

@@ -93,9 +93,13 @@ impl Budget {
     fn take(&mut self, size: Option<(u64, u64)>, at: usize, title: &str, table: &Table<'_>) -> Option<()> {
         let (nodes, elements) = size.unwrap_or((u64::MAX, u64::MAX));
         if nodes > self.nodes || elements > self.elements {
+            let read = match size {
+                Some((nodes, elements)) => format!("{title} with some {nodes} nodes and {elements} elements"),
+                None => format!("{title} with more than 2^64 nodes"),
+            };
             table.faults.add(
                 at,
-                format!("{title} with some {nodes} nodes and {elements} elements"),
+                read,
                 format!("at most {MAX_NODES} nodes and {MAX_ELEMENTS} elements in all parts together"),
                 "use fewer cells",
             );
