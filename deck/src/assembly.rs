@@ -8,7 +8,7 @@ use mechanics::{
 };
 
 use crate::{
-    fault::Faults,
+    fault::{Faults, short},
     format::{MAX_ENTRIES, Names, PartDraft},
     geometry::{EDGES, dot, norm, sub, volume},
     table::{Range, Table},
@@ -37,6 +37,8 @@ pub(crate) struct Assembly {
     pub(crate) largest_edge: Vec<f64>,
     /// Volume by global element.
     pub(crate) volumes: Vec<f64>,
+    /// Whether a join merged nodes of one part, which has been reported.
+    pub(crate) collapsed: bool,
     /// Pairs of parts that share nodes, lower index first.
     pub(crate) joined: Vec<(usize, usize)>,
     /// The global node of each user's number.
@@ -94,6 +96,7 @@ pub(crate) fn assemble(
         smallest_edge,
         largest_edge,
         volumes: Vec::new(),
+        collapsed: false,
         joined: Vec::new(),
         node_of_id,
         part_velocity: drafts.iter().map(|d| d.velocity).collect(),
@@ -209,7 +212,7 @@ fn merge(mesh: &mut Mesh, joins: &[Join], assembly: &mut Assembly, faults: &Faul
             faults.add(
                 join.at,
                 format!("a join of parts {} that share no nodes", names.join(", ")),
-                format!("coincident nodes within {tolerance:e}"),
+                format!("coincident nodes within {}", short(tolerance)),
                 "move or mesh the parts so that nodes coincide, or raise the tolerance",
             );
         }
@@ -217,7 +220,7 @@ fn merge(mesh: &mut Mesh, joins: &[Join], assembly: &mut Assembly, faults: &Faul
     for node in 0..n_nodes as u32 {
         root[node as usize] = find(&root, node);
     }
-    collapsed(mesh, &root, &part_of, joins, faults);
+    assembly.collapsed = collapsed(mesh, &root, &part_of, joins, faults);
     // Close up the numbering.
     let mut new = vec![0u32; n_nodes];
     let mut kept = 0;
@@ -293,8 +296,8 @@ fn merge_pairs(mesh: &Mesh, join: &Join, tolerance: f64, part_of: &[u32], root: 
     merged
 }
 
-/// Reports parts of which a join would merge two nodes of their own.
-fn collapsed(mesh: &Mesh, root: &[u32], part_of: &[u32], joins: &[Join], faults: &Faults<'_>) {
+/// Reports parts of which a join merges two nodes of their own; true where there is one.
+fn collapsed(mesh: &Mesh, root: &[u32], part_of: &[u32], joins: &[Join], faults: &Faults<'_>) -> bool {
     let mut last: HashMap<(u32, u32), u32> = HashMap::new();
     let mut reported = vec![false; mesh.parts.len()];
     for node in 0..root.len() {
@@ -314,6 +317,7 @@ fn collapsed(mesh: &Mesh, root: &[u32], part_of: &[u32], joins: &[Join], faults:
             );
         }
     }
+    reported.contains(&true)
 }
 
 /// Named faces of a part by global node.

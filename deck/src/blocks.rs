@@ -6,6 +6,8 @@
 
 mod o_grid;
 mod structured;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use structured::graded;
 

@@ -9,12 +9,17 @@ pub(crate) use surface::{Face, outer_faces, smallest_face_dimension};
 
 use crate::{
     assembly::Assembly,
-    fault::Faults,
+    fault::{Faults, short},
     format::{ContactDraft, PartDraft},
+    geometry::{EDGES, norm, sub},
 };
 
 /// Most elements named per part; the rest are counted.
 const MAX_NAMED: usize = 10;
+
+/// Volume over the cube of the largest edge below which an element is flat: far under any aspect ratio that
+/// runs, and above the rounding of a volume that is zero.
+const FLAT: f64 = 1e-12;
 
 /// Every check that needs the whole mesh.
 pub(crate) fn spans(
@@ -23,7 +28,8 @@ pub(crate) fn spans(
     contact: Option<&ContactDraft>,
     faults: &Faults<'_>,
 ) {
-    let volumes_fit = volumes(parts, assembly, faults);
+    // Elements that a join folds together were reported with the join.
+    let volumes_fit = !assembly.collapsed && volumes(parts, assembly, faults);
     // Inside and outside mean nothing for inverted elements.
     if volumes_fit && let Some(contact) = contact {
         zones::overlaps(parts, assembly, contact, faults);
@@ -36,8 +42,13 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
     let mut fit = true;
     for (p, (part, draft)) in assembly.mesh.parts.iter().zip(parts).enumerate() {
         let volumes = &assembly.volumes[offsets[p]..offsets[p + 1]];
-        let bad: Vec<usize> =
-            (0..volumes.len()).filter(|&e| !(volumes[e] > 0.0 && volumes[e].is_finite())).collect();
+        let bad: Vec<usize> = (0..volumes.len())
+            .filter(|&e| {
+                let corners = part.corners(e).map(|node| assembly.mesh.positions[node as usize]);
+                let edge = EDGES.iter().map(|[a, b]| norm(sub(corners[*a], corners[*b]))).fold(0.0, f64::max);
+                !(volumes[e] > FLAT * edge * edge * edge && volumes[e].is_finite())
+            })
+            .collect();
         fit &= bad.is_empty();
         for &e in bad.iter().take(MAX_NAMED) {
             let at = draft.explicit.as_ref().map_or(draft.at, |own| own.element_places[e]);
@@ -50,8 +61,10 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
             faults.add(
                 at,
                 format!(
-                    "element {} of part \"{}\" with volume {:e}",
-                    part.element_ids[e], part.name, volumes[e]
+                    "element {} of part \"{}\" with volume {}",
+                    part.element_ids[e],
+                    part.name,
+                    short(volumes[e])
                 ),
                 "a volume above 0",
                 advice,

@@ -3,7 +3,10 @@
 //! Reading never stops at the first fault: every stage adds to one [`Faults`] and goes on with what it
 //! has, so a user sees the whole list at once.
 
-use std::{cell::RefCell, fmt};
+use std::{
+    cell::{Cell, RefCell},
+    fmt,
+};
 
 /// Most faults reported for one deck; the list ends with the number left out.
 pub const MAX_FAULTS: usize = 500;
@@ -43,13 +46,15 @@ pub(crate) struct Faults<'a> {
     text: &'a str,
     line_starts: Vec<usize>,
     list: RefCell<Vec<Fault>>,
+    /// Faults past [`MAX_FAULTS`], which are only counted.
+    more: Cell<usize>,
 }
 
 impl<'a> Faults<'a> {
     /// No faults yet.
     pub(crate) fn new(file: &'a str, text: &'a str) -> Self {
         let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
-        Self { file, text, line_starts, list: RefCell::new(Vec::new()) }
+        Self { file, text, line_starts, list: RefCell::new(Vec::new()), more: Cell::new(0) }
     }
 
     /// Adds a fault at byte offset `at` of the text.
@@ -60,6 +65,10 @@ impl<'a> Faults<'a> {
         expected: impl Into<String>,
         advice: impl Into<String>,
     ) {
+        if self.full() {
+            self.more.set(self.more.get() + 1);
+            return;
+        }
         let (line, column) = self.place(at);
         self.list.borrow_mut().push(Fault {
             file: self.file.to_string(),
@@ -98,16 +107,20 @@ impl<'a> Faults<'a> {
 
     /// Number of faults so far.
     pub(crate) fn count(&self) -> usize {
-        self.list.borrow().len()
+        self.list.borrow().len() + self.more.get()
+    }
+
+    /// Whether further faults are only counted; advice for them need not be sought.
+    pub(crate) fn full(&self) -> bool {
+        self.list.borrow().len() >= MAX_FAULTS
     }
 
     /// The faults in the order of their places, at most [`MAX_FAULTS`] and then one with the rest.
     pub(crate) fn into_list(self) -> Vec<Fault> {
         let mut list = self.list.into_inner();
         list.sort_by_key(|fault| (fault.line, fault.column));
-        if list.len() > MAX_FAULTS {
-            let rest = list.len() - MAX_FAULTS;
-            list.truncate(MAX_FAULTS);
+        let rest = self.more.get();
+        if rest > 0 {
             list.push(Fault {
                 file: self.file.to_string(),
                 line: 1,
@@ -118,6 +131,17 @@ impl<'a> Faults<'a> {
             });
         }
         list
+    }
+}
+
+/// A measured number to six digits, for messages.
+pub(crate) fn short(x: f64) -> String {
+    let rounded = format!("{x:.5e}").parse().unwrap_or(x);
+    let magnitude = f64::abs(rounded);
+    if magnitude == 0.0 || (1e-4..1e7).contains(&magnitude) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
     }
 }
 
@@ -162,6 +186,14 @@ mod tests {
         assert_eq!(faults.place(14), (1, 14));
         assert_eq!(faults.place(15), (2, 1));
         assert_eq!(faults.place(1000), (2, 2));
+    }
+
+    #[test]
+    fn measured_numbers_are_written_with_six_digits() {
+        assert_eq!(short(0.020000000000000018), "0.02");
+        assert_eq!(short(-1.0 + 1e-16), "-1");
+        assert_eq!(short(1.234567891e-9), "1.23457e-9");
+        assert_eq!(short(f64::NAN), "NaN");
     }
 
     #[test]

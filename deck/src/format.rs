@@ -15,6 +15,8 @@ mod part;
 pub(crate) use contact::ContactDraft;
 pub(crate) use part::PartDraft;
 
+use std::collections::BTreeMap;
+
 use mechanics::{
     material::Material,
     setup::{Control, Setup},
@@ -36,6 +38,10 @@ pub const MAX_TEXT: usize = 64 << 20;
 pub const MAX_NODES: u64 = 64_000_000;
 /// Most elements of a mesh.
 pub const MAX_ELEMENTS: u64 = 64_000_000;
+/// Longest title (characters).
+pub const MAX_TITLE: usize = 200;
+/// Most parts of a deck with contact, whose settings hold a matrix of parts.
+pub const MAX_CONTACT_PARTS: usize = 2_000;
 /// Most parts.
 pub const MAX_PARTS: usize = 10_000;
 /// Most entries of any other array of tables.
@@ -75,9 +81,12 @@ pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
 
 fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
     let deck = Table::new(document, 0, "the deck".to_string(), faults);
-    let title = deck.require("title", "a title in quotes").and_then(|v| v.text()).unwrap_or_default();
-    if title.chars().count() > 200 || title.chars().any(char::is_control) {
-        faults.add(0, "the title", "at most 200 characters on one line", "shorten it");
+    let title = deck.require("title", "a title in quotes");
+    let text = title.and_then(|v| v.text()).unwrap_or_default();
+    if let Some(title) = title
+        && (text.chars().count() > MAX_TITLE || text.chars().any(char::is_control))
+    {
+        title.fault(&format!("at most {MAX_TITLE} characters on one line"), "shorten it");
     }
     let names = SETS.map(|set| set.name);
     let units = deck.require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t").and_then(|v| v.one_of(&names));
@@ -105,7 +114,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
         }
     }
     Some(Model {
-        title: title.to_string(),
+        title: text.to_string(),
         units: units.name.to_string(),
         mesh: assembly.mesh,
         velocity,
@@ -124,9 +133,12 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
 
 /// Reads `[control]`.
 fn read_control(deck: &Table<'_>, faults: &Faults<'_>) -> Option<Control> {
-    let control = deck
-        .require("control", "a [control] table with end_time or end_cycle")?
-        .table("[control]".to_string())?;
+    let Some(control) = deck.get("control") else {
+        let expected = "a [control] table with end_time or end_cycle";
+        faults.add(0, "a deck without [control]", expected, "add [control]");
+        return None;
+    };
+    let control = control.table("[control]".to_string())?;
     if !control.has("end_time") && !control.has("end_cycle") {
         faults.add(
             control.at,
@@ -179,9 +191,11 @@ impl Materials {
         let mut materials = Self { units, own: Vec::new(), broken: Vec::new(), list: Vec::new() };
         for table in deck.tables("material", MAX_ENTRIES) {
             let value = table.require("name", "a name in quotes");
-            let Some((name, value)) = value.and_then(|v| v.name().map(|name| (name, v))) else { continue };
+            let name = value.and_then(|v| v.name()).unwrap_or_else(|| table.title.clone());
             let taken = materials.own.iter().any(|m| m.name == name) || materials.broken.contains(&name);
-            if taken || library::find(&name).is_some() {
+            if let Some(value) = value
+                && (taken || library::find(&name).is_some())
+            {
                 let by = if taken { "another [[material]]" } else { "the library" };
                 value.fault(&format!("a name that {by} does not use"), "choose another name");
             }
@@ -227,25 +241,32 @@ impl Materials {
 
 /// The names of the parts, for the tables that refer to them.
 pub(crate) struct Names {
-    names: Vec<String>,
+    index: BTreeMap<String, usize>,
+    n_parts: usize,
 }
 
 impl Names {
     fn of(parts: &[PartDraft]) -> Self {
-        Self { names: parts.iter().map(|p| p.name.clone()).collect() }
+        // Of two parts of one name, a fault already, the first is meant.
+        let mut index = BTreeMap::new();
+        for (p, part) in parts.iter().enumerate() {
+            index.entry(part.name.clone()).or_insert(p);
+        }
+        Self { index, n_parts: parts.len() }
     }
 
     /// Number of parts.
     pub(crate) fn len(&self) -> usize {
-        self.names.len()
+        self.n_parts
     }
 
     /// The part a text names.
     pub(crate) fn one(&self, value: Value<'_>) -> Option<usize> {
         let name = value.text()?;
-        let found = self.names.iter().position(|n| n == name);
+        let found = self.index.get(name).copied();
         if found.is_none() {
-            let advice = match nearest(name, self.names.iter().map(String::as_str)) {
+            let known = self.index.keys().map(String::as_str).filter(|_| !value.faults.full());
+            let advice = match nearest(name, known) {
                 Some(near) => format!("write \"{near}\""),
                 None => "add a [[part]] of that name".to_string(),
             };

@@ -20,9 +20,9 @@ mod table;
 pub mod units;
 
 pub use fault::{Fault, MAX_FAULTS};
-pub use format::{MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT};
+pub use format::{MAX_CONTACT_PARTS, MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT, MAX_TITLE};
 pub use model::Model;
-pub use table::MAX_NAME;
+pub use table::{MAX_NAME, MAX_NUMBER};
 
 /// Reads and checks a deck. `file_name` stands in the faults; no file is opened.
 ///

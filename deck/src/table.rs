@@ -11,6 +11,9 @@ use crate::fault::{Faults, nearest};
 
 /// Longest name of a part, material or gauge (characters).
 pub const MAX_NAME: usize = 64;
+/// Greatest magnitude of a number, and the inverse of the least number above zero, so that volumes, masses
+/// and energies stay inside what a number can hold.
+pub const MAX_NUMBER: f64 = 1e60;
 
 /// A table of the deck.
 pub(crate) struct Table<'a> {
@@ -195,8 +198,14 @@ impl<'a> Value<'a> {
             }
             _ => None,
         };
-        // Subnormal magnitudes are read as what they are; infinities and NaN are not numbers of a deck.
+        // Infinities and NaN are not numbers of a deck.
         let number = number.filter(|x| x.is_finite() && range.admits(*x));
+        if let Some(x) = number
+            && (x.abs() > MAX_NUMBER || (x != 0.0 && x.abs() < 1.0 / MAX_NUMBER))
+        {
+            self.fault(&format!("a magnitude from 1e-60 to {MAX_NUMBER:e}, or 0"), "choose other units");
+            return None;
+        }
         if number.is_none() {
             self.fault(range.words(), &format!("change {}", self.key));
         }

@@ -39,3 +39,49 @@ fn free_slip_plates_start_one_gap_apart() {
     assert!((contact.friction_velocity - 0.0005).abs() < 1e-18);
     assert_eq!(model.join_energy.to_bits(), 0.0f64.to_bits());
 }
+
+#[test]
+fn the_64k_plates_have_64000_elements() {
+    let joined = example("plates-64k-joined");
+    assert_eq!((joined.mesh.n_elements(), joined.mesh.n_nodes()), (64_000, 41 * 41 * 41));
+    let slip = example("plates-64k-free-slip");
+    assert_eq!((slip.mesh.n_elements(), slip.mesh.n_nodes()), (64_000, 41 * 41 * 42));
+    assert_eq!(slip.setup.contact.expect("the deck has contact").gap.to_bits(), 0.1f64.to_bits());
+}
+
+#[test]
+fn taylor_bar_is_the_972_element_quarter_on_its_symmetry_planes() {
+    let model = example("taylor-copper");
+    assert_eq!(model.mesh.n_elements(), 972);
+    let fixed = |axis: usize| {
+        let on = |c: &u16| model.setup.constraints[usize::from(*c)].velocity[axis] == Some(0.0);
+        model.constraint.iter().filter(|c| on(c)).count()
+    };
+    // Seven nodes across each cut plane, 37 layers; the axis is on both.
+    assert_eq!([fixed(0), fixed(1), fixed(2)], [7 * 37, 7 * 37, 0]);
+    assert_eq!(model.setup.constraints.len(), 4);
+    let rim = model.mesh.positions[model.output.gauges[0].node as usize];
+    assert_eq!(rim.map(f64::to_bits), [3.2f64, 0.0, 0.0].map(f64::to_bits));
+    let rear = model.mesh.positions[model.output.gauges[1].node as usize];
+    assert_eq!(rear.map(f64::to_bits), [0.0, 0.0, 32.4f64].map(f64::to_bits));
+    assert_eq!(model.setup.walls[0].parts, [true]);
+    // 130 GPa in GPa, 8930 kg/m3 in kg/mm3.
+    assert_eq!(model.setup.materials[0].bulk().to_bits(), 130.0f64.to_bits());
+    assert!((model.setup.materials[0].density / 8.93e-6 - 1.0).abs() < 1e-15);
+}
+
+#[test]
+fn bars_and_blade_are_read() {
+    let bars = example("two-bars");
+    assert_eq!(bars.mesh.n_elements(), 800);
+    assert!((bars.setup.contact.expect("the bars meet").friction_velocity - 0.1).abs() < 1e-15);
+    let blade = example("self-contact");
+    assert_eq!(blade.mesh.n_elements(), 640);
+    let contact = blade.setup.contact.expect("the blade meets itself");
+    assert_eq!(contact.interacts, [true]);
+    // The inner side is the shorter one.
+    let cell = 2.0 * 99.0 * (0.5f64 * 46.0 / 80.0).to_radians().sin();
+    assert!((contact.gap / (0.2 * cell) - 1.0).abs() < 1e-9);
+    // The driven end starts at its velocity.
+    assert_eq!(blade.velocity.iter().filter(|v| v[2] == -20.0).count(), 3 * 5);
+}

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use super::Face;
 use crate::{
     assembly::Assembly,
-    fault::Faults,
+    fault::{Faults, short},
     format::{ContactDraft, PartDraft},
     geometry::{add, scaled, triangle_distance},
 };
@@ -40,7 +40,9 @@ pub(crate) fn overlaps(
     for (a, nodes) in surfaces.iter().enumerate() {
         for (b, faces) in surfaces.iter().enumerate() {
             let pair = (a.min(b), a.max(b));
-            let apart = a == b || !contact.settings.interacts[a * n + b] || assembly.joined.contains(&pair);
+            let apart = a == b
+                || !contact.settings.interacts[a * n + b]
+                || assembly.joined.binary_search(&pair).is_ok();
             if apart || !nodes.meets(faces, gap) {
                 continue;
             }
@@ -62,12 +64,12 @@ pub(crate) fn overlaps(
         let how = if worst.inside {
             format!("node {id} inside the other part")
         } else {
-            format!("node {id} only {} from the other part", worst.distance)
+            format!("node {id} only {} from the other part", short(worst.distance))
         };
         faults.add(
             parts[b].at,
             format!("part \"{}\" that meets part \"{}\" (line {line}): {how}", parts[b].name, parts[a].name),
-            format!("parts at least one gap ({gap}) apart at the start"),
+            format!("parts at least one gap ({}) apart at the start", short(gap)),
             "move one of them, join them, or switch the pair off in [[contact.pair]]",
         );
     }
@@ -75,7 +77,7 @@ pub(crate) fn overlaps(
 
 /// The outer faces and nodes of one part, and the box around them.
 struct Surface<'a> {
-    faces: Vec<&'a Face>,
+    faces: &'a [Face],
     nodes: Vec<u32>,
     low: [f64; 3],
     high: [f64; 3],
@@ -83,7 +85,9 @@ struct Surface<'a> {
 
 impl<'a> Surface<'a> {
     fn of(part: u32, assembly: &Assembly, faces: &'a [Face]) -> Self {
-        let faces: Vec<&Face> = faces.iter().filter(|f| f.part == part).collect();
+        // Faces stand in the order of their parts.
+        let first = faces.partition_point(|f| f.part < part);
+        let faces = &faces[first..faces.partition_point(|f| f.part <= part)];
         let mut nodes: Vec<u32> = faces.iter().flat_map(|f| f.nodes).collect();
         nodes.sort_unstable();
         nodes.dedup();
@@ -119,7 +123,7 @@ fn worst_node(nodes: &Surface<'_>, faces: &Surface<'_>, assembly: &Assembly, gap
     let columns = Columns::of(&candidates, assembly, faces, gap);
     let mut nearest = vec![f64::INFINITY; candidates.len()];
     let mut above = vec![0u32; candidates.len()];
-    for face in &faces.faces {
+    for face in faces.faces {
         let corners = face.nodes.map(position);
         let middle = scaled(add(add(corners[0], corners[1]), add(corners[2], corners[3])), 0.25);
         for &c in columns.of_face(&corners, gap).iter() {

@@ -7,12 +7,15 @@ use mechanics::setup::{Constraint, RigidWall};
 use super::{MAX_ENTRIES, Names, PartDraft};
 use crate::{
     assembly::Assembly,
+    fault::short,
     geometry::{dot, norm, scaled, sub},
     table::{Range, Table, Value},
 };
 
 /// Distance at which a node counts as on a plane or inside a box, over the smallest edge of its part.
 const ON_PLANE: f64 = 1e-3;
+
+const TYPES: [&str; 3] = ["fixed", "velocity", "symmetry"];
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -38,7 +41,10 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembl
     let mut conflicts: BTreeMap<(usize, usize, usize), (u32, usize)> = BTreeMap::new();
     for table in deck.tables("boundary", MAX_ENTRIES) {
         let at = table.at;
-        let read = read_boundary(&table, names, parts, assembly);
+        let kind = table.require("type", "one of fixed, velocity, symmetry").and_then(|v| v.one_of(&TYPES));
+        // Which keys belong depends on the type, so without one none is called unknown.
+        let Some(kind) = kind else { continue };
+        let read = read_boundary(&table, TYPES[kind], names, parts, assembly);
         table.finish();
         let Some((velocity, nodes)) = read else { continue };
         let this = boundaries.len();
@@ -122,16 +128,15 @@ fn number(
 /// What a boundary prescribes, and its nodes.
 fn read_boundary(
     table: &Table<'_>,
+    kind: &str,
     names: &Names,
     parts: &[PartDraft],
     assembly: &Assembly,
 ) -> Option<([Option<f64>; 3], Vec<u32>)> {
-    const TYPES: [&str; 3] = ["fixed", "velocity", "symmetry"];
-    let kind = table.require("type", "one of fixed, velocity, symmetry").and_then(|v| v.one_of(&TYPES));
     let selected = names.of_table(table);
     // A part that could not be read has no nodes to select; that is no second fault.
     let broken = selected.is_empty() || selected.iter().any(|&p| parts[p].block.is_none());
-    let (velocity, nodes) = match TYPES[kind?] {
+    let (velocity, nodes) = match kind {
         "symmetry" => {
             let axis = table.require("axis", "one of x, y, z").and_then(|v| v.one_of(&AXES));
             let place = table.number_or("at", 0.0, Range::Any);
@@ -323,7 +328,7 @@ fn read_wall(table: Table<'_>, names: &Names, assembly: &Assembly) -> Option<Rig
                     "{title} with node {} of part \"{}\" {} behind it",
                     assembly.mesh.node_ids[deepest as usize],
                     part.name,
-                    -height(deepest)
+                    short(-height(deepest))
                 ),
                 "every node on the side of the normal",
                 "turn the normal, move the wall or the part, or leave the part out of parts",

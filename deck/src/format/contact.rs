@@ -2,10 +2,11 @@
 
 use mechanics::{contact::Settings, material::Material};
 
-use super::{MAX_ENTRIES, Names, boundary::Conditions};
+use super::{MAX_CONTACT_PARTS, MAX_ENTRIES, Names, boundary::Conditions};
 use crate::{
     assembly::Assembly,
     check::{Face, outer_faces, smallest_face_dimension},
+    fault::short,
     geometry::{norm, sub},
     table::{Range, Table},
 };
@@ -36,6 +37,15 @@ pub(crate) fn read(
 ) -> Option<ContactDraft> {
     let table = deck.get("contact")?.table("[contact]".to_string())?;
     let n = names.len();
+    if n > MAX_CONTACT_PARTS {
+        table.faults.add(
+            table.at,
+            format!("[contact] with {n} parts"),
+            format!("at most {MAX_CONTACT_PARTS}"),
+            "make one part of bodies of one material, with self_interaction",
+        );
+        return None;
+    }
     let friction = table.number_or("friction", 0.0, Range::NotNegative);
     let mut interacts: Vec<bool> = (0..n * n).map(|i| i / n != i % n).collect();
     let mut frictions = vec![friction; n * n];
@@ -141,9 +151,10 @@ fn read_gap(table: &Table<'_>, smallest: Option<f64>) -> Option<f64> {
             if gap < 0.1 * face * (1.0 - 1e-9) || gap > 0.5 * face * (1.0 + 1e-9) {
                 value.fault(
                     &format!(
-                        "10 % to 50 % of the smallest face dimension {face}: {} to {}",
-                        0.1 * face,
-                        0.5 * face
+                        "10 % to 50 % of the smallest face dimension {}: {} to {}",
+                        short(face),
+                        short(0.1 * face),
+                        short(0.5 * face)
                     ),
                     "choose one between, or write gap_fraction",
                 );

@@ -5,7 +5,7 @@ use mechanics::state::FIELDS;
 use super::{MAX_ENTRIES, Names};
 use crate::{
     assembly::Assembly,
-    fault::nearest,
+    fault::{nearest, short},
     geometry::{norm, sub},
     model::{Gauge, NODE_FIELDS, Output},
     table::{Range, Table},
@@ -58,6 +58,7 @@ fn read_gauge(table: Table<'_>, names: &Names, assembly: &Assembly, others: &[Ga
     {
         value.fault("a name that no other gauge has", "choose another name");
     }
+    let part = table.get("part");
     let node = match (table.get("node"), table.get("point")) {
         (Some(value), None) => value.integer(1, u64::from(u32::MAX)).and_then(|id| {
             let node = assembly.node_of_id.get(&(id as u32)).copied();
@@ -67,7 +68,7 @@ fn read_gauge(table: Table<'_>, names: &Names, assembly: &Assembly, others: &[Ga
             node
         }),
         (None, Some(value)) => {
-            let selected = match table.get("part") {
+            let selected = match part {
                 None => (0..names.len()).collect(),
                 Some(part) => names.one(part).into_iter().collect::<Vec<usize>>(),
             };
@@ -78,8 +79,10 @@ fn read_gauge(table: Table<'_>, names: &Names, assembly: &Assembly, others: &[Ga
             {
                 value.fault(
                     &format!(
-                        "a point within one cell ({}) of a node; the nearest, {}, is {distance} away",
-                        assembly.largest_edge[part], assembly.mesh.node_ids[node as usize]
+                        "a point within one cell ({}) of a node; the nearest, {}, is {} away",
+                        short(assembly.largest_edge[part]),
+                        assembly.mesh.node_ids[node as usize],
+                        short(distance)
                     ),
                     "move the point into a part",
                 );

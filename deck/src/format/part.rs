@@ -93,9 +93,13 @@ impl Budget {
     fn take(&mut self, size: Option<(u64, u64)>, at: usize, title: &str, table: &Table<'_>) -> Option<()> {
         let (nodes, elements) = size.unwrap_or((u64::MAX, u64::MAX));
         if nodes > self.nodes || elements > self.elements {
+            let read = match size {
+                Some((nodes, elements)) => format!("{title} with some {nodes} nodes and {elements} elements"),
+                None => format!("{title} with more than 2^64 nodes"),
+            };
             table.faults.add(
                 at,
-                format!("{title} with some {nodes} nodes and {elements} elements"),
+                read,
                 format!("at most {MAX_NODES} nodes and {MAX_ELEMENTS} elements in all parts together"),
                 "use fewer cells",
             );
@@ -352,6 +356,12 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
                     );
                 }
             }
+        }
+        let mut sorted = corners;
+        sorted.sort_unstable();
+        if complete && sorted.windows(2).any(|w| w[0] == w[1]) {
+            complete = false;
+            element.fault("eight different nodes", "list each corner once; wedges are not read");
         }
         if complete {
             hexahedra.push(corners);
