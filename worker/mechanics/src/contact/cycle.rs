@@ -137,7 +137,6 @@ impl Contact {
     /// Adds the contact forces at positions `x` into `f`, and says what they mean for the cycle.
     ///
     /// `v` is the velocity of half a step ago and serves friction only. Arrays by batch node.
-    #[expect(clippy::too_many_arguments, reason = "the arrays of a cycle, as the worker holds them")]
     pub fn forces(
         &mut self,
         x: &[Vec<f64>; 3],
@@ -245,5 +244,61 @@ impl Contact {
             face.nodes.map(|n| self.inverse_mass[n as usize]),
             weights,
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{BatchFace, BatchNode, BatchUnit};
+
+    #[test]
+    fn with_and_without_fused_multiply_add_instructions_the_bits_are_equal() {
+        let mut seed = 3_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        // 64 warped faces, each with a node somewhere in its zone.
+        let (mut batch, mut x) = (Batch::default(), [vec![], vec![], vec![]]);
+        for i in 0..64_u32 {
+            for corner in [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0.5, 0.5, 0.0]] {
+                let global = batch.nodes.len() as u32;
+                let part = u32::from(corner[0] == 0.5);
+                batch.nodes.push(BatchNode { global, part, mass: 1.0 + random(), stiffness: 1.0 + random() });
+                for a in 0..3 {
+                    x[a].push(corner[a] + 0.3 * random() + if a == 0 { 10.0 * f64::from(i) } else { 0.0 });
+                }
+            }
+            let nodes = [0, 1, 2, 3].map(|c| 5 * i + c);
+            let corners = [u32::MAX; 8];
+            batch.faces.push(BatchFace { nodes, id: i, part: 0, stiffness: 1.0 + random(), corners });
+            batch.units.push(BatchUnit { nodes: vec![5 * i + 4], faces: vec![i] });
+        }
+        let settings = Settings {
+            gap: 0.4,
+            slack: 0.1,
+            friction: vec![0.3; 4],
+            interacts: vec![true; 4],
+            stiffness: 0.5,
+            friction_velocity: 1e-3,
+        };
+        let mut contact = Contact::new(&batch, &settings, &x);
+        let v = [x[1].clone(), x[2].clone(), x[0].clone()];
+        let mut run = |fused: bool| {
+            let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
+            let force_quantum = Quantum::for_reference(1.0, 50);
+            let energy_quantum = force_quantum;
+            let cycle = Cycle { x: &x, v: &v, dt: 0.1, force_quantum, energy_quantum, f: &mut f };
+            let vote = if fused {
+                let vote = contact.forces(&x, &v, 0.1, force_quantum, energy_quantum, cycle.f);
+                assert!(vote.hits > 40, "{vote:?}");
+                vote
+            } else {
+                contact.forces_with(cycle)
+            };
+            (vote, f.iter().flatten().map(|f| f.to_bits()).collect::<Vec<u64>>())
+        };
+        assert_eq!(run(true), run(false));
     }
 }
