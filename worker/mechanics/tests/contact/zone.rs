@@ -1,8 +1,23 @@
 //! Verification book 4.1: regions, distances and weights of the contact detection zone.
 
-use mechanics::contact::zone::{Closest, Feature, closest};
+use mechanics::contact::zone::{Feature, Frame};
 
 use crate::world::Random;
+
+/// All of a closest point.
+struct Closest {
+    feature: Feature,
+    distance: f64,
+    vector: [f64; 3],
+    weights: [f64; 4],
+}
+
+fn closest(x: &[[f64; 3]; 4], p: [f64; 3]) -> Closest {
+    let frame = Frame::new(x);
+    let nearest = frame.nearest(p);
+    let weights = frame.weights(&nearest, p);
+    Closest { feature: nearest.feature, distance: nearest.distance2.sqrt(), vector: nearest.vector, weights }
+}
 
 const SQUARE: [[f64; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
 const WARPED: [[f64; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.2], [0., 1., 0.]];
@@ -80,11 +95,11 @@ fn unit_square_gives_the_table_of_regions() {
         let c = closest(&SQUARE, p);
         assert_eq!(c.feature, feature, "{p:?}");
         assert!((c.distance - distance).abs() < 1e-15, "{p:?}: {} for {distance}", c.distance);
-        for a in 0..3 {
-            assert!((c.vector[a] / c.distance - normal[a]).abs() < 1e-14, "{p:?}: {:?}", c.vector);
+        for (v, n) in c.vector.iter().zip(normal) {
+            assert!((v / c.distance - n).abs() < 1e-14, "{p:?}: {:?}", c.vector);
         }
-        for i in 0..4 {
-            assert!((c.weights[i] - weights[i]).abs() < 1e-14, "{p:?}: {:?}", c.weights);
+        for (found, w) in c.weights.iter().zip(weights) {
+            assert!((found - w).abs() < 1e-14, "{p:?}: {:?}", c.weights);
         }
     }
 }
