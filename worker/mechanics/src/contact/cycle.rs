@@ -1,7 +1,7 @@
 //! One cycle of contact: from the candidate list through the zone to forces.
 //!
 //! The only place that knows search, geometry and force. Gather: corners of faces to boxes; compute: near
-//! faces, hits, reactions; scatter: into the force arrays, in any order because all terms are exact.
+//! features, hits, reactions; scatter: into the force arrays, in any order because all terms are exact.
 
 use super::{
     ContactVote, Exclusions, Settings, WARNING, force,
@@ -10,7 +10,7 @@ use super::{
     sort::sort,
     surface::Surface,
     work_unit::Batch,
-    zone,
+    zone::Frame,
 };
 use crate::exact::Quantum;
 
@@ -34,7 +34,7 @@ pub fn initial_pairs(surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> 
                     && settings.permits(surface.node_part[n as usize], face.part)
                     && !face.own.contains(&n)
                 {
-                    let distance = zone::closest(&corners, p).distance;
+                    let distance = Frame::new(&corners).nearest(p).distance2.sqrt();
                     if distance < settings.gap * (1.0 - INSIDE) {
                         pairs.push((n, f, distance));
                     }
@@ -58,6 +58,9 @@ struct ActiveFace {
     stiffness: f64,
 }
 
+/// A face without a frame in this cycle.
+const UNFRAMED: u32 = u32::MAX;
+
 /// The contact of one batch, from one sort to the next.
 #[derive(Clone, Debug)]
 pub struct Contact {
@@ -71,10 +74,16 @@ pub struct Contact {
     part: Vec<u32>,
     stiffness: Vec<f64>,
     inverse_mass: Vec<f64>,
-    /// Boxes of the active faces, and work space of one node.
+    /// Corners and boxes of the active faces, and frames of those that a node is near.
+    corners: Vec<[[f64; 3]; 4]>,
     bounds: Vec<Bounds>,
+    frames: Vec<Frame>,
+    /// Place of each active face in `frames`, or [`UNFRAMED`].
+    framed: Vec<u32>,
+    /// Work space of one node.
     near: Vec<Near>,
     hits: Vec<Hit>,
+    beyond: Vec<u32>,
 }
 
 /// Arrays of one cycle, by batch node index.
@@ -118,7 +127,10 @@ impl Contact {
             n_parts: settings.n_parts(),
             settings: settings.clone(),
             candidates,
+            corners: Vec::with_capacity(active.len()),
             bounds: Vec::with_capacity(active.len()),
+            frames: Vec::with_capacity(active.len()),
+            framed: Vec::with_capacity(active.len()),
             active,
             global: batch.nodes.iter().map(|n| n.global).collect(),
             part: batch.nodes.iter().map(|n| n.part).collect(),
@@ -126,6 +138,7 @@ impl Contact {
             inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
             near: Vec::with_capacity(most),
             hits: Vec::with_capacity(most),
+            beyond: Vec::with_capacity(most),
         }
     }
 
@@ -137,7 +150,6 @@ impl Contact {
     /// Adds the contact forces at positions `x` into `f`, and says what they mean for the cycle.
     ///
     /// `v` is the velocity of half a step ago and serves friction only. Arrays by batch node.
-    #[expect(clippy::too_many_arguments, reason = "the arrays of a cycle, as the worker holds them")]
     pub fn forces(
         &mut self,
         x: &[Vec<f64>; 3],
@@ -166,11 +178,10 @@ impl Contact {
 
     #[inline(always)]
     fn forces_with(&mut self, mut cycle: Cycle) -> ContactVote {
-        let at = |n: u32| cycle.x.each_ref().map(|x| x[n as usize]);
         let warning = WARNING * self.settings.gap;
-        self.bounds.clear();
-        self.bounds.extend(self.active.iter().map(|face| Bounds::of(&face.nodes.map(at), warning)));
+        self.gather(cycle.x, warning);
         let mut vote = ContactVote { pairs: self.candidates.faces.len() as u64, ..ContactVote::default() };
+        let mut frequency2 = 0.0;
         for i in 0..self.candidates.nodes.len() {
             let node = self.candidates.nodes[i];
             let p = cycle.x.each_ref().map(|x| x[node as usize]);
@@ -178,40 +189,65 @@ impl Contact {
             let range = self.candidates.starts[i] as usize..self.candidates.starts[i + 1] as usize;
             for &f in &self.candidates.faces[range] {
                 if self.bounds[f as usize].holds(p) {
-                    let face = &self.active[f as usize];
-                    let closest =
-                        zone::closest(&face.nodes.map(|n| cycle.x.each_ref().map(|x| x[n as usize])), p);
-                    if closest.distance < warning {
-                        self.near.push(Near { face: f, id: face.id, corners: face.corners, closest });
+                    let framed = &mut self.framed[f as usize];
+                    if *framed == UNFRAMED {
+                        *framed = self.frames.len() as u32;
+                        self.frames.push(Frame::new(&self.corners[f as usize]));
+                    }
+                    let nearest = self.frames[*framed as usize].nearest(p);
+                    if nearest.distance2 < warning * warning {
+                        let face = &self.active[f as usize];
+                        self.near.push(Near { face: f, id: face.id, corners: face.corners, nearest });
                     }
                 }
             }
             if !self.near.is_empty() {
-                self.node(node, &mut cycle, &mut vote);
+                let voted = self.node(node, p, &mut cycle, &mut vote);
+                frequency2 = if voted > frequency2 { voted } else { frequency2 };
             }
         }
+        vote.dt = force::time_step(frequency2);
         vote
     }
 
-    /// Forces and votes of one node and its near faces.
+    /// Corners and boxes of the active faces; no frames yet.
     #[inline(always)]
-    fn node(&mut self, node: u32, cycle: &mut Cycle, vote: &mut ContactVote) {
+    fn gather(&mut self, x: &[Vec<f64>; 3], warning: f64) {
+        let at = |n: u32| x.each_ref().map(|x| x[n as usize]);
+        self.corners.clear();
+        self.corners.extend(self.active.iter().map(|face| face.nodes.map(at)));
+        self.bounds.clear();
+        self.bounds.extend(self.corners.iter().map(|corners| Bounds::of(corners, warning)));
+        self.frames.clear();
+        self.framed.clear();
+        self.framed.resize(self.active.len(), UNFRAMED);
+    }
+
+    /// Forces of one node at `p` and its near faces. Gives the greatest squared frequency of its springs.
+    #[inline(always)]
+    fn node(&mut self, node: u32, p: [f64; 3], cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
         let n = node as usize;
-        joint::reduce(&mut self.near, self.settings.gap, &mut self.hits);
-        let stacking = joint::stacking(&self.hits);
-        for near in &self.near {
+        let (frames, framed) = (&self.frames, &self.framed);
+        let frame = |f: u32| &frames[framed[f as usize] as usize];
+        joint::reduce(&mut self.near, self.settings.gap, frame, &mut self.hits, &mut self.beyond);
+        let stacking = if self.hits.len() > 1 { joint::stacking(&self.hits) } else { 1.0 };
+        let mut frequency2 = 0.0_f64;
+        for &i in &self.beyond {
+            let near = &self.near[i as usize];
             let face = &self.active[near.face as usize];
             let k = force::stiffness(self.settings.stiffness, self.stiffness[n], face.stiffness);
-            let inverse_mass = self.pair_inverse_mass(n, face, &near.closest.weights);
-            let dt = force::time_step(k, stacking, inverse_mass);
-            vote.dt = if dt < vote.dt { dt } else { vote.dt };
+            let weights = frame(near.face).weights(&near.nearest, p);
+            let inverse_mass = self.pair_inverse_mass(n, face, &weights);
+            frequency2 = frequency2.max(force::frequency2(k, stacking, inverse_mass));
         }
         for hit in &self.hits {
             let near = &self.near[hit.near as usize];
             let face = &self.active[near.face as usize];
             vote.deepest(hit.depth / self.settings.gap, (self.global[n], face.id));
             let k = force::stiffness(self.settings.stiffness, self.stiffness[n], face.stiffness);
-            let weights = near.closest.weights;
+            let weights = frame(near.face).weights(&near.nearest, p);
+            let inverse_mass = self.pair_inverse_mass(n, face, &weights);
+            frequency2 = frequency2.max(force::frequency2(k, stacking, inverse_mass));
             let push =
                 force::Push { stiffness: k * hit.share, depth: hit.depth, direction: hit.direction, weights };
             let coefficient =
@@ -223,7 +259,7 @@ impl Contact {
                     let v = &cycle.v[a];
                     (0..4).fold(v[n], |sum, i| (-weights[i]).mul_add(v[face.nodes[i] as usize], sum))
                 }),
-                inverse_mass: self.pair_inverse_mass(n, face, &weights),
+                inverse_mass,
                 dt: cycle.dt,
             });
             let reaction = force::react(&push, sliding.as_ref(), cycle.force_quantum, cycle.energy_quantum);
@@ -236,6 +272,7 @@ impl Contact {
                 }
             }
         }
+        frequency2
     }
 
     #[inline(always)]
@@ -245,5 +282,61 @@ impl Contact {
             face.nodes.map(|n| self.inverse_mass[n as usize]),
             weights,
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{BatchFace, BatchNode, BatchUnit};
+
+    #[test]
+    fn with_and_without_fused_multiply_add_instructions_the_bits_are_equal() {
+        let mut seed = 3_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        // 64 warped faces, each with a node somewhere in its zone.
+        let (mut batch, mut x) = (Batch::default(), [vec![], vec![], vec![]]);
+        for i in 0..64_u32 {
+            for corner in [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0.5, 0.5, 0.0]] {
+                let global = batch.nodes.len() as u32;
+                let part = u32::from(corner[0] == 0.5);
+                batch.nodes.push(BatchNode { global, part, mass: 1.0 + random(), stiffness: 1.0 + random() });
+                for a in 0..3 {
+                    x[a].push(corner[a] + 0.3 * random() + if a == 0 { 10.0 * f64::from(i) } else { 0.0 });
+                }
+            }
+            let nodes = [0, 1, 2, 3].map(|c| 5 * i + c);
+            let corners = [u32::MAX; 8];
+            batch.faces.push(BatchFace { nodes, id: i, part: 0, stiffness: 1.0 + random(), corners });
+            batch.units.push(BatchUnit { nodes: vec![5 * i + 4], faces: vec![i] });
+        }
+        let settings = Settings {
+            gap: 0.4,
+            slack: 0.1,
+            friction: vec![0.3; 4],
+            interacts: vec![true; 4],
+            stiffness: 0.5,
+            friction_velocity: 1e-3,
+        };
+        let mut contact = Contact::new(&batch, &settings, &x);
+        let v = [x[1].clone(), x[2].clone(), x[0].clone()];
+        let mut run = |fused: bool| {
+            let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
+            let force_quantum = Quantum::for_reference(1.0, 50);
+            let energy_quantum = force_quantum;
+            let cycle = Cycle { x: &x, v: &v, dt: 0.1, force_quantum, energy_quantum, f: &mut f };
+            let vote = if fused {
+                let vote = contact.forces(&x, &v, 0.1, force_quantum, energy_quantum, cycle.f);
+                assert!(vote.hits > 40, "{vote:?}");
+                vote
+            } else {
+                contact.forces_with(cycle)
+            };
+            (vote, f.iter().flatten().map(|f| f.to_bits()).collect::<Vec<u64>>())
+        };
+        assert_eq!(run(true), run(false));
     }
 }

@@ -69,10 +69,15 @@ pub fn inverse_mass(node: f64, corners: [f64; 4], weights: &[f64; 4]) -> f64 {
     (0..4).fold(node, |sum, i| (weights[i] * weights[i]).mul_add(corners[i], sum))
 }
 
-/// Longest time step for `stacking` springs of this stiffness on one node: `0.4 / omega`.
+/// Square of the frequency of `stacking` springs of this stiffness on one node.
 #[inline(always)]
-pub fn time_step(stiffness: f64, stacking: f64, inverse_mass: f64) -> f64 {
-    OMEGA_DT / (BOTH_SIDES * stacking * stiffness * inverse_mass).sqrt()
+pub fn frequency2(stiffness: f64, stacking: f64, inverse_mass: f64) -> f64 {
+    BOTH_SIDES * stacking * stiffness * inverse_mass
+}
+
+/// Longest time step for springs of this greatest squared frequency: `0.4 / omega`; infinite for none.
+pub fn time_step(frequency2: f64) -> f64 {
+    OMEGA_DT / frequency2.sqrt()
 }
 
 /// Force, energy and friction of one hit.
@@ -172,17 +177,10 @@ impl ContactVote {
     pub fn count(&mut self, reaction: &Reaction) {
         self.energy += reaction.energy;
         self.friction += reaction.friction;
-        for a in 0..3 {
-            for term in [
-                reaction.node,
-                reaction.corners[0],
-                reaction.corners[1],
-                reaction.corners[2],
-                reaction.corners[3],
-            ] {
-                let magnitude = term[a].abs();
-                self.force_bound = if magnitude > self.force_bound { magnitude } else { self.force_bound };
-            }
+        // Weights are positive and add to one, so no corner's term exceeds the node's.
+        for component in reaction.node {
+            let magnitude = component.abs();
+            self.force_bound = if magnitude > self.force_bound { magnitude } else { self.force_bound };
         }
         self.hits += 1;
     }

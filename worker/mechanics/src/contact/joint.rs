@@ -13,7 +13,7 @@
 //! What is left is distinct: one hit over a flat or convex surface; several in a concave corner, or between
 //! bodies.
 
-use super::zone::{Closest, Feature, Vector, dot, unit};
+use super::zone::{Feature, Frame, INNER, Nearest, OUTER, Vector, dot, unit};
 
 /// A face near a node.
 #[derive(Clone, Copy, Debug)]
@@ -25,15 +25,15 @@ pub struct Near {
     /// Global nodes of the face's corners.
     pub corners: [u32; 4],
     /// Closest point of the face.
-    pub closest: Closest,
+    pub nearest: Nearest,
 }
 
-/// One push on a node.
+/// One distinct feature near a node: a push if `depth` is positive.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
     /// Index into the near faces.
     pub near: u32,
-    /// Depth of the node in the zone: gap minus signed distance, positive, up to twice the gap (length).
+    /// Depth of the node in the zone: gap minus signed distance, up to twice the gap (length).
     pub depth: f64,
     /// Unit vector along the line of node and closest point, out of the solid.
     pub direction: Vector,
@@ -46,7 +46,7 @@ pub struct Hit {
 /// Whether the feature of `near`, an edge or a corner, belongs to the face with these corners.
 #[inline(always)]
 fn belongs(near: &Near, corners: &[u32; 4]) -> bool {
-    match near.closest.feature {
+    match near.nearest.feature {
         Feature::Face => false,
         Feature::Corner(i) => corners.contains(&near.corners[i as usize]),
         Feature::Edge(i) => {
@@ -59,19 +59,29 @@ fn belongs(near: &Near, corners: &[u32; 4]) -> bool {
     }
 }
 
-/// Reduces the near faces of one node to its hits. Sorts `near` by distance, then id; `hits` is cleared first.
-/// The result does not depend on the order of `near`.
-pub fn reduce(near: &mut [Near], gap: f64, hits: &mut Vec<Hit>) {
+/// Reduces the near faces of one node to distinct features within the gap, into `hits`, and to indices of
+/// those beyond it, into `beyond`; both are cleared first. Sorts `near` by distance, then id, so the result
+/// does not depend on its order. `frame` gives the frame of a face by the caller's index.
+#[inline(always)]
+pub fn reduce<'a>(
+    near: &mut [Near],
+    gap: f64,
+    frame: impl Fn(u32) -> &'a Frame,
+    hits: &mut Vec<Hit>,
+    beyond: &mut Vec<u32>,
+) {
     hits.clear();
-    near.sort_unstable_by(|a, b| a.closest.distance.total_cmp(&b.closest.distance).then(a.id.cmp(&b.id)));
+    beyond.clear();
+    sort_by_distance(near);
     for (i, face) in near.iter().enumerate() {
-        if face.closest.distance >= gap {
-            break;
+        if near[..i].iter().any(|earlier| belongs(face, &earlier.corners) || belongs(earlier, &face.corners))
+        {
+            continue;
         }
-        let counted = near[..i]
-            .iter()
-            .all(|earlier| !belongs(face, &earlier.corners) && !belongs(earlier, &face.corners));
-        if counted && let Some(hit) = hit(near, i, gap) {
+        let distance = face.nearest.distance2.sqrt();
+        if distance >= gap {
+            beyond.push(i as u32);
+        } else if let Some(hit) = hit(near, i, gap, distance, &frame) {
             hits.push(hit);
         }
     }
@@ -81,34 +91,76 @@ pub fn reduce(near: &mut [Near], gap: f64, hits: &mut Vec<Hit>) {
     }
 }
 
-/// The hit of near face `i`: its side by the pseudonormal of its feature, the sum over all near faces that
-/// share it, in order of distance. None for a face of no area with the node on it.
+/// Insertion sort: a node has few near faces.
 #[inline(always)]
-fn hit(near: &[Near], i: usize, gap: f64) -> Option<Hit> {
-    let closest = &near[i].closest;
-    let mut normal = closest.normal;
-    if closest.feature != Feature::Face {
+fn sort_by_distance(near: &mut [Near]) {
+    for i in 1..near.len() {
+        let mut j = i;
+        while j > 0 {
+            let (a, b) = (&near[j - 1], &near[j]);
+            let ordered = a.nearest.distance2 < b.nearest.distance2
+                || (a.nearest.distance2 == b.nearest.distance2 && a.id < b.id);
+            if ordered {
+                break;
+            }
+            near.swap(j - 1, j);
+            j -= 1;
+        }
+    }
+}
+
+/// The hit of near face `i`. None for a face of no area with the node on it.
+///
+/// Its side is that of the pseudonormal of its feature, a sum with positive factors of the normals of the near
+/// faces that share it: where the node is on the same side of all of them the sum need not be made.
+#[inline(always)]
+fn hit<'a>(
+    near: &[Near],
+    i: usize,
+    gap: f64,
+    distance: f64,
+    frame: &impl Fn(u32) -> &'a Frame,
+) -> Option<Hit> {
+    let nearest = &near[i].nearest;
+    let mut sides = nearest.sides;
+    if nearest.feature != Feature::Face {
         for (j, other) in near.iter().enumerate() {
             if j != i && belongs(&near[i], &other.corners) {
-                let n = other.closest.normal;
+                sides |= other.nearest.sides;
+            }
+        }
+    }
+    // On the feature the line has no direction.
+    let on_feature = distance <= 1e-9 * gap;
+    let mut outer = sides == OUTER;
+    let mut normal = [0.0; 3];
+    if on_feature || (sides != OUTER && sides != INNER) {
+        normal = pseudonormal(near, i, frame);
+        outer = dot(nearest.vector, normal) >= 0.0;
+    }
+    let (direction, depth) = if on_feature {
+        (unit(normal), gap)
+    } else {
+        let (s, depth) =
+            if outer { (1.0 / distance, gap - distance) } else { (-1.0 / distance, gap + distance) };
+        (nearest.vector.map(|v| s * v), depth)
+    };
+    (direction != [0.0; 3]).then_some(Hit { near: i as u32, depth, direction, share: 1.0, outer })
+}
+
+/// Pseudonormal of the feature of near face `i`: over all near faces that share it, in order of distance.
+#[inline(never)]
+fn pseudonormal<'a>(near: &[Near], i: usize, frame: &impl Fn(u32) -> &'a Frame) -> Vector {
+    let mut normal = frame(near[i].face).pseudonormal(&near[i].nearest);
+    if near[i].nearest.feature != Feature::Face {
+        for (j, other) in near.iter().enumerate() {
+            if j != i && belongs(&near[i], &other.corners) {
+                let n = frame(other.face).pseudonormal(&other.nearest);
                 normal = [normal[0] + n[0], normal[1] + n[1], normal[2] + n[2]];
             }
         }
     }
-    let d = closest.distance;
-    let outer = dot(closest.vector, normal) >= 0.0;
-    let (direction, signed) = if d > 1e-9 * gap {
-        let s = if outer { 1.0 / d } else { -1.0 / d };
-        ([s * closest.vector[0], s * closest.vector[1], s * closest.vector[2]], if outer { d } else { -d })
-    } else {
-        // On the feature the line has no direction.
-        let direction = unit(normal);
-        if direction == [0.0; 3] {
-            return None;
-        }
-        (direction, 0.0)
-    };
-    Some(Hit { near: i as u32, depth: gap - signed, direction, share: 1.0, outer })
+    normal
 }
 
 /// Drops hits on the wrong side of a patch: beside an acute edge the node lies outside by the nearer face and

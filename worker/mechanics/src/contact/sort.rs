@@ -57,7 +57,7 @@ impl Grid {
                 max[a] = if p[a] > max[a] { p[a] } else { max[a] };
             }
         }
-        if !(min[0] <= max[0]) {
+        if min[0] > max[0] {
             return None;
         }
         let reach = settings.reach();

@@ -8,7 +8,9 @@
 //! its corners), whose share of a weight goes to the corners a quarter each. Weights reproduce the closest
 //! point, `sum w_i x_i = C`, because the moment of the forces depends on it.
 //!
-//! All is done relative to the node, so that bodies far from the origin lose nothing.
+//! What all nodes near a face need of it is computed once a cycle ([`Frame`]); what only a node that is pushed
+//! needs, weights and pseudonormal, is left to a second step. All is done relative to the node, so that bodies
+//! far from the origin lose nothing.
 
 /// A face is coplanar if its diagonals pass each other nearer than this fraction of their mean length.
 ///
@@ -34,28 +36,52 @@ pub enum Feature {
     Corner(u8),
 }
 
+/// On the outer side of a normal; bits that [`Nearest::sides`] joins.
+pub const OUTER: u8 = 1;
+
+/// On the inner side of a normal.
+pub const INNER: u8 = 2;
+
 /// The closest point of a face to a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Closest {
+pub struct Nearest {
     /// Where on the face.
     pub feature: Feature,
-    /// Distance, never negative (length).
-    pub distance: f64,
+    /// Square of the distance (length squared).
+    pub distance2: f64,
     /// From the closest point to the node.
     pub vector: Vector,
-    /// Shape functions of the four corners at the closest point.
-    pub weights: [f64; 4],
-    /// Outward direction at the closest point as far as this face alone knows it, of any length.
-    ///
-    /// In the face and on its edges the unit normal (the sum of two or four of a split face, on its spokes and
-    /// mid-point), at corners the unit normal times the angle there: summed over the faces that share the
-    /// feature it is the angle-weighted pseudonormal (Baerentzen and Aanaes 2005), whose product with `vector`
-    /// has the sign of the side.
-    pub normal: Vector,
+    /// On which sides of the normals that meet at the closest point the node lies: [`OUTER`], [`INNER`], both
+    /// or, where it lies on all of them, none.
+    pub sides: u8,
+    /// Triangle the closest point lies on, or [`PLANE`].
+    triangle: u8,
+    /// Shares of the mid-point and of corners `triangle` and `triangle + 1`.
+    shares: [f64; 3],
+}
+
+/// In place of a triangle: inside a coplanar face.
+const PLANE: u8 = 4;
+
+/// A face in one cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Corners, outward by the right-hand rule.
+    corners: [Vector; 4],
+    /// From corner `i` to corner `i + 1`.
+    edges: [Vector; 4],
+    /// One over the square of each edge's length; zero for an edge of none.
+    inverse_length2: [f64; 4],
+    /// Unit normal, outward; zero for a face of no area.
+    normal: Vector,
+    /// Edge `i` times the normal: in the plane, out of the face.
+    outward: [Vector; 4],
+    /// Whether the face is coplanar and convex.
+    flat: bool,
 }
 
 #[inline(always)]
-pub(super) fn sub(a: Vector, b: Vector) -> Vector {
+fn sub(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
@@ -102,114 +128,241 @@ fn angle(a: Vector, b: Vector) -> f64 {
     if c < 0.0 { std::f64::consts::PI - acute } else { acute }
 }
 
-/// Closest point of the face `x` (outward by the right-hand rule) to the point `p`.
+/// Side of a point on a normal as a bit; neither on the plane.
 #[inline(always)]
-pub fn closest(x: &[Vector; 4], p: Vector) -> Closest {
-    // From the node: the node is the origin from here on.
-    let r = [sub(x[0], p), sub(x[1], p), sub(x[2], p), sub(x[3], p)];
-    let (d0, d1) = (sub(r[2], r[0]), sub(r[3], r[1]));
-    let area = cross(d0, d1);
-    let size2 = dot(area, area);
-    let offset = dot(area, sub(r[1], r[0]));
-    // offset / |area| is how far the diagonals pass each other.
-    let span2 = 0.5 * (dot(d0, d0) + dot(d1, d1));
-    let coplanar = offset * offset <= COPLANAR * COPLANAR * span2 * size2;
-    if coplanar && size2 > 0.0 {
-        let edges = [sub(r[1], r[0]), sub(r[2], r[1]), sub(r[3], r[2]), sub(r[0], r[3])];
-        let turn = [
-            dot(area, cross(edges[3], edges[0])),
-            dot(area, cross(edges[0], edges[1])),
-            dot(area, cross(edges[1], edges[2])),
-            dot(area, cross(edges[2], edges[3])),
-        ];
+fn side(along_normal: f64) -> u8 {
+    if along_normal > 0.0 {
+        OUTER
+    } else if along_normal < 0.0 {
+        INNER
+    } else {
+        0
+    }
+}
+
+impl Frame {
+    /// Measures a face whose corners are `x`, outward by the right-hand rule.
+    #[inline(always)]
+    pub fn new(x: &[Vector; 4]) -> Self {
+        let edges = [sub(x[1], x[0]), sub(x[2], x[1]), sub(x[3], x[2]), sub(x[0], x[3])];
+        let (d0, d1) = (sub(x[2], x[0]), sub(x[3], x[1]));
+        let area = cross(d0, d1);
+        let size2 = dot(area, area);
+        let inverse_size = if size2 > 0.0 { 1.0 / size2.sqrt() } else { 0.0 };
+        let normal = scale(inverse_size, area);
+        let outward = edges.map(|e| cross(e, normal));
+        let length2 = edges.map(|e| dot(e, e));
+        let inverse_length2 = length2.map(|l| if l > 0.0 { 1.0 / l } else { 0.0 });
+        // How far the diagonals pass each other.
+        let offset = dot(normal, edges[0]);
+        let span2 = 0.5 * (dot(d0, d0) + dot(d1, d1));
         // A corner of 180 degrees or more, or an edge of no length, is left to the triangles.
-        let least = 1e-8 * size2;
-        if turn[0] > least && turn[1] > least && turn[2] > least && turn[3] > least {
-            return on_plane(&r, &edges, area, size2);
+        let least = 1e-8 * (size2 * inverse_size);
+        let turns = [3, 0, 1, 2].map(|i| -dot(outward[i], edges[(i + 1) & 3]));
+        let convex = (turns[0] > least) & (turns[1] > least) & (turns[2] > least) & (turns[3] > least);
+        let flat = convex & (offset * offset <= COPLANAR * COPLANAR * span2);
+        Self { corners: *x, edges, inverse_length2, normal, outward, flat }
+    }
+
+    /// Closest point to `p`.
+    #[inline(always)]
+    pub fn nearest(&self, p: Vector) -> Nearest {
+        if self.flat { self.on_plane(p) } else { self.on_triangles(p) }
+    }
+
+    /// Closest point of a coplanar convex face.
+    #[inline(always)]
+    fn on_plane(&self, p: Vector) -> Nearest {
+        let from = self.corners.map(|c| sub(p, c));
+        // Distance beyond each edge, times its length.
+        let beyond = [0, 1, 2, 3].map(|i| dot(self.outward[i], from[i]));
+        if (beyond[0] > 0.0) | (beyond[1] > 0.0) | (beyond[2] > 0.0) | (beyond[3] > 0.0) {
+            return self.on_border(&from, &beyond);
+        }
+        let height = dot(self.normal, from[0]);
+        let near = [0, 1, 2, 3].map(|i: usize| beyond[i] * self.inverse_length2[i] >= -JOINT);
+        let feature = match near {
+            [false, false, false, false] => Feature::Face,
+            [true, _, _, true] => Feature::Corner(0),
+            [true, true, _, _] => Feature::Corner(1),
+            [_, true, true, _] => Feature::Corner(2),
+            [_, _, true, true] => Feature::Corner(3),
+            [true, _, _, _] => Feature::Edge(0),
+            [_, true, _, _] => Feature::Edge(1),
+            [_, _, true, _] => Feature::Edge(2),
+            [_, _, _, true] => Feature::Edge(3),
+        };
+        Nearest {
+            feature,
+            distance2: height * height,
+            vector: scale(height, self.normal),
+            sides: side(height),
+            triangle: PLANE,
+            shares: [0.0; 3],
         }
     }
-    on_triangles(&r)
-}
 
-/// Closest point of a coplanar convex face to the origin. `area` is the cross product of the diagonals.
-#[inline(always)]
-fn on_plane(r: &[Vector; 4], edges: &[Vector; 4], area: Vector, size2: f64) -> Closest {
-    let size = size2.sqrt();
-    let normal = [area[0] / size, area[1] / size, area[2] / size];
-    // In-plane distance to each edge times its length, positive inside, and the edge's length squared.
-    let mut inside = [0.0; 4];
-    let mut length2 = [0.0; 4];
-    let mut outside = false;
-    for i in 0..4 {
-        inside[i] = dot(normal, cross(r[i], edges[i]));
-        length2[i] = dot(edges[i], edges[i]);
-        outside |= inside[i] < 0.0;
-    }
-    if outside {
-        return on_border(r, edges, &inside, &length2, normal);
-    }
-    // The origin's height over the plane of corner 0, along the normal.
-    let height = -dot(normal, r[0]);
-    let foot = scale(-height, normal);
-    let weights = bilinear(r, foot, normal);
-    let near = |i: usize| inside[i] <= JOINT * length2[i];
-    let mut feature = Feature::Face;
-    for i in 0..4 {
-        if near(i) {
-            feature = if near((i + 1) & 3) {
-                Feature::Corner(((i + 1) & 3) as u8)
-            } else if i == 0 && near(3) {
-                Feature::Corner(0)
-            } else {
-                Feature::Edge(i as u8)
-            };
-            break;
+    /// Closest point on the border of a coplanar convex face beside which the node lies. Only edges that it
+    /// lies beyond can be closest.
+    #[inline(always)]
+    fn on_border(&self, from: &[Vector; 4], beyond: &[f64; 4]) -> Nearest {
+        let (mut distance2, mut edge, mut at, mut vector) = (f64::INFINITY, 0, 0.0, from[0]);
+        for i in 0..4 {
+            if beyond[i] > 0.0 {
+                let u = dot(from[i], self.edges[i]) * self.inverse_length2[i];
+                let (u, v) = if u <= 0.0 {
+                    (0.0, from[i])
+                } else if u >= 1.0 {
+                    (1.0, from[(i + 1) & 3])
+                } else {
+                    (u, along(from[i], -u, self.edges[i]))
+                };
+                let d2 = dot(v, v);
+                if d2 < distance2 {
+                    (distance2, edge, at, vector) = (d2, i, u, v);
+                }
+            }
+        }
+        Nearest {
+            feature: edge_feature(edge, at),
+            distance2,
+            vector,
+            sides: side(dot(self.normal, vector)),
+            triangle: edge as u8,
+            shares: [0.0, 1.0 - at, at],
         }
     }
-    let mut closest =
-        Closest { feature, distance: height.abs(), vector: scale(height, normal), weights, normal };
-    if let Feature::Corner(i) = feature {
-        closest.normal = scale(corner_angle(edges, i as usize), normal);
+
+    /// Closest point of a split face: the nearest of those of its four triangles, the first of equals.
+    fn on_triangles(&self, p: Vector) -> Nearest {
+        let r = self.corners.map(|c| sub(c, p));
+        let mid = middle(&r);
+        let mut best = (f64::INFINITY, 0, Region::Inside, [1.0, 0.0, 0.0], mid);
+        for i in 0..4 {
+            let (region, shares, point) = on_triangle(mid, r[i], r[(i + 1) & 3]);
+            let d2 = dot(point, point);
+            if d2 < best.0 {
+                best = (d2, i, region, shares, point);
+            }
+        }
+        let (distance2, i, region, shares, point) = best;
+        let next = (i + 1) & 3;
+        let feature = match region {
+            Region::Border => edge_feature(i, shares[2]),
+            Region::Inside if shares[1] >= 1.0 - JOINT => Feature::Corner(i as u8),
+            Region::Inside if shares[2] >= 1.0 - JOINT => Feature::Corner(next as u8),
+            Region::Inside if shares[0] <= JOINT => Feature::Edge(i as u8),
+            Region::Inside => Feature::Face,
+        };
+        let vector = scale(-1.0, point);
+        let mut nearest = Nearest { feature, distance2, vector, sides: 0, triangle: i as u8, shares };
+        let mut sides = 0;
+        self.for_each_normal(&nearest, |normal, _| sides |= side(dot(normal, vector)));
+        nearest.sides = sides;
+        nearest
     }
-    closest
-}
 
-/// Interior angle at corner `i`.
-#[inline(always)]
-fn corner_angle(edges: &[Vector; 4], i: usize) -> f64 {
-    angle(edges[i], scale(-1.0, edges[(i + 3) & 3]))
-}
-
-/// Closest point on the border of a coplanar convex face that the origin lies beside. Only edges that have the
-/// origin on their outer side can be closest.
-#[inline(always)]
-fn on_border(
-    r: &[Vector; 4],
-    edges: &[Vector; 4],
-    inside: &[f64; 4],
-    length2: &[f64; 4],
-    normal: Vector,
-) -> Closest {
-    let (mut best, mut edge, mut at, mut point) = (f64::INFINITY, 0, 0.0, r[0]);
-    for i in 0..4 {
-        if inside[i] < 0.0 {
-            let u = (-dot(r[i], edges[i]) / length2[i]).clamp(0.0, 1.0);
-            let c = if u < 1.0 { along(r[i], u, edges[i]) } else { r[(i + 1) & 3] };
-            let d2 = dot(c, c);
-            if d2 < best {
-                (best, edge, at, point) = (d2, i, u, c);
+    /// Calls `visit` with every unit normal of this face that meets at a closest point, and with how much of
+    /// the way round it takes: on a corner or the mid-point of a split face two vectors that span its angle.
+    #[inline(always)]
+    fn for_each_normal(&self, nearest: &Nearest, mut visit: impl FnMut(Vector, Option<(Vector, Vector)>)) {
+        let corner_edges = |c: usize| (self.edges[c], scale(-1.0, self.edges[(c + 3) & 3]));
+        if self.flat {
+            match nearest.feature {
+                Feature::Corner(c) => visit(self.normal, Some(corner_edges(c as usize))),
+                _ => visit(self.normal, None),
+            }
+            return;
+        }
+        let mid = middle(&self.corners);
+        let spoke = |i: usize| sub(self.corners[i & 3], mid);
+        let normal = |i: usize| unit(cross(spoke(i), spoke(i + 1)));
+        let i = nearest.triangle as usize;
+        match nearest.feature {
+            Feature::Corner(c) => {
+                let c = c as usize;
+                let (after, before) = corner_edges(c);
+                let to_mid = scale(-1.0, spoke(c));
+                visit(normal(c), Some((after, to_mid)));
+                visit(normal(c + 3), Some((before, to_mid)));
+            }
+            Feature::Edge(e) => visit(normal(e as usize), None),
+            Feature::Face if nearest.shares[0] == 1.0 => {
+                (0..4).for_each(|t| visit(normal(t), Some((spoke(t), spoke(t + 1)))));
+            }
+            Feature::Face => {
+                visit(normal(i), None);
+                if nearest.shares[2] == 0.0 {
+                    visit(normal(i + 3), None);
+                } else if nearest.shares[1] == 0.0 {
+                    visit(normal(i + 1), None);
+                }
             }
         }
     }
-    let feature = edge_feature(edge, at);
-    let normal = match feature {
-        Feature::Corner(i) => scale(corner_angle(edges, i as usize), normal),
-        _ => normal,
-    };
-    let mut weights = [0.0; 4];
-    weights[edge] = 1.0 - at;
-    weights[(edge + 1) & 3] = at;
-    Closest { feature, distance: dot(point, point).sqrt(), vector: scale(-1.0, point), weights, normal }
+
+    /// Outward direction at a closest point as far as this face alone knows it, of any length: the sum of the
+    /// unit normals that meet there, at corners times their angles. Summed over the faces that share the
+    /// feature it is the angle-weighted pseudonormal, whose product with the vector to the node has the sign of
+    /// the side (Baerentzen and Aanaes 2005).
+    pub fn pseudonormal(&self, nearest: &Nearest) -> Vector {
+        let mut sum = [0.0; 3];
+        self.for_each_normal(nearest, |normal, span| {
+            sum = along(sum, span.map_or(1.0, |(a, b)| angle(a, b)), normal);
+        });
+        sum
+    }
+
+    /// Shape functions of the four corners at the closest point to `p`.
+    #[inline(always)]
+    pub fn weights(&self, nearest: &Nearest, p: Vector) -> [f64; 4] {
+        if nearest.triangle == PLANE {
+            return self.bilinear(sub(sub(p, nearest.vector), self.corners[0]));
+        }
+        let i = nearest.triangle as usize;
+        let [of_mid, of_i, of_next] = nearest.shares;
+        let mut weights = [0.25 * of_mid; 4];
+        weights[i] += of_i;
+        weights[(i + 1) & 3] += of_next;
+        weights
+    }
+
+    /// Bilinear weights of the point of a coplanar convex face at `q` from corner 0.
+    ///
+    /// With `q = s b + t c + s t d`, eliminating `s` leaves `k2 t^2 + k1 t + k0 = 0` in cross products; the
+    /// root inside the face is the one where the Jacobian `2 k2 t + k1` is positive. One Newton step on both
+    /// takes off what rounding left.
+    #[inline(always)]
+    fn bilinear(&self, q: Vector) -> [f64; 4] {
+        let (b, c) = (self.edges[0], scale(-1.0, self.edges[3]));
+        let d = sub(scale(-1.0, self.edges[2]), b);
+        let turn = |a: Vector, b: Vector| dot(self.normal, cross(a, b));
+        let (k0, k1, k2) = (turn(q, b), turn(q, d) + turn(b, c), -turn(c, d));
+        let root = k1.mul_add(k1, -(4.0 * k2 * k0)).max(0.0).sqrt();
+        let mut t = if k1 >= 0.0 {
+            if k1 + root > 0.0 { -2.0 * k0 / (k1 + root) } else { 0.5 }
+        } else {
+            (root - k1) / (2.0 * k2)
+        };
+        let xs = along(b, t, d);
+        let mut s = dot(along(q, -t, c), xs) / dot(xs, xs);
+        let xt = along(c, s, d);
+        let rest = sub(along(along(q, -s, b), -t, c), scale(s * t, d));
+        let jacobian = turn(xs, xt);
+        if jacobian > 0.0 {
+            s += turn(rest, xt) / jacobian;
+            t += turn(xs, rest) / jacobian;
+        }
+        let (s, t) = (s.clamp(0.0, 1.0), t.clamp(0.0, 1.0));
+        let (s1, t1) = (1.0 - s, 1.0 - t);
+        [s1 * t1, s * t1, s * t, s1 * t]
+    }
+}
+
+/// Mean of four corners.
+#[inline(always)]
+fn middle(x: &[Vector; 4]) -> Vector {
+    [0, 1, 2].map(|a| 0.25 * ((x[0][a] + x[1][a]) + (x[2][a] + x[3][a])))
 }
 
 /// Feature at fraction `u` of edge `i`.
@@ -224,126 +377,44 @@ fn edge_feature(i: usize, u: f64) -> Feature {
     }
 }
 
-/// Bilinear weights of the point `foot` of a coplanar convex face with this unit normal.
-///
-/// With `x = x0 + s b + t c + s t d`, eliminating `s` leaves `k2 t^2 + k1 t + k0 = 0` in cross products; the
-/// root inside the face is the one where the Jacobian `2 k2 t + k1` is positive. One Newton step on both takes
-/// off what rounding left.
-#[inline(always)]
-fn bilinear(r: &[Vector; 4], foot: Vector, normal: Vector) -> [f64; 4] {
-    let (b, c, q) = (sub(r[1], r[0]), sub(r[3], r[0]), sub(foot, r[0]));
-    let d = sub(sub(r[2], r[3]), b);
-    let turn = |a: Vector, b: Vector| dot(normal, cross(a, b));
-    let (k0, k1, k2) = (turn(q, b), turn(q, d) + turn(b, c), -turn(c, d));
-    let root = k1.mul_add(k1, -(4.0 * k2 * k0)).max(0.0).sqrt();
-    let mut t = if k1 >= 0.0 {
-        if k1 + root > 0.0 { -2.0 * k0 / (k1 + root) } else { 0.5 }
-    } else {
-        (root - k1) / (2.0 * k2)
-    };
-    let side = along(b, t, d);
-    let mut s = dot(along(q, -t, c), side) / dot(side, side);
-    let rest = sub(along(along(q, -s, b), -t, c), scale(s * t, d));
-    let (xs, xt) = (along(b, t, d), along(c, s, d));
-    let jacobian = turn(xs, xt);
-    if jacobian > 0.0 {
-        s += turn(rest, xt) / jacobian;
-        t += turn(xs, rest) / jacobian;
-    }
-    let (s, t) = (s.clamp(0.0, 1.0), t.clamp(0.0, 1.0));
-    let (s1, t1) = (1.0 - s, 1.0 - t);
-    [s1 * t1, s * t1, s * t, s1 * t]
-}
-
-/// Where on a triangle (mid-point, corner `i`, corner `i + 1`) its closest point lies.
+/// Whether the closest point of a triangle of a split face lies on the face's edge, corners included.
 #[derive(Clone, Copy, PartialEq)]
 enum Region {
     Inside,
-    Mid,
-    /// Between mid-point and corner `i`, and `i + 1`.
-    Spoke,
-    NextSpoke,
-    /// On the face's edge, corners included, at this fraction.
-    Border(f64),
-}
-
-/// Closest point of a split face to the origin: the nearest of those of its four triangles, the first of
-/// equals.
-#[inline(never)]
-fn on_triangles(r: &[Vector; 4]) -> Closest {
-    let mid = [0, 1, 2].map(|a| 0.25 * ((r[0][a] + r[1][a]) + (r[2][a] + r[3][a])));
-    let mut best = (f64::INFINITY, 0, Region::Mid, [1.0, 0.0, 0.0], mid);
-    for i in 0..4 {
-        let (region, weights, point) = on_triangle(mid, r[i], r[(i + 1) & 3]);
-        let d2 = dot(point, point);
-        if d2 < best.0 {
-            best = (d2, i, region, weights, point);
-        }
-    }
-    let (d2, i, region, [of_mid, of_i, of_next], point) = best;
-    let next = (i + 1) & 3;
-    let normal_of = |i: usize| unit(cross(sub(r[i], mid), sub(r[(i + 1) & 3], mid)));
-    let feature = match region {
-        Region::Border(u) => edge_feature(i, u),
-        _ if of_i >= 1.0 - JOINT => Feature::Corner(i as u8),
-        _ if of_next >= 1.0 - JOINT => Feature::Corner(next as u8),
-        Region::Inside if of_mid <= JOINT => Feature::Edge(i as u8),
-        _ => Feature::Face,
-    };
-    let normal = match (feature, region) {
-        (Feature::Corner(c), _) => {
-            let c = c as usize;
-            let (before, after) = ((c + 3) & 3, (c + 1) & 3);
-            let to_mid = sub(mid, r[c]);
-            let one = scale(angle(sub(r[after], r[c]), to_mid), normal_of(c));
-            along(one, angle(sub(r[before], r[c]), to_mid), normal_of(before))
-        }
-        (Feature::Edge(e), _) => normal_of(e as usize),
-        (Feature::Face, Region::Spoke) => along(normal_of((i + 3) & 3), 1.0, normal_of(i)),
-        (Feature::Face, Region::NextSpoke) => along(normal_of(i), 1.0, normal_of(next)),
-        (Feature::Face, Region::Mid) => (0..4).fold([0.0; 3], |sum, t| {
-            let corner = angle(sub(r[t], mid), sub(r[(t + 1) & 3], mid));
-            along(sum, corner, normal_of(t))
-        }),
-        (Feature::Face, _) => normal_of(i),
-    };
-    let mut weights = [0.25 * of_mid; 4];
-    weights[i] += of_i;
-    weights[next] += of_next;
-    Closest { feature, distance: d2.sqrt(), vector: scale(-1.0, point), weights, normal }
+    Border,
 }
 
 /// Closest point of the triangle `a b c` to the origin by its Voronoi regions (Ericson 2005, section 5.1.5):
-/// region, barycentric weights, point.
+/// region, barycentric shares, point.
 #[inline(always)]
 fn on_triangle(a: Vector, b: Vector, c: Vector) -> (Region, [f64; 3], Vector) {
     let (ab, ac) = (sub(b, a), sub(c, a));
     let (d1, d2) = (-dot(ab, a), -dot(ac, a));
     if d1 <= 0.0 && d2 <= 0.0 {
-        return (Region::Mid, [1.0, 0.0, 0.0], a);
+        return (Region::Inside, [1.0, 0.0, 0.0], a);
     }
     let (d3, d4) = (-dot(ab, b), -dot(ac, b));
     if d3 >= 0.0 && d4 <= d3 {
-        return (Region::Border(0.0), [0.0, 1.0, 0.0], b);
+        return (Region::Border, [0.0, 1.0, 0.0], b);
     }
     let vc = d1.mul_add(d4, -(d3 * d2));
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
         let v = d1 / (d1 - d3);
-        return (Region::Spoke, [1.0 - v, v, 0.0], along(a, v, ab));
+        return (Region::Inside, [1.0 - v, v, 0.0], along(a, v, ab));
     }
     let (d5, d6) = (-dot(ab, c), -dot(ac, c));
     if d6 >= 0.0 && d5 <= d6 {
-        return (Region::Border(1.0), [0.0, 0.0, 1.0], c);
+        return (Region::Border, [0.0, 0.0, 1.0], c);
     }
     let vb = d5.mul_add(d2, -(d1 * d6));
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
         let w = d2 / (d2 - d6);
-        return (Region::NextSpoke, [1.0 - w, 0.0, w], along(a, w, ac));
+        return (Region::Inside, [1.0 - w, 0.0, w], along(a, w, ac));
     }
     let va = d3.mul_add(d6, -(d5 * d4));
     if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
         let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return (Region::Border(w), [0.0, 1.0 - w, w], along(b, w, sub(c, b)));
+        return (Region::Border, [0.0, 1.0 - w, w], along(b, w, sub(c, b)));
     }
     let sum = va + vb + vc;
     if sum > 0.0 {
@@ -351,5 +422,5 @@ fn on_triangle(a: Vector, b: Vector, c: Vector) -> (Region, [f64; 3], Vector) {
         return (Region::Inside, [(1.0 - v) - w, v, w], along(along(a, v, ab), w, ac));
     }
     // A triangle of no area whose regions rounding has mixed up.
-    (Region::Mid, [1.0, 0.0, 0.0], a)
+    (Region::Inside, [1.0, 0.0, 0.0], a)
 }

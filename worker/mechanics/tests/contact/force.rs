@@ -1,0 +1,178 @@
+//! Verification book 4.2: conservation, and what a cycle of contact books and votes.
+
+use mechanics::contact::{Batch, Contact, ContactVote, Exclusions, WorkUnit, sort};
+
+use crate::{
+    patch::totals,
+    world::{Random, World, add_block, block, deform, on_surface, settings, with_probe, without_self},
+};
+
+#[test]
+fn every_pair_conserves_momentum_to_the_bit_and_moment_to_rounding() {
+    let mut random = Random(31);
+    for _ in 0..20 {
+        let mut mesh = block([2, 2, 2], 1.0);
+        deform(&mut mesh, |p| [0, 1, 2].map(|a| p[a] + random.within(-0.25, 0.25)));
+        let (mut world, probe) = with_probe(mesh, 0.3, &|_| true);
+        let mut hits = 0;
+        for _ in 0..500 {
+            world.place(probe, random.point(-0.4, 2.4));
+            hits += world.forces(1.0).hits;
+            let (force, moment) = totals(&world);
+            assert_eq!(force, [0.0; 3]);
+            assert!(moment.iter().all(|m| m.abs() < 1e-12), "{moment:?}");
+        }
+        assert!(hits > 100, "{hits} hits");
+    }
+}
+
+#[test]
+fn the_vote_of_a_pair_is_its_spring_between_both_masses() {
+    let (mut world, probe) = with_probe(block([1, 1, 1], 1.0), 0.1, &|_| true);
+    // k = .5, all masses 1, weights .25 each: omega^2 = 2 k (1 + .25).
+    let expected = 0.4 / (2.0_f64 * 0.5 * 1.25).sqrt();
+    for height in [1.05, 1.15] {
+        world.place(probe, [0.5, 0.5, height]);
+        let vote = world.forces(1.0);
+        assert!((vote.dt - expected).abs() < 1e-14, "{height}: {} for {expected}", vote.dt);
+        assert_eq!(vote.hits, u64::from(height < 1.1));
+    }
+    world.place(probe, [0.5, 0.5, 1.201]);
+    let vote = world.forces(1.0);
+    assert_eq!(vote.dt, f64::INFINITY);
+    assert_eq!((vote.hits, vote.worst_depth, vote.energy), (0, 0.0, 0.0));
+    world.place(probe, [0.5, 0.5, 1.04]);
+    let vote = world.forces(1.0);
+    assert!((vote.worst_depth - 0.6).abs() < 1e-12);
+    assert!((vote.energy - 0.5 * 0.5 * 0.06 * 0.06).abs() < 1e-15);
+    assert!((vote.force_bound - 0.5 * 0.06).abs() < 1e-14, "{}", vote.force_bound);
+}
+
+#[test]
+fn friction_is_coulombs_and_creeps_below_its_velocity() {
+    let (mut world, probe) = with_probe(block([1, 1, 1], 1.0), 0.1, &|_| true);
+    world.place(probe, [0.5, 0.5, 1.05]);
+    world.settings.friction.fill(0.3);
+    world.contact = Contact::new(&world.batch, &world.settings, &world.x);
+    let (normal, dt) = (0.5 * 0.05, 1e-4);
+    // Sliding and approaching: only sliding matters.
+    (world.v[0][probe], world.v[1][probe], world.v[2][probe]) = (3.0, 4.0, -2.0);
+    let vote = world.forces(dt);
+    let f = world.force_on(probe);
+    for (a, expected) in [(0, -0.3 * normal * 0.6), (1, -0.3 * normal * 0.8), (2, normal)] {
+        assert!((f[a] - expected).abs() < 1e-14, "{f:?}");
+    }
+    assert!((vote.friction - 0.3 * normal * 5.0 * dt).abs() < 1e-14, "{}", vote.friction);
+    let (force, _) = totals(&world);
+    assert_eq!(force, [0.0; 3]);
+    // A tenth of the regularising velocity 1e-3: a tenth of the force.
+    (world.v[0][probe], world.v[1][probe], world.v[2][probe]) = (1e-4, 0.0, 0.0);
+    world.forces(dt);
+    assert!((world.force_on(probe)[0] + 0.1 * 0.3 * normal).abs() < 1e-14);
+    // With the body moving along there is no friction, and with a long step it never turns the sliding round.
+    world.v[0].fill(7.0);
+    world.forces(dt);
+    assert!(world.force_on(probe)[0].abs() < 1e-14);
+    world.v[0].fill(0.0);
+    world.v[0][probe] = 1e-4;
+    let dt = 10.0;
+    world.forces(dt);
+    assert!(world.v[0][probe] + dt * world.force_on(probe)[0] > 0.0);
+}
+
+/// Two bent plates pressed into each other's zones, all units in `n` batches.
+fn pressed(n: usize, chunk_order: bool) -> (Vec<u64>, ContactVote) {
+    let mut mesh = block([6, 6, 1], 1.0);
+    add_block(&mut mesh, [8, 8, 1], [-0.17, 0.21, 1.05], 0.75);
+    deform(&mut mesh, |p| [p[0], p[1], p[2] + 0.02 * (3.0 * p[0]).sin() * (2.0 * p[1]).cos()]);
+    let mut settings = without_self(settings(2, 0.1, 0.05));
+    settings.friction.fill(0.2);
+    let world = World::new(&mesh, settings.clone(), &|_| true);
+    let x = on_surface(&world.surface, &mesh.positions);
+    let units = sort(&world.surface, &x, &settings, &Exclusions::default());
+    let mut total = [0; 3].map(|_| vec![0.0; mesh.n_nodes()]);
+    let mut vote = ContactVote::default();
+    let mut order: Vec<usize> = (0..n).collect();
+    if chunk_order {
+        order.reverse();
+    }
+    for part in order {
+        let mine: Vec<&WorkUnit> = units.iter().skip(part).step_by(n).collect();
+        let batch = Batch::gather(&world.surface, &mine, &|_| 0.25, &Exclusions::default());
+        let x = [0, 1, 2].map(|a| {
+            batch.nodes.iter().map(|node| mesh.positions[node.global as usize][a]).collect::<Vec<f64>>()
+        });
+        let v = [x[1].clone(), x[2].clone(), x[0].clone()];
+        let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
+        let mut contact = Contact::new(&batch, &settings, &x);
+        vote.merge(&contact.forces(&x, &v, 0.01, world.force_quantum, world.energy_quantum, &mut f));
+        for a in 0..3 {
+            for (node, f) in batch.nodes.iter().zip(&f[a]) {
+                total[a][node.global as usize] += f;
+            }
+        }
+    }
+    (total.iter().flatten().map(|f| f.to_bits()).collect(), vote)
+}
+
+#[test]
+fn any_split_into_batches_gives_the_same_bits() {
+    let (bits, vote) = pressed(1, false);
+    assert!(vote.hits > 50 && vote.friction > 0.0, "{vote:?}");
+    for n in [2, 3, 16] {
+        for reverse in [false, true] {
+            let (other, other_vote) = pressed(n, reverse);
+            assert_eq!(bits, other);
+            assert_eq!(vote, other_vote);
+        }
+    }
+}
+
+#[test]
+fn what_a_sort_leaves_out_never_changes_a_bit() {
+    // The same positions with lists of different slack: longer lists, same forces and votes.
+    let result = |slack: f64| {
+        let mut mesh = block([4, 4, 1], 1.0);
+        add_block(&mut mesh, [5, 5, 1], [0.1, -0.2, 1.06], 0.8);
+        let mut world = World::new(&mesh, without_self(settings(2, 0.1, slack)), &|_| true);
+        let vote = world.forces(1.0);
+        let mut bits: Vec<(u32, [u64; 3])> = (0..world.batch.nodes.len())
+            .map(|i| (world.batch.nodes[i].global, world.force_on(i).map(|f| (f + 0.0).to_bits())))
+            .filter(|(_, f)| *f != [0; 3])
+            .collect();
+        bits.sort_unstable();
+        (bits, vote.pairs, ContactVote { pairs: 0, ..vote })
+    };
+    let (short, long) = (result(0.0), result(3.0));
+    assert!(long.1 > 2 * short.1, "{} and {} pairs", short.1, long.1);
+    assert_eq!((short.0, short.2), (long.0, long.2));
+}
+
+#[test]
+fn pairs_inside_the_zone_at_time_zero_are_left_alone() {
+    // A slit half a gap wide inside one part: three elements, the middle one gone, its sides moved in.
+    let mut mesh = block([3, 1, 1], 1.0);
+    deform(&mut mesh, |p| {
+        [
+            if p[0] == 1.0 {
+                1.475
+            } else if p[0] == 2.0 {
+                1.525
+            } else {
+                p[0]
+            },
+            p[1],
+            p[2],
+        ]
+    });
+    let alive = |e| e != 1;
+    let surface = mechanics::contact::Surface::new(&mesh, &crate::world::materials(), &alive);
+    let x = on_surface(&surface, &mesh.positions);
+    let pairs = mechanics::contact::initial_pairs(&surface, &x, &settings(1, 0.1, 0.1));
+    // Eight corners of the slit, each over the corner of three faces.
+    assert_eq!(pairs.len(), 8 * 3, "{pairs:?}");
+    assert!(pairs.iter().all(|&(_, _, d)| (d - 0.05).abs() < 1e-14));
+    let mut world = World::new(&mesh, settings(1, 0.1, 0.1), &alive);
+    let vote = world.forces(1.0);
+    assert_eq!((vote.hits, vote.dt), (0, f64::INFINITY));
+}

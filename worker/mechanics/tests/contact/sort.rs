@@ -1,0 +1,309 @@
+//! Verification book 4.7: the sort finds what brute force finds.
+
+use std::{collections::BTreeSet, time::Instant};
+
+use mechanics::{
+    contact::{Batch, Census, Contact, Exclusions, Settings, Surface, WorkUnit, initial_pairs, sort},
+    exact::Quantum,
+    mesh::Mesh,
+};
+
+use crate::world::{Random, add_block, block, deform, materials, on_surface, settings, without_self};
+
+/// Whether a pair is to be tested, and near enough to be on the list.
+fn wanted(surface: &Surface, x: &[[f64; 3]], settings: &Settings, node: u32, face: u32) -> bool {
+    let f = &surface.faces[face as usize];
+    let p = x[node as usize];
+    settings.interacts[surface.node_part[node as usize] as usize * settings.n_parts() + f.part as usize]
+        && !f.corners.contains(&surface.nodes[node as usize])
+        && (0..3).all(|a| {
+            let c = f.nodes.map(|n| x[n as usize][a]);
+            let min = c.into_iter().fold(f64::INFINITY, f64::min);
+            let max = c.into_iter().fold(f64::NEG_INFINITY, f64::max);
+            p[a] >= min - settings.reach() && p[a] <= max + settings.reach()
+        })
+}
+
+fn sorted_pairs(
+    surface: &Surface,
+    x: &[[f64; 3]],
+    settings: &Settings,
+    units: &[WorkUnit],
+) -> BTreeSet<(u32, u32)> {
+    let mut pairs = BTreeSet::new();
+    let mut seen = BTreeSet::new();
+    for unit in units {
+        let mut interactions = 0;
+        for &n in &unit.nodes {
+            assert!(seen.insert(n), "node {n} is in two units");
+            for &f in &unit.faces {
+                let face = &surface.faces[f as usize];
+                let part = surface.node_part[n as usize] as usize;
+                if settings.interacts[part * settings.n_parts() + face.part as usize]
+                    && !face.corners.contains(&surface.nodes[n as usize])
+                {
+                    interactions += 1;
+                }
+                if wanted(surface, x, settings, n, f) {
+                    assert!(pairs.insert((n, f)));
+                }
+            }
+        }
+        assert!(unit.nodes.is_sorted() && unit.faces.is_sorted());
+        assert_eq!(unit.interactions, interactions, "{:?}", unit.cube);
+        assert!(interactions > 0);
+    }
+    pairs
+}
+
+fn brute_force(surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> BTreeSet<(u32, u32)> {
+    let mut pairs = BTreeSet::new();
+    for n in 0..surface.nodes.len() as u32 {
+        for f in 0..surface.faces.len() as u32 {
+            if wanted(surface, x, settings, n, f) {
+                pairs.insert((n, f));
+            }
+        }
+    }
+    pairs
+}
+
+fn agree(mesh: &Mesh, settings: &Settings) -> usize {
+    let surface = Surface::new(mesh, &materials(), &|_| true);
+    let x = on_surface(&surface, &mesh.positions);
+    let units = sort(&surface, &x, settings, &Exclusions::default());
+    let brute = brute_force(&surface, &x, settings);
+    assert_eq!(sorted_pairs(&surface, &x, settings, &units), brute);
+    brute.len()
+}
+
+/// Positions on a grid fine enough to look random and coarse enough that a large translation is exact.
+fn exact(p: f64) -> f64 {
+    (p * 65536.0).round() / 65536.0
+}
+
+fn cloud(n: usize, parts: usize, seed: u64) -> Mesh {
+    let mut random = Random(seed);
+    let mut mesh = Mesh::default();
+    for _ in 0..parts {
+        let mut part = Mesh::default();
+        let size = random.within(0.2, 1.5);
+        add_block(&mut part, [1, 1, 2], [0.0; 3], size);
+        let offset = random.point(0.0, n as f64);
+        deform(&mut part, |p| [0, 1, 2].map(|a| exact(p[a] + offset[a] + random.within(-0.1, 0.1))));
+        let first = mesh.positions.len() as u32;
+        part.parts[0].nodes.iter_mut().for_each(|node| *node += first);
+        mesh.positions.extend(part.positions);
+        mesh.node_ids.extend(part.node_ids);
+        mesh.parts.extend(part.parts);
+    }
+    mesh
+}
+
+#[test]
+fn the_sort_of_a_cloud_equals_brute_force_for_any_slack() {
+    let mesh = cloud(8, 250, 1);
+    for (gap, slack) in [(0.0, 0.0), (0.02, 0.0), (0.02, 0.1), (0.1, 0.5), (0.3, 3.0)] {
+        let all = agree(&mesh, &settings(250, gap, slack));
+        let foreign = agree(&mesh, &without_self(settings(250, gap, slack)));
+        assert!(all >= foreign && foreign > 100, "{all} {foreign}");
+        assert!(slack < 1.0 || all > foreign, "long boxes meet themselves");
+    }
+    let mut some = settings(250, 0.1, 0.2);
+    for a in 0..250 {
+        for b in 0..250 {
+            some.interacts[a * 250 + b] = (a + b) % 7 == 3;
+        }
+    }
+    assert!(agree(&mesh, &some) > 100);
+    let none = Settings { interacts: vec![false; 250 * 250], ..some };
+    assert_eq!(agree(&mesh, &none), 0);
+}
+
+#[test]
+fn the_sort_of_bent_plates_equals_brute_force() {
+    let mut mesh = block([12, 12, 2], 1.0);
+    add_block(&mut mesh, [3, 3, 1], [1.0, 1.0, 2.4], 3.0);
+    deform(&mut mesh, |p| {
+        [
+            p[0] + 0.3 * p[1].sin(),
+            p[1] * (1.0 + 0.02 * p[0]),
+            p[2] + 0.8 * (0.7 * p[0]).sin() * (0.5 * p[1]).cos(),
+        ]
+    });
+    for slack in [0.0, 0.1, 0.4, 2.0] {
+        agree(&mesh, &settings(2, 0.1, slack));
+        agree(&mesh, &without_self(settings(2, 0.1, slack)));
+    }
+}
+
+#[test]
+fn a_face_much_larger_than_a_cube_reaches_nodes_in_its_middle() {
+    let mut mesh = block([1, 1, 1], 100.0);
+    add_block(&mut mesh, [3, 3, 3], [50.0, 50.0, 100.05], 0.1);
+    let found = agree(&mesh, &without_self(settings(2, 0.03, 0.01)));
+    assert!(found >= 16, "{found}");
+}
+
+#[test]
+fn translation_by_a_thousand_lengths_changes_nothing() {
+    let mesh = cloud(8, 120, 3);
+    let settings = settings(120, 0.0625, 0.125);
+    let units = |offset: [f64; 3]| {
+        let mut moved = mesh.clone();
+        deform(&mut moved, |p| [p[0] + offset[0], p[1] + offset[1], p[2] + offset[2]]);
+        let surface = Surface::new(&moved, &materials(), &|_| true);
+        let x = on_surface(&surface, &moved.positions);
+        sort(&surface, &x, &settings, &Exclusions::default())
+    };
+    let still = units([0.0; 3]);
+    assert!(still.len() > 50);
+    assert_eq!(still, units([8192.0, -8192.0, 16384.0]));
+    assert_eq!(still, units([-0.5, 12345.0, 1.0]));
+}
+
+#[test]
+fn the_order_of_parts_does_not_change_the_units() {
+    let mesh = cloud(6, 60, 7);
+    let settings = settings(60, 0.1, 0.1);
+    let named = |reverse: bool| {
+        let mut mesh = mesh.clone();
+        if reverse {
+            // Parts and nodes in the opposite order; `node_ids` keeps the first number.
+            mesh.parts.reverse();
+            let last = mesh.positions.len() as u32 - 1;
+            mesh.positions.reverse();
+            mesh.parts.iter_mut().for_each(|p| p.nodes.iter_mut().for_each(|n| *n = last - *n));
+        }
+        let last = mesh.positions.len() as u32 - 1;
+        let surface = Surface::new(&mesh, &materials(), &|_| true);
+        let x = on_surface(&surface, &mesh.positions);
+        let name =
+            |n: u32| if reverse { last - surface.nodes[n as usize] } else { surface.nodes[n as usize] };
+        sort(&surface, &x, &settings, &Exclusions::default())
+            .into_iter()
+            .map(|unit| {
+                let nodes: BTreeSet<u32> = unit.nodes.iter().map(|&n| name(n)).collect();
+                let faces: BTreeSet<[u32; 4]> =
+                    unit.faces.iter().map(|&f| surface.faces[f as usize].nodes.map(name)).collect();
+                (unit.cube, nodes, faces, unit.interactions)
+            })
+            .collect::<BTreeSet<_>>()
+    };
+    assert_eq!(named(false), named(true));
+}
+
+#[test]
+fn one_crushed_face_does_not_shrink_the_cubes_below_twice_the_reach() {
+    let mut mesh = block([10, 10, 1], 1.0);
+    mesh.positions[1][0] = 1e-9;
+    let surface = Surface::new(&mesh, &materials(), &|_| true);
+    let x = on_surface(&surface, &mesh.positions);
+    let units = sort(&surface, &x, &settings(1, 0.1, 0.05), &Exclusions::default());
+    // Cubes of side .5: 21 x 21 x 3 of them at most.
+    assert!(units.iter().all(|u| u.cube[0] <= 20 && u.cube[1] <= 20 && u.cube[2] <= 2));
+    agree(&mesh, &settings(1, 0.1, 0.05));
+}
+
+#[test]
+fn excluded_pairs_do_not_count() {
+    let mut mesh = block([2, 2, 1], 1.0);
+    add_block(&mut mesh, [2, 2, 1], [0.25, 0.25, 1.05], 1.0);
+    let settings = without_self(settings(2, 0.1, 0.1));
+    let surface = Surface::new(&mesh, &materials(), &|_| true);
+    let x = on_surface(&surface, &mesh.positions);
+    let pairs = initial_pairs(&surface, &x, &settings);
+    assert!(pairs.iter().all(|&(_, _, d)| d < 0.1) && pairs.len() >= 8, "{pairs:?}");
+    let count = |exclusions| Census::of(&sort(&surface, &x, &settings, &exclusions)).interactions;
+    let (all, rest) = (count(Exclusions::default()), count(Exclusions::new(&surface, &pairs)));
+    assert_eq!(all - rest, pairs.len() as u64);
+}
+
+/// The paper's larger benchmark: plates of 1 cm elements, one gap apart.
+pub fn plates(gap: f64) -> (Mesh, Surface, Vec<[f64; 3]>) {
+    let mut mesh = block([40, 40, 30], 1.0);
+    add_block(&mut mesh, [40, 40, 10], [0.0, 0.0, 30.0 + gap], 1.0);
+    let surface = Surface::new(&mesh, &materials(), &|_| true);
+    let x = on_surface(&surface, &mesh.positions);
+    (mesh, surface, x)
+}
+
+#[test]
+fn the_benchmark_of_64000_elements_has_its_census() {
+    let (mesh, surface, x) = plates(0.1);
+    assert_eq!(mesh.n_elements(), 64_000);
+    assert_eq!((surface.n_elements(), surface.faces.len(), surface.nodes.len()), (12_016, 12_800, 12_804));
+    for slack in [0.05, 0.1, 0.2] {
+        let settings = settings(2, 0.1, slack);
+        let census = Census::of(&sort(&surface, &x, &settings, &Exclusions::default()));
+        println!("slack {slack}: {census:?}");
+        assert!((2_500..3_500).contains(&census.units), "{census:?}");
+        assert!(census.nodes.0 >= 1 && census.nodes.2 <= 12, "{census:?}");
+    }
+    assert!(initial_pairs(&surface, &x, &settings(2, 0.1, 0.1)).is_empty(), "one gap apart is apart");
+}
+
+/// Figures, not a test of anything but that they exist: `cargo test --release -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints timings"]
+fn timing_of_the_sort() {
+    let (mesh, surface, x) = plates(0.1);
+    let start = Instant::now();
+    std::hint::black_box(Surface::new(&mesh, &materials(), &|_| true));
+    println!("surface: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+    for settings in [settings(2, 0.1, 0.1), without_self(settings(2, 0.1, 0.1))] {
+        let best = (0..30)
+            .map(|_| {
+                let start = Instant::now();
+                std::hint::black_box(sort(&surface, &x, &settings, &Exclusions::default()));
+                start.elapsed().as_secs_f64()
+            })
+            .fold(f64::INFINITY, f64::min);
+        println!("sort: {:.0} ns per node", best * 1e9 / surface.nodes.len() as f64);
+        assert!(best > 0.0);
+    }
+}
+
+#[test]
+#[ignore = "prints timings"]
+fn timing_of_the_force() {
+    let (mesh, surface, x) = plates(0.1);
+    let settings = without_self(settings(2, 0.1, 0.1));
+    let units = sort(&surface, &x, &settings, &Exclusions::default());
+    let all: Vec<&WorkUnit> = units.iter().collect();
+    let batch = Batch::gather(&surface, &all, &|_| 1.0, &Exclusions::default());
+    let quantum = Quantum::for_reference(1.0, 42);
+    for (title, offset, waves) in [("on corners", 0.0, 0.0), ("on faces", 0.37, 0.0), ("warped", 0.37, 0.02)]
+    {
+        let mut x = [0, 1, 2]
+            .map(|a| batch.nodes.iter().map(|n| mesh.positions[n.global as usize][a]).collect::<Vec<f64>>());
+        for (i, node) in batch.nodes.iter().enumerate() {
+            let wave = waves * (1.3 * x[0][i]).sin() * (0.9 * x[1][i]).cos();
+            let upper = f64::from(node.part);
+            x[0][i] += offset * upper;
+            x[1][i] += offset * upper;
+            x[2][i] += wave - 0.03 * upper;
+        }
+        let v = x.clone();
+        let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
+        let start = Instant::now();
+        let mut contact = Contact::new(&batch, &settings, &x);
+        let built = start.elapsed().as_secs_f64();
+        let (mut best, mut vote) = (f64::INFINITY, Default::default());
+        for _ in 0..200 {
+            let start = Instant::now();
+            vote = contact.forces(&x, &v, 1.0, quantum, quantum, &mut f);
+            best = best.min(start.elapsed().as_secs_f64());
+        }
+        println!(
+            "{title}: stage zero {:.2} ms; {} pairs, {} hits, {:.1} ns per pair, {:.0} ns per hit, {:.1} us",
+            built * 1e3,
+            vote.pairs,
+            vote.hits,
+            best * 1e9 / vote.pairs as f64,
+            best * 1e9 / vote.hits as f64,
+            best * 1e6
+        );
+        assert!(vote.hits > 3000, "{vote:?}");
+    }
+}

@@ -1,0 +1,88 @@
+//! Verification book 4.8: which faces lie outside, and their static data.
+
+use mechanics::{
+    contact::Surface,
+    mesh::{Mesh, Part, Topology},
+};
+
+use crate::world::{add_block, block, deform, materials, on_surface};
+
+fn faces_without(gone: u32) -> usize {
+    Surface::new(&block([4, 4, 4], 1.0), &materials(), &|e| e != gone).faces.len()
+}
+
+#[test]
+fn removing_an_element_of_a_block_exposes_its_neighbours() {
+    assert_eq!(faces_without(u32::MAX), 96);
+    assert_eq!(faces_without(0), 96, "corner: three lost, three gained");
+    assert_eq!(faces_without(1), 98, "edge: two lost, four gained");
+    assert_eq!(faces_without(5), 100, "face: one lost, five gained");
+    assert_eq!(faces_without(21), 102, "inside: six gained");
+}
+
+#[test]
+fn faces_look_outward_and_close_the_volume() {
+    let mut mesh = block([3, 2, 2], 0.5);
+    deform(&mut mesh, |p| [p[0] + 0.1 * p[1], p[1], p[2] + 0.2 * p[0] * p[1]]);
+    let surface = Surface::new(&mesh, &materials(), &|e| e != 3);
+    let x = on_surface(&surface, &mesh.positions);
+    // The volume from the faces, each as four triangles about its mid-point: shear and a lift of the top by
+    // the same function as the bottom keep it.
+    let mut volume = 0.0;
+    for face in &surface.faces {
+        let c = face.nodes.map(|n| x[n as usize]);
+        let mid = [0, 1, 2].map(|a| 0.25 * (c[0][a] + c[1][a] + c[2][a] + c[3][a]));
+        for i in 0..4 {
+            let (p, q) = (c[i], c[(i + 1) & 3]);
+            volume += (mid[0] * (p[1] * q[2] - p[2] * q[1])
+                + mid[1] * (p[2] * q[0] - p[0] * q[2])
+                + mid[2] * (p[0] * q[1] - p[1] * q[0]))
+                / 6.0;
+        }
+    }
+    assert!((volume - 11.0 * 0.125).abs() < 1e-12, "{volume}");
+}
+
+#[test]
+fn faces_between_joined_parts_are_inside() {
+    let mut mesh = block([2, 2, 1], 1.0);
+    add_block(&mut mesh, [2, 2, 1], [0.0, 0.0, 1.0], 1.0);
+    // Joined: the lower nodes of the second part are the upper ones of the first.
+    for i in 0..9 {
+        mesh.parts[1].nodes[i] = 9 + i as u32;
+    }
+    let surface = Surface::new(&mesh, &materials(), &|_| true);
+    assert_eq!(surface.faces.len(), 4 + 4 + 16);
+    assert_eq!(surface.nodes.len(), 9 + 8 + 9, "the node in the middle of the joint is inside");
+    let on_joint = surface.node_index(9).expect("a joint's rim is on the surface");
+    assert_eq!(surface.node_part[on_joint as usize], 0);
+    assert_eq!(surface.n_elements(), 8);
+}
+
+#[test]
+fn stiffness_is_bulk_times_area_squared_over_volume() {
+    let mut mesh = block([1, 1, 1], 1.0);
+    deform(&mut mesh, |p| [2.0 * p[0], 3.0 * p[1], 5.0 * p[2]]);
+    let surface = Surface::new(&mesh, &materials(), &|_| true);
+    let expected = [6.0 * 6.0 / 30.0, 6.0 * 6.0 / 30.0, 10.0 * 10.0 / 30.0, 7.5, 10.0 * 10.0 / 30.0, 7.5];
+    for (face, expected) in surface.faces.iter().zip(expected) {
+        assert!((face.stiffness - expected).abs() < 1e-13, "side {}: {}", face.side, face.stiffness);
+    }
+    let mean = (1.2 + 10.0 / 3.0 + 7.5) / 3.0;
+    assert!(surface.node_stiffness.iter().all(|s| (s - mean).abs() < 1e-13));
+    let x = on_surface(&surface, &mesh.positions);
+    assert_eq!(surface.smallest_dimension(&x), 2.0);
+}
+
+#[test]
+fn a_wedge_has_five_faces() {
+    let mut mesh = Mesh { positions: vec![], node_ids: vec![], parts: vec![] };
+    add_block(&mut mesh, [1, 1, 1], [0.0; 3], 1.0);
+    mesh.parts[0] = Part {
+        topology: Topology::Explicit { hexahedra: vec![[0, 1, 2, 2, 4, 5, 6, 6]] },
+        nodes: vec![0, 1, 3, 2, 4, 5, 7, 6],
+        ..mesh.parts[0].clone()
+    };
+    let surface = Surface::new(&mesh, &materials(), &|_| true);
+    assert_eq!((surface.faces.len(), surface.nodes.len()), (5, 6));
+}
