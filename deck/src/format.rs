@@ -11,6 +11,7 @@ mod boundary;
 mod contact;
 mod output;
 mod part;
+mod shape;
 
 pub(crate) use contact::ContactDraft;
 pub(crate) use part::PartDraft;
