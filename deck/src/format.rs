@@ -14,7 +14,7 @@ mod part;
 mod shape;
 
 pub(crate) use contact::ContactDraft;
-pub(crate) use part::PartDraft;
+pub(crate) use part::{Explicit, PartDraft};
 
 use std::collections::BTreeMap;
 
