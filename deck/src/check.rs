@@ -10,8 +10,8 @@ pub(crate) use surface::{Face, outer_faces, smallest_face_dimension};
 use crate::{
     assembly::Assembly,
     fault::{Faults, short},
-    format::{ContactDraft, PartDraft},
-    geometry::{EDGES, norm, sub},
+    format::{ContactDraft, Explicit, PartDraft},
+    geometry::{EDGES, norm, sub, worst_corner},
 };
 
 /// Most elements named per part; the rest are counted.
@@ -20,6 +20,9 @@ const MAX_NAMED: usize = 10;
 /// Volume over the cube of the largest edge below which an element is flat: far under any aspect ratio that
 /// runs, and above the rounding of a volume that is zero.
 const FLAT: f64 = 1e-12;
+
+/// What to do about a turned or folded element.
+const CORNER_ORDER: &str = "order the corners 0(000) 1(100) 2(110) 3(010) 4(001) 5(101) 6(111) 7(011)";
 
 /// Every check that needs the whole mesh.
 pub(crate) fn spans(
@@ -50,12 +53,15 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
             })
             .collect();
         fit &= bad.is_empty();
+        if let Some(own) = &draft.explicit
+            && bad.is_empty()
+        {
+            fit &= folded(assembly, p, offsets[p], own, faults);
+        }
         for &e in bad.iter().take(MAX_NAMED) {
             let at = draft.explicit.as_ref().map_or(draft.at, |own| own.element_places[e]);
             let advice = match part.topology {
-                Topology::Explicit { .. } if draft.explicit.is_some() => {
-                    "order the corners 0(000) 1(100) 2(110) 3(010) 4(001) 5(101) 6(111) 7(011)"
-                }
+                Topology::Explicit { .. } if draft.explicit.is_some() => CORNER_ORDER,
                 _ => "use a size that the numbers can hold, or a smaller join tolerance",
             };
             faults.add(
@@ -80,4 +86,43 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
         }
     }
     fit
+}
+
+/// Reports elements of an explicit mesh that are folded at a corner though their volume is positive, as
+/// corners in a wrong order leave them; true where there is none. `offset` is the global index of the part's first
+/// element.
+fn folded(assembly: &Assembly, p: usize, offset: usize, own: &Explicit, faults: &Faults<'_>) -> bool {
+    let part = &assembly.mesh.parts[p];
+
+    let mut n_folded = 0;
+    for e in 0..part.n_elements() {
+        let nodes = part.corners(e);
+        let corners = nodes.map(|node| assembly.mesh.positions[node as usize]);
+        let (corner, jacobian) = worst_corner(&corners);
+        // A corner of 180 degrees is flat, not folded.
+        if jacobian >= -FLAT * assembly.volumes[offset + e] {
+            continue;
+        }
+        n_folded += 1;
+        if n_folded <= MAX_NAMED {
+            faults.add(
+                own.element_places[e],
+                format!(
+                    "element {} of part \"{}\" folded at its corner {corner} (node {})",
+                    part.element_ids[e], part.name, assembly.mesh.node_ids[nodes[corner] as usize]
+                ),
+                "eight corners that each open outward",
+                CORNER_ORDER,
+            );
+        }
+    }
+    if n_folded > MAX_NAMED {
+        faults.add(
+            own.element_places[0],
+            format!("{} more folded elements in part \"{}\"", n_folded - MAX_NAMED, part.name),
+            "none",
+            "mend those named first",
+        );
+    }
+    n_folded == 0
 }

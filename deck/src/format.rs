@@ -11,9 +11,10 @@ mod boundary;
 mod contact;
 mod output;
 mod part;
+mod shape;
 
 pub(crate) use contact::ContactDraft;
-pub(crate) use part::PartDraft;
+pub(crate) use part::{Explicit, PartDraft};
 
 use std::collections::BTreeMap;
 

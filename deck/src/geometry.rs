@@ -56,19 +56,32 @@ pub(crate) fn volume(corners: &[[f64; 3]; 8]) -> f64 {
     sum / 8.0
 }
 
+/// Which end of each axis a corner has.
+const ENDS: [[bool; 3]; 8] = [
+    [false, false, false],
+    [true, false, false],
+    [true, true, false],
+    [false, true, false],
+    [false, false, true],
+    [true, false, true],
+    [true, true, true],
+    [false, true, true],
+];
+
+/// The corner with the least Jacobian, and that Jacobian: negative where the element is folded there.
+pub(crate) fn worst_corner(corners: &[[f64; 3]; 8]) -> (usize, f64) {
+    let mut worst = (0, f64::INFINITY);
+    for (corner, ends) in ENDS.iter().enumerate() {
+        let value = jacobian(corners, ends.map(|end| if end { 1.0 } else { 0.0 }));
+        if value < worst.1 {
+            worst = (corner, value);
+        }
+    }
+    worst
+}
+
 /// Determinant of the Jacobian at `(u, v, w)` of the unit cube.
-pub(crate) fn jacobian(x: &[[f64; 3]; 8], at: [f64; 3]) -> f64 {
-    // Which end of each axis a corner has.
-    const ENDS: [[bool; 3]; 8] = [
-        [false, false, false],
-        [true, false, false],
-        [true, true, false],
-        [false, true, false],
-        [false, false, true],
-        [true, false, true],
-        [true, true, true],
-        [false, true, true],
-    ];
+fn jacobian(x: &[[f64; 3]; 8], at: [f64; 3]) -> f64 {
     let mut columns = [[0.0; 3]; 3];
     for (corner, ends) in x.iter().zip(ENDS) {
         for (axis, column) in columns.iter_mut().enumerate() {
@@ -124,6 +137,15 @@ mod tests {
             [-0.1, 1.0, 0.9],
         ];
         assert!((volume(&corners) - 1.014).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_brick_with_two_corners_exchanged_is_folded_there() {
+        let mut corners = ENDS.map(|ends| ends.map(|end| if end { 2.0 } else { 0.0 }));
+        let (_, plain) = worst_corner(&corners);
+        assert!((plain - 8.0).abs() < 1e-14);
+        corners.swap(2, 3);
+        assert!(worst_corner(&corners).1 < 0.0);
     }
 
     #[test]

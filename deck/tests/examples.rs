@@ -85,3 +85,30 @@ fn bars_and_blade_are_read() {
     // The driven end starts at its velocity.
     assert_eq!(blade.velocity.iter().filter(|v| v[2] == -20.0).count(), 3 * 5);
 }
+
+#[test]
+fn the_format_reference_names_every_library_material() {
+    let reference = std::fs::read_to_string(format!("{}/README.md", env!("CARGO_MANIFEST_DIR")))
+        .expect("the reference is in the repository");
+    for name in deck::materials() {
+        assert!(reference.contains(&format!("`{name}`")), "{name}");
+    }
+}
+
+#[test]
+fn every_deck_of_the_format_reference_has_only_known_keys() {
+    // The pieces are not whole decks; what matters is that no key in them is unknown.
+    let reference = std::fs::read_to_string(format!("{}/README.md", env!("CARGO_MANIFEST_DIR")))
+        .expect("the reference is in the repository");
+    let pieces: Vec<&str> =
+        reference.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap_or("")).collect();
+    assert!(pieces.len() >= 8);
+    for piece in pieces {
+        let faults = deck::read(piece, "README.md").expect_err("a piece is not a whole deck");
+        let unknown: Vec<_> = faults
+            .iter()
+            .filter(|f| f.read.starts_with("unknown key") || f.read.starts_with("a syntax error"))
+            .collect();
+        assert!(unknown.is_empty(), "{unknown:?}\n{piece}");
+    }
+}

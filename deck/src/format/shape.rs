@@ -1,0 +1,167 @@
+//! The blocks of a part: `box`, `cylinder`, `sphere`, `tube`.
+
+use super::MAX_NODES;
+use crate::{
+    blocks::{Sector, Shape, graded},
+    table::{Range, Table},
+};
+
+/// Most cells along one direction of a block.
+const MAX_CELLS: u64 = 10_000_000;
+
+/// Reads a block of that kind; `None` after reporting what is wrong.
+pub(super) fn read(kind: &str, table: &Table<'_>) -> Option<Shape> {
+    match kind {
+        "box" => read_box(table),
+        "cylinder" => read_cylinder(table),
+        "sphere" => read_sphere(table),
+        _ => read_tube(table),
+    }
+}
+
+const CELLS: &str = "three whole numbers [I, J, K] of at least 1";
+
+fn read_box(table: &Table<'_>) -> Option<Shape> {
+    if ["x", "y", "z"].iter().any(|key| table.has(key)) {
+        let coordinates = ["x", "y", "z"].map(|key| read_coordinates(table, key));
+        let [Some(x), Some(y), Some(z)] = coordinates else { return None };
+        return Some(Shape::Brick { coordinates: [x, y, z] });
+    }
+    let origin = table.vector("origin");
+    let size = table
+        .require("size", "[x, y, z]")
+        .and_then(|v| v.numbers::<3>("three lengths [x, y, z]", Range::Positive));
+    let cells = table.require("cells", CELLS).and_then(|v| v.integers::<3>(CELLS, 1, MAX_CELLS));
+    let grading = match table.get("grading") {
+        None => Some([1.0; 3]),
+        Some(v) => v.numbers::<3>(
+            "three ratios of last to first cell [x, y, z]",
+            Range::Within(1e-3, 1e3, "a ratio from 0.001 to 1000"),
+        ),
+    };
+    let (origin, size, cells, grading) = (origin?, size?, cells?, grading?);
+    // The planes are made here, so the count is looked at before.
+    let planes: u64 = cells.iter().try_fold(1u64, |n, c| n.checked_mul(c + 1)).unwrap_or(u64::MAX);
+    if planes > MAX_NODES {
+        table.faults.add(
+            table.at,
+            format!("{} with cells = {cells:?}", table.title),
+            format!("at most {MAX_NODES} nodes"),
+            "use fewer cells",
+        );
+        return None;
+    }
+    let coordinates = [0, 1, 2].map(|a| graded(origin[a], size[a], cells[a] as u32, grading[a]));
+    Some(Shape::Brick { coordinates })
+}
+
+/// A list of ascending coordinates.
+fn read_coordinates(table: &Table<'_>, key: &'static str) -> Option<Vec<f64>> {
+    let value = table.require(key, "a list of ascending coordinates (x, y and z together)")?;
+    let mut list = Vec::new();
+    for item in value.items()? {
+        list.push(item.number(Range::Any)?);
+    }
+    if list.len() < 2 || list.windows(2).any(|w| w[0] >= w[1]) {
+        value.fault("at least two coordinates, each above the one before", "sort them and remove doubles");
+        return None;
+    }
+    Some(list)
+}
+
+/// Axis letter, default z.
+fn read_axis(table: &Table<'_>) -> Option<usize> {
+    match table.get("axis") {
+        None => Some(2),
+        Some(value) => value.one_of(&["x", "y", "z"]),
+    }
+}
+
+fn read_sector(table: &Table<'_>, words: &[&'static str]) -> Option<Sector> {
+    let index = match table.get("sector") {
+        None => 0,
+        Some(value) => value.one_of(words)?,
+    };
+    Some([Sector::Full, Sector::Half, Sector::Quarter, Sector::Octant][index])
+}
+
+const CORE: Range = Range::Within(0.1, 0.9, "a number above 0.1 and at most 0.9");
+
+fn read_cylinder(table: &Table<'_>) -> Option<Shape> {
+    let axis = read_axis(table);
+    let base = table.vector("base");
+    let radius = table.number("radius", Range::Positive);
+    let length = table.number("length", Range::Positive);
+    let sector = read_sector(table, &["full", "half", "quarter"]);
+    let core_fraction = table.number_or("core_fraction", 0.5, CORE);
+    let words = "three whole numbers [core, ring, length] of at least 1";
+    let cells = table.require("cells", words).and_then(|v| v.integers::<3>(words, 1, MAX_CELLS));
+    Some(Shape::Cylinder {
+        axis: axis?,
+        base: base?,
+        radius: radius?,
+        length: length?,
+        sector: sector?,
+        core_fraction,
+        cells: cells?.map(|c| c as u32),
+    })
+}
+
+fn read_sphere(table: &Table<'_>) -> Option<Shape> {
+    let centre = table.vector("centre");
+    let radius = table.number("radius", Range::Positive);
+    let sector = read_sector(table, &["full", "half", "quarter", "octant"]);
+    let core_fraction = table.number_or("core_fraction", 0.5, CORE);
+    let words = "two whole numbers [core, layers] of at least 1";
+    let cells = table.require("cells", words).and_then(|v| v.integers::<2>(words, 1, MAX_CELLS));
+    Some(Shape::Sphere {
+        centre: centre?,
+        radius: radius?,
+        sector: sector?,
+        core_fraction,
+        cells: cells?.map(|c| c as u32),
+    })
+}
+
+fn read_tube(table: &Table<'_>) -> Option<Shape> {
+    let axis = read_axis(table);
+    let base = table.vector("base");
+    let inner = table.number("inner_radius", Range::Positive);
+    let outer = table.number("outer_radius", Range::Positive);
+    let length = table.number("length", Range::Positive);
+    let start = table.number_or("start_degrees", 0.0, Range::Any);
+    let angle = table.number_or(
+        "angle_degrees",
+        360.0,
+        Range::Within(0.0, 360.0, "an angle above 0 and at most 360 degrees"),
+    );
+    let words = "three whole numbers [radial, angular, length] of at least 1";
+    let cells = table.require("cells", words).and_then(|v| v.integers::<3>(words, 1, MAX_CELLS));
+    let (inner, outer, cells) = (inner?, outer?, cells?);
+    if outer <= inner {
+        table.faults.add(
+            table.at,
+            format!("inner_radius = {inner} and outer_radius = {outer}"),
+            "an outer radius above the inner one",
+            "change one of them",
+        );
+        return None;
+    }
+    if cells[1] as f64 * 120.0 < angle {
+        table.faults.add(
+            table.at,
+            format!("{} cells over {angle} degrees", cells[1]),
+            "cells of at most 120 degrees",
+            "use more cells round the tube",
+        );
+        return None;
+    }
+    Some(Shape::Tube {
+        axis: axis?,
+        base: base?,
+        radii: [inner, outer],
+        length: length?,
+        degrees: [start, angle],
+        cells: cells.map(|c| c as u32),
+    })
+}

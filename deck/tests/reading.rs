@@ -1,0 +1,174 @@
+//! What a deck's tables become in the Model.
+
+use deck::Model;
+use mechanics::{material::Strength, mesh::Topology};
+
+const HEAD: &str = "title = \"t\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n";
+
+fn read(tables: &str) -> Model {
+    deck::read(&format!("{HEAD}{tables}"), "t.toml").unwrap_or_else(|faults| {
+        let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
+        panic!("{}", lines.join("\n"))
+    })
+}
+
+fn cube(name: &str, at: [f64; 3], more: &str) -> String {
+    format!(
+        "[[part]]\nname = \"{name}\"\nmaterial = \"LEAD\"\n{more}\n\
+         box = {{ origin = {at:?}, size = [1, 1, 1], cells = [2, 2, 2] }}\n"
+    )
+}
+
+fn good(name: &str) -> Model {
+    let path = format!("{}/../tests/decks/good/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).expect("the deck is in the repository");
+    deck::read(&text, name).expect("a good deck")
+}
+
+#[test]
+fn defaults_are_those_of_the_reference() {
+    let control = read(&cube("a", [0.0; 3], "")).setup.control;
+    assert_eq!(control.end_cycle, u64::MAX);
+    assert_eq!((control.sort_lag, control.plan_interval), (4, 50));
+    let numbers = [
+        control.safety_factor,
+        control.growth,
+        control.linear_viscosity,
+        control.quadratic_viscosity,
+        control.hourglass,
+    ];
+    assert_eq!(numbers.map(f64::to_bits), [0.6666f64, 1.05, 0.2, 1.0, 0.1].map(f64::to_bits));
+}
+
+#[test]
+fn merged_nodes_keep_the_lowest_index_and_the_others_close_up() {
+    let parts = cube("a", [0.0; 3], "") + &cube("b", [1.0, 0.0, 0.0], "");
+    let apart = read(&parts);
+    let joined = read(&(parts.clone() + "[[join]]\nparts = [\"b\", \"a\"]\n"));
+    assert_eq!((apart.mesh.n_nodes(), joined.mesh.n_nodes()), (54, 45));
+    assert_eq!(joined.mesh.parts[0].nodes, (0..27).collect::<Vec<u32>>());
+    // The i-min nodes of b are the i-max nodes of a; the rest of b follows in order.
+    let mut expected = Vec::new();
+    let mut next = 27;
+    for row in 0..9 {
+        expected.push(2 + 3 * row);
+        expected.extend([next, next + 1]);
+        next += 2;
+    }
+    assert_eq!(joined.mesh.parts[1].nodes, expected);
+    // Numbers do not change with the join.
+    assert_eq!(joined.mesh.node_ids[..28], [&(1..=27).collect::<Vec<u32>>()[..], &[29]].concat());
+    assert_eq!(apart.mesh.parts[1].element_ids, joined.mesh.parts[1].element_ids);
+}
+
+#[test]
+fn four_cubes_round_an_edge_share_its_nodes_whatever_the_order_of_joins() {
+    let mut parts = String::new();
+    for (n, (x, y)) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].into_iter().enumerate() {
+        parts += &cube(&format!("c{n}"), [x, y, 0.0], &format!("velocity = [{n}, 0, 0]"));
+    }
+    let all = read(&(parts.clone() + "[[join]]\nparts = \"all\"\n"));
+    assert_eq!(all.mesh.n_nodes(), 5 * 5 * 3);
+    let pairs = ["c3\", \"c2", "c1\", \"c3", "c0\", \"c1"];
+    let joins: String = pairs.iter().map(|p| format!("[[join]]\nparts = [\"{p}\"]\n")).collect();
+    let chain = read(&(parts + &joins));
+    // c0 and c2 are not joined, so the face between them stays open but for the shared edge.
+    assert_eq!(chain.mesh.n_nodes(), 5 * 5 * 3 + 2 * 3);
+    let edge = all.mesh.positions.iter().position(|p| *p == [1.0, 1.0, 0.0]).expect("the edge is there");
+    assert!((all.velocity[edge][0] - 1.5).abs() < 1e-15);
+}
+
+#[test]
+fn join_energy_is_the_loss_of_kinetic_energy() {
+    let parts = cube("a", [0.0; 3], "velocity = [0, 3, 4]") + &cube("b", [1.0, 0.0, 0.0], "");
+    let model = read(&(parts + "[[join]]\nparts = \"all\"\n"));
+    // Half of each cube's mass on the interface is a quarter: of 11340 kg, 2835 kg on either side.
+    let reduced = 2835.0 / 2.0;
+    assert!((model.join_energy / (0.5 * reduced * 25.0) - 1.0).abs() < 1e-12);
+    let same = cube("a", [0.0; 3], "velocity = [0, 3, 4]")
+        + &cube("b", [1.0, 0.0, 0.0], "velocity = [0, 3, 4]")
+        + "[[join]]\nparts = \"all\"\n";
+    let model = read(&same);
+    assert_eq!(model.join_energy.to_bits(), 0);
+    assert!(model.velocity.iter().all(|v| v.map(f64::to_bits) == [0.0f64, 3.0, 4.0].map(f64::to_bits)));
+}
+
+#[test]
+fn contact_matrices_are_symmetric_and_follow_the_pairs() {
+    let contact = good("join").setup.contact.expect("the deck has contact");
+    // a, b, c: self-interaction of all but c, a and c off.
+    assert_eq!(contact.interacts, [true, true, false, true, true, true, false, true, false]);
+    let friction = [0.2, 0.2, 0.2, 0.2, 0.2, 0.05, 0.2, 0.05, 0.2];
+    assert_eq!(contact.friction, friction);
+    assert_eq!([contact.gap, contact.slack, contact.stiffness], [0.1, 0.2, 0.4]);
+}
+
+#[test]
+fn boundaries_merge_by_node_and_set_the_initial_velocity() {
+    let model = good("boundaries");
+    let at = |p: [f64; 3]| {
+        let node = model.mesh.positions.iter().position(|x| *x == p).expect("a node of the mesh");
+        (model.setup.constraints[usize::from(model.constraint[node])].velocity, model.velocity[node])
+    };
+    assert_eq!(at([2.0, 2.0, 2.0]).0, [None; 3]);
+    assert_eq!(at([2.0, 2.0, 0.0]).0, [Some(0.0); 3]);
+    assert_eq!(at([0.0, 2.0, 2.0]).0, [Some(0.0), None, Some(0.0)]);
+    assert_eq!(at([2.0, 0.0, 2.0]).0, [None, Some(0.0), None]);
+    assert_eq!(at([4.0, 4.0, 4.0]), ([Some(2.5), None, Some(0.0)], [2.5, 0.0, 0.0]));
+    let wall = &model.setup.walls[0];
+    assert_eq!(wall.normal, [0.0, 0.0, 1.0]);
+    assert_eq!(model.setup.constraints[0].velocity, [None; 3]);
+}
+
+#[test]
+fn library_values_come_in_the_units_of_the_deck() {
+    let deck = "title = \"t\"\nunits = \"cm-g-us\"\n[control]\nend_cycle = 1\n".to_string()
+        + &cube("a", [0.0; 3], "").replace("LEAD", "STEEL_1006");
+    let model = deck::read(&deck, "t.toml").expect("a good deck");
+    let steel = &model.setup.materials[0];
+    assert_eq!(steel.density.to_bits(), 7.896f64.to_bits());
+    let Strength::JohnsonCook { shear, a, specific_heat, rate0, t_melt, .. } = steel.strength else {
+        panic!("{steel:?}")
+    };
+    let read = [shear, a, specific_heat, rate0, t_melt];
+    let expected = [0.818, 0.0035, 452e-8, 1e-6, 1811.0];
+    assert!(read.iter().zip(expected).all(|(r, e)| (r / e - 1.0).abs() < 1e-15), "{read:?}");
+}
+
+#[test]
+fn parts_of_one_material_share_its_entry() {
+    let own = "[[material]]\nname = \"own\"\ndensity = 1\neos = { type = \"linear\", bulk = 1 }\n";
+    let parts = cube("a", [0.0; 3], "")
+        + &cube("b", [2.0, 0.0, 0.0], "").replace("LEAD", "own")
+        + &cube("c", [4.0, 0.0, 0.0], "");
+    let model = read(&(own.to_string() + &parts));
+    assert_eq!(model.setup.materials.len(), 2);
+    assert_eq!(model.mesh.parts.iter().map(|p| p.material).collect::<Vec<_>>(), [0, 1, 0]);
+    assert_eq!(model.setup.materials[1].strength, Strength::Hydro);
+}
+
+#[test]
+fn blocks_are_numbered_above_the_numbers_that_the_deck_gives() {
+    let model = good("blocks");
+    let explicit = model.mesh.parts.last().expect("the deck has parts");
+    assert_eq!(explicit.element_ids, [100]);
+    let first = &model.mesh.parts[0];
+    assert_eq!((first.element_ids[0], model.mesh.node_ids[0]), (101, 9));
+    assert!(matches!(first.topology, Topology::Structured { cells: [4, 3, 2] }));
+    let mut ids = model.mesh.node_ids.clone();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), model.mesh.n_nodes());
+    let gauge = model.output.gauges[0].node as usize;
+    assert_eq!(model.mesh.positions[gauge], [81.0, 1.0, 1.0]);
+}
+
+#[test]
+fn the_same_text_gives_the_same_bits() {
+    let text = std::fs::read_to_string(format!("{}/examples/self-contact.toml", env!("CARGO_MANIFEST_DIR")))
+        .expect("the example is in the repository");
+    let (a, b) = (deck::read(&text, "a").expect("good"), deck::read(&text, "b").expect("good"));
+    let bits = |m: &Model| m.mesh.positions.iter().flatten().map(|x| x.to_bits()).collect::<Vec<u64>>();
+    assert_eq!(bits(&a), bits(&b));
+    assert_eq!(a, b);
+}
