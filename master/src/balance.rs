@@ -23,7 +23,8 @@ pub fn assign(units: &[WorkUnit], speeds: &[f64], owner: &dyn Fn(u32) -> usize) 
         for &node in &unit.nodes {
             let w = owner(node);
             count[w] += 1;
-            if best == usize::MAX || (count[w], std::cmp::Reverse(w)) > (count[best], std::cmp::Reverse(best)) {
+            if best == usize::MAX || (count[w], std::cmp::Reverse(w)) > (count[best], std::cmp::Reverse(best))
+            {
                 best = w;
             }
         }

@@ -80,7 +80,9 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize]) -> Vec<Subdomain> {
                 let centres: Vec<[f64; 3]> = (0..hexahedra.len())
                     .map(|e| {
                         let corners = mesh_part.corners(e);
-                        std::array::from_fn(|a| corners.iter().map(|&n| mesh.positions[n as usize][a]).sum::<f64>())
+                        std::array::from_fn(|a| {
+                            corners.iter().map(|&n| mesh.positions[n as usize][a]).sum::<f64>()
+                        })
                     })
                     .collect();
                 let all = (0..hexahedra.len() as u32).collect();
@@ -103,7 +105,13 @@ fn fastest(workers: &[usize], speeds: &[f64]) -> usize {
 
 /// Recursive bisection along index planes: the axis with the smaller interface, unless whole planes miss the share of
 /// the workers by much more than another axis would.
-fn cut_planes(low: [u32; 3], high: [u32; 3], workers: &[usize], speeds: &[f64], out: &mut Vec<(Region, usize)>) {
+fn cut_planes(
+    low: [u32; 3],
+    high: [u32; 3],
+    workers: &[usize],
+    speeds: &[f64],
+    out: &mut Vec<(Region, usize)>,
+) {
     let length: [u32; 3] = std::array::from_fn(|a| high[a] - low[a]);
     if workers.len() == 1 || length.iter().all(|&l| l <= 1) {
         out.push((Region::Cells { low, high }, fastest(workers, speeds)));
@@ -137,7 +145,13 @@ fn cut_planes(low: [u32; 3], high: [u32; 3], workers: &[usize], speeds: &[f64], 
 }
 
 /// Recursive coordinate bisection along the longest extent of the element centres; ties by element number.
-fn bisect(mut elements: Vec<u32>, centres: &[[f64; 3]], workers: &[usize], speeds: &[f64], out: &mut Vec<(Region, usize)>) {
+fn bisect(
+    mut elements: Vec<u32>,
+    centres: &[[f64; 3]],
+    workers: &[usize],
+    speeds: &[f64],
+    out: &mut Vec<(Region, usize)>,
+) {
     if workers.len() == 1 || elements.len() <= 1 {
         elements.sort_unstable();
         out.push((Region::List(elements), fastest(workers, speeds)));

@@ -78,7 +78,9 @@ pub fn run(
     let (send, receive) = mpsc::channel();
     let mut host = Host {
         job,
-        places: (0..n_workers).map(|_| Place { session: Session::new(), machine: Some(Box::default()) }).collect(),
+        places: (0..n_workers)
+            .map(|_| Place { session: Session::new(), machine: Some(Box::default()) })
+            .collect(),
         queue: VecDeque::new(),
         // With one worker, tasks run where the loop runs: on the pool.
         pool: (n_workers > 1).then(|| Arc::clone(&pool)),
@@ -130,12 +132,14 @@ impl Host {
             };
             match arrival {
                 Arrival::ToMaster(worker, packed) => {
-                    let message = wire::unpack_to_master(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
+                    let message =
+                        wire::unpack_to_master(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
                     let actions = self.job.apply(Event::Message(worker, message));
                     self.act(actions, sink)?;
                 }
                 Arrival::ToWorker(worker, packed) => {
-                    let message = wire::unpack_to_worker(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
+                    let message =
+                        wire::unpack_to_worker(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
                     self.step(worker, session::Event::Message(message))?;
                 }
                 Arrival::Done(worker, machine, outcome) => {

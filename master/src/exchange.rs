@@ -82,8 +82,12 @@ impl Exchange {
         let mut plans: Vec<Plan> = (0..n).map(|_| Plan::default()).collect();
         for (worker, batch) in batches.iter().enumerate() {
             let Some(batch) = batch else { continue };
-            let mut guests: Vec<u32> =
-                batch.nodes.iter().map(|node| node.global).filter(|&g| !holdings.holds(worker as u32, g)).collect();
+            let mut guests: Vec<u32> = batch
+                .nodes
+                .iter()
+                .map(|node| node.global)
+                .filter(|&g| !holdings.holds(worker as u32, g))
+                .collect();
             guests.sort_unstable();
             for &node in &guests {
                 let owner = holdings.owner_worker[node as usize];

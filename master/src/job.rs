@@ -257,7 +257,12 @@ impl Job {
     ///
     /// # Errors
     /// If the problem cannot start: elements without volume, contact zones that overlap, no worker.
-    pub fn new(model: Arc<Model>, hands: &[Hand], options: Options, resume: Option<Snapshot>) -> Result<(Self, Vec<Action>), String> {
+    pub fn new(
+        model: Arc<Model>,
+        hands: &[Hand],
+        options: Options,
+        resume: Option<Snapshot>,
+    ) -> Result<(Self, Vec<Action>), String> {
         if hands.is_empty() {
             return Err("no worker: start one with `bolide worker --master HOST`".to_owned());
         }
@@ -272,7 +277,9 @@ impl Job {
                 (start, fresh_quanta, ledger, Vec::new(), BTreeMap::new(), None)
             }
             Some(snapshot) => {
-                if snapshot.state.x.len() != start.x.len() || snapshot.state.initial_volume != start.initial_volume {
+                if snapshot.state.x.len() != start.x.len()
+                    || snapshot.state.initial_volume != start.initial_volume
+                {
                     return Err("the snapshot is of another problem: its mesh is not this deck's".to_owned());
                 }
                 let cycle = snapshot.state.cycle;
@@ -501,7 +508,9 @@ impl Job {
             ToMaster::Transfer { cycle, state } => self.transfer(worker, cycle, state, actions),
             ToMaster::Image { cycle, version, pieces, last, work } => {
                 if version != IMAGE_VERSION {
-                    return Err(format!("worker {worker} sends images of version {version}, this master reads {IMAGE_VERSION}"));
+                    return Err(format!(
+                        "worker {worker} sends images of version {version}, this master reads {IMAGE_VERSION}"
+                    ));
                 }
                 self.work[worker] = work;
                 self.image(worker, cycle, pieces, last, actions)
@@ -510,7 +519,13 @@ impl Job {
         }
     }
 
-    fn ready(&mut self, worker: usize, vote: Option<Box<Vote>>, lanes: String, actions: &mut Vec<Action>) -> Result<(), String> {
+    fn ready(
+        &mut self,
+        worker: usize,
+        vote: Option<Box<Vote>>,
+        lanes: String,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), String> {
         if self.running || std::mem::replace(&mut self.ready[worker], true) {
             return Err(format!("worker {worker} is ready twice"));
         }
@@ -570,7 +585,10 @@ impl Job {
         let control = self.model.setup.control;
         let after = next + 1;
         if self.stop_at.is_none()
-            && (self.stop_asked || self.failure.is_some() || time_after >= control.end_time || after >= control.end_cycle)
+            && (self.stop_asked
+                || self.failure.is_some()
+                || time_after >= control.end_time
+                || after >= control.end_cycle)
         {
             self.stop_at = Some(after);
         }
@@ -596,7 +614,7 @@ impl Job {
         let lag = u64::from(self.model.setup.control.sort_lag);
         let waiting = self.exchanges.iter().filter(|(acts_at, _)| *acts_at > self.completed).count();
         let in_flight = self.sorts_under_way.len() + waiting;
-        if in_flight as u64 > lag {
+        if in_flight as u64 > 2 * lag + 2 {
             return false;
         }
         if self.options.force_sorts.at(cycle) {
@@ -647,7 +665,10 @@ impl Job {
         let exchange = self.exchange_at(cycle)?;
         let expected = exchange.n_partials(worker);
         if partials.len() != expected {
-            return Err(format!("worker {worker}, cycle {cycle}: {} numbers of partial forces, the plan has {expected}", partials.len()));
+            return Err(format!(
+                "worker {worker}, cycle {cycle}: {} numbers of partial forces, the plan has {expected}",
+                partials.len()
+            ));
         }
         let n = self.n_workers;
         let arrivals = self.arrivals.entry(cycle).or_insert_with(|| Arrivals {
@@ -700,7 +721,8 @@ impl Job {
             }
             None => self.vote_before.clone().ok_or("a cycle without a vote")?,
         };
-        let (dt_now, time_now) = *self.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
+        let (dt_now, time_now) =
+            *self.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
         if let Some(state) = self.snapshot_state.take() {
             let dt_previous = cycle.checked_sub(1).and_then(|c| self.steps.get(&c)).map_or(0.0, |s| s.0);
             actions.push(Action::Snapshot(Box::new(Snapshot {
@@ -742,7 +764,10 @@ impl Job {
             for (worker, gathered) in arrivals.gathered.iter().enumerate() {
                 let expected = bench.sorter.n_gathered(worker);
                 if gathered.len() != expected {
-                    return Err(format!("worker {worker} gathered {} numbers, expected {expected}", gathered.len()));
+                    return Err(format!(
+                        "worker {worker} gathered {} numbers, expected {expected}",
+                        gathered.len()
+                    ));
                 }
             }
             actions.push(Action::Sort(Arc::clone(bench), bench.sorter.positions(&arrivals.gathered)));
@@ -798,9 +823,16 @@ impl Job {
                 vote.worst_depth
             ))
         } else if self.ledger.worst_courant > 1.0 {
-            Some(format!("cycle {cycle}: time step {dt:e} above the Courant limit {:e} of element {}; lower control.safety_factor", vote.courant, self.element_name(vote.courant_element)))
+            Some(format!(
+                "cycle {cycle}: time step {dt:e} above the Courant limit {:e} of element {}; lower control.safety_factor",
+                vote.courant,
+                self.element_name(vote.courant_element)
+            ))
         } else if self.ledger.worst_gap_travel > 0.2 {
-            Some(format!("cycle {cycle}: a contact node travelled {:.3} gaps in one cycle, at most 0.2; lower control.safety_factor or control.growth", self.ledger.worst_gap_travel))
+            Some(format!(
+                "cycle {cycle}: a contact node travelled {:.3} gaps in one cycle, at most 0.2; lower control.safety_factor or control.growth",
+                self.ledger.worst_gap_travel
+            ))
         } else {
             self.stale(vote, cycle)
         };
@@ -830,7 +862,11 @@ impl Job {
         for part in &self.model.mesh.parts {
             let n = part.n_elements();
             if left < n {
-                return format!("{} of part `{}`", part.element_ids.get(left).copied().unwrap_or(left as u32), part.name);
+                return format!(
+                    "{} of part `{}`",
+                    part.element_ids.get(left).copied().unwrap_or(left as u32),
+                    part.name
+                );
             }
             left -= n;
         }
@@ -858,7 +894,13 @@ impl Job {
         Ok(())
     }
 
-    fn transfer(&mut self, worker: usize, cycle: u64, state: Vec<f64>, actions: &mut Vec<Action>) -> Result<(), String> {
+    fn transfer(
+        &mut self,
+        worker: usize,
+        cycle: u64,
+        state: Vec<f64>,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), String> {
         let exchange = self
             .exchanges
             .iter()
@@ -867,7 +909,10 @@ impl Job {
             .ok_or_else(|| format!("worker {worker} transfers nodes at cycle {cycle}, where no plan acts"))?;
         let expected = exchange.n_transfer(worker);
         if state.len() != expected {
-            return Err(format!("worker {worker} transfers {} numbers at cycle {cycle}, the plan has {expected}", state.len()));
+            return Err(format!(
+                "worker {worker} transfers {} numbers at cycle {cycle}, the plan has {expected}",
+                state.len()
+            ));
         }
         let n = self.n_workers;
         let sent = self.transfers.entry(cycle).or_insert_with(|| vec![None; n]);
@@ -964,8 +1009,15 @@ fn imbalance(elements: &[f64], interactions: &[u64], speeds: &[f64]) -> f64 {
 }
 
 /// The external gap: nodes of one part may not start inside the zone of another.
-fn refuse_overlap(mesh: &Mesh, surface: &Surface, inside: &[(u32, u32, f64)], gap: f64) -> Result<(), String> {
-    let foreign = inside.iter().find(|(node, face, _)| surface.node_part[*node as usize] != surface.faces[*face as usize].part);
+fn refuse_overlap(
+    mesh: &Mesh,
+    surface: &Surface,
+    inside: &[(u32, u32, f64)],
+    gap: f64,
+) -> Result<(), String> {
+    let foreign = inside
+        .iter()
+        .find(|(node, face, _)| surface.node_part[*node as usize] != surface.faces[*face as usize].part);
     match foreign {
         None => Ok(()),
         Some(&(node, face, distance)) => Err(format!(

@@ -101,7 +101,11 @@ impl Ledger {
             total,
             error,
             momentum: vote.momentum,
-            parts: vote.parts.iter().map(|p| PartEnergy { kinetic: p.kinetic, internal: p.internal }).collect(),
+            parts: vote
+                .parts
+                .iter()
+                .map(|p| PartEnergy { kinetic: p.kinetic, internal: p.internal })
+                .collect(),
             gauges: vote
                 .gauges
                 .iter()

@@ -35,7 +35,12 @@ pub fn read_deck(path: &Path) -> Result<Model, String> {
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     deck::read(&text, &path.display().to_string()).map_err(|faults| {
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
-        format!("{} fault{} in the deck\n{}", lines.len(), if lines.len() == 1 { "" } else { "s" }, lines.join("\n"))
+        format!(
+            "{} fault{} in the deck\n{}",
+            lines.len(),
+            if lines.len() == 1 { "" } else { "s" },
+            lines.join("\n")
+        )
     })
 }
 
@@ -87,9 +92,9 @@ pub fn speeds_for(n: usize, given: &[f64]) -> Result<Vec<f64>, String> {
 
 /// Where a run writes: `--out`, or results/<deck name>.
 pub fn folder_for(deck: &Path, args: &JobArgs) -> PathBuf {
-    args.out.clone().unwrap_or_else(|| {
-        Path::new("results").join(deck.file_stem().unwrap_or(std::ffi::OsStr::new("run")))
-    })
+    args.out
+        .clone()
+        .unwrap_or_else(|| Path::new("results").join(deck.file_stem().unwrap_or(std::ffi::OsStr::new("run"))))
 }
 
 /// Runs a deck in this process.
@@ -108,7 +113,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         .collect();
     let resume = args.resume.as_deref().map(snapshot::read).transpose()?;
     let folder = if args.job.no_output { None } else { Some(folder_for(&args.deck, &args.job)) };
-    let folder = folder.map(|path| Folder::create(&path, args.job.force)).transpose().map_err(|e| e.to_string())?;
+    let folder =
+        folder.map(|path| Folder::create(&path, args.job.force)).transpose().map_err(|e| e.to_string())?;
     let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&args.job), resume)?;
     let census = Census::of(&job, &model);
     let mut output = Output::new(Arc::clone(&model), folder, args.job.json)?;
@@ -253,7 +259,9 @@ pub fn stop_on_interrupt() -> Arc<AtomicBool> {
     std::thread::Builder::new()
         .name("signals".to_owned())
         .spawn(move || {
-            let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else { return };
+            let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else {
+                return;
+            };
             runtime.block_on(async {
                 use tokio::signal::unix::{SignalKind, signal};
                 let Ok(mut term) = signal(SignalKind::terminate()) else { return };
@@ -325,7 +333,10 @@ impl Output {
         }
         self.last_state_time = Some(state.time);
         let model = &self.model;
-        self.series.as_mut().map_or(Ok(()), |series| series.write(model, state, None)).map_err(|e| e.to_string())
+        self.series
+            .as_mut()
+            .map_or(Ok(()), |series| series.write(model, state, None))
+            .map_err(|e| e.to_string())
     }
 
     fn progress(&mut self, progress: Progress) {
@@ -336,7 +347,8 @@ impl Output {
         }
         self.last_line = now;
         let control = &self.model.setup.control;
-        let share = (progress.time / control.end_time).max(progress.cycle as f64 / control.end_cycle as f64).min(1.0);
+        let share =
+            (progress.time / control.end_time).max(progress.cycle as f64 / control.end_cycle as f64).min(1.0);
         let elapsed = now.duration_since(self.started).as_secs_f64();
         let grind = elapsed * 1e9 / (progress.cycle.max(1) as f64 * self.model.mesh.n_elements() as f64);
         let limit = match (progress.limit, progress.element) {

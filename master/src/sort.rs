@@ -90,7 +90,9 @@ impl Sorter {
         let mass = |node: u32| state.mass[node as usize];
         let batches = mine
             .iter()
-            .map(|units| (!units.is_empty()).then(|| Batch::gather(&self.surface, units, &mass, &self.exclusions)))
+            .map(|units| {
+                (!units.is_empty()).then(|| Batch::gather(&self.surface, units, &mass, &self.exclusions))
+            })
             .collect();
         Sorted { exchange: Exchange::new(holdings, batches, state), census, interactions }
     }

@@ -81,7 +81,9 @@ pub fn unpack_to_worker(kind: Kind, bytes: &[u8]) -> Result<ToWorker> {
             Ok(ToWorker::Totals { cycle: head.cycle, orders: head.orders, totals: codec::f64s(arrays)? })
         }
         Kind::Control => match codec::decode(bytes, MESSAGE_LIMIT)? {
-            ToWorker::Totals { .. } => Err(Error::Unexpected { found: kind, expected: "totals in a totals frame" }),
+            ToWorker::Totals { .. } => {
+                Err(Error::Unexpected { found: kind, expected: "totals in a totals frame" })
+            }
             message => Ok(message),
         },
         found => Err(Error::Unexpected { found, expected: "a control or totals frame" }),
@@ -119,16 +121,24 @@ pub fn unpack_to_master(kind: Kind, bytes: &[u8]) -> Result<ToMaster> {
             let mut partials = codec::f64s(arrays)?;
             let (found, stated) = (partials.len() as u64, head.partials.saturating_add(head.gathered));
             if found < stated {
-                return Err(Error::Truncated { what: "arrays of a cycle", found: 8 * found, needed: stated.saturating_mul(8) });
+                return Err(Error::Truncated {
+                    what: "arrays of a cycle",
+                    found: 8 * found,
+                    needed: stated.saturating_mul(8),
+                });
             }
             if found > stated {
-                return Err(Error::Message(format!("{found} numbers in a cycle frame, its head says {stated}")));
+                return Err(Error::Message(format!(
+                    "{found} numbers in a cycle frame, its head says {stated}"
+                )));
             }
             let gathered = partials.split_off(head.partials as usize);
             Ok(ToMaster::Cycle { cycle: head.cycle, vote: head.vote, partials, gathered })
         }
         Kind::Control => match codec::decode(bytes, MESSAGE_LIMIT)? {
-            ToMaster::Cycle { .. } => Err(Error::Unexpected { found: kind, expected: "a cycle in a cycle frame" }),
+            ToMaster::Cycle { .. } => {
+                Err(Error::Unexpected { found: kind, expected: "a cycle in a cycle frame" })
+            }
             message => Ok(message),
         },
         found => Err(Error::Unexpected { found, expected: "a control or cycle frame" }),
@@ -147,7 +157,8 @@ fn with_arrays(head: &[u8], arrays: &[&[f64]]) -> Vec<u8> {
 }
 
 fn split_head(bytes: &[u8]) -> Result<(&[u8], &[u8])> {
-    let needed = |n: usize| Error::Truncated { what: "head of arrays", found: bytes.len() as u64, needed: n as u64 };
+    let needed =
+        |n: usize| Error::Truncated { what: "head of arrays", found: bytes.len() as u64, needed: n as u64 };
     let (length, rest) = bytes.split_first_chunk::<4>().ok_or_else(|| needed(4))?;
     let length = u32::from_le_bytes(*length) as usize;
     rest.split_at_checked(length).ok_or_else(|| needed(4 + length))

@@ -34,7 +34,10 @@ impl Meter for ThreadClock {
 impl ThreadClock {
     /// What has been counted so far.
     pub fn work(&self) -> Work {
-        Work { compute_ns: self.all.load(Ordering::Relaxed), contact_ns: self.contact.load(Ordering::Relaxed) }
+        Work {
+            compute_ns: self.all.load(Ordering::Relaxed),
+            contact_ns: self.contact.load(Ordering::Relaxed),
+        }
     }
 }
 

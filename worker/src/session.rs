@@ -6,12 +6,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use mechanics::{
-    block::Piece,
-    cycle::Plan,
-    exact::Quantum,
-    vote::Vote,
-};
+use mechanics::{block::Piece, cycle::Plan, exact::Quantum, vote::Vote};
 use protocol::message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToWorker, Work};
 
 /// What happens to a session.
@@ -243,7 +238,10 @@ impl Session {
             }
             ToWorker::Totals { cycle, orders, totals } => {
                 if self.totals.len() >= MAX_BUFFERED {
-                    return Err(format!("totals of cycle {cycle} while {} cycles wait, at most {MAX_BUFFERED}", self.totals.len()));
+                    return Err(format!(
+                        "totals of cycle {cycle} while {} cycles wait, at most {MAX_BUFFERED}",
+                        self.totals.len()
+                    ));
                 }
                 self.orders.insert(orders.next, orders);
                 if !totals.is_empty() {
@@ -272,8 +270,18 @@ impl Session {
             }
             (Phase::Imaging, Outcome::Image { pieces, work }) => {
                 let stop = self.flags()?.stop;
-                let last = if stop { Some(self.vote.take().unwrap_or_else(|| Box::new(Vote::empty(0)))) } else { None };
-                actions.push(Action::Send(ToMaster::Image { cycle: self.cycle, version: IMAGE_VERSION, pieces, last, work }));
+                let last = if stop {
+                    Some(self.vote.take().unwrap_or_else(|| Box::new(Vote::empty(0))))
+                } else {
+                    None
+                };
+                actions.push(Action::Send(ToMaster::Image {
+                    cycle: self.cycle,
+                    version: IMAGE_VERSION,
+                    pieces,
+                    last,
+                    work,
+                }));
                 if stop {
                     self.phase = Phase::Over;
                     return Ok(());
@@ -324,7 +332,10 @@ impl Session {
     /// The orders whose flags act at the start of this cycle.
     fn flags(&self) -> Result<Orders, String> {
         let before = self.cycle.wrapping_sub(1);
-        self.orders.get(&before).copied().ok_or_else(|| format!("no orders for the start of cycle {}", self.cycle))
+        self.orders
+            .get(&before)
+            .copied()
+            .ok_or_else(|| format!("no orders for the start of cycle {}", self.cycle))
     }
 
     fn force_quantum(&mut self) -> Result<Quantum, String> {
@@ -355,7 +366,11 @@ impl Session {
         }
         self.phase = Phase::Border;
         let quantum = self.force_quantum()?;
-        actions.push(Action::Compute(Task::Border { dt_previous: self.dt_previous, quantum, gather: flags.gather }));
+        actions.push(Action::Compute(Task::Border {
+            dt_previous: self.dt_previous,
+            quantum,
+            gather: flags.gather,
+        }));
         Ok(())
     }
 
@@ -385,7 +400,12 @@ impl Session {
             self.n_exchange = plan.exchange.len();
             self.plan_hash = hash;
             self.phase = Phase::Border;
-            actions.push(Action::Compute(Task::Install { plan, guest_state, dt_previous: self.dt_previous, gather }));
+            actions.push(Action::Compute(Task::Install {
+                plan,
+                guest_state,
+                dt_previous: self.dt_previous,
+                gather,
+            }));
         }
         Ok(())
     }
@@ -404,7 +424,9 @@ impl Session {
                     Some((_, totals)) => totals,
                     None => return Ok(()),
                 },
-                Some((cycle, _)) => return Err(format!("totals of cycle {cycle} before those of cycle {}", self.cycle)),
+                Some((cycle, _)) => {
+                    return Err(format!("totals of cycle {cycle} before those of cycle {}", self.cycle));
+                }
                 None => return Ok(()),
             }
         };

@@ -188,13 +188,15 @@ impl Domain {
             }
             let own = first as u32..rooms.len() as u32;
             let first_copy = |node: u32| {
-                home.get(&node).and_then(|copies| copies.iter().copied().find(|(block, _)| own.contains(block)))
+                home.get(&node)
+                    .and_then(|copies| copies.iter().copied().find(|(block, _)| own.contains(block)))
             };
             for room in own.clone() {
                 for local in 0..rooms[room as usize].block.nodes.len() as u32 {
                     let node = rooms[room as usize].block.nodes[local as usize];
                     let owned = subdomain.unowned.binary_search(&node).is_err();
-                    rooms[room as usize].booked[local as usize] = owned && first_copy(node) == Some((room, local));
+                    rooms[room as usize].booked[local as usize] =
+                        owned && first_copy(node) == Some((room, local));
                 }
             }
             for &node in &subdomain.surface {
@@ -213,7 +215,8 @@ impl Domain {
             .iter()
             .enumerate()
             .filter_map(|(g, node)| {
-                let &(room, local) = home.get(node)?.iter().find(|&&(r, l)| rooms[r as usize].booked[l as usize])?;
+                let &(room, local) =
+                    home.get(node)?.iter().find(|&&(r, l)| rooms[r as usize].booked[l as usize])?;
                 Some((g as u32, room, local))
             })
             .collect();
@@ -260,7 +263,11 @@ impl Domain {
     /// If the plan names a node that is neither held nor a guest, or the state has the wrong length.
     pub fn install(&mut self, plan: &Plan, guest_state: &[f64]) -> Result<(), String> {
         if guest_state.len() != 6 * plan.guests.len() {
-            return Err(format!("{} numbers of guest state for {} guests, expected 6 each", guest_state.len(), plan.guests.len()));
+            return Err(format!(
+                "{} numbers of guest state for {} guests, expected 6 each",
+                guest_state.len(),
+                plan.guests.len()
+            ));
         }
         let n_guests = plan.guests.len();
         self.guests = Guests {
@@ -272,7 +279,8 @@ impl Domain {
             constraint: plan.guests.iter().map(|g| g.constraint).collect(),
             booked: vec![false; n_guests],
         };
-        let guest_of: HashMap<u32, u32> = self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
+        let guest_of: HashMap<u32, u32> =
+            self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
         let mut contact_of = HashMap::new();
         self.contact = None;
         if let (Some(batch), Some(settings)) = (&plan.batch, &self.setup.contact) {
@@ -281,7 +289,9 @@ impl Domain {
                 let source = match (self.home.get(&node.global), guest_of.get(&node.global)) {
                     (Some(copies), _) => copies[0],
                     (None, Some(&guest)) => (NONE, guest),
-                    (None, None) => return Err(format!("contact node {} is neither held nor a guest", node.global)),
+                    (None, None) => {
+                        return Err(format!("contact node {} is neither held nor a guest", node.global));
+                    }
                 };
                 sources.push(source);
                 contact_of.insert(node.global, i as u32);
@@ -383,7 +393,8 @@ impl Domain {
             for f in &mut room.f {
                 f.fill(0.0);
             }
-            let vote = room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
+            let vote =
+                room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
             self.vote.add_contact(&vote);
         }
         meter.stop(mark, true);
@@ -466,9 +477,19 @@ impl Domain {
     ///
     /// # Errors
     /// If `totals` has not three numbers for each node of the exchange.
-    pub fn integrate(&mut self, totals: &[f64], dt_previous: f64, dt: f64, meter: &dyn Meter) -> Result<Vote, String> {
+    pub fn integrate(
+        &mut self,
+        totals: &[f64],
+        dt_previous: f64,
+        dt: f64,
+        meter: &dyn Meter,
+    ) -> Result<Vote, String> {
         if totals.len() != 3 * self.exchange.len() {
-            return Err(format!("{} numbers of total forces for {} shared nodes, expected 3 each", totals.len(), self.exchange.len()));
+            return Err(format!(
+                "{} numbers of total forces for {} shared nodes, expected 3 each",
+                totals.len(),
+                self.exchange.len()
+            ));
         }
         let mark = meter.start();
         for (i, total) in totals.chunks_exact(3).enumerate() {
@@ -532,7 +553,8 @@ impl Domain {
         }
         for &(gauge, room, local) in &self.gauges {
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
-            let values = [block.x[0][i], block.x[1][i], block.x[2][i], block.v[0][i], block.v[1][i], block.v[2][i]];
+            let values =
+                [block.x[0][i], block.x[1][i], block.x[2][i], block.v[0][i], block.v[1][i], block.v[2][i]];
             vote.gauges.push((gauge, values));
         }
         vote
@@ -560,7 +582,13 @@ fn speed_squared(v: &[Vec<f64>; 3], i: usize) -> f64 {
     v[0][i] * v[0][i] + v[1][i] * v[1][i] + v[2][i] * v[2][i]
 }
 
-fn pack(rooms: &[Room], guests: &Guests, sources: &[(u32, u32)], x: &mut [Vec<f64>; 3], v: &mut [Vec<f64>; 3]) {
+fn pack(
+    rooms: &[Room],
+    guests: &Guests,
+    sources: &[(u32, u32)],
+    x: &mut [Vec<f64>; 3],
+    v: &mut [Vec<f64>; 3],
+) {
     for (i, &(room, local)) in sources.iter().enumerate() {
         let local = local as usize;
         let (from_x, from_v) = match room {

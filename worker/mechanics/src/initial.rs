@@ -5,8 +5,8 @@ use crate::{
     mesh::Mesh,
     setup::{Constraint, MAX_WALLS, Setup},
     state::{GlobalState, N_FIELDS, field},
-    vote::Quanta,
     volume,
+    vote::Quanta,
 };
 
 /// The state at time zero.
@@ -15,7 +15,12 @@ use crate::{
 ///
 /// # Errors
 /// Names the first element without a positive volume.
-pub fn state(mesh: &Mesh, setup: &Setup, velocity: &[[f64; 3]], constraint: &[u16]) -> Result<GlobalState, String> {
+pub fn state(
+    mesh: &Mesh,
+    setup: &Setup,
+    velocity: &[[f64; 3]],
+    constraint: &[u16],
+) -> Result<GlobalState, String> {
     let n_elements = mesh.n_elements();
     let mut state = GlobalState {
         cycle: 0,
@@ -33,7 +38,10 @@ pub fn state(mesh: &Mesh, setup: &Setup, velocity: &[[f64; 3]], constraint: &[u1
         for e in 0..part.n_elements() {
             let v = volume::hexahedron(&part.corners(e).map(|n| mesh.positions[n as usize]));
             if v <= 0.0 || !v.is_finite() {
-                return Err(format!("element {} of part `{}`: volume {v:e}, must be positive", part.element_ids[e], part.name));
+                return Err(format!(
+                    "element {} of part `{}`: volume {v:e}, must be positive",
+                    part.element_ids[e], part.name
+                ));
             }
             let index = state.initial_volume.len();
             state.initial_volume.push(v);
@@ -132,7 +140,8 @@ pub fn bind_walls(mesh: &Mesh, setup: &mut Setup, constraint: &mut [u16]) -> Res
             let velocity = setup.constraints[held as usize].velocity;
             setup.constraints.push(Constraint { velocity, walls });
         }
-        constraint[n] = u16::try_from(index).map_err(|_| "more than 65,535 kinds of constraint".to_owned())?;
+        constraint[n] =
+            u16::try_from(index).map_err(|_| "more than 65,535 kinds of constraint".to_owned())?;
     }
     Ok(())
 }

@@ -91,7 +91,8 @@ impl Advance<'_> {
                 }
                 if new != free {
                     // Impulse of the support times the mean velocity is its work.
-                    let work = (0..3).map(|a| mass * (new[a] - free[a]) * 0.5 * (old[a] + new[a])).sum::<f64>();
+                    let work =
+                        (0..3).map(|a| mass * (new[a] - free[a]) * 0.5 * (old[a] + new[a])).sum::<f64>();
                     booked.external += quanta.energy.round(work);
                 }
             }
@@ -115,7 +116,9 @@ fn stop_at_wall(wall: &RigidWall, x: [f64; 3], v: &mut [f64; 3], dt: f64) {
     if wall.friction > 0.0 {
         let normal_speed = -height / dt;
         let tangential: [f64; 3] = std::array::from_fn(|a| v[a] - normal_speed * n[a]);
-        let speed = (tangential[0] * tangential[0] + tangential[1] * tangential[1] + tangential[2] * tangential[2]).sqrt();
+        let speed =
+            (tangential[0] * tangential[0] + tangential[1] * tangential[1] + tangential[2] * tangential[2])
+                .sqrt();
         if speed > 0.0 {
             let factor = (wall.friction * change / speed).min(1.0);
             for a in 0..3 {
@@ -130,7 +133,12 @@ mod tests {
     use super::*;
     use crate::exact::Quantum;
 
-    fn advance_one(v: [f64; 3], f: [f64; 3], constraint: Constraint, walls: &[RigidWall]) -> ([f64; 3], [f64; 3], Booked) {
+    fn advance_one(
+        v: [f64; 3],
+        f: [f64; 3],
+        constraint: Constraint,
+        walls: &[RigidWall],
+    ) -> ([f64; 3], [f64; 3], Booked) {
         let mut x = [vec![0.0], vec![0.0], vec![0.001]];
         let mut vel = v.map(|c| vec![c]);
         let force = f.map(|c| vec![c]);
@@ -172,7 +180,8 @@ mod tests {
     #[test]
     fn wall_stops_the_node_on_its_plane_and_friction_follows_coulomb() {
         let touches = Constraint { velocity: [None; 3], walls: 1 };
-        let mut wall = RigidWall { point: [0.0; 3], normal: [0.0, 0.0, 1.0], friction: 0.0, parts: vec![true] };
+        let mut wall =
+            RigidWall { point: [0.0; 3], normal: [0.0, 0.0, 1.0], friction: 0.0, parts: vec![true] };
         let (x, v, _) = advance_one([10.0, 0.0, -10.0], [0.0; 3], touches, std::slice::from_ref(&wall));
         assert!(x[2].abs() < 1e-15 && v[0] == 10.0);
         wall.friction = 0.3;

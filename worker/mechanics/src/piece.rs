@@ -58,7 +58,9 @@ impl Region {
             Self::List(elements) => {
                 let n = n.clamp(1, elements.len().max(1));
                 (0..n)
-                    .map(|i| Self::List(elements[elements.len() * i / n..elements.len() * (i + 1) / n].to_vec()))
+                    .map(|i| {
+                        Self::List(elements[elements.len() * i / n..elements.len() * (i + 1) / n].to_vec())
+                    })
                     .collect()
             }
         }
@@ -107,7 +109,9 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
                 .collect();
             (Topology::Explicit { hexahedra: corners }, nodes, list.clone())
         }
-        (topology, region) => panic!("region {region:?} does not fit part `{}` ({topology:?})", mesh_part.name),
+        (topology, region) => {
+            panic!("region {region:?} does not fit part `{}` ({topology:?})", mesh_part.name)
+        }
     };
     let nodes: Vec<u32> = local_nodes.iter().map(|&n| mesh_part.nodes[n as usize]).collect();
     let elements: Vec<u32> = local_elements.iter().map(|&e| e + offset as u32).collect();
@@ -120,7 +124,9 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         mass: nodes.iter().map(|&n| state.mass[n as usize]).collect(),
         constraint: nodes.iter().map(|&n| state.constraint[n as usize]).collect(),
         initial_volume: elements.iter().map(|&e| state.initial_volume[e as usize]).collect(),
-        fields: std::array::from_fn(|k: usize| elements.iter().map(|&e| state.elements[k][e as usize]).collect()),
+        fields: std::array::from_fn(|k: usize| {
+            elements.iter().map(|&e| state.elements[k][e as usize]).collect()
+        }),
         nodes,
         elements,
     }
@@ -136,13 +142,21 @@ pub fn put_back(piece: &Piece, state: &mut GlobalState) -> Result<(), String> {
         && piece.v.len() == piece.nodes.len()
         && (0..N_FIELDS).all(|k| piece.fields[k].len() == piece.elements.len());
     if !lengths_fit {
-        return Err(format!("image of part {}: array lengths do not fit its {} nodes and {} elements", piece.part, piece.nodes.len(), piece.elements.len()));
+        return Err(format!(
+            "image of part {}: array lengths do not fit its {} nodes and {} elements",
+            piece.part,
+            piece.nodes.len(),
+            piece.elements.len()
+        ));
     }
     if let Some(n) = piece.nodes.iter().find(|&&n| n as usize >= n_nodes) {
         return Err(format!("image of part {}: node index {n}, the problem has {n_nodes} nodes", piece.part));
     }
     if let Some(e) = piece.elements.iter().find(|&&e| e as usize >= n_elements) {
-        return Err(format!("image of part {}: element index {e}, the problem has {n_elements} elements", piece.part));
+        return Err(format!(
+            "image of part {}: element index {e}, the problem has {n_elements} elements",
+            piece.part
+        ));
     }
     for (i, &n) in piece.nodes.iter().enumerate() {
         state.x[n as usize] = piece.x[i];

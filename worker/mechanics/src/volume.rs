@@ -18,7 +18,11 @@ pub fn hexahedron(corners: &[[f64; 3]; 8]) -> f64 {
         [-1.0, 1.0, 1.0],
     ];
     let mode = |sign: &dyn Fn(&[f64; 3]) -> f64| {
-        corners.iter().zip(&XI).fold(Vector3::zeros(), |sum: Vector3<f64>, (x, r)| sum + Vector3::from(*x) * sign(r)) / 8.0
+        corners
+            .iter()
+            .zip(&XI)
+            .fold(Vector3::zeros(), |sum: Vector3<f64>, (x, r)| sum + Vector3::from(*x) * sign(r))
+            / 8.0
     };
     let (a, b, c) = (mode(&|r| r[0]), mode(&|r| r[1]), mode(&|r| r[2]));
     let (d, e, f) = (mode(&|r| r[1] * r[2]), mode(&|r| r[0] * r[2]), mode(&|r| r[0] * r[1]));
