@@ -119,8 +119,8 @@ pub fn react(
     let mut corners = [[0.0; 3]; 4];
     let mut node = [0.0; 3];
     for a in 0..3 {
-        for i in 0..4 {
-            corners[i][a] = force_quantum.round(-(push.weights[i] * force[a]));
+        for (corner, w) in corners.iter_mut().zip(push.weights) {
+            corner[a] = force_quantum.round(-(w * force[a]));
         }
         node[a] = -((corners[0][a] + corners[1][a]) + (corners[2][a] + corners[3][a]));
     }
