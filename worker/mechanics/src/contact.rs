@@ -11,6 +11,8 @@
 //! 4. reduces the hits of a node to distinct closest features with a side ([`joint`]);
 //! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
 //!
+//! Nodes meet faces: two edges that cross while no node is in a zone are not seen.
+//!
 //! Search, geometry (zone and joint) and force know nothing of each other; only [`cycle`] knows all three.
 
 use serde::{Deserialize, Serialize};

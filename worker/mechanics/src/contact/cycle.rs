@@ -101,7 +101,7 @@ impl Contact {
     /// which no spread since the sort exceeds the slack.
     ///
     /// # Panics
-    /// If an index of the batch is out of range: a batch is made by [`Batch::gather`] or checked on arrival.
+    /// If the batch is not sound ([`Batch::is_sound`]) or `x` has fewer nodes.
     pub fn new(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3]) -> Self {
         let mut candidates = search::candidates(batch, settings, x);
         let mut index = vec![u32::MAX; batch.faces.len()];

@@ -19,6 +19,9 @@ const MAX_CUBE: f64 = 2_097_000.0;
 ///
 /// Every pair that interacts and of which the node lies in the face's box grown by the reach is in exactly one
 /// unit. Nodes and faces of parts that interact with nothing are left out.
+///
+/// # Panics
+/// If the settings know fewer parts than the surface.
 pub fn sort(
     surface: &Surface,
     x: &[[f64; 3]],
