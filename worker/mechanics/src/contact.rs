@@ -1,7 +1,7 @@
 //! The words of contact, and the order of its stages; nothing is computed here.
 //!
 //! A *surface* is the outer faces of the elements that are alive, and their nodes ([`surface`]). Every so
-//! often the surface is *sorted* into *work units* ([`sort`], [`work_unit`]): virtual cubes of which each
+//! often the surface is *sorted* into *work units* ([`mod@sort`], [`work_unit`]): virtual cubes of which each
 //! holds the nodes inside it and every face those may meet before the next sort. When that next sort is due
 //! is a rule on displacements ([`reach`]). A worker gets a *batch* of units and each cycle
 //! ([`cycle`]):

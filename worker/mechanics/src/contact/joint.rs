@@ -37,7 +37,7 @@ pub struct Hit {
     pub depth: f64,
     /// Unit vector along the line of node and closest point, out of the solid.
     pub direction: Vector,
-    /// Share of the push this hit has, in (0, 1]; see [`share`].
+    /// Share of the push this hit has, in (0, 1]: below 1 where several hits push the same way.
     pub share: f64,
     /// Whether the node is on the outer side.
     outer: bool,

@@ -15,7 +15,8 @@ pub const SIDES: [[usize; 4]; 6] =
 pub struct Surface {
     /// Global node index of each surface node, ascending.
     pub nodes: Vec<u32>,
-    /// Part of each surface node; the lowest of them where joined parts share it.
+    /// Part of each surface node; the lowest of them where joined parts share it (and the one whose row of the
+    /// matrix counts for it).
     pub node_part: Vec<u32>,
     /// Mean of the stiffness of the faces around each surface node (force per length).
     pub node_stiffness: Vec<f64>,
