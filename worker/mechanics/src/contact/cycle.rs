@@ -101,7 +101,7 @@ impl Contact {
     /// which no spread since the sort exceeds the slack.
     ///
     /// # Panics
-    /// If an index of the batch is out of range: a batch is made by [`Batch::gather`] or checked on arrival.
+    /// If the batch is not sound ([`Batch::is_sound`]) or `x` has fewer nodes.
     pub fn new(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3]) -> Self {
         let mut candidates = search::candidates(batch, settings, x);
         let mut index = vec![u32::MAX; batch.faces.len()];
@@ -255,10 +255,7 @@ impl Contact {
             let sliding = (coefficient > 0.0).then(|| force::Sliding {
                 coefficient,
                 regular: self.settings.friction_velocity,
-                velocity: [0, 1, 2].map(|a| {
-                    let v = &cycle.v[a];
-                    (0..4).fold(v[n], |sum, i| (-weights[i]).mul_add(v[face.nodes[i] as usize], sum))
-                }),
+                velocity: against(cycle.v, n, &face.nodes, &weights),
                 inverse_mass,
                 dt: cycle.dt,
             });
@@ -283,6 +280,18 @@ impl Contact {
             weights,
         )
     }
+}
+
+/// Velocity of a node against the point of a face with these weights.
+#[inline(always)]
+fn against(v: &[Vec<f64>; 3], node: usize, corners: &[u32; 4], weights: &[f64; 4]) -> [f64; 3] {
+    let mut relative = [v[0][node], v[1][node], v[2][node]];
+    for a in 0..3 {
+        for i in 0..4 {
+            relative[a] = (-weights[i]).mul_add(v[a][corners[i] as usize], relative[a]);
+        }
+    }
+    relative
 }
 
 #[cfg(test)]

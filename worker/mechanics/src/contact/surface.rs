@@ -15,7 +15,8 @@ pub const SIDES: [[usize; 4]; 6] =
 pub struct Surface {
     /// Global node index of each surface node, ascending.
     pub nodes: Vec<u32>,
-    /// Part of each surface node; the lowest of them where joined parts share it.
+    /// Part of each surface node; the lowest of them where joined parts share it (and the one whose row of the
+    /// matrix counts for it).
     pub node_part: Vec<u32>,
     /// Mean of the stiffness of the faces around each surface node (force per length).
     pub node_stiffness: Vec<f64>,
@@ -133,7 +134,8 @@ impl Surface {
                 if a != b {
                     let (a, b) = (x[a as usize], x[b as usize]);
                     let e = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-                    smallest = smallest.min(e[2].mul_add(e[2], e[1].mul_add(e[1], e[0] * e[0])));
+                    let length2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+                    smallest = if length2 < smallest { length2 } else { smallest };
                 }
             }
         }
@@ -229,7 +231,7 @@ fn volume(x: &[[f64; 3]; 8]) -> f64 {
     for point in SIGNS {
         let mut j = [[0.0; 3]; 3];
         for (corner, s) in x.iter().zip(SIGNS) {
-            let h = [0, 1, 2].map(|a| (g * s[a]).mul_add(point[a], 1.0));
+            let h = [0, 1, 2].map(|a| 1.0 + g * s[a] * point[a]);
             let derivative = [s[0] * h[1] * h[2], s[1] * h[0] * h[2], s[2] * h[0] * h[1]];
             for a in 0..3 {
                 for b in 0..3 {
