@@ -56,7 +56,8 @@ pub struct Reaction {
     pub friction: f64,
 }
 
-/// Penalty stiffness of a pair: factor times the harmonic mean of both sides (force per length).
+/// Penalty stiffness of a pair: factor times the harmonic mean of both sides (force per length). The factor is the
+/// deck's times the node's share.
 #[inline(always)]
 pub fn stiffness(factor: f64, node: f64, face: f64) -> f64 {
     let sum = node + face;

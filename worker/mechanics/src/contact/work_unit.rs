@@ -75,6 +75,8 @@ pub struct BatchNode {
     pub mass: f64,
     /// Mean `K A^2 / V` of its faces (force per length).
     pub stiffness: f64,
+    /// Share of it that the node takes ([`Surface::node_share`]).
+    pub share: f64,
 }
 
 /// One face of a batch.
@@ -132,6 +134,7 @@ impl Batch {
                 part: surface.node_part[n],
                 mass: mass(global),
                 stiffness: surface.node_stiffness[n],
+                share: surface.node_share[n],
             });
         }
         let mut faces = Vec::new();
