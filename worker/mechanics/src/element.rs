@@ -1,8 +1,8 @@
 //! Elements: the words between a cycle and its element kernels.
 //!
 //! [`Step`] is what a cycle tells the elements, [`ElementVote`] what they answer. The eight-node hexahedron stands
-//! in `hex8`, with its rotation, hourglass control, viscosity and time-step limit beside it; `vector` is the small
-//! algebra they are written in.
+//! in `hex8`, its geometry in `modes`, with rotation, hourglass control, viscosity and time-step limit beside it;
+//! `vector` is the small algebra they are written in.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +10,7 @@ use crate::exact::Quantum;
 
 pub mod hex8;
 pub(crate) mod hourglass;
+pub(crate) mod modes;
 pub(crate) mod rotation;
 pub(crate) mod vector;
 pub(crate) mod viscosity;
