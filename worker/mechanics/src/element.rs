@@ -44,7 +44,9 @@ pub struct ElementVote {
     pub volume_limit: f64,
     /// Internal energy.
     pub internal: f64,
-    /// Energy that hourglass control took in this step.
+    /// Energy that hourglass control took in this step, at the velocity `v_{n-1/2}`. In a mesh, where the forces of
+    /// neighbours mostly balance, that is close; for a single free element it is too much by the part
+    /// `4 c dt / mass` (c the resistance of its modes), since its own force slows it within the step.
     pub hourglass: f64,
     /// Work of artificial viscosity in this step; part of the internal energy.
     pub viscosity: f64,
