@@ -358,11 +358,14 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let mut axis = 0;
     while axis < 3 {
         let mut forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
+        // Seven corners are rounded, the eighth takes what they leave: the element's forces add to exactly zero.
+        let mut rest = zero;
         let mut corner = 0;
         while corner < 8 {
             let force = L::select(active, forces[corner], zero);
             tally.largest_force = tally.largest_force.max(force.abs());
-            forces[corner] = (force + magic) - magic;
+            forces[corner] = if corner == 7 { rest } else { (force + magic) - magic };
+            rest = rest - forces[corner];
             corner += 1;
         }
         // SAFETY: corners are inside the node arrays.
