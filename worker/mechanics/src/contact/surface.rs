@@ -4,7 +4,7 @@
 //! are therefore inside. A face of a degenerate element counts with its distinct nodes and vanishes with fewer
 //! than three. The surface holds static data only; positions come from the caller, by surface node.
 
-use crate::{material::Material, mesh::Mesh, volume};
+use crate::{element::hex8, material::Material, mesh::Mesh};
 
 pub use crate::mesh::FACES as SIDES;
 
@@ -80,7 +80,7 @@ impl Surface {
             let bulk = materials[mesh.parts[part].material as usize].bulk();
             let nodes = SIDES[side as usize].map(|c| corners[c]);
             let area = area(nodes.map(|n| mesh.positions[n as usize]));
-            let volume = volume::hexahedron(&corners.map(|n| mesh.positions[n as usize]));
+            let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
             for n in nodes {
                 index[n as usize] = 0;
             }
@@ -102,7 +102,7 @@ impl Surface {
             for e in 0..part.n_elements() {
                 let corners = part.corners(e);
                 if alive(element) && corners.iter().any(|&n| index[n as usize] != u32::MAX) {
-                    let volume = volume::hexahedron(&corners.map(|n| mesh.positions[n as usize]));
+                    let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
                     for n in corners.map(|n| index[n as usize]).into_iter().filter(|&n| n != u32::MAX) {
                         around[n as usize] += 0.125 * volume;
                     }
@@ -111,7 +111,7 @@ impl Surface {
             }
         }
         for face in &mut faces {
-            let face_volume = volume::hexahedron(&face.corners.map(|n| mesh.positions[n as usize]));
+            let face_volume = hex8::volume(&face.corners.map(|n| mesh.positions[n as usize]));
             face.nodes = face.nodes.map(|n| index[n as usize]);
             for (i, n) in face.corners.into_iter().enumerate() {
                 if !face.corners[..i].contains(&n) {
