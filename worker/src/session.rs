@@ -29,23 +29,62 @@ pub enum Action {
     Forget,
 }
 
-/// Work on the domain.
+/// Work on the domain. `dt_previous` is `dt_{n-1}`, the step that led to `x_n` (time).
 #[derive(Debug)]
 pub enum Task {
-    /// Build the domain and install the first plan; `prepare` asks for the vote of a preparing pass.
-    Load { assign: Box<Assign>, prepare: bool },
-    /// State of these nodes for other workers.
-    Transfer { nodes: Vec<u32> },
+    /// Build the domain and install the first plan.
+    Load {
+        /// All that this worker holds.
+        assign: Box<Assign>,
+        /// Ask for the vote of a preparing pass.
+        prepare: bool,
+    },
+    /// State of nodes for other workers.
+    Transfer {
+        /// Global node indices.
+        nodes: Vec<u32>,
+    },
     /// All element sets at `x_n`, before a new plan is in force.
-    Elements { dt_previous: f64, quantum: Quantum },
-    /// Install a plan; contact; partial forces. Gather positions first if asked.
-    Install { plan: Box<Plan>, guest_state: Vec<f64>, dt_previous: f64, gather: bool },
-    /// Contact, border elements, partial forces. Gather positions first if asked.
-    Border { dt_previous: f64, quantum: Quantum, gather: bool },
+    Elements {
+        /// The step before.
+        dt_previous: f64,
+        /// Quantum of forces from now on.
+        quantum: Quantum,
+    },
+    /// Install a plan; contact; partial forces.
+    Install {
+        /// The plan.
+        plan: Box<Plan>,
+        /// Six numbers by guest.
+        guest_state: Vec<f64>,
+        /// The step before.
+        dt_previous: f64,
+        /// Gather positions first.
+        gather: bool,
+    },
+    /// Contact, border elements, partial forces.
+    Border {
+        /// The step before.
+        dt_previous: f64,
+        /// Quantum of forces from now on.
+        quantum: Quantum,
+        /// Gather positions first.
+        gather: bool,
+    },
     /// Interior elements.
-    Interior { dt_previous: f64 },
+    Interior {
+        /// The step before.
+        dt_previous: f64,
+    },
     /// Totals in place, integrate.
-    Integrate { totals: Vec<f64>, dt_previous: f64, dt: f64 },
+    Integrate {
+        /// Three numbers by node of the exchange.
+        totals: Vec<f64>,
+        /// The step before.
+        dt_previous: f64,
+        /// The step to take.
+        dt: f64,
+    },
     /// State of all sub-domains.
     Image,
 }
@@ -54,17 +93,32 @@ pub enum Task {
 #[derive(Debug)]
 pub enum Outcome {
     /// Of `Load`.
-    Loaded { vote: Option<Box<Vote>>, lanes: String },
-    /// Of `Transfer`.
+    Loaded {
+        /// Of the preparing pass, if one was asked for.
+        vote: Option<Box<Vote>>,
+        /// Lane width in use.
+        lanes: String,
+    },
+    /// Of `Transfer`: six numbers by node.
     Transferred(Vec<f64>),
     /// Of `Elements` and `Interior`.
     Computed,
     /// Of `Install` and `Border`.
-    Forces { partials: Vec<f64>, gathered: Vec<f64> },
+    Forces {
+        /// Three numbers by node of the exchange.
+        partials: Vec<f64>,
+        /// Three numbers by owned surface node, if asked for.
+        gathered: Vec<f64>,
+    },
     /// Of `Integrate`.
     Integrated(Box<Vote>),
     /// Of `Image`.
-    Image { pieces: Vec<Piece>, work: Work },
+    Image {
+        /// The state.
+        pieces: Vec<Piece>,
+        /// Compute time so far.
+        work: Work,
+    },
     /// The task failed: a sentence for the user.
     Failed(String),
 }
