@@ -8,7 +8,7 @@ use mechanics::{
     element::{ElementVote, Step, hex8},
     exact::Quantum,
     lanes::Width,
-    material::{Eos, Material, Strength},
+    material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
     state::{N_FIELDS, field},
 };
@@ -130,14 +130,18 @@ fn main() {
     let laws = [
         ("hydro + linear", Eos::Linear { bulk: 164e9 }, Strength::Hydro),
         ("elastic + linear", Eos::Linear { bulk: 164e9 }, Strength::Elastic { shear }),
-        ("von Mises + shock", shock, Strength::VonMises { shear, yield_stress: 350e6, hardening: 1e8 }),
+        (
+            "von Mises + shock",
+            shock,
+            Strength::VonMises { shear, yield_stress: 350e6, hardening: 1e8, rate: None },
+        ),
         ("Johnson-Cook (m = 1) + shock", shock, johnson_cook(1.0)),
         ("Johnson-Cook (m = 1.03) + shock", shock, johnson_cook(1.03)),
     ];
     println!("ns per element and cycle, median and (least)");
     println!("{:<34}{:<9}{:>16}{:>16}", "laws", "width", "structured", "explicit");
     for (name, eos, strength) in laws {
-        let material = Material { name: name.into(), density: 7896.0, eos, strength };
+        let material = Material { name: name.into(), density: 7896.0, eos, strength, failure: Failure::None };
         for width in Width::ALL {
             match width.require() {
                 Ok(width) => {
