@@ -125,7 +125,8 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
     let x = model.mesh.positions.iter().map(|&p| std::array::from_fn(|a| p[a] + dent(p)[a])).collect();
     let n = model.mesh.n_elements();
     let element = |scale: f64| (0..n).map(|e| scale * ((e as f64 * 0.37).sin() + 1.5)).collect::<Vec<f64>>();
-    let mut elements: [Vec<f64>; mechanics::state::N_FIELDS] = std::array::from_fn(|f| element(1e-3 / (f as f64 + 1.0)));
+    let mut elements: [Vec<f64>; mechanics::state::N_FIELDS] =
+        std::array::from_fn(|f| element(1e-3 / (f as f64 + 1.0)));
     elements[field::RELATIVE_VOLUME] = vec![0.5; n];
     elements[field::PLASTIC_STRAIN] = (0..n)
         .map(|e| {
@@ -325,7 +326,9 @@ fn deck_selects_fields_and_an_empty_list_selects_all_but_components() {
     assert_eq!(names_in(&["pressure"]), ["node_id", "part", "material", "element_id", "pressure"]);
     let default: Vec<_> = results::FIELD_NAMES
         .into_iter()
-        .filter(|name| !name.starts_with("stress") && !["relative_volume", "mass", "time_to_light"].contains(name))
+        .filter(|name| {
+            !name.starts_with("stress") && !["relative_volume", "mass", "time_to_light"].contains(name)
+        })
         .collect();
     assert_eq!(names_in(&[]), default);
     let state_fields = names_in(&mechanics::state::FIELDS);
