@@ -21,7 +21,7 @@ use mechanics::{
     state::GlobalState,
     vote::{Quanta, Vote},
 };
-use protocol::message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToWorker, Work};
+use protocol::message::{Assign, IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work};
 
 use crate::{
     decompose::{self, decompose},
@@ -48,6 +48,8 @@ pub struct Hand {
 pub struct Options {
     /// Lane width by name; none for the best.
     pub lanes: Option<String>,
+    /// How partial forces travel.
+    pub route: Route,
     /// Take a snapshot at the start of this cycle.
     pub snapshot_at: Option<u64>,
     /// Write states while the run goes (the last one is always gathered).
@@ -166,6 +168,8 @@ pub struct Outcome {
     pub imbalance: f64,
     /// Lane width of the workers.
     pub lanes: String,
+    /// Name of the route.
+    pub route: &'static str,
     /// Cycles of this session of the run: not those before a snapshot that it resumed from.
     pub cycles_run: u64,
 }
@@ -349,14 +353,21 @@ impl Job {
                 let inside = initial_pairs(&surface, &at_start, settings);
                 refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
                 let exclusions = Exclusions::new(&surface, &inside);
-                let sorter = Sorter::new(surface, settings.clone(), exclusions, speeds.clone(), &gather);
+                let sorter = Sorter::new(
+                    surface,
+                    settings.clone(),
+                    exclusions,
+                    speeds.clone(),
+                    options.route,
+                    &gather,
+                );
                 let x = sorter.positions_of(&state);
                 let bench = Bench { sorter, holdings, state: shared_state };
                 let sorted = bench.sort(&x);
                 (Some(Arc::new(bench)), sorted.exchange, sorted.census, sorted.interactions)
             }
             _ => {
-                let exchange = Exchange::new(&holdings, vec![None; n], &state);
+                let exchange = Exchange::new(&holdings, vec![None; n], &state, options.route);
                 (None, exchange, mechanics::contact::Census::default(), vec![0; n])
             }
         };
@@ -382,6 +393,7 @@ impl Job {
                     lanes: options.lanes.clone(),
                     cycle: first_cycle,
                     dt_previous,
+                    route: options.route,
                     plan: exchange.plans[w].clone(),
                     plan_hash: exchange.hash,
                     guest_state: exchange.guest_state_from(w, &state),
@@ -495,6 +507,10 @@ impl Job {
             work: self.work.clone(),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
+            route: match self.options.route {
+                Route::Master => "master",
+                Route::Direct => "direct",
+            },
             cycles_run,
         })));
     }
@@ -504,6 +520,16 @@ impl Job {
             ToMaster::Ready { vote, lanes } => self.ready(worker, vote, lanes, actions),
             ToMaster::Cycle { cycle, vote, partials, gathered } => {
                 self.arrived(worker, cycle, vote, &partials, gathered, actions)
+            }
+            ToMaster::Relay { to, message } => {
+                if to as usize >= self.n_workers {
+                    return Err(format!(
+                        "worker {worker} writes to worker {to}, there are {}",
+                        self.n_workers
+                    ));
+                }
+                actions.push(Action::Send(to as usize, ToWorker::Relayed { from: worker as u32, message }));
+                Ok(())
             }
             ToMaster::Transfer { cycle, state } => self.transfer(worker, cycle, state, actions),
             ToMaster::Image { cycle, version, pieces, last, work } => {
