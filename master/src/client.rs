@@ -96,6 +96,12 @@ impl Client {
     }
 }
 
+impl Drop for Client {
+    fn drop(&mut self) {
+        self.runtime.block_on(dial::leave(self.outbox.sender(), "done"));
+    }
+}
+
 fn surprise() -> String {
     "the master answered something else; install the same release on both".to_owned()
 }

@@ -5,7 +5,7 @@
 
 use std::sync::{
     Arc, Mutex,
-    atomic::{AtomicU32, Ordering},
+    atomic::{AtomicBool, AtomicU32, Ordering},
 };
 
 use protocol::{
@@ -23,7 +23,6 @@ use tokio::{
     net::TcpStream,
     sync::{mpsc, oneshot},
 };
-use tracing::info;
 
 use crate::{
     daemon::Event,
@@ -38,18 +37,39 @@ const HEARTBEAT_MS: u32 = 1000;
 /// What every connection needs of the daemon.
 pub struct Gate {
     /// To the owner of hosts and queue.
-    pub events: mpsc::Sender<Event>,
+    events: mpsc::Sender<Event>,
     /// Who is taken in.
-    pub roles: Vec<Role>,
+    roles: Vec<Role>,
     /// The secret that greetings must hold.
-    pub token: Option<String>,
+    token: Option<String>,
     /// Certificates; none on loopback.
-    pub tls: Option<Arc<ServerConfig>>,
+    tls: Option<Arc<ServerConfig>>,
     /// The last incarnation that was given.
-    pub incarnations: AtomicU32,
+    incarnations: AtomicU32,
+    ending: AtomicBool,
 }
 
 impl Gate {
+    /// With nobody taken in yet.
+    pub fn new(
+        events: mpsc::Sender<Event>,
+        roles: Vec<Role>,
+        token: Option<String>,
+        tls: Option<Arc<ServerConfig>>,
+    ) -> Self {
+        Self { events, roles, token, tls, incarnations: AtomicU32::new(0), ending: AtomicBool::new(false) }
+    }
+
+    /// This side ends all connections from now on, so that their ends are no faults.
+    pub fn end(&self) {
+        self.ending.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether [`Gate::end`] was called.
+    pub fn is_ending(&self) -> bool {
+        self.ending.load(Ordering::Relaxed)
+    }
+
     /// Serves a TCP connection to its end.
     ///
     /// # Errors
@@ -88,7 +108,8 @@ impl Gate {
         let welcome = Welcome { incarnation, host: 0, heartbeat_ms: HEARTBEAT_MS };
         link::admit(server, &sender, &mut receiver, welcome)?;
         match desk::serve(&self.events, &sender, &mut receiver, incarnation).await {
-            Error::Closed | Error::Left { .. } => Ok(()),
+            // A client may go as it likes.
+            Error::Closed | Error::Left { .. } | Error::Io { .. } => Ok(()),
             error => {
                 leave(&sender, &error.to_string()).await;
                 Err(error)
@@ -106,12 +127,8 @@ impl Gate {
         incarnation: u32,
     ) -> Result<()> {
         let (answer, answered) = oneshot::channel();
-        let knock = Event::Knock {
-            hello: Box::new(hello.clone()),
-            address: address.clone(),
-            incarnation,
-            answer,
-        };
+        let knock =
+            Event::Knock { hello: Box::new(hello.clone()), address: address.clone(), incarnation, answer };
         // The owner lives as long as the daemon; a daemon that ends refuses.
         let _ = self.events.send(knock).await;
         let host = match answered.await.unwrap_or_else(|_| Err("the master is ending".to_owned())) {
@@ -134,14 +151,6 @@ impl Gate {
                     outbox: Arc::new(Mutex::new(Outbox::new(sender.clone(), 0))),
                     route: Arc::clone(&route),
                 };
-                info!(
-                    name = hello.name,
-                    address,
-                    speed = hello.speed,
-                    threads = hello.threads,
-                    lanes = hello.lanes,
-                    "worker joined as host {host}"
-                );
                 let _ = self.events.send(Event::Joined(seat)).await;
                 listen(&mut receiver, incarnation, &route).await
             }

@@ -10,7 +10,7 @@ use std::{
     process::ExitCode,
     sync::{
         Arc,
-        atomic::{AtomicBool, AtomicU32, Ordering},
+        atomic::{AtomicBool, Ordering},
     },
     time::Duration,
 };
@@ -113,15 +113,10 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         let address = listener.local_addr().map_err(|e| e.to_string())?;
         announce(address, tls.is_some());
         let (events, heard) = mpsc::channel(WAITING_EVENTS);
-        let gate = Arc::new(Gate {
-            events: events.clone(),
-            roles: vec![Role::Worker, Role::Client],
-            token: None,
-            tls,
-            incarnations: AtomicU32::new(0),
-        });
-        tokio::spawn(listen(listener, gate));
-        Owner::new(args.spool.clone(), first, events).run(heard, crate::run::stop_on_interrupt()).await;
+        let gate = Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls));
+        tokio::spawn(listen(listener, Arc::clone(&gate)));
+        let stop = crate::run::stop_on_interrupt("ending; the job under way writes its results");
+        Owner::new(args.spool.clone(), first, events).run(heard, &stop, &gate).await;
         Ok(ExitCode::SUCCESS)
     });
     runtime.shutdown_background();
@@ -147,7 +142,9 @@ pub async fn listen(listener: TcpListener, gate: Arc<Gate>) {
         };
         let gate = Arc::clone(&gate);
         tokio::spawn(async move {
-            if let Err(error) = gate.take(stream, address.to_string()).await {
+            if let Err(error) = Arc::clone(&gate).take(stream, address.to_string()).await
+                && !gate.is_ending()
+            {
                 warn!("connection from {address}: {error}");
             }
             drop(place);
@@ -211,7 +208,7 @@ impl Owner {
         }
     }
 
-    async fn run(mut self, mut heard: mpsc::Receiver<Event>, stop: Arc<AtomicBool>) {
+    async fn run(mut self, mut heard: mpsc::Receiver<Event>, stop: &AtomicBool, gate: &Gate) {
         let mut look = tokio::time::interval(Duration::from_millis(100));
         while !stop.load(Ordering::Relaxed) {
             tokio::select! {
@@ -222,11 +219,11 @@ impl Owner {
                 _ = look.tick() => {}
             }
         }
-        self.end(&mut heard).await;
+        self.end(&mut heard, gate).await;
     }
 
     /// Lets the job under way write its results, and says good-bye.
-    async fn end(&mut self, heard: &mut mpsc::Receiver<Event>) {
+    async fn end(&mut self, heard: &mut mpsc::Receiver<Event>, gate: &Gate) {
         if let Some((_, stop)) = &self.running {
             stop.store(true, Ordering::Relaxed);
         }
@@ -238,6 +235,7 @@ impl Owner {
             }
         })
         .await;
+        gate.end();
         let leaving = self.seats.values().map(|seat| {
             let sender = seat.sender();
             tokio::spawn(async move { protocol::dial::leave(&sender, "the master is ending").await })
@@ -255,6 +253,8 @@ impl Owner {
                 let _ = answer.send(self.admit(&hello, &address, incarnation));
             }
             Event::Joined(seat) => {
+                let Seat { hand, address, .. } = &seat;
+                info!(address, speed = hand.speed, threads = hand.threads, "worker {} joined", hand.name);
                 self.seats.insert(seat.incarnation, seat);
             }
             Event::Left { incarnation, why } => {

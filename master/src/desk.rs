@@ -77,7 +77,10 @@ impl Desk<'_> {
     }
 
     /// Asks the owner of hosts and queue.
-    async fn ask<T>(&self, event: impl FnOnce(oneshot::Sender<T>) -> Event) -> std::result::Result<T, String> {
+    async fn ask<T>(
+        &self,
+        event: impl FnOnce(oneshot::Sender<T>) -> Event,
+    ) -> std::result::Result<T, String> {
         let (answer, answered) = oneshot::channel();
         let ending = "the master is ending".to_owned();
         self.events.send(event(answer)).await.map_err(|_| ending.clone())?;

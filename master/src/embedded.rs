@@ -21,7 +21,7 @@ use worker::{
 };
 
 use crate::{
-    job::{self, Action, Bench, Event, Job, Outcome},
+    job::{Action, Bench, Event, Job, Outcome},
     sort::Sorted,
 };
 
@@ -251,7 +251,7 @@ impl Host {
 }
 
 /// A sort and its thread-CPU time (ns).
-pub fn timed_sort(bench: &job::Bench, x: &[[f64; 3]]) -> (Box<Sorted>, u64) {
+pub fn timed_sort(bench: &Bench, x: &[[f64; 3]]) -> (Box<Sorted>, u64) {
     let clock = ThreadClock::default();
     let mark = clock.start();
     let sorted = Box::new(bench.sort(x));

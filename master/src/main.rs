@@ -2,7 +2,7 @@
 //!
 //! Exit codes: 0 a run to its end, 1 a fault (deck, disk, physics, peer), 2 wrong flags, 130 stopped by Ctrl-C.
 
-use std::{path::Path, process::ExitCode, time::Duration};
+use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 
 use clap::Parser;
 use master::{
@@ -17,6 +17,8 @@ fn main() -> ExitCode {
             tracing_subscriber::EnvFilter::try_from_env("BOLIDE_LOG").unwrap_or_else(|_| "info".into()),
         )
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_target(false)
         .init();
     let result = match Cli::parse().command {
         Command::Run(args) => run::run(&args),

@@ -6,10 +6,7 @@ use std::{
     os::unix::process::CommandExt,
     path::PathBuf,
     process::{Child, Command, Stdio},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, AtomicU32},
-    },
+    sync::{Arc, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
@@ -33,6 +30,7 @@ const JOIN_LIMIT: Duration = Duration::from_secs(60);
 
 /// Children that have joined. They are ended with this value.
 pub struct Processes {
+    gate: Arc<Gate>,
     seats: Vec<Seat>,
     children: Vec<Child>,
     /// Carries the links; taken only when this value is dropped.
@@ -60,15 +58,9 @@ impl Processes {
         let address = listener.local_addr().map_err(fault)?;
         let token = format!("{:016x}{:016x}", worker::random(), worker::random());
         let (events, mut heard) = mpsc::channel(WAITING_EVENTS);
-        let gate = Gate {
-            events,
-            roles: vec![Role::Worker],
-            token: Some(token.clone()),
-            tls: None,
-            incarnations: AtomicU32::new(0),
-        };
-        runtime.spawn(listen(listener, Arc::new(gate)));
-        let mut started = Self { seats: Vec::new(), children: Vec::new(), runtime: None };
+        let gate = Arc::new(Gate::new(events, vec![Role::Worker], Some(token.clone()), None));
+        runtime.spawn(listen(listener, Arc::clone(&gate)));
+        let mut started = Self { gate, seats: Vec::new(), children: Vec::new(), runtime: None };
         for hand in hands {
             let child = Command::new(&binary)
                 .args(["worker", "--once", "--master", &address.to_string(), "--name", &hand.name])
@@ -126,7 +118,9 @@ async fn join(
                     seats.insert(place, seat);
                 }
             }
-            Ok(Some(Event::Left { why, .. })) => return Err(format!("a worker left before the start: {why}")),
+            Ok(Some(Event::Left { why, .. })) => {
+                return Err(format!("a worker left before the start: {why}"));
+            }
             Ok(Some(_)) => {}
             Ok(None) => return Err("the listener has ended".to_owned()),
             Err(_) => {
@@ -147,6 +141,7 @@ async fn join(
 
 impl Drop for Processes {
     fn drop(&mut self) {
+        self.gate.end();
         if let Some(runtime) = self.runtime.take() {
             runtime.block_on(async {
                 for seat in &self.seats {

@@ -154,8 +154,13 @@ mod tests {
             }
         }
         use State::{Cancelled, Done, Failed, Queued, Running};
-        let expected =
-            [(Queued, Running), (Queued, Cancelled), (Running, Done), (Running, Failed), (Running, Cancelled)];
+        let expected = [
+            (Queued, Running),
+            (Queued, Cancelled),
+            (Running, Done),
+            (Running, Failed),
+            (Running, Cancelled),
+        ];
         assert_eq!(legal, expected);
     }
 

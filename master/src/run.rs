@@ -127,7 +127,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         .collect();
     let resume = args.resume.as_deref().map(snapshot::read).transpose()?;
     let folder = if asked.no_output { None } else { Some(folder_for(args)) };
-    let folder = folder.map(|path| Folder::create(&path, args.force)).transpose().map_err(|e| e.to_string())?;
+    let folder =
+        folder.map(|path| Folder::create(&path, args.force)).transpose().map_err(|e| e.to_string())?;
     let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&asked), resume)?;
     let census = Census::of(&job, &model);
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
@@ -135,7 +136,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         output.row(row)?;
     }
     output.state(job.start_state())?;
-    let stop = stop_on_interrupt();
+    let stop = stop_on_interrupt("stopping after this cycle");
     let children = args.processes.then(|| Processes::start(&hands)).transpose()?;
     let started = Instant::now();
     let (outcome, traffic) = match &children {
@@ -273,8 +274,8 @@ pub fn summarise(
     }
 }
 
-/// A flag that Ctrl-C or SIGTERM sets; a second one ends the process at once.
-pub fn stop_on_interrupt() -> Arc<AtomicBool> {
+/// A flag that Ctrl-C or SIGTERM sets, saying `what` happens now; a second one ends the process at once.
+pub fn stop_on_interrupt(what: &'static str) -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     std::thread::Builder::new()
@@ -294,7 +295,7 @@ pub fn stop_on_interrupt() -> Arc<AtomicBool> {
                     if flag.swap(true, Ordering::Relaxed) {
                         std::process::exit(130);
                     }
-                    eprintln!("stopping after this cycle; once more to leave at once");
+                    eprintln!("{what}; once more to leave at once");
                 }
             });
         })
@@ -403,10 +404,11 @@ pub fn progress_line(model: &Model, progress: &Progress, elapsed: f64) -> (Strin
         (Limit::Courant, Some(element)) => format!("element {element}"),
         (limit, _) => format!("{limit:?}").to_lowercase(),
     };
-    let eta = if share > 0.0 { elapsed * (1.0 - share) / share } else { f64::NAN };
+    let eta =
+        if share > 0.0 { format!("  ETA {:.0} s", elapsed * (1.0 - share) / share) } else { String::new() };
     let units = crate::results::Units::named(&model.units).time;
     let line = format!(
-        "cycle {}  t {:.4e} {units}  dt {:.3e} ({limit})  {grind:.0} ns/element wall  ETA {eta:.0} s",
+        "cycle {}  t {:.4e} {units}  dt {:.3e} ({limit})  {grind:.0} ns/element wall{eta}",
         progress.cycle, progress.time, progress.dt
     );
     (line, share)

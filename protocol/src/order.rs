@@ -63,8 +63,9 @@ impl Outbox {
             return self.sender.send(Frame::new(header, packed.bytes));
         }
         let number = self.next;
-        self.next =
-            number.checked_add(1).ok_or_else(|| Error::Message("2^32 control messages on one link".into()))?;
+        self.next = number
+            .checked_add(1)
+            .ok_or_else(|| Error::Message("2^32 control messages on one link".into()))?;
         if packed.goes_in_bulk() {
             self.sender.send_bulk(header, u64::from(number), packed.bytes)
         } else {

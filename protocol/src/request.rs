@@ -213,10 +213,7 @@ pub struct HostRow {
 /// `-`, `_` and `.`.
 pub fn check_file_name(name: &str) -> Result<(), String> {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
-    if !name.is_empty()
-        && name.len() <= FILE_NAME_LIMIT
-        && !name.starts_with('.')
-        && name.chars().all(plain)
+    if !name.is_empty() && name.len() <= FILE_NAME_LIMIT && !name.starts_with('.') && name.chars().all(plain)
     {
         return Ok(());
     }

@@ -329,6 +329,10 @@ pub fn explain(error: &std::io::Error) -> String {
         Some(rustls::Error::InvalidMessage(_)) => {
             "the peer does not speak TLS; it may run without certificates".into()
         }
+        // rustls adds the address of its manual.
+        _ if error.kind() == std::io::ErrorKind::UnexpectedEof => {
+            "the peer closed the connection in the middle".into()
+        }
         _ => error.to_string(),
     }
 }

@@ -135,7 +135,12 @@ async fn stay(
     loop {
         let error = match dial::dial(&options.master, certificates, hello).await {
             Ok(call) => {
-                info!(host = call.welcome.host, incarnation = call.welcome.incarnation, "joined {}", options.master);
+                info!(
+                    host = call.welcome.host,
+                    incarnation = call.welcome.incarnation,
+                    "joined {}",
+                    options.master
+                );
                 let error = serve(call, Arc::clone(pool)).await;
                 if options.once {
                     return Ok(());
@@ -353,7 +358,11 @@ mod tests {
         assert_eq!(fresh().heard(&header(3, 5, 8), &totals(5)), Ok(()));
         for (header, message, words) in [
             (header(2, 5, 8), totals(5), "of job 2 epoch 0, this worker has job 3 epoch 0"),
-            (header(3, 6, 8), totals(6), "totals of cycle 6 in a frame of cycle 6, those of Some(5) are next"),
+            (
+                header(3, 6, 8),
+                totals(6),
+                "totals of cycle 6 in a frame of cycle 6, those of Some(5) are next",
+            ),
             (header(3, 6, 8), totals(5), "totals of cycle 5 in a frame of cycle 6"),
             (header(3, 5, 9), totals(5), "follow plan 0000000000000009, sent was plan 0000000000000008"),
         ] {
