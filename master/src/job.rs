@@ -199,6 +199,16 @@ struct Arrivals {
     gathered: Vec<Vec<f64>>,
 }
 
+/// What a snapshot holds beside the state, as it was when its cycle was complete.
+struct SnapshotRest {
+    dt_previous: f64,
+    dt: f64,
+    force_quantum: Quantum,
+    vote: Vote,
+    ledger: Ledger,
+    rows: Vec<HistoryRow>,
+}
+
 /// An image on its way.
 struct Collecting {
     pieces: Vec<Piece>,
@@ -239,8 +249,9 @@ pub struct Job {
     sorts_under_way: VecDeque<u64>,
     transfers: BTreeMap<u64, Vec<Option<Vec<f64>>>>,
     collecting: BTreeMap<u64, Collecting>,
-    /// Images complete at this cycle that a snapshot waits to join with the vote.
+    /// The images of a snapshot, and the rest of it: frames of cycles may overtake images, so either may come first.
     snapshot_state: Option<GlobalState>,
+    snapshot_rest: Option<SnapshotRest>,
     next_state_time: Option<f64>,
     last_spread: f64,
     spread_rate: f64,
@@ -422,6 +433,7 @@ impl Job {
             transfers: BTreeMap::new(),
             collecting: BTreeMap::new(),
             snapshot_state: None,
+            snapshot_rest: None,
             next_state_time,
             last_spread: 0.0,
             spread_rate: 0.0,
@@ -460,6 +472,11 @@ impl Job {
     /// Whether it has ended.
     pub fn is_over(&self) -> bool {
         self.over
+    }
+
+    /// Hash of the plan that frames of a cycle follow; none for a cycle without one.
+    pub fn plan_hash(&self, cycle: u64) -> Option<u64> {
+        self.exchange_at(cycle).ok().map(|exchange| exchange.hash)
     }
 
     /// Takes an event, says what to do.
@@ -749,17 +766,17 @@ impl Job {
         };
         let (dt_now, time_now) =
             *self.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
-        if let Some(state) = self.snapshot_state.take() {
+        if self.options.snapshot_at == Some(cycle) {
             let dt_previous = cycle.checked_sub(1).and_then(|c| self.steps.get(&c)).map_or(0.0, |s| s.0);
-            actions.push(Action::Snapshot(Box::new(Snapshot {
-                state,
+            self.snapshot_rest = Some(SnapshotRest {
                 dt_previous,
                 dt: dt_now,
                 force_quantum: self.quanta.force,
                 vote: vote.clone(),
                 ledger: self.ledger.clone(),
                 rows: self.rows.clone(),
-            })));
+            });
+            self.snapshot(actions);
         }
         self.follow_spread(&vote);
         let growth = self.model.setup.control.growth;
@@ -1003,11 +1020,23 @@ impl Job {
         }
         if self.options.snapshot_at == Some(cycle) {
             self.snapshot_state = Some(state.clone());
+            self.snapshot(actions);
         }
         if self.options.states {
             actions.push(Action::State(Box::new(state)));
         }
         Ok(())
+    }
+
+    /// Stores the snapshot once both halves of it are here.
+    fn snapshot(&mut self, actions: &mut Vec<Action>) {
+        if let (Some(_), Some(_)) = (&self.snapshot_state, &self.snapshot_rest)
+            && let (Some(state), Some(rest)) = (self.snapshot_state.take(), self.snapshot_rest.take())
+        {
+            let SnapshotRest { dt_previous, dt, force_quantum, vote, ledger, rows } = rest;
+            let snapshot = Snapshot { state, dt_previous, dt, force_quantum, vote, ledger, rows };
+            actions.push(Action::Snapshot(Box::new(snapshot)));
+        }
     }
 
     fn time_at(&self, cycle: u64) -> f64 {

@@ -1,1 +1,3 @@
-//! tests
+//! What tests of the whole system share: [`cluster`] runs real processes on loopback.
+
+pub mod cluster;
