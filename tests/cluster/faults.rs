@@ -59,7 +59,7 @@ fn a_cancelled_job_keeps_what_it_had_and_frees_its_workers() {
 #[test]
 fn a_bad_deck_comes_back_with_every_fault_at_its_place() {
     let cluster = Cluster::start(BOLIDE, false);
-    let deck = repository("tests/decks/bad/submitted.toml").display().to_string();
+    let deck = repository("tests/decks/submitted.toml").display().to_string();
     let submitted = cluster.client(&["submit", &deck]);
     let checked = said(Command::new(BOLIDE).args(["check", &deck]));
     assert_eq!((submitted.code, &submitted.err), (Some(1), &checked.err));
