@@ -1,1 +1,9 @@
-//! tests
+//! What the tests of the whole system share.
+//!
+//! [`solve`] takes a deck through master and workers in this process; [`case`] compares a figure with a published
+//! or derived one of `reference.toml` and says how it went; [`checker`] looks for nodes inside foreign bodies,
+//! without asking the contact code.
+
+pub mod case;
+pub mod checker;
+pub mod solve;
