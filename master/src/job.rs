@@ -643,9 +643,9 @@ impl Job {
         offer(vote.volume_limit, Limit::Volume, None);
         offer(vote.contact_limit, Limit::Contact, None);
         if let Some(contact) = &self.model.setup.contact
-            && vote.contact_speed_squared > 0.0
+            && vote.contact_speed_ahead > 0.0
         {
-            offer(TRAVEL_VOTE * contact.gap / vote.contact_speed_squared.sqrt(), Limit::Travel, None);
+            offer(TRAVEL_VOTE * contact.gap / vote.contact_speed_ahead, Limit::Travel, None);
         }
         best
     }

@@ -26,6 +26,9 @@ use crate::{
     strength::{Elastic, Hydro, JohnsonCook, StrengthLaw, VonMises},
 };
 
+/// Stands for the global element index in a slot without an element.
+const PHANTOM: u32 = u32::MAX;
+
 /// State image of a sub-domain. Node arrays are by local node (structured: I fastest), element arrays by local
 /// element (structured: I fastest).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -121,7 +124,7 @@ impl Block {
                 array
             })
         };
-        let mut slot_elements = vec![u32::MAX; n_slots];
+        let mut slot_elements = vec![PHANTOM; n_slots];
         for (&slot, &element) in slots.iter().zip(&piece.elements) {
             slot_elements[slot as usize] = element;
         }
@@ -185,7 +188,10 @@ impl Block {
 
     /// Local nodes of the corners of a local element.
     pub fn corners(&self, element: usize) -> [u32; 8] {
-        let slot = self.slots[element] as usize;
+        self.slot_corners(self.slots[element] as usize)
+    }
+
+    fn slot_corners(&self, slot: usize) -> [u32; 8] {
         match &self.layout {
             Layout::Structured { row, plane, base } => {
                 let n = base[slot / SET] + (slot % SET) as u32;
@@ -196,6 +202,19 @@ impl Block {
         }
     }
 
+    /// Local nodes that the elements of a set touch, ascending.
+    ///
+    /// # Panics
+    /// If there is no such set.
+    pub fn nodes_of_set(&self, set: u32) -> Vec<u32> {
+        let slots = set as usize * SET..(set as usize + 1) * SET;
+        let members = slots.filter(|&slot| self.slot_elements[slot] != PHANTOM);
+        let mut nodes: Vec<u32> = members.flat_map(|slot| self.slot_corners(slot)).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
     /// For each set, whether one of its elements has a node that `marked` (by local node) holds true: the sets to
     /// compute before the forces of those nodes travel.
     ///
@@ -203,21 +222,8 @@ impl Block {
     /// If `marked` is not by local node.
     pub fn sets_touching(&self, marked: &[bool]) -> Vec<bool> {
         assert!(marked.len() == self.nodes.len(), "{} marks, {} nodes", marked.len(), self.nodes.len());
-        let mut touching = vec![false; self.n_sets() as usize];
-        for element in 0..self.elements.len() {
-            let touches = self.corners(element).iter().any(|&node| marked[node as usize]);
-            touching[self.set_of_element(element) as usize] |= touches;
-        }
-        touching
-    }
-
-    /// Local nodes that the elements of a set touch, ascending.
-    pub fn nodes_of_set(&self, set: u32) -> Vec<u32> {
-        let members = (0..self.elements.len()).filter(|&element| self.set_of_element(element) == set);
-        let mut nodes: Vec<u32> = members.flat_map(|element| self.corners(element)).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        nodes
+        let touches = |set| self.nodes_of_set(set).iter().any(|&node| marked[node as usize]);
+        (0..self.n_sets()).map(touches).collect()
     }
 
     /// Sets all forces to zero.

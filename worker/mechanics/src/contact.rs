@@ -1,7 +1,7 @@
 //! The words of contact, and the order of its stages; nothing is computed here.
 //!
 //! A *surface* is the outer faces of the elements that are alive, and their nodes ([`surface`]). Every so
-//! often the surface is *sorted* into *work units* ([`sort`], [`work_unit`]): virtual cubes of which each
+//! often the surface is *sorted* into *work units* ([`mod@sort`], [`work_unit`]): virtual cubes of which each
 //! holds the nodes inside it and every face those may meet before the next sort. When that next sort is due
 //! is a rule on displacements ([`reach`]). A worker gets a *batch* of units and each cycle
 //! ([`cycle`]):
@@ -10,6 +10,8 @@
 //! 3. finds the closest point of each face to its node: the contact detection zone ([`zone`]);
 //! 4. reduces the hits of a node to distinct closest features with a side ([`joint`]);
 //! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
+//!
+//! Nodes meet faces: two edges that cross while no node is in a zone are not seen.
 //!
 //! Search, geometry (zone and joint) and force know nothing of each other; only [`cycle`] knows all three.
 

@@ -82,6 +82,10 @@ pub enum Sets {
     All,
 }
 
+/// Cycles for which a contact node's speed is foreseen by its acceleration: a vote takes effect two cycles later, and
+/// forces of an impact still grow meanwhile.
+const SPEED_LAG: f64 = 3.0;
+
 /// No index.
 const NONE: u32 = u32::MAX;
 
@@ -101,6 +105,7 @@ struct Room {
     sums: Booked,
     extent: Extent,
     speed_squared: f64,
+    speed_ahead: f64,
 }
 
 /// Copies of one node: a range of `Domain::copies`, its contact node and its guest.
@@ -184,6 +189,7 @@ impl Domain {
                     sums: Booked::default(),
                     extent: Extent::NONE,
                     speed_squared: 0.0,
+                    speed_ahead: 0.0,
                 });
             }
             let own = first as u32..rooms.len() as u32;
@@ -253,6 +259,7 @@ impl Domain {
             let v = &block.v;
             let top = surface.iter().map(|&i| speed_squared(v, i as usize)).fold(0.0, f64::max);
             self.vote.contact_speed_squared = self.vote.contact_speed_squared.max(top);
+            self.vote.contact_speed_ahead = self.vote.contact_speed_ahead.max(top.sqrt());
         }
         self.finish_vote()
     }
@@ -520,10 +527,14 @@ impl Domain {
             });
             room.extent = Extent::NONE;
             room.speed_squared = 0.0;
+            room.speed_ahead = 0.0;
             for (&i, from) in room.surface.iter().zip(&room.reference) {
                 let i = i as usize;
                 room.extent.add(std::array::from_fn(|a| block.x[a][i] - from[a]));
-                room.speed_squared = room.speed_squared.max(speed_squared(&block.v, i));
+                let squared = speed_squared(&block.v, i);
+                let gain = SPEED_LAG * dt * speed_squared(&block.f, i).sqrt() / block.mass[i];
+                room.speed_squared = room.speed_squared.max(squared);
+                room.speed_ahead = room.speed_ahead.max(squared.sqrt() + gain);
             }
             meter.stop(mark, false);
         });
@@ -550,6 +561,7 @@ impl Domain {
             }
             vote.extents[part].merge(&room.extent);
             vote.contact_speed_squared = vote.contact_speed_squared.max(room.speed_squared);
+            vote.contact_speed_ahead = vote.contact_speed_ahead.max(room.speed_ahead);
         }
         for &(gauge, room, local) in &self.gauges {
             let (block, i) = (&self.rooms[room as usize].block, local as usize);

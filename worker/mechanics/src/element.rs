@@ -1,8 +1,8 @@
 //! Elements: the words between a cycle and its element kernels.
 //!
 //! [`Step`] is what a cycle tells the elements, [`ElementVote`] what they answer. The eight-node hexahedron stands
-//! in `hex8`, with its rotation, hourglass control, viscosity and time-step limit beside it; `vector` is the small
-//! algebra they are written in.
+//! in `hex8`, its geometry in `modes`, with rotation, hourglass control, viscosity and time-step limit beside it;
+//! `vector` is the small algebra they are written in.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +10,7 @@ use crate::exact::Quantum;
 
 pub mod hex8;
 pub(crate) mod hourglass;
+pub(crate) mod modes;
 pub(crate) mod rotation;
 pub(crate) mod vector;
 pub(crate) mod viscosity;
@@ -43,7 +44,9 @@ pub struct ElementVote {
     pub volume_limit: f64,
     /// Internal energy.
     pub internal: f64,
-    /// Energy that hourglass control took in this step.
+    /// Energy that hourglass control took in this step, at the velocity `v_{n-1/2}`. In a mesh, where the forces of
+    /// neighbours mostly balance, that is close; for a single free element it is too much by the part
+    /// `4 c dt / mass` (c the resistance of its modes), since its own force slows it within the step.
     pub hourglass: f64,
     /// Work of artificial viscosity in this step; part of the internal energy.
     pub viscosity: f64,

@@ -1,11 +1,11 @@
 //! The state a run starts from: masses by eighths of element masses, stress-free elements at rest volume.
 
 use crate::{
+    element::hex8,
     exact::Quantum,
     mesh::Mesh,
     setup::{Constraint, MAX_WALLS, Setup},
     state::{GlobalState, N_FIELDS, field},
-    volume,
     vote::Quanta,
 };
 
@@ -36,7 +36,7 @@ pub fn state(
     for part in &mesh.parts {
         let material = &setup.materials[part.material as usize];
         for e in 0..part.n_elements() {
-            let v = volume::hexahedron(&part.corners(e).map(|n| mesh.positions[n as usize]));
+            let v = hex8::volume(&part.corners(e).map(|n| mesh.positions[n as usize]));
             if v <= 0.0 || !v.is_finite() {
                 return Err(format!(
                     "element {} of part `{}`: volume {v:e}, must be positive",

@@ -85,6 +85,9 @@ pub trait Lane:
     /// `2^self` for whole numbers between -1022 and 1023.
     fn power_of_two(self) -> Self;
 
+    /// The lanes moved up by one, zero in the first; and the last lane, which falls out.
+    fn shifted_up(self) -> (Self, f64);
+
     /// The lanes in order, zeros behind them.
     #[inline(always)]
     fn to_array(self) -> [f64; SET] {

@@ -34,5 +34,4 @@ pub mod piece;
 pub mod setup;
 pub mod state;
 mod strength;
-pub mod volume;
 pub mod vote;

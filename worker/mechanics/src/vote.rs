@@ -23,6 +23,8 @@ pub struct Vote {
     pub contact_limit: f64,
     /// Greatest squared speed of a contact node after integration.
     pub contact_speed_squared: f64,
+    /// Greatest speed that a contact node may have when the vote takes effect.
+    pub contact_speed_ahead: f64,
     /// Bound on every force term of the cycle.
     pub force_bound: f64,
     /// Deepest contact in gaps.
@@ -73,6 +75,7 @@ impl Vote {
             volume_limit: f64::INFINITY,
             contact_limit: f64::INFINITY,
             contact_speed_squared: 0.0,
+            contact_speed_ahead: 0.0,
             force_bound: 0.0,
             worst_depth: 0.0,
             worst_pair: (u32::MAX, u32::MAX),
@@ -97,6 +100,7 @@ impl Vote {
         self.volume_limit = self.volume_limit.min(other.volume_limit);
         self.contact_limit = self.contact_limit.min(other.contact_limit);
         self.contact_speed_squared = self.contact_speed_squared.max(other.contact_speed_squared);
+        self.contact_speed_ahead = self.contact_speed_ahead.max(other.contact_speed_ahead);
         self.force_bound = self.force_bound.max(other.force_bound);
         self.deepest(other.worst_depth, other.worst_pair);
         self.pairs += other.pairs;

@@ -73,6 +73,8 @@ pub struct Contact {
     global: Vec<u32>,
     part: Vec<u32>,
     stiffness: Vec<f64>,
+    /// The deck's factor times the node's share.
+    factor: Vec<f64>,
     inverse_mass: Vec<f64>,
     /// Corners and boxes of the active faces, and frames of those that a node is near.
     corners: Vec<[[f64; 3]; 4]>,
@@ -101,7 +103,7 @@ impl Contact {
     /// which no spread since the sort exceeds the slack.
     ///
     /// # Panics
-    /// If an index of the batch is out of range: a batch is made by [`Batch::gather`] or checked on arrival.
+    /// If the batch is not sound ([`Batch::is_sound`]) or `x` has fewer nodes.
     pub fn new(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3]) -> Self {
         let mut candidates = search::candidates(batch, settings, x);
         let mut index = vec![u32::MAX; batch.faces.len()];
@@ -135,6 +137,7 @@ impl Contact {
             global: batch.nodes.iter().map(|n| n.global).collect(),
             part: batch.nodes.iter().map(|n| n.part).collect(),
             stiffness: batch.nodes.iter().map(|n| n.stiffness).collect(),
+            factor: batch.nodes.iter().map(|n| settings.stiffness * n.share).collect(),
             inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
             near: Vec::with_capacity(most),
             hits: Vec::with_capacity(most),
@@ -235,7 +238,7 @@ impl Contact {
         for &i in &self.beyond {
             let near = &self.near[i as usize];
             let face = &self.active[near.face as usize];
-            let k = force::stiffness(self.settings.stiffness, self.stiffness[n], face.stiffness);
+            let k = force::stiffness(self.factor[n], self.stiffness[n], face.stiffness);
             let weights = frame(near.face).weights(&near.nearest, p);
             let inverse_mass = self.pair_inverse_mass(n, face, &weights);
             frequency2 = frequency2.max(force::frequency2(k, stacking, inverse_mass));
@@ -244,7 +247,7 @@ impl Contact {
             let near = &self.near[hit.near as usize];
             let face = &self.active[near.face as usize];
             vote.deepest(hit.depth / self.settings.gap, (self.global[n], face.id));
-            let k = force::stiffness(self.settings.stiffness, self.stiffness[n], face.stiffness);
+            let k = force::stiffness(self.factor[n], self.stiffness[n], face.stiffness);
             let weights = frame(near.face).weights(&near.nearest, p);
             let inverse_mass = self.pair_inverse_mass(n, face, &weights);
             frequency2 = frequency2.max(force::frequency2(k, stacking, inverse_mass));
@@ -255,10 +258,7 @@ impl Contact {
             let sliding = (coefficient > 0.0).then(|| force::Sliding {
                 coefficient,
                 regular: self.settings.friction_velocity,
-                velocity: [0, 1, 2].map(|a| {
-                    let v = &cycle.v[a];
-                    (0..4).fold(v[n], |sum, i| (-weights[i]).mul_add(v[face.nodes[i] as usize], sum))
-                }),
+                velocity: against(cycle.v, n, &face.nodes, &weights),
                 inverse_mass,
                 dt: cycle.dt,
             });
@@ -285,6 +285,18 @@ impl Contact {
     }
 }
 
+/// Velocity of a node against the point of a face with these weights.
+#[inline(always)]
+fn against(v: &[Vec<f64>; 3], node: usize, corners: &[u32; 4], weights: &[f64; 4]) -> [f64; 3] {
+    let mut relative = [v[0][node], v[1][node], v[2][node]];
+    for a in 0..3 {
+        for i in 0..4 {
+            relative[a] = (-weights[i]).mul_add(v[a][corners[i] as usize], relative[a]);
+        }
+    }
+    relative
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -303,7 +315,13 @@ mod tests {
             for corner in [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0.5, 0.5, 0.0]] {
                 let global = batch.nodes.len() as u32;
                 let part = u32::from(corner[0] == 0.5);
-                batch.nodes.push(BatchNode { global, part, mass: 1.0 + random(), stiffness: 1.0 + random() });
+                batch.nodes.push(BatchNode {
+                    global,
+                    part,
+                    mass: 1.0 + random(),
+                    stiffness: 1.0 + random(),
+                    share: 0.25 + 0.75 * random(),
+                });
                 for a in 0..3 {
                     x[a].push(corner[a] + 0.3 * random() + if a == 0 { 10.0 * f64::from(i) } else { 0.0 });
                 }

@@ -56,7 +56,8 @@ pub struct Reaction {
     pub friction: f64,
 }
 
-/// Penalty stiffness of a pair: factor times the harmonic mean of both sides (force per length).
+/// Penalty stiffness of a pair: factor times the harmonic mean of both sides (force per length). The factor is the
+/// deck's times the node's share.
 #[inline(always)]
 pub fn stiffness(factor: f64, node: f64, face: f64) -> f64 {
     let sum = node + face;
@@ -66,7 +67,11 @@ pub fn stiffness(factor: f64, node: f64, face: f64) -> f64 {
 /// Inverse of the mass that a pair moves: `1/m + sum w_i^2/m_i`, from inverse masses.
 #[inline(always)]
 pub fn inverse_mass(node: f64, corners: [f64; 4], weights: &[f64; 4]) -> f64 {
-    (0..4).fold(node, |sum, i| (weights[i] * weights[i]).mul_add(corners[i], sum))
+    let mut sum = node;
+    for i in 0..4 {
+        sum = (weights[i] * weights[i]).mul_add(corners[i], sum);
+    }
+    sum
 }
 
 /// Square of the frequency of `stacking` springs of this stiffness on one node.
@@ -93,24 +98,33 @@ pub fn react(
     energy_quantum: Quantum,
 ) -> Reaction {
     let normal = push.stiffness * push.depth;
-    let mut force = [0, 1, 2].map(|a| normal * push.direction[a]);
+    let n = push.direction;
+    let mut force = [normal * n[0], normal * n[1], normal * n[2]];
     let mut friction = 0.0;
     if let Some(s) = sliding {
-        let n = push.direction;
-        let across = n[2].mul_add(s.velocity[2], n[1].mul_add(s.velocity[1], n[0] * s.velocity[0]));
-        let v = [0, 1, 2].map(|a| (-across).mul_add(n[a], s.velocity[a]));
+        let u = s.velocity;
+        let across = n[2].mul_add(u[2], n[1].mul_add(u[1], n[0] * u[0]));
+        let v = [(-across).mul_add(n[0], u[0]), (-across).mul_add(n[1], u[1]), (-across).mul_add(n[2], u[2])];
         let speed2 = v[2].mul_add(v[2], v[1].mul_add(v[1], v[0] * v[0]));
         let limit = s.coefficient * normal;
         let least = s.regular.max(BOTH_SIDES * limit * s.dt * s.inverse_mass);
         let divisor = speed2.sqrt().max(least);
         if divisor > 0.0 {
             let drag = limit / divisor;
-            force = [0, 1, 2].map(|a| (-drag).mul_add(v[a], force[a]));
+            for a in 0..3 {
+                force[a] = (-drag).mul_add(v[a], force[a]);
+            }
             friction = energy_quantum.round(drag * speed2 * s.dt);
         }
     }
-    let corners = push.weights.map(|w| force.map(|f| force_quantum.round(-(w * f))));
-    let node = [0, 1, 2].map(|a| -((corners[0][a] + corners[1][a]) + (corners[2][a] + corners[3][a])));
+    let mut corners = [[0.0; 3]; 4];
+    let mut node = [0.0; 3];
+    for a in 0..3 {
+        for (corner, w) in corners.iter_mut().zip(push.weights) {
+            corner[a] = force_quantum.round(-(w * force[a]));
+        }
+        node[a] = -((corners[0][a] + corners[1][a]) + (corners[2][a] + corners[3][a]));
+    }
     let energy = energy_quantum.round(0.5 * normal * push.depth);
     Reaction { corners, node, energy, friction }
 }

@@ -37,7 +37,7 @@ pub struct Hit {
     pub depth: f64,
     /// Unit vector along the line of node and closest point, out of the solid.
     pub direction: Vector,
-    /// Share of the push this hit has, in (0, 1]; see [`share`].
+    /// Share of the push this hit has, in (0, 1]: below 1 where several hits push the same way.
     pub share: f64,
     /// Whether the node is on the outer side.
     outer: bool,
@@ -48,13 +48,15 @@ pub struct Hit {
 fn belongs(near: &Near, corners: &[u32; 4]) -> bool {
     match near.nearest.feature {
         Feature::Face => false,
-        Feature::Corner(i) => corners.contains(&near.corners[i as usize]),
+        Feature::Corner(i) => {
+            let c = near.corners[i as usize];
+            (corners[0] == c) | (corners[1] == c) | (corners[2] == c) | (corners[3] == c)
+        }
         Feature::Edge(i) => {
             let (a, b) = (near.corners[i as usize], near.corners[(i as usize + 1) & 3]);
-            (0..4).any(|j| {
-                let (c, d) = (corners[j], corners[(j + 1) & 3]);
-                (c == a && d == b) || (c == b && d == a)
-            })
+            let at = |c: u32| [corners[0] == c, corners[1] == c, corners[2] == c, corners[3] == c];
+            let (a, b) = (at(a), at(b));
+            ((a[0] | a[2]) & (b[1] | b[3])) | ((a[1] | a[3]) & (b[0] | b[2]))
         }
     }
 }
@@ -143,7 +145,8 @@ fn hit<'a>(
     } else {
         let (s, depth) =
             if outer { (1.0 / distance, gap - distance) } else { (-1.0 / distance, gap + distance) };
-        (nearest.vector.map(|v| s * v), depth)
+        let v = nearest.vector;
+        ([s * v[0], s * v[1], s * v[2]], depth)
     };
     (direction != [0.0; 3]).then_some(Hit { near: i as u32, depth, direction, share: 1.0, outer })
 }
@@ -204,7 +207,10 @@ fn share(hits: &mut [Hit]) {
 pub fn stacking(hits: &[Hit]) -> f64 {
     let mut most = 1.0_f64;
     for a in hits {
-        let row: f64 = hits.iter().map(|b| b.share * dot(a.direction, b.direction).abs()).sum();
+        let mut row = 0.0;
+        for b in hits {
+            row += b.share * dot(a.direction, b.direction).abs();
+        }
         most = most.max(row);
     }
     most

@@ -19,6 +19,9 @@ const MAX_CUBE: f64 = 2_097_000.0;
 ///
 /// Every pair that interacts and of which the node lies in the face's box grown by the reach is in exactly one
 /// unit. Nodes and faces of parts that interact with nothing are left out.
+///
+/// # Panics
+/// If the settings know fewer parts than the surface.
 pub fn sort(
     surface: &Surface,
     x: &[[f64; 3]],
@@ -30,11 +33,12 @@ pub fn sort(
         settings.interacts.chunks(n_parts.max(1)).map(|row| row.contains(&true)).collect();
     let Some(grid) = Grid::new(surface, x, settings, &interacting) else { return Vec::new() };
     let (table, unit_of) = sort_nodes(surface, x, &grid, &interacting);
-    let census = PartCensus::new(surface, &unit_of, table.cubes.len());
+    let nodes = group(table.cubes.len(), unit_of.iter().zip(0..).map(|(&unit, node)| (unit, node)));
+    let census = PartCensus::new(surface, &nodes);
     let mut interactions = vec![0_u64; table.cubes.len()];
     let incidences =
         sort_faces(surface, x, settings, &grid, &table, &unit_of, &census, &interacting, &mut interactions);
-    assemble(surface, settings, exclusions, &table.cubes, &unit_of, &incidences, interactions)
+    assemble(surface, settings, exclusions, &table.cubes, &unit_of, &nodes, &incidences, interactions)
 }
 
 /// The virtual grid.
@@ -74,11 +78,12 @@ impl Grid {
     /// Cube of a point; monotonic in each coordinate, rounding included, so a box test and a cube test agree.
     #[inline(always)]
     fn cube(&self, p: [f64; 3]) -> [i32; 3] {
-        [0, 1, 2].map(|a| {
+        let along = |a: usize| {
             let c = (p[a] - self.origin[a]) * self.inverse_side;
             let truncated = c as i32;
             truncated - i32::from(c < f64::from(truncated))
-        })
+        };
+        [along(0), along(1), along(2)]
     }
 }
 
@@ -191,9 +196,8 @@ struct PartCensus {
 }
 
 impl PartCensus {
-    fn new(surface: &Surface, unit_of: &[u32], n_units: usize) -> Self {
-        let (starts, nodes) = group(n_units, unit_of.iter().zip(0..).map(|(&unit, node)| (unit, node)));
-        let mut census = Self { starts: vec![0], counts: Vec::with_capacity(n_units) };
+    fn new(surface: &Surface, (starts, nodes): &(Vec<u32>, Vec<u32>)) -> Self {
+        let mut census = Self { starts: vec![0], counts: Vec::with_capacity(starts.len()) };
         for bounds in starts.windows(2) {
             let first = census.counts.len();
             for &node in &nodes[bounds[0] as usize..bounds[1] as usize] {
@@ -239,28 +243,27 @@ fn sort_faces(
             continue;
         }
         let permitted = &settings.interacts[face.part as usize * n_parts..][..n_parts];
-        let corners = face.nodes.map(|n| x[n as usize]);
-        let (mut min, mut max) = (corners[0], corners[0]);
-        for c in &corners[1..] {
+        let (mut min, mut max) = (x[face.nodes[0] as usize], x[face.nodes[0] as usize]);
+        for n in &face.nodes[1..] {
+            let c = x[*n as usize];
             for a in 0..3 {
                 min[a] = if c[a] < min[a] { c[a] } else { min[a] };
                 max[a] = if c[a] > max[a] { c[a] } else { max[a] };
             }
         }
-        let mut low = grid.cube(min.map(|m| m - grid.reach));
-        let mut high = grid.cube(max.map(|m| m + grid.reach));
+        let mut low = grid.cube([min[0] - grid.reach, min[1] - grid.reach, min[2] - grid.reach]);
+        let mut high = grid.cube([max[0] + grid.reach, max[1] + grid.reach, max[2] + grid.reach]);
         for a in 0..3 {
             low[a] = low[a].max(0);
             high[a] = high[a].min(grid.last[a]);
         }
         // Own corners that can be in a unit and are permitted: to be taken off its count.
-        let own = face.own.map(|node| {
+        let mut own = [NO_UNIT; 8];
+        for (own, &node) in own.iter_mut().zip(&face.own) {
             if node != u32::MAX && permitted[surface.node_part[node as usize] as usize] {
-                unit_of[node as usize]
-            } else {
-                NO_UNIT
+                *own = unit_of[node as usize];
             }
-        });
+        }
         let mut put = |unit: u32| {
             let all = census.permitted(unit, permitted);
             if all > 0 {
@@ -293,16 +296,17 @@ fn sort_faces(
 }
 
 /// Gathers units from what the passes found; takes excluded pairs off and drops units without interactions.
+#[expect(clippy::too_many_arguments, reason = "what both passes left behind")]
 fn assemble(
     surface: &Surface,
     settings: &Settings,
     exclusions: &Exclusions,
     cubes: &[[i32; 3]],
     unit_of: &[u32],
+    (node_starts, nodes): &(Vec<u32>, Vec<u32>),
     incidences: &[(u32, u32)],
     mut interactions: Vec<u64>,
 ) -> Vec<WorkUnit> {
-    let (node_starts, nodes) = group(cubes.len(), unit_of.iter().zip(0..).map(|(&unit, node)| (unit, node)));
     let (face_starts, faces) = group(cubes.len(), incidences.iter().copied());
     let slice = |starts: &[u32], unit: usize| starts[unit] as usize..starts[unit + 1] as usize;
     for (node, face) in exclusions.on(surface) {
@@ -319,7 +323,7 @@ fn assemble(
         .filter(|&unit| interactions[unit] > 0)
         .map(|unit| WorkUnit {
             cube: cubes[unit],
-            nodes: nodes[slice(&node_starts, unit)].to_vec(),
+            nodes: nodes[slice(node_starts, unit)].to_vec(),
             faces: faces[slice(&face_starts, unit)].to_vec(),
             interactions: interactions[unit],
         })

@@ -4,21 +4,24 @@
 //! are therefore inside. A face of a degenerate element counts with its distinct nodes and vanishes with fewer
 //! than three. The surface holds static data only; positions come from the caller, by surface node.
 
-use crate::{material::Material, mesh::Mesh};
+use crate::{element::hex8, material::Material, mesh::Mesh};
 
-/// Corners of each side of a hexahedron, outward by the right-hand rule.
-pub const SIDES: [[usize; 4]; 6] =
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+pub use crate::mesh::FACES as SIDES;
 
 /// The outer faces of a mesh and their nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Global node index of each surface node, ascending.
     pub nodes: Vec<u32>,
-    /// Part of each surface node; the lowest of them where joined parts share it.
+    /// Part of each surface node; the lowest of them where joined parts share it (and the one whose row of the
+    /// matrix counts for it).
     pub node_part: Vec<u32>,
     /// Mean of the stiffness of the faces around each surface node (force per length).
     pub node_stiffness: Vec<f64>,
+    /// Material around each surface node against that around one inside a flat face, by volume: 1 there, 1/2 on an
+    /// edge, 1/4 at a corner. The penalty takes this share, as the node carries that share of the pressure; otherwise
+    /// the light nodes of edges and corners would rule the time step.
+    pub node_share: Vec<f64>,
     /// Faces by element, then side.
     pub faces: Vec<Face>,
 }
@@ -77,7 +80,7 @@ impl Surface {
             let bulk = materials[mesh.parts[part].material as usize].bulk();
             let nodes = SIDES[side as usize].map(|c| corners[c]);
             let area = area(nodes.map(|n| mesh.positions[n as usize]));
-            let volume = volume(&corners.map(|n| mesh.positions[n as usize]));
+            let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
             for n in nodes {
                 index[n as usize] = 0;
             }
@@ -91,8 +94,24 @@ impl Surface {
         }
         let mut node_part = vec![u32::MAX; nodes.len()];
         let mut node_stiffness = vec![0.0; nodes.len()];
+        let mut node_share = vec![0.0; nodes.len()];
         let mut count = vec![0_u32; nodes.len()];
+        let mut around = vec![0.0; nodes.len()];
+        let mut element = 0;
+        for part in &mesh.parts {
+            for e in 0..part.n_elements() {
+                let corners = part.corners(e);
+                if alive(element) && corners.iter().any(|&n| index[n as usize] != u32::MAX) {
+                    let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
+                    for n in corners.map(|n| index[n as usize]).into_iter().filter(|&n| n != u32::MAX) {
+                        around[n as usize] += 0.125 * volume;
+                    }
+                }
+                element += 1;
+            }
+        }
         for face in &mut faces {
+            let face_volume = hex8::volume(&face.corners.map(|n| mesh.positions[n as usize]));
             face.nodes = face.nodes.map(|n| index[n as usize]);
             for (i, n) in face.corners.into_iter().enumerate() {
                 if !face.corners[..i].contains(&n) {
@@ -102,13 +121,16 @@ impl Surface {
             for n in face.nodes.map(|n| n as usize) {
                 node_part[n] = node_part[n].min(face.part);
                 node_stiffness[n] += face.stiffness;
+                node_share[n] += face_volume;
                 count[n] += 1;
             }
         }
-        for (stiffness, &count) in node_stiffness.iter_mut().zip(&count) {
-            *stiffness /= f64::from(count);
+        for n in 0..nodes.len() {
+            node_stiffness[n] /= f64::from(count[n]);
+            let half_mean = 0.5 * node_share[n] / f64::from(count[n]);
+            node_share[n] = if half_mean > 0.0 { (around[n] / half_mean).min(1.0) } else { 1.0 };
         }
-        Self { nodes, node_part, node_stiffness, faces }
+        Self { nodes, node_part, node_stiffness, node_share, faces }
     }
 
     /// Number of elements with at least one outer face.
@@ -133,7 +155,8 @@ impl Surface {
                 if a != b {
                     let (a, b) = (x[a as usize], x[b as usize]);
                     let e = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-                    smallest = smallest.min(e[2].mul_add(e[2], e[1].mul_add(e[1], e[0] * e[0])));
+                    let length2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+                    smallest = if length2 < smallest { length2 } else { smallest };
                 }
             }
         }
@@ -212,54 +235,7 @@ fn area(x: [[f64; 3]; 4]) -> f64 {
     0.5 * (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt()
 }
 
-/// Trilinear volume of a hexahedron by 2 x 2 x 2 Gauss points, which is exact for it.
-fn volume(x: &[[f64; 3]; 8]) -> f64 {
-    const SIGNS: [[f64; 3]; 8] = [
-        [-1., -1., -1.],
-        [1., -1., -1.],
-        [1., 1., -1.],
-        [-1., 1., -1.],
-        [-1., -1., 1.],
-        [1., -1., 1.],
-        [1., 1., 1.],
-        [-1., 1., 1.],
-    ];
-    let g = 1.0 / 3.0_f64.sqrt();
-    let mut volume = 0.0;
-    for point in SIGNS {
-        let mut j = [[0.0; 3]; 3];
-        for (corner, s) in x.iter().zip(SIGNS) {
-            let h = [0, 1, 2].map(|a| (g * s[a]).mul_add(point[a], 1.0));
-            let derivative = [s[0] * h[1] * h[2], s[1] * h[0] * h[2], s[2] * h[0] * h[1]];
-            for a in 0..3 {
-                for b in 0..3 {
-                    j[a][b] += 0.125 * derivative[a] * corner[b];
-                }
-            }
-        }
-        volume += j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1])
-            - j[0][1] * (j[1][0] * j[2][2] - j[1][2] * j[2][0])
-            + j[0][2] * (j[1][0] * j[2][1] - j[1][1] * j[2][0]);
-    }
-    volume
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn volume_of_a_skewed_hexahedron_is_exact() {
-        let x = [
-            [0., 0., 0.],
-            [1., 0., 0.],
-            [1.2, 1.1, 0.1],
-            [0., 1., 0.2],
-            [0.1, 0., 1.],
-            [1., 0.2, 1.3],
-            [1.1, 1., 1.],
-            [-0.1, 1., 0.9],
-        ];
-        assert!((volume(&x) - 1.014).abs() < 1e-13, "{}", volume(&x));
-    }
 }

@@ -75,6 +75,8 @@ pub struct BatchNode {
     pub mass: f64,
     /// Mean `K A^2 / V` of its faces (force per length).
     pub stiffness: f64,
+    /// Share of it that the node takes ([`Surface::node_share`]).
+    pub share: f64,
 }
 
 /// One face of a batch.
@@ -132,6 +134,7 @@ impl Batch {
                 part: surface.node_part[n],
                 mass: mass(global),
                 stiffness: surface.node_stiffness[n],
+                share: surface.node_share[n],
             });
         }
         let mut faces = Vec::new();
@@ -160,5 +163,16 @@ impl Batch {
             })
             .collect();
         Self { nodes, faces, units, excluded }
+    }
+
+    /// Whether every index is in range, parts among `n_parts` and masses positive: what a batch from outside
+    /// must satisfy before [`super::Contact::new`].
+    pub fn is_sound(&self, n_parts: usize) -> bool {
+        let (n_nodes, n_faces) = (self.nodes.len(), self.faces.len());
+        let below = |indices: &[u32], n: usize| indices.iter().all(|&i| (i as usize) < n);
+        self.nodes.iter().all(|n| (n.part as usize) < n_parts && n.mass > 0.0)
+            && self.faces.iter().all(|f| (f.part as usize) < n_parts && below(&f.nodes, n_nodes))
+            && self.units.iter().all(|u| below(&u.nodes, n_nodes) && below(&u.faces, n_faces))
+            && self.excluded.is_sorted()
     }
 }

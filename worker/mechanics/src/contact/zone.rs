@@ -117,6 +117,27 @@ pub(super) fn unit(a: Vector) -> Vector {
     if l > 0.0 { [a[0] / l, a[1] / l, a[2] / l] } else { [0.0; 3] }
 }
 
+// Fours are written out: a closure in `map` may become a function of its own, without the caller's
+// fused multiply-add.
+
+/// `p - x_i`.
+#[inline(always)]
+fn from_each(p: Vector, x: &[Vector; 4]) -> [Vector; 4] {
+    [sub(p, x[0]), sub(p, x[1]), sub(p, x[2]), sub(p, x[3])]
+}
+
+/// `a_i . b_i`.
+#[inline(always)]
+fn dot_each(a: &[Vector; 4], b: &[Vector; 4]) -> [f64; 4] {
+    [dot(a[0], b[0]), dot(a[1], b[1]), dot(a[2], b[2]), dot(a[3], b[3])]
+}
+
+/// `1 / l`, zero for zero.
+#[inline(always)]
+fn inverse(l: f64) -> f64 {
+    if l > 0.0 { 1.0 / l } else { 0.0 }
+}
+
 /// Angle between two vectors to 7e-5 (Abramowitz and Stegun 4.4.45): only a weight among normals, and the
 /// platform's `acos` has other bits on other platforms.
 #[inline(always)]
@@ -148,18 +169,24 @@ impl Frame {
         let (d0, d1) = (sub(x[2], x[0]), sub(x[3], x[1]));
         let area = cross(d0, d1);
         let size2 = dot(area, area);
-        let inverse_size = if size2 > 0.0 { 1.0 / size2.sqrt() } else { 0.0 };
+        let inverse_size = inverse(size2.sqrt());
         let normal = scale(inverse_size, area);
-        let outward = edges.map(|e| cross(e, normal));
-        let length2 = edges.map(|e| dot(e, e));
-        let inverse_length2 = length2.map(|l| if l > 0.0 { 1.0 / l } else { 0.0 });
+        let outward = [
+            cross(edges[0], normal),
+            cross(edges[1], normal),
+            cross(edges[2], normal),
+            cross(edges[3], normal),
+        ];
+        let l = dot_each(&edges, &edges);
+        let inverse_length2 = [inverse(l[0]), inverse(l[1]), inverse(l[2]), inverse(l[3])];
         // How far the diagonals pass each other.
         let offset = dot(normal, edges[0]);
         let span2 = 0.5 * (dot(d0, d0) + dot(d1, d1));
         // A corner of 180 degrees or more, or an edge of no length, is left to the triangles.
         let least = 1e-8 * (size2 * inverse_size);
-        let turns = [3, 0, 1, 2].map(|i| -dot(outward[i], edges[(i + 1) & 3]));
-        let convex = (turns[0] > least) & (turns[1] > least) & (turns[2] > least) & (turns[3] > least);
+        // Minus the sine of each corner's turn, times its edges' lengths.
+        let turns = dot_each(&outward, &[edges[1], edges[2], edges[3], edges[0]]);
+        let convex = (turns[0] < -least) & (turns[1] < -least) & (turns[2] < -least) & (turns[3] < -least);
         let flat = convex & (offset * offset <= COPLANAR * COPLANAR * span2);
         Self { corners: *x, edges, inverse_length2, normal, outward, flat }
     }
@@ -173,14 +200,20 @@ impl Frame {
     /// Closest point of a coplanar convex face.
     #[inline(always)]
     fn on_plane(&self, p: Vector) -> Nearest {
-        let from = self.corners.map(|c| sub(p, c));
+        let from = from_each(p, &self.corners);
         // Distance beyond each edge, times its length.
-        let beyond = [0, 1, 2, 3].map(|i| dot(self.outward[i], from[i]));
+        let beyond = dot_each(&self.outward, &from);
         if (beyond[0] > 0.0) | (beyond[1] > 0.0) | (beyond[2] > 0.0) | (beyond[3] > 0.0) {
             return self.on_border(&from, &beyond);
         }
         let height = dot(self.normal, from[0]);
-        let near = [0, 1, 2, 3].map(|i: usize| beyond[i] * self.inverse_length2[i] >= -JOINT);
+        let inverse = &self.inverse_length2;
+        let near = [
+            beyond[0] * inverse[0] >= -JOINT,
+            beyond[1] * inverse[1] >= -JOINT,
+            beyond[2] * inverse[2] >= -JOINT,
+            beyond[3] * inverse[3] >= -JOINT,
+        ];
         let feature = match near {
             [false, false, false, false] => Feature::Face,
             [true, _, _, true] => Feature::Corner(0),
@@ -234,8 +267,10 @@ impl Frame {
     }
 
     /// Closest point of a split face: the nearest of those of its four triangles, the first of equals.
+    #[inline(always)]
     fn on_triangles(&self, p: Vector) -> Nearest {
-        let r = self.corners.map(|c| sub(c, p));
+        let c = &self.corners;
+        let r = [sub(c[0], p), sub(c[1], p), sub(c[2], p), sub(c[3], p)];
         let mid = middle(&r);
         let mut best = (f64::INFINITY, 0, Region::Inside, [1.0, 0.0, 0.0], mid);
         for i in 0..4 {
@@ -362,7 +397,8 @@ impl Frame {
 /// Mean of four corners.
 #[inline(always)]
 fn middle(x: &[Vector; 4]) -> Vector {
-    [0, 1, 2].map(|a| 0.25 * ((x[0][a] + x[1][a]) + (x[2][a] + x[3][a])))
+    let mean = |a: usize| 0.25 * ((x[0][a] + x[1][a]) + (x[2][a] + x[3][a]));
+    [mean(0), mean(1), mean(2)]
 }
 
 /// Feature at fraction `u` of edge `i`.

@@ -1,21 +1,16 @@
-//! The eight-node hexahedron with one integration point, exact volume and exact mean gradient, after Flanagan and
-//! Belytschko (1981), in modal form.
+//! The eight-node hexahedron with one integration point: one cycle of a lane set, from gather to scatter.
 //!
-//! With `x(xi, eta, zeta) = x0 + a xi + b eta + c zeta + d eta zeta + e xi zeta + f xi eta + g xi eta zeta` over the cube
-//! -1..1, that is `m = (1/8) sum_I Gamma_mI x_I`, the volume integral of the Jacobian is
-//!
-//! `V/8 = a.(b x c + f x e/3) + [c.(e x d) + b.(d x f)]/3`,
-//!
-//! its derivatives by the modes are the `G_m` of [`Gradient`] (g has none), `B_I = dV/dx_I = sum_m Gamma_mI G_m`, and
-//! the velocity gradient is `L = (8/V) sum_m v_m G_m^T`. A cycle follows the numbered steps of `compute`.
+//! The geometry is that of `modes`; the steps of a cycle are numbered in `slots`, in the order of their
+//! dependence. `volume` and `volume_gradient` give single elements the same numbers.
 
 use std::ops::Range;
 
 use super::{
     ElementVote, Fault, Step,
     hourglass::{Hourglass, amplitude},
+    modes::{Gradient, Modes, corner_values, modes_of},
     rotation::rotated,
-    vector::{Tensor, Vector},
+    vector::Vector,
     viscosity::{Spread, frequency},
 };
 use crate::{
@@ -44,155 +39,6 @@ pub fn volume_gradient(corners: &[[f64; 3]; 8]) -> [[f64; 3]; 8] {
 fn scalar_modes(corners: &[[f64; 3]; 8]) -> Modes<Scalar> {
     let axis = |axis: usize| modes_of(std::array::from_fn(|corner| Scalar(corners[corner][axis])));
     Modes::of(axis(0), axis(1), axis(2))
-}
-
-/// The seven modes of a vector field at the corners, without its mean.
-#[derive(Clone, Copy)]
-struct Modes<L> {
-    a: Vector<L>,
-    b: Vector<L>,
-    c: Vector<L>,
-    d: Vector<L>,
-    e: Vector<L>,
-    f: Vector<L>,
-    g: Vector<L>,
-}
-
-impl<L: Lane> Modes<L> {
-    #[inline(always)]
-    fn of(x: [L; 7], y: [L; 7], z: [L; 7]) -> Self {
-        Self {
-            a: Vector { x: x[0], y: y[0], z: z[0] },
-            b: Vector { x: x[1], y: y[1], z: z[1] },
-            c: Vector { x: x[2], y: y[2], z: z[2] },
-            d: Vector { x: x[3], y: y[3], z: z[3] },
-            e: Vector { x: x[4], y: y[4], z: z[4] },
-            f: Vector { x: x[5], y: y[5], z: z[5] },
-            g: Vector { x: x[6], y: y[6], z: z[6] },
-        }
-    }
-
-    /// `x - v * half`: the positions at the middle of the step.
-    #[inline(always)]
-    fn before(x: &Self, v: &Self, half: L) -> Self {
-        Self {
-            a: v.a.neg_mul_add(half, &x.a),
-            b: v.b.neg_mul_add(half, &x.b),
-            c: v.c.neg_mul_add(half, &x.c),
-            d: v.d.neg_mul_add(half, &x.d),
-            e: v.e.neg_mul_add(half, &x.e),
-            f: v.f.neg_mul_add(half, &x.f),
-            g: v.g.neg_mul_add(half, &x.g),
-        }
-    }
-}
-
-/// The modes xi, eta, zeta, eta zeta, xi zeta, xi eta, xi eta zeta of one component at the corners, times 1/8.
-#[inline(always)]
-fn modes_of<L: Lane>(u: [L; 8]) -> [L; 7] {
-    let (s0, d0) = (u[1] + u[0], u[1] - u[0]);
-    let (s1, d1) = (u[2] + u[3], u[2] - u[3]);
-    let (s2, d2) = (u[5] + u[4], u[5] - u[4]);
-    let (s3, d3) = (u[6] + u[7], u[6] - u[7]);
-    let (low, low_eta) = (s1 + s0, s1 - s0);
-    let (low_xi, low_xi_eta) = (d1 + d0, d1 - d0);
-    let (high, high_eta) = (s3 + s2, s3 - s2);
-    let (high_xi, high_xi_eta) = (d3 + d2, d3 - d2);
-    let eighth = L::splat(0.125);
-    [
-        (high_xi + low_xi) * eighth,
-        (high_eta + low_eta) * eighth,
-        (high - low) * eighth,
-        (high_eta - low_eta) * eighth,
-        (high_xi - low_xi) * eighth,
-        (high_xi_eta + low_xi_eta) * eighth,
-        (high_xi_eta - low_xi_eta) * eighth,
-    ]
-}
-
-/// `sum_m Gamma_mI phi_m` at the corners, the way back from modes.
-#[inline(always)]
-fn corner_values<L: Lane>([a, b, c, d, e, f, g]: [L; 7]) -> [L; 8] {
-    let (eta_low, eta_high) = (b - d, b + d);
-    let (xi_low, xi_high) = (a - e, a + e);
-    let (both_low, both_high) = (f - g, f + g);
-    let (low_0, low_1) = (-c - eta_low, eta_low - c);
-    let (high_0, high_1) = (c - eta_high, c + eta_high);
-    let (xi_low_0, xi_low_1) = (xi_low - both_low, xi_low + both_low);
-    let (xi_high_0, xi_high_1) = (xi_high - both_high, xi_high + both_high);
-    [
-        low_0 - xi_low_0,
-        low_0 + xi_low_0,
-        low_1 + xi_low_1,
-        low_1 - xi_low_1,
-        high_0 - xi_high_0,
-        high_0 + xi_high_0,
-        high_1 + xi_high_1,
-        high_1 - xi_high_1,
-    ]
-}
-
-/// Volume and its derivatives by the modes.
-#[derive(Clone, Copy)]
-struct Gradient<L> {
-    a: Vector<L>,
-    b: Vector<L>,
-    c: Vector<L>,
-    d: Vector<L>,
-    e: Vector<L>,
-    f: Vector<L>,
-    eighth_volume: L,
-}
-
-impl<L: Lane> Gradient<L> {
-    #[inline(always)]
-    fn of(m: &Modes<L>) -> Self {
-        let third = L::splat(1.0 / 3.0);
-        let fe = m.f.cross(&m.e);
-        let df = m.d.cross(&m.f);
-        let ed = m.e.cross(&m.d);
-        let a = m.b.cross_add(&m.c, &fe.scaled(third));
-        let bent = m.c.dot(&ed) + m.b.dot(&df);
-        Self {
-            a,
-            b: m.c.cross_add(&m.a, &df.scaled(third)),
-            c: m.a.cross_add(&m.b, &ed.scaled(third)),
-            d: m.c.cross_add(&m.e, &m.f.cross(&m.b)).scaled(third),
-            e: m.a.cross_add(&m.f, &m.d.cross(&m.c)).scaled(third),
-            f: m.e.cross_add(&m.a, &m.b.cross(&m.d)).scaled(third),
-            eighth_volume: bent.mul_add(third, m.a.dot(&a)),
-        }
-    }
-
-    #[inline(always)]
-    fn volume(&self) -> L {
-        self.eighth_volume * L::splat(8.0)
-    }
-
-    /// `sum_m v_m G_m^T`.
-    #[inline(always)]
-    fn against(&self, v: &Modes<L>) -> Tensor<L> {
-        Tensor::outer(&v.a, &self.a)
-            .outer_add(&v.b, &self.b)
-            .outer_add(&v.c, &self.c)
-            .outer_add(&v.d, &self.d)
-            .outer_add(&v.e, &self.e)
-            .outer_add(&v.f, &self.f)
-    }
-
-    /// One component of the corner forces: `row . G_m - resist q_m` for each mode, brought to the corners.
-    #[inline(always)]
-    fn forces(&self, row: &Vector<L>, resist: L, q: [L; 4]) -> [L; 8] {
-        corner_values([
-            row.dot(&self.a),
-            row.dot(&self.b),
-            row.dot(&self.c),
-            resist.neg_mul_add(q[0], row.dot(&self.d)),
-            resist.neg_mul_add(q[1], row.dot(&self.e)),
-            resist.neg_mul_add(q[2], row.dot(&self.f)),
-            -(resist * q[3]),
-        ])
-    }
 }
 
 /// Where the corners of the slots are.
@@ -356,7 +202,9 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let at_end = Gradient::of(&x);
     let volume = at_end.volume();
     let inverse_eighth = one / at_end.eighth_volume;
+    let inverse_volume = inverse_eighth * L::splat(0.125);
     let relative_volume = volume / initial_volume;
+    let per_initial_volume = relative_volume * inverse_volume;
 
     // 3. Deviatoric stress: rotation, elastic increment, yield; its work on the middle volume.
     let mut history = History { plastic_strain: zero, temperature: zero };
@@ -404,7 +252,7 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
         // The stress before, turned, is `turned` less its half of the increment.
         let turned_power = half_increment.neg_mul_add(rate_square, turned.contract(&rate));
         let mean_power = half * (turned_power + stress.contract(&rate));
-        deviatoric_work = mean_power * dt * (at_mid.volume() / initial_volume);
+        deviatoric_work = mean_power * dt * (at_mid.volume() * per_initial_volume);
     }
 
     // 4. Pressure line at the new volume and the sound speed there.
@@ -416,7 +264,7 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let volume_change = L::select(zero.less(dt), relative_volume - volume_before, zero);
     let energy_before = energy_before + deviatoric_work;
     let line = laws.eos.line(relative_volume);
-    let energy = line.energy_after(energy_before, pressure_before, zero, volume_change);
+    let energy = pressure_before.neg_mul_add(volume_change, energy_before);
     let bulk = line
         .stiffness(relative_volume, line.pressure(energy), energy)
         .max(L::splat(laws.eos.least_stiffness()));
@@ -428,7 +276,7 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
     let area = (L::splat(2.0 / 3.0) * spread.trace()).sqrt();
     let length = volume / area;
-    let density = L::splat(laws.density) / relative_volume;
+    let density = L::splat(laws.density) * (initial_volume * inverse_volume);
     let closing = L::select(volume_rate.less(zero), -volume_rate, zero);
     let quadratic = L::splat(step.quadratic_viscosity * step.quadratic_viscosity);
     let linear = L::splat(step.linear_viscosity);
@@ -453,7 +301,6 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     }
 
     // 8. Votes and energies.
-    let inverse_volume = inverse_eighth * L::splat(0.125);
     let double_inverse_square = L::splat(2.0) * inverse_volume * inverse_volume;
     let damping = L::select(volume_rate.less(zero), damping, zero);
     let bound = frequency(spread.eigenvalue_bound() * double_inverse_square, damping, sound_square);
@@ -511,11 +358,14 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let mut axis = 0;
     while axis < 3 {
         let mut forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
+        // Seven corners are rounded, the eighth takes what they leave: the element's forces add to exactly zero.
+        let mut rest = zero;
         let mut corner = 0;
         while corner < 8 {
             let force = L::select(active, forces[corner], zero);
             tally.largest_force = tally.largest_force.max(force.abs());
-            forces[corner] = (force + magic) - magic;
+            forces[corner] = if corner == 7 { rest } else { (force + magic) - magic };
+            rest = rest - forces[corner];
             corner += 1;
         }
         // SAFETY: corners are inside the node arrays.
@@ -573,14 +423,10 @@ unsafe fn scatter<L: Lane>(layout: &Layout, to: &mut [f64], slot: usize, values:
             Layout::Structured { row, plane, base } => {
                 let n = *base.get_unchecked(slot / SET) as usize + slot % SET;
                 let (row, plane) = (*row, *plane);
-                add(to, n, values[0]);
-                add(to, n + plane, values[4]);
-                add(to, n + row, values[3]);
-                add(to, n + plane + row, values[7]);
-                add(to, n + 1, values[1]);
-                add(to, n + plane + 1, values[5]);
-                add(to, n + row + 1, values[2]);
-                add(to, n + plane + row + 1, values[6]);
+                add_pair(to, n, values[0], values[1]);
+                add_pair(to, n + row, values[3], values[2]);
+                add_pair(to, n + plane, values[4], values[5]);
+                add_pair(to, n + plane + row, values[7], values[6]);
             }
             Layout::Explicit { corners } => {
                 let mut corner = 0;
@@ -600,8 +446,17 @@ unsafe fn scatter<L: Lane>(layout: &Layout, to: &mut [f64], slot: usize, values:
     }
 }
 
+/// Adds `low` from `at` on and `high` from `at + 1` on. Two stores of which the second overlaps the first would
+/// make its load wait, so the lanes are added in registers and only the last goes alone.
+///
+/// # Safety
+/// `at + N < to.len()`.
 #[inline(always)]
-unsafe fn add<L: Lane>(to: &mut [f64], at: usize, value: L) {
+unsafe fn add_pair<L: Lane>(to: &mut [f64], at: usize, low: L, high: L) {
+    let (shifted, last) = high.shifted_up();
     // SAFETY: the caller keeps the lanes inside.
-    unsafe { (L::load(to, at) + value).store(to, at) };
+    unsafe {
+        (L::load(to, at) + (low + shifted)).store(to, at);
+        *to.get_unchecked_mut(at + L::N) += last;
+    }
 }

@@ -157,4 +157,13 @@ impl Lane for Avx2 {
             _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(biased)))
         }))
     }
+
+    #[inline(always)]
+    fn shifted_up(self) -> (Self, f64) {
+        avx2!({
+            let turned = _mm256_permute4x64_pd::<0b10_01_00_11>(self.0);
+            let shifted = _mm256_blend_pd::<0b0001>(turned, _mm256_setzero_pd());
+            (Self(shifted), _mm256_cvtsd_f64(turned))
+        })
+    }
 }

@@ -157,4 +157,14 @@ impl Lane for Avx512 {
             _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(biased)))
         }))
     }
+
+    #[inline(always)]
+    fn shifted_up(self) -> (Self, f64) {
+        avx512!({
+            let bits = _mm512_castpd_si512(self.0);
+            let turned = _mm512_castsi512_pd(_mm512_alignr_epi64::<7>(bits, bits));
+            let shifted = _mm512_maskz_mov_pd(0b1111_1110, turned);
+            (Self(shifted), _mm512_cvtsd_f64(turned))
+        })
+    }
 }

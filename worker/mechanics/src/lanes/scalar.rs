@@ -136,4 +136,9 @@ impl Lane for Scalar {
     fn power_of_two(self) -> Self {
         Self(f64::from_bits((self.0 + BIASED).to_bits() << 52))
     }
+
+    #[inline(always)]
+    fn shifted_up(self) -> (Self, f64) {
+        (Self(0.0), self.0)
+    }
 }

@@ -176,3 +176,21 @@ fn pairs_inside_the_zone_at_time_zero_are_left_alone() {
     let vote = world.forces(1.0);
     assert_eq!((vote.hits, vote.dt), (0, f64::INFINITY));
 }
+
+#[test]
+fn edges_that_cross_without_a_node_in_a_zone_are_not_seen() {
+    // Two bars on edge, along x and along y, that overlap where their edges cross: documented behaviour.
+    let half = 0.5_f64.sqrt();
+    let mut mesh = block([1, 1, 1], 1.0);
+    deform(&mut mesh, |p| [2.0 * p[0] - 1.0, half * (p[1] - p[2]), half * (p[1] + p[2] - 2.0)]);
+    let mut other = block([1, 1, 1], 1.0);
+    deform(&mut other, |p| [half * (p[0] - p[2]), 2.0 * p[1] - 1.0, half * (p[0] + p[2]) - 0.05]);
+    let first = mesh.positions.len() as u32;
+    other.parts[0].nodes.iter_mut().for_each(|n| *n += first);
+    mesh.positions.extend(other.positions);
+    mesh.node_ids.extend(other.node_ids);
+    mesh.parts.extend(other.parts);
+    let mut world = World::new(&mesh, without_self(settings(2, 0.1, 0.1)), &|_| true);
+    assert_eq!(world.forces(1.0).hits, 0);
+    assert!(world.batch.is_sound(2) && !world.batch.is_sound(1));
+}

@@ -26,7 +26,7 @@ fn winding(world: &World, probe: usize) -> f64 {
 
 /// Shoots nodes of mass 1 at a fixed body: 3 x 3 x 3 elements without one corner and the middle of one side,
 /// so that convex and concave edges and corners and joints of four faces all occur; `jitter` bends its faces.
-fn shoot(gap: f64, jitter: f64, seed: u64, shots: usize) -> (usize, f64) {
+fn shoot(gap: f64, jitter: f64, seed: u64, shots: usize) -> (usize, f64, f64) {
     let mut random = Random(seed);
     let mut mesh = block([3, 3, 3], 1.0);
     deform(&mut mesh, |p| [0, 1, 2].map(|a| p[a] + random.within(-jitter, jitter)));
@@ -43,7 +43,7 @@ fn shoot(gap: f64, jitter: f64, seed: u64, shots: usize) -> (usize, f64) {
     let speed = gap * (0.5 * k).sqrt();
     let dt = 0.2 * gap / speed;
     let faces: Vec<_> = world.batch.faces.iter().filter(|f| f.part == 0).copied().collect();
-    let (mut touched, mut deepest) = (0, 0.0_f64);
+    let (mut touched, mut deepest, mut square) = (0, 0.0_f64, 0.0);
     for shot in 0..shots {
         // A target on a face: inside, on a joint of two, or on a corner.
         let face = &faces[(random.next() * faces.len() as f64) as usize];
@@ -85,17 +85,27 @@ fn shoot(gap: f64, jitter: f64, seed: u64, shots: usize) -> (usize, f64) {
         }
         world.place(probe, p);
         assert!(winding(&world, probe) < 0.5, "shot {shot} at {target:?} went through to {p:?}");
-        touched += usize::from(hit);
+        if hit && world.forces(dt).hits == 0 {
+            let energy = v.iter().map(|v| v * v).sum::<f64>() / (speed * speed);
+            square += (energy - 1.0).powi(2);
+            touched += 1;
+        }
     }
-    (touched, deepest)
+    (touched, deepest, (square / touched as f64).sqrt())
 }
 
 #[test]
 fn no_node_passes_a_faceted_body() {
     for (gap, jitter, seed) in [(0.1, 0.0, 1), (0.1, 0.15, 2), (0.3, 0.15, 3), (0.5, 0.05, 4), (0.2, 0.25, 5)]
     {
-        let (touched, deepest) = shoot(gap, jitter, seed, 1000);
-        println!("gap {gap}, jitter {jitter}: {touched} of 1000 touched, deepest {deepest:.3} gap");
+        let (touched, deepest, energy) = shoot(gap, jitter, seed, 1000);
+        println!(
+            "gap {gap}, jitter {jitter}: {touched} of 1000 touched, deepest {deepest:.3} gap, energy {energy:.2e}"
+        );
         assert!(touched > 300, "{touched} shots met the body");
+        // Flat faces: 1.5e-2 as the table of bounces has it for omega dt = .4. Bent ones add jumps of stiffness
+        // and direction at joints; with every hit of a concave joint pushing in full it would be 0.08 to 0.17.
+        let bound = if jitter == 0.0 { 1.8e-2 } else { 9e-2 };
+        assert!(energy < bound, "root mean square of the energy error {energy}");
     }
 }

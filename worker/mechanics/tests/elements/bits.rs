@@ -181,8 +181,12 @@ fn border_sets_first_and_then_the_rest_make_the_whole() {
     let marked: Vec<bool> = (0..piece.nodes.len()).map(|node| node % 8 == 7).collect();
     let border = block.sets_touching(&marked);
     for set in 0..block.n_sets() {
-        let touches = block.nodes_of_set(set).iter().any(|&node| marked[node as usize]);
-        assert_eq!(border[set as usize], touches, "set {set}");
+        let members = (0..piece.elements.len()).filter(|&e| block.set_of_element(e) == set);
+        let mut nodes: Vec<u32> = members.flat_map(|e| block.corners(e)).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        assert_eq!(block.nodes_of_set(set), nodes);
+        assert_eq!(border[set as usize], nodes.iter().any(|&node| marked[node as usize]), "set {set}");
     }
     let mut joined = ElementVote::default();
     let ranges = |wanted: bool| -> Vec<std::ops::Range<u32>> {
@@ -263,4 +267,47 @@ fn an_inverted_element_is_named_gives_no_force_and_keeps_its_state() {
     piece.x[4] = [0.04, f64::NAN, 0.0];
     let vote = compute(&mut Block::new(&piece), material, &full_step(1e-7), Width::best());
     assert_eq!(vote.fault.map(|fault| fault.element), Some(103));
+}
+
+#[test]
+fn the_vote_is_the_least_of_the_elements_alone() {
+    for material in all_laws() {
+        let mut piece = stirred(&material, [7, 5, 3], 41);
+        piece.elements.iter_mut().for_each(|element| *element += 1000);
+        let step = full_step(2e-7);
+        let vote = compute(&mut Block::new(&piece), &material, &step, Width::best());
+        let part = written_out(&piece);
+        let Topology::Explicit { hexahedra } = part.topology else { panic!("written out") };
+        let mut joined = ElementVote::default();
+        for (element, corners) in hexahedra.iter().enumerate().rev() {
+            let mut alone = one(&material, &corners.map(|node| piece.x[node as usize]));
+            alone.v = corners.map(|node| piece.v[node as usize]).to_vec();
+            alone.elements = vec![piece.elements[element]];
+            alone.initial_volume = vec![piece.initial_volume[element]];
+            alone.fields = std::array::from_fn(|field| vec![piece.fields[field][element]]);
+            joined.merge(&compute(&mut Block::new(&alone), &material, &step, Width::Scalar));
+        }
+        assert_eq!(joined, vote);
+    }
+}
+
+#[test]
+fn equal_limits_go_to_the_lowest_element() {
+    let material = &all_laws()[1];
+    let mut piece = grid(material, [9, 3, 2], 0.125, 0.0, 1);
+    let n = piece.elements.len() as u32;
+    piece.elements = (0..n).map(|element| 100 + (element + 20) % n).collect();
+    for width in Width::ALL.into_iter().filter(|width| width.available()) {
+        let vote = compute(&mut Block::new(&piece), material, &full_step(0.0), width);
+        assert_eq!(vote.courant_element, 100);
+    }
+}
+
+#[test]
+fn a_distorted_body_at_rest_is_without_force_to_the_bit() {
+    for material in all_laws() {
+        let piece = grid(&material, [5, 4, 3], 0.01, 0.15, 8);
+        let vote = compute(&mut Block::new(&piece), &material, &full_step(1e-7), Width::best());
+        assert_eq!((vote.force_bound, vote.internal), (0.0, 0.0));
+    }
 }

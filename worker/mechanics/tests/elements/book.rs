@@ -58,13 +58,12 @@ fn volume_gradient_has_all_reference_components_and_is_the_difference_quotient()
 
 #[test]
 fn linear_velocities_give_their_gradient_on_a_skewed_element() {
-    // Without rotation over a short step the stress is 2 G dev(D) dt - p, which shows D; W shows in no stress.
     let l = Matrix3::new(0.3, -0.2, 0.5, 0.1, 0.4, -0.7, 0.6, 0.2, -0.1);
-    let v = volume_gradient(&SKEWED);
+    let gradient = volume_gradient(&SKEWED);
     for i in 0..3 {
         for j in 0..3 {
             let velocity = |x: &[f64; 3]| l[(i, 0)] * x[0] + l[(i, 1)] * x[1] + l[(i, 2)] * x[2];
-            let sum: f64 = (0..8).map(|corner| velocity(&SKEWED[corner]) * v[corner][j]).sum();
+            let sum: f64 = (0..8).map(|corner| velocity(&SKEWED[corner]) * gradient[corner][j]).sum();
             assert!((sum / 1.014 - l[(i, j)]).abs() < 1e-15, "{i} {j}");
         }
     }
