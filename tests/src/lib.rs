@@ -4,6 +4,7 @@
 //! or derived one of `reference.toml` and says how it went; [`checker`] looks for nodes inside foreign bodies,
 //! without asking the contact code.
 
+pub mod bits;
 pub mod case;
 pub mod checker;
 pub mod solve;
