@@ -36,25 +36,7 @@ pub(crate) fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Volume of the trilinear hexahedron, positive for corners in the crate's order.
-///
-/// The Jacobian's determinant is at most quadratic in each of the three variables, so 2 x 2 x 2 Gauss
-/// points integrate it exactly. Corners are taken relative to corner 0, which keeps the digits of small
-/// elements far from the origin.
-pub(crate) fn volume(corners: &[[f64; 3]; 8]) -> f64 {
-    let x = corners.map(|c| sub(c, corners[0]));
-    let g = 1.0 / 3f64.sqrt();
-    let (low, high) = (0.5 * (1.0 - g), 0.5 * (1.0 + g));
-    let mut sum = 0.0;
-    for w in [low, high] {
-        for v in [low, high] {
-            for u in [low, high] {
-                sum += jacobian(&x, [u, v, w]);
-            }
-        }
-    }
-    sum / 8.0
-}
+pub(crate) use mechanics::element::hex8::volume;
 
 /// Which end of each axis a corner has.
 const ENDS: [[bool; 3]; 8] = [

@@ -3,9 +3,29 @@
 use mechanics::{mesh::Mesh, setup::Setup};
 use serde::{Deserialize, Serialize};
 
-/// Node fields that [`Output::fields`] may name beside the element fields of
-/// [`mechanics::state::FIELDS`].
-pub const NODE_FIELDS: [&str; 3] = ["displacement", "velocity", "mass"];
+/// Names that [`Output::fields`] may hold: fields of nodes and elements in the results.
+pub const FIELD_NAMES: [&str; 20] = [
+    "velocity",
+    "displacement",
+    "node_id",
+    "part",
+    "material",
+    "element_id",
+    "pressure",
+    "von_mises",
+    "plastic_strain",
+    "temperature",
+    "density",
+    "energy",
+    "stress",
+    "relative_volume",
+    "stress_xx",
+    "stress_yy",
+    "stress_xy",
+    "stress_yz",
+    "stress_zx",
+    "mass",
+];
 
 /// A checked problem in one consistent set of units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -32,6 +32,17 @@ pub enum Command {
 pub enum Route {
     /// All through the master, which adds them
     Master,
+    /// From worker to worker; votes and orders pass the master
+    Direct,
+}
+
+impl From<Route> for protocol::message::Route {
+    fn from(route: Route) -> Self {
+        match route {
+            Route::Master => Self::Master,
+            Route::Direct => Self::Direct,
+        }
+    }
 }
 
 /// Lane width of the kernels; the bits do not depend on it.

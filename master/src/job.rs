@@ -21,7 +21,7 @@ use mechanics::{
     state::GlobalState,
     vote::{Quanta, Vote},
 };
-use protocol::message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToWorker, Work};
+use protocol::message::{Assign, IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work};
 
 use crate::{
     decompose::{self, decompose},
@@ -48,6 +48,8 @@ pub struct Hand {
 pub struct Options {
     /// Lane width by name; none for the best.
     pub lanes: Option<String>,
+    /// How partial forces travel.
+    pub route: Route,
     /// Take a snapshot at the start of this cycle.
     pub snapshot_at: Option<u64>,
     /// Write states while the run goes (the last one is always gathered).
@@ -166,6 +168,8 @@ pub struct Outcome {
     pub imbalance: f64,
     /// Lane width of the workers.
     pub lanes: String,
+    /// Name of the route.
+    pub route: &'static str,
     /// Cycles of this session of the run: not those before a snapshot that it resumed from.
     pub cycles_run: u64,
 }
@@ -357,14 +361,21 @@ impl Job {
                 let inside = initial_pairs(&surface, &at_start, settings);
                 refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
                 let exclusions = Exclusions::new(&surface, &inside);
-                let sorter = Sorter::new(surface, settings.clone(), exclusions, speeds.clone(), &gather);
+                let sorter = Sorter::new(
+                    surface,
+                    settings.clone(),
+                    exclusions,
+                    speeds.clone(),
+                    options.route,
+                    &gather,
+                );
                 let x = sorter.positions_of(&state);
                 let bench = Bench { sorter, holdings, state: shared_state };
                 let sorted = bench.sort(&x);
                 (Some(Arc::new(bench)), sorted.exchange, sorted.census, sorted.interactions)
             }
             _ => {
-                let exchange = Exchange::new(&holdings, vec![None; n], &state);
+                let exchange = Exchange::new(&holdings, vec![None; n], &state, options.route);
                 (None, exchange, mechanics::contact::Census::default(), vec![0; n])
             }
         };
@@ -390,6 +401,7 @@ impl Job {
                     lanes: options.lanes.clone(),
                     cycle: first_cycle,
                     dt_previous,
+                    route: options.route,
                     plan: exchange.plans[w].clone(),
                     plan_hash: exchange.hash,
                     guest_state: exchange.guest_state_from(w, &state),
@@ -505,6 +517,10 @@ impl Job {
             work: self.work.clone(),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
+            route: match self.options.route {
+                Route::Master => "master",
+                Route::Direct => "direct",
+            },
             cycles_run,
         })));
     }
@@ -514,6 +530,16 @@ impl Job {
             ToMaster::Ready { vote, lanes } => self.ready(worker, vote, lanes, actions),
             ToMaster::Cycle { cycle, vote, partials, gathered } => {
                 self.arrived(worker, cycle, vote, &partials, gathered, actions)
+            }
+            ToMaster::Relay { to, message } => {
+                if to as usize >= self.n_workers {
+                    return Err(format!(
+                        "worker {worker} writes to worker {to}, there are {}",
+                        self.n_workers
+                    ));
+                }
+                actions.push(Action::Send(to as usize, ToWorker::Relayed { from: worker as u32, message }));
+                Ok(())
             }
             ToMaster::Transfer { cycle, state } => self.transfer(worker, cycle, state, actions),
             ToMaster::Image { cycle, version, pieces, last, work } => {
@@ -1047,5 +1073,146 @@ fn refuse_overlap(
             mesh.parts[surface.node_part[node as usize] as usize].name,
             mesh.parts[surface.faces[face as usize].part as usize].name,
         )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DECK: &str = r#"
+        title = "two cubes"
+        units = "SI"
+        [control]
+        end_cycle = 3
+        [[part]]
+        name = "low"
+        material = "LEAD"
+        box = { origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2] }
+        [[part]]
+        name = "high"
+        material = "LEAD"
+        velocity = [0, 0, -10]
+        box = { origin = [0, 0, 1.1], size = [1, 1, 1], cells = [2, 2, 2] }
+        [contact]
+        gap_fraction = 0.1
+    "#;
+
+    fn hands(n: usize) -> Vec<Hand> {
+        (0..n).map(|i| Hand { name: format!("worker-{i}"), speed: 1.0, threads: 1 }).collect()
+    }
+
+    fn job(n: usize) -> (Job, Vec<Action>) {
+        let model = deck::read(DECK, "two cubes").expect("a good deck");
+        Job::new(Arc::new(model), &hands(n), Options::default(), None).expect("a good problem")
+    }
+
+    /// A job whose workers are ready and have their first orders, and the number of exchange nodes of each.
+    fn started(n: usize) -> (Job, Vec<usize>) {
+        let (mut job, actions) = job(n);
+        let exchange: Vec<usize> = actions
+            .iter()
+            .map(|action| match action {
+                Action::Send(_, ToWorker::Assign(assign)) => assign.plan.exchange.len(),
+                _ => panic!("a job begins with assignments"),
+            })
+            .collect();
+        for worker in 0..n {
+            let mut vote = Vote::empty(2);
+            vote.courant = 1e-4;
+            let actions = job.apply(Event::Message(
+                worker,
+                ToMaster::Ready { vote: Some(Box::new(vote)), lanes: "scalar".into() },
+            ));
+            let starts =
+                actions.iter().filter(|a| matches!(a, Action::Send(_, ToWorker::Start { .. }))).count();
+            assert_eq!(starts, if worker + 1 == n { n } else { 0 }, "all start when the last is ready");
+        }
+        (job, exchange)
+    }
+
+    fn cycle(cycle: u64, n_exchange: usize) -> ToMaster {
+        let vote = (cycle > 0).then(|| Box::new(Vote { courant: 1e-4, ..Vote::empty(2) }));
+        ToMaster::Cycle { cycle, vote, partials: vec![1.0; 3 * n_exchange], gathered: Vec::new() }
+    }
+
+    fn failure(actions: &[Action]) -> &str {
+        actions
+            .iter()
+            .find_map(|action| match action {
+                Action::Over(outcome) => outcome.failure.as_deref(),
+                _ => None,
+            })
+            .expect("the job ends with a reason")
+    }
+
+    #[test]
+    fn totals_are_the_sums_of_both_workers_and_come_when_both_have_sent() {
+        let (mut job, exchange) = started(2);
+        assert!(exchange[0] > 0 && exchange[0] == exchange[1]);
+        assert!(job.apply(Event::Message(0, cycle(0, exchange[0]))).is_empty());
+        let actions = job.apply(Event::Message(1, cycle(0, exchange[1])));
+        let totals: Vec<&Vec<f64>> = actions
+            .iter()
+            .filter_map(|a| match a {
+                Action::Send(_, ToWorker::Totals { totals, .. }) => Some(totals),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(totals.len(), 2);
+        assert!(totals.iter().all(|t| t.len() == 3 * exchange[0] && t.iter().all(|x| *x == 2.0)));
+    }
+
+    #[test]
+    fn a_frame_of_the_wrong_length_ends_the_job_with_both_lengths() {
+        let (mut job, exchange) = started(2);
+        let actions = job.apply(Event::Message(1, cycle(0, exchange[1] + 1)));
+        let reason = failure(&actions);
+        assert!(
+            reason.contains(&format!("{}", 3 * exchange[1]))
+                && reason.contains(&format!("{}", 3 * exchange[1] + 3)),
+            "{reason}"
+        );
+        assert!(job.is_over() && job.apply(Event::Stop).is_empty());
+    }
+
+    #[test]
+    fn the_same_cycle_twice_from_one_worker_ends_the_job() {
+        let (mut job, exchange) = started(2);
+        job.apply(Event::Message(0, cycle(0, exchange[0])));
+        let actions = job.apply(Event::Message(0, cycle(0, exchange[0])));
+        assert!(failure(&actions).contains("twice"));
+    }
+
+    #[test]
+    fn a_lost_worker_is_named_and_the_others_are_released() {
+        let (mut job, _) = started(3);
+        let actions = job.apply(Event::Lost(2, "closed by peer".into()));
+        assert!(failure(&actions).contains("worker 2"));
+        assert_eq!(actions.iter().filter(|a| matches!(a, Action::Send(_, ToWorker::Release))).count(), 3);
+    }
+
+    #[test]
+    fn images_of_another_version_are_refused_with_both_versions() {
+        let (mut job, _) = started(1);
+        let image = ToMaster::Image {
+            cycle: 1,
+            version: IMAGE_VERSION + 1,
+            pieces: Vec::new(),
+            last: None,
+            work: Work::default(),
+        };
+        let actions = job.apply(Event::Message(0, image));
+        let reason = failure(&actions).to_owned();
+        assert!(
+            reason.contains(&IMAGE_VERSION.to_string()) && reason.contains(&(IMAGE_VERSION + 1).to_string())
+        );
+    }
+
+    #[test]
+    fn a_node_inside_a_foreign_gap_is_refused_with_its_number() {
+        let text = DECK.replace("1.1]", "1.02]");
+        let faults = deck::read(&text, "two cubes").map(|_| ()).expect_err("zones overlap");
+        assert!(faults[0].to_string().contains("low"), "{}", faults[0]);
     }
 }

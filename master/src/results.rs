@@ -25,33 +25,7 @@ pub const HISTORY: &str = "history.csv";
 /// Name of the summary.
 pub const SUMMARY: &str = "summary.json";
 
-/// Every name that a deck may list under `output.fields`.
-///
-/// `node_id`, `element_id`, `part` and `material` are written in any case. All of
-/// [`mechanics::state::FIELDS`] are among them; `stress_xx` to `stress_zx` are deviatoric as there, while
-/// `stress` is the whole tensor.
-pub const FIELD_NAMES: [&str; 20] = [
-    "velocity",
-    "displacement",
-    "node_id",
-    "part",
-    "material",
-    "element_id",
-    "pressure",
-    "von_mises",
-    "plastic_strain",
-    "temperature",
-    "density",
-    "energy",
-    "stress",
-    "relative_volume",
-    "stress_xx",
-    "stress_yy",
-    "stress_xy",
-    "stress_yz",
-    "stress_zx",
-    "mass",
-];
+pub use deck::model::FIELD_NAMES;
 
 /// Why results could not be written or read.
 #[derive(Debug)]

@@ -66,6 +66,7 @@ pub fn model_for(deck: &Path, args: &JobArgs) -> Result<Model, String> {
 pub fn options_for(args: &JobArgs) -> Options {
     Options {
         lanes: args.lanes.map(|l| l.name()),
+        route: args.route.into(),
         snapshot_at: args.snapshot_at,
         states: !args.no_output,
         force_sorts: match (args.sort_every, args.sort_seed) {
@@ -215,7 +216,7 @@ fn summarise(
         surface_nodes: census.nodes,
         workers,
         threads,
-        route: "master".to_owned(),
+        route: outcome.route.to_owned(),
         lanes: outcome.lanes.clone(),
         cycles,
         end_time: outcome.state.as_ref().map_or(ledger.last.time, |s| s.time),

@@ -7,6 +7,8 @@ use mechanics::{
     state::GlobalState,
 };
 
+use protocol::message::Route;
+
 use crate::{
     balance,
     exchange::{Exchange, Holdings},
@@ -18,6 +20,7 @@ pub struct Sorter {
     settings: contact::Settings,
     exclusions: Exclusions,
     speeds: Vec<f64>,
+    route: Route,
     /// By worker: surface node index of each gathered position.
     gather: Vec<Vec<u32>>,
 }
@@ -39,13 +42,14 @@ impl Sorter {
         settings: contact::Settings,
         exclusions: Exclusions,
         speeds: Vec<f64>,
+        route: Route,
         gather: &[Vec<u32>],
     ) -> Self {
         let gather = gather
             .iter()
             .map(|nodes| nodes.iter().filter_map(|&node| surface.node_index(node)).collect())
             .collect();
-        Self { surface, settings, exclusions, speeds, gather }
+        Self { surface, settings, exclusions, speeds, route, gather }
     }
 
     /// The surface it sorts.
@@ -94,6 +98,6 @@ impl Sorter {
                 (!units.is_empty()).then(|| Batch::gather(&self.surface, units, &mass, &self.exclusions))
             })
             .collect();
-        Sorted { exchange: Exchange::new(holdings, batches, state), census, interactions }
+        Sorted { exchange: Exchange::new(holdings, batches, state, self.route), census, interactions }
     }
 }

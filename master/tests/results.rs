@@ -612,7 +612,7 @@ fn whole_folder_of_a_run_holds_states_index_history_and_summary() {
         series.write(&model, &dented(&model, cycle, 2.0 * cycle as f64), Some(&worker)).expect("written");
         history.append(&row(&model, cycle)).expect("written");
     }
-    let end = Summary { cycles: 2, end_time: dented(&model, 2, 0.0).time, ..summary(&model) };
+    let end = Summary { cycles: 3, end_time: dented(&model, 2, 0.0).time, ..summary(&model) };
     end.write(&folder).expect("written");
     let mut names: Vec<_> = fs::read_dir(folder.path())
         .expect("exists")

@@ -6,14 +6,21 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use mechanics::{block::Piece, cycle::Plan, exact::Quantum, vote::Vote};
-use protocol::message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToWorker, Work};
+use mechanics::{
+    block::Piece,
+    cycle::{Neighbour, Plan},
+    exact::Quantum,
+    vote::Vote,
+};
+use protocol::message::{Assign, IMAGE_VERSION, Orders, Route, ToMaster, ToPeer, ToWorker, Work};
 
 /// What happens to a session.
 #[derive(Debug)]
 pub enum Event {
     /// A message from the master, in the order it was sent.
     Message(ToWorker),
+    /// A message from another worker of the job, by its index.
+    Peer(u32, ToPeer),
     /// A task is done.
     Done(Outcome),
 }
@@ -23,29 +30,70 @@ pub enum Event {
 pub enum Action {
     /// Send to the master.
     Send(ToMaster),
+    /// Send to another worker of the job, over a link of our own or through the master.
+    SendPeer(u32, ToPeer),
     /// Compute; exactly one [`Event::Done`] answers it.
     Compute(Task),
     /// The job is over: drop the domain.
     Forget,
 }
 
-/// Work on the domain.
+/// Work on the domain. `dt_previous` is `dt_{n-1}`, the step that led to `x_n` (time).
 #[derive(Debug)]
 pub enum Task {
-    /// Build the domain and install the first plan; `prepare` asks for the vote of a preparing pass.
-    Load { assign: Box<Assign>, prepare: bool },
-    /// State of these nodes for other workers.
-    Transfer { nodes: Vec<u32> },
+    /// Build the domain and install the first plan.
+    Load {
+        /// All that this worker holds.
+        assign: Box<Assign>,
+        /// Ask for the vote of a preparing pass.
+        prepare: bool,
+    },
+    /// State of nodes for other workers.
+    Transfer {
+        /// Global node indices.
+        nodes: Vec<u32>,
+    },
     /// All element sets at `x_n`, before a new plan is in force.
-    Elements { dt_previous: f64, quantum: Quantum },
-    /// Install a plan; contact; partial forces. Gather positions first if asked.
-    Install { plan: Box<Plan>, guest_state: Vec<f64>, dt_previous: f64, gather: bool },
-    /// Contact, border elements, partial forces. Gather positions first if asked.
-    Border { dt_previous: f64, quantum: Quantum, gather: bool },
+    Elements {
+        /// The step before.
+        dt_previous: f64,
+        /// Quantum of forces from now on.
+        quantum: Quantum,
+    },
+    /// Install a plan; contact; partial forces.
+    Install {
+        /// The plan.
+        plan: Box<Plan>,
+        /// Six numbers by guest.
+        guest_state: Vec<f64>,
+        /// The step before.
+        dt_previous: f64,
+        /// Gather positions first.
+        gather: bool,
+    },
+    /// Contact, border elements, partial forces.
+    Border {
+        /// The step before.
+        dt_previous: f64,
+        /// Quantum of forces from now on.
+        quantum: Quantum,
+        /// Gather positions first.
+        gather: bool,
+    },
     /// Interior elements.
-    Interior { dt_previous: f64 },
+    Interior {
+        /// The step before.
+        dt_previous: f64,
+    },
     /// Totals in place, integrate.
-    Integrate { totals: Vec<f64>, dt_previous: f64, dt: f64 },
+    Integrate {
+        /// Three numbers by node of the exchange.
+        totals: Vec<f64>,
+        /// The step before.
+        dt_previous: f64,
+        /// The step to take.
+        dt: f64,
+    },
     /// State of all sub-domains.
     Image,
 }
@@ -54,17 +102,32 @@ pub enum Task {
 #[derive(Debug)]
 pub enum Outcome {
     /// Of `Load`.
-    Loaded { vote: Option<Box<Vote>>, lanes: String },
-    /// Of `Transfer`.
+    Loaded {
+        /// Of the preparing pass, if one was asked for.
+        vote: Option<Box<Vote>>,
+        /// Lane width in use.
+        lanes: String,
+    },
+    /// Of `Transfer`: six numbers by node.
     Transferred(Vec<f64>),
     /// Of `Elements` and `Interior`.
     Computed,
     /// Of `Install` and `Border`.
-    Forces { partials: Vec<f64>, gathered: Vec<f64> },
+    Forces {
+        /// Three numbers by node of the exchange.
+        partials: Vec<f64>,
+        /// Three numbers by owned surface node, if asked for.
+        gathered: Vec<f64>,
+    },
     /// Of `Integrate`.
     Integrated(Box<Vote>),
     /// Of `Image`.
-    Image { pieces: Vec<Piece>, work: Work },
+    Image {
+        /// The state.
+        pieces: Vec<Piece>,
+        /// Compute time so far.
+        work: Work,
+    },
     /// The task failed: a sentence for the user.
     Failed(String),
 }
@@ -119,6 +182,11 @@ pub struct Session {
     plans: VecDeque<(u64, u64, Box<Plan>)>,
     guests: Option<(u64, Vec<f64>)>,
     n_exchange: usize,
+    route: Route,
+    neighbours: Vec<Neighbour>,
+    /// On route direct: own partial forces of this cycle, and what neighbours sent, by (cycle, worker).
+    partials: Vec<f64>,
+    heard: BTreeMap<(u64, u32), Vec<f64>>,
     plan_hash: u64,
     vote: Option<Box<Vote>>,
     resumed: bool,
@@ -150,6 +218,10 @@ impl Session {
             plans: VecDeque::new(),
             guests: None,
             n_exchange: 0,
+            route: Route::Master,
+            neighbours: Vec::new(),
+            partials: Vec::new(),
+            heard: BTreeMap::new(),
             plan_hash: 0,
             vote: None,
             resumed: false,
@@ -184,7 +256,9 @@ impl Session {
 
     fn step(&mut self, event: Event, actions: &mut Vec<Action>) -> Result<(), String> {
         match event {
+            Event::Message(ToWorker::Relayed { from, message }) => self.hear_peer(from, message, actions),
             Event::Message(message) => self.hear(message, actions),
+            Event::Peer(from, message) => self.hear_peer(from, message, actions),
             Event::Done(Outcome::Failed(reason)) => Err(reason),
             Event::Done(outcome) => self.done(outcome, actions),
         }
@@ -207,6 +281,8 @@ impl Session {
                     self.sort_lag = u64::from(assign.setup.control.sort_lag);
                     self.quantum = Some(assign.quanta.force);
                     self.n_exchange = assign.plan.exchange.len();
+                    self.route = assign.route;
+                    self.neighbours.clone_from(&assign.plan.neighbours);
                     self.plan_hash = assign.plan_hash;
                     self.resumed = assign.cycle > 0;
                     let prepare = !self.resumed;
@@ -216,6 +292,7 @@ impl Session {
                 phase => Err(format!("an assignment while {phase:?}: a job is in hand")),
             },
             _ if self.phase == Phase::Over || self.phase == Phase::Idle => Ok(()),
+            ToWorker::Relayed { from, message } => self.hear_peer(from, message, actions),
             ToWorker::Start { orders } => {
                 for order in orders {
                     self.orders.insert(order.next, order);
@@ -250,6 +327,24 @@ impl Session {
                 self.resume_waiting(actions)
             }
         }
+    }
+
+    /// A neighbour may be a cycle ahead, and its first frame of a new plan may come before this worker has that plan.
+    fn hear_peer(&mut self, from: u32, message: ToPeer, actions: &mut Vec<Action>) -> Result<(), String> {
+        if matches!(self.phase, Phase::Idle | Phase::Over) {
+            return Ok(());
+        }
+        let ahead = message.cycle.wrapping_sub(self.cycle);
+        if ahead >= MAX_BUFFERED as u64 {
+            return Err(format!(
+                "worker {from} sends cycle {} while this worker is in cycle {}",
+                message.cycle, self.cycle
+            ));
+        }
+        if self.heard.insert((message.cycle, from), message.partials).is_some() {
+            return Err(format!("worker {from} sends cycle {} twice", message.cycle));
+        }
+        self.resume_waiting(actions)
     }
 
     fn resume_waiting(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
@@ -305,7 +400,18 @@ impl Session {
             }
             (Phase::Border, Outcome::Forces { partials, gathered }) => {
                 let vote = self.vote.take();
-                actions.push(Action::Send(ToMaster::Cycle { cycle: self.cycle, vote, partials, gathered }));
+                let cycle = self.cycle;
+                if self.route == Route::Master {
+                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered }));
+                } else {
+                    for neighbour in &self.neighbours {
+                        let partials = of_nodes(&partials, &neighbour.shared)?;
+                        actions.push(Action::SendPeer(neighbour.worker, ToPeer { cycle, partials }));
+                    }
+                    self.partials = partials;
+                    let partials = Vec::new();
+                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered }));
+                }
                 if std::mem::take(&mut self.whole) {
                     self.phase = Phase::AwaitTotals;
                     return self.try_integrate(actions);
@@ -398,6 +504,7 @@ impl Session {
         if let Some((_, hash, plan)) = self.plans.pop_front() {
             self.boundaries.pop_front();
             self.n_exchange = plan.exchange.len();
+            self.neighbours.clone_from(&plan.neighbours);
             self.plan_hash = hash;
             self.phase = Phase::Border;
             actions.push(Action::Compute(Task::Install {
@@ -413,26 +520,233 @@ impl Session {
     /// A worker that shares no node needs only the orders of the cycle before.
     fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
         let Some(orders) = self.orders.get(&self.cycle).copied() else { return Ok(()) };
-        while self.totals.front().is_some_and(|(cycle, _)| *cycle < self.cycle) {
-            self.totals.pop_front();
-        }
-        let totals = if self.n_exchange == 0 {
-            Vec::new()
-        } else {
-            match self.totals.front() {
-                Some((cycle, _)) if *cycle == self.cycle => match self.totals.pop_front() {
-                    Some((_, totals)) => totals,
-                    None => return Ok(()),
-                },
-                Some((cycle, _)) => {
-                    return Err(format!("totals of cycle {cycle} before those of cycle {}", self.cycle));
-                }
-                None => return Ok(()),
-            }
+        let totals = match self.route {
+            _ if self.n_exchange == 0 => Some(Vec::new()),
+            Route::Master => self.totals_of_master()?,
+            Route::Direct => self.totals_of_peers()?,
         };
+        let Some(totals) = totals else { return Ok(()) };
         self.dt = orders.dt;
         self.phase = Phase::Integrating;
         actions.push(Action::Compute(Task::Integrate { totals, dt_previous: self.dt_previous, dt: self.dt }));
         Ok(())
+    }
+
+    /// The totals of this cycle from the master, if they are here.
+    fn totals_of_master(&mut self) -> Result<Option<Vec<f64>>, String> {
+        match self.totals.front() {
+            None => Ok(None),
+            Some((cycle, _)) if *cycle == self.cycle => Ok(self.totals.pop_front().map(|(_, totals)| totals)),
+            Some((cycle, _)) => {
+                Err(format!("totals of cycle {cycle}, expected those of cycle {}", self.cycle))
+            }
+        }
+    }
+
+    /// Own and all neighbours' partial forces of this cycle, added, if all are here. Exact, so the order is no matter.
+    fn totals_of_peers(&mut self) -> Result<Option<Vec<f64>>, String> {
+        if self.neighbours.iter().any(|n| !self.heard.contains_key(&(self.cycle, n.worker))) {
+            return Ok(None);
+        }
+        let mut totals = std::mem::take(&mut self.partials);
+        for neighbour in &self.neighbours {
+            let Some(partials) = self.heard.remove(&(self.cycle, neighbour.worker)) else { continue };
+            if partials.len() != 3 * neighbour.shared.len() {
+                return Err(format!(
+                    "worker {} sends {} numbers in cycle {}, the plan has {}",
+                    neighbour.worker,
+                    partials.len(),
+                    self.cycle,
+                    3 * neighbour.shared.len()
+                ));
+            }
+            for (&at, partial) in neighbour.shared.iter().zip(partials.chunks_exact(3)) {
+                for (total, term) in totals[3 * at as usize..].iter_mut().zip(partial) {
+                    *total += term;
+                }
+            }
+        }
+        Ok(Some(totals))
+    }
+}
+
+/// Three numbers of each of these nodes.
+fn of_nodes(values: &[f64], nodes: &[u32]) -> Result<Vec<f64>, String> {
+    let mut out = Vec::with_capacity(3 * nodes.len());
+    for &node in nodes {
+        let at = 3 * node as usize;
+        out.extend_from_slice(
+            values.get(at..at + 3).ok_or("a neighbour shares a node that is not in the exchange")?,
+        );
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mechanics::{cycle::Guest, setup::Control, setup::Setup, vote::Quanta};
+
+    fn assign(cycle: u64) -> Box<Assign> {
+        let quantum = Quantum::for_reference(1.0, 42);
+        Box::new(Assign {
+            setup: Setup {
+                materials: Vec::new(),
+                control: Control {
+                    end_time: 1.0,
+                    end_cycle: 10,
+                    safety_factor: 0.6666,
+                    growth: 1.05,
+                    linear_viscosity: 0.2,
+                    quadratic_viscosity: 1.0,
+                    hourglass: 0.1,
+                    sort_lag: 2,
+                    plan_interval: 50,
+                },
+                contact: None,
+                constraints: Vec::new(),
+                walls: Vec::new(),
+            },
+            n_parts: 1,
+            quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
+            subdomains: Vec::new(),
+            gauges: Vec::new(),
+            lanes: None,
+            cycle,
+            dt_previous: 0.0,
+            route: Route::Master,
+            plan: Plan { exchange: vec![4], ..Plan::default() },
+            plan_hash: 7,
+            guest_state: Vec::new(),
+        })
+    }
+
+    fn orders(next: u64) -> Orders {
+        let force_quantum = Quantum::for_reference(1.0, 42);
+        Orders { next, dt: 1e-3, force_quantum, gather: false, collect: false, stop: false }
+    }
+
+    fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
+        session.apply(Event::Message(message))
+    }
+
+    fn done(session: &mut Session, outcome: Outcome) -> Vec<Action> {
+        session.apply(Event::Done(outcome))
+    }
+
+    fn forces() -> Outcome {
+        Outcome::Forces { partials: vec![0.0; 3], gathered: Vec::new() }
+    }
+
+    fn vote() -> Outcome {
+        Outcome::Integrated(Box::new(Vote::empty(1)))
+    }
+
+    /// A session that has sent its first frame and computes the interior; `second` are the orders for cycle 0.
+    fn in_first_cycle(second: Orders) -> Session {
+        let mut session = Session::new();
+        let load = hear(&mut session, ToWorker::Assign(assign(0)));
+        assert!(matches!(load[..], [Action::Compute(Task::Load { prepare: true, .. })]));
+        let ready = done(&mut session, Outcome::Loaded { vote: None, lanes: "scalar".into() });
+        assert!(matches!(ready[..], [Action::Send(ToMaster::Ready { .. })]));
+        let border = hear(&mut session, ToWorker::Start { orders: [orders(u64::MAX), second] });
+        assert!(matches!(border[..], [Action::Compute(Task::Border { .. })]));
+        let sent = done(&mut session, forces());
+        assert!(matches!(
+            sent[..],
+            [Action::Send(ToMaster::Cycle { cycle: 0, .. }), Action::Compute(Task::Interior { .. })]
+        ));
+        session
+    }
+
+    #[test]
+    fn totals_may_come_before_the_interior_is_done() {
+        let mut session = in_first_cycle(orders(0));
+        assert!(
+            hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] })
+                .is_empty()
+        );
+        let actions = done(&mut session, Outcome::Computed);
+        assert!(matches!(actions[..], [Action::Compute(Task::Integrate { .. })]));
+        let actions = done(&mut session, vote());
+        assert!(matches!(actions[..], [Action::Compute(Task::Border { .. })]));
+        assert_eq!(session.cycle(), 1);
+    }
+
+    #[test]
+    fn a_plan_is_installed_when_it_and_the_guests_are_there() {
+        let mut session = in_first_cycle(Orders { gather: true, ..orders(0) });
+        done(&mut session, Outcome::Computed);
+        hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+        let actions = done(&mut session, vote());
+        assert!(
+            matches!(actions[..], [Action::Compute(Task::Border { gather: true, .. })]),
+            "gathers at cycle 1"
+        );
+        for cycle in 1..3 {
+            done(&mut session, forces());
+            done(&mut session, Outcome::Computed);
+            hear(&mut session, ToWorker::Totals { cycle, orders: orders(cycle + 1), totals: vec![0.0; 3] });
+            let actions = done(&mut session, vote());
+            assert_eq!(actions.is_empty(), cycle == 2, "cycle 3 waits for the plan: {actions:?}");
+        }
+        let plan =
+            Box::new(Plan { guests: vec![Guest { node: 9, mass: 1.0, constraint: 0 }], ..Plan::default() });
+        let actions = hear(&mut session, ToWorker::Plan { acts_at: 3, plan, hash: 8 });
+        assert!(matches!(actions[..], [Action::Compute(Task::Transfer { .. })]));
+        let actions = done(&mut session, Outcome::Transferred(vec![0.0; 6]));
+        assert!(matches!(
+            actions[..],
+            [Action::Send(ToMaster::Transfer { cycle: 3, .. }), Action::Compute(Task::Elements { .. })]
+        ));
+        assert!(done(&mut session, Outcome::Computed).is_empty(), "waits for the guests");
+        let actions = hear(&mut session, ToWorker::Transfer { cycle: 3, state: vec![0.0; 6] });
+        assert!(matches!(actions[..], [Action::Compute(Task::Install { .. })]));
+        assert_eq!(session.plan_hash(), 8);
+    }
+
+    #[test]
+    fn more_totals_than_two_cycles_end_the_session() {
+        let mut session = in_first_cycle(orders(0));
+        for cycle in 0..2 {
+            let totals = vec![0.0; 3];
+            assert!(
+                hear(&mut session, ToWorker::Totals { cycle, orders: orders(cycle + 1), totals }).is_empty()
+            );
+        }
+        let actions =
+            hear(&mut session, ToWorker::Totals { cycle: 2, orders: orders(3), totals: vec![0.0; 3] });
+        assert!(
+            matches!(&actions[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("at most 2"))
+        );
+    }
+
+    #[test]
+    fn a_second_assignment_names_the_phase() {
+        let mut session = in_first_cycle(orders(0));
+        let actions = hear(&mut session, ToWorker::Assign(assign(0)));
+        assert!(
+            matches!(&actions[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("Interior"))
+        );
+    }
+
+    #[test]
+    fn release_forgets_the_job_in_any_phase() {
+        let mut session = in_first_cycle(orders(0));
+        assert!(matches!(hear(&mut session, ToWorker::Release)[..], [Action::Forget]));
+        assert!(done(&mut session, Outcome::Computed).is_empty(), "an outcome of the job before is ignored");
+        let load = hear(&mut session, ToWorker::Assign(assign(5)));
+        assert!(matches!(load[..], [Action::Compute(Task::Load { prepare: false, .. })]));
+    }
+
+    #[test]
+    fn stop_sends_the_image_with_the_last_vote() {
+        let mut session = in_first_cycle(Orders { stop: true, ..orders(0) });
+        done(&mut session, Outcome::Computed);
+        hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+        let actions = done(&mut session, vote());
+        assert!(matches!(actions[..], [Action::Compute(Task::Image)]));
+        let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
+        assert!(matches!(actions[..], [Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. })]));
     }
 }

@@ -1,13 +1,11 @@
 //! `[output]` and `[[gauge]]`.
 
-use mechanics::state::FIELDS;
-
 use super::{MAX_ENTRIES, Names};
 use crate::{
     assembly::Assembly,
     fault::{nearest, short},
     geometry::{norm, sub},
-    model::{Gauge, NODE_FIELDS, Output},
+    model::{FIELD_NAMES, Gauge, Output},
     table::{Range, Table},
 };
 
@@ -30,7 +28,7 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, assembly: &Assembly) -> Outp
 
 fn read_fields(table: &Table<'_>) -> Vec<String> {
     let mut fields = Vec::new();
-    let known = || FIELDS.into_iter().chain(NODE_FIELDS);
+    let known = || FIELD_NAMES.into_iter();
     for item in table.get("fields").and_then(|v| v.items()).unwrap_or_default() {
         let Some(name) = item.text() else { continue };
         if known().any(|field| field == name) {

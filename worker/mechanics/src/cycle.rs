@@ -58,6 +58,18 @@ pub struct Plan {
     pub guests: Vec<Guest>,
     /// Global nodes whose state this worker sends to others when the plan starts to act.
     pub send: Vec<u32>,
+    /// On route direct: the workers that hold nodes of `exchange` too.
+    pub neighbours: Vec<Neighbour>,
+}
+
+/// Another worker that holds nodes of the exchange.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Neighbour {
+    /// Its index among the workers of the job.
+    pub worker: u32,
+    /// Positions in [`Plan::exchange`] of the nodes that both hold, ascending; both sides list them in the same order
+    /// of nodes.
+    pub shared: Vec<u32>,
 }
 
 /// What integrating a guest needs beside its position and velocity.

@@ -234,8 +234,3 @@ fn area(x: [[f64; 3]; 4]) -> f64 {
     let c = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
     0.5 * (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-}

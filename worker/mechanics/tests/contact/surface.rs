@@ -60,6 +60,17 @@ fn faces_between_joined_parts_are_inside() {
 }
 
 #[test]
+fn a_node_has_the_share_of_the_material_around_it() {
+    let mesh = block([4, 4, 4], 1.0);
+    let surface = Surface::new(&mesh, &materials(), &|_| true);
+    for (&node, &share) in surface.nodes.iter().zip(&surface.node_share) {
+        let faces = mesh.positions[node as usize].iter().filter(|&&c| c == 0.0 || c == 4.0).count();
+        let expected = [f64::NAN, 1.0, 0.5, 0.25][faces];
+        assert!((share - expected).abs() < 1e-14, "{faces} faces: {share}");
+    }
+}
+
+#[test]
 fn stiffness_is_bulk_times_area_squared_over_volume() {
     let mut mesh = block([1, 1, 1], 1.0);
     deform(&mut mesh, |p| [2.0 * p[0], 3.0 * p[1], 5.0 * p[2]]);
