@@ -216,6 +216,10 @@ struct Collecting {
     vote: Option<Vote>,
 }
 
+/// Part of the slack kept free for a rate of spread that rises between the trigger of a sort and the cycle it acts at:
+/// surfaces that shake change it threefold in a few cycles.
+const SPREAD_MARGIN: f64 = 0.25;
+
 /// Most an element's interactions weigh against an element when imbalance is reported: an element-cycle costs about as
 /// much as this many interactions.
 const INTERACTIONS_PER_ELEMENT: f64 = 60.0;
@@ -253,6 +257,10 @@ pub struct Job {
     snapshot_state: Option<GlobalState>,
     snapshot_rest: Option<SnapshotRest>,
     next_state_time: Option<f64>,
+    /// The cycle whose positions the newest sort works on, asked for or in force.
+    last_gather: u64,
+    /// The exchange in force and the one before it: where it began to act, and the cycle whose positions it sorted.
+    references: [(u64, u64); 2],
     last_spread: f64,
     spread_rate: f64,
     stop_asked: bool,
@@ -435,6 +443,8 @@ impl Job {
             snapshot_state: None,
             snapshot_rest: None,
             next_state_time,
+            last_gather: first_cycle,
+            references: [(first_cycle, first_cycle); 2],
             last_spread: 0.0,
             spread_rate: 0.0,
             stop_asked: false,
@@ -647,6 +657,7 @@ impl Job {
         let gather = !stop && self.sort_due(after, vote);
         if gather {
             self.sorts_under_way.push_back(after);
+            self.last_gather = after;
         }
         Orders { next, dt, force_quantum: self.quanta.force, gather, collect, stop }
     }
@@ -664,13 +675,18 @@ impl Job {
             return true;
         }
         let Some(vote) = vote else { return false };
-        if in_flight > 0 {
-            return false;
-        }
-        let (spread, _) = reach::worst_spread(&vote.extents, settings);
         // Positions were those of two cycles before `cycle`; the sort acts `lag` cycles after it.
-        let ahead = (lag + 3) as f64;
-        spread + 1.5 * ahead * self.spread_rate > settings.slack
+        let added = (lag + 3) as f64 * self.spread_rate;
+        let measured = self.references[0].0 < self.completed && in_flight == 0;
+        let (spread, margin) = if measured {
+            let (spread, _) = reach::worst_spread(&vote.extents, settings);
+            (spread, (0.5 * added).max(SPREAD_MARGIN * settings.slack))
+        } else {
+            // Until votes are against the newest sorted positions, the rate says how far bodies are from those: bodies
+            // that close in at the travel limit from both sides need the next sort before this one acts.
+            (self.spread_rate * cycle.saturating_sub(self.last_gather) as f64, 0.0)
+        };
+        spread + added + margin > settings.slack
     }
 
     /// The step that a vote allows, what limits it, and the element if one does.
@@ -749,8 +765,10 @@ impl Job {
     /// No frame of `cycle` or before will come any more.
     fn retire(&mut self, cycle: u64) {
         self.completed = cycle + 1;
-        while self.exchanges.get(1).is_some_and(|(acts_at, _)| *acts_at <= cycle + 1) {
+        while let Some(&(acts_at, _)) = self.exchanges.get(1).filter(|(acts_at, _)| *acts_at <= cycle + 1) {
             self.exchanges.pop_front();
+            let lag = u64::from(self.model.setup.control.sort_lag);
+            self.references = [(acts_at, acts_at - lag), self.references[0]];
             self.sorts += 1;
         }
     }
@@ -778,7 +796,7 @@ impl Job {
             });
             self.snapshot(actions);
         }
-        self.follow_spread(&vote);
+        self.follow_spread(cycle.saturating_sub(1), &vote);
         let growth = self.model.setup.control.growth;
         let (dt, limit, element) = self.limit(&vote, growth * dt_now);
         let time_next = time_now + dt_now;
@@ -832,16 +850,19 @@ impl Job {
         Ok((vote.force_bound > quantum.rescale_bound()).then(|| Quantum::for_reference(vote.force_bound, 42)))
     }
 
-    /// Keeps the rate at which bodies move against each other (length per cycle).
-    fn follow_spread(&mut self, vote: &Vote) {
+    /// Keeps the rate at which bodies move against each other (length per cycle), from the vote of `cycle`: that of the
+    /// last cycle, or of all since the sorted positions if it is greater. Surfaces that shake stand still at times.
+    fn follow_spread(&mut self, cycle: u64, vote: &Vote) {
         let Some(settings) = &self.model.setup.contact else { return };
         let (spread, _) = reach::worst_spread(&vote.extents, settings);
         if !spread.is_finite() {
             return;
         }
-        if spread >= self.last_spread {
-            self.spread_rate = spread - self.last_spread;
-        }
+        let [newest, before] = self.references;
+        let (acts_at, gathered_at) = if newest.0 <= cycle { newest } else { before };
+        let age = (cycle + 1).saturating_sub(gathered_at).max(1);
+        let step = if acts_at < cycle { spread - self.last_spread } else { 0.0 };
+        self.spread_rate = step.max(spread / age as f64);
         self.last_spread = spread;
     }
 

@@ -52,7 +52,8 @@ pub fn state(
     }
     debug_assert_eq!(state.elements.len(), N_FIELDS);
     let heaviest = mass_of.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let quantum = Quantum::for_reference(heaviest, 46);
+    // 64 eighths at a node stay below 2^53 quanta.
+    let quantum = Quantum::for_reference(heaviest, 50);
     let mut index = 0;
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
