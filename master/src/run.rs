@@ -18,7 +18,8 @@ use protocol::request::JobOptions;
 use crate::{
     command::RunArgs,
     embedded::{self, Sink, Traffic},
-    job::{Action, ForceSorts, Hand, Job, Limit, Options, Outcome, Progress},
+    event::{Action, ForceSorts, Hand, Limit, Options, Outcome, Progress},
+    job::Job,
     processes::Processes,
     results::{
         Folder,

@@ -11,7 +11,8 @@ use master::{
     daemon::Event,
     drive::{Seat, drive},
     embedded::{self, Sink},
-    job::{Action, Hand, Job, Options, Outcome},
+    event::{Action, Hand, Options, Outcome},
+    job::Job,
     snapshot::Snapshot,
 };
 use protocol::{

@@ -1,6 +1,6 @@
 //! What must be equal to the bit between two runs of one problem.
 
-use master::{job::ForceSorts, results::history::HistoryRow};
+use master::{event::ForceSorts, results::history::HistoryRow};
 
 use crate::solve::Solved;
 

@@ -5,7 +5,8 @@ use std::sync::{Arc, atomic::AtomicBool};
 use deck::Model;
 use master::{
     embedded::{self, Sink},
-    job::{Action, Hand, Job, Options, Outcome},
+    event::{Action, Hand, Options, Outcome},
+    job::Job,
     results::history::{GaugeRow, HistoryRow},
     snapshot::Snapshot,
 };

@@ -9,7 +9,7 @@ use tests::{
 };
 
 use deck::Model;
-use master::job::{ForceSorts, Options};
+use master::event::{ForceSorts, Options};
 
 fn fingerprint(model: &Model, crew: Crew) -> Fingerprint {
     Fingerprint::of(&solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}")))
