@@ -280,6 +280,12 @@ fn cycles(only: Option<usize>) {
 }
 
 fn main() {
+    // Blocks spread over the current pool: one of a single thread keeps all work on the clock.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    pool.install(tables);
+}
+
+fn tables() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let only = words.iter().find_map(|word| word.parse().ok());
     let asks = |name: &str| words.iter().any(|word| word == name);
