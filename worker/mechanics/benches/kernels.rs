@@ -195,23 +195,13 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
             let last = below * plane;
             let unowned = if p == 1 { (last..last + plane).collect() } else { Vec::new() };
             let pieces = vec![cut(&mesh, &state, p, &region)];
-            Subdomain { id: p as u32, pieces, unowned, surface: outer_nodes(side, below + above, &mesh, p) }
+            Subdomain { id: p as u32, pieces, unowned, surface: Vec::new() }
         })
         .collect();
     let n_elements = mesh.n_elements();
     let mut domain = Domain::new(setup, 2, quanta, &subdomains, &[], width);
     domain.install(&Default::default(), &[]).expect("a plan without other workers");
     (domain, n_elements)
-}
-
-/// Nodes of a part on the outside of the joined plates: those that a worker watches for contact.
-fn outer_nodes(side: u32, layers: u32, mesh: &Mesh, part: usize) -> Vec<u32> {
-    let (row, plane) = (side + 1, (side + 1) * (side + 1));
-    let outer = |n: u32| {
-        let (i, j, k) = (n % row, n / row % row, n / plane);
-        i == 0 || i == side || j == 0 || j == side || k == 0 || k == layers
-    };
-    mesh.parts[part].nodes.iter().copied().filter(|&n| outer(n)).collect()
 }
 
 /// Books nothing: the bench reads the clock itself.

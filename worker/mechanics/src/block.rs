@@ -86,6 +86,8 @@ pub struct Block {
     initial_volume: Vec<f64>,
     alive: Vec<f64>,
     slot_elements: Vec<u32>,
+    /// Lowest global element index of each set.
+    lowest: Vec<u32>,
     /// Entries of a node array that the kernels may touch.
     reach: usize,
 }
@@ -142,6 +144,7 @@ impl Block {
             fields: std::array::from_fn(|field| by_slot(&piece.fields[field], 0.0)),
             initial_volume: by_slot(&piece.initial_volume, 1.0),
             alive: by_slot(&vec![1.0; n_elements], 0.0),
+            lowest: slot_elements.chunks(SET).map(|set| set.iter().copied().min().unwrap_or(PHANTOM)).collect(),
             slot_elements,
             layout,
             slots,
@@ -317,6 +320,7 @@ impl Block {
             initial_volume: &self.initial_volume,
             alive: &self.alive,
             elements: &self.slot_elements,
+            lowest: &self.lowest,
         };
         let n_padded = view.x.iter().chain(&view.v).map(|a| a.len()).min().unwrap_or(0);
         let n_forces = view.f.iter().map(|a| a.len()).min().unwrap_or(0);

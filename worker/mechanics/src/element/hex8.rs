@@ -72,6 +72,8 @@ pub(crate) struct View<'a> {
     pub alive: &'a [f64],
     /// Global element index by slot.
     pub elements: &'a [u32],
+    /// Lowest global element index by set.
+    pub lowest: &'a [u32],
 }
 
 impl View<'_> {
@@ -106,8 +108,17 @@ struct Tally<L> {
     viscosity: L,
     largest_force: L,
     largest_rate: L,
-    /// Inverse of the least Courant limit so far: no element slower than this can matter.
-    frequency: L,
+    /// Greatest frequency of an element so far, whose inverse is the least Courant limit.
+    frequency: f64,
+}
+
+impl<L: Lane> Tally<L> {
+    /// The frequency that an element must exceed to change the vote. An element of higher index than that of the vote
+    /// is not chosen among equals; one of lower index is, also when only the inverses are equal.
+    #[inline(always)]
+    fn frequency_to_beat(&self, lowest: u32, vote: &ElementVote) -> f64 {
+        if lowest > vote.courant_element { self.frequency } else { self.frequency * (1.0 - 1e-15) }
+    }
 }
 
 /// Elements of the sets in one cycle: forces into `view.f`, new state, votes.
@@ -130,7 +141,7 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw>(
         viscosity: zero,
         largest_force: zero,
         largest_rate: zero,
-        frequency: L::splat(1.0 / vote.courant),
+        frequency: 1.0 / vote.courant,
     };
     for range in sets {
         for set in range.clone() {
@@ -304,15 +315,16 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let double_inverse_square = L::splat(2.0) * inverse_volume * inverse_volume;
     let damping = L::select(volume_rate.less(zero), damping, zero);
     let bound = frequency(spread.eigenvalue_bound() * double_inverse_square, damping, sound_square);
-    if L::any(L::both(tally.frequency.less_equal(bound * L::splat(1.0 + 1e-6)), active)) {
+    let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);
+    if L::any(L::both(L::splat(to_beat).less(bound), active)) {
         let exact = frequency(spread.largest_eigenvalue() * double_inverse_square, damping, sound_square);
-        let limits = (one / exact).to_array();
-        for (lane, &limit) in limits.iter().enumerate().take(L::N) {
+        let (frequencies, limits) = (exact.to_array(), (one / exact).to_array());
+        for lane in 0..L::N {
             if L::bits(active) >> lane & 1 == 1 {
-                vote.offer_courant(limit, view.elements[slot + lane]);
+                vote.offer_courant(limits[lane], view.elements[slot + lane]);
+                tally.frequency = tally.frequency.max(frequencies[lane]);
             }
         }
-        tally.frequency = L::splat(1.0 / vote.courant);
     }
     let resist = L::splat(2.0 * step.hourglass) * density * sound * area;
     let energy_magic = L::splat(step.energy_quantum.magic());
