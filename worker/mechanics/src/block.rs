@@ -58,7 +58,7 @@ pub struct Piece {
 }
 
 /// Elements of one kind and one material, laid out for the kernels. The first `nodes.len()` entries of the node
-/// arrays are nodes; what follows is padding that wide loads may touch and nothing may rely on.
+/// arrays are nodes; what follows is padding, to whole sets of eight at least, that nothing may rely on.
 pub struct Block {
     /// Part index.
     pub part: u32,
@@ -119,10 +119,11 @@ impl Block {
             }
             array
         };
+        let n_padded = reach.max(n_nodes.next_multiple_of(SET));
         let by_axis = |values: &[[f64; 3]]| -> [Vec<f64>; 3] {
             std::array::from_fn(|axis| {
                 let mut array: Vec<f64> = values.iter().map(|value| value[axis]).collect();
-                array.resize(reach.max(n_nodes), 0.0);
+                array.resize(n_padded, 0.0);
                 array
             })
         };
@@ -137,14 +138,17 @@ impl Block {
             elements: piece.elements.clone(),
             x: by_axis(&piece.x),
             v: by_axis(&piece.v),
-            f: std::array::from_fn(|_| vec![0.0; reach.max(n_nodes)]),
-            mass: piece.mass.clone(),
+            f: std::array::from_fn(|_| vec![0.0; n_padded]),
+            mass: piece.mass.iter().copied().chain(std::iter::repeat_n(1.0, n_padded - n_nodes)).collect(),
             constraint: piece.constraint.clone(),
             topology: piece.topology.clone(),
             fields: std::array::from_fn(|field| by_slot(&piece.fields[field], 0.0)),
             initial_volume: by_slot(&piece.initial_volume, 1.0),
             alive: by_slot(&vec![1.0; n_elements], 0.0),
-            lowest: slot_elements.chunks(SET).map(|set| set.iter().copied().min().unwrap_or(PHANTOM)).collect(),
+            lowest: slot_elements
+                .chunks(SET)
+                .map(|set| set.iter().copied().min().unwrap_or(PHANTOM))
+                .collect(),
             slot_elements,
             layout,
             slots,
@@ -167,7 +171,7 @@ impl Block {
             elements: self.elements.clone(),
             x: by_node(&self.x),
             v: by_node(&self.v),
-            mass: self.mass.clone(),
+            mass: self.mass[..self.nodes.len()].to_vec(),
             constraint: self.constraint.clone(),
             initial_volume: by_element(&self.initial_volume),
             fields: std::array::from_fn(|field| by_element(&self.fields[field])),
