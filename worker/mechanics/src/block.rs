@@ -84,7 +84,8 @@ pub struct Block {
     slots: Vec<u32>,
     fields: [Vec<f64>; N_FIELDS],
     initial_volume: Vec<f64>,
-    alive: Vec<f64>,
+    /// Bits of the slots of each set that hold elements.
+    alive: Vec<u8>,
     slot_elements: Vec<u32>,
     /// Lowest global element index of each set.
     lowest: Vec<u32>,
@@ -144,7 +145,10 @@ impl Block {
             topology: piece.topology.clone(),
             fields: std::array::from_fn(|field| by_slot(&piece.fields[field], 0.0)),
             initial_volume: by_slot(&piece.initial_volume, 1.0),
-            alive: by_slot(&vec![1.0; n_elements], 0.0),
+            alive: slot_elements
+                .chunks(SET)
+                .map(|set| (0..).zip(set).map(|(i, &element)| u8::from(element != PHANTOM) << i).sum())
+                .collect(),
             lowest: slot_elements
                 .chunks(SET)
                 .map(|set| set.iter().copied().min().unwrap_or(PHANTOM))
@@ -180,7 +184,7 @@ impl Block {
 
     /// Number of lane sets.
     pub fn n_sets(&self) -> u32 {
-        (self.alive.len() / SET) as u32
+        self.alive.len() as u32
     }
 
     /// One state field of a local element.

@@ -7,7 +7,7 @@
 use super::vector::Vector;
 use crate::lanes::Lane;
 
-/// The symmetric tensor `S`.
+/// The symmetric tensor `S` or a multiple of it.
 #[derive(Clone, Copy)]
 pub(crate) struct Spread<L> {
     pub xx: L,
@@ -19,7 +19,7 @@ pub(crate) struct Spread<L> {
 }
 
 impl<L: Lane> Spread<L> {
-    /// `8 sum_m G_m G_m^T` over the modes of the gradient.
+    /// `512 S` from the vectors `64 G_m` of the gradient, since `S = 8 sum_m G_m G_m^T`.
     #[inline(always)]
     pub fn of(gradient: [&Vector<L>; 6]) -> Self {
         let [a, b, c, d, e, f] = gradient;
@@ -30,15 +30,7 @@ impl<L: Lane> Spread<L> {
         s.add(d);
         s.add(e);
         s.add(f);
-        let eight = L::splat(8.0);
-        Self {
-            xx: s.xx * eight,
-            yy: s.yy * eight,
-            zz: s.zz * eight,
-            xy: s.xy * eight,
-            yz: s.yz * eight,
-            zx: s.zx * eight,
-        }
+        s
     }
 
     #[inline(always)]
