@@ -18,10 +18,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     block::{Block, Piece},
-    contact::{Batch, Contact, Extent},
+    contact::{Batch, Contact},
     element::{ElementVote, Step},
-    lanes::Width,
-    nodes::{Advance, Booked, Nodes},
+    lanes::{SET, Width},
+    nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
     vote::{Quanta, Vote},
 };
@@ -94,10 +94,6 @@ pub enum Sets {
     All,
 }
 
-/// Cycles for which a contact node's speed is foreseen by its acceleration: a vote takes effect two cycles later, and
-/// forces of an impact still grow meanwhile.
-const SPEED_LAG: f64 = 3.0;
-
 /// No index.
 const NONE: u32 = u32::MAX;
 
@@ -106,18 +102,28 @@ struct Room {
     block: Block,
     border: Vec<Range<u32>>,
     interior: Vec<Range<u32>>,
-    booked: Vec<bool>,
-    /// Local nodes on the contact surface.
-    surface: Vec<u32>,
-    /// Their positions at the sort in force.
-    reference: Vec<[f64; 3]>,
-    /// Their positions at gatherings whose sorts do not act yet, oldest first.
-    gathered: VecDeque<Vec<[f64; 3]>>,
+    /// Which nodes are held, booked and on the contact surface.
+    sets: Vec<NodeSet>,
+    /// Positions at the sort in force, eight for each set with nodes on the surface.
+    reference: [Vec<f64>; 3],
+    /// Those at gatherings whose sorts do not act yet, oldest first.
+    gathered: VecDeque<[Vec<f64>; 3]>,
     vote: ElementVote,
-    sums: Booked,
-    extent: Extent,
-    speed_squared: f64,
-    speed_ahead: f64,
+    booked: Booked,
+}
+
+impl Room {
+    /// Positions as of now of the sets with nodes on the surface.
+    fn surface_positions(&self) -> [Vec<f64>; 3] {
+        let touched = || (0..).zip(&self.sets).filter(|(_, set)| set.surface != 0);
+        std::array::from_fn(|a| {
+            touched().flat_map(|(set, _)| &self.block.x[a][set * SET..(set + 1) * SET]).copied().collect()
+        })
+    }
+
+    fn is_booked(&self, local: u32) -> bool {
+        self.sets[local as usize / SET].booked >> (local as usize % SET) & 1 == 1
+    }
 }
 
 /// Copies of one node: a range of `Domain::copies`, its contact node and its guest.
@@ -146,7 +152,7 @@ struct Guests {
     f: [Vec<f64>; 3],
     mass: Vec<f64>,
     constraint: Vec<u16>,
-    booked: Vec<bool>,
+    sets: Vec<NodeSet>,
 }
 
 /// Everything a worker computes on.
@@ -187,21 +193,16 @@ impl Domain {
                 for (local, &node) in piece.nodes.iter().enumerate() {
                     home.entry(node).or_default().push((rooms.len() as u32, local as u32));
                 }
-                let n = block.nodes.len();
                 let all = 0..block.n_sets();
                 rooms.push(Room {
+                    sets: NodeSet::all(&block.constraint),
                     block,
                     border: Vec::new(),
                     interior: vec![all],
-                    booked: vec![false; n],
-                    surface: Vec::new(),
-                    reference: Vec::new(),
+                    reference: Default::default(),
                     gathered: VecDeque::new(),
                     vote: ElementVote::default(),
-                    sums: Booked::default(),
-                    extent: Extent::NONE,
-                    speed_squared: 0.0,
-                    speed_ahead: 0.0,
+                    booked: Booked::default(),
                 });
             }
             let own = first as u32..rooms.len() as u32;
@@ -213,8 +214,9 @@ impl Domain {
                 for local in 0..rooms[room as usize].block.nodes.len() as u32 {
                     let node = rooms[room as usize].block.nodes[local as usize];
                     let owned = subdomain.unowned.binary_search(&node).is_err();
-                    rooms[room as usize].booked[local as usize] =
-                        owned && first_copy(node) == Some((room, local));
+                    if owned && first_copy(node) == Some((room, local)) {
+                        rooms[room as usize].sets[local as usize / SET].booked |= 1 << (local as usize % SET);
+                    }
                 }
             }
             for &node in &subdomain.surface {
@@ -222,19 +224,19 @@ impl Domain {
                     if subdomain.unowned.binary_search(&node).is_err() {
                         gather.push((room, local));
                     }
-                    rooms[room as usize].surface.push(local);
+                    rooms[room as usize].sets[local as usize / SET].surface |= 1 << (local as usize % SET);
                 }
             }
         }
         for room in &mut rooms {
-            room.reference = positions(&room.block, &room.surface);
+            room.reference = room.surface_positions();
         }
         let gauges = gauges
             .iter()
             .enumerate()
             .filter_map(|(g, node)| {
                 let &(room, local) =
-                    home.get(node)?.iter().find(|&&(r, l)| rooms[r as usize].booked[l as usize])?;
+                    home.get(node)?.iter().find(|&&(r, l)| rooms[r as usize].is_booked(l))?;
                 Some((g as u32, room, local))
             })
             .collect();
@@ -267,9 +269,10 @@ impl Domain {
         self.elements(Sets::All, 0.0, meter);
         for room in &mut self.rooms {
             room.block.clear_forces();
-            let Room { block, surface, .. } = room;
-            let v = &block.v;
-            let top = surface.iter().map(|&i| speed_squared(v, i as usize)).fold(0.0, f64::max);
+            let v = &room.block.v;
+            let on_surface = |i: usize| room.sets[i / SET].surface >> (i % SET) & 1 == 1;
+            let nodes = (0..room.block.nodes.len()).filter(|&i| on_surface(i));
+            let top = nodes.map(|i| speed_squared(v, i)).fold(0.0, f64::max);
             self.vote.contact_speed_squared = self.vote.contact_speed_squared.max(top);
             self.vote.contact_speed_ahead = self.vote.contact_speed_ahead.max(top.sqrt());
         }
@@ -288,15 +291,22 @@ impl Domain {
                 plan.guests.len()
             ));
         }
-        let n_guests = plan.guests.len();
+        let constraint: Vec<u16> = plan.guests.iter().map(|g| g.constraint).collect();
+        let sets = NodeSet::all(&constraint);
+        let padded = |values: &mut dyn Iterator<Item = f64>, padding: f64| {
+            let mut array: Vec<f64> = values.collect();
+            array.resize(sets.len() * SET, padding);
+            array
+        };
+        let number = |i: usize| padded(&mut guest_state.chunks_exact(6).map(|s| s[i]), 0.0);
         self.guests = Guests {
             node: plan.guests.iter().map(|g| g.node).collect(),
-            x: std::array::from_fn(|a| guest_state.chunks_exact(6).map(|s| s[a]).collect()),
-            v: std::array::from_fn(|a| guest_state.chunks_exact(6).map(|s| s[3 + a]).collect()),
-            f: std::array::from_fn(|_| vec![0.0; n_guests]),
-            mass: plan.guests.iter().map(|g| g.mass).collect(),
-            constraint: plan.guests.iter().map(|g| g.constraint).collect(),
-            booked: vec![false; n_guests],
+            x: std::array::from_fn(number),
+            v: std::array::from_fn(|a| number(3 + a)),
+            f: std::array::from_fn(|_| padded(&mut std::iter::empty(), 0.0)),
+            mass: padded(&mut plan.guests.iter().map(|g| g.mass), 1.0),
+            constraint,
+            sets,
         };
         let guest_of: HashMap<u32, u32> =
             self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
@@ -389,7 +399,7 @@ impl Domain {
     /// Positions of the owned surface nodes in the order the master expects; a sort will use them.
     pub fn gather(&mut self) -> Vec<f64> {
         for room in &mut self.rooms {
-            room.gathered.push_back(positions(&room.block, &room.surface));
+            room.gathered.push_back(room.surface_positions());
         }
         let mut out = Vec::with_capacity(3 * self.gather.len());
         for &(room, local) in &self.gather {
@@ -419,7 +429,7 @@ impl Domain {
         meter.stop(mark, true);
     }
 
-    /// Forces of element sets at `x_n`; `dt` is `dt_{n-1}`. Border and All start from cleared forces.
+    /// Forces of element sets at `x_n`, added to forces that integration has cleared; `dt` is `dt_{n-1}`.
     pub fn elements(&mut self, sets: Sets, dt: f64, meter: &dyn Meter) {
         let control = &self.setup.control;
         let step = Step {
@@ -435,10 +445,7 @@ impl Domain {
             let mark = meter.start();
             let material = &materials[room.block.material as usize];
             if sets != Sets::Interior {
-                room.block.clear_forces();
                 room.vote = ElementVote::default();
-            }
-            if sets != Sets::Interior {
                 room.block.compute(material, &room.border, &step, width, &mut room.vote);
             }
             if sets != Sets::Border {
@@ -526,38 +533,33 @@ impl Domain {
             walls: &self.setup.walls,
             quanta: self.quanta,
         };
+        let width = self.width;
         each(&mut self.rooms, |room| {
             let mark = meter.start();
             let block = &mut room.block;
-            room.sums = advance.run(&mut Nodes {
+            let mut nodes = Nodes {
                 x: &mut block.x,
                 v: &mut block.v,
-                f: &block.f,
+                f: &mut block.f,
                 mass: &block.mass,
                 constraint: &block.constraint,
-                booked: &room.booked,
-            });
-            room.extent = Extent::NONE;
-            room.speed_squared = 0.0;
-            room.speed_ahead = 0.0;
-            for (&i, from) in room.surface.iter().zip(&room.reference) {
-                let i = i as usize;
-                room.extent.add(std::array::from_fn(|a| block.x[a][i] - from[a]));
-                let squared = speed_squared(&block.v, i);
-                let gain = SPEED_LAG * dt * speed_squared(&block.f, i).sqrt() / block.mass[i];
-                room.speed_squared = room.speed_squared.max(squared);
-                room.speed_ahead = room.speed_ahead.max(squared.sqrt() + gain);
-            }
+                sets: &room.sets,
+                reference: &room.reference,
+            };
+            room.booked = advance.run(&mut nodes, width);
             meter.stop(mark, false);
         });
-        advance.run(&mut Nodes {
-            x: &mut self.guests.x,
-            v: &mut self.guests.v,
-            f: &self.guests.f,
-            mass: &self.guests.mass,
-            constraint: &self.guests.constraint,
-            booked: &self.guests.booked,
-        });
+        let guests = &mut self.guests;
+        let mut nodes = Nodes {
+            x: &mut guests.x,
+            v: &mut guests.v,
+            f: &mut guests.f,
+            mass: &guests.mass,
+            constraint: &guests.constraint,
+            sets: &guests.sets,
+            reference: &Default::default(),
+        };
+        advance.run(&mut nodes, width);
         Ok(self.finish_vote())
     }
 
@@ -566,14 +568,14 @@ impl Domain {
         for room in &self.rooms {
             let part = room.block.part as usize;
             vote.add_elements(part, &room.vote);
-            vote.parts[part].kinetic += room.sums.kinetic;
-            vote.external += room.sums.external;
+            vote.parts[part].kinetic += room.booked.kinetic;
+            vote.external += room.booked.external;
             for a in 0..3 {
-                vote.momentum[a] += room.sums.momentum[a];
+                vote.momentum[a] += room.booked.momentum[a];
             }
-            vote.extents[part].merge(&room.extent);
-            vote.contact_speed_squared = vote.contact_speed_squared.max(room.speed_squared);
-            vote.contact_speed_ahead = vote.contact_speed_ahead.max(room.speed_ahead);
+            vote.extents[part].merge(&room.booked.extent);
+            vote.contact_speed_squared = vote.contact_speed_squared.max(room.booked.speed_squared);
+            vote.contact_speed_ahead = vote.contact_speed_ahead.max(room.booked.speed_ahead);
         }
         for &(gauge, room, local) in &self.gauges {
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
@@ -596,10 +598,6 @@ fn each(rooms: &mut [Room], work: impl Fn(&mut Room) + Send + Sync) {
         [one] => work(one),
         many => many.par_iter_mut().with_max_len(1).for_each(work),
     }
-}
-
-fn positions(block: &Block, local: &[u32]) -> Vec<[f64; 3]> {
-    local.iter().map(|&i| std::array::from_fn(|a| block.x[a][i as usize])).collect()
 }
 
 fn speed_squared(v: &[Vec<f64>; 3], i: usize) -> f64 {
