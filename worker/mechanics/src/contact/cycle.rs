@@ -18,7 +18,7 @@ use super::{
     work_unit::Batch,
     zone::{
         Frame, INNER, OUTER,
-        lanes::{self, Closest},
+        lanes::{self, Approach, Closest},
     },
 };
 use crate::{exact::Quantum, lanes::Width};
@@ -92,8 +92,12 @@ struct Work {
     closest: Closest,
     /// Features near nodes: where the pushes act.
     near_pairs: Pairs,
-    near_points: Closest,
-    pushes: Pushes,
+    approach: Approach,
+    face: Vec<u32>,
+    share: Vec<f64>,
+    stacking: Vec<f64>,
+    /// Depths and directions from the long way: place, depth, direction.
+    long_way: Vec<(usize, f64, [f64; 3])>,
     terms: Terms,
     /// The near faces of one node that needs the long way.
     near: Vec<Near>,
@@ -226,50 +230,46 @@ impl Contact {
         if work.held.is_empty() {
             return 0.0;
         }
-        work.pairs.clear();
-        let mut start = 0;
-        for (&node, &end) in nodes.iter().zip(&work.ends) {
-            for &face in &work.held[start..end as usize] {
-                work.pairs.push(node, self.faces[face as usize]);
-            }
-            start = end as usize;
-        }
-        work.pairs.fill_up();
+        work.pairs.expand(nodes, &work.ends, &work.held, &self.faces);
         lanes::nearest(self.width, cycle.x, &work.pairs, &mut work.closest);
-        work.near_pairs.clear();
-        work.near_points.clear();
-        work.pushes.clear();
+        work.approach.clear();
+        work.share.clear();
+        work.stacking.clear();
+        work.long_way.clear();
         let mut start = 0;
-        for (i, &node) in nodes.iter().enumerate() {
+        for i in 0..nodes.len() {
             let end = work.ends[i] as usize;
             if start < end {
-                self.node(node, start, end, work, cycle.x, vote);
+                self.node(start, end, work, cycle.x);
             }
             start = end;
         }
-        let n = work.pushes.face.len();
+        let n = work.approach.index.len();
         if n == 0 {
             return 0.0;
         }
-        work.near_pairs.fill_up();
-        work.near_points.fill_up(work.near_pairs.node.len());
-        work.pushes.fill_up();
-        let weights = &mut work.pushes.weights;
-        lanes::weights(self.width, cycle.x, &work.near_pairs, &work.near_points, weights);
+        work.near_pairs.choose(&work.pairs, &work.approach.index);
+        work.approach.fill_up();
+        let filled = work.approach.index.len();
+        let Work { approach, face, share, stacking, held, .. } = work;
+        // Of the last set what is left over repeats a pair and pushes nothing.
+        face.clear();
+        face.extend(approach.index.iter().map(|&i| held[i as usize]));
+        share.resize(filled, 0.0);
+        stacking.resize(filled, 0.0);
+        let gap = self.settings.gap;
+        lanes::approach(self.width, cycle.x, gap, &work.near_pairs, &work.closest, approach);
+        for &(i, depth, direction) in &work.long_way {
+            approach.depth[i] = depth;
+            (0..3).for_each(|a| approach.direction[a][i] = direction[a]);
+        }
+        approach.depth[n..].fill(0.0);
         if self.smooth { self.push(n, work, cycle, vote) } else { self.rub(n, work, cycle, vote) }
     }
 
-    /// Takes the near features of one node, whose pairs are `start..end`, into the lists of pushes.
+    /// Takes the near features of one node, whose pairs are `start..end`, into the lists.
     #[inline(always)]
-    fn node(
-        &self,
-        node: u32,
-        start: usize,
-        end: usize,
-        work: &mut Work,
-        x: &[Vec<f64>; 3],
-        vote: &mut ContactVote,
-    ) {
+    fn node(&self, start: usize, end: usize, work: &mut Work, x: &[Vec<f64>; 3]) {
         let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
         let closest = &work.closest;
         let distance2 = &closest.distance2[start..end];
@@ -285,8 +285,7 @@ impl Contact {
             return;
         }
         // Mostly all other faces are dropped by the nearest: the first step of the reduction is then all of it.
-        let face = held[nearest];
-        let corners = &self.corners[face as usize];
+        let corners = &self.corners[held[nearest] as usize];
         let feature = closest.feature(start + nearest);
         let mut sides = closest.sides(start + nearest);
         let mut alone = true;
@@ -298,38 +297,23 @@ impl Contact {
                 sides |= if shared { closest.sides(start + i) } else { 0 };
             }
         }
-        let distance = least.sqrt();
-        if alone && distance >= gap {
-            work.near_pairs.push(node, self.faces[face as usize]);
-            work.near_points.push(closest, start + nearest);
-            work.pushes.push(face, 0.0, [0.0; 3], 0.0, 1.0);
-        } else if alone && (sides == OUTER || sides == INNER) && !joint::is_on_feature(distance, gap) {
-            let v = &closest.vector;
-            let vector = [v[0][start + nearest], v[1][start + nearest], v[2][start + nearest]];
-            let (depth, direction) = joint::lone(gap, distance, sides == OUTER, vector);
-            vote.hits += 1;
-            vote.deepest(depth / gap, (self.global[node as usize], self.ids[face as usize]));
-            work.near_pairs.push(node, self.faces[face as usize]);
-            work.near_points.push(closest, start + nearest);
-            work.pushes.push(face, depth, direction, 1.0, 1.0);
+        // Nodes on the feature, whose line has no direction, and some that are only very near it.
+        let touches = least <= 1e-17 * gap * gap;
+        if alone && (sides == OUTER || sides == INNER) && !touches {
+            work.approach.index.push((start + nearest) as u32);
+            work.approach.sign.push(if sides == OUTER { 1.0 } else { -1.0 });
+            work.share.push(1.0);
+            work.stacking.push(1.0);
         } else {
-            self.reduce(node, start, end, work, x, vote);
+            self.reduce(start, end, work, x);
         }
     }
 
     /// As [`Contact::node`], the long way.
     #[inline(never)]
-    fn reduce(
-        &self,
-        node: u32,
-        start: usize,
-        end: usize,
-        work: &mut Work,
-        x: &[Vec<f64>; 3],
-        vote: &mut ContactVote,
-    ) {
+    fn reduce(&self, start: usize, end: usize, work: &mut Work, x: &[Vec<f64>; 3]) {
         let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
-        let Work { held, closest, near, hits, beyond, near_pairs, near_points, pushes, .. } = work;
+        let Work { held, closest, near, hits, beyond, .. } = work;
         near.clear();
         for i in start..end {
             if closest.distance2[i] < warning * warning {
@@ -344,32 +328,43 @@ impl Contact {
         };
         joint::reduce(near, gap, frame, hits, beyond);
         let stacking = if hits.len() > 1 { joint::stacking(hits) } else { 1.0 };
-        let mut take = |i: u32, depth: f64, direction: [f64; 3], share: f64| {
-            let i = near[i as usize].face as usize;
-            near_pairs.push(node, self.faces[held[i] as usize]);
-            near_points.push(closest, i);
-            pushes.push(held[i], depth, direction, share, stacking);
-        };
-        beyond.iter().for_each(|&i| take(i, 0.0, [0.0; 3], 0.0));
+        for &i in beyond.iter() {
+            work.approach.index.push(near[i as usize].face);
+            work.approach.sign.push(1.0);
+            work.share.push(1.0);
+            work.stacking.push(stacking);
+        }
         for hit in hits.iter() {
-            take(hit.near, hit.depth, hit.direction, hit.share);
-            vote.hits += 1;
-            vote.deepest(hit.depth / gap, (self.global[node as usize], near[hit.near as usize].id));
+            work.long_way.push((work.approach.index.len(), hit.depth, hit.direction));
+            work.approach.index.push(near[hit.near as usize].face);
+            work.approach.sign.push(1.0);
+            work.share.push(hit.share);
+            work.stacking.push(stacking);
         }
     }
 
     /// Forces without friction of the first `n` pushes. Gives the greatest squared frequency.
     #[inline(always)]
     fn push(&self, n: usize, work: &mut Work, cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
-        let sums = force::lanes::push(
-            self.width,
-            &self.statics,
-            &work.near_pairs,
-            &mut work.pushes,
-            cycle.force_quantum,
-            cycle.energy_quantum,
-            &mut work.terms,
-        );
+        let approach = &work.approach;
+        let pushes = Pushes {
+            face: &work.face,
+            depth: &approach.depth,
+            direction: &approach.direction,
+            share: &work.share,
+            stacking: &work.stacking,
+            weights: &approach.weights,
+        };
+        let (statics, pairs) = (&self.statics, &work.near_pairs);
+        let quanta = (cycle.force_quantum, cycle.energy_quantum);
+        let sums = force::lanes::push(self.width, statics, pairs, pushes, quanta, &mut work.terms);
+        vote.hits += approach.depth.iter().map(|&depth| u64::from(depth > 0.0)).sum::<u64>();
+        if sums.deepest > 0.0 && sums.deepest / self.settings.gap >= vote.worst_depth {
+            for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+                let pair = (self.global[pairs.node[i] as usize], self.ids[work.face[i] as usize]);
+                vote.deepest(depth / self.settings.gap, pair);
+            }
+        }
         vote.energy += sums.energy;
         vote.force_bound =
             if sums.force_bound > vote.force_bound { sums.force_bound } else { vote.force_bound };
@@ -394,25 +389,28 @@ impl Contact {
     /// Forces with friction of the first `n` pushes. Gives the greatest squared frequency.
     #[inline(always)]
     fn rub(&self, n: usize, work: &mut Work, cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
-        let (pushes, statics) = (&work.pushes, &self.statics);
+        let (approach, statics) = (&work.approach, &self.statics);
         let mut frequency2 = 0.0_f64;
         for i in 0..n {
             let node = work.near_pairs.node[i] as usize;
-            let face = pushes.face[i] as usize;
+            let face = work.face[i] as usize;
             let nodes = self.faces[face];
-            let weights = [0, 1, 2, 3].map(|k| pushes.weights[k][i]);
+            let weights = [0, 1, 2, 3].map(|k| approach.weights[k][i]);
             let k =
                 force::stiffness(statics.factor[node], statics.stiffness[node], statics.face_stiffness[face]);
             let of_corners = nodes.map(|n| statics.inverse_mass[n as usize]);
             let inverse_mass = force::inverse_mass(statics.inverse_mass[node], of_corners, &weights);
-            frequency2 = frequency2.max(force::frequency2(k, pushes.stacking[i], inverse_mass));
-            if pushes.share[i] <= 0.0 {
+            frequency2 = frequency2.max(force::frequency2(k, work.stacking[i], inverse_mass));
+            let depth = approach.depth[i];
+            if depth <= 0.0 {
                 continue;
             }
+            vote.hits += 1;
+            vote.deepest(depth / self.settings.gap, (self.global[node], self.ids[face]));
             let push = force::Push {
-                stiffness: k * pushes.share[i],
-                depth: pushes.depth[i],
-                direction: [0, 1, 2].map(|a| pushes.direction[a][i]),
+                stiffness: k * work.share[i],
+                depth,
+                direction: [0, 1, 2].map(|a| approach.direction[a][i]),
                 weights,
             };
             let coefficient =

@@ -10,26 +10,50 @@ pub(super) struct Pairs {
 }
 
 impl Pairs {
-    pub(super) fn clear(&mut self) {
-        self.node.clear();
-        self.corners.iter_mut().for_each(Vec::clear);
+    /// Room for `n` pairs, in whole lane sets; what they hold is for the caller to write.
+    fn resize(&mut self, n: usize) {
+        let n = n.next_multiple_of(SET);
+        self.node.resize(n, 0);
+        self.corners.iter_mut().for_each(|list| list.resize(n, 0));
+    }
+
+    /// Pairs each of `nodes` with its faces among `held`, up to its end in `ends`; `faces` gives batch nodes. The
+    /// last is repeated until lane sets are full.
+    #[inline(always)]
+    pub(super) fn expand(&mut self, nodes: &[u32], ends: &[u32], held: &[u32], faces: &[[u32; 4]]) {
+        self.resize(held.len());
+        let mut start = 0;
+        for (&node, &end) in nodes.iter().zip(ends) {
+            self.node[start..end as usize].fill(node);
+            start = end as usize;
+        }
+        let [a, b, c, d] = &mut self.corners;
+        let lists = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
+        for (((a, b), (c, d)), &face) in lists.zip(held) {
+            [*a, *b, *c, *d] = faces[face as usize];
+        }
+        self.repeat_last(held.len());
+    }
+
+    /// The pairs of another list at `indices`; the last is repeated until lane sets are full.
+    #[inline(always)]
+    pub(super) fn choose(&mut self, from: &Pairs, indices: &[u32]) {
+        self.resize(indices.len());
+        let lists =
+            std::iter::once((&mut self.node, &from.node)).chain(self.corners.iter_mut().zip(&from.corners));
+        for (list, from) in lists {
+            for (node, &i) in list.iter_mut().zip(indices) {
+                *node = from[i as usize];
+            }
+        }
+        self.repeat_last(indices.len());
     }
 
     #[inline(always)]
-    pub(super) fn push(&mut self, node: u32, corners: [u32; 4]) {
-        self.node.push(node);
-        self.corners[0].push(corners[0]);
-        self.corners[1].push(corners[1]);
-        self.corners[2].push(corners[2]);
-        self.corners[3].push(corners[3]);
-    }
-
-    /// Repeats the last pair until whole lane sets are full.
-    pub(super) fn fill_up(&mut self) {
-        let n = self.node.len().next_multiple_of(SET);
+    fn repeat_last(&mut self, n: usize) {
         for list in std::iter::once(&mut self.node).chain(&mut self.corners) {
-            let last = list.last().copied().unwrap_or(0);
-            list.resize(n, last);
+            let last = if n > 0 { list[n - 1] } else { 0 };
+            list[n..].fill(last);
         }
     }
 

@@ -22,21 +22,21 @@ pub(in crate::contact) struct Statics {
     pub(in crate::contact) face_stiffness: Vec<f64>,
 }
 
-/// Features near nodes, by pair of a [`Pairs`]; those beyond the gap have depth and share zero.
-#[derive(Clone, Debug, Default)]
-pub(in crate::contact) struct Pushes {
+/// Features near nodes, by pair of a [`Pairs`]; those beyond the gap have depth zero.
+#[derive(Clone, Copy)]
+pub(in crate::contact) struct Pushes<'a> {
     /// Index of the face among the static data.
-    pub(in crate::contact) face: Vec<u32>,
+    pub(in crate::contact) face: &'a [u32],
     /// Depth in the zone (length).
-    pub(in crate::contact) depth: Vec<f64>,
+    pub(in crate::contact) depth: &'a [f64],
     /// Unit vector of the force on the node.
-    pub(in crate::contact) direction: [Vec<f64>; 3],
+    pub(in crate::contact) direction: &'a [Vec<f64>; 3],
     /// Share of the push.
-    pub(in crate::contact) share: Vec<f64>,
+    pub(in crate::contact) share: &'a [f64],
     /// How many springs act on the node along one direction.
-    pub(in crate::contact) stacking: Vec<f64>,
+    pub(in crate::contact) stacking: &'a [f64],
     /// Shape functions of the corners.
-    pub(in crate::contact) weights: [Vec<f64>; 4],
+    pub(in crate::contact) weights: &'a [Vec<f64>; 4],
 }
 
 /// Forces by pair: three of the node, then three of each corner; multiples of the force quantum.
@@ -51,43 +51,8 @@ pub(in crate::contact) struct Sums {
     pub(in crate::contact) force_bound: f64,
     /// Greatest squared frequency.
     pub(in crate::contact) frequency2: f64,
-}
-
-impl Pushes {
-    pub(in crate::contact) fn clear(&mut self) {
-        self.face.clear();
-        self.scalars().for_each(Vec::clear);
-    }
-
-    #[inline(always)]
-    pub(in crate::contact) fn push(
-        &mut self,
-        face: u32,
-        depth: f64,
-        direction: [f64; 3],
-        share: f64,
-        stacking: f64,
-    ) {
-        self.face.push(face);
-        self.depth.push(depth);
-        self.share.push(share);
-        self.stacking.push(stacking);
-        for (list, component) in self.direction.iter_mut().zip(direction) {
-            list.push(component);
-        }
-    }
-
-    fn scalars(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
-        self.direction.iter_mut().chain([&mut self.depth, &mut self.share, &mut self.stacking])
-    }
-
-    /// Fills lane sets with pushes of nothing.
-    pub(in crate::contact) fn fill_up(&mut self) {
-        let n = self.face.len().next_multiple_of(SET);
-        let last = self.face.last().copied().unwrap_or(0);
-        self.face.resize(n, last);
-        self.scalars().for_each(|values| values.resize(n, 0.0));
-    }
+    /// Greatest depth (length).
+    pub(in crate::contact) deepest: f64,
 }
 
 /// Forces of all pairs. The result does not depend on the width.
@@ -98,9 +63,8 @@ pub(in crate::contact) fn push(
     width: Width,
     statics: &Statics,
     pairs: &Pairs,
-    pushes: &mut Pushes,
-    force_quantum: Quantum,
-    energy_quantum: Quantum,
+    pushes: Pushes,
+    (force_quantum, energy_quantum): (Quantum, Quantum),
     terms: &mut Terms,
 ) -> Sums {
     let n = pairs.node.len();
@@ -108,8 +72,9 @@ pub(in crate::contact) fn push(
     assert!(pushes.face.len() == n && (n == 0 || (highest as usize) < statics.face_stiffness.len()));
     let n_nodes = statics.factor.len();
     assert!(statics.stiffness.len() == n_nodes && statics.inverse_mass.len() == n_nodes);
-    pushes.scalars().for_each(|values| assert!(values.len() == n, "{} values of {n} pairs", values.len()));
-    pushes.weights.iter().for_each(|values| assert!(values.len() == n));
+    let lists = pushes.direction.iter().chain(pushes.weights).map(Vec::len);
+    let lengths = lists.chain([pushes.depth.len(), pushes.share.len(), pushes.stacking.len()]);
+    lengths.for_each(|length| assert!(length == n, "{length} values of {n} pairs"));
     pairs.check_nodes(width, n_nodes);
     terms.iter_mut().for_each(|values| values.resize(n, 0.0));
     let magic = [force_quantum.magic(), energy_quantum.magic()];
@@ -132,7 +97,7 @@ pub(in crate::contact) fn push(
 unsafe fn on_avx2(
     statics: &Statics,
     pairs: &Pairs,
-    pushes: &Pushes,
+    pushes: Pushes,
     magic: [f64; 2],
     terms: &mut Terms,
 ) -> Sums {
@@ -145,7 +110,7 @@ unsafe fn on_avx2(
 unsafe fn on_avx512(
     statics: &Statics,
     pairs: &Pairs,
-    pushes: &Pushes,
+    pushes: Pushes,
     magic: [f64; 2],
     terms: &mut Terms,
 ) -> Sums {
@@ -159,20 +124,20 @@ unsafe fn on_avx512(
 unsafe fn kernel<L: Lane>(
     statics: &Statics,
     pairs: &Pairs,
-    pushes: &Pushes,
+    pushes: Pushes,
     magic: [f64; 2],
     terms: &mut Terms,
 ) -> Sums {
     let zero = L::splat(0.0);
     let (force_magic, energy_magic) = (L::splat(magic[0]), L::splat(magic[1]));
-    let (mut energy, mut bound, mut frequency2) = (zero, zero, zero);
+    let (mut energy, mut bound, mut frequency2, mut deepest) = (zero, zero, zero, zero);
     let mut at = 0;
     while at < pairs.node.len() {
         // SAFETY: the caller's; `at + N` is within the lists because N divides SET.
         unsafe {
             let factor = L::gather(&statics.factor, &pairs.node, at);
             let of_node = L::gather(&statics.stiffness, &pairs.node, at);
-            let of_face = L::gather(&statics.face_stiffness, &pushes.face, at);
+            let of_face = L::gather(&statics.face_stiffness, pushes.face, at);
             let sum = of_node + of_face;
             let mean = L::splat(2.0) * of_node * of_face / sum;
             let k = L::select(zero.less(sum), factor * mean, zero);
@@ -189,10 +154,11 @@ unsafe fn kernel<L: Lane>(
                 inverse_mass = (weights[i] * weights[i]).mul_add(of_corner, inverse_mass);
                 i += 1;
             }
-            let stacking = L::load(&pushes.stacking, at);
+            let stacking = L::load(pushes.stacking, at);
             frequency2 = (L::splat(BOTH_SIDES) * stacking * k * inverse_mass).max(frequency2);
-            let depth = L::load(&pushes.depth, at);
-            let normal = (k * L::load(&pushes.share, at)) * depth;
+            let depth = L::load(pushes.depth, at);
+            deepest = depth.max(deepest);
+            let normal = (k * L::load(pushes.share, at)) * depth;
             let mut a = 0;
             while a < 3 {
                 let force = normal * L::load(&pushes.direction[a], at);
@@ -217,10 +183,12 @@ unsafe fn kernel<L: Lane>(
         at += L::N;
     }
     let mut sums = Sums::default();
-    let (energy, bound, frequency2) = (energy.to_array(), bound.to_array(), frequency2.to_array());
+    let (energy, bound) = (energy.to_array(), bound.to_array());
+    let (frequency2, deepest) = (frequency2.to_array(), deepest.to_array());
     for i in 0..SET {
         sums.energy += energy[i];
         sums.force_bound = if bound[i] > sums.force_bound { bound[i] } else { sums.force_bound };
+        sums.deepest = if deepest[i] > sums.deepest { deepest[i] } else { sums.deepest };
         sums.frequency2 = if frequency2[i] > sums.frequency2 { frequency2[i] } else { sums.frequency2 };
     }
     sums

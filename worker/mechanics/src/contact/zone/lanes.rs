@@ -9,7 +9,7 @@ use super::{COPLANAR, Feature, INNER, JOINT, Nearest, OUTER, PLANE};
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     contact::pairs::Pairs,
-    lanes::{Lane, Width, scalar::Scalar},
+    lanes::{Lane, SET, Width, scalar::Scalar},
 };
 
 type V<L> = [L; 3];
@@ -26,6 +26,40 @@ pub(in crate::contact) struct Closest {
     shares: [Vec<f64>; 3],
 }
 
+/// How nodes approach closest points, by near feature.
+#[derive(Clone, Debug, Default)]
+pub(in crate::contact) struct Approach {
+    /// Index of the closest point among all.
+    pub(in crate::contact) index: Vec<u32>,
+    /// 1 for a node on the outer side, -1 on the inner.
+    pub(in crate::contact) sign: Vec<f64>,
+    /// Depth in the zone: gap minus signed distance; zero beyond the gap (length).
+    pub(in crate::contact) depth: Vec<f64>,
+    /// Unit vector along the line of node and closest point, out of the solid.
+    pub(in crate::contact) direction: [Vec<f64>; 3],
+    /// Shape functions of the corners.
+    pub(in crate::contact) weights: [Vec<f64>; 4],
+}
+
+impl Approach {
+    pub(in crate::contact) fn clear(&mut self) {
+        self.index.clear();
+        self.sign.clear();
+    }
+
+    /// Repeats the last feature until lane sets are full.
+    pub(in crate::contact) fn fill_up(&mut self) {
+        let n = self.index.len().next_multiple_of(SET);
+        self.index.resize(n, self.index.last().copied().unwrap_or(0));
+        self.sign.resize(n, 1.0);
+    }
+
+    fn resize(&mut self, n: usize) {
+        self.depth.resize(n, 0.0);
+        self.direction.iter_mut().chain(&mut self.weights).for_each(|values| values.resize(n, 0.0));
+    }
+}
+
 /// Code of edge 0; the face is 0.
 const EDGE: f64 = 1.0;
 /// Code of corner 0.
@@ -38,32 +72,6 @@ impl Closest {
         self.distance2.resize(n, 0.0);
         self.code.resize(n, 0.0);
         self.vector.iter_mut().chain(&mut self.shares).for_each(|values| values.resize(n, 0.0));
-    }
-
-    pub(in crate::contact) fn clear(&mut self) {
-        self.distance2.clear();
-        self.code.clear();
-        self.vector.iter_mut().chain(&mut self.shares).for_each(Vec::clear);
-    }
-
-    /// Takes in the closest point of another list's pair.
-    pub(in crate::contact) fn push(&mut self, from: &Closest, i: usize) {
-        self.distance2.push(from.distance2[i]);
-        self.code.push(from.code[i]);
-        for a in 0..3 {
-            self.vector[a].push(from.vector[a][i]);
-            self.shares[a].push(from.shares[a][i]);
-        }
-    }
-
-    /// Repeats the last point until there are `n`.
-    pub(in crate::contact) fn fill_up(&mut self, n: usize) {
-        for values in
-            self.vector.iter_mut().chain(&mut self.shares).chain([&mut self.distance2, &mut self.code])
-        {
-            let last = values.last().copied().unwrap_or(0.0);
-            values.resize(n, last);
-        }
     }
 
     /// Where on its face the closest point of a pair lies.
@@ -219,31 +227,36 @@ fn middle<L: Lane>(x: &[V<L>; 4]) -> V<L> {
     ]
 }
 
-/// Shape functions of the corners at closest points, to the bits of [`Frame::weights`](super::Frame::weights).
+/// Depths, directions and weights of near features, whose `index` and `sign` are given: depth and direction to
+/// the bits of the reduction, weights to those of [`Frame::weights`](super::Frame::weights). `pairs` are those of
+/// the features, `closest` the points of all pairs.
 ///
 /// # Panics
-/// As [`nearest`], and if the closest points are not as many as the pairs.
-pub(in crate::contact) fn weights(
+/// As [`nearest`], and if an index is out of range or there are not as many as pairs.
+pub(in crate::contact) fn approach(
     width: Width,
     x: &[Vec<f64>; 3],
+    gap: f64,
     pairs: &Pairs,
     closest: &Closest,
-    found: &mut [Vec<f64>; 4],
+    found: &mut Approach,
 ) {
     pairs.check(width, x);
     let n = pairs.node.len();
-    let lists = closest.vector.iter().chain(&closest.shares).chain([&closest.code]);
-    lists.for_each(|list| assert!(list.len() == n, "{} closest points of {n} pairs", list.len()));
-    found.iter_mut().for_each(|values| values.resize(n, 0.0));
+    assert!(found.index.len() == n && found.sign.len() == n, "{} features of {n} pairs", found.index.len());
+    let highest = found.index.iter().fold(0, |highest, &i| if i > highest { i } else { highest });
+    let lists = closest.vector.iter().chain(&closest.shares).chain([&closest.code, &closest.distance2]);
+    lists.for_each(|list| assert!(n == 0 || (highest as usize) < list.len(), "point {highest}"));
+    found.resize(n);
     match width {
-        // SAFETY: pairs, width and lengths have been checked.
-        Width::Scalar => unsafe { weigh::<Scalar>(x, pairs, closest, found) },
+        // SAFETY: pairs, width, indices and lengths have been checked.
+        Width::Scalar => unsafe { near::<Scalar>(x, gap, pairs, closest, found) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Width::Avx2 => unsafe { weigh_on_avx2(x, pairs, closest, found) },
+        Width::Avx2 => unsafe { near_on_avx2(x, gap, pairs, closest, found) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Width::Avx512 => unsafe { weigh_on_avx512(x, pairs, closest, found) },
+        Width::Avx512 => unsafe { near_on_avx512(x, gap, pairs, closest, found) },
         #[cfg(not(target_arch = "x86_64"))]
         Width::Avx2 | Width::Avx512 => unreachable!("not available"),
     }
@@ -251,32 +264,45 @@ pub(in crate::contact) fn weights(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn weigh_on_avx2(x: &[Vec<f64>; 3], pairs: &Pairs, closest: &Closest, found: &mut [Vec<f64>; 4]) {
+unsafe fn near_on_avx2(x: &[Vec<f64>; 3], gap: f64, pairs: &Pairs, closest: &Closest, found: &mut Approach) {
     // SAFETY: the caller's.
-    unsafe { weigh::<Avx2>(x, pairs, closest, found) }
+    unsafe { near::<Avx2>(x, gap, pairs, closest, found) }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn weigh_on_avx512(x: &[Vec<f64>; 3], pairs: &Pairs, closest: &Closest, found: &mut [Vec<f64>; 4]) {
+unsafe fn near_on_avx512(
+    x: &[Vec<f64>; 3],
+    gap: f64,
+    pairs: &Pairs,
+    closest: &Closest,
+    found: &mut Approach,
+) {
     // SAFETY: the caller's.
-    unsafe { weigh::<Avx512>(x, pairs, closest, found) }
+    unsafe { near::<Avx512>(x, gap, pairs, closest, found) }
 }
 
 /// # Safety
-/// Pairs checked, all lists as long as they.
+/// Pairs and indices checked, all lists of `found` as long as the pairs.
 #[inline(always)]
-unsafe fn weigh<L: Lane>(x: &[Vec<f64>; 3], pairs: &Pairs, closest: &Closest, found: &mut [Vec<f64>; 4]) {
+unsafe fn near<L: Lane>(x: &[Vec<f64>; 3], gap: f64, pairs: &Pairs, closest: &Closest, found: &mut Approach) {
+    let (zero, gap) = (L::splat(0.0), L::splat(gap));
     let mut at = 0;
     while at < pairs.node.len() {
         // SAFETY: the caller's; `at + N` is within the lists because N divides SET.
         unsafe {
-            let code = L::load(&closest.code, at);
-            let shares = [
-                L::load(&closest.shares[0], at),
-                L::load(&closest.shares[1], at),
-                L::load(&closest.shares[2], at),
-            ];
+            let index = &found.index[..];
+            let code = L::gather(&closest.code, index, at);
+            let vector = gather::<L>(&closest.vector, index, at);
+            let shares = gather::<L>(&closest.shares, index, at);
+            let sign = L::load(&found.sign, at);
+            let distance = L::gather(&closest.distance2, index, at).sqrt();
+            let depth = L::select(distance.less(gap), gap - sign * distance, zero);
+            let scale = sign / distance;
+            depth.store(&mut found.depth, at);
+            (scale * vector[0]).store(&mut found.direction[0], at);
+            (scale * vector[1]).store(&mut found.direction[1], at);
+            (scale * vector[2]).store(&mut found.direction[2], at);
             let mut weights = of_shares(code, shares);
             let plane = L::splat(OF_TRIANGLE * PLANE as f64).less_equal(code);
             if L::any(plane) {
@@ -287,11 +313,6 @@ unsafe fn weigh<L: Lane>(x: &[Vec<f64>; 3], pairs: &Pairs, closest: &Closest, fo
                     gather::<L>(x, &pairs.corners[2], at),
                     gather::<L>(x, &pairs.corners[3], at),
                 ];
-                let vector = [
-                    L::load(&closest.vector[0], at),
-                    L::load(&closest.vector[1], at),
-                    L::load(&closest.vector[2], at),
-                ];
                 let inside = bilinear(sub(sub(p, vector), corners[0]), &corners);
                 weights = [
                     L::select(plane, inside[0], weights[0]),
@@ -300,10 +321,10 @@ unsafe fn weigh<L: Lane>(x: &[Vec<f64>; 3], pairs: &Pairs, closest: &Closest, fo
                     L::select(plane, inside[3], weights[3]),
                 ];
             }
-            weights[0].store(&mut found[0], at);
-            weights[1].store(&mut found[1], at);
-            weights[2].store(&mut found[2], at);
-            weights[3].store(&mut found[3], at);
+            weights[0].store(&mut found.weights[0], at);
+            weights[1].store(&mut found.weights[1], at);
+            weights[2].store(&mut found.weights[2], at);
+            weights[3].store(&mut found.weights[3], at);
         }
         at += L::N;
     }
@@ -663,7 +684,7 @@ mod tests {
             (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         let (mut x, mut pairs) = ([vec![], vec![], vec![]], Pairs::default());
-        let mut frames = Vec::new();
+        let (mut frames, mut nodes, mut faces) = (vec![], vec![], vec![]);
         for round in 0..20_000_u32 {
             let mut quad = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
             // Coplanar, warped, hardly warped, or with two corners in one.
@@ -688,16 +709,21 @@ mod tests {
             for point in [p, quad[0], quad[1], quad[2], quad[3]] {
                 (0..3).for_each(|a| x[a].push(point[a]));
             }
-            pairs.push(first, [1, 2, 3, 4].map(|i| first + i));
+            faces.push([1, 2, 3, 4].map(|i| first + i));
+            nodes.push(first);
             frames.push((Frame::new(&quad), p));
         }
-        pairs.fill_up();
+        let (ends, held): (Vec<u32>, Vec<u32>) = (0..nodes.len() as u32).map(|i| (i + 1, i)).unzip();
+        pairs.expand(&nodes, &ends, &held, &faces);
         let mut counts = [0; 9];
         for width in Width::ALL.into_iter().filter(|width| width.available()) {
             let mut found = Closest::default();
             nearest(width, &x, &pairs, &mut found);
-            let mut weighed = [vec![], vec![], vec![], vec![]];
-            weights(width, &x, &pairs, &found, &mut weighed);
+            let mut near =
+                Approach { index: held.clone(), sign: vec![1.0; held.len()], ..Approach::default() };
+            near.fill_up();
+            approach(width, &x, 0.3, &pairs, &found, &mut near);
+            let weighed = &near.weights;
             for (i, (frame, p)) in frames.iter().enumerate() {
                 let wanted = frame.nearest(*p);
                 assert_eq!(bits(&found.nearest(i)), bits(&wanted), "{width}: {frame:?} {p:?}");
