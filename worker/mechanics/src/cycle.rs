@@ -9,7 +9,7 @@
 //! [`Domain::partials`], [`Domain::elements`] (interior), [`Domain::integrate`].
 
 use std::{
-    collections::{HashMap, VecDeque},
+    collections::{HashMap, HashSet, VecDeque},
     ops::Range,
 };
 
@@ -20,6 +20,7 @@ use crate::{
     block::{Block, Piece},
     contact::{Batch, Contact},
     element::{ElementVote, Step},
+    home::Home,
     lanes::{SET, Width},
     nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
@@ -167,7 +168,7 @@ pub struct Domain {
     exchange: Vec<Shared>,
     local: Vec<Shared>,
     copies: Vec<(u32, u32)>,
-    home: HashMap<u32, Vec<(u32, u32)>>,
+    home: Home,
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
     vote: Vote,
@@ -184,15 +185,13 @@ impl Domain {
         width: Width,
     ) -> Self {
         let mut rooms: Vec<Room> = Vec::new();
-        let mut home: HashMap<u32, Vec<(u32, u32)>> = HashMap::new();
+        let pieces = subdomains.iter().flat_map(|subdomain| &subdomain.pieces);
+        let home = Home::new(pieces.map(|piece| piece.nodes.as_slice()));
         let mut gather = Vec::new();
         for subdomain in subdomains {
             let first = rooms.len();
             for piece in &subdomain.pieces {
                 let block = Block::new(piece);
-                for (local, &node) in piece.nodes.iter().enumerate() {
-                    home.entry(node).or_default().push((rooms.len() as u32, local as u32));
-                }
                 let all = 0..block.n_sets();
                 rooms.push(Room {
                     sets: NodeSet::all(&block.constraint),
@@ -206,10 +205,8 @@ impl Domain {
                 });
             }
             let own = first as u32..rooms.len() as u32;
-            let first_copy = |node: u32| {
-                home.get(&node)
-                    .and_then(|copies| copies.iter().copied().find(|(block, _)| own.contains(block)))
-            };
+            let first_copy =
+                |node: u32| home.get(node).iter().copied().find(|(block, _)| own.contains(block));
             for room in own.clone() {
                 for local in 0..rooms[room as usize].block.nodes.len() as u32 {
                     let node = rooms[room as usize].block.nodes[local as usize];
@@ -236,7 +233,7 @@ impl Domain {
             .enumerate()
             .filter_map(|(g, node)| {
                 let &(room, local) =
-                    home.get(node)?.iter().find(|&&(r, l)| rooms[r as usize].is_booked(l))?;
+                    home.get(*node).iter().find(|&&(r, l)| rooms[r as usize].is_booked(l))?;
                 Some((g as u32, room, local))
             })
             .collect();
@@ -310,20 +307,22 @@ impl Domain {
         };
         let guest_of: HashMap<u32, u32> =
             self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
-        let mut contact_of = HashMap::new();
+        let contact_nodes = plan.batch.as_ref().map_or(&[][..], |batch| &batch.nodes);
+        if !contact_nodes.is_sorted_by(|a, b| a.global < b.global) {
+            return Err("contact nodes are not in ascending order".to_owned());
+        }
         self.contact = None;
         if let (Some(batch), Some(settings)) = (&plan.batch, &self.setup.contact) {
             let mut sources = Vec::with_capacity(batch.nodes.len());
-            for (i, node) in batch.nodes.iter().enumerate() {
-                let source = match (self.home.get(&node.global), guest_of.get(&node.global)) {
-                    (Some(copies), _) => copies[0],
-                    (None, Some(&guest)) => (NONE, guest),
-                    (None, None) => {
+            for node in &batch.nodes {
+                let source = match (self.home.get(node.global), guest_of.get(&node.global)) {
+                    ([first, ..], _) => *first,
+                    ([], Some(&guest)) => (NONE, guest),
+                    ([], None) => {
                         return Err(format!("contact node {} is neither held nor a guest", node.global));
                     }
                 };
                 sources.push(source);
-                contact_of.insert(node.global, i as u32);
             }
             let n = sources.len();
             let zeros = || std::array::from_fn(|_| vec![0.0; n]);
@@ -336,30 +335,37 @@ impl Domain {
         self.copies.clear();
         self.exchange.clear();
         self.local.clear();
-        let mut exchanged = std::collections::HashSet::with_capacity(plan.exchange.len());
+        let mut exchanged = HashSet::with_capacity(plan.exchange.len());
         for &node in &plan.exchange {
             exchanged.insert(node);
-            let shared = self.shared(node, &contact_of, &guest_of);
+            let contact = contact_nodes.binary_search_by_key(&node, |n| n.global);
+            let shared = self.shared(node, contact.map_or(NONE, |i| i as u32), &guest_of);
             if shared.copies.is_empty() && shared.guest == NONE {
                 return Err(format!("node {node} of the exchange is neither held nor a guest"));
             }
             self.exchange.push(shared);
         }
-        let mut inner: Vec<u32> = self
-            .home
-            .iter()
-            .filter(|(node, copies)| copies.len() > 1 || contact_of.contains_key(node))
-            .map(|(&node, _)| node)
-            .filter(|node| !exchanged.contains(node))
-            .collect();
-        inner.sort_unstable();
-        for node in inner {
-            let shared = self.shared(node, &contact_of, &guest_of);
-            self.local.push(shared);
+        // Both lists ascend, so one walk over them finds the contact node of each.
+        let (mut next, n_several) = (0, self.home.several().len());
+        for (i, node) in (0_u32..).zip(contact_nodes.iter().map(|n| n.global)) {
+            while next < n_several && self.home.several()[next] < node {
+                self.share_locally(self.home.several()[next], NONE, &exchanged, &guest_of);
+                next += 1;
+            }
+            next += usize::from(next < n_several && self.home.several()[next] == node);
+            self.share_locally(node, i, &exchanged, &guest_of);
+        }
+        for i in next..n_several {
+            self.share_locally(self.home.several()[i], NONE, &exchanged, &guest_of);
         }
         for room in &mut self.rooms {
-            let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
-            (room.border, room.interior) = split(&room.block.sets_touching(&touched));
+            (room.border, room.interior) = if exchanged.is_empty() {
+                let all = 0..room.block.n_sets();
+                (Vec::new(), vec![all])
+            } else {
+                let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
+                split(&room.block.sets_touching(&touched))
+            };
             if let Some(gathered) = room.gathered.pop_front() {
                 room.reference = gathered;
             }
@@ -367,12 +373,26 @@ impl Domain {
         Ok(())
     }
 
-    fn shared(&mut self, node: u32, contact_of: &HashMap<u32, u32>, guest_of: &HashMap<u32, u32>) -> Shared {
+    /// Books the copies of a held node that is not exchanged.
+    fn share_locally(
+        &mut self,
+        node: u32,
+        contact: u32,
+        exchanged: &HashSet<u32>,
+        guest_of: &HashMap<u32, u32>,
+    ) {
+        if !self.home.get(node).is_empty() && !exchanged.contains(&node) {
+            let shared = self.shared(node, contact, guest_of);
+            self.local.push(shared);
+        }
+    }
+
+    fn shared(&mut self, node: u32, contact: u32, guest_of: &HashMap<u32, u32>) -> Shared {
         let first = self.copies.len() as u32;
-        self.copies.extend(self.home.get(&node).into_iter().flatten());
+        self.copies.extend_from_slice(self.home.get(node));
         Shared {
             copies: first..self.copies.len() as u32,
-            contact: contact_of.get(&node).copied().unwrap_or(NONE),
+            contact,
             guest: guest_of.get(&node).copied().unwrap_or(NONE),
         }
     }
@@ -386,8 +406,8 @@ impl Domain {
         for node in nodes {
             let (room, local) = *self
                 .home
-                .get(node)
-                .and_then(|copies| copies.first())
+                .get(*node)
+                .first()
                 .ok_or_else(|| format!("node {node} to transfer is not held"))?;
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
             out.extend((0..3).map(|a| block.x[a][i]));
