@@ -266,13 +266,9 @@ fn throw(throw: &Throw, fraction: f64, speed: f64) -> Result<Solved, String> {
 
 #[test]
 fn no_node_of_a_body_thrown_at_another_ends_inside_it() {
-    // The spring of a gap is linear and static: what it can hold ends at about a twentieth of the bulk modulus for a gap
-    // of a tenth of the face, and grows with the gap.
-    for (fraction, speeds) in
-        [(0.1, [100.0, 200.0, 500.0]), (0.3, [300.0, 500.0, 1000.0]), (0.5, [1000.0, 2000.0, 3000.0])]
-    {
+    for fraction in [0.1, 0.3, 0.5] {
         for case in throws() {
-            for speed in speeds.into_iter().chain((case.direction[0] != 0.0).then_some(5000.0)) {
+            for speed in [100.0, 500.0, 1000.0, 2000.0, 3000.0, 5000.0] {
                 let named = format!("{} at {speed} m/s, gap {fraction}", case.name);
                 let solved = throw(&case, fraction, speed).unwrap_or_else(|e| panic!("{named}: {e}"));
                 let ledger = &solved.outcome.ledger;
@@ -284,18 +280,6 @@ fn no_node_of_a_body_thrown_at_another_ends_inside_it() {
                 assert!(ledger.worst_penetration > 0.0, "{named}: they did not meet");
                 assert!(found.is_empty(), "{named}: {found:?}");
             }
-        }
-    }
-}
-
-#[test]
-fn a_body_too_fast_for_the_spring_of_its_gap_ends_the_run_by_name() {
-    for case in throws().iter().filter(|case| case.direction[0] == 0.0) {
-        for (fraction, speed) in [(0.1, 2000.0), (0.1, 5000.0), (0.3, 5000.0)] {
-            let Err(failure) = throw(case, fraction, speed) else {
-                panic!("{} at {speed} m/s, gap {fraction}: held", case.name)
-            };
-            assert!(failure.contains("raise contact.stiffness or the gap"), "{failure}");
         }
     }
 }

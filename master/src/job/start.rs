@@ -93,11 +93,12 @@ impl Job {
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
         }
         let holdings = Holdings::new(model.mesh.n_nodes(), n, &layout, &nodes_of);
-        let surface = model
-            .setup
-            .contact
-            .as_ref()
-            .map(|_| Surface::new(&model.mesh, &model.setup.materials, &|_| true));
+        let surface = model.setup.contact.as_ref().map(|settings| {
+            let speed = initial::closing_speeds(&model.mesh, settings, &model.velocity);
+            let mut surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
+            surface.stiffen(&model.mesh, &model.setup.materials, settings, &speed);
+            surface
+        });
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         for (subdomain, (place, nodes)) in subdomains.iter_mut().zip(layout.iter().zip(&nodes_of)) {
             let id = subdomain.id;

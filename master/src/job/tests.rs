@@ -120,6 +120,27 @@ fn a_lost_worker_is_named_and_the_others_are_released() {
 }
 
 #[test]
+fn a_contact_deeper_than_nine_tenths_of_the_gap_stops_the_run_with_its_node() {
+    let (mut job, exchange) = started(1);
+    job.apply(Event::Message(0, cycle(0, exchange[0])));
+    let vote = Vote { courant: 1e-4, worst_depth: 0.95, worst_pair: (3, 1), ..Vote::empty(2) };
+    let partials = Vec::new();
+    let frame = ToMaster::Cycle { cycle: 1, vote: Some(Box::new(vote)), partials, gathered: Vec::new() };
+    let actions = job.apply(Event::Message(0, frame));
+    let stops = |a: &Action| matches!(a, Action::Send(_, ToWorker::Totals { orders, .. }) if orders.stop && orders.collect);
+    assert!(actions.iter().any(stops), "the state up to there is still gathered");
+    let last = Some(Box::new(Vote { courant: 1e-4, ..Vote::empty(2) }));
+    let image =
+        ToMaster::Image { cycle: 3, version: IMAGE_VERSION, pieces: Vec::new(), last, work: Work::default() };
+    let actions = job.apply(Event::Message(0, image));
+    let reason = failure(&actions);
+    assert!(
+        reason.contains("node 4") && reason.contains("0.95") && reason.contains("contact.stiffness"),
+        "{reason}"
+    );
+}
+
+#[test]
 fn images_of_another_version_are_refused_with_both_versions() {
     let (mut job, _) = started(1);
     let image = ToMaster::Image {
