@@ -143,6 +143,39 @@ struct Guests {
     sets: Vec<NodeSet>,
 }
 
+/// Where the nodes are: global node and its copies as (block, local node), ascending by node, then by block.
+struct Home {
+    nodes: Vec<u32>,
+    copies: Vec<(u32, u32)>,
+}
+
+impl Home {
+    fn new(mut entries: Vec<(u32, (u32, u32))>) -> Self {
+        entries.sort_unstable();
+        Self {
+            nodes: entries.iter().map(|entry| entry.0).collect(),
+            copies: entries.iter().map(|entry| entry.1).collect(),
+        }
+    }
+
+    /// The copies of a node; none if it is not held.
+    fn copies(&self, node: u32) -> &[(u32, u32)] {
+        let first = self.nodes.partition_point(|&n| n < node);
+        let n = self.nodes[first..].iter().take_while(|&&n| n == node).count();
+        &self.copies[first..first + n]
+    }
+
+    /// Each node once, with its copies.
+    fn iter(&self) -> impl Iterator<Item = (u32, &[(u32, u32)])> {
+        let mut at = 0;
+        self.nodes.chunk_by(|a, b| a == b).map(move |same| {
+            let copies = &self.copies[at..at + same.len()];
+            at += same.len();
+            (same[0], copies)
+        })
+    }
+}
+
 /// Everything a worker computes on.
 pub struct Domain {
     setup: Setup,
@@ -155,7 +188,7 @@ pub struct Domain {
     exchange: Vec<Shared>,
     local: Vec<Shared>,
     copies: Vec<(u32, u32)>,
-    home: HashMap<u32, Vec<(u32, u32)>>,
+    home: Home,
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
     vote: Vote,
@@ -172,32 +205,31 @@ impl Domain {
         width: Width,
     ) -> Self {
         let mut rooms: Vec<Room> = Vec::new();
-        let mut home: HashMap<u32, Vec<(u32, u32)>> = HashMap::new();
+        let mut entries = Vec::new();
         let mut gather = Vec::new();
+        for piece in subdomains.iter().flat_map(|subdomain| &subdomain.pieces) {
+            let block = Block::new(piece);
+            let room = rooms.len() as u32;
+            entries.extend((0..).zip(&piece.nodes).map(|(local, &node)| (node, (room, local))));
+            let all = 0..block.n_sets();
+            rooms.push(Room {
+                sets: NodeSet::all(&block.constraint),
+                block,
+                border: Vec::new(),
+                interior: vec![all],
+                reference: Default::default(),
+                gathered: VecDeque::new(),
+                vote: ElementVote::default(),
+                booked: Booked::default(),
+            });
+        }
+        let home = Home::new(entries);
+        let mut first = 0;
         for subdomain in subdomains {
-            let first = rooms.len();
-            for piece in &subdomain.pieces {
-                let block = Block::new(piece);
-                for (local, &node) in piece.nodes.iter().enumerate() {
-                    home.entry(node).or_default().push((rooms.len() as u32, local as u32));
-                }
-                let all = 0..block.n_sets();
-                rooms.push(Room {
-                    sets: NodeSet::all(&block.constraint),
-                    block,
-                    border: Vec::new(),
-                    interior: vec![all],
-                    reference: Default::default(),
-                    gathered: VecDeque::new(),
-                    vote: ElementVote::default(),
-                    booked: Booked::default(),
-                });
-            }
-            let own = first as u32..rooms.len() as u32;
-            let first_copy = |node: u32| {
-                home.get(&node)
-                    .and_then(|copies| copies.iter().copied().find(|(block, _)| own.contains(block)))
-            };
+            let own = first..first + subdomain.pieces.len() as u32;
+            first = own.end;
+            let first_copy =
+                |node: u32| home.copies(node).iter().copied().find(|(block, _)| own.contains(block));
             for room in own.clone() {
                 for local in 0..rooms[room as usize].block.nodes.len() as u32 {
                     let node = rooms[room as usize].block.nodes[local as usize];
@@ -224,7 +256,7 @@ impl Domain {
             .enumerate()
             .filter_map(|(g, node)| {
                 let &(room, local) =
-                    home.get(node)?.iter().find(|&&(r, l)| rooms[r as usize].is_booked(l))?;
+                    home.copies(*node).iter().find(|&&(r, l)| rooms[r as usize].is_booked(l))?;
                 Some((g as u32, room, local))
             })
             .collect();
@@ -303,8 +335,8 @@ impl Domain {
         if let (Some(batch), Some(settings)) = (&plan.batch, &self.setup.contact) {
             let mut sources = Vec::with_capacity(batch.nodes.len());
             for (i, node) in batch.nodes.iter().enumerate() {
-                let source = match (self.home.get(&node.global), guest_of.get(&node.global)) {
-                    (Some(copies), _) => copies[0],
+                let source = match (self.home.copies(node.global).first(), guest_of.get(&node.global)) {
+                    (Some(&copy), _) => copy,
                     (None, Some(&guest)) => (NONE, guest),
                     (None, None) => {
                         return Err(format!("contact node {} is neither held nor a guest", node.global));
@@ -333,14 +365,13 @@ impl Domain {
             }
             self.exchange.push(shared);
         }
-        let mut inner: Vec<u32> = self
+        let inner: Vec<u32> = self
             .home
             .iter()
             .filter(|(node, copies)| copies.len() > 1 || contact_of.contains_key(node))
-            .map(|(&node, _)| node)
+            .map(|(node, _)| node)
             .filter(|node| !exchanged.contains(node))
             .collect();
-        inner.sort_unstable();
         for node in inner {
             let shared = self.shared(node, &contact_of, &guest_of);
             self.local.push(shared);
@@ -357,7 +388,7 @@ impl Domain {
 
     fn shared(&mut self, node: u32, contact_of: &HashMap<u32, u32>, guest_of: &HashMap<u32, u32>) -> Shared {
         let first = self.copies.len() as u32;
-        self.copies.extend(self.home.get(&node).into_iter().flatten());
+        self.copies.extend(self.home.copies(node));
         Shared {
             copies: first..self.copies.len() as u32,
             contact: contact_of.get(&node).copied().unwrap_or(NONE),
@@ -374,8 +405,8 @@ impl Domain {
         for node in nodes {
             let (room, local) = *self
                 .home
-                .get(node)
-                .and_then(|copies| copies.first())
+                .copies(*node)
+                .first()
                 .ok_or_else(|| format!("node {node} to transfer is not held"))?;
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
             out.extend((0..3).map(|a| block.x[a][i]));
