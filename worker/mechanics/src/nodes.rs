@@ -475,7 +475,7 @@ mod tests {
         let mut sets = NodeSet::all(&constraint);
         for (i, set) in (0..n).map(|i| (i, i / SET)).filter(|(i, _)| i % 3 != 1) {
             sets[set].booked |= 1 << (i % SET);
-            if i < 8 || i > 17 {
+            if !(8..=17).contains(&i) {
                 sets[set].surface |= 1 << (i % SET);
             }
         }

@@ -196,23 +196,10 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
         )
     };
 
-    // 1. Geometry in the middle and at the end of the step; velocity gradient on that of the middle, and what of
-    //    the velocity it leaves.
+    // 1. Velocity gradient on the geometry of the middle of the step, and what of the velocity it leaves.
     let mid = Modes::before(&x, &v, L::splat(0.5 * step.dt));
     let at_mid = Gradient::of(&mid);
-    let at_end = Gradient::of(&x);
-    let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
-    let area = (L::splat(2.0 / 3.0 / 512.0) * spread.trace()).sqrt();
-    // One division inverts both volumes, that of the start and the area: it is much slower than products.
-    let volumes = at_mid.volume_times_64 * at_end.volume_times_64;
-    let others = initial_volume * area;
-    let inverse = one / (volumes * others);
-    let (inverse_volumes, inverse_others) = (inverse * others, inverse * volumes);
-    let inverse_mid_by_64 = inverse_volumes * at_end.volume_times_64;
-    let inverse_by_64 = inverse_volumes * at_mid.volume_times_64;
-    let inverse_initial = inverse_others * area;
-    let inverse_area = inverse_others * initial_volume;
-    let gradient = at_mid.against(&v).scaled(inverse_mid_by_64);
+    let gradient = at_mid.against(&v).scaled(one / at_mid.volume_times_64);
     let hourglass = Hourglass {
         d: amplitude(&v.d, &gradient, &mid.d),
         e: amplitude(&v.e, &gradient, &mid.e),
@@ -221,15 +208,10 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     };
     let volume_rate = gradient.x.x + gradient.y.y + gradient.z.z;
 
-    // 2. Volume at the end of the step: exactly the initial one as long as nothing moves.
-    let volume = at_end.volume();
-    let inverse_volume = inverse_by_64 * L::splat(64.0);
-    let relative_volume = (volume - initial_volume).mul_add(inverse_initial, one);
-
-    // 3. Deviatoric stress: rotation, elastic increment, yield; its work on the middle volume.
+    // 2. Deviatoric stress: rotation, elastic increment, yield; its power.
     let mut history = History { plastic_strain: zero, temperature: zero };
     let mut stress = Deviator::zero();
-    let mut deviatoric_work = zero;
+    let mut deviatoric_power = zero;
     if S::DEVIATORIC {
         let third = volume_rate * L::splat(1.0 / 3.0);
         let rate = Deviator {
@@ -271,9 +253,25 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
         stress = laws.strength.update(trial, strain, &mut history, alive);
         // The stress before, turned, is `turned` less its half of the increment.
         let turned_power = half_increment.neg_mul_add(rate_square, turned.contract(&rate));
-        let mean_power = half * (turned_power + stress.contract(&rate));
-        deviatoric_work = mean_power * dt * (at_mid.volume() * inverse_initial);
+        deviatoric_power = half * (turned_power + stress.contract(&rate));
     }
+
+    // 3. Geometry at the end of the step. It follows the stress, whose long chain of roots and quotients it fills. The
+    //    relative volume is exactly 1 as long as nothing moves.
+    let at_end = Gradient::of(&x);
+    let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
+    let area_square = L::splat(2.0 / 3.0 / 512.0) * spread.trace();
+    let area = area_square.sqrt();
+    // One division inverts volume, initial volume and area: it is much slower than products.
+    let starting = initial_volume * area_square;
+    let inverse = one / (at_end.volume_times_64 * starting);
+    let inverse_by_64 = inverse * starting;
+    let inverse_others = inverse * at_end.volume_times_64;
+    let inverse_initial = inverse_others * area_square;
+    let volume = at_end.volume();
+    let length = volume * (inverse_others * initial_volume * area);
+    let inverse_volume = inverse_by_64 * L::splat(64.0);
+    let relative_volume = (volume - initial_volume).mul_add(inverse_initial, one);
 
     // 4. Pressure line at the new volume and the sound speed there.
     let (pressure_before, energy_before, volume_before): (L, L, L) = (
@@ -282,7 +280,9 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
         view.state(slot, field::RELATIVE_VOLUME),
     );
     let volume_change = L::select(zero.less(dt), relative_volume - volume_before, zero);
-    let energy_before = energy_before + deviatoric_work;
+    // The deviator works on the middle volume.
+    let middle = at_mid.volume() * inverse_initial;
+    let energy_before = (deviatoric_power * dt).mul_add(middle, energy_before);
     let line = laws.eos.line(relative_volume);
     let energy = pressure_before.neg_mul_add(volume_change, energy_before);
     let bulk = line
@@ -293,7 +293,6 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let sound = sound_square.sqrt();
 
     // 5. Artificial viscosity in compression.
-    let length = volume * inverse_area;
     let density = L::splat(laws.density) * (initial_volume * inverse_volume);
     let closing = L::select(volume_rate.less(zero), -volume_rate, zero);
     let quadratic = L::splat(step.quadratic_viscosity * step.quadratic_viscosity);
@@ -379,21 +378,30 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let magic = L::splat(step.force_quantum.magic());
     let mut axis = 0;
     while axis < 3 {
-        let mut forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
-        // Seven corners are rounded, the eighth takes what they leave: the element's forces add to exactly zero.
-        let mut rest = zero;
-        let mut corner = 0;
-        while corner < 8 {
-            let force = L::select(active, forces[corner], zero);
-            tally.largest_force = tally.largest_force.max_magnitude(force);
-            forces[corner] = if corner == 7 { rest } else { (force + magic) - magic };
-            rest = rest - forces[corner];
-            corner += 1;
-        }
+        let forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
+        let forces = balanced(forces, active, magic, &mut tally.largest_force);
         // SAFETY: corners are inside the node arrays.
         unsafe { scatter(view.layout, view.f[axis], slot, forces) };
         axis += 1;
     }
+}
+
+/// One component of the corner forces of active elements as it is added: seven corners are rounded, the eighth takes
+/// what they leave, so that the forces of an element add to exactly zero. The largest magnitude before that is kept.
+#[inline(always)]
+fn balanced<L: Lane>(forces: [L; 8], active: L::Mask, magic: L, largest: &mut L) -> [L; 8] {
+    let zero = L::splat(0.0);
+    let mut rounded = [zero; 8];
+    let mut corner = 0;
+    while corner < 8 {
+        let force = L::select(active, forces[corner], zero);
+        *largest = largest.max_magnitude(force);
+        rounded[corner] = (force + magic) - magic;
+        corner += 1;
+    }
+    let [a, b, c, d, e, f, g, _] = rounded;
+    rounded[7] = -(((a + b) + (c + d)) + ((e + f) + g));
+    rounded
 }
 
 /// Values of one node array at the eight corners.
