@@ -117,7 +117,6 @@ impl Boxes {
         held: &mut Vec<u32>,
         ends: &mut Vec<u32>,
     ) {
-        let all = (1_u32 << L::N) - 1;
         let starts = &candidates.starts[first..=end];
         // Room for all; each is written where the next held one goes.
         held.clear();
@@ -127,17 +126,8 @@ impl Boxes {
         for (bounds, &node) in starts.windows(2).zip(&candidates.nodes[first..end]) {
             let point = &self.points[SET * node as usize..][..SET];
             for &face in &candidates.faces[bounds[0] as usize..bounds[1] as usize] {
-                let of = &self.faces[SET * face as usize..][..SET];
-                let mut inside = all;
-                let mut at = 0;
-                while at < SET {
-                    // SAFETY: both slices hold a set, and N divides it.
-                    let (least, value) = unsafe { (L::load(of, at), L::load(point, at)) };
-                    inside &= L::bits(least.less_equal(value));
-                    at += L::N;
-                }
                 held[n] = face;
-                n += usize::from(inside == all);
+                n += usize::from(holds::<L>(&self.faces[SET * face as usize..][..SET], point));
             }
             ends.push(n as u32);
         }
@@ -166,5 +156,56 @@ impl Boxes {
         ends: &mut Vec<u32>,
     ) {
         self.held::<Avx512>(candidates, range, held, ends);
+    }
+}
+
+/// Whether a box holds a point.
+#[inline(always)]
+fn holds<L: Lane>(least: &[f64], point: &[f64]) -> bool {
+    assert!(least.len() == SET && point.len() == SET, "one set each");
+    let mut inside = (1_u32 << L::N) - 1;
+    let mut at = 0;
+    while at < SET {
+        // SAFETY: both slices hold a set, and N divides it.
+        let (least, value) = unsafe { (L::load(least, at), L::load(point, at)) };
+        inside &= L::bits(least.less_equal(value));
+        at += L::N;
+    }
+    inside == (1_u32 << L::N) - 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::search::Bounds;
+
+    #[test]
+    fn every_width_finds_the_faces_whose_bounds_hold_a_node() {
+        let mut seed = 9_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            // A coarse grid, so that nodes lie on borders.
+            ((seed >> 60) as f64 - 8.0) * 0.25
+        };
+        let x: [Vec<f64>; 3] = [0; 3].map(|_| (0..200).map(|_| random()).collect());
+        let at = |n: u32| [x[0][n as usize], x[1][n as usize], x[2][n as usize]];
+        let faces: Vec<[u32; 4]> = (0..40).map(|f| [4 * f, 4 * f + 1, 4 * f + 2, 4 * f + 3]).collect();
+        let (nodes, all): (Vec<u32>, Vec<u32>) = ((100..200).collect(), (0..40).collect());
+        let holds = |n: u32, f: u32| Bounds::of(&faces[f as usize].map(at), 0.25).holds(at(n));
+        let wanted: Vec<Vec<u32>> =
+            nodes.iter().map(|&n| all.iter().copied().filter(|&f| holds(n, f)).collect()).collect();
+        assert!(wanted.concat().len() > 500);
+        let starts: Vec<u32> = (0..=100).map(|i| 40 * i).collect();
+        let candidates = Candidates { nodes: nodes.clone(), starts, faces: all.repeat(100) };
+        for width in Width::ALL.into_iter().filter(|width| width.available()) {
+            let (mut boxes, mut held, mut ends) = (Boxes::default(), vec![], vec![]);
+            boxes.measure(width, &x, &faces, 0.25);
+            boxes.hold(width, &candidates, (0, 100), &mut held, &mut ends);
+            assert_eq!(held, wanted.concat(), "{width}");
+            assert_eq!(ends.last(), Some(&(held.len() as u32)));
+            assert_eq!(held[ends[6] as usize..ends[7] as usize], wanted[7]);
+            boxes.hold(width, &candidates, (7, 9), &mut held, &mut ends);
+            assert_eq!(held, wanted[7..9].concat(), "{width}");
+        }
     }
 }
