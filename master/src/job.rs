@@ -24,6 +24,7 @@ use mechanics::{
 use protocol::message::{Assign, IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work};
 
 use crate::{
+    balance::Dealing,
     decompose::{self, decompose},
     exchange::{Exchange, Holdings},
     ledger::Ledger,
@@ -50,6 +51,8 @@ pub struct Options {
     pub lanes: Option<String>,
     /// How partial forces travel.
     pub route: Route,
+    /// How work units are dealt.
+    pub dealing: Dealing,
     /// Take a snapshot at the start of this cycle.
     pub snapshot_at: Option<u64>,
     /// Write states while the run goes (the last one is always gathered).
@@ -370,6 +373,7 @@ impl Job {
                     exclusions,
                     speeds.clone(),
                     options.route,
+                    options.dealing,
                     &gather,
                 );
                 let x = sorter.positions_of(&state);

@@ -1,0 +1,64 @@
+//! Costs of work from a cluster file and from what one host works on per cycle.
+
+use std::sync::Arc;
+
+use deck::model::Model;
+use protocol::message::Route;
+
+use super::{
+    cluster::{Cluster, ElementCost},
+    virtual_clock::{self, Costs, Machines, Scheme},
+};
+
+/// Work of one cycle of a problem on one host: elements, nodes, pairs, surface nodes sorted.
+pub type Work = [f64; 4];
+
+/// What one host works on per cycle, by running the problem on one.
+///
+/// # Errors
+/// Whatever keeps the run from its end.
+pub fn work(model: &Arc<Model>, cluster: &Cluster) -> Result<Work, String> {
+    let one = Machines {
+        speeds: vec![1.0],
+        believed: vec![1.0],
+        costs: Costs { element: 1.0, node: 0.0, pair: 0.0, sort: 0.0 },
+        network: cluster.network.clone(),
+        changes: Vec::new(),
+    };
+    let (timeline, _) = virtual_clock::run(model, &one, Scheme::bolide(Route::Direct), None)?;
+    Ok(timeline.work_per_cycle())
+}
+
+/// Costs such that one host takes `1 / k` of the cluster file's seconds per cycle for the two benchmarks; as they
+/// stand where the file gives seconds.
+pub fn costs(cluster: &Cluster, benchmarks: &[Work; 2], k: f64) -> Costs {
+    let (element, pair) = match cluster.element {
+        ElementCost::Seconds(element) => (element, element * cluster.pair),
+        ElementCost::Calibrated([plain, contact]) => {
+            let [[elements, nodes, ..], [elements_2, nodes_2, pairs, sorted]] = benchmarks;
+            let element = plain / k / (elements + cluster.node * nodes);
+            let left = contact / k - element * (elements_2 + cluster.node * nodes_2);
+            (element, left.max(0.0) / (pairs + cluster.sort * sorted).max(1.0))
+        }
+    };
+    Costs { element, node: element * cluster.node, pair, sort: pair * cluster.sort }
+}
+
+/// Seconds of a cycle's work on one host of speed 1, and how many of them are the master's sorts.
+pub fn seconds(costs: &Costs, work: &Work) -> (f64, f64) {
+    let [elements, nodes, pairs, sorted] = work;
+    let sorts = costs.sort * sorted;
+    (costs.element * elements + costs.node * nodes + costs.pair * pairs + sorts, sorts)
+}
+
+/// The speeds by which the master deals out work: what its own host has left beside sorts is less.
+pub fn believed(speeds: &[f64], costs: &Costs, work: &Work) -> Vec<f64> {
+    let (all, sorts) = seconds(costs, work);
+    let mut believed = speeds.to_vec();
+    let sum: f64 = speeds.iter().sum();
+    if speeds.len() > 1 && all > 0.0 {
+        // In a cycle of all / sum seconds the host does all / sum * speed of work, of which the sorts are the master's.
+        believed[0] = (speeds[0] - sorts / all * sum).max(0.1 * speeds[0]);
+    }
+    believed
+}
