@@ -107,7 +107,13 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
     let costs = calibrate::costs(cluster, &benchmarks, 1.0);
     let work = calibrate::work(&model, cluster)?;
     let machines = Machines {
-        believed: calibrate::believed(&cluster.speeds, &costs, &work),
+        believed: calibrate::believed(
+            &cluster.speeds,
+            &costs,
+            &work,
+            calibrate::surface_nodes(&model),
+            model.setup.control.sort_lag,
+        ),
         speeds: cluster.speeds.clone(),
         costs,
         network: cluster.network.clone(),

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use deck::model::Model;
+use mechanics::contact::Surface;
 use protocol::message::Route;
 
 use super::{
@@ -51,14 +52,23 @@ pub fn seconds(costs: &Costs, work: &Work) -> (f64, f64) {
     (costs.element * elements + costs.node * nodes + costs.pair * pairs + sorts, sorts)
 }
 
-/// The speeds by which the master deals out work: what its own host has left beside sorts is less.
-pub fn believed(speeds: &[f64], costs: &Costs, work: &Work) -> Vec<f64> {
-    let (all, sorts) = seconds(costs, work);
+/// The speeds by which the master deals out work: its own host has less left beside sorts. A sort of `sorted` surface
+/// nodes has `lag` cycles to be done, half a cycle less for the way of positions and plans; the host must leave that much
+/// idle in each, for all wait if it is late.
+pub fn believed(speeds: &[f64], costs: &Costs, work: &Work, sorted: f64, lag: u32) -> Vec<f64> {
     let mut believed = speeds.to_vec();
-    let sum: f64 = speeds.iter().sum();
-    if speeds.len() > 1 && all > 0.0 {
-        // In a cycle of all / sum seconds the host does all / sum * speed of work, of which the sorts are the master's.
-        believed[0] = (speeds[0] - sorts / all * sum).max(0.1 * speeds[0]);
+    let cycle = seconds(costs, work).0 / speeds.iter().sum::<f64>();
+    if speeds.len() > 1 && cycle > 0.0 {
+        let share = costs.sort * sorted / (f64::from(lag) - 0.5) / cycle;
+        believed[0] = (speeds[0] - share).max(0.1 * speeds[0]);
     }
     believed
+}
+
+/// Surface nodes that a sort of the problem works on.
+pub fn surface_nodes(model: &Model) -> f64 {
+    match model.setup.contact {
+        Some(_) => Surface::new(&model.mesh, &model.setup.materials, &|_| true).nodes.len() as f64,
+        None => 0.0,
+    }
 }

@@ -1,18 +1,27 @@
 //! The processor of one host: what runs on it when, in virtual time.
 //!
-//! Message work comes first, in the order it came, and stops everything else. Computation and sorts share what is left
-//! equally, as processes do on a PC.
+//! Message work comes first, then computation, then sorts, each in the order it came; the higher stops the lower. So a
+//! sort takes what computing leaves idle, as a thread of low priority does on a PC.
 
 use std::collections::VecDeque;
+
+/// How urgent work is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rank {
+    /// Messages.
+    Message = 0,
+    /// The tasks of a worker.
+    Compute = 1,
+    /// The master's sorts.
+    Idle = 2,
+}
 
 /// One processor with work of type `W` on it.
 pub struct Processor<W> {
     /// Relative speed: seconds of work per second.
     speed: f64,
-    /// Message work: what is left (s at speed 1), and what it is.
-    urgent: VecDeque<(f64, W)>,
-    /// Everything else.
-    shared: Vec<(f64, W)>,
+    /// By rank: what is left (s at speed 1), and what it is.
+    queues: [VecDeque<(f64, W)>; 3],
     updated: f64,
     version: u64,
 }
@@ -20,7 +29,7 @@ pub struct Processor<W> {
 impl<W> Processor<W> {
     /// An idle processor.
     pub fn new(speed: f64) -> Self {
-        Self { speed, urgent: VecDeque::new(), shared: Vec::new(), updated: 0.0, version: 0 }
+        Self { speed, queues: [const { VecDeque::new() }; 3], updated: 0.0, version: 0 }
     }
 
     /// Changes with every change of work or speed; what was foreseen before is void then.
@@ -33,26 +42,15 @@ impl<W> Processor<W> {
         let done = (now - self.updated) * self.speed;
         self.updated = now;
         self.version += 1;
-        if let Some((left, _)) = self.urgent.front_mut() {
+        if let Some((left, _)) = self.queues.iter_mut().find_map(VecDeque::front_mut) {
             *left -= done;
-            return;
-        }
-        let part = done / self.shared.len().max(1) as f64;
-        for (left, _) in &mut self.shared {
-            *left -= part;
         }
     }
 
-    /// Adds message work of `seconds` at speed 1.
-    pub fn interrupt(&mut self, now: f64, seconds: f64, work: W) {
+    /// Adds work of `seconds` at speed 1.
+    pub fn add(&mut self, now: f64, rank: Rank, seconds: f64, work: W) {
         self.advance(now);
-        self.urgent.push_back((seconds, work));
-    }
-
-    /// Adds computation of `seconds` at speed 1.
-    pub fn compute(&mut self, now: f64, seconds: f64, work: W) {
-        self.advance(now);
-        self.shared.push((seconds, work));
+        self.queues[rank as usize].push_back((seconds, work));
     }
 
     /// Runs at another speed from `now` on.
@@ -63,22 +61,14 @@ impl<W> Processor<W> {
 
     /// When the next piece of work ends if none is added; none if idle.
     pub fn next_end(&self) -> Option<f64> {
-        if let Some((left, _)) = self.urgent.front() {
-            return Some(self.updated + left.max(0.0) / self.speed);
-        }
-        let least = self.shared.iter().map(|(left, _)| *left).reduce(f64::min)?;
-        Some(self.updated + least.max(0.0) * self.shared.len() as f64 / self.speed)
+        let (left, _) = self.queues.iter().find_map(VecDeque::front)?;
+        Some(self.updated + left.max(0.0) / self.speed)
     }
 
     /// Takes the piece of work that ends `now`, which [`Processor::next_end`] foresaw.
     pub fn finish(&mut self, now: f64) -> Option<W> {
         self.advance(now);
-        if let Some((_, work)) = self.urgent.pop_front() {
-            return Some(work);
-        }
-        let least =
-            (0..self.shared.len()).reduce(|a, b| if self.shared[b].0 < self.shared[a].0 { b } else { a })?;
-        Some(self.shared.remove(least).1)
+        self.queues.iter_mut().find_map(VecDeque::pop_front).map(|(_, work)| work)
     }
 }
 
@@ -87,22 +77,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_computations_share_and_the_shorter_ends_first() {
+    fn a_sort_takes_what_computing_leaves_idle() {
         let mut p = Processor::new(1.0);
-        p.compute(0.0, 4.0, 'a');
-        p.compute(0.0, 1.0, 'b');
-        assert_eq!(p.next_end(), Some(2.0));
-        assert_eq!(p.finish(2.0), Some('b'));
-        assert_eq!(p.next_end(), Some(5.0));
-        assert_eq!(p.finish(5.0), Some('a'));
+        p.add(0.0, Rank::Idle, 4.0, 's');
+        p.add(1.0, Rank::Compute, 2.0, 'c');
+        assert_eq!(p.next_end(), Some(3.0));
+        assert_eq!(p.finish(3.0), Some('c'));
+        assert_eq!(p.next_end(), Some(6.0));
+        assert_eq!(p.finish(6.0), Some('s'));
         assert_eq!(p.next_end(), None);
     }
 
     #[test]
     fn message_work_stops_computation() {
         let mut p = Processor::new(2.0);
-        p.compute(0.0, 4.0, 'c');
-        p.interrupt(1.0, 1.0, 'm');
+        p.add(0.0, Rank::Compute, 4.0, 'c');
+        p.add(1.0, Rank::Message, 1.0, 'm');
         assert_eq!(p.next_end(), Some(1.5));
         assert_eq!(p.finish(1.5), Some('m'));
         assert_eq!(p.next_end(), Some(2.5));
@@ -111,7 +101,7 @@ mod tests {
     #[test]
     fn a_slower_host_takes_longer_from_then_on() {
         let mut p = Processor::new(1.0);
-        p.compute(0.0, 4.0, 'c');
+        p.add(0.0, Rank::Compute, 4.0, 'c');
         p.set_speed(2.0, 0.5);
         assert_eq!(p.next_end(), Some(6.0));
     }

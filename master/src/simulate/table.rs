@@ -151,7 +151,11 @@ fn cells(
     // The share of sorts is the same for every k, and one tape serves them all.
     let believed = match name {
         "control" => part.speeds.clone(),
-        _ => calibrate::believed(&part.speeds, &calibrate::costs(cluster, works, 1.0), &works[benchmark]),
+        _ => {
+            let costs = calibrate::costs(cluster, works, 1.0);
+            let sorted = calibrate::surface_nodes(model);
+            calibrate::believed(&part.speeds, &costs, &works[benchmark], sorted, model.setup.control.sort_lag)
+        }
     };
     let mut tape = None;
     let mut out = Vec::new();

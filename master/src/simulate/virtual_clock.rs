@@ -24,7 +24,7 @@ use worker::session::{self, Outcome, Session, Task};
 
 use super::{
     network::{Network, Stage, Traffic},
-    processor::Processor,
+    processor::{Processor, Rank},
     tape::{Player, Tape},
 };
 use crate::{
@@ -495,7 +495,7 @@ impl Clock<'_> {
         let host = parcel.from.host();
         let seconds = self.machines.network.handling(parcel.bytes);
         self.charge_message(parcel.from, seconds);
-        self.processors[host].interrupt(self.now, seconds, Begun(self.now, Work::Send(parcel)));
+        self.processors[host].add(self.now, Rank::Message, seconds, Begun(self.now, Work::Send(parcel)));
         self.foresee(host);
     }
 
@@ -508,7 +508,7 @@ impl Clock<'_> {
         }
         let seconds = self.machines.network.handling(parcel.bytes);
         self.charge_message(parcel.to, seconds);
-        self.processors[host].interrupt(self.now, seconds, Begun(self.now, Work::Receive(parcel)));
+        self.processors[host].add(self.now, Rank::Message, seconds, Begun(self.now, Work::Receive(parcel)));
         self.foresee(host);
     }
 
@@ -637,7 +637,7 @@ impl Clock<'_> {
             self.count(kind, cycle, &load);
         }
         let work = Begun(self.now, Work::Task(worker, kind, outcome));
-        self.processors[worker].compute(self.now, costs.busy(), work);
+        self.processors[worker].add(self.now, Rank::Compute, costs.busy(), work);
         self.foresee(worker);
         Ok(())
     }
@@ -682,7 +682,7 @@ impl Clock<'_> {
                     counts_at(&mut self.timeline.counts, cycle).sorted += x.len() as u64;
                     let seconds = self.machines.costs.sort * x.len() as f64;
                     let work = Begun(self.now, Work::Sort(Box::new(sorted)));
-                    self.processors[0].compute(self.now, seconds, work);
+                    self.processors[0].add(self.now, Rank::Idle, seconds, work);
                     self.foresee(0);
                 }
                 Action::Over(outcome) => {
