@@ -318,6 +318,70 @@ mod tests {
         assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16]), 16), vec![1000; 16]);
     }
 
+    /// Sixteen hosts with speeds of 1 to 4, by a small generator.
+    fn mixed_lab(seed: u64) -> Vec<f64> {
+        let mut state = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let speed = |_| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (1 + (state >> 33) % 4) as f64
+        };
+        (0..16).map(speed).collect()
+    }
+
+    /// Slabs along the first axis in proportion to speeds, rounded to planes: what index planes alone give.
+    fn naive_slabs(cells: [u32; 3], speeds: &[f64]) -> f64 {
+        let all: f64 = speeds.iter().sum();
+        let (mut passed, mut from, mut worst) = (0.0, 0.0, 0.0_f64);
+        for speed in speeds {
+            passed += speed;
+            let to = (f64::from(cells[0]) * passed / all).round();
+            worst = worst.max((to - from) * f64::from(cells[1] * cells[2]) / speed);
+            from = to;
+        }
+        worst
+    }
+
+    #[test]
+    fn a_mixed_lab_ends_near_the_bound() {
+        for (n, goal) in [(30, 1.05), (40, 1.04), (100, 1.015)] {
+            let (mut worst, mut sum, mut naive) = (0.0_f64, 0.0, 0.0_f64);
+            for seed in 0..20 {
+                let speeds = mixed_lab(seed);
+                let bound = f64::from(n * n * n) / speeds.iter().sum::<f64>();
+                let ratio = slowest_finish(&decompose(&plate([n; 3]), &speeds), &speeds) / bound;
+                (worst, sum) = (worst.max(ratio), sum + ratio);
+                naive = naive.max(naive_slabs([n; 3], &speeds) / bound);
+            }
+            println!(
+                "{n}^3: time over the bound {:.4} mean, {worst:.4} worst; slabs {naive:.3} worst",
+                sum / 20.0
+            );
+            assert!(worst <= goal, "{n}^3: {worst} over the bound, at most {goal}");
+            assert!(worst < naive, "{n}^3: {worst} against slabs {naive}");
+        }
+    }
+
+    #[test]
+    fn facing_columns_of_plates_of_any_thickness_fall_on_one_worker() {
+        let speeds = mixed_lab(3);
+        let owner = |cells: [u32; 3]| {
+            let mut owner = vec![usize::MAX; 1600];
+            for s in decompose(&plate(cells), &speeds) {
+                let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
+                assert_eq!((low[2], high[2]), (0, cells[2]), "the thin axis stays whole");
+                for j in low[1]..high[1] {
+                    for i in low[0]..high[0] {
+                        owner[(j * 40 + i) as usize] = s.worker;
+                    }
+                }
+            }
+            owner
+        };
+        assert_eq!(owner([40, 40, 10]), owner([40, 40, 8]));
+    }
+
     #[test]
     fn cuts_leave_the_thin_axis_whole() {
         for s in decompose(&plate([30, 30, 10]), &[1.0; 4]) {

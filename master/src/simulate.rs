@@ -92,7 +92,7 @@ struct Summary<'a> {
 fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
     let model = model(deck, args.cycles)?;
     let benchmarks = match (&cluster.element, &cluster.tables) {
-        (ElementCost::Seconds(_), _) => [[0.0; 4]; 2],
+        (ElementCost::Seconds(_), _) => [[0.0; 5]; 2],
         (ElementCost::Calibrated(_), Some(tables)) => [
             calibrate::work(&self::model(&tables.decks[0], args.cycles)?, cluster)?,
             calibrate::work(&self::model(&tables.decks[1], args.cycles)?, cluster)?,
@@ -134,7 +134,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         cycles: timeline.counts.len(),
         window: (window.start, window.end),
         sec_per_cycle: timeline.seconds_per_cycle(),
-        bound: calibrate::seconds(&costs, &work).0 / cluster.speeds.iter().sum::<f64>(),
+        bound: calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>(),
         bytes_per_cycle: timeline.bytes_per_cycle(),
         phases: (0..cluster.speeds.len()).map(|worker| timeline.mean_phases(worker)).collect(),
         digest: &timeline.digest,
@@ -158,9 +158,9 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         summary.bound,
         summary.bytes_per_cycle
     );
+    let [elements, nodes, pairs, searched, sorted] = work;
     println!(
-        "work per cycle: {:.0} elements, {:.0} nodes, {:.0} pairs, {:.0} surface nodes sorted",
-        work[0], work[1], work[2], work[3]
+        "work per cycle: {elements:.0} elements, {nodes:.0} nodes, {pairs:.0} pairs, {searched:.0} pairs of new plans, {sorted:.0} surface nodes sorted"
     );
     println!("  host  speed     border    contact   interior       send  integrate       wait  (s/cycle)");
     for (i, (p, speed)) in summary.phases.iter().zip(&cluster.speeds).enumerate() {

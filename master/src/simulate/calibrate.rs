@@ -11,8 +11,8 @@ use super::{
     virtual_clock::{self, Costs, Machines, Scheme},
 };
 
-/// Work of one cycle of a problem on one host: elements, nodes, pairs, surface nodes sorted.
-pub type Work = [f64; 4];
+/// Work of one cycle of a problem on one host: elements, nodes, pairs, pairs of new plans, surface nodes sorted.
+pub type Work = [f64; 5];
 
 /// What one host works on per cycle, by running the problem on one.
 ///
@@ -22,7 +22,7 @@ pub fn work(model: &Arc<Model>, cluster: &Cluster) -> Result<Work, String> {
     let one = Machines {
         speeds: vec![1.0],
         believed: vec![1.0],
-        costs: Costs { element: 1.0, node: 0.0, pair: 0.0, sort: 0.0 },
+        costs: Costs { element: 1.0, node: 0.0, pair: 0.0, search: 0.0, sort: 0.0 },
         network: cluster.network.clone(),
         changes: Vec::new(),
     };
@@ -36,20 +36,29 @@ pub fn costs(cluster: &Cluster, benchmarks: &[Work; 2], k: f64) -> Costs {
     let (element, pair) = match cluster.element {
         ElementCost::Seconds(element) => (element, element * cluster.pair),
         ElementCost::Calibrated([plain, contact]) => {
-            let [[elements, nodes, ..], [elements_2, nodes_2, pairs, sorted]] = benchmarks;
+            let [[elements, nodes, ..], [elements_2, nodes_2, pairs, searched, sorted]] = benchmarks;
             let element = plain / k / (elements + cluster.node * nodes);
             let left = contact / k - element * (elements_2 + cluster.node * nodes_2);
-            (element, left.max(0.0) / (pairs + cluster.sort * sorted).max(1.0))
+            (element, left.max(0.0) / (pairs + cluster.search * searched + cluster.sort * sorted).max(1.0))
         }
     };
-    Costs { element, node: element * cluster.node, pair, sort: pair * cluster.sort }
+    Costs {
+        element,
+        node: element * cluster.node,
+        pair,
+        search: pair * cluster.search,
+        sort: pair * cluster.sort,
+    }
 }
 
-/// Seconds of a cycle's work on one host of speed 1, and how many of them are the master's sorts.
-pub fn seconds(costs: &Costs, work: &Work) -> (f64, f64) {
-    let [elements, nodes, pairs, sorted] = work;
-    let sorts = costs.sort * sorted;
-    (costs.element * elements + costs.node * nodes + costs.pair * pairs + sorts, sorts)
+/// Seconds of a cycle's work on one host of speed 1, sorts included.
+pub fn seconds(costs: &Costs, work: &Work) -> f64 {
+    let [elements, nodes, pairs, searched, sorted] = work;
+    costs.element * elements
+        + costs.node * nodes
+        + costs.pair * pairs
+        + costs.search * searched
+        + costs.sort * sorted
 }
 
 /// The speeds by which the master deals out work: its own host has less left beside sorts. A sort of `sorted` surface
@@ -57,7 +66,7 @@ pub fn seconds(costs: &Costs, work: &Work) -> (f64, f64) {
 /// idle in each, for all wait if it is late.
 pub fn believed(speeds: &[f64], costs: &Costs, work: &Work, sorted: f64, lag: u32) -> Vec<f64> {
     let mut believed = speeds.to_vec();
-    let cycle = seconds(costs, work).0 / speeds.iter().sum::<f64>();
+    let cycle = seconds(costs, work) / speeds.iter().sum::<f64>();
     if speeds.len() > 1 && cycle > 0.0 {
         let share = costs.sort * sorted / (f64::from(lag) - 0.5) / cycle;
         believed[0] = (speeds[0] - share).max(0.1 * speeds[0]);

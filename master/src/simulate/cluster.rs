@@ -36,6 +36,8 @@ pub struct Cluster {
     pub node: f64,
     /// A node-face pair in a cycle, in element-cycles; where the element is calibrated with contact, this is too.
     pub pair: f64,
+    /// A pair when its plan starts to act, in pairs.
+    pub search: f64,
     /// A surface node in a sort, in pairs.
     pub sort: f64,
     /// The network.
@@ -126,13 +128,14 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Cluster>
     let changes = read_changes(&file, speeds.len());
     let tables = read_tables(&file, speeds.len());
     file.finish();
-    let (element, [node, pair, sort]) = costs?;
+    let (element, [node, pair, search, sort]) = costs?;
     Some(Cluster {
         title: title?.to_owned(),
         speeds,
         element,
         node,
         pair,
+        search,
         sort,
         network: network?,
         changes: changes?,
@@ -164,8 +167,8 @@ fn read_hosts(file: &Table<'_>, faults: &Faults<'_>) -> Vec<f64> {
     speeds
 }
 
-/// The element's cost, then node, pair and sort.
-fn read_costs(file: &Table<'_>) -> Option<(ElementCost, [f64; 3])> {
+/// The element's cost, then node, pair, search and sort.
+fn read_costs(file: &Table<'_>) -> Option<(ElementCost, [f64; 4])> {
     let costs = file.require("cost", "a table [cost]")?.table("[cost]".to_owned())?;
     let expected =
         "seconds of an element-cycle, or [s, s]: of a whole cycle on one host without and with contact";
@@ -181,10 +184,10 @@ fn read_costs(file: &Table<'_>) -> Option<(ElementCost, [f64; 3])> {
             value.number(Range::Positive).map(ElementCost::Seconds)
         }
     });
-    let rest = ["node", "pair", "sort"].map(|key| costs.number(key, Range::NotNegative));
+    let rest = ["node", "pair", "search", "sort"].map(|key| costs.number(key, Range::NotNegative));
     costs.finish();
-    let [node, pair, sort] = rest;
-    Some((element?, [node?, pair?, sort?]))
+    let [node, pair, search, sort] = rest;
+    Some((element?, [node?, pair?, search?, sort?]))
 }
 
 fn read_network(file: &Table<'_>) -> Option<Network> {
@@ -246,7 +249,7 @@ fn read_tables(file: &Table<'_>, n_hosts: usize) -> Option<Option<Tables>> {
 mod tests {
     use super::*;
 
-    const GOOD: &str = "title = \"two PCs\"\n[[host]]\ncount = 2\n[cost]\nelement = 1e-3\nnode = 0.03\npair = 0.5\nsort = 3\n[network]\nwires = \"hub\"\nrate_bits_per_second = 1e7\nlatency_seconds = 1e-4\nmessage_seconds = 1e-4\nbyte_seconds = 1e-8\n";
+    const GOOD: &str = "title = \"two PCs\"\n[[host]]\ncount = 2\n[cost]\nelement = 1e-3\nnode = 0.03\npair = 0.5\nsearch = 9\nsort = 3\n[network]\nwires = \"hub\"\nrate_bits_per_second = 1e7\nlatency_seconds = 1e-4\nmessage_seconds = 1e-4\nbyte_seconds = 1e-8\n";
 
     #[test]
     fn a_cluster_file_reads_back() {
@@ -265,7 +268,7 @@ mod tests {
             .replace("sort = 3", "sport = 3");
         let faults = read(&bad, "bad.toml").expect_err("three faults were put in");
         let lines: Vec<u32> = faults.iter().map(|f| f.line).collect();
-        assert_eq!(lines, [3, 4, 8, 10], "{faults:?}");
+        assert_eq!(lines, [3, 4, 9, 11], "{faults:?}");
         assert!(faults[2].to_string().contains("sport"), "{}", faults[2]);
     }
 
@@ -275,6 +278,6 @@ mod tests {
             "{GOOD}[[event]]\nhost = 3\ncycle = 5\nspeed = 0.5\n[tables]\ndecks = [\"a\", \"b\"]\nhosts = [2]\n"
         );
         let faults = read(&bad, "bad.toml").expect_err("two faults were put in");
-        assert_eq!(faults.iter().map(|f| f.line).collect::<Vec<_>>(), [16, 21]);
+        assert_eq!(faults.iter().map(|f| f.line).collect::<Vec<_>>(), [17, 22]);
     }
 }

@@ -42,6 +42,8 @@ pub struct Costs {
     pub node: f64,
     /// A node-face pair on the lists, in a cycle.
     pub pair: f64,
+    /// A pair, once when its plan starts to act: finding it, and setting up what the plan needs.
+    pub search: f64,
     /// A surface node in a sort.
     pub sort: f64,
 }
@@ -54,7 +56,7 @@ impl Costs {
         let none = Phases::default();
         match task {
             Kind::Load | Kind::Elements => Phases { border: elements(load.border + load.interior), ..none },
-            Kind::Install => Phases { contact, ..none },
+            Kind::Install => Phases { contact: contact + self.search * load.pairs as f64, ..none },
             Kind::Border => Phases { contact, border: elements(load.border), ..none },
             Kind::Interior => Phases { interior: elements(load.interior), ..none },
             Kind::Integrate => Phases { integrate: self.node * load.nodes as f64, ..none },
@@ -199,6 +201,8 @@ pub struct Counts {
     pub nodes: u64,
     /// Pairs.
     pub pairs: u64,
+    /// Pairs of plans that start to act.
+    pub searched: u64,
     /// Surface nodes sorted, where this cycle gathered.
     pub sorted: u64,
 }
@@ -254,13 +258,13 @@ impl Timeline {
         sent.map(|f| f.bytes).sum::<u64>() as f64 / (window.end - window.start).max(1) as f64
     }
 
-    /// Work per cycle of the window: elements, nodes, pairs, surface nodes sorted.
-    pub fn work_per_cycle(&self) -> [f64; 4] {
+    /// Work per cycle of the window: elements, nodes, pairs, pairs of new plans, surface nodes sorted.
+    pub fn work_per_cycle(&self) -> [f64; 5] {
         let window = self.window();
-        let mut sum = [0.0; 4];
+        let mut sum = [0.0; 5];
         for counts in &self.counts[window.start as usize..window.end as usize] {
-            let Counts { elements, nodes, pairs, sorted } = *counts;
-            for (sum, count) in sum.iter_mut().zip([elements, nodes, pairs, sorted]) {
+            let Counts { elements, nodes, pairs, searched, sorted } = *counts;
+            for (sum, count) in sum.iter_mut().zip([elements, nodes, pairs, searched, sorted]) {
                 *sum += count as f64;
             }
         }
@@ -654,7 +658,10 @@ impl Clock<'_> {
                 counts.pairs += load.pairs;
             }
             Kind::Interior => counts.elements += load.interior,
-            Kind::Install => counts.pairs += load.pairs,
+            Kind::Install => {
+                counts.pairs += load.pairs;
+                counts.searched += load.pairs;
+            }
             Kind::Integrate => counts.nodes += load.nodes,
             _ => {}
         }
