@@ -39,7 +39,6 @@ pub struct Sorted {
 
 impl Sorter {
     /// `gather` lists, by worker, the global surface nodes whose positions it sends, in its order.
-    #[expect(clippy::too_many_arguments, reason = "all that a sort needs, told once")]
     pub fn new(
         surface: Surface,
         settings: contact::Settings,

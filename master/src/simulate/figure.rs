@@ -107,7 +107,7 @@ pub fn speed_up(title: &str, rows: &[Row]) -> String {
             }
         }
         line(format!(
-            "<text x=\"{}\" y=\"{}\" fill=\"{colour}\">benchmark {benchmark}, k = {k} (circles: printed in 1999-2000)</text>",
+            "<text x=\"{}\" y=\"{}\" fill=\"{colour}\">benchmark {benchmark}, k = {k} (circles: the paper's)</text>",
             margin + 16.0,
             56.0 + 18.0 * i as f64
         ));
