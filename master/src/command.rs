@@ -19,6 +19,8 @@ pub struct Cli {
 pub enum Command {
     /// Run a deck here: master and workers in one process
     Run(RunArgs),
+    /// Say what an emulated cluster would take for a deck, or for the benchmark tables
+    Simulate(SimulateArgs),
     /// Listen for workers and clients, and run the jobs of the queue
     Master(MasterArgs),
     /// Compute for a master
@@ -201,6 +203,42 @@ pub struct RunArgs {
     /// The rest
     #[command(flatten)]
     pub job: JobArgs,
+}
+
+/// Flags of `simulate`.
+#[derive(Args, Clone, Debug)]
+pub struct SimulateArgs {
+    /// The deck (TOML)
+    #[arg(required_unless_present = "table", conflicts_with = "table")]
+    pub deck: Option<PathBuf>,
+    /// The cluster file (TOML)
+    #[arg(long)]
+    pub cluster: PathBuf,
+    /// Print the cluster file's tables instead of one run
+    #[arg(long)]
+    pub table: bool,
+    /// What tells the time: costs and messages, replayed
+    #[arg(long, value_enum, default_value = "virtual")]
+    pub clock: Clock,
+    /// Stop after this many cycles, or at the deck's end, whichever comes first
+    #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u64).range(4..))]
+    pub cycles: u64,
+    /// Route of the shared-node forces
+    #[arg(long, value_enum, default_value = "direct")]
+    pub route: Route,
+    /// Folder for pictures and the trace; without it none are drawn
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Print JSON on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What tells the time of an emulated cluster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Clock {
+    /// Costs and messages, replayed: the same figures on every machine
+    Virtual,
 }
 
 /// Flags of `master`.

@@ -5,7 +5,10 @@ use std::sync::Arc;
 use mechanics::{contact::Census, state::GlobalState};
 use protocol::message::{Route, ToMaster, ToWorker, Work};
 
-use crate::{job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot, sort::Sorted};
+use crate::{
+    balance::Dealing, job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot,
+    sort::Sorted,
+};
 /// A worker as the job sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hand {
@@ -24,6 +27,8 @@ pub struct Options {
     pub lanes: Option<String>,
     /// How partial forces travel.
     pub route: Route,
+    /// How work units are dealt.
+    pub dealing: Dealing,
     /// Take a snapshot at the start of this cycle.
     pub snapshot_at: Option<u64>,
     /// Write states while the run goes (the last one is always gathered).

@@ -58,6 +58,7 @@ impl Holdings {
 }
 
 /// The exchange of all workers from one plan boundary to the next.
+#[derive(Clone)]
 pub struct Exchange {
     /// By worker.
     pub plans: Vec<Plan>,

@@ -3,7 +3,7 @@
 //! [`job`] is the pure session of one run; [`embedded`] drives it with workers in the same process, [`drive`] with
 //! workers over links. [`daemon`] owns [`hosts`] and [`queue`]: each [`connection`] is one task that carries messages,
 //! the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
-//! [`processes`] starts workers as children for one run.
+//! [`processes`] starts workers as children for one run. [`simulate`] drives the sessions on an emulated cluster.
 
 pub mod balance;
 pub mod certs;
@@ -25,5 +25,6 @@ pub mod queue;
 pub mod results;
 pub mod run;
 pub mod service;
+pub mod simulate;
 pub mod snapshot;
 pub mod sort;

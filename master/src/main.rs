@@ -8,7 +8,7 @@ use clap::Parser;
 use master::{
     certs, client,
     command::{Certs, Cli, Command, WorkerArgs},
-    daemon, processes, run,
+    daemon, processes, run, simulate,
 };
 
 fn main() -> ExitCode {
@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         .init();
     let result = match Cli::parse().command {
         Command::Run(args) => run::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
         Command::Master(args) => daemon::run(&args),
         Command::Worker(args) => work(args),
         Command::Submit(args) => client::submit(&args),

@@ -81,6 +81,7 @@ pub fn options_for(asked: &JobOptions) -> Options {
     Options {
         lanes: asked.lanes.clone(),
         route: asked.route,
+        dealing: crate::balance::Dealing::Owners,
         snapshot_at: asked.snapshot_at,
         states: !asked.no_output,
         force_sorts: match (asked.sort_every, asked.sort_seed) {

@@ -130,6 +130,7 @@ impl Job {
                     exclusions,
                     speeds.clone(),
                     options.route,
+                    options.dealing,
                     &gather,
                 );
                 let x = sorter.positions_of(&state);

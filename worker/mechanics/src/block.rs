@@ -187,6 +187,15 @@ impl Block {
         self.alive.len() as u32
     }
 
+    /// Number of elements in a range of lane sets.
+    ///
+    /// # Panics
+    /// If there are no such sets.
+    pub fn n_elements_of(&self, sets: &Range<u32>) -> u64 {
+        let slots = sets.start as usize * SET..sets.end as usize * SET;
+        self.slot_elements[slots].iter().filter(|&&element| element != PHANTOM).count() as u64
+    }
+
     /// One state field of a local element.
     pub fn field(&self, element: usize, field: usize) -> f64 {
         self.fields[field][self.slots[element] as usize]

@@ -95,6 +95,19 @@ pub enum Sets {
     All,
 }
 
+/// How much a domain holds under the plan in force: what its steps cost is in proportion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Load {
+    /// Elements that are computed before partial forces travel.
+    pub border: u64,
+    /// Elements that are computed while they travel.
+    pub interior: u64,
+    /// Nodes that are integrated, copies and guests included.
+    pub nodes: u64,
+    /// Node-face pairs that are looked at each cycle.
+    pub pairs: u64,
+}
+
 /// No index.
 const NONE: u32 = u32::MAX;
 
@@ -258,6 +271,21 @@ impl Domain {
     /// Number of elements held.
     pub fn n_elements(&self) -> usize {
         self.rooms.iter().map(|r| r.block.elements.len()).sum()
+    }
+
+    /// What it holds under the plan in force.
+    pub fn load(&self) -> Load {
+        let mut load = Load::default();
+        for room in &self.rooms {
+            let n = room.block.elements.len() as u64;
+            let interior: u64 = room.interior.iter().map(|sets| room.block.n_elements_of(sets)).sum();
+            load.border += n - interior;
+            load.interior += interior;
+            load.nodes += room.block.nodes.len() as u64;
+        }
+        load.nodes += self.guests.node.len() as u64;
+        load.pairs = self.contact.as_ref().map_or(0, |room| room.contact.n_pairs() as u64);
+        load
     }
 
     /// A pass with a step of zero: changes nothing and gives the vote a run starts from.
