@@ -21,6 +21,7 @@ use protocol::{
 use crate::{
     command::{ClientArgs, SubmitArgs},
     daemon::host_name,
+    results::Folder,
     run::list_of_faults,
 };
 
@@ -231,13 +232,13 @@ pub fn cancel(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
 /// `bolide results`.
 ///
 /// # Errors
-/// If the job has none, a file cannot be written, or whatever went wrong on the way.
-pub fn results(job: u32, out: Option<PathBuf>, at: &ClientArgs) -> Result<ExitCode, String> {
+/// If the job has none, the folder holds something already, a file cannot be written, or whatever went wrong on the way.
+pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> Result<ExitCode, String> {
     let folder = out.unwrap_or_else(|| Path::new("results").join(format!("job-{job}")));
     let mut client = Client::new(at)?;
     let Reply::Files(files) = client.ask(&Request::Files { job })? else { return Err(surprise()) };
+    Folder::create(&folder, force).map_err(|e| e.to_string())?;
     let fault = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
-    std::fs::create_dir_all(&folder).map_err(|e| fault(&folder, e))?;
     let mut total = 0;
     for (name, _) in &files {
         // The master is believed no more than any other peer.

@@ -62,6 +62,9 @@ pub enum Command {
         /// Folder for them [default: results/job-<JOB>]
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Replace the results in an existing folder
+        #[arg(long)]
+        force: bool,
         /// The master
         #[command(flatten)]
         at: ClientArgs,

@@ -28,7 +28,7 @@ use crate::{
     daemon::Event,
     desk,
     drive::{Input, Route, Seat},
-    job::Hand,
+    event::Hand,
 };
 
 /// Interval of heartbeats on every connection (ms).

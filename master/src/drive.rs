@@ -24,7 +24,8 @@ use tokio::sync::mpsc;
 
 use crate::{
     embedded::{Sink, Traffic, timed_sort},
-    job::{Action, Bench, Event, Hand, Job, Outcome},
+    event::{Action, Event, Hand, Outcome},
+    job::{Bench, Job},
     sort::Sorted,
 };
 

@@ -21,7 +21,8 @@ use worker::{
 };
 
 use crate::{
-    job::{Action, Bench, Event, Job, Outcome},
+    event::{Action, Event, Outcome},
+    job::{Bench, Job},
     sort::Sorted,
 };
 

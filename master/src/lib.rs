@@ -15,6 +15,7 @@ pub mod decompose;
 pub mod desk;
 pub mod drive;
 pub mod embedded;
+pub mod event;
 pub mod exchange;
 pub mod hosts;
 pub mod job;

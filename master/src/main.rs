@@ -30,7 +30,7 @@ fn main() -> ExitCode {
         Command::Jobs { at } => client::jobs(&at),
         Command::Hosts { at } => client::hosts(&at),
         Command::Cancel { job, at } => client::cancel(job, &at),
-        Command::Results { job, out, at } => client::results(job, out, &at),
+        Command::Results { job, out, force, at } => client::results(job, out, force, &at),
         Command::Certs { what } => make_certificates(what),
         Command::Check { deck } => check(&deck),
         Command::Materials => {

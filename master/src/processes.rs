@@ -18,7 +18,8 @@ use crate::{
     daemon::{Event, WAITING_EVENTS, listen},
     drive::{Seat, drive},
     embedded::{Sink, Traffic},
-    job::{Action, Hand, Job, Outcome},
+    event::{Action, Hand, Outcome},
+    job::Job,
 };
 
 /// The environment variable that names the executable, where this process is another one.

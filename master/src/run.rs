@@ -18,7 +18,8 @@ use protocol::request::JobOptions;
 use crate::{
     command::RunArgs,
     embedded::{self, Sink, Traffic},
-    job::{Action, ForceSorts, Hand, Job, Limit, Options, Outcome, Progress},
+    event::{Action, ForceSorts, Hand, Limit, Options, Outcome, Progress},
+    job::Job,
     processes::Processes,
     results::{
         Folder,
@@ -280,29 +281,33 @@ pub fn summarise(
 pub fn stop_on_interrupt(what: &'static str) -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
-    std::thread::Builder::new()
-        .name("signals".to_owned())
-        .spawn(move || {
-            let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else {
-                return;
-            };
-            runtime.block_on(async {
-                use tokio::signal::unix::{SignalKind, signal};
-                let Ok(mut term) = signal(SignalKind::terminate()) else { return };
-                loop {
-                    tokio::select! {
-                        interrupt = tokio::signal::ctrl_c() => if interrupt.is_err() { return },
-                        _ = term.recv() => {}
-                    }
-                    if flag.swap(true, Ordering::Relaxed) {
-                        std::process::exit(130);
-                    }
-                    eprintln!("{what}; once more to leave at once");
+    let (heeded, heeding) = std::sync::mpsc::channel();
+    let spawned = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else {
+            return;
+        };
+        runtime.block_on(async {
+            use tokio::signal::unix::{SignalKind, signal};
+            let Ok(mut interrupt) = signal(SignalKind::interrupt()) else { return };
+            let Ok(mut term) = signal(SignalKind::terminate()) else { return };
+            // The caller waits for this.
+            let _ = heeded.send(());
+            loop {
+                tokio::select! {
+                    _ = interrupt.recv() => {}
+                    _ = term.recv() => {}
                 }
-            });
-        })
+                if flag.swap(true, Ordering::Relaxed) {
+                    std::process::exit(130);
+                }
+                eprintln!("{what}; once more to leave at once");
+            }
+        });
+    });
+    if spawned.is_ok() {
         // Without the thread Ctrl-C ends the process as usual.
-        .ok();
+        let _ = heeding.recv();
+    }
     stop
 }
 

@@ -17,7 +17,8 @@ use tokio::sync::watch;
 use crate::{
     drive::{Seat, drive},
     embedded::Sink,
-    job::{Action, Job},
+    event::Action,
+    job::Job,
     queue::Event,
     results::Folder,
     run::{Census, Output, limit, options_for, progress_line, summarise},

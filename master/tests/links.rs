@@ -1,7 +1,7 @@
 //! Sessions over links that hold next to nothing, and many workers in one process: the digest does not know.
 
 use std::{
-    sync::{Arc, OnceLock, atomic::AtomicBool},
+    sync::{Arc, atomic::AtomicBool},
     time::Duration,
 };
 
@@ -11,7 +11,9 @@ use master::{
     daemon::Event,
     drive::{Seat, drive},
     embedded::{self, Sink},
-    job::{Action, Hand, Job, Options, Outcome},
+    event::{Action, Hand, Options, Outcome},
+    job::Job,
+    snapshot::Snapshot,
 };
 use protocol::{
     dial,
@@ -25,18 +27,28 @@ use tokio::{
 };
 use worker::daemon::compute_pool;
 
-const SMALL: &str = include_str!("../../tests/decks/plates-small.toml");
 const PLATES: &str = include_str!("../../deck/examples/plates-free-slip.toml");
 /// The longest that a run over links may take.
 const DEADLINE: Duration = Duration::from_secs(120);
 
-/// Takes everything and keeps nothing.
-struct Nowhere;
+/// Cycles of a run over links, long enough for sorts, a state and a snapshot.
+const CYCLES: u64 = 30;
 
-impl Sink for Nowhere {
-    fn take(&mut self, _: Action) -> Result<(), String> {
+/// Keeps the snapshot and nothing else.
+#[derive(Default)]
+struct Keep(Option<Box<Snapshot>>);
+
+impl Sink for Keep {
+    fn take(&mut self, action: Action) -> Result<(), String> {
+        if let Action::Snapshot(snapshot) = action {
+            assert!(self.0.replace(snapshot).is_none(), "one snapshot was asked for");
+        }
         Ok(())
     }
+}
+
+fn options() -> Options {
+    Options { states: true, snapshot_at: Some(17), ..Options::default() }
 }
 
 fn model(text: &str, cycles: u64) -> Arc<Model> {
@@ -55,28 +67,22 @@ fn digest(outcome: &Outcome) -> String {
     outcome.digest.clone()
 }
 
-fn embedded_digest(model: &Arc<Model>, hands: &[Hand]) -> String {
-    let (job, first) = Job::new(Arc::clone(model), hands, Options::default(), None).expect("it starts");
-    let stop = AtomicBool::new(false);
-    let run = embedded::run(job, first, hands.len(), 2, &mut Nowhere, &stop).expect("it runs");
-    digest(&run.0)
+fn embedded_run(model: &Arc<Model>, hands: &[Hand]) -> (String, Option<Box<Snapshot>>) {
+    let (job, first) = Job::new(Arc::clone(model), hands, options(), None).expect("it starts");
+    let (stop, mut sink) = (AtomicBool::new(false), Keep::default());
+    let run = embedded::run(job, first, hands.len(), 2, &mut sink, &stop).expect("it runs");
+    (digest(&run.0), sink.0)
 }
 
-/// Forty cycles of the small deck.
-fn small() -> (Arc<Model>, &'static str) {
-    static DIGEST: OnceLock<String> = OnceLock::new();
-    let model = model(SMALL, 40);
-    let digest = DIGEST.get_or_init(|| embedded_digest(&model, &hands(1)));
-    (model, digest)
-}
-
-/// Runs the small deck, with images on the way, over these pairs of streams: the master's end and the worker's.
+/// Runs the plates over these pairs of streams: the master's end and the worker's. Assignments and images are long
+/// enough to travel in bulk, which frames of cycles overtake.
 async fn run_over<S>(pairs: Vec<(S, S)>)
 where
     S: AsyncRead + AsyncWrite + Send + 'static,
 {
-    let (model, expected) = small();
+    let model = model(PLATES, CYCLES);
     let hands = hands(pairs.len());
+    let (expected, snapshot) = embedded_run(&model, &hands);
     let (events, mut heard) = mpsc::channel(16);
     let gate = Arc::new(Gate::new(events, vec![Role::Worker], None, None));
     for (i, ((near, far), hand)) in pairs.into_iter().zip(&hands).enumerate() {
@@ -102,14 +108,18 @@ where
     }
     seats.sort_by(|a, b| a.hand.name.cmp(&b.hand.name));
     let running = tokio::task::spawn_blocking(move || {
-        let options = Options { states: true, snapshot_at: Some(17), ..Options::default() };
-        let (job, first) = Job::new(model, &hands, options, None).expect("it starts");
-        drive(job, first, 1, &seats, &mut Nowhere, &AtomicBool::new(false))
+        let (job, first) = Job::new(model, &hands, options(), None).expect("it starts");
+        let mut sink = Keep::default();
+        let ran = drive(job, first, 1, &seats, &mut sink, &AtomicBool::new(false));
+        ran.map(|(outcome, traffic)| (outcome, traffic, sink.0))
     });
     let ran = tokio::time::timeout(DEADLINE, running).await.expect("nobody waits for the other");
-    let (outcome, traffic) = ran.expect("no bug").expect("a sink that takes all");
+    let (outcome, traffic, stored) = ran.expect("no bug").expect("a sink that takes all");
     assert_eq!(digest(&outcome), expected);
-    assert!(traffic.bytes > 1_000_000, "{}", traffic.bytes);
+    assert!(traffic.bytes > 10 << 20, "{}", traffic.bytes);
+    let stored = stored.expect("it was asked for");
+    assert_eq!(stored.state.cycle, 17);
+    assert!(snapshot.is_some_and(|snapshot| snapshot == stored), "the halves of a snapshot are of one cycle");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -146,5 +156,5 @@ async fn a_job_finishes_over_sockets_of_four_kilobytes() {
 fn two_hundred_workers_start_in_one_process_and_give_the_digest_of_one() {
     let model = model(PLATES, 6);
     assert_eq!(model.mesh.n_elements(), 27_000);
-    assert_eq!(embedded_digest(&model, &hands(200)), embedded_digest(&model, &hands(1)));
+    assert_eq!(embedded_run(&model, &hands(200)), embedded_run(&model, &hands(1)));
 }

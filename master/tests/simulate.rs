@@ -8,7 +8,8 @@ use std::{
 use deck::model::Model;
 use master::{
     embedded::{self, Sink},
-    job::{Action, Hand, Job, Options},
+    event::{Action, Hand, Options},
+    job::Job,
     run::read_deck,
     simulate::{
         calibrate,

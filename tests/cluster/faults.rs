@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use tests::cluster::{Cluster, Process, repository, said};
+use tests::cluster::{Cluster, Process, repository, said, until};
 
 use crate::{BOLIDE, digest_of, long, reference, small};
 
@@ -59,7 +59,7 @@ fn a_cancelled_job_keeps_what_it_had_and_frees_its_workers() {
 #[test]
 fn a_bad_deck_comes_back_with_every_fault_at_its_place() {
     let cluster = Cluster::start(BOLIDE, false);
-    let deck = repository("tests/decks/bad/submitted.toml").display().to_string();
+    let deck = repository("tests/decks/submitted.toml").display().to_string();
     let submitted = cluster.client(&["submit", &deck]);
     let checked = said(Command::new(BOLIDE).args(["check", &deck]));
     assert_eq!((submitted.code, &submitted.err), (Some(1), &checked.err));
@@ -86,4 +86,28 @@ fn a_second_worker_of_the_same_name_is_refused() {
     let second = said(&mut cluster.command("worker", &["worker", "--name", "a"]));
     assert_eq!(second.code, Some(1));
     assert!(second.err.contains("a worker named \"a\" is connected from 127.0.0.1:"), "{second:?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_run_of_processes_ends_at_a_whole_cycle_and_leaves_no_child() {
+    let mut command = Command::new(BOLIDE);
+    command.args(["run", &long(), "--no-output", "--processes", "--workers", "2", "--threads", "1"]);
+    let mut run = Process::start("run", &mut command);
+    let (me, children) = (run.id(), format!("/proc/{0}/task/{0}/children", run.id()));
+    let children = until(
+        || format!("two children in {children}"),
+        || {
+            let text = std::fs::read_to_string(&children).unwrap_or_default();
+            let ids: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
+            (ids.len() == 2).then_some(ids)
+        },
+    );
+    let sent = Command::new("kill").args(["-INT", &me.to_string()]).status().expect("kill is there");
+    assert!(sent.success());
+    assert_eq!(run.wait().code(), Some(130), "{}", run.text());
+    run.wait_for("digest ");
+    for id in children {
+        assert!(!std::path::Path::new(&format!("/proc/{id}")).exists(), "child {id} is left");
+    }
 }

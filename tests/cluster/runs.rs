@@ -58,6 +58,8 @@ fn three_workers_give_the_digest_of_run(tls: bool) {
     };
     assert_eq!(names(&spool), names(&out));
     assert!(names(&out).len() >= 5, "{:?}", names(&out));
+    let again = cluster.client(&["results", "1", "--out", "fetched"]);
+    assert!(again.code == Some(1) && again.err.contains("fetched is not empty"), "{again:?}");
     for name in names(&out) {
         let (theirs, ours) = (fs::read(spool.join(&name)), fs::read(out.join(&name)));
         assert!(theirs.expect("there") == ours.expect("fetched"), "{name:?} differs");

@@ -29,7 +29,8 @@ use super::{
 };
 use crate::{
     balance::Dealing,
-    job::{Action, Event, Hand, Job, Options},
+    event::{Action, Event, Hand, Options},
+    job::Job,
     sort::Sorted,
 };
 

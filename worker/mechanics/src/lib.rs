@@ -25,6 +25,7 @@ pub mod digest;
 pub mod element;
 mod eos;
 pub mod exact;
+mod home;
 pub mod initial;
 pub mod lanes;
 pub mod material;
