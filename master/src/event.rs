@@ -9,6 +9,7 @@ use crate::{
     balance::Dealing, job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot,
     sort::Sorted,
 };
+
 /// A worker as the job sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hand {
