@@ -59,7 +59,7 @@ fn row(name: &str, flags: &str) -> Row {
 fn rows(asked: &Asked, processes: bool, lanes: &[&str], snapshot: &Path) -> Vec<Row> {
     let half = asked.cycles / 2;
     let mut rows = vec![row("1 worker, 1 thread", "--workers 1 --threads 1")];
-    for workers in [1, 2, 3, 7].into_iter().filter(|w| *w <= asked.most_workers) {
+    for workers in [1, 2, 3, 4, 7].into_iter().filter(|w| *w <= asked.most_workers) {
         // One worker of one thread is the first row.
         for threads in [1, 2].into_iter().filter(|threads| workers * threads > 1) {
             rows.push(row(
@@ -161,6 +161,18 @@ fn main() -> ExitCode {
 }
 
 /// Runs everything, prints the table and counts the runs that differ.
+/// A copy of a deck whose contact has twice the default slack; none without contact.
+fn with_doubled_slack(deck: &Path, folder: &Path) -> Result<Option<PathBuf>, String> {
+    let text = std::fs::read_to_string(deck).map_err(|e| format!("{}: {e}", deck.display()))?;
+    if !text.contains("[contact]\n") || text.contains("slack") {
+        return Ok(None);
+    }
+    let copy = folder.join("doubled-slack.toml");
+    std::fs::write(&copy, text.replace("[contact]\n", "[contact]\nslack_gaps = 5.0\n"))
+        .map_err(|e| format!("{}: {e}", copy.display()))?;
+    Ok(Some(copy))
+}
+
 fn matrix() -> Result<usize, String> {
     let asked = asked()?;
     let help = Command::new(&asked.bolide).args(["run", "--help"]).output().map_err(|e| {
@@ -178,7 +190,10 @@ fn matrix() -> Result<usize, String> {
         // Overwritten by no run but the one that takes it.
         let kept = folder.join("snapshot.bolide");
         let mut first: Option<Outcome> = None;
-        for row in rows(&asked, processes, &lanes(), &kept) {
+        let wider = with_doubled_slack(deck, &folder)?;
+        let doubled = wider.iter().map(|deck| (deck, row("doubled slack", "--workers 2 --threads 1")));
+        let rows = rows(&asked, processes, &lanes(), &kept);
+        for (deck, row) in rows.into_iter().map(|row| (deck, row)).chain(doubled) {
             let out = folder.join("results");
             match run(&asked, deck, &row, &out) {
                 Ok((outcome, wall)) => {
