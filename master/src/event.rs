@@ -9,7 +9,6 @@ use crate::{
     balance::Dealing, job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot,
     sort::Sorted,
 };
-
 /// A worker as the job sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hand {
