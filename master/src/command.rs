@@ -221,7 +221,7 @@ pub struct SimulateArgs {
     #[arg(long, value_enum, default_value = "virtual")]
     pub clock: Clock,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
-    #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u64).range(4..))]
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u64).range(4..))]
     pub cycles: u64,
     /// Route of the shared-node forces
     #[arg(long, value_enum, default_value = "direct")]

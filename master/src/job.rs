@@ -417,6 +417,11 @@ impl Job {
             actions.push(Action::Send(worker, ToWorker::Plan { acts_at, plan, hash: sorted.exchange.hash }));
         }
         self.exchanges.push_back((acts_at, Arc::new(sorted.exchange)));
+        // A late sort: the cycles before its own are complete, and workers wait for the plan. It is in force from here, as
+        // it would be had it come in time, so that the cycles of further sorts do not depend on how long this one took.
+        if acts_at <= self.completed {
+            self.retire(self.completed - 1);
+        }
         Ok(())
     }
 

@@ -179,13 +179,27 @@ fn every_number_of_hosts_and_every_scheme_gives_the_digest_of_a_plain_run() {
     }
 }
 
+#[test]
+fn a_sort_that_is_late_makes_workers_wait_and_changes_no_later_sort() {
+    let model = model("plates-free-slip.toml", 40);
+    let mut three = machines(3);
+    let (quick, tape) = virtual_clock::run(&model, &three, Scheme::control(), None).expect("the deck runs");
+    // Six cycles of one host, where the lag is four.
+    three.costs.sort = 6.0 * 9_000.0 / calibrate::surface_nodes(&model);
+    let (late, _) =
+        virtual_clock::run(&model, &three, Scheme::control(), tape.as_ref()).expect("the same sorts");
+    assert!(quick.boundaries.len() > 2, "{:?}", quick.boundaries);
+    assert_eq!(quick.boundaries, late.boundaries);
+    assert!(late.seconds_per_cycle() > 1.1 * quick.seconds_per_cycle());
+}
+
 fn table_of(file: &str, hosts: &[usize]) -> Vec<table::Row> {
     let cluster = cluster(file);
     let mut tables = cluster.tables.clone().expect("the file has tables");
     tables.hosts = hosts.to_vec();
     let models = tables.decks.clone().map(|deck| {
         let mut model = read_deck(&deck).expect("an example deck");
-        model.setup.control.end_cycle = 40;
+        model.setup.control.end_cycle = 80;
         Arc::new(model)
     });
     table::run(&cluster, &tables, &models, &mut |_| {}).expect("the tables run").rows

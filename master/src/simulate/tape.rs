@@ -41,6 +41,21 @@ enum Kept {
     Image,
 }
 
+impl Kept {
+    /// Whether it can be the outcome of a task.
+    fn answers(&self, task: &Task) -> bool {
+        matches!(
+            (self, task),
+            (Self::Loaded(..), Task::Load { .. })
+                | (Self::Transferred(_), Task::Transfer { .. })
+                | (Self::Computed, Task::Elements { .. } | Task::Interior { .. })
+                | (Self::Forces(..), Task::Install { .. } | Task::Border { .. })
+                | (Self::Integrated(_), Task::Integrate { .. })
+                | (Self::Image, Task::Image)
+        )
+    }
+}
+
 /// A worker's part in a run: computes, or plays a tape.
 pub enum Player {
     /// Computes and keeps what came of it.
@@ -80,6 +95,9 @@ impl Player {
             Self::Tape(left) => {
                 let Taped { load, kept } =
                     left.pop_front().ok_or("the tape of a run is shorter than the run")?;
+                if !kept.answers(&task) {
+                    return Err("the tape is of a run with other sorts: report this as a bug".to_owned());
+                }
                 Ok((give(kept), load))
             }
         }

@@ -704,9 +704,7 @@ impl Clock<'_> {
                     self.foresee(0);
                 }
                 Action::Over(outcome) => {
-                    if let Some(reason) = outcome.failure
-                        && self.live
-                    {
+                    if let Some(reason) = outcome.failure {
                         return Err(reason);
                     }
                     self.timeline.digest = outcome.digest;
