@@ -1,13 +1,12 @@
 //! Bodies in three dimensions against published figures: the Taylor bar.
 
-use mechanics::state::field;
-use tests::{
+use crate::{
     case::Sheet,
     solve::{example, run},
 };
+use mechanics::state::field;
 
-#[test]
-fn the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find() {
+pub(super) fn the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find(sheet: &mut Sheet) {
     let solved = run(example("taylor-copper"));
     assert_eq!(solved.model.mesh.n_elements(), 972);
     let on_axis = |n: &usize| solved.model.mesh.positions[*n][..2] == [0.0, 0.0];
@@ -16,7 +15,6 @@ fn the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find() {
     let radius = solved.state.x.iter().map(|x| x[0].hypot(x[1])).fold(0.0, f64::max);
     let strain = solved.state.elements[field::PLASTIC_STRAIN].iter().copied().fold(0.0, f64::max);
     let ledger = &solved.outcome.ledger;
-    let mut sheet = Sheet::default();
     sheet.add("taylor copper 972: length (mm)", length);
     sheet.add("taylor copper 972: radius of the foot (mm)", radius);
     sheet.add("taylor copper 972: greatest plastic strain", strain);
@@ -26,5 +24,4 @@ fn the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find() {
         ledger.hourglass / ledger.greatest_kinetic,
     );
     println!("{} cycles", solved.state.cycle);
-    sheet.close();
 }
