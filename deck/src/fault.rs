@@ -41,7 +41,7 @@ impl fmt::Display for Fault {
 impl std::error::Error for Fault {}
 
 /// The faults found so far, with the text that turns offsets into lines and columns.
-pub(crate) struct Faults<'a> {
+pub struct Faults<'a> {
     file: &'a str,
     text: &'a str,
     line_starts: Vec<usize>,
@@ -52,13 +52,13 @@ pub(crate) struct Faults<'a> {
 
 impl<'a> Faults<'a> {
     /// No faults yet.
-    pub(crate) fn new(file: &'a str, text: &'a str) -> Self {
+    pub fn new(file: &'a str, text: &'a str) -> Self {
         let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
         Self { file, text, line_starts, list: RefCell::new(Vec::new()), more: Cell::new(0) }
     }
 
     /// Adds a fault at byte offset `at` of the text.
-    pub(crate) fn add(
+    pub fn add(
         &self,
         at: usize,
         read: impl Into<String>,
@@ -82,7 +82,7 @@ impl<'a> Faults<'a> {
 
     /// Line and column of a byte offset, both from 1. Offsets past the end or inside a character are
     /// moved back to the nearest character.
-    pub(crate) fn place(&self, at: usize) -> (u32, u32) {
+    pub fn place(&self, at: usize) -> (u32, u32) {
         let mut at = at.min(self.text.len());
         while !self.text.is_char_boundary(at) {
             at -= 1;
@@ -93,7 +93,7 @@ impl<'a> Faults<'a> {
     }
 
     /// The deck's own words between two offsets, on one line and cut to a readable length.
-    pub(crate) fn quote(&self, from: usize, to: usize) -> String {
+    pub fn quote(&self, from: usize, to: usize) -> String {
         let piece = self.text.get(from..to).unwrap_or_default();
         let mut words = String::new();
         for (n, c) in piece.split_whitespace().flat_map(|w| w.chars().chain([' '])).enumerate() {
@@ -106,17 +106,17 @@ impl<'a> Faults<'a> {
     }
 
     /// Number of faults so far.
-    pub(crate) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.list.borrow().len() + self.more.get()
     }
 
     /// Whether further faults are only counted; advice for them need not be sought.
-    pub(crate) fn full(&self) -> bool {
+    pub fn full(&self) -> bool {
         self.list.borrow().len() >= MAX_FAULTS
     }
 
     /// The faults in the order of their places, at most [`MAX_FAULTS`] and then one with the rest.
-    pub(crate) fn into_list(self) -> Vec<Fault> {
+    pub fn into_list(self) -> Vec<Fault> {
         let mut list = self.list.into_inner();
         list.sort_by_key(|fault| (fault.line, fault.column));
         let rest = self.more.get();
@@ -135,7 +135,7 @@ impl<'a> Faults<'a> {
 }
 
 /// A measured number to six digits, for messages.
-pub(crate) fn short(x: f64) -> String {
+pub fn short(x: f64) -> String {
     let rounded = format!("{x:.5e}").parse().unwrap_or(x);
     let magnitude = f64::abs(rounded);
     if magnitude == 0.0 || (1e-4..1e7).contains(&magnitude) {
@@ -146,7 +146,7 @@ pub(crate) fn short(x: f64) -> String {
 }
 
 /// The known word nearest to `word`, if it is near enough to be what was meant.
-pub(crate) fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
+pub fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
     if word.chars().count() > MAX_QUOTE {
         return None;
     }

@@ -11,12 +11,12 @@
 mod assembly;
 mod blocks;
 mod check;
-mod fault;
+pub mod fault;
 mod format;
 mod geometry;
 pub mod library;
 pub mod model;
-mod table;
+pub mod table;
 pub mod units;
 
 pub use fault::{Fault, MAX_FAULTS};

@@ -16,35 +16,37 @@ pub const MAX_NAME: usize = 64;
 pub const MAX_NUMBER: f64 = 1e60;
 
 /// A table of the deck.
-pub(crate) struct Table<'a> {
+pub struct Table<'a> {
     table: &'a DeTable<'a>,
     /// Offset of its header or opening brace.
-    pub(crate) at: usize,
+    pub at: usize,
     /// What it is called in messages, for instance `[control]`.
-    pub(crate) title: String,
-    pub(crate) faults: &'a Faults<'a>,
+    pub title: String,
+    /// Where faults are reported.
+    pub faults: &'a Faults<'a>,
     known: RefCell<BTreeSet<&'static str>>,
 }
 
 /// A value of the deck and the key it stands under.
 #[derive(Clone, Copy)]
-pub(crate) struct Value<'a> {
+pub struct Value<'a> {
     value: &'a DeValue<'a>,
     /// Offset of its first character.
-    pub(crate) at: usize,
+    pub at: usize,
     end: usize,
     key: &'static str,
-    pub(crate) faults: &'a Faults<'a>,
+    /// Where faults are reported.
+    pub faults: &'a Faults<'a>,
 }
 
 impl<'a> Table<'a> {
     /// A table called `title`, its header at offset `at`.
-    pub(crate) fn new(table: &'a DeTable<'a>, at: usize, title: String, faults: &'a Faults<'a>) -> Self {
+    pub fn new(table: &'a DeTable<'a>, at: usize, title: String, faults: &'a Faults<'a>) -> Self {
         Self { table, at, title, faults, known: RefCell::new(BTreeSet::new()) }
     }
 
     /// The value under `key`, if the deck has one.
-    pub(crate) fn get(&self, key: &'static str) -> Option<Value<'a>> {
+    pub fn get(&self, key: &'static str) -> Option<Value<'a>> {
         self.known.borrow_mut().insert(key);
         let spanned = self.table.get(key)?;
         let span = spanned.span();
@@ -52,7 +54,7 @@ impl<'a> Table<'a> {
     }
 
     /// The value under `key`; its absence is a fault. `expected` says what belongs there.
-    pub(crate) fn require(&self, key: &'static str, expected: &str) -> Option<Value<'a>> {
+    pub fn require(&self, key: &'static str, expected: &str) -> Option<Value<'a>> {
         let value = self.get(key);
         if value.is_none() {
             self.faults.add(
@@ -67,27 +69,27 @@ impl<'a> Table<'a> {
 
     /// A number under `key` that passes `range`, or `default` where the key is absent or faulty (a faulty
     /// one is reported).
-    pub(crate) fn number_or(&self, key: &'static str, default: f64, range: Range) -> f64 {
+    pub fn number_or(&self, key: &'static str, default: f64, range: Range) -> f64 {
         self.get(key).and_then(|v| v.number(range)).unwrap_or(default)
     }
 
     /// An integer under `key` between `min` and `max`, or `default` where it is absent or faulty.
-    pub(crate) fn integer_or(&self, key: &'static str, default: u64, min: u64, max: u64) -> u64 {
+    pub fn integer_or(&self, key: &'static str, default: u64, min: u64, max: u64) -> u64 {
         self.get(key).and_then(|v| v.integer(min, max)).unwrap_or(default)
     }
 
     /// A required number.
-    pub(crate) fn number(&self, key: &'static str, range: Range) -> Option<f64> {
+    pub fn number(&self, key: &'static str, range: Range) -> Option<f64> {
         self.require(key, range.words())?.number(range)
     }
 
     /// A required point or vector.
-    pub(crate) fn vector(&self, key: &'static str) -> Option<[f64; 3]> {
+    pub fn vector(&self, key: &'static str) -> Option<[f64; 3]> {
         self.require(key, "[x, y, z]")?.vector()
     }
 
     /// The tables of an array of tables such as `[[part]]`; empty where the key is absent.
-    pub(crate) fn tables(&self, key: &'static str, max: usize) -> Vec<Table<'a>> {
+    pub fn tables(&self, key: &'static str, max: usize) -> Vec<Table<'a>> {
         let Some(value) = self.get(key) else { return Vec::new() };
         let DeValue::Array(array) = value.value else {
             value.fault(&format!("an array of tables [[{key}]]"), &format!("write [[{key}]] before each"));
@@ -117,12 +119,12 @@ impl<'a> Table<'a> {
     }
 
     /// Whether the deck has `key`, without making it known.
-    pub(crate) fn has(&self, key: &str) -> bool {
+    pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
     }
 
     /// Reports every key that nobody asked for.
-    pub(crate) fn finish(self) {
+    pub fn finish(self) {
         let known = self.known.into_inner();
         for key in self.table.keys() {
             let name = key.get_ref().as_ref();
@@ -147,7 +149,7 @@ impl<'a> Table<'a> {
 
 /// Which numbers a key takes.
 #[derive(Clone, Copy)]
-pub(crate) enum Range {
+pub enum Range {
     /// Any finite number.
     Any,
     /// Above zero.
@@ -180,17 +182,17 @@ impl Range {
 
 impl<'a> Value<'a> {
     /// What the deck says here, as `key = value`.
-    pub(crate) fn words(&self) -> String {
+    pub fn words(&self) -> String {
         format!("{} = {}", self.key, self.faults.quote(self.at, self.end))
     }
 
     /// Reports this value.
-    pub(crate) fn fault(&self, expected: &str, advice: &str) {
+    pub fn fault(&self, expected: &str, advice: &str) {
         self.faults.add(self.at, self.words(), expected, advice);
     }
 
     /// A finite number in `range`.
-    pub(crate) fn number(&self, range: Range) -> Option<f64> {
+    pub fn number(&self, range: Range) -> Option<f64> {
         let number = match self.value {
             DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
             DeValue::Integer(integer) => {
@@ -213,7 +215,7 @@ impl<'a> Value<'a> {
     }
 
     /// An integer from `min` to `max`.
-    pub(crate) fn integer(&self, min: u64, max: u64) -> Option<u64> {
+    pub fn integer(&self, min: u64, max: u64) -> Option<u64> {
         let number = match self.value {
             DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix()).ok(),
             _ => None,
@@ -226,7 +228,7 @@ impl<'a> Value<'a> {
     }
 
     /// A text.
-    pub(crate) fn text(&self) -> Option<&'a str> {
+    pub fn text(&self) -> Option<&'a str> {
         match self.value {
             DeValue::String(text) => Some(text.as_ref()),
             _ => {
@@ -238,7 +240,7 @@ impl<'a> Value<'a> {
 
     /// A name: letters, digits, space, dash and underscore, at most [`MAX_NAME`]; it becomes a column
     /// heading or a file name.
-    pub(crate) fn name(&self) -> Option<String> {
+    pub fn name(&self) -> Option<String> {
         let text = self.text()?;
         let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, ' ' | '-' | '_');
         if text.is_empty() || text.len() > MAX_NAME || !text.chars().all(fits) || text.trim() != text {
@@ -252,7 +254,7 @@ impl<'a> Value<'a> {
     }
 
     /// One of a few words; the index of the word.
-    pub(crate) fn one_of(&self, words: &[&'static str]) -> Option<usize> {
+    pub fn one_of(&self, words: &[&'static str]) -> Option<usize> {
         let text = self.text()?;
         let found = words.iter().position(|w| *w == text);
         if found.is_none() {
@@ -266,7 +268,7 @@ impl<'a> Value<'a> {
     }
 
     /// True or false.
-    pub(crate) fn boolean(&self) -> Option<bool> {
+    pub fn boolean(&self) -> Option<bool> {
         match self.value {
             DeValue::Boolean(b) => Some(*b),
             _ => {
@@ -277,12 +279,12 @@ impl<'a> Value<'a> {
     }
 
     /// A point or vector `[x, y, z]` of finite numbers.
-    pub(crate) fn vector(&self) -> Option<[f64; 3]> {
+    pub fn vector(&self) -> Option<[f64; 3]> {
         self.numbers::<3>("[x, y, z]", Range::Any)
     }
 
     /// Exactly `N` numbers in `range`.
-    pub(crate) fn numbers<const N: usize>(&self, expected: &str, range: Range) -> Option<[f64; N]> {
+    pub fn numbers<const N: usize>(&self, expected: &str, range: Range) -> Option<[f64; N]> {
         let items = self.fixed::<N>(expected)?;
         let read = items.map(|item| item.number(range));
         if read.iter().any(Option::is_none) {
@@ -292,7 +294,7 @@ impl<'a> Value<'a> {
     }
 
     /// Exactly `N` whole numbers from `min` to `max`.
-    pub(crate) fn integers<const N: usize>(&self, expected: &str, min: u64, max: u64) -> Option<[u64; N]> {
+    pub fn integers<const N: usize>(&self, expected: &str, min: u64, max: u64) -> Option<[u64; N]> {
         let items = self.fixed::<N>(expected)?;
         let read = items.map(|item| item.integer(min, max));
         if read.iter().any(Option::is_none) {
@@ -302,7 +304,7 @@ impl<'a> Value<'a> {
     }
 
     /// Exactly `N` values.
-    pub(crate) fn fixed<const N: usize>(&self, expected: &str) -> Option<[Value<'a>; N]> {
+    pub fn fixed<const N: usize>(&self, expected: &str) -> Option<[Value<'a>; N]> {
         let items = match self.value {
             DeValue::Array(array) if array.len() == N => self.items()?,
             _ => {
@@ -314,7 +316,7 @@ impl<'a> Value<'a> {
     }
 
     /// The items of an array.
-    pub(crate) fn items(&self) -> Option<Vec<Value<'a>>> {
+    pub fn items(&self) -> Option<Vec<Value<'a>>> {
         let DeValue::Array(array) = self.value else {
             self.fault("a list in square brackets", "write [ ... ]");
             return None;
@@ -333,17 +335,22 @@ impl<'a> Value<'a> {
     }
 
     /// Whether this is a text (rather than a list or table).
-    pub(crate) fn is_text(&self) -> bool {
+    pub fn is_text(&self) -> bool {
         matches!(self.value, DeValue::String(_))
     }
 
+    /// Whether this is a list.
+    pub fn is_list(&self) -> bool {
+        matches!(self.value, DeValue::Array(_))
+    }
+
     /// Whether this is a table.
-    pub(crate) fn is_table(&self) -> bool {
+    pub fn is_table(&self) -> bool {
         matches!(self.value, DeValue::Table(_))
     }
 
     /// A table called `title`.
-    pub(crate) fn table(&self, title: String) -> Option<Table<'a>> {
+    pub fn table(&self, title: String) -> Option<Table<'a>> {
         match self.value {
             DeValue::Table(table) => Some(Table::new(table, self.at, title, self.faults)),
             _ => {

@@ -5,6 +5,31 @@
 
 use mechanics::contact::WorkUnit;
 
+/// How units are dealt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Dealing {
+    /// To the owner of their nodes while its load allows.
+    #[default]
+    Owners,
+    /// By weight alone, the heaviest first: what a cluster pays for leaving ownership out, in `simulate`.
+    Weights,
+}
+
+/// Worker of each unit by weight alone: each, the heaviest first, to the worker that would end it first.
+pub fn assign_by_weight(units: &[WorkUnit], speeds: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..units.len()).collect();
+    order.sort_by_key(|&u| (std::cmp::Reverse(units[u].interactions), u));
+    let mut load = vec![0_u64; speeds.len()];
+    let mut chosen = vec![0; units.len()];
+    for u in order {
+        let end = |w: usize| (load[w] + units[u].interactions) as f64 / speeds[w];
+        let best = (0..speeds.len()).fold(0, |best, w| if end(w) < end(best) { w } else { best });
+        load[best] += units[u].interactions;
+        chosen[u] = best;
+    }
+    chosen
+}
+
 /// How far above its share a worker may be before units move; moving one costs shared nodes in every cycle.
 const TOLERANCE: f64 = 0.10;
 
@@ -73,6 +98,13 @@ mod tests {
         let units: Vec<_> = (0..8).map(|i| unit(i, vec![i as u32], 10)).collect();
         let owner = |n: u32| (n % 2) as usize;
         assert_eq!(assign(&units, &[1.0, 1.0], &owner), [0, 1, 0, 1, 0, 1, 0, 1]);
+    }
+
+    #[test]
+    fn dealing_by_weight_follows_speeds_and_not_owners() {
+        let units: Vec<_> = (0..60).map(|i| unit(i, vec![i as u32], 10)).collect();
+        let chosen = assign_by_weight(&units, &[1.0, 2.0]);
+        assert_eq!(chosen.iter().filter(|&&w| w == 1).count(), 40);
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Every subcommand and flag, with help and default.
 
-use std::path::PathBuf;
+use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use protocol::{request::JobOptions, tls};
 
 /// Explicit Lagrangian impact simulation on whatever PCs a lab has.
 #[derive(Debug, Parser)]
@@ -18,6 +19,62 @@ pub struct Cli {
 pub enum Command {
     /// Run a deck here: master and workers in one process
     Run(RunArgs),
+    /// Say what an emulated cluster would take for a deck, or for the benchmark tables
+    Simulate(SimulateArgs),
+    /// Listen for workers and clients, and run the jobs of the queue
+    Master(MasterArgs),
+    /// Compute for a master
+    Worker(WorkerArgs),
+    /// Put a deck into a master's queue
+    Submit(SubmitArgs),
+    /// Follow a job until it ends, then print its summary
+    Watch {
+        /// The job [default: the newest]
+        job: Option<u32>,
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
+    /// List the jobs of a master
+    Jobs {
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
+    /// List the hosts of a master
+    Hosts {
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
+    /// Take a job from the queue, or end it with the results so far
+    Cancel {
+        /// The job
+        job: u32,
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
+    /// Fetch the results of a job
+    Results {
+        /// The job
+        job: u32,
+        /// Folder for them [default: results/job-<JOB>]
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Replace the results in an existing folder
+        #[arg(long)]
+        force: bool,
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
+    /// Make certificates: a CA, and one folder for each host
+    Certs {
+        /// What to make
+        #[command(subcommand)]
+        what: Certs,
+    },
     /// Report every fault of a deck without running it
     Check {
         /// The deck
@@ -32,6 +89,17 @@ pub enum Command {
 pub enum Route {
     /// All through the master, which adds them
     Master,
+    /// From worker to worker; votes and orders pass the master
+    Direct,
+}
+
+impl From<Route> for protocol::message::Route {
+    fn from(route: Route) -> Self {
+        match route {
+            Route::Master => Self::Master,
+            Route::Direct => Self::Direct,
+        }
+    }
 }
 
 /// Lane width of the kernels; the bits do not depend on it.
@@ -72,15 +140,6 @@ pub struct JobArgs {
     /// Lane width; the widest of each machine by default
     #[arg(long, value_enum)]
     pub lanes: Option<Lanes>,
-    /// Results folder [default: results/<deck name>]
-    #[arg(long)]
-    pub out: Option<PathBuf>,
-    /// Replace the results in an existing folder
-    #[arg(long)]
-    pub force: bool,
-    /// Print the summary alone, as JSON, on standard output
-    #[arg(long)]
-    pub json: bool,
     /// Write no results folder
     #[arg(long)]
     pub no_output: bool,
@@ -93,6 +152,23 @@ pub struct JobArgs {
     /// Extra sorts at pseudo-random cycles of this seed, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_seed: Option<u64>,
+}
+
+impl JobArgs {
+    /// The same as a master takes it.
+    pub fn asked(&self) -> JobOptions {
+        JobOptions {
+            cycles: self.cycles,
+            end_time: self.end_time,
+            route: self.route.into(),
+            lanes: self.lanes.map(Lanes::name),
+            no_output: self.no_output,
+            snapshot_at: self.snapshot_at,
+            sort_every: self.sort_every,
+            sort_seed: self.sort_seed,
+            min_workers: 1,
+        }
+    }
 }
 
 /// Flags of `run`.
@@ -109,10 +185,182 @@ pub struct RunArgs {
     /// Compute threads per worker [default: all cores]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
+    /// A process for each worker, over loopback TCP
+    #[arg(long)]
+    pub processes: bool,
     /// Go on from this snapshot
     #[arg(long, value_name = "FILE")]
     pub resume: Option<PathBuf>,
+    /// Results folder [default: results/<deck name>]
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Replace the results in an existing folder
+    #[arg(long)]
+    pub force: bool,
+    /// Print the summary alone, as JSON, on standard output
+    #[arg(long)]
+    pub json: bool,
     /// The rest
     #[command(flatten)]
     pub job: JobArgs,
+}
+
+/// Flags of `simulate`.
+#[derive(Args, Clone, Debug)]
+pub struct SimulateArgs {
+    /// The deck (TOML)
+    #[arg(required_unless_present = "table", conflicts_with = "table")]
+    pub deck: Option<PathBuf>,
+    /// The cluster file (TOML)
+    #[arg(long)]
+    pub cluster: PathBuf,
+    /// Print the cluster file's tables instead of one run
+    #[arg(long)]
+    pub table: bool,
+    /// What tells the time: costs and messages, replayed
+    #[arg(long, value_enum, default_value = "virtual")]
+    pub clock: Clock,
+    /// Stop after this many cycles, or at the deck's end, whichever comes first
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u64).range(4..))]
+    pub cycles: u64,
+    /// Route of the shared-node forces
+    #[arg(long, value_enum, default_value = "direct")]
+    pub route: Route,
+    /// Folder for pictures and the trace; without it none are drawn
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Print JSON on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What tells the time of an emulated cluster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Clock {
+    /// Costs and messages, replayed: the same figures on every machine
+    Virtual,
+}
+
+/// Flags of `master`.
+#[derive(Args, Clone, Debug)]
+pub struct MasterArgs {
+    /// Address to listen on; other than loopback only with --certs
+    #[arg(long, default_value = "127.0.0.1:7117")]
+    pub listen: SocketAddr,
+    /// Folder with this host's certificates, as `bolide certs host` makes it
+    #[arg(long, value_name = "FOLDER")]
+    pub certs: Option<PathBuf>,
+    /// Folder for the results of jobs
+    #[arg(long, default_value = "results/spool")]
+    pub spool: PathBuf,
+}
+
+/// Flags of `worker`.
+#[derive(Args, Clone, Debug)]
+pub struct WorkerArgs {
+    /// The master: HOST, HOST:PORT or [ADDRESS]:PORT
+    #[arg(long)]
+    pub master: String,
+    /// Speed relative to the other workers
+    #[arg(long, default_value_t = 1.0)]
+    pub speed: f64,
+    /// Compute threads [default: all cores]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub threads: Option<u32>,
+    /// Name, unlike that of any other worker [default: host name and process id]
+    #[arg(long)]
+    pub name: Option<String>,
+    /// Folder with this host's certificates, as `bolide certs host` makes it
+    #[arg(long, value_name = "FOLDER")]
+    pub certs: Option<PathBuf>,
+    /// Seconds to go on dialling a master that is not there
+    #[arg(long, default_value_t = 300)]
+    pub patience: u64,
+    /// End when the master ends the connection, instead of dialling again
+    #[arg(long)]
+    pub once: bool,
+}
+
+/// How a client reaches a master, and how it prints.
+#[derive(Args, Clone, Debug)]
+pub struct ClientArgs {
+    /// The master: HOST, HOST:PORT or [ADDRESS]:PORT
+    #[arg(long, default_value = "127.0.0.1:7117")]
+    pub master: String,
+    /// Folder with this host's certificates, as `bolide certs host` makes it
+    #[arg(long, value_name = "FOLDER")]
+    pub certs: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Flags of `submit`.
+#[derive(Args, Clone, Debug)]
+pub struct SubmitArgs {
+    /// The deck (TOML)
+    pub deck: PathBuf,
+    /// Start when so many workers are there
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub min_workers: u32,
+    /// Follow the job until it ends, then print its summary
+    #[arg(long)]
+    pub wait: bool,
+    /// The job
+    #[command(flatten)]
+    pub job: JobArgs,
+    /// The master
+    #[command(flatten)]
+    pub at: ClientArgs,
+}
+
+/// What `certs` makes.
+#[derive(Debug, Subcommand)]
+pub enum Certs {
+    /// A certificate authority in a folder: ca.pem, and ca-key.pem, which stays there
+    Ca {
+        /// The folder
+        folder: PathBuf,
+        /// Replace the CA that is there; its hosts' certificates then become useless
+        #[arg(long)]
+        force: bool,
+    },
+    /// The certificate of a host, in FOLDER/NAME, which is copied to that host
+    Host {
+        /// The folder of the CA
+        folder: PathBuf,
+        /// Name of the host
+        name: String,
+        /// Another name or address under which the host is dialled; may be given several times
+        #[arg(long)]
+        address: Vec<String>,
+        /// What the host may be
+        #[arg(long, value_enum)]
+        role: CertRole,
+        /// Replace the certificate that is there
+        #[arg(long)]
+        force: bool,
+    },
+}
+
+/// What the holder of a certificate may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CertRole {
+    /// Listens, and may be anything else too
+    Master,
+    /// Computes
+    Worker,
+    /// Submits and watches jobs
+    Client,
+}
+
+impl CertRole {
+    /// The same as certificates spell it.
+    pub const fn role(self) -> tls::Role {
+        match self {
+            Self::Master => tls::Role::Master,
+            Self::Worker => tls::Role::Worker,
+            Self::Client => tls::Role::Client,
+        }
+    }
 }

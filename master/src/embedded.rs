@@ -21,7 +21,8 @@ use worker::{
 };
 
 use crate::{
-    job::{Action, Bench, Event, Job, Outcome},
+    event::{Action, Event, Outcome},
+    job::{Bench, Job},
     sort::Sorted,
 };
 
@@ -47,6 +48,8 @@ pub struct Traffic {
 enum Arrival {
     ToMaster(usize, Packed),
     ToWorker(usize, Packed),
+    /// From, to.
+    ToPeer(u32, usize, Packed),
     Done(usize, Box<Machine>, session::Outcome),
     Sorted(Box<Sorted>, u64),
 }
@@ -142,6 +145,11 @@ impl Host {
                         wire::unpack_to_worker(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
                     self.step(worker, session::Event::Message(message))?;
                 }
+                Arrival::ToPeer(from, worker, packed) => {
+                    let message =
+                        wire::unpack_to_peer(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
+                    self.step(worker, session::Event::Peer(from, message))?;
+                }
                 Arrival::Done(worker, machine, outcome) => {
                     self.places[worker].machine = Some(machine);
                     self.step(worker, session::Event::Done(outcome))?;
@@ -182,6 +190,11 @@ impl Host {
                     let packed = wire::pack_to_master(&message).map_err(|e| e.to_string())?;
                     self.traffic.bytes += packed.wire_bytes();
                     self.queue.push_back(Arrival::ToMaster(worker, packed));
+                }
+                session::Action::SendPeer(to, message) => {
+                    let packed = wire::pack_to_peer(&message);
+                    self.traffic.bytes += packed.wire_bytes();
+                    self.queue.push_back(Arrival::ToPeer(worker as u32, to as usize, packed));
                 }
                 session::Action::Compute(task) => self.compute(worker, task)?,
                 session::Action::Forget => {

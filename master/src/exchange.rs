@@ -7,9 +7,11 @@ use std::collections::{BTreeMap, HashMap};
 
 use mechanics::{
     contact::Batch,
-    cycle::{Guest, Plan},
+    cycle::{Guest, Neighbour, Plan},
     state::GlobalState,
 };
+
+use protocol::message::Route;
 
 use crate::decompose::Subdomain;
 
@@ -56,11 +58,13 @@ impl Holdings {
 }
 
 /// The exchange of all workers from one plan boundary to the next.
+#[derive(Clone)]
 pub struct Exchange {
     /// By worker.
     pub plans: Vec<Plan>,
     /// Says which exchange this is; frames carry it.
     pub hash: u64,
+    route: Route,
     /// Number of nodes in the exchange.
     n_slots: usize,
     /// By worker: the slot of each node of its exchange list.
@@ -71,7 +75,7 @@ pub struct Exchange {
 
 impl Exchange {
     /// Plans for these batches (one per worker, none where there is no contact).
-    pub fn new(holdings: &Holdings, batches: Vec<Option<Batch>>, state: &GlobalState) -> Self {
+    pub fn new(holdings: &Holdings, batches: Vec<Option<Batch>>, state: &GlobalState, route: Route) -> Self {
         let n = holdings.n_workers;
         let mut holders: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for (&node, others) in &holdings.others {
@@ -105,11 +109,24 @@ impl Exchange {
             plan.send.dedup();
         }
         let mut slots = vec![Vec::new(); n];
+        let mut shared: Vec<BTreeMap<u32, Vec<u32>>> = vec![BTreeMap::new(); n];
         for (slot, (&node, list)) in holders.iter().enumerate() {
             for &worker in list {
                 slots[worker as usize].push(slot as u32);
                 plans[worker as usize].exchange.push(node);
             }
+            if route == Route::Direct {
+                for &worker in list {
+                    let at = plans[worker as usize].exchange.len() as u32 - 1;
+                    for &other in list.iter().filter(|other| **other != worker) {
+                        shared[worker as usize].entry(other).or_default().push(at);
+                    }
+                }
+            }
+        }
+        for (plan, shared) in plans.iter_mut().zip(shared) {
+            plan.neighbours =
+                shared.into_iter().map(|(worker, shared)| Neighbour { worker, shared }).collect();
         }
         let sources = plans
             .iter()
@@ -128,12 +145,15 @@ impl Exchange {
             plan.batch = batch;
         }
         let hash = hash(&plans);
-        Self { plans, hash, n_slots: holders.len(), slots, sources }
+        Self { plans, hash, route, n_slots: holders.len(), slots, sources }
     }
 
-    /// Numbers in the partial forces of a worker.
+    /// Numbers in the partial forces that a worker sends to the master: none on route direct.
     pub fn n_partials(&self, worker: usize) -> usize {
-        3 * self.slots[worker].len()
+        match self.route {
+            Route::Master => 3 * self.slots[worker].len(),
+            Route::Direct => 0,
+        }
     }
 
     /// Numbers in the transfer of a worker.
@@ -141,9 +161,12 @@ impl Exchange {
         6 * self.plans[worker].send.len()
     }
 
-    /// Zero totals.
+    /// Zero totals; none on route direct.
     pub fn totals(&self) -> Vec<f64> {
-        vec![0.0; 3 * self.n_slots]
+        match self.route {
+            Route::Master => vec![0.0; 3 * self.n_slots],
+            Route::Direct => Vec::new(),
+        }
     }
 
     /// Adds the partial forces of one worker; exact, so the order of workers does not matter.
@@ -158,6 +181,9 @@ impl Exchange {
     /// The totals of one worker's nodes.
     pub fn of_worker(&self, worker: usize, totals: &[f64]) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.n_partials(worker));
+        if self.route == Route::Direct {
+            return out;
+        }
         for &slot in &self.slots[worker] {
             out.extend_from_slice(&totals[3 * slot as usize..3 * slot as usize + 3]);
         }

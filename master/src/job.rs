@@ -3,6 +3,13 @@
 //! It decides time steps, sorts, images and the end from the votes of whole cycles, adds partial forces, and keeps the
 //! ledger. It knows no socket, clock, disk or thread: those are events and actions.
 
+mod images;
+mod pace;
+mod start;
+#[cfg(test)]
+mod tests;
+mod verdict;
+
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::Arc,
@@ -10,165 +17,21 @@ use std::{
 
 use deck::model::Model;
 use mechanics::{
-    block::Piece,
-    contact::{Exclusions, Surface, initial_pairs, reach},
-    cycle::Subdomain,
+    contact::Surface,
     digest,
-    exact::Quantum,
-    initial,
-    mesh::Mesh,
-    piece,
     state::GlobalState,
     vote::{Quanta, Vote},
 };
-use protocol::message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToWorker, Work};
+use protocol::message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work};
 
 use crate::{
-    decompose::{self, decompose},
+    event::{Action, Event, Limit, Options, Outcome, Progress},
     exchange::{Exchange, Holdings},
     ledger::Ledger,
     results::history::HistoryRow,
-    snapshot::Snapshot,
     sort::{Sorted, Sorter},
 };
-
-/// A worker as the job sees it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Hand {
-    /// Name for messages.
-    pub name: String,
-    /// Relative speed, user-given.
-    pub speed: f64,
-    /// Compute threads.
-    pub threads: u32,
-}
-
-/// What a user may ask of a run beside the deck.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Options {
-    /// Lane width by name; none for the best.
-    pub lanes: Option<String>,
-    /// Take a snapshot at the start of this cycle.
-    pub snapshot_at: Option<u64>,
-    /// Write states while the run goes (the last one is always gathered).
-    pub states: bool,
-    /// Forces extra sorts, for tests of bits.
-    pub force_sorts: ForceSorts,
-}
-
-/// Extra sorts, which may not change a bit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ForceSorts {
-    /// Only when due.
-    #[default]
-    Never,
-    /// Every so many cycles.
-    Every(u64),
-    /// At pseudo-random cycles, about one in four.
-    Seeded(u64),
-}
-
-impl ForceSorts {
-    fn at(self, cycle: u64) -> bool {
-        match self {
-            Self::Never => false,
-            Self::Every(n) => cycle.is_multiple_of(n.max(1)),
-            Self::Seeded(seed) => {
-                let mut x = cycle.wrapping_add(seed).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-                x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-                (x ^ (x >> 31)).is_multiple_of(4)
-            }
-        }
-    }
-}
-
-/// What happens to a job.
-pub enum Event {
-    /// A message from a worker.
-    Message(usize, ToMaster),
-    /// A sort is done.
-    Sorted(Box<Sorted>),
-    /// The user wants the run to end with the results so far.
-    Stop,
-    /// A worker is gone for good.
-    Lost(usize, String),
-}
-
-/// What a job wants done.
-pub enum Action {
-    /// Send to a worker.
-    Send(usize, ToWorker),
-    /// Sort; exactly one [`Event::Sorted`] answers it. Positions by surface node.
-    Sort(Arc<Bench>, Vec<[f64; 3]>),
-    /// Append a row of history.
-    Row(Box<HistoryRow>),
-    /// Write a state for the user.
-    State(Box<GlobalState>),
-    /// Store a snapshot.
-    Snapshot(Box<Snapshot>),
-    /// Tell the user how far it is.
-    Progress(Progress),
-    /// The job is over.
-    Over(Box<Outcome>),
-}
-
-/// How far a run is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
-    /// Cycles completed.
-    pub cycle: u64,
-    /// Time (time).
-    pub time: f64,
-    /// Time step (time).
-    pub dt: f64,
-    /// Global index of the element that limits it; none where something else does.
-    pub element: Option<u32>,
-    /// What limits it.
-    pub limit: Limit,
-}
-
-/// What limits a time step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Limit {
-    /// Courant limit of an element.
-    Courant,
-    /// Rate of volume of an element.
-    Volume,
-    /// Stiffness of a contact.
-    Contact,
-    /// A contact node may not travel further.
-    Travel,
-    /// The step before times the growth.
-    Growth,
-    /// The end of the run.
-    End,
-}
-
-/// How a job ended.
-pub struct Outcome {
-    /// None for a run to its end or to the user's stop; else what went wrong.
-    pub failure: Option<String>,
-    /// The user stopped it.
-    pub stopped: bool,
-    /// The final state, unless a worker could not give it.
-    pub state: Option<GlobalState>,
-    /// Digest of the final state.
-    pub digest: String,
-    /// The ledger.
-    pub ledger: Ledger,
-    /// Sorts that took effect.
-    pub sorts: u64,
-    /// Census of the last sort.
-    pub census: mechanics::contact::Census,
-    /// Compute time of each worker.
-    pub work: Vec<Work>,
-    /// Largest over mean of cost over speed.
-    pub imbalance: f64,
-    /// Lane width of the workers.
-    pub lanes: String,
-    /// Cycles of this session of the run: not those before a snapshot that it resumed from.
-    pub cycles_run: u64,
-}
+use images::{Collecting, SnapshotRest};
 
 /// What sorts work on: fixed between two decompositions.
 pub struct Bench {
@@ -195,21 +58,6 @@ struct Arrivals {
     gathered: Vec<Vec<f64>>,
 }
 
-/// An image on its way.
-struct Collecting {
-    pieces: Vec<Piece>,
-    arrived: Vec<bool>,
-    vote: Option<Vote>,
-}
-
-/// Most an element's interactions weigh against an element when imbalance is reported: an element-cycle costs about as
-/// much as this many interactions.
-const INTERACTIONS_PER_ELEMENT: f64 = 60.0;
-/// Deepest contact (gaps) before the run is stopped.
-const DEEPEST: f64 = 0.9;
-/// Share of the gap that contact votes for per cycle; the lag may not take it past 20 %.
-const TRAVEL_VOTE: f64 = 0.16;
-
 /// The master's part in one job.
 pub struct Job {
     model: Arc<Model>,
@@ -235,9 +83,16 @@ pub struct Job {
     sorts_under_way: VecDeque<u64>,
     transfers: BTreeMap<u64, Vec<Option<Vec<f64>>>>,
     collecting: BTreeMap<u64, Collecting>,
-    /// Images complete at this cycle that a snapshot waits to join with the vote.
+    /// Time of each image that was ordered and is not complete: frames of later cycles may overtake it.
+    image_times: BTreeMap<u64, f64>,
+    /// The images of a snapshot, and the rest of it: frames of cycles may overtake images, so either may come first.
     snapshot_state: Option<GlobalState>,
+    snapshot_rest: Option<SnapshotRest>,
     next_state_time: Option<f64>,
+    /// The cycle whose positions the newest sort works on, asked for or in force.
+    last_gather: u64,
+    /// The exchange in force and the one before it: where it began to act, and the cycle whose positions it sorted.
+    references: [(u64, u64); 2],
     last_spread: f64,
     spread_rate: f64,
     stop_asked: bool,
@@ -253,183 +108,6 @@ pub struct Job {
 }
 
 impl Job {
-    /// Takes a problem to these workers: from its deck, or from a snapshot of it.
-    ///
-    /// # Errors
-    /// If the problem cannot start: elements without volume, contact zones that overlap, no worker.
-    pub fn new(
-        model: Arc<Model>,
-        hands: &[Hand],
-        options: Options,
-        resume: Option<Snapshot>,
-    ) -> Result<(Self, Vec<Action>), String> {
-        if hands.is_empty() {
-            return Err("no worker: start one with `bolide worker --master HOST`".to_owned());
-        }
-        let mut setup = model.setup.clone();
-        let mut constraint = model.constraint.clone();
-        initial::bind_walls(&model.mesh, &mut setup, &mut constraint)?;
-        let start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
-        let fresh_quanta = initial::quanta(&model.mesh, &setup, &start);
-        let (state, quanta, ledger, rows, steps, vote_before) = match resume {
-            None => {
-                let ledger = Ledger::new(&model, &start.mass);
-                (start, fresh_quanta, ledger, Vec::new(), BTreeMap::new(), None)
-            }
-            Some(snapshot) => {
-                if snapshot.state.x.len() != start.x.len()
-                    || snapshot.state.initial_volume != start.initial_volume
-                {
-                    return Err("the snapshot is of another problem: its mesh is not this deck's".to_owned());
-                }
-                let cycle = snapshot.state.cycle;
-                let time = snapshot.state.time;
-                let mut steps = BTreeMap::new();
-                if cycle > 0 {
-                    steps.insert(cycle - 1, (snapshot.dt_previous, time - snapshot.dt_previous));
-                }
-                steps.insert(cycle, (snapshot.dt, time));
-                let quanta = Quanta { force: snapshot.force_quantum, ..fresh_quanta };
-                (snapshot.state, quanta, snapshot.ledger, snapshot.rows, steps, Some(snapshot.vote))
-            }
-        };
-        let mut model = model;
-        if setup != model.setup {
-            let mut with_walls = (*model).clone();
-            with_walls.setup = setup;
-            model = Arc::new(with_walls);
-        }
-        let n = hands.len();
-        let speeds: Vec<f64> = hands.iter().map(|h| h.speed).collect();
-        let layout = decompose(&model.mesh, &speeds);
-        let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
-        let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
-        for (id, subdomain) in layout.iter().enumerate() {
-            let threads = hands[subdomain.worker].threads.max(1) as usize;
-            let pieces: Vec<Piece> = subdomain
-                .region
-                .split(threads)
-                .iter()
-                .map(|region| piece::cut(&model.mesh, &state, subdomain.part, region))
-                .collect();
-            let mut nodes: Vec<u32> = pieces.iter().flat_map(|p| p.nodes.iter().copied()).collect();
-            nodes.sort_unstable();
-            nodes.dedup();
-            nodes_of.push(nodes);
-            subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
-        }
-        let holdings = Holdings::new(model.mesh.n_nodes(), n, &layout, &nodes_of);
-        let surface = model
-            .setup
-            .contact
-            .as_ref()
-            .map(|_| Surface::new(&model.mesh, &model.setup.materials, &|_| true));
-        let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
-        for (subdomain, (place, nodes)) in subdomains.iter_mut().zip(layout.iter().zip(&nodes_of)) {
-            let id = subdomain.id;
-            subdomain.unowned =
-                nodes.iter().copied().filter(|&node| holdings.owner_subdomain[node as usize] != id).collect();
-            if let Some(surface) = &surface {
-                subdomain.surface =
-                    nodes.iter().copied().filter(|&node| surface.node_index(node).is_some()).collect();
-                gather[place.worker].extend(
-                    subdomain.surface.iter().filter(|&&node| holdings.owner_subdomain[node as usize] == id),
-                );
-            }
-        }
-        let shared_state = Arc::new(state.clone());
-        let mut elements = vec![0.0; n];
-        for s in &layout {
-            elements[s.worker] += s.region.n_elements() as f64;
-        }
-        let (bench, exchange, census, interactions) = match (surface, &model.setup.contact) {
-            (Some(surface), Some(settings)) => {
-                let at_start: Vec<[f64; 3]> =
-                    surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
-                let inside = initial_pairs(&surface, &at_start, settings);
-                refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
-                let exclusions = Exclusions::new(&surface, &inside);
-                let sorter = Sorter::new(surface, settings.clone(), exclusions, speeds.clone(), &gather);
-                let x = sorter.positions_of(&state);
-                let bench = Bench { sorter, holdings, state: shared_state };
-                let sorted = bench.sort(&x);
-                (Some(Arc::new(bench)), sorted.exchange, sorted.census, sorted.interactions)
-            }
-            _ => {
-                let exchange = Exchange::new(&holdings, vec![None; n], &state);
-                (None, exchange, mechanics::contact::Census::default(), vec![0; n])
-            }
-        };
-        let imbalance = imbalance(&elements, &interactions, &speeds);
-        let exchange = Arc::new(exchange);
-        let first_cycle = state.cycle;
-        let dt_previous = first_cycle.checked_sub(1).and_then(|c| steps.get(&c)).map_or(0.0, |s| s.0);
-        let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
-        for (subdomain, place) in subdomains.into_iter().zip(&layout) {
-            by_worker[place.worker].push(subdomain);
-        }
-        let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
-        let actions = by_worker
-            .into_iter()
-            .enumerate()
-            .map(|(w, subdomains)| {
-                let assign = Assign {
-                    setup: model.setup.clone(),
-                    n_parts: model.mesh.parts.len() as u32,
-                    quanta,
-                    subdomains,
-                    gauges: gauges.clone(),
-                    lanes: options.lanes.clone(),
-                    cycle: first_cycle,
-                    dt_previous,
-                    plan: exchange.plans[w].clone(),
-                    plan_hash: exchange.hash,
-                    guest_state: exchange.guest_state_from(w, &state),
-                };
-                Action::Send(w, ToWorker::Assign(Box::new(assign)))
-            })
-            .collect();
-        let next_state_time = model.output.period.map(|period| {
-            let passed = (state.time / period).floor() + 1.0;
-            passed * period
-        });
-        let job = Self {
-            n_workers: n,
-            quanta,
-            bench,
-            ready: vec![false; n],
-            running: false,
-            lanes: String::new(),
-            first_cycle,
-            steps,
-            vote_before,
-            arrivals: BTreeMap::new(),
-            exchanges: VecDeque::from([(first_cycle, exchange)]),
-            completed: first_cycle,
-            sorts_under_way: VecDeque::new(),
-            transfers: BTreeMap::new(),
-            collecting: BTreeMap::new(),
-            snapshot_state: None,
-            next_state_time,
-            last_spread: 0.0,
-            spread_rate: 0.0,
-            stop_asked: false,
-            stop_at: None,
-            failure: None,
-            ledger,
-            rows,
-            sorts: u64::from(census.units > 0),
-            census,
-            work: vec![Work::default(); n],
-            imbalance,
-            over: false,
-            state,
-            model,
-            options,
-        };
-        Ok((job, actions))
-    }
-
     /// The state the run starts from.
     pub fn start_state(&self) -> &GlobalState {
         &self.state
@@ -448,6 +126,11 @@ impl Job {
     /// Whether it has ended.
     pub fn is_over(&self) -> bool {
         self.over
+    }
+
+    /// Hash of the plan that frames of a cycle follow; none for a cycle without one.
+    pub fn plan_hash(&self, cycle: u64) -> Option<u64> {
+        self.exchange_at(cycle).ok().map(|exchange| exchange.hash)
     }
 
     /// Takes an event, says what to do.
@@ -495,6 +178,10 @@ impl Job {
             work: self.work.clone(),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
+            route: match self.options.route {
+                Route::Master => "master",
+                Route::Direct => "direct",
+            },
             cycles_run,
         })));
     }
@@ -504,6 +191,16 @@ impl Job {
             ToMaster::Ready { vote, lanes } => self.ready(worker, vote, lanes, actions),
             ToMaster::Cycle { cycle, vote, partials, gathered } => {
                 self.arrived(worker, cycle, vote, &partials, gathered, actions)
+            }
+            ToMaster::Relay { to, message } => {
+                if to as usize >= self.n_workers {
+                    return Err(format!(
+                        "worker {worker} writes to worker {to}, there are {}",
+                        self.n_workers
+                    ));
+                }
+                actions.push(Action::Send(to as usize, ToWorker::Relayed { from: worker as u32, message }));
+                Ok(())
             }
             ToMaster::Transfer { cycle, state } => self.transfer(worker, cycle, state, actions),
             ToMaster::Image { cycle, version, pieces, last, work } => {
@@ -569,6 +266,9 @@ impl Job {
             collect: snapshot_now || at_end,
             stop: at_end,
         };
+        if before.collect {
+            self.image_times.insert(first, time);
+        }
         if at_end {
             self.stop_at = Some(first);
         }
@@ -577,77 +277,6 @@ impl Job {
             actions.push(Action::Send(worker, ToWorker::Start { orders: [before, orders] }));
         }
         Ok(())
-    }
-
-    /// The orders that give `dt` of cycle `next`, which ends at `time_after`, and what happens then. `vote` is of the
-    /// cycle two before the sort that it may trigger could gather.
-    fn orders_for(&mut self, next: u64, dt: f64, time_after: f64, vote: Option<&Vote>) -> Orders {
-        let control = self.model.setup.control;
-        let after = next + 1;
-        if self.stop_at.is_none()
-            && (self.stop_asked
-                || self.failure.is_some()
-                || time_after >= control.end_time
-                || after >= control.end_cycle)
-        {
-            self.stop_at = Some(after);
-        }
-        let stop = self.stop_at == Some(after);
-        let mut collect = stop || self.options.snapshot_at == Some(after);
-        if self.options.states
-            && let (Some(due), Some(period)) = (self.next_state_time, self.model.output.period)
-            && time_after >= due
-        {
-            collect = true;
-            self.next_state_time = Some(((time_after / period).floor() + 1.0) * period);
-        }
-        let gather = !stop && self.sort_due(after, vote);
-        if gather {
-            self.sorts_under_way.push_back(after);
-        }
-        Orders { next, dt, force_quantum: self.quanta.force, gather, collect, stop }
-    }
-
-    /// Whether positions travel at the start of cycle `cycle`, so that a sort acts a lag later.
-    fn sort_due(&mut self, cycle: u64, vote: Option<&Vote>) -> bool {
-        let (Some(_), Some(settings)) = (&self.bench, &self.model.setup.contact) else { return false };
-        let lag = u64::from(self.model.setup.control.sort_lag);
-        let waiting = self.exchanges.iter().filter(|(acts_at, _)| *acts_at > self.completed).count();
-        let in_flight = self.sorts_under_way.len() + waiting;
-        if in_flight as u64 > 2 * lag + 2 {
-            return false;
-        }
-        if self.options.force_sorts.at(cycle) {
-            return true;
-        }
-        let Some(vote) = vote else { return false };
-        if in_flight > 0 {
-            return false;
-        }
-        let (spread, _) = reach::worst_spread(&vote.extents, settings);
-        // Positions were those of two cycles before `cycle`; the sort acts `lag` cycles after it.
-        let ahead = (lag + 3) as f64;
-        spread + 1.5 * ahead * self.spread_rate > settings.slack
-    }
-
-    /// The step that a vote allows, what limits it, and the element if one does.
-    fn limit(&self, vote: &Vote, grown: f64) -> (f64, Limit, Option<u32>) {
-        let control = &self.model.setup.control;
-        let mut best = (grown, Limit::Growth, None);
-        let mut offer = |dt: f64, limit: Limit, element: Option<u32>| {
-            if dt < best.0 {
-                best = (dt, limit, element);
-            }
-        };
-        offer(control.safety_factor * vote.courant, Limit::Courant, Some(vote.courant_element));
-        offer(vote.volume_limit, Limit::Volume, None);
-        offer(vote.contact_limit, Limit::Contact, None);
-        if let Some(contact) = &self.model.setup.contact
-            && vote.contact_speed_ahead > 0.0
-        {
-            offer(TRAVEL_VOTE * contact.gap / vote.contact_speed_ahead, Limit::Travel, None);
-        }
-        best
     }
 
     fn arrived(
@@ -706,8 +335,10 @@ impl Job {
     /// No frame of `cycle` or before will come any more.
     fn retire(&mut self, cycle: u64) {
         self.completed = cycle + 1;
-        while self.exchanges.get(1).is_some_and(|(acts_at, _)| *acts_at <= cycle + 1) {
+        while let Some(&(acts_at, _)) = self.exchanges.get(1).filter(|(acts_at, _)| *acts_at <= cycle + 1) {
             self.exchanges.pop_front();
+            let lag = u64::from(self.model.setup.control.sort_lag);
+            self.references = [(acts_at, acts_at - lag), self.references[0]];
             self.sorts += 1;
         }
     }
@@ -723,19 +354,19 @@ impl Job {
         };
         let (dt_now, time_now) =
             *self.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
-        if let Some(state) = self.snapshot_state.take() {
+        if self.options.snapshot_at == Some(cycle) {
             let dt_previous = cycle.checked_sub(1).and_then(|c| self.steps.get(&c)).map_or(0.0, |s| s.0);
-            actions.push(Action::Snapshot(Box::new(Snapshot {
-                state,
+            self.snapshot_rest = Some(SnapshotRest {
                 dt_previous,
                 dt: dt_now,
                 force_quantum: self.quanta.force,
                 vote: vote.clone(),
                 ledger: self.ledger.clone(),
                 rows: self.rows.clone(),
-            })));
+            });
+            self.snapshot(actions);
         }
-        self.follow_spread(&vote);
+        self.follow_spread(cycle.saturating_sub(1), &vote);
         let growth = self.model.setup.control.growth;
         let (dt, limit, element) = self.limit(&vote, growth * dt_now);
         let time_next = time_now + dt_now;
@@ -776,111 +407,6 @@ impl Job {
         Ok(())
     }
 
-    /// Forces nearing the bound of exact sums ask for a coarser quantum.
-    fn rescaled(&self, vote: &Vote) -> Result<Option<Quantum>, String> {
-        let quantum = self.quanta.force;
-        if vote.force_bound > quantum.term_bound() || !vote.force_bound.is_finite() {
-            return Err(format!(
-                "a force of up to {:e}, exact sums hold {:e}; the run has blown up or needs a smaller time step",
-                vote.force_bound,
-                quantum.term_bound()
-            ));
-        }
-        Ok((vote.force_bound > quantum.rescale_bound()).then(|| Quantum::for_reference(vote.force_bound, 42)))
-    }
-
-    /// Keeps the rate at which bodies move against each other (length per cycle).
-    fn follow_spread(&mut self, vote: &Vote) {
-        let Some(settings) = &self.model.setup.contact else { return };
-        let (spread, _) = reach::worst_spread(&vote.extents, settings);
-        if !spread.is_finite() {
-            return;
-        }
-        if spread >= self.last_spread {
-            self.spread_rate = spread - self.last_spread;
-        }
-        self.last_spread = spread;
-    }
-
-    /// Books the whole vote of a cycle, and stops the run where the physics went wrong.
-    fn book(&mut self, cycle: u64, vote: &Vote, actions: &mut Vec<Action>) {
-        let Some(&(dt, time)) = self.steps.get(&cycle) else { return };
-        let gap = self.model.setup.contact.as_ref().map(|c| c.gap);
-        self.ledger.book(vote, cycle, time, dt, gap);
-        if cycle.is_multiple_of(u64::from(self.model.output.history_cycles.max(1))) {
-            self.row(actions);
-        }
-        if self.failure.is_some() {
-            return;
-        }
-        self.failure = if let Some((element, volume)) = vote.fault {
-            Some(self.element_fault(element, volume, cycle))
-        } else if vote.worst_depth >= DEEPEST {
-            let (node, face) = vote.worst_pair;
-            Some(format!(
-                "node {} is {:.2} gaps into the contact zone of surface face {face} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap",
-                self.model.mesh.node_ids.get(node as usize).copied().unwrap_or(node),
-                vote.worst_depth
-            ))
-        } else if self.ledger.worst_courant > 1.0 {
-            Some(format!(
-                "cycle {cycle}: time step {dt:e} above the Courant limit {:e} of element {}; lower control.safety_factor",
-                vote.courant,
-                self.element_name(vote.courant_element)
-            ))
-        } else if self.ledger.worst_gap_travel > 0.2 {
-            Some(format!(
-                "cycle {cycle}: a contact node travelled {:.3} gaps in one cycle, at most 0.2; lower control.safety_factor or control.growth",
-                self.ledger.worst_gap_travel
-            ))
-        } else {
-            self.stale(vote, cycle)
-        };
-    }
-
-    fn stale(&self, vote: &Vote, cycle: u64) -> Option<String> {
-        let settings = self.model.setup.contact.as_ref()?;
-        let (spread, [a, b]) = reach::worst_spread(&vote.extents, settings);
-        (spread > settings.slack).then(|| {
-            let name = |p: u32| self.model.mesh.parts[p as usize].name.as_str();
-            format!(
-                "cycle {cycle}: parts `{}` and `{}` moved {spread:e} against each other since the last sort, the slack is {:e}; raise contact.slack",
-                name(a),
-                name(b),
-                settings.slack
-            )
-        })
-    }
-
-    fn row(&mut self, actions: &mut Vec<Action>) {
-        self.rows.push(self.ledger.last.clone());
-        actions.push(Action::Row(Box::new(self.ledger.last.clone())));
-    }
-
-    fn element_name(&self, element: u32) -> String {
-        let mut left = element as usize;
-        for part in &self.model.mesh.parts {
-            let n = part.n_elements();
-            if left < n {
-                return format!(
-                    "{} of part `{}`",
-                    part.element_ids.get(left).copied().unwrap_or(left as u32),
-                    part.name
-                );
-            }
-            left -= n;
-        }
-        element.to_string()
-    }
-
-    fn element_fault(&self, element: u32, volume: f64, cycle: u64) -> String {
-        let was = self.state.initial_volume.get(element as usize).copied().unwrap_or(f64::NAN);
-        format!(
-            "element {}: volume {volume:e} at cycle {cycle}, at first {was:e}; refine the mesh, soften the load or add an erosion strain",
-            self.element_name(element)
-        )
-    }
-
     /// A sort is done: its plan goes to the workers and acts a lag after the gathering.
     fn sorted(&mut self, sorted: Sorted, actions: &mut Vec<Action>) -> Result<(), String> {
         let gathered_at = self.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
@@ -891,6 +417,11 @@ impl Job {
             actions.push(Action::Send(worker, ToWorker::Plan { acts_at, plan, hash: sorted.exchange.hash }));
         }
         self.exchanges.push_back((acts_at, Arc::new(sorted.exchange)));
+        // A late sort: the cycles before its own are complete, and workers wait for the plan. It is in force from here, as
+        // it would be had it come in time, so that the cycles of further sorts do not depend on how long this one took.
+        if acts_at <= self.completed {
+            self.retire(self.completed - 1);
+        }
         Ok(())
     }
 
@@ -928,103 +459,5 @@ impl Job {
             }
         }
         Ok(())
-    }
-
-    fn image(
-        &mut self,
-        worker: usize,
-        cycle: u64,
-        pieces: Vec<Piece>,
-        last: Option<Box<Vote>>,
-        actions: &mut Vec<Action>,
-    ) -> Result<(), String> {
-        let n = self.n_workers;
-        let collecting = self.collecting.entry(cycle).or_insert_with(|| Collecting {
-            pieces: Vec::new(),
-            arrived: vec![false; n],
-            vote: None,
-        });
-        if std::mem::replace(&mut collecting.arrived[worker], true) {
-            return Err(format!("worker {worker} sends its image of cycle {cycle} twice"));
-        }
-        collecting.pieces.extend(pieces);
-        if let Some(vote) = last {
-            match &mut collecting.vote {
-                Some(merged) => merged.merge(&vote),
-                None => collecting.vote = Some(*vote),
-            }
-        }
-        if !collecting.arrived.iter().all(|a| *a) {
-            return Ok(());
-        }
-        let Some(collected) = self.collecting.remove(&cycle) else { return Ok(()) };
-        let mut state = self.state.clone();
-        for piece in &collected.pieces {
-            piece::put_back(piece, &mut state)?;
-        }
-        state.cycle = cycle;
-        state.time = self.time_at(cycle);
-        if let Some(vote) = collected.vote {
-            if cycle > self.first_cycle {
-                self.book(cycle - 1, &vote, actions);
-                if !(cycle - 1).is_multiple_of(u64::from(self.model.output.history_cycles.max(1))) {
-                    self.row(actions);
-                }
-            }
-            actions.push(Action::State(Box::new(state.clone())));
-            self.finish(Some(state), actions);
-            return Ok(());
-        }
-        if self.options.snapshot_at == Some(cycle) {
-            self.snapshot_state = Some(state.clone());
-        }
-        if self.options.states {
-            actions.push(Action::State(Box::new(state)));
-        }
-        Ok(())
-    }
-
-    fn time_at(&self, cycle: u64) -> f64 {
-        if let Some((_, time)) = self.steps.get(&cycle) {
-            return *time;
-        }
-        cycle
-            .checked_sub(1)
-            .and_then(|before| self.steps.get(&before))
-            .map_or(self.state.time, |(dt, time)| (time + dt).min(self.model.setup.control.end_time))
-    }
-}
-
-/// Largest over mean of cost over speed, workers without a speed aside.
-fn imbalance(elements: &[f64], interactions: &[u64], speeds: &[f64]) -> f64 {
-    let finish: Vec<f64> = elements
-        .iter()
-        .zip(interactions)
-        .zip(speeds)
-        .map(|((e, i), s)| (e + *i as f64 / INTERACTIONS_PER_ELEMENT) / s)
-        .collect();
-    let bound = finish.iter().zip(speeds).map(|(f, s)| f * s).sum::<f64>() / speeds.iter().sum::<f64>();
-    debug_assert!(decompose::slowest_finish(&[], speeds) == 0.0);
-    if bound > 0.0 { finish.iter().copied().fold(0.0, f64::max) / bound } else { 1.0 }
-}
-
-/// The external gap: nodes of one part may not start inside the zone of another.
-fn refuse_overlap(
-    mesh: &Mesh,
-    surface: &Surface,
-    inside: &[(u32, u32, f64)],
-    gap: f64,
-) -> Result<(), String> {
-    let foreign = inside
-        .iter()
-        .find(|(node, face, _)| surface.node_part[*node as usize] != surface.faces[*face as usize].part);
-    match foreign {
-        None => Ok(()),
-        Some(&(node, face, distance)) => Err(format!(
-            "node {} of part `{}` starts {distance:e} from part `{}`, inside the contact gap {gap:e}; move the parts apart by at least the gap, or join them",
-            mesh.node_ids[surface.nodes[node as usize] as usize],
-            mesh.parts[surface.node_part[node as usize] as usize].name,
-            mesh.parts[surface.faces[face as usize].part as usize].name,
-        )),
     }
 }

@@ -1,17 +1,30 @@
 //! The master: owns the problem, decides, adds partial forces, writes results.
 //!
-//! [`job`] is the pure session of one run; [`embedded`] drives it with workers in the same process;
-//! `daemon` with workers over TCP.
+//! [`job`] is the pure session of one run; [`embedded`] drives it with workers in the same process, [`drive`] with
+//! workers over links. [`daemon`] owns [`hosts`] and [`queue`]: each [`connection`] is one task that carries messages,
+//! the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
+//! [`processes`] starts workers as children for one run. [`simulate`] drives the sessions on an emulated cluster.
 
 pub mod balance;
 pub mod certs;
+pub mod client;
 pub mod command;
+pub mod connection;
+pub mod daemon;
 pub mod decompose;
+pub mod desk;
+pub mod drive;
 pub mod embedded;
+pub mod event;
 pub mod exchange;
+pub mod hosts;
 pub mod job;
 pub mod ledger;
+pub mod processes;
+pub mod queue;
 pub mod results;
 pub mod run;
+pub mod service;
+pub mod simulate;
 pub mod snapshot;
 pub mod sort;

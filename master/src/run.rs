@@ -13,11 +13,14 @@ use std::{
 
 use deck::model::Model;
 use indicatif::{ProgressBar, ProgressStyle};
+use protocol::request::JobOptions;
 
 use crate::{
-    command::{JobArgs, RunArgs},
+    command::RunArgs,
     embedded::{self, Sink, Traffic},
-    job::{Action, ForceSorts, Hand, Job, Limit, Options, Outcome, Progress},
+    event::{Action, ForceSorts, Hand, Limit, Options, Outcome, Progress},
+    job::Job,
+    processes::Processes,
     results::{
         Folder,
         history::{History, HistoryRow},
@@ -35,40 +38,53 @@ pub fn read_deck(path: &Path) -> Result<Model, String> {
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     deck::read(&text, &path.display().to_string()).map_err(|faults| {
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
-        format!(
-            "{} fault{} in the deck\n{}",
-            lines.len(),
-            if lines.len() == 1 { "" } else { "s" },
-            lines.join("\n")
-        )
+        list_of_faults(&lines)
     })
+}
+
+/// Every fault of a deck, one per line, under their number.
+pub fn list_of_faults(lines: &[String]) -> String {
+    let ending = if lines.len() == 1 { "" } else { "s" };
+    format!("{} fault{ending} in the deck\n{}", lines.len(), lines.join("\n"))
 }
 
 /// A deck with what the flags change of it.
 ///
 /// # Errors
 /// Faults of the deck or of the flags.
-pub fn model_for(deck: &Path, args: &JobArgs) -> Result<Model, String> {
+pub fn model_for(deck: &Path, options: &JobOptions) -> Result<Model, String> {
     let mut model = read_deck(deck)?;
-    if let Some(cycles) = args.cycles {
-        model.setup.control.end_cycle = model.setup.control.end_cycle.min(cycles);
-    }
-    if let Some(time) = args.end_time {
-        if !(time.is_finite() && time > 0.0) {
-            return Err(format!("--end-time {time}: a positive time in the deck's unit is needed"));
-        }
-        model.setup.control.end_time = model.setup.control.end_time.min(time);
-    }
+    limit(&mut model, options)?;
     Ok(model)
 }
 
-/// The options of a job from its flags.
-pub fn options_for(args: &JobArgs) -> Options {
+/// Brings the end of a run forward to where the flags want it.
+///
+/// # Errors
+/// If the time is none.
+pub fn limit(model: &mut Model, options: &JobOptions) -> Result<(), String> {
+    let control = &mut model.setup.control;
+    if let Some(cycles) = options.cycles {
+        control.end_cycle = control.end_cycle.min(cycles);
+    }
+    if let Some(time) = options.end_time {
+        if !(time.is_finite() && time > 0.0) {
+            return Err(format!("--end-time {time}: a positive time in the deck's unit is needed"));
+        }
+        control.end_time = control.end_time.min(time);
+    }
+    Ok(())
+}
+
+/// The options of a job from what was asked.
+pub fn options_for(asked: &JobOptions) -> Options {
     Options {
-        lanes: args.lanes.map(|l| l.name()),
-        snapshot_at: args.snapshot_at,
-        states: !args.no_output,
-        force_sorts: match (args.sort_every, args.sort_seed) {
+        lanes: asked.lanes.clone(),
+        route: asked.route,
+        dealing: crate::balance::Dealing::Owners,
+        snapshot_at: asked.snapshot_at,
+        states: !asked.no_output,
+        force_sorts: match (asked.sort_every, asked.sort_seed) {
             (Some(n), _) => ForceSorts::Every(n),
             (None, Some(seed)) => ForceSorts::Seeded(seed),
             (None, None) => ForceSorts::Never,
@@ -91,18 +107,19 @@ pub fn speeds_for(n: usize, given: &[f64]) -> Result<Vec<f64>, String> {
 }
 
 /// Where a run writes: `--out`, or results/<deck name>.
-pub fn folder_for(deck: &Path, args: &JobArgs) -> PathBuf {
-    args.out
-        .clone()
-        .unwrap_or_else(|| Path::new("results").join(deck.file_stem().unwrap_or(std::ffi::OsStr::new("run"))))
+pub fn folder_for(args: &RunArgs) -> PathBuf {
+    args.out.clone().unwrap_or_else(|| {
+        Path::new("results").join(args.deck.file_stem().unwrap_or(std::ffi::OsStr::new("run")))
+    })
 }
 
-/// Runs a deck in this process.
+/// Runs a deck here: in this process, or with a process for each worker.
 ///
 /// # Errors
 /// Whatever kept it from its end.
 pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
-    let model = Arc::new(model_for(&args.deck, &args.job)?);
+    let asked = args.job.asked();
+    let model = Arc::new(model_for(&args.deck, &asked)?);
     let n = args.workers as usize;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = args.threads.map_or(cores, |t| t as usize);
@@ -112,24 +129,31 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         .map(|(i, speed)| Hand { name: format!("worker-{i}"), speed, threads: threads as u32 })
         .collect();
     let resume = args.resume.as_deref().map(snapshot::read).transpose()?;
-    let folder = if args.job.no_output { None } else { Some(folder_for(&args.deck, &args.job)) };
+    let folder = if asked.no_output { None } else { Some(folder_for(args)) };
     let folder =
-        folder.map(|path| Folder::create(&path, args.job.force)).transpose().map_err(|e| e.to_string())?;
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&args.job), resume)?;
+        folder.map(|path| Folder::create(&path, args.force)).transpose().map_err(|e| e.to_string())?;
+    let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&asked), resume)?;
     let census = Census::of(&job, &model);
-    let mut output = Output::new(Arc::clone(&model), folder, args.job.json)?;
+    let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     for row in job.rows_before() {
         output.row(row)?;
     }
     output.state(job.start_state())?;
-    let stop = stop_on_interrupt();
+    let stop = stop_on_interrupt("stopping after this cycle");
+    let children = args.processes.then(|| Processes::start(&hands)).transpose()?;
     let started = Instant::now();
-    let pool = threads.max(cores.min(n * threads));
-    let (outcome, traffic) = embedded::run(job, first, n, pool, &mut output, &stop)?;
+    let (outcome, traffic) = match &children {
+        Some(children) => children.run(job, first, &mut output, &stop)?,
+        None => {
+            let pool = threads.max(cores.min(n * threads));
+            embedded::run(job, first, n, pool, &mut output, &stop)?
+        }
+    };
     let wall = started.elapsed().as_secs_f64();
+    drop(children);
     output.finish();
     let total_threads = (n * threads) as u32;
-    conclude(&model, &census, &outcome, traffic, n as u32, total_threads, wall, &output, args.job.json)
+    conclude(&model, &census, &outcome, traffic, n as u32, total_threads, wall, &output, args.json)
 }
 
 /// Counts of the surface, taken before the run.
@@ -189,7 +213,8 @@ pub fn conclude(
     }
 }
 
-fn summarise(
+/// The facts of a run, for a person and for a file.
+pub fn summarise(
     model: &Model,
     census: &Census,
     outcome: &Outcome,
@@ -215,7 +240,7 @@ fn summarise(
         surface_nodes: census.nodes,
         workers,
         threads,
-        route: "master".to_owned(),
+        route: outcome.route.to_owned(),
         lanes: outcome.lanes.clone(),
         cycles,
         end_time: outcome.state.as_ref().map_or(ledger.last.time, |s| s.time),
@@ -252,33 +277,37 @@ fn summarise(
     }
 }
 
-/// A flag that Ctrl-C or SIGTERM sets; a second one ends the process at once.
-pub fn stop_on_interrupt() -> Arc<AtomicBool> {
+/// A flag that Ctrl-C or SIGTERM sets, saying `what` happens now; a second one ends the process at once.
+pub fn stop_on_interrupt(what: &'static str) -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
-    std::thread::Builder::new()
-        .name("signals".to_owned())
-        .spawn(move || {
-            let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else {
-                return;
-            };
-            runtime.block_on(async {
-                use tokio::signal::unix::{SignalKind, signal};
-                let Ok(mut term) = signal(SignalKind::terminate()) else { return };
-                loop {
-                    tokio::select! {
-                        interrupt = tokio::signal::ctrl_c() => if interrupt.is_err() { return },
-                        _ = term.recv() => {}
-                    }
-                    if flag.swap(true, Ordering::Relaxed) {
-                        std::process::exit(130);
-                    }
-                    eprintln!("stopping after this cycle; once more to leave at once");
+    let (heeded, heeding) = std::sync::mpsc::channel();
+    let spawned = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else {
+            return;
+        };
+        runtime.block_on(async {
+            use tokio::signal::unix::{SignalKind, signal};
+            let Ok(mut interrupt) = signal(SignalKind::interrupt()) else { return };
+            let Ok(mut term) = signal(SignalKind::terminate()) else { return };
+            // The caller waits for this.
+            let _ = heeded.send(());
+            loop {
+                tokio::select! {
+                    _ = interrupt.recv() => {}
+                    _ = term.recv() => {}
                 }
-            });
-        })
+                if flag.swap(true, Ordering::Relaxed) {
+                    std::process::exit(130);
+                }
+                eprintln!("{what}; once more to leave at once");
+            }
+        });
+    });
+    if spawned.is_ok() {
         // Without the thread Ctrl-C ends the process as usual.
-        .ok();
+        let _ = heeding.recv();
+    }
     stop
 }
 
@@ -323,11 +352,19 @@ impl Output {
         })
     }
 
-    fn row(&mut self, row: &HistoryRow) -> Result<(), String> {
+    /// Appends a row of history.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn row(&mut self, row: &HistoryRow) -> Result<(), String> {
         self.history.as_mut().map_or(Ok(()), |history| history.append(row)).map_err(|e| e.to_string())
     }
 
-    fn state(&mut self, state: &mechanics::state::GlobalState) -> Result<(), String> {
+    /// Writes a state, unless one of that time was the last.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn state(&mut self, state: &mechanics::state::GlobalState) -> Result<(), String> {
         if self.last_state_time == Some(state.time) {
             return Ok(());
         }
@@ -346,21 +383,8 @@ impl Output {
             return;
         }
         self.last_line = now;
-        let control = &self.model.setup.control;
-        let share =
-            (progress.time / control.end_time).max(progress.cycle as f64 / control.end_cycle as f64).min(1.0);
         let elapsed = now.duration_since(self.started).as_secs_f64();
-        let grind = elapsed * 1e9 / (progress.cycle.max(1) as f64 * self.model.mesh.n_elements() as f64);
-        let limit = match (progress.limit, progress.element) {
-            (Limit::Courant, Some(element)) => format!("element {element}"),
-            (limit, _) => format!("{limit:?}").to_lowercase(),
-        };
-        let eta = if share > 0.0 { elapsed * (1.0 - share) / share } else { f64::NAN };
-        let units = crate::results::Units::named(&self.model.units).time;
-        let line = format!(
-            "cycle {}  t {:.4e} {units}  dt {:.3e} ({limit})  {grind:.0} ns/element wall  ETA {eta:.0} s",
-            progress.cycle, progress.time, progress.dt
-        );
+        let (line, share) = progress_line(&self.model, &progress, elapsed);
         match &self.bar {
             Some(bar) => {
                 bar.set_position((share * 1000.0) as u64);
@@ -375,6 +399,26 @@ impl Output {
             bar.finish_and_clear();
         }
     }
+}
+
+/// How far a run is, in words and as a share of the whole, `elapsed` seconds after its start.
+pub fn progress_line(model: &Model, progress: &Progress, elapsed: f64) -> (String, f64) {
+    let control = &model.setup.control;
+    let share =
+        (progress.time / control.end_time).max(progress.cycle as f64 / control.end_cycle as f64).min(1.0);
+    let grind = elapsed * 1e9 / (progress.cycle.max(1) as f64 * model.mesh.n_elements() as f64);
+    let limit = match (progress.limit, progress.element) {
+        (Limit::Courant, Some(element)) => format!("element {element}"),
+        (limit, _) => format!("{limit:?}").to_lowercase(),
+    };
+    let eta =
+        if share > 0.0 { format!("  ETA {:.0} s", elapsed * (1.0 - share) / share) } else { String::new() };
+    let units = crate::results::Units::named(&model.units).time;
+    let line = format!(
+        "cycle {}  t {:.4e} {units}  dt {:.3e} ({limit})  {grind:.0} ns/element wall{eta}",
+        progress.cycle, progress.time, progress.dt
+    );
+    (line, share)
 }
 
 impl Sink for Output {

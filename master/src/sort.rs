@@ -7,8 +7,10 @@ use mechanics::{
     state::GlobalState,
 };
 
+use protocol::message::Route;
+
 use crate::{
-    balance,
+    balance::{self, Dealing},
     exchange::{Exchange, Holdings},
 };
 
@@ -18,11 +20,14 @@ pub struct Sorter {
     settings: contact::Settings,
     exclusions: Exclusions,
     speeds: Vec<f64>,
+    route: Route,
+    dealing: Dealing,
     /// By worker: surface node index of each gathered position.
     gather: Vec<Vec<u32>>,
 }
 
 /// What came of a sort.
+#[derive(Clone)]
 pub struct Sorted {
     /// The next plan of every worker.
     pub exchange: Exchange,
@@ -39,13 +44,15 @@ impl Sorter {
         settings: contact::Settings,
         exclusions: Exclusions,
         speeds: Vec<f64>,
+        route: Route,
+        dealing: Dealing,
         gather: &[Vec<u32>],
     ) -> Self {
         let gather = gather
             .iter()
             .map(|nodes| nodes.iter().filter_map(|&node| surface.node_index(node)).collect())
             .collect();
-        Self { surface, settings, exclusions, speeds, gather }
+        Self { surface, settings, exclusions, speeds, route, dealing, gather }
     }
 
     /// The surface it sorts.
@@ -79,7 +86,10 @@ impl Sorter {
         let units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
         let census = Census::of(&units);
         let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
-        let worker_of = balance::assign(&units, &self.speeds, &owner);
+        let worker_of = match self.dealing {
+            Dealing::Owners => balance::assign(&units, &self.speeds, &owner),
+            Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
+        };
         let n = self.speeds.len();
         let mut mine: Vec<Vec<&contact::WorkUnit>> = vec![Vec::new(); n];
         let mut interactions = vec![0; n];
@@ -94,6 +104,6 @@ impl Sorter {
                 (!units.is_empty()).then(|| Batch::gather(&self.surface, units, &mass, &self.exclusions))
             })
             .collect();
-        Sorted { exchange: Exchange::new(holdings, batches, state), census, interactions }
+        Sorted { exchange: Exchange::new(holdings, batches, state, self.route), census, interactions }
     }
 }

@@ -3,16 +3,20 @@
 //! From the wire upward: [`frame`] is the header that every message starts with and the bounds that
 //! are checked before anything is allocated; [`codec`] turns values and arrays into payloads and cuts
 //! large messages into chunks; [`link`] carries frames both ways over any byte stream without one
-//! direction waiting for the other; [`handshake`] says who is at the other end; [`tls`] proves it.
+//! direction waiting for the other; [`order`] keeps control messages in order over it; [`handshake`] says who is at the other end; [`tls`] proves it. [`message`] and
+//! [`wire`] are what master and workers say in a run, [`request`] what clients ask, [`dial`] how to call.
 //!
 //! Nothing here knows what a cycle computes: a link moves frames and ends with one [`Error`] value when
 //! the peer breaks a rule. No input from a peer reaches a panic.
 
 pub mod codec;
+pub mod dial;
 pub mod frame;
 pub mod handshake;
 pub mod link;
 pub mod message;
+pub mod order;
+pub mod request;
 pub mod tls;
 pub mod wire;
 
@@ -139,6 +143,11 @@ pub enum Error {
         /// The peer's reason.
         reason: String,
     },
+    /// The peer ended the connection on purpose.
+    Left {
+        /// The peer's reason.
+        reason: String,
+    },
     /// A handshake event that the state does not allow.
     State {
         /// The state of the handshake.
@@ -216,6 +225,7 @@ impl fmt::Display for Error {
             }
             Self::Closed => f.write_str("connection closed"),
             Self::Refused { reason } => write!(f, "refused by the peer: {reason}"),
+            Self::Left { reason } => write!(f, "the peer left: {reason}"),
             Self::State { state, event } => write!(f, "handshake is {state}, which does not allow {event}"),
             Self::Io { doing, why, .. } => write!(f, "{doing}: {why}"),
             Self::Certificate(why) => f.write_str(why),

@@ -51,8 +51,34 @@ pub enum ToWorker {
         /// x, y, z, vx, vy, vz by guest.
         state: Vec<f64>,
     },
+    /// Partial forces of another worker that has no link of its own to this one (route direct, relayed).
+    Relayed {
+        /// The other worker's index in the job.
+        from: u32,
+        /// What it says.
+        message: ToPeer,
+    },
     /// The job is over or given up; the worker forgets it.
     Release,
+}
+
+/// From one worker to another, on route direct: once per cycle to each neighbour of the plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ToPeer {
+    /// The cycle.
+    pub cycle: u64,
+    /// Partial forces of the nodes that both hold, three numbers each.
+    pub partials: Vec<f64>,
+}
+
+/// How partial forces travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Route {
+    /// To the master, which adds them and sends totals back: the paper's card, and the reference.
+    #[default]
+    Master,
+    /// From each worker to those that share nodes with it; votes and orders pass the master.
+    Direct,
 }
 
 /// All that a worker holds of a job.
@@ -74,6 +100,8 @@ pub struct Assign {
     pub cycle: u64,
     /// `dt` of the cycle before it; 0 at the start of a run.
     pub dt_previous: f64,
+    /// How partial forces travel.
+    pub route: Route,
     /// The first plan.
     pub plan: Plan,
     /// Its hash.
@@ -120,6 +148,13 @@ pub enum ToMaster {
         partials: Vec<f64>,
         /// Positions of owned surface nodes where this cycle gathers; else empty.
         gathered: Vec<f64>,
+    },
+    /// For another worker that this one has no link to (route direct). Passed on as it is.
+    Relay {
+        /// The other worker's index in the job.
+        to: u32,
+        /// What to pass on.
+        message: ToPeer,
     },
     /// State of the nodes that others will have as guests.
     Transfer {

@@ -11,7 +11,8 @@ use rustls::crypto::{CryptoProvider, aws_lc_rs};
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
 use rustls::server::WebPkiClientVerifier;
-use rustls::{AlertDescription, CertificateError, ClientConfig, RootCertStore, ServerConfig};
+use rustls::{AlertDescription, CertificateError, RootCertStore};
+pub use rustls::{ClientConfig, ServerConfig};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::net::SocketAddr;
@@ -327,6 +328,10 @@ pub fn explain(error: &std::io::Error) -> String {
         }
         Some(rustls::Error::InvalidMessage(_)) => {
             "the peer does not speak TLS; it may run without certificates".into()
+        }
+        // rustls adds the address of its manual.
+        _ if error.kind() == std::io::ErrorKind::UnexpectedEof => {
+            "the peer closed the connection in the middle".into()
         }
         _ => error.to_string(),
     }

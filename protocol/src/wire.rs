@@ -10,7 +10,7 @@ use crate::{
     Error, Result,
     codec::{self, MESSAGE_LIMIT},
     frame::{CHUNK, CHUNK_PREFIX, CONTROL_LIMIT, HEADER_LEN, Kind},
-    message::{Orders, ToMaster, ToWorker},
+    message::{Orders, ToMaster, ToPeer, ToWorker},
 };
 
 /// A message ready to be framed.
@@ -143,6 +143,27 @@ pub fn unpack_to_master(kind: Kind, bytes: &[u8]) -> Result<ToMaster> {
         },
         found => Err(Error::Unexpected { found, expected: "a control or cycle frame" }),
     }
+}
+
+/// Packs a message to another worker: its cycle, then raw numbers.
+pub fn pack_to_peer(message: &ToPeer) -> Packed {
+    let bytes = with_arrays(&message.cycle.to_le_bytes(), &[&message.partials]);
+    Packed { kind: Kind::Cycle, cycle: message.cycle, bytes }
+}
+
+/// Reads a message of another worker.
+///
+/// # Errors
+/// If the bytes are not one.
+pub fn unpack_to_peer(kind: Kind, bytes: &[u8]) -> Result<ToPeer> {
+    if kind != Kind::Cycle {
+        return Err(Error::Unexpected { found: kind, expected: "a cycle frame" });
+    }
+    let (head, arrays) = split_head(bytes)?;
+    let head = <[u8; 8]>::try_from(head).map_err(|_| {
+        Error::Message(format!("head of a peer's cycle has {} bytes, expected 8", head.len()))
+    })?;
+    Ok(ToPeer { cycle: u64::from_le_bytes(head), partials: codec::f64s(arrays)? })
 }
 
 fn with_arrays(head: &[u8], arrays: &[&[f64]]) -> Vec<u8> {

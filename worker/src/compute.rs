@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use mechanics::{
-    cycle::{Domain, Meter, Sets},
+    cycle::{Domain, Load, Meter, Sets},
     lanes::Width,
 };
 use protocol::message::{Assign, Work};
@@ -64,6 +64,11 @@ impl Machine {
         *self = Self::default();
     }
 
+    /// What the domain holds; nothing without one.
+    pub fn load(&self) -> Load {
+        self.domain.as_ref().map(Domain::load).unwrap_or_default()
+    }
+
     /// Does one task. Failures are outcomes.
     pub fn run(&mut self, task: Task) -> Outcome {
         self.try_run(task).unwrap_or_else(Outcome::Failed)
@@ -71,7 +76,7 @@ impl Machine {
 
     fn try_run(&mut self, task: Task) -> Result<Outcome, String> {
         if let Task::Load { assign, prepare } = task {
-            return self.load(*assign, prepare);
+            return self.build(*assign, prepare);
         }
         let clock = &self.clock;
         let domain = self.domain.as_mut().ok_or("a task without an assignment")?;
@@ -109,7 +114,7 @@ impl Machine {
         })
     }
 
-    fn load(&mut self, assign: Assign, prepare: bool) -> Result<Outcome, String> {
+    fn build(&mut self, assign: Assign, prepare: bool) -> Result<Outcome, String> {
         let width = match &assign.lanes {
             Some(name) => {
                 let width: Width = name.parse().map_err(|e| format!("{e}"))?;

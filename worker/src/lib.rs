@@ -1,7 +1,16 @@
 //! The worker: holds sub-domains and work units, computes, exchanges.
 //!
-//! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics; `daemon`
+//! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics; [`daemon`]
 //! carries bytes between the session and a master.
 
+use std::hash::{BuildHasher, Hasher, RandomState};
+
 pub mod compute;
+pub mod daemon;
 pub mod session;
+
+/// A number that no other process draws: for nonces and tokens.
+pub fn random() -> u64 {
+    // Each state is keyed from the system's source of random bytes.
+    RandomState::new().build_hasher().finish()
+}

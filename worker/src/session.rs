@@ -6,14 +6,21 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use mechanics::{block::Piece, cycle::Plan, exact::Quantum, vote::Vote};
-use protocol::message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToWorker, Work};
+use mechanics::{
+    block::Piece,
+    cycle::{Neighbour, Plan},
+    exact::Quantum,
+    vote::Vote,
+};
+use protocol::message::{Assign, IMAGE_VERSION, Orders, Route, ToMaster, ToPeer, ToWorker, Work};
 
 /// What happens to a session.
 #[derive(Debug)]
 pub enum Event {
     /// A message from the master, in the order it was sent.
     Message(ToWorker),
+    /// A message from another worker of the job, by its index.
+    Peer(u32, ToPeer),
     /// A task is done.
     Done(Outcome),
 }
@@ -23,6 +30,8 @@ pub enum Event {
 pub enum Action {
     /// Send to the master.
     Send(ToMaster),
+    /// Send to another worker of the job, over a link of our own or through the master.
+    SendPeer(u32, ToPeer),
     /// Compute; exactly one [`Event::Done`] answers it.
     Compute(Task),
     /// The job is over: drop the domain.
@@ -173,6 +182,11 @@ pub struct Session {
     plans: VecDeque<(u64, u64, Box<Plan>)>,
     guests: Option<(u64, Vec<f64>)>,
     n_exchange: usize,
+    route: Route,
+    neighbours: Vec<Neighbour>,
+    /// On route direct: own partial forces of this cycle, and what neighbours sent, by (cycle, worker).
+    partials: Vec<f64>,
+    heard: BTreeMap<(u64, u32), Vec<f64>>,
     plan_hash: u64,
     vote: Option<Box<Vote>>,
     resumed: bool,
@@ -204,6 +218,10 @@ impl Session {
             plans: VecDeque::new(),
             guests: None,
             n_exchange: 0,
+            route: Route::Master,
+            neighbours: Vec::new(),
+            partials: Vec::new(),
+            heard: BTreeMap::new(),
             plan_hash: 0,
             vote: None,
             resumed: false,
@@ -238,7 +256,9 @@ impl Session {
 
     fn step(&mut self, event: Event, actions: &mut Vec<Action>) -> Result<(), String> {
         match event {
+            Event::Message(ToWorker::Relayed { from, message }) => self.hear_peer(from, message, actions),
             Event::Message(message) => self.hear(message, actions),
+            Event::Peer(from, message) => self.hear_peer(from, message, actions),
             Event::Done(Outcome::Failed(reason)) => Err(reason),
             Event::Done(outcome) => self.done(outcome, actions),
         }
@@ -261,6 +281,8 @@ impl Session {
                     self.sort_lag = u64::from(assign.setup.control.sort_lag);
                     self.quantum = Some(assign.quanta.force);
                     self.n_exchange = assign.plan.exchange.len();
+                    self.route = assign.route;
+                    self.neighbours.clone_from(&assign.plan.neighbours);
                     self.plan_hash = assign.plan_hash;
                     self.resumed = assign.cycle > 0;
                     let prepare = !self.resumed;
@@ -270,6 +292,7 @@ impl Session {
                 phase => Err(format!("an assignment while {phase:?}: a job is in hand")),
             },
             _ if self.phase == Phase::Over || self.phase == Phase::Idle => Ok(()),
+            ToWorker::Relayed { from, message } => self.hear_peer(from, message, actions),
             ToWorker::Start { orders } => {
                 for order in orders {
                     self.orders.insert(order.next, order);
@@ -304,6 +327,24 @@ impl Session {
                 self.resume_waiting(actions)
             }
         }
+    }
+
+    /// A neighbour may be a cycle ahead, and its first frame of a new plan may come before this worker has that plan.
+    fn hear_peer(&mut self, from: u32, message: ToPeer, actions: &mut Vec<Action>) -> Result<(), String> {
+        if matches!(self.phase, Phase::Idle | Phase::Over) {
+            return Ok(());
+        }
+        let ahead = message.cycle.wrapping_sub(self.cycle);
+        if ahead >= MAX_BUFFERED as u64 {
+            return Err(format!(
+                "worker {from} sends cycle {} while this worker is in cycle {}",
+                message.cycle, self.cycle
+            ));
+        }
+        if self.heard.insert((message.cycle, from), message.partials).is_some() {
+            return Err(format!("worker {from} sends cycle {} twice", message.cycle));
+        }
+        self.resume_waiting(actions)
     }
 
     fn resume_waiting(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
@@ -359,7 +400,18 @@ impl Session {
             }
             (Phase::Border, Outcome::Forces { partials, gathered }) => {
                 let vote = self.vote.take();
-                actions.push(Action::Send(ToMaster::Cycle { cycle: self.cycle, vote, partials, gathered }));
+                let cycle = self.cycle;
+                if self.route == Route::Master {
+                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered }));
+                } else {
+                    for neighbour in &self.neighbours {
+                        let partials = of_nodes(&partials, &neighbour.shared)?;
+                        actions.push(Action::SendPeer(neighbour.worker, ToPeer { cycle, partials }));
+                    }
+                    self.partials = partials;
+                    let partials = Vec::new();
+                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered }));
+                }
                 if std::mem::take(&mut self.whole) {
                     self.phase = Phase::AwaitTotals;
                     return self.try_integrate(actions);
@@ -452,6 +504,7 @@ impl Session {
         if let Some((_, hash, plan)) = self.plans.pop_front() {
             self.boundaries.pop_front();
             self.n_exchange = plan.exchange.len();
+            self.neighbours.clone_from(&plan.neighbours);
             self.plan_hash = hash;
             self.phase = Phase::Border;
             actions.push(Action::Compute(Task::Install {
@@ -467,26 +520,67 @@ impl Session {
     /// A worker that shares no node needs only the orders of the cycle before.
     fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
         let Some(orders) = self.orders.get(&self.cycle).copied() else { return Ok(()) };
-        while self.totals.front().is_some_and(|(cycle, _)| *cycle < self.cycle) {
-            self.totals.pop_front();
-        }
-        let totals = if self.n_exchange == 0 {
-            Vec::new()
-        } else {
-            match self.totals.front() {
-                Some((cycle, _)) if *cycle == self.cycle => match self.totals.pop_front() {
-                    Some((_, totals)) => totals,
-                    None => return Ok(()),
-                },
-                Some((cycle, _)) => {
-                    return Err(format!("totals of cycle {cycle} before those of cycle {}", self.cycle));
-                }
-                None => return Ok(()),
-            }
+        let totals = match self.route {
+            _ if self.n_exchange == 0 => Some(Vec::new()),
+            Route::Master => self.totals_of_master()?,
+            Route::Direct => self.totals_of_peers()?,
         };
+        let Some(totals) = totals else { return Ok(()) };
         self.dt = orders.dt;
         self.phase = Phase::Integrating;
         actions.push(Action::Compute(Task::Integrate { totals, dt_previous: self.dt_previous, dt: self.dt }));
         Ok(())
     }
+
+    /// The totals of this cycle from the master, if they are here.
+    fn totals_of_master(&mut self) -> Result<Option<Vec<f64>>, String> {
+        match self.totals.front() {
+            None => Ok(None),
+            Some((cycle, _)) if *cycle == self.cycle => Ok(self.totals.pop_front().map(|(_, totals)| totals)),
+            Some((cycle, _)) => {
+                Err(format!("totals of cycle {cycle}, expected those of cycle {}", self.cycle))
+            }
+        }
+    }
+
+    /// Own and all neighbours' partial forces of this cycle, added, if all are here. Exact, so the order is no matter.
+    fn totals_of_peers(&mut self) -> Result<Option<Vec<f64>>, String> {
+        if self.neighbours.iter().any(|n| !self.heard.contains_key(&(self.cycle, n.worker))) {
+            return Ok(None);
+        }
+        let mut totals = std::mem::take(&mut self.partials);
+        for neighbour in &self.neighbours {
+            let Some(partials) = self.heard.remove(&(self.cycle, neighbour.worker)) else { continue };
+            if partials.len() != 3 * neighbour.shared.len() {
+                return Err(format!(
+                    "worker {} sends {} numbers in cycle {}, the plan has {}",
+                    neighbour.worker,
+                    partials.len(),
+                    self.cycle,
+                    3 * neighbour.shared.len()
+                ));
+            }
+            for (&at, partial) in neighbour.shared.iter().zip(partials.chunks_exact(3)) {
+                for (total, term) in totals[3 * at as usize..].iter_mut().zip(partial) {
+                    *total += term;
+                }
+            }
+        }
+        Ok(Some(totals))
+    }
 }
+
+/// Three numbers of each of these nodes.
+fn of_nodes(values: &[f64], nodes: &[u32]) -> Result<Vec<f64>, String> {
+    let mut out = Vec::with_capacity(3 * nodes.len());
+    for &node in nodes {
+        let at = 3 * node as usize;
+        out.extend_from_slice(
+            values.get(at..at + 3).ok_or("a neighbour shares a node that is not in the exchange")?,
+        );
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests;

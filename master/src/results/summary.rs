@@ -194,7 +194,12 @@ impl Summary {
             writeln!(out, "             {name:<10} {:>14}", significant(value))?;
         }
         writeln!(out, "             {:<10} {:>14}   *part of internal", "error", percent(error))?;
-        writeln!(out, "  momentum   {:<10} {:>14}", "error", percent(self.momentum_error))?;
+        writeln!(
+            out,
+            "  momentum   {:<10} {:>14}   supports and walls included",
+            "change",
+            percent(self.momentum_error)
+        )?;
         writeln!(out, "  digest     {}", self.digest)
     }
 }

@@ -1,15 +1,22 @@
-//! Grind time of the element kernels: nanoseconds of thread CPU time per element per cycle, by lane width, laws and
-//! topology, on two strained plates of 27,000 elements in all.
+//! Grind time: nanoseconds of thread CPU time per element per cycle, on one thread.
 //!
-//! `cargo bench -p mechanics --bench kernels`
+//! First whole cycles of benchmark 1 (a steel plate on an aluminium plate, joined, 500 m/s; Johnson-Cook and shock) by
+//! number of elements, topology and lane width: elements, shared sums, integration and votes, as a worker runs them.
+//! Then the element kernel alone by laws, topology and lane width, on a strained plate of 27,000 elements.
+//!
+//! `cargo bench -p mechanics --bench kernels`; after `--` a word chooses: `cycles`, `kernels`, or a number of elements.
 
 use mechanics::{
     block::{Block, Piece},
+    cycle::{Domain, Meter, Sets, Subdomain},
     element::{ElementVote, Step, hex8},
     exact::Quantum,
+    initial,
     lanes::Width,
     material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
+    piece::{Region, cut},
+    setup::{Constraint, Control, Setup},
     state::{N_FIELDS, field},
 };
 use rustix::time::{ClockId, clock_gettime};
@@ -112,7 +119,178 @@ fn grind(material: &Material, explicit: bool, width: Width) -> [f64; 2] {
     [times[times.len() / 2], times[0]].map(|time| time * 1e9 / f64::from(CELLS.iter().product::<u32>()))
 }
 
+/// The domain of benchmark 1, whose plates have `below` and `above` layers of `side` by `side` elements, and the number
+/// of elements.
+fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (Domain, usize) {
+    let row = side + 1;
+    let plane = row * row;
+    let size = 0.01;
+    let mut positions = Vec::new();
+    for k in 0..=below + above {
+        for j in 0..row {
+            positions.extend((0..row).map(|i| [i, j, k].map(|c| f64::from(c) * size)));
+        }
+    }
+    let part = |name: &str, material: u32, layers: u32, first: u32| {
+        let cells = [side, side, layers];
+        let n_elements = side * side * layers;
+        let mut part = Part {
+            name: name.into(),
+            material,
+            topology: Topology::Structured { cells },
+            nodes: (0..plane * (layers + 1)).collect(),
+            element_ids: (0..n_elements).collect(),
+        };
+        if explicit {
+            let hexahedra = (0..n_elements as usize).map(|e| part.corners(e)).collect();
+            part.topology = Topology::Explicit { hexahedra };
+        }
+        part.nodes.iter_mut().for_each(|n| *n += first * plane);
+        part
+    };
+    let parts = vec![part("target", 0, below, 0), part("projectile", 1, above, below)];
+    let mesh = Mesh { node_ids: (0..positions.len() as u32).collect(), positions, parts };
+    let steel = [7896.0, 4569.0, 1.49, 2.17, 81.8e9, 350e6, 275e6, 0.36, 0.022, 1811.0, 452.0];
+    let aluminium = [2785.0, 5328.0, 1.338, 2.0, 27.6e9, 265e6, 426e6, 0.34, 0.015, 775.0, 875.0];
+    let materials = [("aluminium", aluminium), ("steel", steel)].map(|(name, constants)| {
+        let [density, c0, s, gamma, shear, a, b, n, c, t_melt, specific_heat] = constants;
+        let (m, t_room, rate0) = (1.0, 300.0, 1.0);
+        Material {
+            name: name.into(),
+            density,
+            eos: Eos::Shock { c0, s, gamma },
+            strength: Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 },
+            failure: Failure::None,
+        }
+    });
+    let setup = Setup {
+        materials: materials.into(),
+        control: Control {
+            end_time: 1.0,
+            end_cycle: u64::MAX,
+            safety_factor: 0.6666,
+            growth: 1.05,
+            linear_viscosity: 0.2,
+            quadratic_viscosity: 1.0,
+            hourglass: 0.1,
+            sort_lag: 3,
+            plan_interval: 100,
+        },
+        contact: None,
+        constraints: vec![Constraint::default()],
+        walls: Vec::new(),
+        detonations: Vec::new(),
+    };
+    let falls = |n: u32| [0.0, 0.0, if n / plane > below { -500.0 } else { 0.0 }];
+    let velocity: Vec<[f64; 3]> = mesh.node_ids.iter().map(|&n| falls(n)).collect();
+    let state = initial::state(&mesh, &setup, &velocity, &vec![0; mesh.n_nodes()]).expect("sound cubes");
+    let quanta = initial::quanta(&mesh, &setup, &state);
+    let subdomains: Vec<Subdomain> = (0..2)
+        .map(|p| {
+            let n_elements = mesh.parts[p].n_elements() as u32;
+            let region = if explicit {
+                Region::List((0..n_elements).collect())
+            } else {
+                let Topology::Structured { cells } = mesh.parts[p].topology else { panic!("built above") };
+                Region::Cells { low: [0; 3], high: cells }
+            };
+            let last = below * plane;
+            let unowned = if p == 1 { (last..last + plane).collect() } else { Vec::new() };
+            let pieces = vec![cut(&mesh, &state, p, &region)];
+            Subdomain { id: p as u32, pieces, unowned, surface: Vec::new() }
+        })
+        .collect();
+    let n_elements = mesh.n_elements();
+    let mut domain = Domain::new(setup, 2, quanta, &subdomains, &[], width);
+    domain.install(&Default::default(), &[]).expect("a plan without other workers");
+    (domain, n_elements)
+}
+
+/// Books nothing: the bench reads the clock itself.
+struct Silent;
+
+impl Meter for Silent {
+    fn start(&self) -> u64 {
+        0
+    }
+
+    fn stop(&self, _mark: u64, _contact: bool) {}
+}
+
+/// Median and least over `n_cycles` cycles of the nanoseconds per element of a whole cycle, from the impact on.
+fn whole_cycle(plates: (Domain, usize), n_cycles: usize) -> [f64; 2] {
+    let (mut domain, n_elements) = plates;
+    let mut vote = domain.prepare(&Silent);
+    let mut dt_previous = 0.0;
+    let mut times: Vec<f64> = (0..n_cycles)
+        .map(|cycle| {
+            let limit = 0.6666 * vote.courant.min(vote.volume_limit);
+            let dt = if cycle == 0 { 0.5 * limit } else { limit.min(1.05 * dt_previous) };
+            let start = now();
+            domain.contact(dt_previous, &Silent);
+            domain.elements(Sets::Border, dt_previous, &Silent);
+            let partials = domain.partials(&Silent);
+            domain.elements(Sets::Interior, dt_previous, &Silent);
+            vote = domain.integrate(&partials, dt_previous, dt, &Silent).expect("totals of the exchange");
+            let spent = now() - start;
+            assert!(vote.fault.is_none(), "fault {:?}", vote.fault);
+            dt_previous = dt;
+            spent
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    [times[times.len() / 2], times[0]].map(|time| time * 1e9 / n_elements as f64)
+}
+
+/// The table of whole cycles; `only` chooses a number of elements.
+fn cycles(only: Option<usize>) {
+    println!("whole cycle of benchmark 1, ns per element and cycle, median and (least)");
+    println!("{:>9}  {:<12}{:>16}{:>16}", "elements", "topology", "avx2", "avx512");
+    let shapes = [
+        (30, 20, 10, false, 200),
+        (40, 30, 10, false, 120),
+        (40, 30, 10, true, 120),
+        (60, 40, 20, false, 50),
+        (100, 75, 25, false, 20),
+    ];
+    for (side, below, above, explicit, n_cycles) in shapes {
+        let n_elements = (side * side * (below + above)) as usize;
+        if only.is_some_and(|only| only != n_elements) {
+            continue;
+        }
+        let columns = [Width::Avx2, Width::Avx512].map(|width| {
+            if width.available() {
+                let [median, least] = whole_cycle(plates(side, below, above, explicit, width), n_cycles);
+                format!("{median:.1} ({least:.1})")
+            } else {
+                "-".to_owned()
+            }
+        });
+        let topology = if explicit { "explicit" } else { "structured" };
+        println!("{n_elements:>9}  {topology:<12}{:>16}{:>16}", columns[0], columns[1]);
+    }
+}
+
 fn main() {
+    // Blocks spread over the current pool: one of a single thread keeps all work on the clock.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    pool.install(tables);
+}
+
+fn tables() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let only = words.iter().find_map(|word| word.parse().ok());
+    let asks = |name: &str| words.iter().any(|word| word == name);
+    if !asks("kernels") {
+        cycles(only);
+    }
+    if only.is_none() && !asks("cycles") {
+        kernels();
+    }
+}
+
+/// The table of kernels.
+fn kernels() {
     let shock = Eos::Shock { c0: 4569.0, s: 1.49, gamma: 2.17 };
     let shear = 81.8e9;
     let johnson_cook = |m: f64| Strength::JohnsonCook {
@@ -138,7 +316,7 @@ fn main() {
         ("Johnson-Cook (m = 1) + shock", shock, johnson_cook(1.0)),
         ("Johnson-Cook (m = 1.03) + shock", shock, johnson_cook(1.03)),
     ];
-    println!("ns per element and cycle, median and (least)");
+    println!("element kernel alone, ns per element and cycle, median and (least)");
     println!("{:<34}{:<9}{:>16}{:>16}", "laws", "width", "structured", "explicit");
     for (name, eos, strength) in laws {
         let material = Material { name: name.into(), density: 7896.0, eos, strength, failure: Failure::None };

@@ -62,7 +62,7 @@ pub struct Piece {
 }
 
 /// Elements of one kind and one material, laid out for the kernels. The first `nodes.len()` entries of the node
-/// arrays are nodes; what follows is padding that wide loads may touch and nothing may rely on.
+/// arrays are nodes; what follows is padding, to whole sets of eight at least, that nothing may rely on.
 pub struct Block {
     /// Part index.
     pub part: u32,
@@ -88,8 +88,11 @@ pub struct Block {
     slots: Vec<u32>,
     fields: [Vec<f64>; N_FIELDS],
     initial_volume: Vec<f64>,
-    alive: Vec<f64>,
+    /// Bits of the slots of each set that hold elements.
+    alive: Vec<u8>,
     slot_elements: Vec<u32>,
+    /// Lowest global element index of each set.
+    lowest: Vec<u32>,
     /// Entries of a node array that the kernels may touch.
     reach: usize,
 }
@@ -121,10 +124,11 @@ impl Block {
             }
             array
         };
+        let n_padded = reach.max(n_nodes.next_multiple_of(SET));
         let by_axis = |values: &[[f64; 3]]| -> [Vec<f64>; 3] {
             std::array::from_fn(|axis| {
                 let mut array: Vec<f64> = values.iter().map(|value| value[axis]).collect();
-                array.resize(reach.max(n_nodes), 0.0);
+                array.resize(n_padded, 0.0);
                 array
             })
         };
@@ -139,13 +143,20 @@ impl Block {
             elements: piece.elements.clone(),
             x: by_axis(&piece.x),
             v: by_axis(&piece.v),
-            f: std::array::from_fn(|_| vec![0.0; reach.max(n_nodes)]),
-            mass: piece.mass.clone(),
+            f: std::array::from_fn(|_| vec![0.0; n_padded]),
+            mass: piece.mass.iter().copied().chain(std::iter::repeat_n(1.0, n_padded - n_nodes)).collect(),
             constraint: piece.constraint.clone(),
             topology: piece.topology.clone(),
             fields: std::array::from_fn(|field| by_slot(&piece.fields[field], 0.0)),
             initial_volume: by_slot(&piece.initial_volume, 1.0),
-            alive: by_slot(&vec![1.0; n_elements], 0.0),
+            alive: slot_elements
+                .chunks(SET)
+                .map(|set| (0..).zip(set).map(|(i, &element)| u8::from(element != PHANTOM) << i).sum())
+                .collect(),
+            lowest: slot_elements
+                .chunks(SET)
+                .map(|set| set.iter().copied().min().unwrap_or(PHANTOM))
+                .collect(),
             slot_elements,
             layout,
             slots,
@@ -168,7 +179,7 @@ impl Block {
             elements: self.elements.clone(),
             x: by_node(&self.x),
             v: by_node(&self.v),
-            mass: self.mass.clone(),
+            mass: self.mass[..self.nodes.len()].to_vec(),
             constraint: self.constraint.clone(),
             initial_volume: by_element(&self.initial_volume),
             fields: std::array::from_fn(|field| by_element(&self.fields[field])),
@@ -177,7 +188,16 @@ impl Block {
 
     /// Number of lane sets.
     pub fn n_sets(&self) -> u32 {
-        (self.alive.len() / SET) as u32
+        self.alive.len() as u32
+    }
+
+    /// Number of elements in a range of lane sets.
+    ///
+    /// # Panics
+    /// If there are no such sets.
+    pub fn n_elements_of(&self, sets: &Range<u32>) -> u64 {
+        let slots = sets.start as usize * SET..sets.end as usize * SET;
+        self.slot_elements[slots].iter().filter(|&&element| element != PHANTOM).count() as u64
     }
 
     /// One state field of a local element.
@@ -369,6 +389,7 @@ impl Block {
             initial_volume: &self.initial_volume,
             alive: &self.alive,
             elements: &self.slot_elements,
+            lowest: &self.lowest,
         };
         let n_padded = view.x.iter().chain(&view.v).map(|a| a.len()).min().unwrap_or(0);
         let n_forces = view.f.iter().map(|a| a.len()).min().unwrap_or(0);

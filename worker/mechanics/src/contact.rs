@@ -17,9 +17,11 @@
 
 use serde::{Deserialize, Serialize};
 
+mod boxes;
 pub mod cycle;
 pub mod force;
 pub mod joint;
+mod pairs;
 pub mod reach;
 pub mod search;
 pub mod sort;

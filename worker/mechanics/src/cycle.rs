@@ -9,7 +9,7 @@
 //! [`Domain::partials`], [`Domain::elements`] (interior), [`Domain::integrate`].
 
 use std::{
-    collections::{HashMap, VecDeque},
+    collections::{HashMap, HashSet, VecDeque},
     ops::Range,
 };
 
@@ -18,10 +18,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     block::{Block, Piece},
-    contact::{Batch, Contact, Extent},
+    contact::{Batch, Contact},
     element::{ElementVote, Step},
-    lanes::Width,
-    nodes::{Advance, Booked, Nodes},
+    home::Home,
+    lanes::{SET, Width},
+    nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
     vote::{Quanta, Vote},
 };
@@ -58,6 +59,18 @@ pub struct Plan {
     pub guests: Vec<Guest>,
     /// Global nodes whose state this worker sends to others when the plan starts to act.
     pub send: Vec<u32>,
+    /// On route direct: the workers that hold nodes of `exchange` too.
+    pub neighbours: Vec<Neighbour>,
+}
+
+/// Another worker that holds nodes of the exchange.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Neighbour {
+    /// Its index among the workers of the job.
+    pub worker: u32,
+    /// Positions in [`Plan::exchange`] of the nodes that both hold, ascending; both sides list them in the same order
+    /// of nodes.
+    pub shared: Vec<u32>,
 }
 
 /// What integrating a guest needs beside its position and velocity.
@@ -82,9 +95,18 @@ pub enum Sets {
     All,
 }
 
-/// Cycles for which a contact node's speed is foreseen by its acceleration: a vote takes effect two cycles later, and
-/// forces of an impact still grow meanwhile.
-const SPEED_LAG: f64 = 3.0;
+/// How much a domain holds under the plan in force: what its steps cost is in proportion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Load {
+    /// Elements that are computed before partial forces travel.
+    pub border: u64,
+    /// Elements that are computed while they travel.
+    pub interior: u64,
+    /// Nodes that are integrated, copies and guests included.
+    pub nodes: u64,
+    /// Node-face pairs that are looked at each cycle.
+    pub pairs: u64,
+}
 
 /// No index.
 const NONE: u32 = u32::MAX;
@@ -94,18 +116,28 @@ struct Room {
     block: Block,
     border: Vec<Range<u32>>,
     interior: Vec<Range<u32>>,
-    booked: Vec<bool>,
-    /// Local nodes on the contact surface.
-    surface: Vec<u32>,
-    /// Their positions at the sort in force.
-    reference: Vec<[f64; 3]>,
-    /// Their positions at gatherings whose sorts do not act yet, oldest first.
-    gathered: VecDeque<Vec<[f64; 3]>>,
+    /// Which nodes are held, booked and on the contact surface.
+    sets: Vec<NodeSet>,
+    /// Positions at the sort in force, eight for each set with nodes on the surface.
+    reference: [Vec<f64>; 3],
+    /// Those at gatherings whose sorts do not act yet, oldest first.
+    gathered: VecDeque<[Vec<f64>; 3]>,
     vote: ElementVote,
-    sums: Booked,
-    extent: Extent,
-    speed_squared: f64,
-    speed_ahead: f64,
+    booked: Booked,
+}
+
+impl Room {
+    /// Positions as of now of the sets with nodes on the surface.
+    fn surface_positions(&self) -> [Vec<f64>; 3] {
+        let touched = || (0..).zip(&self.sets).filter(|(_, set)| set.surface != 0);
+        std::array::from_fn(|a| {
+            touched().flat_map(|(set, _)| &self.block.x[a][set * SET..(set + 1) * SET]).copied().collect()
+        })
+    }
+
+    fn is_booked(&self, local: u32) -> bool {
+        self.sets[local as usize / SET].booked >> (local as usize % SET) & 1 == 1
+    }
 }
 
 /// Copies of one node: a range of `Domain::copies`, its contact node and its guest.
@@ -134,7 +166,7 @@ struct Guests {
     f: [Vec<f64>; 3],
     mass: Vec<f64>,
     constraint: Vec<u16>,
-    booked: Vec<bool>,
+    sets: Vec<NodeSet>,
 }
 
 /// Everything a worker computes on.
@@ -149,7 +181,7 @@ pub struct Domain {
     exchange: Vec<Shared>,
     local: Vec<Shared>,
     copies: Vec<(u32, u32)>,
-    home: HashMap<u32, Vec<(u32, u32)>>,
+    home: Home,
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
     vote: Vote,
@@ -166,43 +198,35 @@ impl Domain {
         width: Width,
     ) -> Self {
         let mut rooms: Vec<Room> = Vec::new();
-        let mut home: HashMap<u32, Vec<(u32, u32)>> = HashMap::new();
+        let pieces = subdomains.iter().flat_map(|subdomain| &subdomain.pieces);
+        let home = Home::new(pieces.map(|piece| piece.nodes.as_slice()));
         let mut gather = Vec::new();
         for subdomain in subdomains {
             let first = rooms.len();
             for piece in &subdomain.pieces {
                 let block = Block::new(piece);
-                for (local, &node) in piece.nodes.iter().enumerate() {
-                    home.entry(node).or_default().push((rooms.len() as u32, local as u32));
-                }
-                let n = block.nodes.len();
                 let all = 0..block.n_sets();
                 rooms.push(Room {
+                    sets: NodeSet::all(&block.constraint),
                     block,
                     border: Vec::new(),
                     interior: vec![all],
-                    booked: vec![false; n],
-                    surface: Vec::new(),
-                    reference: Vec::new(),
+                    reference: Default::default(),
                     gathered: VecDeque::new(),
                     vote: ElementVote::default(),
-                    sums: Booked::default(),
-                    extent: Extent::NONE,
-                    speed_squared: 0.0,
-                    speed_ahead: 0.0,
+                    booked: Booked::default(),
                 });
             }
             let own = first as u32..rooms.len() as u32;
-            let first_copy = |node: u32| {
-                home.get(&node)
-                    .and_then(|copies| copies.iter().copied().find(|(block, _)| own.contains(block)))
-            };
+            let first_copy =
+                |node: u32| home.get(node).iter().copied().find(|(block, _)| own.contains(block));
             for room in own.clone() {
                 for local in 0..rooms[room as usize].block.nodes.len() as u32 {
                     let node = rooms[room as usize].block.nodes[local as usize];
                     let owned = subdomain.unowned.binary_search(&node).is_err();
-                    rooms[room as usize].booked[local as usize] =
-                        owned && first_copy(node) == Some((room, local));
+                    if owned && first_copy(node) == Some((room, local)) {
+                        rooms[room as usize].sets[local as usize / SET].booked |= 1 << (local as usize % SET);
+                    }
                 }
             }
             for &node in &subdomain.surface {
@@ -210,19 +234,19 @@ impl Domain {
                     if subdomain.unowned.binary_search(&node).is_err() {
                         gather.push((room, local));
                     }
-                    rooms[room as usize].surface.push(local);
+                    rooms[room as usize].sets[local as usize / SET].surface |= 1 << (local as usize % SET);
                 }
             }
         }
         for room in &mut rooms {
-            room.reference = positions(&room.block, &room.surface);
+            room.reference = room.surface_positions();
         }
         let gauges = gauges
             .iter()
             .enumerate()
             .filter_map(|(g, node)| {
                 let &(room, local) =
-                    home.get(node)?.iter().find(|&&(r, l)| rooms[r as usize].booked[l as usize])?;
+                    home.get(*node).iter().find(|&&(r, l)| rooms[r as usize].is_booked(l))?;
                 Some((g as u32, room, local))
             })
             .collect();
@@ -249,15 +273,31 @@ impl Domain {
         self.rooms.iter().map(|r| r.block.elements.len()).sum()
     }
 
+    /// What it holds under the plan in force.
+    pub fn load(&self) -> Load {
+        let mut load = Load::default();
+        for room in &self.rooms {
+            let n = room.block.elements.len() as u64;
+            let interior: u64 = room.interior.iter().map(|sets| room.block.n_elements_of(sets)).sum();
+            load.border += n - interior;
+            load.interior += interior;
+            load.nodes += room.block.nodes.len() as u64;
+        }
+        load.nodes += self.guests.node.len() as u64;
+        load.pairs = self.contact.as_ref().map_or(0, |room| room.contact.n_pairs() as u64);
+        load
+    }
+
     /// A pass with a step of zero: changes nothing and gives the vote a run starts from.
     pub fn prepare(&mut self, meter: &dyn Meter) -> Vote {
         self.vote = Vote::empty(self.n_parts);
         self.elements(Sets::All, 0.0, meter);
         for room in &mut self.rooms {
             room.block.clear_forces();
-            let Room { block, surface, .. } = room;
-            let v = &block.v;
-            let top = surface.iter().map(|&i| speed_squared(v, i as usize)).fold(0.0, f64::max);
+            let v = &room.block.v;
+            let on_surface = |i: usize| room.sets[i / SET].surface >> (i % SET) & 1 == 1;
+            let nodes = (0..room.block.nodes.len()).filter(|&i| on_surface(i));
+            let top = nodes.map(|i| speed_squared(v, i)).fold(0.0, f64::max);
             self.vote.contact_speed_squared = self.vote.contact_speed_squared.max(top);
             self.vote.contact_speed_ahead = self.vote.contact_speed_ahead.max(top.sqrt());
         }
@@ -276,32 +316,41 @@ impl Domain {
                 plan.guests.len()
             ));
         }
-        let n_guests = plan.guests.len();
+        let constraint: Vec<u16> = plan.guests.iter().map(|g| g.constraint).collect();
+        let sets = NodeSet::all(&constraint);
+        let padded = |values: &mut dyn Iterator<Item = f64>, padding: f64| {
+            let mut array: Vec<f64> = values.collect();
+            array.resize(sets.len() * SET, padding);
+            array
+        };
+        let number = |i: usize| padded(&mut guest_state.chunks_exact(6).map(|s| s[i]), 0.0);
         self.guests = Guests {
             node: plan.guests.iter().map(|g| g.node).collect(),
-            x: std::array::from_fn(|a| guest_state.chunks_exact(6).map(|s| s[a]).collect()),
-            v: std::array::from_fn(|a| guest_state.chunks_exact(6).map(|s| s[3 + a]).collect()),
-            f: std::array::from_fn(|_| vec![0.0; n_guests]),
-            mass: plan.guests.iter().map(|g| g.mass).collect(),
-            constraint: plan.guests.iter().map(|g| g.constraint).collect(),
-            booked: vec![false; n_guests],
+            x: std::array::from_fn(number),
+            v: std::array::from_fn(|a| number(3 + a)),
+            f: std::array::from_fn(|_| padded(&mut std::iter::empty(), 0.0)),
+            mass: padded(&mut plan.guests.iter().map(|g| g.mass), 1.0),
+            constraint,
+            sets,
         };
         let guest_of: HashMap<u32, u32> =
             self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
-        let mut contact_of = HashMap::new();
+        let contact_nodes = plan.batch.as_ref().map_or(&[][..], |batch| &batch.nodes);
+        if !contact_nodes.is_sorted_by(|a, b| a.global < b.global) {
+            return Err("contact nodes are not in ascending order".to_owned());
+        }
         self.contact = None;
         if let (Some(batch), Some(settings)) = (&plan.batch, &self.setup.contact) {
             let mut sources = Vec::with_capacity(batch.nodes.len());
-            for (i, node) in batch.nodes.iter().enumerate() {
-                let source = match (self.home.get(&node.global), guest_of.get(&node.global)) {
-                    (Some(copies), _) => copies[0],
-                    (None, Some(&guest)) => (NONE, guest),
-                    (None, None) => {
+            for node in &batch.nodes {
+                let source = match (self.home.get(node.global), guest_of.get(&node.global)) {
+                    ([first, ..], _) => *first,
+                    ([], Some(&guest)) => (NONE, guest),
+                    ([], None) => {
                         return Err(format!("contact node {} is neither held nor a guest", node.global));
                     }
                 };
                 sources.push(source);
-                contact_of.insert(node.global, i as u32);
             }
             let n = sources.len();
             let zeros = || std::array::from_fn(|_| vec![0.0; n]);
@@ -314,30 +363,37 @@ impl Domain {
         self.copies.clear();
         self.exchange.clear();
         self.local.clear();
-        let mut exchanged = std::collections::HashSet::with_capacity(plan.exchange.len());
+        let mut exchanged = HashSet::with_capacity(plan.exchange.len());
         for &node in &plan.exchange {
             exchanged.insert(node);
-            let shared = self.shared(node, &contact_of, &guest_of);
+            let contact = contact_nodes.binary_search_by_key(&node, |n| n.global);
+            let shared = self.shared(node, contact.map_or(NONE, |i| i as u32), &guest_of);
             if shared.copies.is_empty() && shared.guest == NONE {
                 return Err(format!("node {node} of the exchange is neither held nor a guest"));
             }
             self.exchange.push(shared);
         }
-        let mut inner: Vec<u32> = self
-            .home
-            .iter()
-            .filter(|(node, copies)| copies.len() > 1 || contact_of.contains_key(node))
-            .map(|(&node, _)| node)
-            .filter(|node| !exchanged.contains(node))
-            .collect();
-        inner.sort_unstable();
-        for node in inner {
-            let shared = self.shared(node, &contact_of, &guest_of);
-            self.local.push(shared);
+        // Both lists ascend, so one walk over them finds the contact node of each.
+        let (mut next, n_several) = (0, self.home.several().len());
+        for (i, node) in (0_u32..).zip(contact_nodes.iter().map(|n| n.global)) {
+            while next < n_several && self.home.several()[next] < node {
+                self.share_locally(self.home.several()[next], NONE, &exchanged, &guest_of);
+                next += 1;
+            }
+            next += usize::from(next < n_several && self.home.several()[next] == node);
+            self.share_locally(node, i, &exchanged, &guest_of);
+        }
+        for i in next..n_several {
+            self.share_locally(self.home.several()[i], NONE, &exchanged, &guest_of);
         }
         for room in &mut self.rooms {
-            let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
-            (room.border, room.interior) = split(&room.block.sets_touching(&touched));
+            (room.border, room.interior) = if exchanged.is_empty() {
+                let all = 0..room.block.n_sets();
+                (Vec::new(), vec![all])
+            } else {
+                let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
+                split(&room.block.sets_touching(&touched))
+            };
             if let Some(gathered) = room.gathered.pop_front() {
                 room.reference = gathered;
             }
@@ -345,12 +401,26 @@ impl Domain {
         Ok(())
     }
 
-    fn shared(&mut self, node: u32, contact_of: &HashMap<u32, u32>, guest_of: &HashMap<u32, u32>) -> Shared {
+    /// Books the copies of a held node that is not exchanged.
+    fn share_locally(
+        &mut self,
+        node: u32,
+        contact: u32,
+        exchanged: &HashSet<u32>,
+        guest_of: &HashMap<u32, u32>,
+    ) {
+        if !self.home.get(node).is_empty() && !exchanged.contains(&node) {
+            let shared = self.shared(node, contact, guest_of);
+            self.local.push(shared);
+        }
+    }
+
+    fn shared(&mut self, node: u32, contact: u32, guest_of: &HashMap<u32, u32>) -> Shared {
         let first = self.copies.len() as u32;
-        self.copies.extend(self.home.get(&node).into_iter().flatten());
+        self.copies.extend_from_slice(self.home.get(node));
         Shared {
             copies: first..self.copies.len() as u32,
-            contact: contact_of.get(&node).copied().unwrap_or(NONE),
+            contact,
             guest: guest_of.get(&node).copied().unwrap_or(NONE),
         }
     }
@@ -364,8 +434,8 @@ impl Domain {
         for node in nodes {
             let (room, local) = *self
                 .home
-                .get(node)
-                .and_then(|copies| copies.first())
+                .get(*node)
+                .first()
                 .ok_or_else(|| format!("node {node} to transfer is not held"))?;
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
             out.extend((0..3).map(|a| block.x[a][i]));
@@ -377,7 +447,7 @@ impl Domain {
     /// Positions of the owned surface nodes in the order the master expects; a sort will use them.
     pub fn gather(&mut self) -> Vec<f64> {
         for room in &mut self.rooms {
-            room.gathered.push_back(positions(&room.block, &room.surface));
+            room.gathered.push_back(room.surface_positions());
         }
         let mut out = Vec::with_capacity(3 * self.gather.len());
         for &(room, local) in &self.gather {
@@ -407,7 +477,7 @@ impl Domain {
         meter.stop(mark, true);
     }
 
-    /// Forces of element sets at `x_n`; `dt` is `dt_{n-1}`. Border and All start from cleared forces.
+    /// Forces of element sets at `x_n`, added to forces that integration has cleared; `dt` is `dt_{n-1}`.
     pub fn elements(&mut self, sets: Sets, dt: f64, meter: &dyn Meter) {
         let control = &self.setup.control;
         let step = Step {
@@ -423,10 +493,7 @@ impl Domain {
             let mark = meter.start();
             let material = &materials[room.block.material as usize];
             if sets != Sets::Interior {
-                room.block.clear_forces();
                 room.vote = ElementVote::default();
-            }
-            if sets != Sets::Interior {
                 room.block.compute(material, &room.border, &step, width, &mut room.vote);
             }
             if sets != Sets::Border {
@@ -514,38 +581,33 @@ impl Domain {
             walls: &self.setup.walls,
             quanta: self.quanta,
         };
+        let width = self.width;
         each(&mut self.rooms, |room| {
             let mark = meter.start();
             let block = &mut room.block;
-            room.sums = advance.run(&mut Nodes {
+            let mut nodes = Nodes {
                 x: &mut block.x,
                 v: &mut block.v,
-                f: &block.f,
+                f: &mut block.f,
                 mass: &block.mass,
                 constraint: &block.constraint,
-                booked: &room.booked,
-            });
-            room.extent = Extent::NONE;
-            room.speed_squared = 0.0;
-            room.speed_ahead = 0.0;
-            for (&i, from) in room.surface.iter().zip(&room.reference) {
-                let i = i as usize;
-                room.extent.add(std::array::from_fn(|a| block.x[a][i] - from[a]));
-                let squared = speed_squared(&block.v, i);
-                let gain = SPEED_LAG * dt * speed_squared(&block.f, i).sqrt() / block.mass[i];
-                room.speed_squared = room.speed_squared.max(squared);
-                room.speed_ahead = room.speed_ahead.max(squared.sqrt() + gain);
-            }
+                sets: &room.sets,
+                reference: &room.reference,
+            };
+            room.booked = advance.run(&mut nodes, width);
             meter.stop(mark, false);
         });
-        advance.run(&mut Nodes {
-            x: &mut self.guests.x,
-            v: &mut self.guests.v,
-            f: &self.guests.f,
-            mass: &self.guests.mass,
-            constraint: &self.guests.constraint,
-            booked: &self.guests.booked,
-        });
+        let guests = &mut self.guests;
+        let mut nodes = Nodes {
+            x: &mut guests.x,
+            v: &mut guests.v,
+            f: &mut guests.f,
+            mass: &guests.mass,
+            constraint: &guests.constraint,
+            sets: &guests.sets,
+            reference: &Default::default(),
+        };
+        advance.run(&mut nodes, width);
         Ok(self.finish_vote())
     }
 
@@ -554,14 +616,14 @@ impl Domain {
         for room in &self.rooms {
             let part = room.block.part as usize;
             vote.add_elements(part, &room.vote);
-            vote.parts[part].kinetic += room.sums.kinetic;
-            vote.external += room.sums.external;
+            vote.parts[part].kinetic += room.booked.kinetic;
+            vote.external += room.booked.external;
             for a in 0..3 {
-                vote.momentum[a] += room.sums.momentum[a];
+                vote.momentum[a] += room.booked.momentum[a];
             }
-            vote.extents[part].merge(&room.extent);
-            vote.contact_speed_squared = vote.contact_speed_squared.max(room.speed_squared);
-            vote.contact_speed_ahead = vote.contact_speed_ahead.max(room.speed_ahead);
+            vote.extents[part].merge(&room.booked.extent);
+            vote.contact_speed_squared = vote.contact_speed_squared.max(room.booked.speed_squared);
+            vote.contact_speed_ahead = vote.contact_speed_ahead.max(room.booked.speed_ahead);
         }
         for &(gauge, room, local) in &self.gauges {
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
@@ -584,10 +646,6 @@ fn each(rooms: &mut [Room], work: impl Fn(&mut Room) + Send + Sync) {
         [one] => work(one),
         many => many.par_iter_mut().with_max_len(1).for_each(work),
     }
-}
-
-fn positions(block: &Block, local: &[u32]) -> Vec<[f64; 3]> {
-    local.iter().map(|&i| std::array::from_fn(|a| block.x[a][i as usize])).collect()
 }
 
 fn speed_squared(v: &[Vec<f64>; 3], i: usize) -> f64 {

@@ -3,6 +3,7 @@
 
 use crate::{
     burn::lighting_time,
+    contact::Extent,
     element::hex8,
     exact::Quantum,
     mesh::Mesh,
@@ -62,7 +63,8 @@ pub fn state(
     }
     debug_assert_eq!(state.elements.len(), N_FIELDS);
     let heaviest = mass_of.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let quantum = Quantum::for_reference(heaviest, 46);
+    // 64 eighths at a node stay below 2^53 quanta.
+    let quantum = Quantum::for_reference(heaviest, 50);
     let mut index = 0;
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
@@ -157,4 +159,29 @@ pub fn bind_walls(mesh: &Mesh, setup: &mut Setup, constraint: &mut [u16]) -> Res
             u16::try_from(index).map_err(|_| "more than 65,535 kinds of constraint".to_owned())?;
     }
     Ok(())
+}
+
+/// The greatest speed at which each part closes in on a part that it may meet, itself included (length per time): the
+/// diagonal of the box around both parts' initial velocities. `velocity` by global node.
+pub fn closing_speeds(mesh: &Mesh, contact: &crate::contact::Settings, velocity: &[[f64; 3]]) -> Vec<f64> {
+    let boxes: Vec<Extent> = mesh
+        .parts
+        .iter()
+        .map(|part| {
+            let mut extent = Extent::NONE;
+            part.nodes.iter().for_each(|&n| extent.add(velocity[n as usize]));
+            extent
+        })
+        .collect();
+    let closing = |a: &Extent, b: &Extent| {
+        (0..3).map(|i| (a.max[i] - b.min[i]).max(b.max[i] - a.min[i]).powi(2)).sum::<f64>().sqrt()
+    };
+    (0..boxes.len())
+        .map(|p| {
+            (0..boxes.len())
+                .filter(|&q| contact.permits(p as u32, q as u32))
+                .map(|q| closing(&boxes[p], &boxes[q]))
+                .fold(0.0, f64::max)
+        })
+        .collect()
 }

@@ -63,11 +63,15 @@ pub trait Lane:
     fn min(self, other: Self) -> Self;
     /// `if self > other { self } else { other }`.
     fn max(self, other: Self) -> Self;
+    /// The larger of the magnitudes, for numbers that are not NaN.
+    fn max_magnitude(self, other: Self) -> Self;
 
     /// `self < other`; false if either is NaN.
     fn less(self, other: Self) -> Self::Mask;
     /// `self <= other`; false if either is NaN.
     fn less_equal(self, other: Self) -> Self::Mask;
+    /// Lane `i` set where bit `i` is; higher bits are no matter.
+    fn mask(bits: u32) -> Self::Mask;
     /// Both masks.
     fn both(one: Self::Mask, other: Self::Mask) -> Self::Mask;
     /// `yes` where the mask is set, else `no`. What is not chosen has no influence, NaN included.

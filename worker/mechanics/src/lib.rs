@@ -27,6 +27,7 @@ pub mod element;
 mod eos;
 pub mod exact;
 mod failure;
+mod home;
 pub mod initial;
 pub mod lanes;
 pub mod material;

@@ -4,15 +4,24 @@
 //! features, hits, reactions; scatter: into the force arrays, in any order because all terms are exact.
 
 use super::{
-    ContactVote, Exclusions, Settings, WARNING, force,
+    ContactVote, Exclusions, Settings, WARNING,
+    boxes::Boxes,
+    force::{
+        self,
+        lanes::{Pushes, Statics, Terms},
+    },
     joint::{self, Hit, Near},
+    pairs::Pairs,
     search::{self, Bounds, Candidates},
     sort::sort,
     surface::Surface,
     work_unit::Batch,
-    zone::Frame,
+    zone::{
+        Frame, INNER, OUTER,
+        lanes::{self, Approach, Closest},
+    },
 };
-use crate::exact::Quantum;
+use crate::{exact::Quantum, lanes::Width};
 
 /// A pair at exactly one gap is outside the zone, rounding or not: only nearer ones by this fraction are
 /// inside it at time zero.
@@ -46,43 +55,51 @@ pub fn initial_pairs(surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> 
     pairs
 }
 
-/// A face that has candidates, as the cycle needs it.
-#[derive(Clone, Copy, Debug)]
-struct ActiveFace {
-    /// Batch nodes.
-    nodes: [u32; 4],
-    /// Global nodes of the same corners.
-    corners: [u32; 4],
-    id: u32,
-    part: u32,
-    stiffness: f64,
-}
-
-/// A face without a frame in this cycle.
-const UNFRAMED: u32 = u32::MAX;
+/// Candidate nodes whose pairs are computed together: their lists fit the first cache.
+const BLOCK: usize = 64;
 
 /// The contact of one batch, from one sort to the next.
 #[derive(Clone, Debug)]
 pub struct Contact {
     settings: Settings,
     n_parts: usize,
-    /// Pairs that can meet; `faces` are indices into `active`.
+    /// Pairs that can meet; `faces` are indices into the lists of active faces.
     candidates: Candidates,
-    active: Vec<ActiveFace>,
+    /// By active face, one that has candidates: batch nodes, global nodes of the same corners, face id, part.
+    faces: Vec<[u32; 4]>,
+    corners: Vec<[u32; 4]>,
+    ids: Vec<u32>,
+    parts: Vec<u32>,
     /// By batch node.
     global: Vec<u32>,
     part: Vec<u32>,
-    stiffness: Vec<f64>,
-    /// The deck's factor times the node's share.
-    factor: Vec<f64>,
-    inverse_mass: Vec<f64>,
-    /// Corners and boxes of the active faces, and frames of those that a node is near.
-    corners: Vec<[[f64; 3]; 4]>,
-    bounds: Vec<Bounds>,
-    frames: Vec<Frame>,
-    /// Place of each active face in `frames`, or [`UNFRAMED`].
-    framed: Vec<u32>,
-    /// Work space of one node.
+    /// By batch node and by active face.
+    statics: Statics,
+    /// Whether no pair has friction.
+    smooth: bool,
+    width: Width,
+    work: Work,
+}
+
+/// Work space of one block of nodes.
+#[derive(Clone, Debug, Default)]
+struct Work {
+    boxes: Boxes,
+    /// Active faces whose boxes hold a node, and the end of those of each node.
+    held: Vec<u32>,
+    ends: Vec<u32>,
+    pairs: Pairs,
+    closest: Closest,
+    /// Features near nodes: where the pushes act.
+    near_pairs: Pairs,
+    approach: Approach,
+    face: Vec<u32>,
+    share: Vec<f64>,
+    stacking: Vec<f64>,
+    /// Depths and directions from the long way: place, depth, direction.
+    long_way: Vec<(usize, f64, [f64; 3])>,
+    terms: Terms,
+    /// The near faces of one node that needs the long way.
     near: Vec<Near>,
     hits: Vec<Hit>,
     beyond: Vec<u32>,
@@ -110,39 +127,39 @@ impl Contact {
         for &f in &candidates.faces {
             index[f as usize] = 0;
         }
-        let mut active = Vec::new();
+        let mut contact = Self {
+            n_parts: settings.n_parts(),
+            settings: settings.clone(),
+            candidates: Candidates::default(),
+            faces: Vec::new(),
+            corners: Vec::new(),
+            ids: Vec::new(),
+            parts: Vec::new(),
+            global: batch.nodes.iter().map(|n| n.global).collect(),
+            part: batch.nodes.iter().map(|n| n.part).collect(),
+            statics: Statics {
+                factor: batch.nodes.iter().map(|n| settings.stiffness * n.share).collect(),
+                stiffness: batch.nodes.iter().map(|n| n.stiffness).collect(),
+                inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
+                face_stiffness: Vec::new(),
+            },
+            smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
+            width: Width::best(),
+            work: Work::default(),
+        };
         for (index, face) in index.iter_mut().zip(&batch.faces).filter(|(index, _)| **index == 0) {
-            *index = active.len() as u32;
-            active.push(ActiveFace {
-                nodes: face.nodes,
-                corners: face.nodes.map(|n| batch.nodes[n as usize].global),
-                id: face.id,
-                part: face.part,
-                stiffness: face.stiffness,
-            });
+            *index = contact.faces.len() as u32;
+            contact.faces.push(face.nodes);
+            contact.corners.push(face.nodes.map(|n| batch.nodes[n as usize].global));
+            contact.ids.push(face.id);
+            contact.parts.push(face.part);
+            contact.statics.face_stiffness.push(face.stiffness);
         }
         for f in &mut candidates.faces {
             *f = index[*f as usize];
         }
-        let most = candidates.starts.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0);
-        Self {
-            n_parts: settings.n_parts(),
-            settings: settings.clone(),
-            candidates,
-            corners: Vec::with_capacity(active.len()),
-            bounds: Vec::with_capacity(active.len()),
-            frames: Vec::with_capacity(active.len()),
-            framed: Vec::with_capacity(active.len()),
-            active,
-            global: batch.nodes.iter().map(|n| n.global).collect(),
-            part: batch.nodes.iter().map(|n| n.part).collect(),
-            stiffness: batch.nodes.iter().map(|n| n.stiffness).collect(),
-            factor: batch.nodes.iter().map(|n| settings.stiffness * n.share).collect(),
-            inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
-            near: Vec::with_capacity(most),
-            hits: Vec::with_capacity(most),
-            beyond: Vec::with_capacity(most),
-        }
+        contact.candidates = candidates;
+        contact
     }
 
     /// Number of node-face pairs on the candidate list.
@@ -164,7 +181,7 @@ impl Contact {
     ) -> ContactVote {
         let cycle = Cycle { x, v, dt, force_quantum, energy_quantum, f };
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("fma") {
+        if self.width != Width::Scalar && std::arch::is_x86_feature_detected!("fma") {
             // SAFETY: the feature has just been detected.
             return unsafe { self.forces_with_fma(cycle) };
         }
@@ -181,84 +198,227 @@ impl Contact {
 
     #[inline(always)]
     fn forces_with(&mut self, mut cycle: Cycle) -> ContactVote {
-        let warning = WARNING * self.settings.gap;
-        self.gather(cycle.x, warning);
+        let mut work = std::mem::take(&mut self.work);
         let mut vote = ContactVote { pairs: self.candidates.faces.len() as u64, ..ContactVote::default() };
         let mut frequency2 = 0.0;
-        for i in 0..self.candidates.nodes.len() {
-            let node = self.candidates.nodes[i];
-            let p = cycle.x.each_ref().map(|x| x[node as usize]);
-            self.near.clear();
-            let range = self.candidates.starts[i] as usize..self.candidates.starts[i + 1] as usize;
-            for &f in &self.candidates.faces[range] {
-                if self.bounds[f as usize].holds(p) {
-                    let framed = &mut self.framed[f as usize];
-                    if *framed == UNFRAMED {
-                        *framed = self.frames.len() as u32;
-                        self.frames.push(Frame::new(&self.corners[f as usize]));
-                    }
-                    let nearest = self.frames[*framed as usize].nearest(p);
-                    if nearest.distance2 < warning * warning {
-                        let face = &self.active[f as usize];
-                        self.near.push(Near { face: f, id: face.id, corners: face.corners, nearest });
-                    }
-                }
-            }
-            if !self.near.is_empty() {
-                let voted = self.node(node, p, &mut cycle, &mut vote);
-                frequency2 = if voted > frequency2 { voted } else { frequency2 };
-            }
+        work.boxes.measure(self.width, cycle.x, &self.faces, WARNING * self.settings.gap);
+        let n = self.candidates.nodes.len();
+        let mut first = 0;
+        while first < n {
+            let end = (first + BLOCK).min(n);
+            let voted = self.block(first, end, &mut work, &mut cycle, &mut vote);
+            frequency2 = if voted > frequency2 { voted } else { frequency2 };
+            first = end;
         }
+        self.work = work;
         vote.dt = force::time_step(frequency2);
         vote
     }
 
-    /// Corners and boxes of the active faces; no frames yet.
+    /// Forces of candidate nodes `first..end`. Gives the greatest squared frequency of their springs.
     #[inline(always)]
-    fn gather(&mut self, x: &[Vec<f64>; 3], warning: f64) {
-        let at = |n: u32| x.each_ref().map(|x| x[n as usize]);
-        self.corners.clear();
-        self.corners.extend(self.active.iter().map(|face| face.nodes.map(at)));
-        self.bounds.clear();
-        self.bounds.extend(self.corners.iter().map(|corners| Bounds::of(corners, warning)));
-        self.frames.clear();
-        self.framed.clear();
-        self.framed.resize(self.active.len(), UNFRAMED);
+    fn block(
+        &self,
+        first: usize,
+        end: usize,
+        work: &mut Work,
+        cycle: &mut Cycle,
+        vote: &mut ContactVote,
+    ) -> f64 {
+        let nodes = &self.candidates.nodes[first..end];
+        work.boxes.hold(self.width, &self.candidates, (first, end), &mut work.held, &mut work.ends);
+        if work.held.is_empty() {
+            return 0.0;
+        }
+        work.pairs.expand(nodes, &work.ends, &work.held, &self.faces);
+        lanes::nearest(self.width, cycle.x, &work.pairs, &mut work.closest);
+        work.approach.clear();
+        work.share.clear();
+        work.stacking.clear();
+        work.long_way.clear();
+        let mut start = 0;
+        for i in 0..nodes.len() {
+            let end = work.ends[i] as usize;
+            if start < end {
+                self.node(start, end, work, cycle.x);
+            }
+            start = end;
+        }
+        let n = work.approach.index.len();
+        if n == 0 {
+            return 0.0;
+        }
+        work.near_pairs.choose(&work.pairs, &work.approach.index);
+        work.approach.fill_up();
+        let filled = work.approach.index.len();
+        let Work { approach, face, share, stacking, held, .. } = work;
+        // Of the last set what is left over repeats a pair and pushes nothing.
+        face.clear();
+        face.extend(approach.index.iter().map(|&i| held[i as usize]));
+        share.resize(filled, 0.0);
+        stacking.resize(filled, 0.0);
+        let gap = self.settings.gap;
+        lanes::approach(self.width, cycle.x, gap, &work.near_pairs, &work.closest, approach);
+        for &(i, depth, direction) in &work.long_way {
+            approach.depth[i] = depth;
+            (0..3).for_each(|a| approach.direction[a][i] = direction[a]);
+        }
+        approach.depth[n..].fill(0.0);
+        if self.smooth { self.push(n, work, cycle, vote) } else { self.rub(n, work, cycle, vote) }
     }
 
-    /// Forces of one node at `p` and its near faces. Gives the greatest squared frequency of its springs.
+    /// Takes the near features of one node, whose pairs are `start..end`, into the lists.
     #[inline(always)]
-    fn node(&mut self, node: u32, p: [f64; 3], cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
-        let n = node as usize;
-        let (frames, framed) = (&self.frames, &self.framed);
-        let frame = |f: u32| &frames[framed[f as usize] as usize];
-        joint::reduce(&mut self.near, self.settings.gap, frame, &mut self.hits, &mut self.beyond);
-        let stacking = if self.hits.len() > 1 { joint::stacking(&self.hits) } else { 1.0 };
-        let mut frequency2 = 0.0_f64;
-        for &i in &self.beyond {
-            let near = &self.near[i as usize];
-            let face = &self.active[near.face as usize];
-            let k = force::stiffness(self.factor[n], self.stiffness[n], face.stiffness);
-            let weights = frame(near.face).weights(&near.nearest, p);
-            let inverse_mass = self.pair_inverse_mass(n, face, &weights);
-            frequency2 = frequency2.max(force::frequency2(k, stacking, inverse_mass));
+    fn node(&self, start: usize, end: usize, work: &mut Work, x: &[Vec<f64>; 3]) {
+        let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
+        let closest = &work.closest;
+        let distance2 = &closest.distance2[start..end];
+        let held = &work.held[start..end];
+        let (mut nearest, mut least) = (usize::MAX, warning * warning);
+        for (i, &d2) in distance2.iter().enumerate() {
+            let tie = d2 == least && nearest != usize::MAX;
+            if d2 < least || (tie && self.ids[held[i] as usize] < self.ids[held[nearest] as usize]) {
+                (nearest, least) = (i, d2);
+            }
         }
-        for hit in &self.hits {
-            let near = &self.near[hit.near as usize];
-            let face = &self.active[near.face as usize];
-            vote.deepest(hit.depth / self.settings.gap, (self.global[n], face.id));
-            let k = force::stiffness(self.factor[n], self.stiffness[n], face.stiffness);
-            let weights = frame(near.face).weights(&near.nearest, p);
-            let inverse_mass = self.pair_inverse_mass(n, face, &weights);
-            frequency2 = frequency2.max(force::frequency2(k, stacking, inverse_mass));
-            let push =
-                force::Push { stiffness: k * hit.share, depth: hit.depth, direction: hit.direction, weights };
+        if nearest == usize::MAX {
+            return;
+        }
+        // Mostly all other faces are dropped by the nearest: the first step of the reduction is then all of it.
+        let corners = &self.corners[held[nearest] as usize];
+        let feature = closest.feature(start + nearest);
+        let mut sides = closest.sides(start + nearest);
+        let mut alone = true;
+        for (i, &d2) in distance2.iter().enumerate() {
+            if d2 < warning * warning && i != nearest {
+                let others = &self.corners[held[i] as usize];
+                let shared = joint::shares(feature, corners, others);
+                alone &= shared || joint::shares(closest.feature(start + i), others, corners);
+                sides |= if shared { closest.sides(start + i) } else { 0 };
+            }
+        }
+        // Nodes on the feature, whose line has no direction, and some that are only very near it.
+        let touches = least <= 1e-17 * gap * gap;
+        if alone && (sides == OUTER || sides == INNER) && !touches {
+            work.approach.index.push((start + nearest) as u32);
+            work.approach.sign.push(if sides == OUTER { 1.0 } else { -1.0 });
+            work.share.push(1.0);
+            work.stacking.push(1.0);
+        } else {
+            self.reduce(start, end, work, x);
+        }
+    }
+
+    /// As [`Contact::node`], the long way.
+    #[inline(never)]
+    fn reduce(&self, start: usize, end: usize, work: &mut Work, x: &[Vec<f64>; 3]) {
+        let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
+        let Work { held, closest, near, hits, beyond, .. } = work;
+        near.clear();
+        for i in start..end {
+            if closest.distance2[i] < warning * warning {
+                let face = held[i] as usize;
+                let (id, corners) = (self.ids[face], self.corners[face]);
+                near.push(Near { face: i as u32, id, corners, nearest: closest.nearest(i) });
+            }
+        }
+        let frame = |i: u32| {
+            let corners = self.faces[held[i as usize] as usize];
+            Frame::new(&corners.map(|n| x.each_ref().map(|x| x[n as usize])))
+        };
+        joint::reduce(near, gap, frame, hits, beyond);
+        let stacking = if hits.len() > 1 { joint::stacking(hits) } else { 1.0 };
+        for &i in beyond.iter() {
+            work.approach.index.push(near[i as usize].face);
+            work.approach.sign.push(1.0);
+            work.share.push(1.0);
+            work.stacking.push(stacking);
+        }
+        for hit in hits.iter() {
+            work.long_way.push((work.approach.index.len(), hit.depth, hit.direction));
+            work.approach.index.push(near[hit.near as usize].face);
+            work.approach.sign.push(1.0);
+            work.share.push(hit.share);
+            work.stacking.push(stacking);
+        }
+    }
+
+    /// Forces without friction of the first `n` pushes. Gives the greatest squared frequency.
+    #[inline(always)]
+    fn push(&self, n: usize, work: &mut Work, cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
+        let approach = &work.approach;
+        let pushes = Pushes {
+            face: &work.face,
+            depth: &approach.depth,
+            direction: &approach.direction,
+            share: &work.share,
+            stacking: &work.stacking,
+            weights: &approach.weights,
+        };
+        let (statics, pairs) = (&self.statics, &work.near_pairs);
+        let quanta = (cycle.force_quantum, cycle.energy_quantum);
+        let sums = force::lanes::push(self.width, statics, pairs, pushes, quanta, &mut work.terms);
+        vote.hits += approach.depth.iter().map(|&depth| u64::from(depth > 0.0)).sum::<u64>();
+        if sums.deepest > 0.0 && sums.deepest / self.settings.gap >= vote.worst_depth {
+            for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+                let pair = (self.global[pairs.node[i] as usize], self.ids[work.face[i] as usize]);
+                vote.deepest(depth / self.settings.gap, pair);
+            }
+        }
+        vote.energy += sums.energy;
+        vote.force_bound =
+            if sums.force_bound > vote.force_bound { sums.force_bound } else { vote.force_bound };
+        for a in 0..3 {
+            let f = &mut cycle.f[a];
+            let ends = [
+                &work.near_pairs.node,
+                &work.near_pairs.corners[0],
+                &work.near_pairs.corners[1],
+                &work.near_pairs.corners[2],
+                &work.near_pairs.corners[3],
+            ];
+            for (e, nodes) in ends.into_iter().enumerate() {
+                for (&node, &term) in nodes[..n].iter().zip(&work.terms[3 * e + a]) {
+                    f[node as usize] += term;
+                }
+            }
+        }
+        sums.frequency2
+    }
+
+    /// Forces with friction of the first `n` pushes. Gives the greatest squared frequency.
+    #[inline(always)]
+    fn rub(&self, n: usize, work: &mut Work, cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
+        let (approach, statics) = (&work.approach, &self.statics);
+        let mut frequency2 = 0.0_f64;
+        for i in 0..n {
+            let node = work.near_pairs.node[i] as usize;
+            let face = work.face[i] as usize;
+            let nodes = self.faces[face];
+            let weights = [0, 1, 2, 3].map(|k| approach.weights[k][i]);
+            let k =
+                force::stiffness(statics.factor[node], statics.stiffness[node], statics.face_stiffness[face]);
+            let of_corners = nodes.map(|n| statics.inverse_mass[n as usize]);
+            let inverse_mass = force::inverse_mass(statics.inverse_mass[node], of_corners, &weights);
+            frequency2 = frequency2.max(force::frequency2(k, work.stacking[i], inverse_mass));
+            let depth = approach.depth[i];
+            if depth <= 0.0 {
+                continue;
+            }
+            vote.hits += 1;
+            vote.deepest(depth / self.settings.gap, (self.global[node], self.ids[face]));
+            let push = force::Push {
+                stiffness: k * work.share[i],
+                depth,
+                direction: [0, 1, 2].map(|a| approach.direction[a][i]),
+                weights,
+            };
             let coefficient =
-                self.settings.friction[self.part[n] as usize * self.n_parts + face.part as usize];
+                self.settings.friction[self.part[node] as usize * self.n_parts + self.parts[face] as usize];
             let sliding = (coefficient > 0.0).then(|| force::Sliding {
                 coefficient,
                 regular: self.settings.friction_velocity,
-                velocity: against(cycle.v, n, &face.nodes, &weights),
+                velocity: against(cycle.v, node, &nodes, &weights),
                 inverse_mass,
                 dt: cycle.dt,
             });
@@ -266,22 +426,13 @@ impl Contact {
             vote.count(&reaction);
             for a in 0..3 {
                 let f = &mut cycle.f[a];
-                f[n] += reaction.node[a];
-                for i in 0..4 {
-                    f[face.nodes[i] as usize] += reaction.corners[i][a];
+                f[node] += reaction.node[a];
+                for (corner, &n) in reaction.corners.iter().zip(&nodes) {
+                    f[n as usize] += corner[a];
                 }
             }
         }
         frequency2
-    }
-
-    #[inline(always)]
-    fn pair_inverse_mass(&self, node: usize, face: &ActiveFace, weights: &[f64; 4]) -> f64 {
-        force::inverse_mass(
-            self.inverse_mass[node],
-            face.nodes.map(|n| self.inverse_mass[n as usize]),
-            weights,
-        )
     }
 }
 
@@ -302,59 +453,166 @@ mod tests {
     use super::*;
     use crate::contact::{BatchFace, BatchNode, BatchUnit};
 
-    #[test]
-    fn with_and_without_fused_multiply_add_instructions_the_bits_are_equal() {
-        let mut seed = 3_u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        // 64 warped faces, each with a node somewhere in its zone.
-        let (mut batch, mut x) = (Batch::default(), [vec![], vec![], vec![]]);
-        for i in 0..64_u32 {
-            for corner in [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0.5, 0.5, 0.0]] {
-                let global = batch.nodes.len() as u32;
-                let part = u32::from(corner[0] == 0.5);
-                batch.nodes.push(BatchNode {
-                    global,
-                    part,
-                    mass: 1.0 + random(),
-                    stiffness: 1.0 + random(),
-                    share: 0.25 + 0.75 * random(),
-                });
-                for a in 0..3 {
-                    x[a].push(corner[a] + 0.3 * random() + if a == 0 { 10.0 * f64::from(i) } else { 0.0 });
-                }
-            }
-            let nodes = [0, 1, 2, 3].map(|c| 5 * i + c);
-            let corners = [u32::MAX; 8];
-            batch.faces.push(BatchFace { nodes, id: i, part: 0, stiffness: 1.0 + random(), corners });
-            batch.units.push(BatchUnit { nodes: vec![5 * i + 4], faces: vec![i] });
+    /// A random number from 0 to 1.
+    struct Random(u64);
+
+    impl Random {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
         }
-        let settings = Settings {
-            gap: 0.4,
+    }
+
+    /// A bumpy patch of 6 x 6 faces of part 0, flat here and there, and 400 nodes of part 1 about it, some of
+    /// them on it.
+    fn patch(random: &mut Random, bump: f64) -> (Batch, [Vec<f64>; 3]) {
+        let (mut batch, mut x) = (Batch::default(), [vec![], vec![], vec![]]);
+        let mut put = |p: [f64; 3], part: u32, random: &mut Random| {
+            batch.nodes.push(BatchNode {
+                global: batch.nodes.len() as u32,
+                part,
+                mass: 1.0 + random.next(),
+                stiffness: 1.0 + random.next(),
+                share: 0.25 + 0.75 * random.next(),
+            });
+            (0..3).for_each(|a| x[a].push(p[a]));
+        };
+        for i in 0..49 {
+            let (column, row) = (f64::from(i % 7), f64::from(i / 7));
+            let height = if i % 7 < 3 { 0.0 } else { bump * random.next() };
+            put([column, row, height], 0, random);
+        }
+        for i in 0..400 {
+            let p = [7.0 * random.next() - 0.5, 7.0 * random.next() - 0.5, 2.0 * random.next() - 0.5];
+            let p = match i % 8 {
+                0 => [p[0].round(), p[1], p[2]],
+                1 => [p[0].round(), p[1].round(), 0.1],
+                2 => [p[0], p[1], 0.0],
+                _ => p,
+            };
+            put(p, 1, random);
+        }
+        for i in 0..36_u32 {
+            let first = i / 6 * 7 + i % 6;
+            batch.faces.push(BatchFace {
+                nodes: [first, first + 1, first + 8, first + 7],
+                id: i,
+                part: 0,
+                stiffness: 1.0 + random.next(),
+                corners: [u32::MAX; 8],
+            });
+        }
+        batch.units.push(BatchUnit { nodes: (49..449).collect(), faces: (0..36).collect() });
+        (batch, x)
+    }
+
+    fn settings(friction: f64) -> Settings {
+        Settings {
+            gap: 0.3,
             slack: 0.1,
-            friction: vec![0.3; 4],
-            interacts: vec![true; 4],
+            friction: vec![friction; 4],
+            interacts: vec![false, true, true, false],
             stiffness: 0.5,
             friction_velocity: 1e-3,
-        };
-        let mut contact = Contact::new(&batch, &settings, &x);
-        let v = [x[1].clone(), x[2].clone(), x[0].clone()];
-        let mut run = |fused: bool| {
-            let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
-            let force_quantum = Quantum::for_reference(1.0, 50);
-            let energy_quantum = force_quantum;
-            let cycle = Cycle { x: &x, v: &v, dt: 0.1, force_quantum, energy_quantum, f: &mut f };
-            let vote = if fused {
-                let vote = contact.forces(&x, &v, 0.1, force_quantum, energy_quantum, cycle.f);
-                assert!(vote.hits > 40, "{vote:?}");
-                vote
-            } else {
-                contact.forces_with(cycle)
+        }
+    }
+
+    /// The same one pair at a time: a frame for each face, the whole reduction for each node.
+    fn slowly(contact: &Contact, cycle: Cycle) -> ContactVote {
+        let warning = WARNING * contact.settings.gap;
+        let at = |n: u32| cycle.x.each_ref().map(|x| x[n as usize]);
+        let frame = |f: u32| Frame::new(&contact.faces[f as usize].map(at));
+        let mut vote = ContactVote { pairs: contact.n_pairs() as u64, ..ContactVote::default() };
+        let (mut hits, mut beyond, mut frequency2) = (vec![], vec![], 0.0_f64);
+        for (i, &node) in contact.candidates.nodes.iter().enumerate() {
+            let (n, p) = (node as usize, at(node));
+            let mut near = Vec::new();
+            let range = contact.candidates.starts[i] as usize..contact.candidates.starts[i + 1] as usize;
+            for &face in &contact.candidates.faces[range] {
+                let nearest = frame(face).nearest(p);
+                let bounds = Bounds::of(&contact.faces[face as usize].map(at), warning);
+                if bounds.holds(p) && nearest.distance2 < warning * warning {
+                    let (id, corners) = (contact.ids[face as usize], contact.corners[face as usize]);
+                    near.push(Near { face, id, corners, nearest });
+                }
+            }
+            joint::reduce(&mut near, contact.settings.gap, frame, &mut hits, &mut beyond);
+            let stacking = if hits.len() > 1 { joint::stacking(&hits) } else { 1.0 };
+            let of_hits = hits.iter().map(|hit| (hit.near, Some(hit)));
+            for (of, hit) in of_hits.chain(beyond.iter().map(|&i| (i, None))) {
+                let near = &near[of as usize];
+                let (face, nodes) = (near.face as usize, contact.faces[near.face as usize]);
+                let statics = &contact.statics;
+                let k =
+                    force::stiffness(statics.factor[n], statics.stiffness[n], statics.face_stiffness[face]);
+                let weights = frame(near.face).weights(&near.nearest, p);
+                let of_corners = nodes.map(|n| statics.inverse_mass[n as usize]);
+                let inverse_mass = force::inverse_mass(statics.inverse_mass[n], of_corners, &weights);
+                frequency2 = frequency2.max(force::frequency2(k, stacking, inverse_mass));
+                let Some(hit) = hit else { continue };
+                vote.hits += 1;
+                vote.deepest(hit.depth / contact.settings.gap, (contact.global[n], near.id));
+                let push = force::Push {
+                    stiffness: k * hit.share,
+                    depth: hit.depth,
+                    direction: hit.direction,
+                    weights,
+                };
+                let sliding = force::Sliding {
+                    coefficient: contact.settings.friction[0],
+                    regular: contact.settings.friction_velocity,
+                    velocity: against(cycle.v, n, &nodes, &weights),
+                    inverse_mass,
+                    dt: cycle.dt,
+                };
+                let sliding = (sliding.coefficient > 0.0).then_some(&sliding);
+                let reaction = force::react(&push, sliding, cycle.force_quantum, cycle.energy_quantum);
+                vote.count(&reaction);
+                for a in 0..3 {
+                    cycle.f[a][n] += reaction.node[a];
+                    (0..4).for_each(|c| cycle.f[a][nodes[c] as usize] += reaction.corners[c][a]);
+                }
+            }
+        }
+        vote.dt = force::time_step(frequency2);
+        vote
+    }
+
+    #[test]
+    fn lanes_of_every_width_have_the_bits_of_one_pair_at_a_time() {
+        let mut random = Random(3);
+        let mut long_way = 0;
+        for (bump, friction) in [(0.0, 0.0), (0.2, 0.0), (0.9, 0.0), (0.0, 0.3), (0.9, 0.3)] {
+            let (batch, x) = patch(&mut random, bump);
+            let mut contact = Contact::new(&batch, &settings(friction), &x);
+            let v = [x[1].clone(), x[2].clone(), x[0].clone()];
+            let quantum = Quantum::for_reference(1.0, 42);
+            let mut run = |width: Option<Width>| {
+                let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
+                let cycle = Cycle {
+                    x: &x,
+                    v: &v,
+                    dt: 0.1,
+                    force_quantum: quantum,
+                    energy_quantum: quantum,
+                    f: &mut f,
+                };
+                let vote = match width {
+                    Some(width) => {
+                        contact.width = width;
+                        contact.forces(&x, &v, 0.1, quantum, quantum, cycle.f)
+                    }
+                    None => slowly(&contact, cycle),
+                };
+                (vote, f.iter().flatten().map(|f| f.to_bits()).collect::<Vec<u64>>())
             };
-            (vote, f.iter().flatten().map(|f| f.to_bits()).collect::<Vec<u64>>())
-        };
-        assert_eq!(run(true), run(false));
+            let slow = run(None);
+            assert!(slow.0.hits > 80, "{:?}", slow.0);
+            for width in Width::ALL.into_iter().filter(|width| width.available()) {
+                assert_eq!(run(Some(width)), slow, "{width}, bump {bump}, friction {friction}");
+            }
+            long_way += usize::from(!contact.work.hits.is_empty());
+        }
+        assert!(long_way > 0, "no node went the long way");
     }
 }

@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::exact::Quantum;
 
+pub(super) mod lanes;
+
 /// `omega dt` of a node between all its springs at most: the energy of a bounce is then right to 2.6 %.
 pub const OMEGA_DT: f64 = 0.4;
 
@@ -196,6 +198,5 @@ impl ContactVote {
             let magnitude = component.abs();
             self.force_bound = if magnitude > self.force_bound { magnitude } else { self.force_bound };
         }
-        self.hits += 1;
     }
 }

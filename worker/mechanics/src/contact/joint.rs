@@ -46,14 +46,20 @@ pub struct Hit {
 /// Whether the feature of `near`, an edge or a corner, belongs to the face with these corners.
 #[inline(always)]
 fn belongs(near: &Near, corners: &[u32; 4]) -> bool {
-    match near.nearest.feature {
+    shares(near.nearest.feature, &near.corners, corners)
+}
+
+/// Whether a feature, an edge or a corner of the face with corners `of`, belongs to the face with these corners.
+#[inline(always)]
+pub(super) fn shares(feature: Feature, of: &[u32; 4], corners: &[u32; 4]) -> bool {
+    match feature {
         Feature::Face => false,
         Feature::Corner(i) => {
-            let c = near.corners[i as usize];
+            let c = of[i as usize & 3];
             (corners[0] == c) | (corners[1] == c) | (corners[2] == c) | (corners[3] == c)
         }
         Feature::Edge(i) => {
-            let (a, b) = (near.corners[i as usize], near.corners[(i as usize + 1) & 3]);
+            let (a, b) = (of[i as usize & 3], of[(i as usize + 1) & 3]);
             let at = |c: u32| [corners[0] == c, corners[1] == c, corners[2] == c, corners[3] == c];
             let (a, b) = (at(a), at(b));
             ((a[0] | a[2]) & (b[1] | b[3])) | ((a[1] | a[3]) & (b[0] | b[2]))
@@ -61,14 +67,28 @@ fn belongs(near: &Near, corners: &[u32; 4]) -> bool {
     }
 }
 
+/// The one hit of a node of whose near faces all but the nearest are dropped, and that lies on one side of all
+/// that share the feature: what [`reduce`] would find. `distance` is positive and below the gap.
+#[inline(always)]
+pub(super) fn lone(gap: f64, distance: f64, outer: bool, vector: Vector) -> (f64, Vector) {
+    let (s, depth) = if outer { (1.0 / distance, gap - distance) } else { (-1.0 / distance, gap + distance) };
+    (depth, [s * vector[0], s * vector[1], s * vector[2]])
+}
+
+/// Whether a node is so near its closest point that the line has no direction.
+#[inline(always)]
+pub(super) fn is_on_feature(distance: f64, gap: f64) -> bool {
+    distance <= 1e-9 * gap
+}
+
 /// Reduces the near faces of one node to distinct features within the gap, into `hits`, and to indices of
 /// those beyond it, into `beyond`; both are cleared first. Sorts `near` by distance, then id, so the result
 /// does not depend on its order. `frame` gives the frame of a face by the caller's index.
 #[inline(always)]
-pub fn reduce<'a>(
+pub fn reduce(
     near: &mut [Near],
     gap: f64,
-    frame: impl Fn(u32) -> &'a Frame,
+    frame: impl Fn(u32) -> Frame,
     hits: &mut Vec<Hit>,
     beyond: &mut Vec<u32>,
 ) {
@@ -116,13 +136,7 @@ fn sort_by_distance(near: &mut [Near]) {
 /// Its side is that of the pseudonormal of its feature, a sum with positive factors of the normals of the near
 /// faces that share it: where the node is on the same side of all of them the sum need not be made.
 #[inline(always)]
-fn hit<'a>(
-    near: &[Near],
-    i: usize,
-    gap: f64,
-    distance: f64,
-    frame: &impl Fn(u32) -> &'a Frame,
-) -> Option<Hit> {
+fn hit(near: &[Near], i: usize, gap: f64, distance: f64, frame: &impl Fn(u32) -> Frame) -> Option<Hit> {
     let nearest = &near[i].nearest;
     let mut sides = nearest.sides;
     if nearest.feature != Feature::Face {
@@ -132,8 +146,7 @@ fn hit<'a>(
             }
         }
     }
-    // On the feature the line has no direction.
-    let on_feature = distance <= 1e-9 * gap;
+    let on_feature = is_on_feature(distance, gap);
     let mut outer = sides == OUTER;
     let mut normal = [0.0; 3];
     if on_feature || (sides != OUTER && sides != INNER) {
@@ -143,17 +156,15 @@ fn hit<'a>(
     let (direction, depth) = if on_feature {
         (unit(normal), gap)
     } else {
-        let (s, depth) =
-            if outer { (1.0 / distance, gap - distance) } else { (-1.0 / distance, gap + distance) };
-        let v = nearest.vector;
-        ([s * v[0], s * v[1], s * v[2]], depth)
+        let (depth, direction) = lone(gap, distance, outer, nearest.vector);
+        (direction, depth)
     };
     (direction != [0.0; 3]).then_some(Hit { near: i as u32, depth, direction, share: 1.0, outer })
 }
 
 /// Pseudonormal of the feature of near face `i`: over all near faces that share it, in order of distance.
 #[inline(never)]
-fn pseudonormal<'a>(near: &[Near], i: usize, frame: &impl Fn(u32) -> &'a Frame) -> Vector {
+fn pseudonormal(near: &[Near], i: usize, frame: &impl Fn(u32) -> Frame) -> Vector {
     let mut normal = frame(near[i].face).pseudonormal(&near[i].nearest);
     if near[i].nearest.feature != Feature::Face {
         for (j, other) in near.iter().enumerate() {

@@ -2,7 +2,7 @@
 //!
 //! Cubes have twice the smallest dimension of all interacting faces as their side, but at least twice the
 //! reach, so one crushed face cannot shrink them without limit. They are *virtual*: only those that hold nodes
-//! exist, found through a hash table. The first pass puts each node into the cube that contains it and makes
+//! exist, found through an array or a hash table. The first pass puts each node into the cube that contains it and makes
 //! the cube if need be; the second puts each face into every existing cube that holds nodes it may interact
 //! with: those that its box, grown by the reach, touches. (The paper tests the nodes of the face; the box also
 //! finds cubes in the middle of a face much larger than a cube.) Then interactions are counted and units
@@ -87,8 +87,13 @@ impl Grid {
     }
 }
 
-/// Existing cubes, by hash of their index: open addressing over a power of two of slots.
+/// Existing cubes. Where the bodies are compact, by place in an array of the whole grid; where they are far apart, by
+/// hash of their index: open addressing over a power of two of slots.
 struct Table {
+    /// Unit of every cube of the grid, or [`NO_UNIT`]; empty if the grid is too large.
+    dense: Vec<u32>,
+    /// Cubes of the grid along the first two axes.
+    extent: [usize; 2],
     /// Key and unit of each slot.
     slots: Vec<(u64, u32)>,
     mask: usize,
@@ -98,10 +103,36 @@ struct Table {
 impl Table {
     const FREE: u64 = u64::MAX;
 
-    /// A table that is at most half full.
-    fn with_room(units: usize) -> Self {
-        let slots = (2 * units.max(8)).next_power_of_two();
-        Self { slots: vec![(Self::FREE, 0); slots], mask: slots - 1, cubes: Vec::new() }
+    /// Cubes of the grid for each node up to which it is an array: as much memory as the hash table at most.
+    const DENSE: f64 = 4.0;
+
+    /// A table of about `n_nodes / 4` units in a grid with these highest cubes; the hash table is at most half full.
+    fn with_room(n_nodes: usize, last: [i32; 3]) -> Self {
+        let extent = last.map(|last| last as usize + 1);
+        let all: f64 = extent.iter().map(|&n| n as f64).product();
+        if all <= Self::DENSE * n_nodes as f64 {
+            let dense = vec![NO_UNIT; extent.iter().product()];
+            return Self {
+                dense,
+                extent: [extent[0], extent[1]],
+                slots: Vec::new(),
+                mask: 0,
+                cubes: Vec::new(),
+            };
+        }
+        let slots = (2 * (n_nodes / 4).max(8)).next_power_of_two();
+        Self {
+            dense: Vec::new(),
+            extent: [0; 2],
+            slots: vec![(Self::FREE, 0); slots],
+            mask: slots - 1,
+            cubes: Vec::new(),
+        }
+    }
+
+    #[inline(always)]
+    fn place(&self, cube: [i32; 3]) -> usize {
+        cube[0] as usize + self.extent[0] * (cube[1] as usize + self.extent[1] * cube[2] as usize)
     }
 
     #[inline(always)]
@@ -118,6 +149,10 @@ impl Table {
     /// Unit of a cube, if it exists.
     #[inline(always)]
     fn find(&self, cube: [i32; 3]) -> Option<u32> {
+        if !self.dense.is_empty() {
+            let unit = self.dense[self.place(cube)];
+            return (unit != NO_UNIT).then_some(unit);
+        }
         let key = Self::key(cube);
         let mut slot = self.slot(key);
         loop {
@@ -135,6 +170,14 @@ impl Table {
     /// Unit of a cube, made if need be.
     #[inline(always)]
     fn find_or_create(&mut self, cube: [i32; 3]) -> u32 {
+        if !self.dense.is_empty() {
+            let place = self.place(cube);
+            if self.dense[place] == NO_UNIT {
+                self.dense[place] = self.cubes.len() as u32;
+                self.cubes.push(cube);
+            }
+            return self.dense[place];
+        }
         let key = Self::key(cube);
         let mut slot = self.slot(key);
         loop {
@@ -175,7 +218,7 @@ const NO_UNIT: u32 = u32::MAX;
 
 /// First pass: the cubes that hold nodes, and the unit of each surface node.
 fn sort_nodes(surface: &Surface, x: &[[f64; 3]], grid: &Grid, interacting: &[bool]) -> (Table, Vec<u32>) {
-    let mut table = Table::with_room(surface.nodes.len() / 4);
+    let mut table = Table::with_room(surface.nodes.len(), grid.last);
     let unit_of = x
         .iter()
         .zip(&surface.node_part)
@@ -346,4 +389,25 @@ fn group(n_units: usize, items: impl Iterator<Item = (u32, u32)> + Clone) -> (Ve
         next[unit as usize] += 1;
     }
     (starts, grouped)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_array_and_a_hash_table_number_cubes_alike() {
+        let last = [6, 4, 9];
+        let (mut array, mut hash) = (Table::with_room(1000, last), Table::with_room(10, last));
+        assert!(!array.dense.is_empty() && hash.dense.is_empty());
+        let mut seed = 9_u64;
+        for _ in 0..200 {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let cube = [0, 1, 2].map(|a| (seed >> (20 + 14 * a)) as i32 & 0xfff).map(|i| i % 5);
+            assert_eq!(array.find(cube), hash.find(cube));
+            assert_eq!(array.find_or_create(cube), hash.find_or_create(cube));
+        }
+        assert!(array.cubes.len() > 40);
+        assert_eq!(array.cubes, hash.cubes);
+    }
 }

@@ -8,6 +8,10 @@ use crate::{element::hex8, material::Material, mesh::Mesh};
 
 pub use crate::mesh::FACES as SIDES;
 
+/// Depth (gaps) within which the penalty stops a node at the closing speed of its part; the rest of 0.9 is for the bodies
+/// behind it.
+const STOPPING_DEPTH: f64 = 0.75;
+
 /// The outer faces of a mesh and their nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
@@ -131,6 +135,37 @@ impl Surface {
             node_share[n] = if half_mean > 0.0 { (around[n] / half_mean).min(1.0) } else { 1.0 };
         }
         Self { nodes, node_part, node_stiffness, node_share, faces }
+    }
+
+    /// Raises stiffness where bodies close in so fast that `K A^2 / V` could not stop them inside the gap.
+    ///
+    /// A node of mass m at speed v sinks `v sqrt(m / k)` into a spring, so `k >= m v^2 / (3/4 gap)^2` holds it; m is half
+    /// its element's mass, as for a node inside a flat face. `speed` is the closing speed of each part, static data
+    /// of the deck like the rest (length per time). The time step pays nothing: it is bound by gap and speed already.
+    pub fn stiffen(
+        &mut self,
+        mesh: &Mesh,
+        materials: &[Material],
+        settings: &super::Settings,
+        speed: &[f64],
+    ) {
+        let depth = STOPPING_DEPTH * settings.gap;
+        let mut sum = vec![0.0; self.nodes.len()];
+        let mut count = vec![0_u32; self.nodes.len()];
+        for face in &mut self.faces {
+            let part = face.part as usize;
+            let density = materials[mesh.parts[part].material as usize].density;
+            let mass = density * hex8::volume(&face.corners.map(|n| mesh.positions[n as usize]));
+            let least = 0.5 * mass * speed[part] * speed[part] / (depth * depth * settings.stiffness);
+            face.stiffness = face.stiffness.max(least);
+            for n in face.nodes {
+                sum[n as usize] += face.stiffness;
+                count[n as usize] += 1;
+            }
+        }
+        for (n, stiffness) in self.node_stiffness.iter_mut().enumerate() {
+            *stiffness = sum[n] / f64::from(count[n].max(1));
+        }
     }
 
     /// Number of elements with at least one outer face.

@@ -12,6 +12,8 @@
 //! needs, weights and pseudonormal, is left to a second step. All is done relative to the node, so that bodies
 //! far from the origin lose nothing.
 
+pub(super) mod lanes;
+
 /// A face is coplanar if its diagonals pass each other nearer than this fraction of their mean length.
 ///
 /// Between the two treatments the distance jumps by no more than that: far below any gap, and far above the
@@ -292,12 +294,13 @@ impl Frame {
         let vector = scale(-1.0, point);
         let mut nearest = Nearest { feature, distance2, vector, sides: 0, triangle: i as u8, shares };
         let mut sides = 0;
+        // The length of a normal has no say in its side.
         self.for_each_normal(&nearest, |normal, _| sides |= side(dot(normal, vector)));
         nearest.sides = sides;
         nearest
     }
 
-    /// Calls `visit` with every unit normal of this face that meets at a closest point, and with how much of
+    /// Calls `visit` with every normal of this face that meets at a closest point, a unit vector if the face is flat, and with how much of
     /// the way round it takes: on a corner or the mid-point of a split face two vectors that span its angle.
     #[inline(always)]
     fn for_each_normal(&self, nearest: &Nearest, mut visit: impl FnMut(Vector, Option<(Vector, Vector)>)) {
@@ -311,7 +314,7 @@ impl Frame {
         }
         let mid = middle(&self.corners);
         let spoke = |i: usize| sub(self.corners[i & 3], mid);
-        let normal = |i: usize| unit(cross(spoke(i), spoke(i + 1)));
+        let normal = |i: usize| cross(spoke(i), spoke(i + 1));
         let i = nearest.triangle as usize;
         match nearest.feature {
             Feature::Corner(c) => {
@@ -343,6 +346,7 @@ impl Frame {
     pub fn pseudonormal(&self, nearest: &Nearest) -> Vector {
         let mut sum = [0.0; 3];
         self.for_each_normal(nearest, |normal, span| {
+            let normal = if self.flat { normal } else { unit(normal) };
             sum = along(sum, span.map_or(1.0, |(a, b)| angle(a, b)), normal);
         });
         sum

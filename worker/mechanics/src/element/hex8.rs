@@ -34,7 +34,7 @@ pub fn volume_gradient(corners: &[[f64; 3]; 8]) -> [[f64; 3]; 8] {
     let x = axis(g.a.x, g.b.x, g.c.x, g.d.x, g.e.x, g.f.x);
     let y = axis(g.a.y, g.b.y, g.c.y, g.d.y, g.e.y, g.f.y);
     let z = axis(g.a.z, g.b.z, g.c.z, g.d.z, g.e.z, g.f.z);
-    std::array::from_fn(|corner| [x[corner].0, y[corner].0, z[corner].0])
+    std::array::from_fn(|corner| [x[corner].0, y[corner].0, z[corner].0].map(|c| c / 64.0))
 }
 
 fn scalar_modes(corners: &[[f64; 3]; 8]) -> Modes<Scalar> {
@@ -69,10 +69,12 @@ pub(crate) struct View<'a> {
     pub fields: [&'a mut [f64]; N_FIELDS],
     /// Volume at time zero by slot; 1 in phantoms.
     pub initial_volume: &'a [f64],
-    /// 1 for an element that takes part, 0 for a phantom.
-    pub alive: &'a [f64],
+    /// Bits of the slots of a set whose elements take part; phantoms do not.
+    pub alive: &'a [u8],
     /// Global element index by slot.
     pub elements: &'a [u32],
+    /// Lowest global element index by set.
+    pub lowest: &'a [u32],
 }
 
 impl View<'_> {
@@ -108,8 +110,17 @@ struct Tally<L> {
     viscosity: L,
     largest_force: L,
     largest_rate: L,
-    /// Inverse of the least Courant limit so far: no element slower than this can matter.
-    frequency: L,
+    /// Greatest frequency of an element so far, whose inverse is the least Courant limit.
+    frequency: f64,
+}
+
+impl<L: Lane> Tally<L> {
+    /// The frequency that an element must exceed to change the vote. An element of higher index than that of the vote
+    /// is not chosen among equals; one of lower index is, also when only the inverses are equal.
+    #[inline(always)]
+    fn frequency_to_beat(&self, lowest: u32, vote: &ElementVote) -> f64 {
+        if lowest > vote.courant_element { self.frequency } else { self.frequency * (1.0 - 1e-15) }
+    }
 }
 
 /// Elements of the sets in one cycle: forces into `view.f`, new state, votes.
@@ -132,7 +143,7 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: Fai
         viscosity: zero,
         largest_force: zero,
         largest_rate: zero,
-        frequency: L::splat(1.0 / vote.courant),
+        frequency: 1.0 / vote.courant,
     };
     for range in sets {
         for set in range.clone() {
@@ -183,15 +194,14 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
                 modes_of(corners(view.layout, view.v[2], slot)),
             ),
             L::load(view.initial_volume, slot),
-            L::load(view.alive, slot),
+            L::mask(u32::from(*view.alive.get_unchecked(slot / SET)) >> (slot % SET)),
         )
     };
-    let alive = half.less(alive);
 
     // 1. Velocity gradient on the geometry of the middle of the step, and what of the velocity it leaves.
     let mid = Modes::before(&x, &v, L::splat(0.5 * step.dt));
     let at_mid = Gradient::of(&mid);
-    let gradient = at_mid.against(&v).scaled(one / at_mid.eighth_volume);
+    let gradient = at_mid.against(&v).scaled(one / at_mid.volume_times_64);
     let hourglass = Hourglass {
         d: amplitude(&v.d, &gradient, &mid.d),
         e: amplitude(&v.e, &gradient, &mid.e),
@@ -200,22 +210,14 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     };
     let volume_rate = gradient.x.x + gradient.y.y + gradient.z.z;
 
-    // 2. Geometry at the end of the step.
-    let at_end = Gradient::of(&x);
-    let volume = at_end.volume();
-    let inverse_eighth = one / at_end.eighth_volume;
-    let inverse_volume = inverse_eighth * L::splat(0.125);
-    let relative_volume = volume / initial_volume;
-    let per_initial_volume = relative_volume * inverse_volume;
-
-    // 3. Deviatoric stress: rotation, elastic increment, yield; its work on the middle volume.
+    // 2. Deviatoric stress: rotation, elastic increment, yield; its power.
     let damage: L = if F::FAILS { view.state(slot, field::DAMAGE) } else { zero };
     let failed = one.less_equal(damage);
     let mut history = History { plastic_strain: zero, temperature: zero };
     let mut strain = Strain { rate: zero, increment: zero };
     let mut plastic_before = zero;
     let mut stress = Deviator::zero();
-    let mut deviatoric_work = zero;
+    let mut deviatoric_power = zero;
     if S::DEVIATORIC {
         let third = volume_rate * L::splat(1.0 / 3.0);
         let rate = Deviator {
@@ -261,9 +263,25 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
         stress = laws.strength.update(trial, strain, &mut history, alive);
         // The stress before, turned, is `turned` less its half of the increment.
         let turned_power = half_increment.neg_mul_add(rate_square, turned.contract(&rate));
-        let mean_power = half * (turned_power + stress.contract(&rate));
-        deviatoric_work = mean_power * dt * (at_mid.volume() * per_initial_volume);
+        deviatoric_power = half * (turned_power + stress.contract(&rate));
     }
+
+    // 3. Geometry at the end of the step. It follows the stress, whose long chain of roots and quotients it fills. The
+    //    relative volume is exactly 1 as long as nothing moves.
+    let at_end = Gradient::of(&x);
+    let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
+    let area_square = L::splat(2.0 / 3.0 / 512.0) * spread.trace();
+    let area = area_square.sqrt();
+    // One division inverts volume, initial volume and area: it is much slower than products.
+    let starting = initial_volume * area_square;
+    let inverse = one / (at_end.volume_times_64 * starting);
+    let inverse_by_64 = inverse * starting;
+    let inverse_others = inverse * at_end.volume_times_64;
+    let inverse_initial = inverse_others * area_square;
+    let volume = at_end.volume();
+    let length = volume * (inverse_others * initial_volume * area);
+    let inverse_volume = inverse_by_64 * L::splat(64.0);
+    let relative_volume = (volume - initial_volume).mul_add(inverse_initial, one);
 
     // 4. Pressure line at the new volume and the sound speed there.
     let (pressure_before, energy_before, volume_before): (L, L, L) = (
@@ -272,7 +290,9 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
         view.state(slot, field::RELATIVE_VOLUME),
     );
     let volume_change = L::select(zero.less(dt), relative_volume - volume_before, zero);
-    let energy_before = energy_before + deviatoric_work;
+    // The deviator works on the middle volume.
+    let middle = at_mid.volume() * inverse_initial;
+    let energy_before = (deviatoric_power * dt).mul_add(middle, energy_before);
     let mut burnt = one;
     let mut time_to_light = zero;
     if E::BURNS {
@@ -288,9 +308,6 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     let sound = sound_square.sqrt();
 
     // 5. Artificial viscosity in compression.
-    let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
-    let area = (L::splat(2.0 / 3.0) * spread.trace()).sqrt();
-    let length = volume / area;
     let density = L::splat(laws.density) * (initial_volume * inverse_volume);
     let closing = L::select(volume_rate.less(zero), -volume_rate, zero);
     let quadratic = L::splat(step.quadratic_viscosity * step.quadratic_viscosity);
@@ -316,7 +333,7 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
 
     // 7. Which elements count.
     let check = energy + pressure + viscosity + hourglass.square() + stress.contract(&stress);
-    let upright = L::both(zero.less(at_mid.eighth_volume), zero.less(at_end.eighth_volume));
+    let upright = L::both(zero.less(at_mid.volume_times_64), zero.less(at_end.volume_times_64));
     let finite = check.abs().less_equal(L::splat(f64::MAX));
     let active = L::both(alive, L::both(upright, finite));
     if L::bits(active) != L::bits(alive) {
@@ -328,23 +345,24 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     }
 
     // 8. Votes and energies.
-    let double_inverse_square = L::splat(2.0) * inverse_volume * inverse_volume;
+    let double_inverse_square = L::splat(2.0 / 512.0) * inverse_volume * inverse_volume;
     let damping = L::select(volume_rate.less(zero), damping, zero);
     let bound = frequency(spread.eigenvalue_bound() * double_inverse_square, damping, sound_square);
-    if L::any(L::both(tally.frequency.less_equal(bound * L::splat(1.0 + 1e-6)), active)) {
+    let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);
+    if L::any(L::both(L::splat(to_beat).less(bound), active)) {
         let exact = frequency(spread.largest_eigenvalue() * double_inverse_square, damping, sound_square);
-        let limits = (one / exact).to_array();
-        for (lane, &limit) in limits.iter().enumerate().take(L::N) {
+        let (frequencies, limits) = (exact.to_array(), (one / exact).to_array());
+        for lane in 0..L::N {
             if L::bits(active) >> lane & 1 == 1 {
-                vote.offer_courant(limit, view.elements[slot + lane]);
+                vote.offer_courant(limits[lane], view.elements[slot + lane]);
+                tally.frequency = tally.frequency.max(frequencies[lane]);
             }
         }
-        tally.frequency = L::splat(1.0 / vote.courant);
     }
     let resist = L::splat(2.0 * step.hourglass) * density * sound * area;
     let energy_magic = L::splat(step.energy_quantum.magic());
     let internal = energy * initial_volume;
-    let taken = L::splat(8.0 * step.dt) * resist * hourglass.square();
+    let taken = L::splat(step.dt / 8.0) * resist * hourglass.square();
     let squeezed = -(viscosity * volume_change * initial_volume);
     tally.internal = tally.internal + L::select(active, (internal + energy_magic) - energy_magic, zero);
     tally.hourglass = tally.hourglass + L::select(active, (taken + energy_magic) - energy_magic, zero);
@@ -378,8 +396,11 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     }
 
     // 10. Corner forces: minus the stress, with the correction of hourglass control, on the volume gradient.
-    let squeeze = pressure + viscosity;
-    let bent = hourglass.against(&x.d, &x.e, &x.f, &x.g).scaled(resist * inverse_eighth);
+    //     The factor 1/64 takes back what the gradient is too large by.
+    let squeeze = (pressure + viscosity) * L::splat(1.0 / 64.0);
+    let stress = stress.scaled(L::splat(1.0 / 64.0));
+    let resist = resist * L::splat(1.0 / 8.0);
+    let bent = hourglass.against(&x.d, &x.e, &x.f, &x.g).scaled(resist * inverse_by_64);
     let rows = [
         Vector { x: bent.x.x - (stress.xx - squeeze), y: bent.x.y - stress.xy, z: bent.x.z - stress.zx },
         Vector { x: bent.y.x - stress.xy, y: bent.y.y - (stress.yy - squeeze), z: bent.y.z - stress.yz },
@@ -390,21 +411,30 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     let magic = L::splat(step.force_quantum.magic());
     let mut axis = 0;
     while axis < 3 {
-        let mut forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
-        // Seven corners are rounded, the eighth takes what they leave: the element's forces add to exactly zero.
-        let mut rest = zero;
-        let mut corner = 0;
-        while corner < 8 {
-            let force = L::select(active, forces[corner], zero);
-            tally.largest_force = tally.largest_force.max(force.abs());
-            forces[corner] = if corner == 7 { rest } else { (force + magic) - magic };
-            rest = rest - forces[corner];
-            corner += 1;
-        }
+        let forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
+        let forces = balanced(forces, active, magic, &mut tally.largest_force);
         // SAFETY: corners are inside the node arrays.
         unsafe { scatter(view.layout, view.f[axis], slot, forces) };
         axis += 1;
     }
+}
+
+/// One component of the corner forces of active elements as it is added: seven corners are rounded, the eighth takes
+/// what they leave, so that the forces of an element add to exactly zero. The largest magnitude before that is kept.
+#[inline(always)]
+fn balanced<L: Lane>(forces: [L; 8], active: L::Mask, magic: L, largest: &mut L) -> [L; 8] {
+    let zero = L::splat(0.0);
+    let mut rounded = [zero; 8];
+    let mut corner = 0;
+    while corner < 8 {
+        let force = L::select(active, forces[corner], zero);
+        *largest = largest.max_magnitude(force);
+        rounded[corner] = (force + magic) - magic;
+        corner += 1;
+    }
+    let [a, b, c, d, e, f, g, _] = rounded;
+    rounded[7] = -(((a + b) + (c + d)) + ((e + f) + g));
+    rounded
 }
 
 /// Values of one node array at the eight corners.

@@ -10,7 +10,7 @@
 use super::vector::{Tensor, Vector};
 use crate::lanes::Lane;
 
-/// The amplitudes q of the four modes.
+/// The amplitudes of the four modes, eight times as large as q, as the modes are.
 #[derive(Clone, Copy)]
 pub(crate) struct Hourglass<L> {
     pub d: Vector<L>,
@@ -27,13 +27,13 @@ pub(crate) fn amplitude<L: Lane>(v: &Vector<L>, gradient: &Tensor<L>, x: &Vector
 }
 
 impl<L: Lane> Hourglass<L> {
-    /// Sum of the squares of the amplitudes. The power taken from the nodes is `8 c` times it.
+    /// Sum of the squares, `64 q . q`. The power taken from the nodes is `8 c q . q`.
     #[inline(always)]
     pub fn square(&self) -> L {
         self.d.dot(&self.d) + self.e.dot(&self.e) + (self.f.dot(&self.f) + self.g.dot(&self.g))
     }
 
-    /// `sum_m q_m x_m^T` for the modes x_m at the end of the step.
+    /// `64 sum_m q_m x_m^T` for the modes x_m at the end of the step.
     #[inline(always)]
     pub fn against(&self, d: &Vector<L>, e: &Vector<L>, f: &Vector<L>, g: &Vector<L>) -> Tensor<L> {
         Tensor::outer(&self.d, d).outer_add(&self.e, e).outer_add(&self.f, f).outer_add(&self.g, g)

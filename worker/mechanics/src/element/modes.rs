@@ -12,7 +12,8 @@
 use super::vector::{Tensor, Vector};
 use crate::lanes::Lane;
 
-/// The seven modes of a vector field at the corners, without its mean.
+/// The seven modes of a vector field at the corners, without its mean, eight times as large as in the formulas: they
+/// are the plain sums over the corners, and what follows from them takes powers of two back where that is cheapest.
 #[derive(Clone, Copy)]
 pub(crate) struct Modes<L> {
     pub a: Vector<L>,
@@ -53,7 +54,8 @@ impl<L: Lane> Modes<L> {
     }
 }
 
-/// The modes xi, eta, zeta, eta zeta, xi zeta, xi eta, xi eta zeta of one component at the corners, times 1/8.
+/// The sums `sum_I Gamma_mI u_I` of one component at the corners for the modes xi, eta, zeta, eta zeta, xi zeta, xi eta,
+/// xi eta zeta.
 #[inline(always)]
 pub(crate) fn modes_of<L: Lane>(u: [L; 8]) -> [L; 7] {
     let (s0, d0) = (u[1] + u[0], u[1] - u[0]);
@@ -64,15 +66,14 @@ pub(crate) fn modes_of<L: Lane>(u: [L; 8]) -> [L; 7] {
     let (low_xi, low_xi_eta) = (d1 + d0, d1 - d0);
     let (high, high_eta) = (s3 + s2, s3 - s2);
     let (high_xi, high_xi_eta) = (d3 + d2, d3 - d2);
-    let eighth = L::splat(0.125);
     [
-        (high_xi + low_xi) * eighth,
-        (high_eta + low_eta) * eighth,
-        (high - low) * eighth,
-        (high_eta - low_eta) * eighth,
-        (high_xi - low_xi) * eighth,
-        (high_xi_eta + low_xi_eta) * eighth,
-        (high_xi_eta - low_xi_eta) * eighth,
+        high_xi + low_xi,
+        high_eta + low_eta,
+        high - low,
+        high_eta - low_eta,
+        high_xi - low_xi,
+        high_xi_eta + low_xi_eta,
+        high_xi_eta - low_xi_eta,
     ]
 }
 
@@ -98,44 +99,46 @@ pub(crate) fn corner_values<L: Lane>([a, b, c, d, e, f, g]: [L; 7]) -> [L; 8] {
     ]
 }
 
-/// Volume and its derivatives by the modes.
+/// Volume and its derivatives by the modes, from modes that are eight times as large.
 #[derive(Clone, Copy)]
 pub(crate) struct Gradient<L> {
+    /// `64 G_a`, and so on.
     pub a: Vector<L>,
     pub b: Vector<L>,
     pub c: Vector<L>,
     pub d: Vector<L>,
     pub e: Vector<L>,
     pub f: Vector<L>,
-    pub eighth_volume: L,
+    /// `64 V`, which is `512 V/8`.
+    pub volume_times_64: L,
 }
 
 impl<L: Lane> Gradient<L> {
     #[inline(always)]
     pub fn of(m: &Modes<L>) -> Self {
         let third = L::splat(1.0 / 3.0);
-        let fe = m.f.cross(&m.e);
-        let df = m.d.cross(&m.f);
-        let ed = m.e.cross(&m.d);
-        let a = m.b.cross_add(&m.c, &fe.scaled(third));
-        let bent = m.c.dot(&ed) + m.b.dot(&df);
+        // Each product of two of the bent modes, or of one with a straight one, carries one third.
+        let (d, e, f) = (m.d.scaled(third), m.e.scaled(third), m.f.scaled(third));
+        let df = d.cross(&m.f);
+        let ed = e.cross(&m.d);
+        let a = m.b.cross_add(&m.c, &f.cross(&m.e));
         Self {
+            b: m.c.cross_add(&m.a, &df),
+            c: m.a.cross_add(&m.b, &ed),
+            d: m.c.cross_add(&e, &f.cross(&m.b)),
+            e: m.a.cross_add(&f, &d.cross(&m.c)),
+            f: e.cross_add(&m.a, &m.b.cross(&d)),
+            volume_times_64: m.a.dot(&a) + (m.c.dot(&ed) + m.b.dot(&df)),
             a,
-            b: m.c.cross_add(&m.a, &df.scaled(third)),
-            c: m.a.cross_add(&m.b, &ed.scaled(third)),
-            d: m.c.cross_add(&m.e, &m.f.cross(&m.b)).scaled(third),
-            e: m.a.cross_add(&m.f, &m.d.cross(&m.c)).scaled(third),
-            f: m.e.cross_add(&m.a, &m.b.cross(&m.d)).scaled(third),
-            eighth_volume: bent.mul_add(third, m.a.dot(&a)),
         }
     }
 
     #[inline(always)]
     pub fn volume(&self) -> L {
-        self.eighth_volume * L::splat(8.0)
+        self.volume_times_64 * L::splat(1.0 / 64.0)
     }
 
-    /// `sum_m v_m G_m^T`.
+    /// `512 sum_m v_m G_m^T`; by [`Gradient::volume_times_64`] it is the velocity gradient.
     #[inline(always)]
     pub fn against(&self, v: &Modes<L>) -> Tensor<L> {
         Tensor::outer(&v.a, &self.a)
@@ -146,7 +149,7 @@ impl<L: Lane> Gradient<L> {
             .outer_add(&v.f, &self.f)
     }
 
-    /// One component of the corner forces: `row . G_m - resist q_m` for each mode, brought to the corners.
+    /// One component of the corner forces, `row . 64 G_m - resist 8 q_m` for each mode, brought to the corners.
     #[inline(always)]
     pub fn forces(&self, row: &Vector<L>, resist: L, q: [L; 4]) -> [L; 8] {
         corner_values([

@@ -43,6 +43,16 @@ impl<L: Lane> Vector<L> {
         Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
     }
 
+    /// `self * factor + other`.
+    #[inline(always)]
+    pub fn mul_add(&self, factor: L, other: &Self) -> Self {
+        Self {
+            x: self.x.mul_add(factor, other.x),
+            y: self.y.mul_add(factor, other.y),
+            z: self.z.mul_add(factor, other.z),
+        }
+    }
+
     /// `other - self * factor`.
     #[inline(always)]
     pub fn neg_mul_add(&self, factor: L, other: &Self) -> Self {
@@ -72,11 +82,7 @@ impl<L: Lane> Tensor<L> {
     /// `self + a b^T`.
     #[inline(always)]
     pub fn outer_add(&self, a: &Vector<L>, b: &Vector<L>) -> Self {
-        Self {
-            x: add_scaled(&self.x, b, a.x),
-            y: add_scaled(&self.y, b, a.y),
-            z: add_scaled(&self.z, b, a.z),
-        }
+        Self { x: b.mul_add(a.x, &self.x), y: b.mul_add(a.y, &self.y), z: b.mul_add(a.z, &self.z) }
     }
 
     /// `self * factor`.
@@ -90,10 +96,4 @@ impl<L: Lane> Tensor<L> {
     pub fn apply(&self, b: &Vector<L>) -> Vector<L> {
         Vector { x: self.x.dot(b), y: self.y.dot(b), z: self.z.dot(b) }
     }
-}
-
-/// `a + b * factor`.
-#[inline(always)]
-fn add_scaled<L: Lane>(a: &Vector<L>, b: &Vector<L>, factor: L) -> Vector<L> {
-    Vector { x: b.x.mul_add(factor, a.x), y: b.y.mul_add(factor, a.y), z: b.z.mul_add(factor, a.z) }
 }

@@ -112,6 +112,11 @@ impl Lane for Avx2 {
     }
 
     #[inline(always)]
+    fn max_magnitude(self, other: Self) -> Self {
+        self.abs().max(other.abs())
+    }
+
+    #[inline(always)]
     fn less(self, other: Self) -> __m256d {
         avx2!(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0))
     }
@@ -119,6 +124,15 @@ impl Lane for Avx2 {
     #[inline(always)]
     fn less_equal(self, other: Self) -> __m256d {
         avx2!(_mm256_cmp_pd::<_CMP_LE_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn mask(bits: u32) -> __m256d {
+        avx2!({
+            let one_each = _mm256_set_epi64x(8, 4, 2, 1);
+            let chosen = _mm256_and_si256(_mm256_set1_epi64x(i64::from(bits)), one_each);
+            _mm256_castsi256_pd(_mm256_cmpeq_epi64(chosen, one_each))
+        })
     }
 
     #[inline(always)]

@@ -112,6 +112,12 @@ impl Lane for Avx512 {
     }
 
     #[inline(always)]
+    fn max_magnitude(self, other: Self) -> Self {
+        // Larger absolute value, sign cleared.
+        Self(avx512!(_mm512_range_pd::<0b1011>(self.0, other.0)))
+    }
+
+    #[inline(always)]
     fn less(self, other: Self) -> __mmask8 {
         avx512!(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0))
     }
@@ -119,6 +125,11 @@ impl Lane for Avx512 {
     #[inline(always)]
     fn less_equal(self, other: Self) -> __mmask8 {
         avx512!(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn mask(bits: u32) -> __mmask8 {
+        bits as u8
     }
 
     #[inline(always)]

@@ -100,6 +100,11 @@ impl Lane for Scalar {
     }
 
     #[inline(always)]
+    fn max_magnitude(self, other: Self) -> Self {
+        self.abs().max(other.abs())
+    }
+
+    #[inline(always)]
     fn less(self, other: Self) -> bool {
         self.0 < other.0
     }
@@ -107,6 +112,11 @@ impl Lane for Scalar {
     #[inline(always)]
     fn less_equal(self, other: Self) -> bool {
         self.0 <= other.0
+    }
+
+    #[inline(always)]
+    fn mask(bits: u32) -> bool {
+        bits & 1 == 1
     }
 
     #[inline(always)]

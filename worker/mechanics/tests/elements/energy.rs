@@ -22,7 +22,7 @@ fn energy_and_momentum_of_a_free_body_are_conserved() {
             std::array::from_fn(|axis| (0..block.nodes.len()).map(|n| block.mass[n] * block.v[axis][n]).sum())
         };
         let before = momentum(&block);
-        let scale: f64 = block.mass.iter().sum::<f64>() * 200.0;
+        let scale: f64 = block.mass[..block.nodes.len()].iter().sum::<f64>() * 200.0;
         let mut dt = 0.0;
         let (mut first, mut taken, mut worst) = (0.0, 0.0, 0.0_f64);
         for cycle in 0..300 {

@@ -1,0 +1,267 @@
+//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel` and `results`, the other end of the [`desk`](crate::desk).
+
+use std::{
+    fs::File,
+    io::Write,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use protocol::{
+    codec::{self, MESSAGE_LIMIT},
+    dial::{self, Call},
+    frame::Kind,
+    handshake::{Hello, Role},
+    link::Receiver,
+    order::{BULK_ON_THE_WAY, Inbox, Outbox, Place},
+    request::{DECK_LIMIT, HostRow, JobOptions, Reply, Request, State, Status, check_file_name},
+    wire::Packed,
+};
+
+use crate::{
+    command::{ClientArgs, SubmitArgs},
+    daemon::host_name,
+    results::Folder,
+    run::list_of_faults,
+};
+
+/// A connection to a master.
+struct Client {
+    runtime: tokio::runtime::Runtime,
+    outbox: Outbox,
+    inbox: Inbox,
+    receiver: Receiver,
+}
+
+impl Client {
+    fn new(at: &ClientArgs) -> Result<Self, String> {
+        let certificates = dial::certificates(at.certs.as_deref()).map_err(|e| e.to_string())?;
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .map_err(|e| format!("threads of the link: {e}"))?;
+        let hello = Hello::new(Role::Client, host_name(), 1.0, 1, "none", worker::random());
+        let call = runtime.block_on(dial::dial(&at.master, certificates.as_ref(), &hello));
+        let Call { sender, receiver, welcome } = call.map_err(|e| e.to_string())?;
+        Ok(Self {
+            runtime,
+            outbox: Outbox::new(sender, welcome.incarnation),
+            inbox: Inbox::new(0, BULK_ON_THE_WAY),
+            receiver,
+        })
+    }
+
+    /// Asks for something and waits for the answer; a refusal is an error.
+    fn ask(&mut self, request: &Request) -> Result<Reply, String> {
+        let bytes = codec::encode(request).map_err(|e| e.to_string())?;
+        let packed = Packed { kind: Kind::Control, cycle: 0, bytes };
+        // Outside of the runtime: the link's own task writes.
+        self.outbox.send(Place::default(), packed).map_err(|e| e.to_string())?;
+        self.hear()
+    }
+
+    fn hear(&mut self) -> Result<Reply, String> {
+        let Self { runtime, inbox, receiver, .. } = self;
+        let letter = runtime.block_on(async {
+            loop {
+                if let Some(letter) = inbox.take() {
+                    return Ok(letter);
+                }
+                inbox.accept(receiver.receive().await?)?;
+            }
+        });
+        let letter = letter.map_err(|e: protocol::Error| format!("the master: {e}"))?;
+        match codec::decode(&letter.bytes, MESSAGE_LIMIT).map_err(|e| e.to_string())? {
+            Reply::No(why) => Err(why),
+            reply => Ok(reply),
+        }
+    }
+
+    /// Follows a job to its end; reports go to standard error.
+    fn follow(&mut self, job: Option<u32>, quiet: bool) -> Result<Status, String> {
+        let mut reply = self.ask(&Request::Watch { job })?;
+        let mut last = String::new();
+        loop {
+            let Reply::Status(status) = reply else { return Err(surprise()) };
+            let line = line_of(&status);
+            if !quiet && line != last {
+                eprintln!("{line}");
+            }
+            last = line;
+            if status.ended.is_some() {
+                return Ok(*status);
+            }
+            reply = self.hear()?;
+        }
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        self.runtime.block_on(dial::leave(self.outbox.sender(), "done"));
+    }
+}
+
+fn surprise() -> String {
+    "the master answered something else; install the same release on both".to_owned()
+}
+
+/// One line on how a job stands.
+fn line_of(status: &Status) -> String {
+    let Status { job, state, waits_for, progress, .. } = status;
+    match (state, waits_for) {
+        (State::Queued, Some(what)) => format!("job {job} queued, waits for {what}"),
+        (State::Running, _) => format!("job {job} running  {progress}"),
+        _ => format!("job {job} {}", state.name()),
+    }
+}
+
+/// `bolide submit`.
+///
+/// # Errors
+/// Faults of the deck, or whatever went wrong on the way.
+pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
+    let name = args.deck.display().to_string();
+    let text = std::fs::read_to_string(&args.deck).map_err(|e| format!("{name}: {e}"))?;
+    if text.len() > DECK_LIMIT {
+        return Err(format!("{name}: {} bytes, at most {DECK_LIMIT} can be sent", text.len()));
+    }
+    let options = JobOptions { min_workers: args.min_workers, ..args.job.asked() };
+    let mut client = Client::new(&args.at)?;
+    match client.ask(&Request::Submit { name, text, options })? {
+        Reply::Submitted { job } if args.wait => {
+            if !args.at.json {
+                eprintln!("job {job} submitted");
+            }
+            finish(&mut client, Some(job), args.at.json)
+        }
+        Reply::Submitted { job } => {
+            if args.at.json {
+                println!("{{\"job\":{job}}}");
+            } else {
+                println!("job {job} submitted");
+            }
+            Ok(ExitCode::SUCCESS)
+        }
+        Reply::Faults(lines) => Err(list_of_faults(&lines)),
+        _ => Err(surprise()),
+    }
+}
+
+/// `bolide watch`: ends as `run` would.
+///
+/// # Errors
+/// The job's failure, or whatever went wrong on the way.
+pub fn watch(job: Option<u32>, at: &ClientArgs) -> Result<ExitCode, String> {
+    finish(&mut Client::new(at)?, job, at.json)
+}
+
+fn finish(client: &mut Client, job: Option<u32>, json: bool) -> Result<ExitCode, String> {
+    let status = client.follow(job, json)?;
+    let ended = status.ended.unwrap_or_default();
+    if let Some(text) = if json { ended.summary } else { ended.table } {
+        println!("{text}");
+    }
+    match (ended.failure, status.state) {
+        (Some(why), _) => Err(format!("job {}: {why}", status.job)),
+        (None, State::Cancelled) => Ok(ExitCode::from(130)),
+        (None, _) => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// `bolide jobs`.
+///
+/// # Errors
+/// Whatever went wrong on the way.
+pub fn jobs(at: &ClientArgs) -> Result<ExitCode, String> {
+    let Reply::Jobs(jobs) = Client::new(at)?.ask(&Request::Jobs)? else { return Err(surprise()) };
+    if at.json {
+        println!("{}", serde_json::to_string(&jobs).map_err(|e| e.to_string())?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("{:>5}  {:<10} {:>9} {:>12}  {:<40} note", "job", "state", "cycle", "time", "title");
+    for job in jobs {
+        let failure = job.ended.and_then(|ended| ended.failure);
+        let note = job.waits_for.map(|what| format!("waits for {what}")).or(failure).unwrap_or_else(|| {
+            let shares = job.shares.iter().map(|s| format!("{} {}", s.host, s.elements));
+            shares.collect::<Vec<_>>().join(", ")
+        });
+        let title: String = job.title.chars().take(40).collect();
+        println!(
+            "{:>5}  {:<10} {:>9} {:>12.5e}  {title:<40} {note}",
+            job.job,
+            job.state.name(),
+            job.cycle,
+            job.time
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `bolide hosts`.
+///
+/// # Errors
+/// Whatever went wrong on the way.
+pub fn hosts(at: &ClientArgs) -> Result<ExitCode, String> {
+    let Reply::Hosts(hosts) = Client::new(at)?.ask(&Request::Hosts)? else { return Err(surprise()) };
+    if at.json {
+        println!("{}", serde_json::to_string(&hosts).map_err(|e| e.to_string())?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!(
+        "{:>4}  {:<24} {:>7} {:>7}  {:<7} {:<22} {:<5} note",
+        "host", "name", "speed", "threads", "lanes", "address", "state"
+    );
+    for HostRow { host, name, speed, threads, lanes, address, state, note, .. } in hosts {
+        println!("{host:>4}  {name:<24} {speed:>7} {threads:>7}  {lanes:<7} {address:<22} {state:<5} {note}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `bolide cancel`.
+///
+/// # Errors
+/// If there is no such job or it is over, or whatever went wrong on the way.
+pub fn cancel(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
+    let Reply::Done(what) = Client::new(at)?.ask(&Request::Cancel { job })? else { return Err(surprise()) };
+    println!("{what}");
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `bolide results`.
+///
+/// # Errors
+/// If the job has none, the folder holds something already, a file cannot be written, or whatever went wrong on the way.
+pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> Result<ExitCode, String> {
+    let folder = out.unwrap_or_else(|| Path::new("results").join(format!("job-{job}")));
+    let mut client = Client::new(at)?;
+    let Reply::Files(files) = client.ask(&Request::Files { job })? else { return Err(surprise()) };
+    Folder::create(&folder, force).map_err(|e| e.to_string())?;
+    let fault = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
+    let mut total = 0;
+    for (name, _) in &files {
+        // The master is believed no more than any other peer.
+        check_file_name(name)?;
+        let path = folder.join(name);
+        let mut file = File::create(&path).map_err(|e| fault(&path, e))?;
+        let mut offset = 0;
+        loop {
+            let request = Request::File { job, name: name.clone(), offset };
+            let Reply::Piece(bytes) = client.ask(&request)? else { return Err(surprise()) };
+            if bytes.is_empty() {
+                break;
+            }
+            file.write_all(&bytes).map_err(|e| fault(&path, e))?;
+            offset += bytes.len() as u64;
+        }
+        total += offset;
+    }
+    if at.json {
+        let names: Vec<&String> = files.iter().map(|(name, _)| name).collect();
+        println!("{}", serde_json::to_string(&names).map_err(|e| e.to_string())?);
+    } else {
+        println!("{} files, {total} bytes in {}", files.len(), folder.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,273 @@
+//! DRIVE: a job's session over links to its workers.
+//!
+//! The calling thread owns the [`Job`]. What comes from the connections' tasks are its events; its actions are sent
+//! through the links' queues without waiting, or given to the sink. Nothing is decided here.
+
+use std::{
+    collections::VecDeque,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use protocol::{
+    Error,
+    frame::Header,
+    link::Sender,
+    message::{ToMaster, ToWorker},
+    order::{Outbox, Place},
+    wire,
+};
+use tokio::sync::mpsc;
+
+use crate::{
+    embedded::{Sink, Traffic, timed_sort},
+    event::{Action, Event, Hand, Outcome},
+    job::{Bench, Job},
+    sort::Sorted,
+};
+
+/// Messages of one worker that may wait for the job's thread.
+const WAITING_PER_WORKER: usize = 8;
+
+/// What reaches the job's thread.
+pub enum Input {
+    /// A message, with the header of its frame.
+    Message(usize, Header, ToMaster),
+    /// A worker's connection has ended.
+    Lost(usize, String),
+    /// A sort is done, with its thread-CPU time (ns); or the sort had a bug.
+    Sorted(Result<(Box<Sorted>, u64), String>),
+}
+
+/// A connected worker, as those see it who send to it.
+#[derive(Clone)]
+pub struct Seat {
+    /// The host.
+    pub hand: Hand,
+    /// Where it calls from.
+    pub address: String,
+    /// Its connection.
+    pub incarnation: u32,
+    /// The way to it.
+    pub outbox: Arc<Mutex<Outbox>>,
+    /// The way from it.
+    pub route: Arc<Route>,
+}
+
+impl Seat {
+    fn send(&self, place: Place, message: &ToWorker) -> protocol::Result<()> {
+        let packed = wire::pack_to_worker(message)?;
+        self.outbox.lock().unwrap_or_else(PoisonError::into_inner).send(place, packed)
+    }
+
+    /// The link's sending half.
+    pub fn sender(&self) -> Sender {
+        self.outbox.lock().unwrap_or_else(PoisonError::into_inner).sender().clone()
+    }
+
+    fn bytes(&self) -> u64 {
+        let counters = self.sender().counters();
+        counters.bytes_sent + counters.bytes_received
+    }
+}
+
+/// The way from a worker's connection to the job that it computes.
+#[derive(Default)]
+pub struct Route(Mutex<Port>);
+
+#[derive(Default)]
+struct Port {
+    /// The last job that the worker was given.
+    job: u32,
+    to: Option<(usize, mpsc::Sender<Input>)>,
+    /// Why the connection has ended.
+    gone: Option<String>,
+}
+
+impl Route {
+    fn port(&self) -> std::sync::MutexGuard<'_, Port> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// From now on messages of `job` go to `send`.
+    fn open(&self, job: u32, index: usize, send: mpsc::Sender<Input>) -> Result<(), String> {
+        let mut port = self.port();
+        port.job = job;
+        match &port.gone {
+            Some(why) => Err(why.clone()),
+            None => {
+                port.to = Some((index, send));
+                Ok(())
+            }
+        }
+    }
+
+    fn close(&self) {
+        self.port().to = None;
+    }
+
+    /// Where a frame goes: none for what a job that is over still had on its way.
+    ///
+    /// # Errors
+    /// For a frame of a job that the worker was not given.
+    pub fn find(&self, header: &Header) -> protocol::Result<Option<(usize, mpsc::Sender<Input>)>> {
+        let port = self.port();
+        if header.job > port.job || header.job == 0 || header.epoch != 0 {
+            return Err(Error::Message(format!(
+                "{} frame of job {} epoch {}, the worker was given job {} epoch 0",
+                header.kind, header.job, header.epoch, port.job
+            )));
+        }
+        Ok(if header.job == port.job { port.to.clone() } else { None })
+    }
+
+    /// The connection has ended; gives where to say so.
+    pub fn lose(&self, why: &str) -> Option<(usize, mpsc::Sender<Input>)> {
+        let mut port = self.port();
+        port.gone = Some(why.to_owned());
+        port.to.take()
+    }
+}
+
+/// Runs job `number` on these workers to its end; `first` are the actions that came with the job.
+///
+/// # Errors
+/// What the sink refused; the workers are released all the same.
+pub fn drive(
+    job: Job,
+    first: Vec<Action>,
+    number: u32,
+    seats: &[Seat],
+    sink: &mut dyn Sink,
+    stop: &AtomicBool,
+) -> Result<(Outcome, Traffic), String> {
+    let (send, input) = mpsc::channel(WAITING_PER_WORKER * seats.len() + 1);
+    let bytes_before: u64 = seats.iter().map(Seat::bytes).sum();
+    let mut driver = Driver {
+        job,
+        place: Place { job: number, epoch: 0, plan: 0 },
+        seats,
+        send,
+        input,
+        lost: VecDeque::new(),
+        sort_ns: 0,
+        outcome: None,
+    };
+    for (index, seat) in seats.iter().enumerate() {
+        if let Err(why) = seat.route.open(number, index, driver.send.clone()) {
+            driver.lost.push_back((index, why));
+        }
+    }
+    let result = driver.run(first, sink, stop);
+    for seat in seats {
+        seat.route.close();
+        if result.is_err() {
+            // A worker that cannot be reached is found lost by its connection's task.
+            let _ = seat.send(driver.place, &ToWorker::Release);
+        }
+    }
+    let bytes = seats.iter().map(Seat::bytes).sum::<u64>() - bytes_before;
+    result.map(|outcome| (outcome, Traffic { bytes, sort_ns: driver.sort_ns }))
+}
+
+struct Driver<'a> {
+    job: Job,
+    place: Place,
+    seats: &'a [Seat],
+    send: mpsc::Sender<Input>,
+    input: mpsc::Receiver<Input>,
+    /// Workers found lost while sending.
+    lost: VecDeque<(usize, String)>,
+    sort_ns: u64,
+    outcome: Option<Outcome>,
+}
+
+impl Driver<'_> {
+    fn run(&mut self, first: Vec<Action>, sink: &mut dyn Sink, stop: &AtomicBool) -> Result<Outcome, String> {
+        self.act(first, sink)?;
+        let mut stopping = false;
+        loop {
+            if !stopping && stop.load(Ordering::Relaxed) {
+                stopping = true;
+                self.apply(Event::Stop, sink)?;
+            }
+            if let Some(outcome) = self.outcome.take() {
+                return Ok(outcome);
+            }
+            let input = match self.lost.pop_front() {
+                Some((worker, why)) => Input::Lost(worker, why),
+                None => self.input.blocking_recv().ok_or("every way to the job is closed")?,
+            };
+            match input {
+                Input::Message(worker, header, message) => match self.check(&header, &message) {
+                    Ok(()) => self.apply(Event::Message(worker, message), sink)?,
+                    Err(why) => {
+                        let seat = &self.seats[worker];
+                        let why = format!("{} at {}: {why}", seat.hand.name, seat.address);
+                        seat.sender().abort(Error::Message(why.clone()));
+                        self.apply(Event::Lost(worker, why), sink)?;
+                    }
+                },
+                Input::Lost(worker, why) => self.apply(Event::Lost(worker, why), sink)?,
+                Input::Sorted(sorted) => {
+                    let (sorted, ns) = sorted?;
+                    self.sort_ns += ns;
+                    self.apply(Event::Sorted(sorted), sink)?;
+                }
+            }
+        }
+    }
+
+    /// A cycle's frame follows the plan in force at its cycle, which the totals that answer it follow as well.
+    fn check(&mut self, header: &Header, message: &ToMaster) -> Result<(), String> {
+        if let ToMaster::Cycle { cycle, .. } = message {
+            let plan = self.job.plan_hash(*cycle);
+            if header.cycle != *cycle || plan != Some(header.plan) {
+                return Err(format!(
+                    "cycle {cycle} in a frame of cycle {} under plan {:016x}, in force is {:016x}",
+                    header.cycle,
+                    header.plan,
+                    plan.unwrap_or_default()
+                ));
+            }
+            self.place.plan = header.plan;
+        }
+        Ok(())
+    }
+
+    fn apply(&mut self, event: Event, sink: &mut dyn Sink) -> Result<(), String> {
+        let actions = self.job.apply(event);
+        self.act(actions, sink)
+    }
+
+    fn act(&mut self, actions: Vec<Action>, sink: &mut dyn Sink) -> Result<(), String> {
+        for action in actions {
+            match action {
+                Action::Send(worker, message) => {
+                    let seat = &self.seats[worker];
+                    if let Err(error) = seat.send(self.place, &message) {
+                        let why = format!("{} at {}: {error}", seat.hand.name, seat.address);
+                        self.lost.push_back((worker, why));
+                    }
+                }
+                Action::Sort(bench, x) => self.sort(bench, x),
+                Action::Over(outcome) => self.outcome = Some(*outcome),
+                other => sink.take(other)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn sort(&self, bench: Arc<Bench>, x: Vec<[f64; 3]>) {
+        let send = self.send.clone();
+        rayon::spawn(move || {
+            let sorted = catch_unwind(AssertUnwindSafe(|| timed_sort(&bench, &x)));
+            let sorted = sorted.map_err(|_| "a bug in the sort; the log has its words".to_owned());
+            // The receiver is gone only when the job is over.
+            let _ = send.blocking_send(Input::Sorted(sorted));
+        });
+    }
+}

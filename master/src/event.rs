@@ -1,0 +1,155 @@
+//! The closed lists of a job: what happens to it, what it wants done, how it ends.
+
+use std::sync::Arc;
+
+use mechanics::{contact::Census, state::GlobalState};
+use protocol::message::{Route, ToMaster, ToWorker, Work};
+
+use crate::{
+    balance::Dealing, job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot,
+    sort::Sorted,
+};
+
+/// A worker as the job sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hand {
+    /// Name for messages.
+    pub name: String,
+    /// Relative speed, user-given.
+    pub speed: f64,
+    /// Compute threads.
+    pub threads: u32,
+}
+
+/// What a user may ask of a run beside the deck.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Lane width by name; none for the best.
+    pub lanes: Option<String>,
+    /// How partial forces travel.
+    pub route: Route,
+    /// How work units are dealt.
+    pub dealing: Dealing,
+    /// Take a snapshot at the start of this cycle.
+    pub snapshot_at: Option<u64>,
+    /// Write states while the run goes (the last one is always gathered).
+    pub states: bool,
+    /// Forces extra sorts, for tests of bits.
+    pub force_sorts: ForceSorts,
+}
+
+/// Extra sorts, which may not change a bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ForceSorts {
+    /// Only when due.
+    #[default]
+    Never,
+    /// Every so many cycles.
+    Every(u64),
+    /// At pseudo-random cycles, about one in four.
+    Seeded(u64),
+}
+
+impl ForceSorts {
+    pub(crate) fn at(self, cycle: u64) -> bool {
+        match self {
+            Self::Never => false,
+            Self::Every(n) => cycle.is_multiple_of(n.max(1)),
+            Self::Seeded(seed) => {
+                let mut x = cycle.wrapping_add(seed).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                (x ^ (x >> 31)).is_multiple_of(4)
+            }
+        }
+    }
+}
+
+/// What happens to a job.
+pub enum Event {
+    /// A message from a worker.
+    Message(usize, ToMaster),
+    /// A sort is done.
+    Sorted(Box<Sorted>),
+    /// The user wants the run to end with the results so far.
+    Stop,
+    /// A worker is gone for good.
+    Lost(usize, String),
+}
+
+/// What a job wants done.
+pub enum Action {
+    /// Send to a worker.
+    Send(usize, ToWorker),
+    /// Sort; exactly one [`Event::Sorted`] answers it. Positions by surface node.
+    Sort(Arc<Bench>, Vec<[f64; 3]>),
+    /// Append a row of history.
+    Row(Box<HistoryRow>),
+    /// Write a state for the user.
+    State(Box<GlobalState>),
+    /// Store a snapshot.
+    Snapshot(Box<Snapshot>),
+    /// Tell the user how far it is.
+    Progress(Progress),
+    /// The job is over.
+    Over(Box<Outcome>),
+}
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Cycles completed.
+    pub cycle: u64,
+    /// Time (time).
+    pub time: f64,
+    /// Time step (time).
+    pub dt: f64,
+    /// Global index of the element that limits it; none where something else does.
+    pub element: Option<u32>,
+    /// What limits it.
+    pub limit: Limit,
+}
+
+/// What limits a time step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Courant limit of an element.
+    Courant,
+    /// Rate of volume of an element.
+    Volume,
+    /// Stiffness of a contact.
+    Contact,
+    /// A contact node may not travel further.
+    Travel,
+    /// The step before times the growth.
+    Growth,
+    /// The end of the run.
+    End,
+}
+
+/// How a job ended.
+pub struct Outcome {
+    /// None for a run to its end or to the user's stop; else what went wrong.
+    pub failure: Option<String>,
+    /// The user stopped it.
+    pub stopped: bool,
+    /// The final state, unless a worker could not give it.
+    pub state: Option<GlobalState>,
+    /// Digest of the final state.
+    pub digest: String,
+    /// The ledger.
+    pub ledger: Ledger,
+    /// Sorts that took effect.
+    pub sorts: u64,
+    /// Census of the last sort.
+    pub census: Census,
+    /// Compute time of each worker.
+    pub work: Vec<Work>,
+    /// Largest over mean of cost over speed.
+    pub imbalance: f64,
+    /// Lane width of the workers.
+    pub lanes: String,
+    /// Name of the route.
+    pub route: &'static str,
+    /// Cycles of this session of the run: not those before a snapshot that it resumed from.
+    pub cycles_run: u64,
+}

@@ -1,0 +1,221 @@
+//! HOSTS: who is or was connected, what each offers, and what each is doing.
+//!
+//! A plain table: it knows no socket and no clock. A host's link and the way to its job stand beside it in the daemon.
+
+use std::collections::BTreeMap;
+
+use protocol::{handshake::Hello, request::HostRow};
+
+/// Most lost hosts that are remembered.
+pub const LOST_LIMIT: usize = 1000;
+
+/// What a host is doing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Connected, without a job.
+    Idle,
+    /// Computing this job.
+    Busy(u32),
+    /// Not connected any more, and why.
+    Lost(String),
+}
+
+/// One host.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Host {
+    /// Its number, from 0; a host that returns keeps it.
+    pub number: u32,
+    /// Its name, unique among the connected.
+    pub name: String,
+    /// Relative speed.
+    pub speed: f64,
+    /// Compute threads.
+    pub threads: u32,
+    /// Lane set.
+    pub lanes: String,
+    /// Where it called from.
+    pub address: String,
+    /// Drawn at the start of its process.
+    pub nonce: u64,
+    /// Its connection.
+    pub incarnation: u32,
+    /// What it is doing.
+    pub state: State,
+}
+
+/// Every host that is or was connected.
+#[derive(Debug, Default)]
+pub struct Hosts {
+    by_number: BTreeMap<u32, Host>,
+    next: u32,
+}
+
+impl Hosts {
+    /// Takes a greeting in on connection `incarnation`; gives the host's number, and the connection that the same
+    /// process had before and is to be ended, if any.
+    ///
+    /// # Errors
+    /// The reason to refuse it: another process of that name is connected.
+    pub fn admit(
+        &mut self,
+        hello: &Hello,
+        address: &str,
+        incarnation: u32,
+    ) -> Result<(u32, Option<u32>), String> {
+        let known = self.by_number.values_mut().find(|host| host.name == hello.name);
+        let mut ended = None;
+        let number = match known {
+            Some(host) => {
+                if !matches!(host.state, State::Lost(_)) {
+                    if host.nonce != hello.nonce {
+                        return Err(format!(
+                            "a worker named {:?} is connected from {}; start this one with another --name",
+                            host.name, host.address
+                        ));
+                    }
+                    ended = Some(host.incarnation);
+                }
+                host.number
+            }
+            None => {
+                self.forget_the_oldest_lost();
+                self.next += 1;
+                self.next - 1
+            }
+        };
+        self.by_number.insert(
+            number,
+            Host {
+                number,
+                name: hello.name.clone(),
+                speed: hello.speed,
+                threads: hello.threads,
+                lanes: hello.lanes.clone(),
+                address: address.to_owned(),
+                nonce: hello.nonce,
+                incarnation,
+                state: State::Idle,
+            },
+        );
+        Ok((number, ended))
+    }
+
+    /// The host on a connection.
+    pub fn on(&self, incarnation: u32) -> Option<&Host> {
+        self.by_number.values().find(|host| host.incarnation == incarnation)
+    }
+
+    /// A connection has ended; what an older connection of a returned host says is not heard.
+    pub fn lose(&mut self, incarnation: u32, why: &str) {
+        if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
+            host.state = State::Lost(why.to_owned());
+        }
+    }
+
+    /// Those without a job, by number.
+    pub fn idle(&self) -> impl Iterator<Item = &Host> {
+        self.by_number.values().filter(|host| host.state == State::Idle)
+    }
+
+    /// These connections compute a job from now on.
+    pub fn occupy(&mut self, incarnations: &[u32], job: u32) {
+        for host in self.by_number.values_mut() {
+            if incarnations.contains(&host.incarnation) && host.state == State::Idle {
+                host.state = State::Busy(job);
+            }
+        }
+    }
+
+    /// A job is over: its hosts that are still connected are idle.
+    pub fn release(&mut self, job: u32) {
+        for host in self.by_number.values_mut() {
+            if host.state == State::Busy(job) {
+                host.state = State::Idle;
+            }
+        }
+    }
+
+    /// The table as clients see it.
+    pub fn rows(&self) -> Vec<HostRow> {
+        let row = |host: &Host| {
+            let (state, note) = match &host.state {
+                State::Idle => ("idle", String::new()),
+                State::Busy(job) => ("busy", format!("job {job}")),
+                State::Lost(why) => ("lost", why.clone()),
+            };
+            HostRow {
+                host: host.number,
+                name: host.name.clone(),
+                speed: host.speed,
+                threads: host.threads,
+                lanes: host.lanes.clone(),
+                address: host.address.clone(),
+                incarnation: host.incarnation,
+                state: state.to_owned(),
+                note,
+            }
+        };
+        self.by_number.values().map(row).collect()
+    }
+
+    fn forget_the_oldest_lost(&mut self) {
+        let lost = |host: &&Host| matches!(host.state, State::Lost(_));
+        if self.by_number.values().filter(lost).count() < LOST_LIMIT {
+            return;
+        }
+        if let Some(oldest) =
+            self.by_number.values().filter(lost).min_by_key(|host| host.incarnation).map(|h| h.number)
+        {
+            self.by_number.remove(&oldest);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::handshake::Role;
+
+    fn hello(name: &str, nonce: u64) -> Hello {
+        Hello::new(Role::Worker, name, 1.0, 1, "scalar", nonce)
+    }
+
+    #[test]
+    fn a_returned_process_replaces_its_ghost_and_another_one_is_refused() {
+        let mut hosts = Hosts::default();
+        assert_eq!(hosts.admit(&hello("a", 1), "x", 1), Ok((0, None)));
+        assert_eq!(hosts.admit(&hello("b", 2), "y", 2), Ok((1, None)));
+        let refused = hosts.admit(&hello("a", 9), "z", 3).expect_err("a is there");
+        assert!(refused.contains("\"a\" is connected from x"), "{refused}");
+        assert_eq!(hosts.admit(&hello("a", 1), "x2", 4), Ok((0, Some(1))));
+        hosts.lose(1, "the ghost's end");
+        assert_eq!(hosts.on(4).map(|h| &h.state), Some(&State::Idle));
+        hosts.lose(4, "gone");
+        assert_eq!(hosts.admit(&hello("a", 9), "z", 5), Ok((0, None)), "the place is free again");
+    }
+
+    #[test]
+    fn a_job_occupies_its_hosts_until_it_is_over() {
+        let mut hosts = Hosts::default();
+        for (i, name) in ["a", "b", "c"].into_iter().enumerate() {
+            hosts.admit(&hello(name, i as u64), "x", i as u32 + 1).expect("new");
+        }
+        hosts.occupy(&[1, 2], 7);
+        hosts.lose(2, "cable");
+        assert_eq!(hosts.idle().map(|h| h.incarnation).collect::<Vec<_>>(), [3]);
+        hosts.release(7);
+        assert_eq!(hosts.idle().map(|h| h.incarnation).collect::<Vec<_>>(), [1, 3]);
+        assert_eq!(hosts.rows()[1].note, "cable");
+    }
+
+    #[test]
+    fn lost_hosts_are_remembered_up_to_a_limit() {
+        let mut hosts = Hosts::default();
+        for i in 0..LOST_LIMIT as u32 + 5 {
+            hosts.admit(&hello(&format!("pc-{i}"), u64::from(i)), "x", i + 1).expect("new");
+            hosts.lose(i + 1, "gone");
+        }
+        assert_eq!(hosts.rows().len(), LOST_LIMIT);
+        assert_eq!(hosts.rows()[0].name, "pc-5");
+    }
+}

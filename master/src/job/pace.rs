@@ -1,0 +1,123 @@
+//! The pace of a run: time steps, sorts, images and the end, from the votes of whole cycles.
+
+use mechanics::{contact::reach, exact::Quantum, vote::Vote};
+use protocol::message::Orders;
+
+use super::Job;
+use crate::event::Limit;
+/// Part of the slack kept free for a rate of spread that rises between the trigger of a sort and the cycle it acts at:
+/// surfaces that shake change it threefold in a few cycles.
+const SPREAD_MARGIN: f64 = 0.25;
+/// Share of the gap that contact votes for per cycle; the lag may not take it past 20 %.
+const TRAVEL_VOTE: f64 = 0.16;
+
+impl Job {
+    /// The orders that give `dt` of cycle `next`, which ends at `time_after`, and what happens then. `vote` is of the
+    /// cycle two before the sort that it may trigger could gather.
+    pub(super) fn orders_for(&mut self, next: u64, dt: f64, time_after: f64, vote: Option<&Vote>) -> Orders {
+        let control = self.model.setup.control;
+        let after = next + 1;
+        if self.stop_at.is_none()
+            && (self.stop_asked
+                || self.failure.is_some()
+                || time_after >= control.end_time
+                || after >= control.end_cycle)
+        {
+            self.stop_at = Some(after);
+        }
+        let stop = self.stop_at == Some(after);
+        let mut collect = stop || self.options.snapshot_at == Some(after);
+        if self.options.states
+            && let (Some(due), Some(period)) = (self.next_state_time, self.model.output.period)
+            && time_after >= due
+        {
+            collect = true;
+            self.next_state_time = Some(((time_after / period).floor() + 1.0) * period);
+        }
+        if collect {
+            self.image_times.insert(after, time_after);
+        }
+        let gather = !stop && self.sort_due(after, vote);
+        if gather {
+            self.sorts_under_way.push_back(after);
+            self.last_gather = after;
+        }
+        Orders { next, dt, force_quantum: self.quanta.force, gather, collect, stop }
+    }
+
+    /// Whether positions travel at the start of cycle `cycle`, so that a sort acts a lag later.
+    pub(super) fn sort_due(&mut self, cycle: u64, vote: Option<&Vote>) -> bool {
+        let (Some(_), Some(settings)) = (&self.bench, &self.model.setup.contact) else { return false };
+        let lag = u64::from(self.model.setup.control.sort_lag);
+        let waiting = self.exchanges.iter().filter(|(acts_at, _)| *acts_at > self.completed).count();
+        let in_flight = self.sorts_under_way.len() + waiting;
+        if in_flight as u64 > 2 * lag + 2 {
+            return false;
+        }
+        if self.options.force_sorts.at(cycle) {
+            return true;
+        }
+        let Some(vote) = vote else { return false };
+        // Positions were those of two cycles before `cycle`; the sort acts `lag` cycles after it.
+        let added = (lag + 3) as f64 * self.spread_rate;
+        let measured = self.references[0].0 < self.completed && in_flight == 0;
+        let (spread, margin) = if measured {
+            let (spread, _) = reach::worst_spread(&vote.extents, settings);
+            (spread, (0.5 * added).max(SPREAD_MARGIN * settings.slack))
+        } else {
+            // Until votes are against the newest sorted positions, the rate says how far bodies are from those: bodies
+            // that close in at the travel limit from both sides need the next sort before this one acts.
+            (self.spread_rate * cycle.saturating_sub(self.last_gather) as f64, 0.0)
+        };
+        spread + added + margin > settings.slack
+    }
+
+    /// The step that a vote allows, what limits it, and the element if one does.
+    pub(super) fn limit(&self, vote: &Vote, grown: f64) -> (f64, Limit, Option<u32>) {
+        let control = &self.model.setup.control;
+        let mut best = (grown, Limit::Growth, None);
+        let mut offer = |dt: f64, limit: Limit, element: Option<u32>| {
+            if dt < best.0 {
+                best = (dt, limit, element);
+            }
+        };
+        offer(control.safety_factor * vote.courant, Limit::Courant, Some(vote.courant_element));
+        offer(vote.volume_limit, Limit::Volume, None);
+        offer(vote.contact_limit, Limit::Contact, None);
+        if let Some(contact) = &self.model.setup.contact
+            && vote.contact_speed_ahead > 0.0
+        {
+            offer(TRAVEL_VOTE * contact.gap / vote.contact_speed_ahead, Limit::Travel, None);
+        }
+        best
+    }
+
+    /// Forces nearing the bound of exact sums ask for a coarser quantum.
+    pub(super) fn rescaled(&self, vote: &Vote) -> Result<Option<Quantum>, String> {
+        let quantum = self.quanta.force;
+        if vote.force_bound > quantum.term_bound() || !vote.force_bound.is_finite() {
+            return Err(format!(
+                "a force of up to {:e}, exact sums hold {:e}; the run has blown up or needs a smaller time step",
+                vote.force_bound,
+                quantum.term_bound()
+            ));
+        }
+        Ok((vote.force_bound > quantum.rescale_bound()).then(|| Quantum::for_reference(vote.force_bound, 42)))
+    }
+
+    /// Keeps the rate at which bodies move against each other (length per cycle), from the vote of `cycle`: that of the
+    /// last cycle, or of all since the sorted positions if it is greater. Surfaces that shake stand still at times.
+    pub(super) fn follow_spread(&mut self, cycle: u64, vote: &Vote) {
+        let Some(settings) = &self.model.setup.contact else { return };
+        let (spread, _) = reach::worst_spread(&vote.extents, settings);
+        if !spread.is_finite() {
+            return;
+        }
+        let [newest, before] = self.references;
+        let (acts_at, gathered_at) = if newest.0 <= cycle { newest } else { before };
+        let age = (cycle + 1).saturating_sub(gathered_at).max(1);
+        let step = if acts_at < cycle { spread - self.last_spread } else { 0.0 };
+        self.spread_rate = step.max(spread / age as f64);
+        self.last_spread = spread;
+    }
+}

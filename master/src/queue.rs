@@ -1,0 +1,199 @@
+//! QUEUE: jobs, their legal states, first come first served.
+//!
+//! A plain table in memory: it knows no socket, clock or disk. The text of a deck is kept until its job is over.
+
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+
+use protocol::request::{JobOptions, State};
+
+/// Most jobs that may wait.
+pub const QUEUED_LIMIT: usize = 1000;
+/// Most jobs that are remembered after their end.
+pub const ENDED_LIMIT: usize = 1000;
+
+/// What happens to a job in the queue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// Workers were given to it.
+    Start,
+    /// It came to its end.
+    Finish,
+    /// Something went wrong.
+    Fail,
+    /// A user took it back, or it ended early because of that.
+    Cancel,
+}
+
+/// The state after an event.
+///
+/// # Errors
+/// A sentence that names both, where the event cannot happen.
+pub fn after(state: State, event: Event) -> Result<State, String> {
+    match (state, event) {
+        (State::Queued, Event::Start) => Ok(State::Running),
+        (State::Queued | State::Running, Event::Cancel) => Ok(State::Cancelled),
+        (State::Running, Event::Finish) => Ok(State::Done),
+        (State::Running, Event::Fail) => Ok(State::Failed),
+        (State::Queued, Event::Finish | Event::Fail)
+        | (State::Running, Event::Start)
+        | (State::Done | State::Failed | State::Cancelled, _) => {
+            Err(format!("a job that is {} cannot {event:?}", state.name()).to_lowercase())
+        }
+    }
+}
+
+/// One job.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// Its number, from 1.
+    pub id: u32,
+    /// Name of the deck's file.
+    pub name: String,
+    /// The deck; empty once the job is over.
+    pub text: Arc<String>,
+    /// What is asked beside the deck.
+    pub options: JobOptions,
+    /// Where it stands.
+    pub state: State,
+    /// Where its results go; none with `no_output`.
+    pub folder: Option<PathBuf>,
+}
+
+/// All jobs, by number.
+#[derive(Debug)]
+pub struct Queue {
+    jobs: BTreeMap<u32, Entry>,
+    next: u32,
+}
+
+impl Queue {
+    /// An empty queue that numbers from `first`.
+    pub const fn new(first: u32) -> Self {
+        Self { jobs: BTreeMap::new(), next: first }
+    }
+
+    /// Adds a job whose results go below `spool`; gives its number.
+    ///
+    /// # Errors
+    /// If too many wait.
+    pub fn add(
+        &mut self,
+        name: String,
+        text: String,
+        options: JobOptions,
+        spool: &std::path::Path,
+    ) -> Result<u32, String> {
+        let waiting = self.jobs.values().filter(|job| job.state == State::Queued).count();
+        if waiting >= QUEUED_LIMIT {
+            return Err(format!("{waiting} jobs wait, at most {QUEUED_LIMIT}; cancel some"));
+        }
+        let id = self.next;
+        self.next += 1;
+        let folder = (!options.no_output).then(|| spool.join(format!("job-{id}")));
+        let text = Arc::new(text);
+        self.jobs.insert(id, Entry { id, name, text, options, state: State::Queued, folder });
+        Ok(id)
+    }
+
+    /// The job that is to start next.
+    pub fn first(&self) -> Option<&Entry> {
+        self.jobs.values().find(|job| job.state == State::Queued)
+    }
+
+    /// A job.
+    pub fn get(&self, id: u32) -> Option<&Entry> {
+        self.jobs.get(&id)
+    }
+
+    /// The newest job.
+    pub fn last(&self) -> Option<u32> {
+        self.jobs.keys().next_back().copied()
+    }
+
+    /// Changes a job's state; gives the new one, and the jobs that are forgotten.
+    ///
+    /// # Errors
+    /// As for [`after`], or if there is no such job.
+    pub fn apply(&mut self, id: u32, event: Event) -> Result<(State, Vec<u32>), String> {
+        let job = self.jobs.get_mut(&id).ok_or_else(|| format!("no job {id}"))?;
+        job.state = after(job.state, event)?;
+        let state = job.state;
+        if is_over(state) {
+            job.text = Arc::default();
+        }
+        let ended: Vec<u32> = self.jobs.values().filter(|j| is_over(j.state)).map(|j| j.id).collect();
+        let forgotten = ended[..ended.len().saturating_sub(ENDED_LIMIT)].to_vec();
+        for id in &forgotten {
+            self.jobs.remove(id);
+        }
+        Ok((state, forgotten))
+    }
+}
+
+/// Whether nothing more can happen to a job.
+pub const fn is_over(state: State) -> bool {
+    matches!(state, State::Done | State::Failed | State::Cancelled)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STATES: [State; 5] = [State::Queued, State::Running, State::Done, State::Failed, State::Cancelled];
+    const EVENTS: [Event; 4] = [Event::Start, Event::Finish, Event::Fail, Event::Cancel];
+
+    #[test]
+    fn only_five_changes_are_legal_and_none_leaves_an_end() {
+        let mut legal = Vec::new();
+        for state in STATES {
+            for event in EVENTS {
+                match after(state, event) {
+                    Ok(next) => legal.push((state, next)),
+                    Err(why) => assert!(why.contains(state.name()), "{why}"),
+                }
+            }
+        }
+        use State::{Cancelled, Done, Failed, Queued, Running};
+        let expected = [
+            (Queued, Running),
+            (Queued, Cancelled),
+            (Running, Done),
+            (Running, Failed),
+            (Running, Cancelled),
+        ];
+        assert_eq!(legal, expected);
+    }
+
+    fn add(queue: &mut Queue) -> Result<u32, String> {
+        queue.add("d".into(), "text".into(), JobOptions::default(), "spool".as_ref())
+    }
+
+    #[test]
+    fn the_first_come_is_the_first_served() {
+        let mut queue = Queue::new(5);
+        assert_eq!((add(&mut queue), add(&mut queue), add(&mut queue)), (Ok(5), Ok(6), Ok(7)));
+        assert_eq!(queue.first().map(|job| job.id), Some(5));
+        assert_eq!(queue.apply(6, Event::Cancel), Ok((State::Cancelled, vec![])));
+        assert_eq!(queue.apply(5, Event::Start), Ok((State::Running, vec![])));
+        assert_eq!(queue.first().map(|job| job.id), Some(7));
+        assert_eq!(queue.apply(5, Event::Fail), Ok((State::Failed, vec![])));
+        assert_eq!(queue.get(5).map(|job| job.text.as_str()), Some(""), "the deck is not kept");
+        assert_eq!(queue.apply(9, Event::Start), Err("no job 9".to_owned()));
+    }
+
+    #[test]
+    fn waiting_and_ended_jobs_have_their_limits() {
+        let mut queue = Queue::new(1);
+        for _ in 0..QUEUED_LIMIT {
+            add(&mut queue).expect("room");
+        }
+        let full = add(&mut queue).expect_err("full");
+        assert!(full.contains("1000 jobs wait"), "{full}");
+        for id in 1..=ENDED_LIMIT as u32 {
+            assert_eq!(queue.apply(id, Event::Cancel), Ok((State::Cancelled, vec![])));
+        }
+        let next = add(&mut queue).expect("room again");
+        assert_eq!(queue.apply(next, Event::Cancel), Ok((State::Cancelled, vec![1])));
+        assert!(queue.get(1).is_none() && queue.last() == Some(next));
+    }
+}

@@ -1,0 +1,191 @@
+//! `bolide simulate`: what an emulated cluster would take for a deck, on one machine.
+//!
+//! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`processor`]) and
+//! wires ([`network`]); [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
+//! seconds of a cluster file into costs of work. [`table`] prints the tables of the paper ([`mod@paper`]) beside
+//! modelled ones, [`figure`] draws them. All figures are modelled, and say so.
+
+use std::{path::Path, process::ExitCode, sync::Arc};
+
+use deck::model::Model;
+use serde::Serialize;
+
+pub mod calibrate;
+pub mod cluster;
+pub mod figure;
+pub mod network;
+pub mod paper;
+pub mod processor;
+pub mod table;
+pub mod tape;
+pub mod virtual_clock;
+
+use crate::{
+    command::{Route, SimulateArgs},
+    run::read_deck,
+};
+
+use cluster::{Cluster, ElementCost};
+use virtual_clock::{Machines, Phases, Scheme, Timeline};
+
+/// Does what `bolide simulate` is asked for.
+///
+/// # Errors
+/// Faults of the files, and whatever keeps a run from its end.
+pub fn run(args: &SimulateArgs) -> Result<ExitCode, String> {
+    let cluster = cluster::read_file(&args.cluster)?;
+    match &args.deck {
+        Some(deck) => one(args, &cluster, deck),
+        None => tables(args, &cluster),
+    }
+}
+
+fn model(path: &Path, cycles: u64) -> Result<Arc<Model>, String> {
+    let mut model = read_deck(path)?;
+    model.setup.control.end_cycle = model.setup.control.end_cycle.min(cycles);
+    Ok(Arc::new(model))
+}
+
+fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
+    let tables = cluster
+        .tables
+        .as_ref()
+        .ok_or_else(|| format!("{}: no [tables]; add decks and hosts", args.cluster.display()))?;
+    let models = [model(&tables.decks[0], args.cycles)?, model(&tables.decks[1], args.cycles)?];
+    let report = table::run(cluster, tables, &models, &mut |cell| eprintln!("{cell}"))?;
+    if let Some(folder) = &args.out {
+        pictures(folder, &cluster.title, &report.last)?;
+        let path = folder.join("speed-up.svg");
+        let picture = figure::speed_up(&cluster.title, &report.rows);
+        std::fs::write(&path, picture).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    if args.json {
+        for row in &report.rows {
+            println!("{}", serde_json::to_string(row).map_err(|e| e.to_string())?);
+        }
+    } else {
+        print!("{}", table::print(cluster, &report));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What one run on a cluster came to.
+#[derive(Serialize)]
+struct Summary<'a> {
+    cluster: &'a str,
+    clock: &'a str,
+    route: &'a str,
+    elements: usize,
+    hosts: usize,
+    cycles: usize,
+    /// Cycles that averages are taken over.
+    window: (u64, u64),
+    sec_per_cycle: f64,
+    /// Work of a cycle at speed 1 over the sum of speeds (s): no cluster is faster.
+    bound: f64,
+    bytes_per_cycle: f64,
+    /// Mean phases of a cycle by worker (s).
+    phases: Vec<Phases>,
+    digest: &'a str,
+}
+
+fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
+    let model = model(deck, args.cycles)?;
+    let benchmarks = match (&cluster.element, &cluster.tables) {
+        (ElementCost::Seconds(_), _) => [[0.0; 5]; 2],
+        (ElementCost::Calibrated(_), Some(tables)) => [
+            calibrate::work(&self::model(&tables.decks[0], args.cycles)?, cluster)?,
+            calibrate::work(&self::model(&tables.decks[1], args.cycles)?, cluster)?,
+        ],
+        (ElementCost::Calibrated(_), None) => {
+            return Err(format!(
+                "{}: element = [s, s] needs the two decks of [tables] to be calibrated by",
+                args.cluster.display()
+            ));
+        }
+    };
+    let costs = calibrate::costs(cluster, &benchmarks, 1.0);
+    let work = calibrate::work(&model, cluster)?;
+    let machines = Machines {
+        believed: calibrate::believed(
+            &cluster.speeds,
+            &costs,
+            &work,
+            calibrate::surface_nodes(&model),
+            model.setup.control.sort_lag,
+        ),
+        speeds: cluster.speeds.clone(),
+        costs,
+        network: cluster.network.clone(),
+        changes: cluster.changes.clone(),
+    };
+    let scheme = Scheme::bolide(args.route.into());
+    let (timeline, _) = virtual_clock::run(&model, &machines, scheme, None)?;
+    let window = timeline.window();
+    let summary = Summary {
+        cluster: &cluster.title,
+        clock: "virtual",
+        route: match args.route {
+            Route::Master => "master",
+            Route::Direct => "direct",
+        },
+        elements: model.mesh.n_elements(),
+        hosts: cluster.speeds.len(),
+        cycles: timeline.counts.len(),
+        window: (window.start, window.end),
+        sec_per_cycle: timeline.seconds_per_cycle(),
+        bound: calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>(),
+        bytes_per_cycle: timeline.bytes_per_cycle(),
+        phases: (0..cluster.speeds.len()).map(|worker| timeline.mean_phases(worker)).collect(),
+        digest: &timeline.digest,
+    };
+    if let Some(folder) = &args.out {
+        pictures(folder, &cluster.title, &timeline)?;
+    }
+    if args.json {
+        println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("{}: modelled under a virtual clock, route {}", summary.cluster, summary.route);
+    println!(
+        "{} elements, {} hosts, cycles {} to {}: {:.6} s/cycle, {:.4} of the bound {:.6}; {:.0} bytes/cycle",
+        summary.elements,
+        summary.hosts,
+        window.start,
+        window.end,
+        summary.sec_per_cycle,
+        summary.sec_per_cycle / summary.bound,
+        summary.bound,
+        summary.bytes_per_cycle
+    );
+    let [elements, nodes, pairs, searched, sorted] = work;
+    println!(
+        "work per cycle: {elements:.0} elements, {nodes:.0} nodes, {pairs:.0} pairs, {searched:.0} pairs of new plans, {sorted:.0} surface nodes sorted"
+    );
+    println!("  host  speed     border    contact   interior       send  integrate       wait  (s/cycle)");
+    for (i, (p, speed)) in summary.phases.iter().zip(&cluster.speeds).enumerate() {
+        println!(
+            "  {:4}  {speed:5}  {:9.6}  {:9.6}  {:9.6}  {:9.6}  {:9.6}  {:9.6}",
+            i + 1,
+            p.border,
+            p.contact,
+            p.interior,
+            p.send,
+            p.integrate,
+            p.wait
+        );
+    }
+    println!("digest {}", summary.digest);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Draws what a run shows.
+fn pictures(folder: &Path, title: &str, timeline: &Timeline) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let write = |name: &str, text: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
+    };
+    write("space-time.svg", figure::space_time(title, timeline))?;
+    write("trace.json", figure::trace(timeline))
+}

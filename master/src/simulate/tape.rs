@@ -1,0 +1,130 @@
+//! What the tasks and sorts of a run gave, so that its sessions can be driven again under other costs without computing.
+//!
+//! Partial forces are kept as their number alone: totals decide nothing that takes time, votes do.
+
+use std::collections::VecDeque;
+
+use mechanics::{cycle::Load, vote::Vote};
+use protocol::message::Work;
+use worker::{
+    compute::Machine,
+    session::{Outcome, Task},
+};
+
+use crate::sort::Sorted;
+
+/// What a run gave, by worker in the order of its tasks.
+#[derive(Clone, Default)]
+pub struct Tape {
+    /// Outcomes of each worker's tasks.
+    pub workers: Vec<Vec<Taped>>,
+    /// Outcomes of the sorts.
+    pub sorts: Vec<Sorted>,
+    /// Digest of the run's final state.
+    pub digest: String,
+}
+
+/// One outcome: what it was, and what the worker held then.
+#[derive(Clone)]
+pub struct Taped {
+    load: Load,
+    kept: Kept,
+}
+
+#[derive(Clone)]
+enum Kept {
+    Loaded(Option<Box<Vote>>, String),
+    Transferred(usize),
+    Computed,
+    Forces(usize, usize),
+    Integrated(Box<Vote>),
+    Image,
+}
+
+impl Kept {
+    /// Whether it can be the outcome of a task.
+    fn answers(&self, task: &Task) -> bool {
+        matches!(
+            (self, task),
+            (Self::Loaded(..), Task::Load { .. })
+                | (Self::Transferred(_), Task::Transfer { .. })
+                | (Self::Computed, Task::Elements { .. } | Task::Interior { .. })
+                | (Self::Forces(..), Task::Install { .. } | Task::Border { .. })
+                | (Self::Integrated(_), Task::Integrate { .. })
+                | (Self::Image, Task::Image)
+        )
+    }
+}
+
+/// A worker's part in a run: computes, or plays a tape.
+pub enum Player {
+    /// Computes and keeps what came of it.
+    Live {
+        /// The domain.
+        machine: Box<Machine>,
+        /// What the domain holds.
+        load: Load,
+        /// What came of its tasks so far.
+        kept: Vec<Taped>,
+    },
+    /// Plays what another run kept.
+    Tape(VecDeque<Taped>),
+}
+
+impl Player {
+    /// One that computes.
+    pub fn live() -> Self {
+        Self::Live { machine: Box::default(), load: Load::default(), kept: Vec::new() }
+    }
+
+    /// Does a task: its outcome and what the worker holds with it.
+    ///
+    /// # Errors
+    /// The sentence of a task that failed, or that the tape is of another run.
+    pub fn run(&mut self, task: Task) -> Result<(Outcome, Load), String> {
+        match self {
+            Self::Live { machine, load, kept } => {
+                let builds = matches!(task, Task::Load { .. } | Task::Install { .. });
+                let outcome = machine.run(task);
+                if builds {
+                    *load = machine.load();
+                }
+                kept.push(Taped { load: *load, kept: keep(&outcome)? });
+                Ok((outcome, *load))
+            }
+            Self::Tape(left) => {
+                let Taped { load, kept } =
+                    left.pop_front().ok_or("the tape of a run is shorter than the run")?;
+                if !kept.answers(&task) {
+                    return Err("the tape is of a run with other sorts: report this as a bug".to_owned());
+                }
+                Ok((give(kept), load))
+            }
+        }
+    }
+}
+
+fn keep(outcome: &Outcome) -> Result<Kept, String> {
+    Ok(match outcome {
+        Outcome::Loaded { vote, lanes } => Kept::Loaded(vote.clone(), lanes.clone()),
+        Outcome::Transferred(state) => Kept::Transferred(state.len()),
+        Outcome::Computed => Kept::Computed,
+        Outcome::Forces { partials, gathered } => Kept::Forces(partials.len(), gathered.len()),
+        Outcome::Integrated(vote) => Kept::Integrated(vote.clone()),
+        Outcome::Image { .. } => Kept::Image,
+        Outcome::Failed(reason) => return Err(reason.clone()),
+    })
+}
+
+fn give(kept: Kept) -> Outcome {
+    match kept {
+        Kept::Loaded(vote, lanes) => Outcome::Loaded { vote, lanes },
+        Kept::Transferred(n) => Outcome::Transferred(vec![0.0; n]),
+        Kept::Computed => Outcome::Computed,
+        Kept::Forces(partials, gathered) => {
+            Outcome::Forces { partials: vec![0.0; partials], gathered: vec![0.0; gathered] }
+        }
+        Kept::Integrated(vote) => Outcome::Integrated(vote),
+        Kept::Image => Outcome::Image { pieces: Vec::new(), work: Work::default() },
+    }
+}

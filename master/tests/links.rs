@@ -1,0 +1,160 @@
+//! Sessions over links that hold next to nothing, and many workers in one process: the digest does not know.
+
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Duration,
+};
+
+use deck::model::Model;
+use master::{
+    connection::Gate,
+    daemon::Event,
+    drive::{Seat, drive},
+    embedded::{self, Sink},
+    event::{Action, Hand, Options, Outcome},
+    job::Job,
+    snapshot::Snapshot,
+};
+use protocol::{
+    dial,
+    handshake::{Hello, Role},
+    link::{Settings, split},
+};
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    net::{TcpSocket, TcpStream},
+    sync::mpsc,
+};
+use worker::daemon::compute_pool;
+
+const PLATES: &str = include_str!("../../deck/examples/plates-free-slip.toml");
+/// The longest that a run over links may take.
+const DEADLINE: Duration = Duration::from_secs(120);
+
+/// Cycles of a run over links, long enough for sorts, a state and a snapshot.
+const CYCLES: u64 = 30;
+
+/// Keeps the snapshot and nothing else.
+#[derive(Default)]
+struct Keep(Option<Box<Snapshot>>);
+
+impl Sink for Keep {
+    fn take(&mut self, action: Action) -> Result<(), String> {
+        if let Action::Snapshot(snapshot) = action {
+            assert!(self.0.replace(snapshot).is_none(), "one snapshot was asked for");
+        }
+        Ok(())
+    }
+}
+
+fn options() -> Options {
+    Options { states: true, snapshot_at: Some(17), ..Options::default() }
+}
+
+fn model(text: &str, cycles: u64) -> Arc<Model> {
+    let mut model = deck::read(text, "deck").expect("a good deck");
+    model.setup.control.end_cycle = cycles;
+    Arc::new(model)
+}
+
+fn hands(n: usize) -> Vec<Hand> {
+    (0..n).map(|i| Hand { name: format!("worker-{i}"), speed: 1.0 + i as f64, threads: 1 }).collect()
+}
+
+fn digest(outcome: &Outcome) -> String {
+    assert_eq!(outcome.failure, None);
+    assert_eq!(outcome.digest.len(), 32);
+    outcome.digest.clone()
+}
+
+fn embedded_run(model: &Arc<Model>, hands: &[Hand]) -> (String, Option<Box<Snapshot>>) {
+    let (job, first) = Job::new(Arc::clone(model), hands, options(), None).expect("it starts");
+    let (stop, mut sink) = (AtomicBool::new(false), Keep::default());
+    let run = embedded::run(job, first, hands.len(), 2, &mut sink, &stop).expect("it runs");
+    (digest(&run.0), sink.0)
+}
+
+/// Runs the plates over these pairs of streams: the master's end and the worker's. Assignments and images are long
+/// enough to travel in bulk, which frames of cycles overtake.
+async fn run_over<S>(pairs: Vec<(S, S)>)
+where
+    S: AsyncRead + AsyncWrite + Send + 'static,
+{
+    let model = model(PLATES, CYCLES);
+    let hands = hands(pairs.len());
+    let (expected, snapshot) = embedded_run(&model, &hands);
+    let (events, mut heard) = mpsc::channel(16);
+    let gate = Arc::new(Gate::new(events, vec![Role::Worker], None, None));
+    for (i, ((near, far), hand)) in pairs.into_iter().zip(&hands).enumerate() {
+        tokio::spawn(Arc::clone(&gate).serve(near, format!("pair {i}"), None));
+        let hello = Hello::new(Role::Worker, &hand.name, hand.speed, 1, "any", i as u64);
+        tokio::spawn(async move {
+            let (sender, receiver) = split(far, Settings::default());
+            let call = dial::greet(sender, receiver, &hello).await.expect("taken in");
+            worker::daemon::serve(call, compute_pool(1).expect("threads")).await
+        });
+    }
+    let mut seats: Vec<Seat> = Vec::new();
+    while seats.len() < hands.len() {
+        match heard.recv().await.expect("the gate stands") {
+            Event::Knock { hello, answer, .. } => {
+                let place = hands.iter().position(|hand| hand.name == hello.name).expect("one of ours");
+                answer.send(Ok(place as u32)).expect("it waits");
+            }
+            Event::Joined(seat) => seats.push(seat),
+            Event::Left { why, .. } => panic!("a worker left: {why}"),
+            _ => panic!("no client is here"),
+        }
+    }
+    seats.sort_by(|a, b| a.hand.name.cmp(&b.hand.name));
+    let running = tokio::task::spawn_blocking(move || {
+        let (job, first) = Job::new(model, &hands, options(), None).expect("it starts");
+        let mut sink = Keep::default();
+        let ran = drive(job, first, 1, &seats, &mut sink, &AtomicBool::new(false));
+        ran.map(|(outcome, traffic)| (outcome, traffic, sink.0))
+    });
+    let ran = tokio::time::timeout(DEADLINE, running).await.expect("nobody waits for the other");
+    let (outcome, traffic, stored) = ran.expect("no bug").expect("a sink that takes all");
+    assert_eq!(digest(&outcome), expected);
+    assert!(traffic.bytes > 10 << 20, "{}", traffic.bytes);
+    let stored = stored.expect("it was asked for");
+    assert_eq!(stored.state.cycle, 17);
+    assert!(snapshot.is_some_and(|snapshot| snapshot == stored), "the halves of a snapshot are of one cycle");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_job_finishes_over_pipes_of_a_thousand_bytes() {
+    run_over((0..3).map(|_| tokio::io::duplex(1024)).collect()).await;
+}
+
+/// Two ends of a TCP connection whose buffers in the system are the smallest it has.
+async fn tight_pair() -> (TcpStream, TcpStream) {
+    let socket = |()| {
+        let socket = TcpSocket::new_v4().expect("a socket");
+        socket.set_send_buffer_size(4096).expect("a buffer");
+        socket.set_recv_buffer_size(4096).expect("a buffer");
+        socket
+    };
+    let listening = socket(());
+    listening.bind("127.0.0.1:0".parse().expect("an address")).expect("a port");
+    let listener = listening.listen(1).expect("listens");
+    let address = listener.local_addr().expect("bound");
+    let (far, near) = tokio::join!(socket(()).connect(address), listener.accept());
+    (near.expect("taken").0, far.expect("connected"))
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_job_finishes_over_sockets_of_four_kilobytes() {
+    let mut pairs = Vec::new();
+    for _ in 0..3 {
+        pairs.push(tight_pair().await);
+    }
+    run_over(pairs).await;
+}
+
+#[test]
+fn two_hundred_workers_start_in_one_process_and_give_the_digest_of_one() {
+    let model = model(PLATES, 6);
+    assert_eq!(model.mesh.n_elements(), 27_000);
+    assert_eq!(embedded_run(&model, &hands(200)), embedded_run(&model, &hands(1)));
+}

@@ -1,0 +1,253 @@
+//! The virtual clock against closed forms and other drivers, and the cells of the paper's tables.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{Arc, atomic::AtomicBool},
+};
+
+use deck::model::Model;
+use master::{
+    embedded::{self, Sink},
+    event::{Action, Hand, Options},
+    job::Job,
+    run::read_deck,
+    simulate::{
+        calibrate,
+        cluster::{self, Cluster},
+        network::{Network, Wires},
+        paper::{self, Verdict},
+        table,
+        virtual_clock::{self, Change, Costs, Machines, Scheme, Timeline},
+    },
+};
+use protocol::message::Route;
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn model(name: &str, cycles: u64) -> Arc<Model> {
+    let mut model = read_deck(&repository().join("deck/examples").join(name)).expect("an example deck");
+    model.setup.control.end_cycle = cycles;
+    Arc::new(model)
+}
+
+fn cluster(name: &str) -> Cluster {
+    cluster::read_file(&repository().join("deploy/clusters").join(name)).expect("a cluster file of ours")
+}
+
+/// Elements cost 1 s, everything else nothing unless said.
+fn machines(n: usize) -> Machines {
+    Machines {
+        speeds: vec![1.0; n],
+        believed: vec![1.0; n],
+        costs: Costs { element: 1.0, ..Costs::default() },
+        network: Network {
+            wires: Wires::Switch,
+            rate: 1e12,
+            latency: 0.0,
+            payload: 1000,
+            overhead: 0,
+            message: 0.0,
+            byte: 0.0,
+        },
+        changes: Vec::new(),
+    }
+}
+
+fn run(model: &Arc<Model>, machines: &Machines, scheme: Scheme) -> Timeline {
+    virtual_clock::run(model, machines, scheme, None).expect("the deck runs").0
+}
+
+fn close(found: f64, expected: f64) {
+    assert!((found / expected - 1.0).abs() < 1e-6, "{found}, expected {expected}");
+}
+
+#[test]
+fn without_message_costs_a_cycle_is_elements_over_speed() {
+    let model = model("plates-joined.toml", 6);
+    close(run(&model, &machines(1), Scheme::bolide(Route::Direct)).seconds_per_cycle(), 27_000.0);
+    close(run(&model, &machines(4), Scheme::bolide(Route::Direct)).seconds_per_cycle(), 6_750.0);
+    close(run(&model, &machines(4), Scheme::control()).seconds_per_cycle(), 6_750.0);
+}
+
+#[test]
+fn messages_of_one_cycle_add_up_as_the_route_says() {
+    let model = model("plates-joined.toml", 6);
+    // Elements cost nothing; a message costs 1 s at each end.
+    let mut lone = machines(1);
+    lone.costs.element = 0.0;
+    lone.network.message = 1.0;
+    // Its frame to the master and the answer, all on one host.
+    close(run(&model, &lone, Scheme::bolide(Route::Master)).seconds_per_cycle(), 4.0);
+    let mut star = machines(4);
+    star.costs.element = 0.0;
+    star.network.message = 1.0;
+    // Host 1 handles its own worker's two ends of two messages, and one end of two for each of three others.
+    close(run(&model, &star, Scheme::control()).seconds_per_cycle(), 10.0);
+}
+
+#[test]
+fn latency_counts_there_and_back_when_nothing_hides_it() {
+    let model = model("plates-joined.toml", 6);
+    let mut pair = machines(2);
+    pair.costs.element = 0.0;
+    pair.network.latency = 0.25;
+    close(run(&model, &pair, Scheme::bolide(Route::Master)).seconds_per_cycle(), 0.5);
+}
+
+#[test]
+fn interior_elements_hide_the_network_and_without_overlap_they_do_not() {
+    let model = model("plates-joined.toml", 6);
+    let mut pair = machines(2);
+    pair.network.latency = 100.0;
+    close(run(&model, &pair, Scheme::bolide(Route::Master)).seconds_per_cycle(), 13_500.0);
+    close(run(&model, &pair, Scheme::control()).seconds_per_cycle(), 13_700.0);
+}
+
+#[test]
+fn a_hub_carries_in_turn_what_a_switch_carries_at_once() {
+    let model = model("plates-joined.toml", 6);
+    let mut four = machines(4);
+    four.costs.element = 0.0;
+    four.network.rate = 1e6;
+    let at_once = run(&model, &four, Scheme::bolide(Route::Direct));
+    four.network.wires = Wires::Hub;
+    let in_turn = run(&model, &four, Scheme::bolide(Route::Direct));
+    // All bytes of a cycle pass the one wire.
+    close(in_turn.seconds_per_cycle(), in_turn.bytes_per_cycle() * 8.0 / 1e6);
+    assert!(at_once.seconds_per_cycle() < 0.6 * in_turn.seconds_per_cycle());
+}
+
+#[test]
+fn a_host_that_slows_down_holds_up_the_others_from_then_on() {
+    let model = model("plates-joined.toml", 8);
+    let mut two = machines(2);
+    two.changes.push(Change { host: 1, cycle: 4, speed: 0.5 });
+    let timeline = run(&model, &two, Scheme::bolide(Route::Direct));
+    close(timeline.reached(4) - timeline.reached(3), 13_500.0);
+    close(timeline.reached(6) - timeline.reached(5), 27_000.0);
+}
+
+struct Nowhere;
+
+impl Sink for Nowhere {
+    fn take(&mut self, _: Action) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+fn embedded_digest(model: &Arc<Model>) -> String {
+    let hand = Hand { name: "worker".into(), speed: 1.0, threads: 1 };
+    let (job, first) =
+        Job::new(Arc::clone(model), &[hand], Options::default(), None).expect("the deck starts");
+    let (outcome, _) =
+        embedded::run(job, first, 1, 1, &mut Nowhere, &AtomicBool::new(false)).expect("the deck runs");
+    outcome.digest
+}
+
+#[test]
+fn the_same_run_twice_is_equal_to_the_bit_and_a_tape_tells_the_same() {
+    let model = model("plates-free-slip.toml", 16);
+    let mut three = machines(3);
+    three.network.message = 3e-4;
+    three.costs = Costs { element: 1e-5, node: 1e-6, pair: 1e-5, search: 1e-5, sort: 1e-5 };
+    let scheme = Scheme::bolide(Route::Direct);
+    let (first, tape) = virtual_clock::run(&model, &three, scheme, None).expect("the deck runs");
+    let tape = tape.expect("a run that computes keeps a tape");
+    let (second, _) = virtual_clock::run(&model, &three, scheme, None).expect("the deck runs");
+    let (played, _) =
+        virtual_clock::run(&model, &three, scheme, Some(&tape)).expect("the tape is of this run");
+    for other in [second, played] {
+        let bits = |t: &Timeline| -> Vec<u64> { t.ends.iter().flatten().map(|x| x.to_bits()).collect() };
+        assert_eq!(bits(&first), bits(&other));
+        assert_eq!(first.digest, other.digest);
+    }
+}
+
+#[test]
+fn every_number_of_hosts_and_every_scheme_gives_the_digest_of_a_plain_run() {
+    let model = model("plates-free-slip.toml", 16);
+    let digest = embedded_digest(&model);
+    for n in [1, 2, 5] {
+        for scheme in [Scheme::bolide(Route::Direct), Scheme::bolide(Route::Master), Scheme::control()] {
+            let mut hosts = machines(n);
+            hosts.network.message = 1.0;
+            hosts.believed[0] = 0.7;
+            assert_eq!(run(&model, &hosts, scheme).digest, digest, "{n} hosts, {scheme:?}");
+        }
+    }
+}
+
+#[test]
+fn a_sort_that_is_late_makes_workers_wait_and_changes_no_later_sort() {
+    let model = model("plates-free-slip.toml", 40);
+    let mut three = machines(3);
+    let (quick, tape) = virtual_clock::run(&model, &three, Scheme::control(), None).expect("the deck runs");
+    // Six cycles of one host, where the lag is four.
+    three.costs.sort = 6.0 * 9_000.0 / calibrate::surface_nodes(&model);
+    let (late, _) =
+        virtual_clock::run(&model, &three, Scheme::control(), tape.as_ref()).expect("the same sorts");
+    assert!(quick.boundaries.len() > 2, "{:?}", quick.boundaries);
+    assert_eq!(quick.boundaries, late.boundaries);
+    assert!(late.seconds_per_cycle() > 1.1 * quick.seconds_per_cycle());
+}
+
+fn table_of(file: &str, hosts: &[usize]) -> Vec<table::Row> {
+    let cluster = cluster(file);
+    let mut tables = cluster.tables.clone().expect("the file has tables");
+    tables.hosts = hosts.to_vec();
+    let models = tables.decks.clone().map(|deck| {
+        let mut model = read_deck(&deck).expect("an example deck");
+        model.setup.control.end_cycle = 80;
+        Arc::new(model)
+    });
+    table::run(&cluster, &tables, &models, &mut |_| {}).expect("the tables run").rows
+}
+
+fn not_behind(rows: &[table::Row]) {
+    let direct = rows.iter().filter(|r| r.route == "direct" && r.network_factor == 1.0 && r.hosts > 1);
+    for row in direct.filter(|r| r.paper_efficiency.is_some_and(|e| e < 1.0)) {
+        assert_ne!(row.verdict, Some(Verdict::Behind), "{row:?}");
+    }
+}
+
+#[test]
+fn no_cell_of_table_1_is_behind_the_paper() {
+    let rows = table_of("dec-alpha-4.toml", &[1, 2, 3, 4]);
+    not_behind(&rows);
+    let table = paper::table(1).expect("the paper has it");
+    for row in rows.iter().filter(|r| r.hosts == 1 && r.route == "direct") {
+        let (seconds, _) = table.cell(row.benchmark - 1, 1).expect("the first line");
+        let printed = seconds / f64::from(row.k);
+        assert!((row.sec_per_cycle / printed - 1.0).abs() < 2e-3, "calibrated: {row:?}");
+    }
+}
+
+#[test]
+fn sixteen_pcs_are_ahead_of_table_2() {
+    let rows = table_of("pentium-16.toml", &[1, 16]);
+    not_behind(&rows);
+    let cell = |k: u32| {
+        let found = rows
+            .iter()
+            .find(|r| (r.benchmark, r.hosts, r.route, r.k, r.network_factor) == (2, 16, "direct", k, 1.0));
+        found.expect("the table has it").efficiency
+    };
+    assert!(cell(1) >= 0.98, "k = 1: {}", cell(1));
+    assert!(cell(10) >= 0.94, "k = 10: {}", cell(10));
+}
+
+#[test]
+fn a_mixed_lab_computes_near_its_bound_contact_included() {
+    let lab = cluster("mixed-lab.toml");
+    let model = model("plates-64k-free-slip.toml", 24);
+    let work = calibrate::work(&model, &lab).expect("the deck runs on one host");
+    // Contact costs a few percent, as in the paper; sorts on a machine of their own.
+    let costs = Costs { element: 1.0, pair: 0.16, ..Costs::default() };
+    let hosts = Machines { costs, speeds: lab.speeds.clone(), believed: lab.speeds.clone(), ..machines(16) };
+    let seconds = run(&model, &hosts, Scheme::bolide(Route::Direct)).seconds_per_cycle();
+    let bound = calibrate::seconds(&costs, &work) / lab.speeds.iter().sum::<f64>();
+    println!("mixed lab, contact included: {:.4} of the bound", seconds / bound);
+    assert!(seconds / bound <= 1.04, "{seconds} s per cycle, bound {bound}");
+}

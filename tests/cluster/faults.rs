@@ -1,0 +1,113 @@
+//! What users and machines do wrong.
+
+use std::process::Command;
+
+use tests::cluster::{Cluster, Process, repository, said, until};
+
+use crate::{BOLIDE, digest_of, long, reference, small};
+
+#[test]
+fn a_killed_worker_fails_its_job_by_name_and_the_next_job_runs() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    for name in ["a", "victim", "c"] {
+        cluster.worker(name, "1");
+    }
+    let arguments = ["submit", &long(), "--no-output", "--wait", "--min-workers", "3"];
+    let mut waiting = Process::start("submit", &mut cluster.command("client", &arguments));
+    cluster.wait_until_running(1);
+    cluster.kill_worker("victim");
+    assert_eq!(waiting.wait().code(), Some(1));
+    let words = waiting.wait_for("is lost: victim at 127.0.0.1:");
+    assert!(words.starts_with("bolide: job 1: worker 1 is lost"), "{words}");
+    assert_eq!(cluster.job(1)["state"], "failed");
+    let table = cluster.client(&["hosts"]).out;
+    let row = table.lines().find(|line| line.contains("victim")).expect("it is remembered");
+    assert!(row.contains(" lost "), "{row}");
+
+    let next = ["submit", &small(), "--cycles", "40", "--no-output", "--wait", "--min-workers", "2"];
+    assert_eq!(digest_of(&cluster.json(&next)), reference());
+    assert!(cluster.master.is_alive());
+}
+
+#[test]
+fn a_cancelled_job_keeps_what_it_had_and_frees_its_workers() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker("a", "1");
+    let mut waiting =
+        Process::start("submit", &mut cluster.command("client", &["submit", &long(), "--wait"]));
+    cluster.wait_until_running(1);
+    assert_eq!(cluster.json(&["submit", &small(), "--cycles", "40"])["job"], 2);
+    assert_eq!(cluster.json(&["submit", &small(), "--cycles", "40"])["job"], 3);
+    let second = cluster.client(&["cancel", "2"]);
+    assert_eq!((second.code, second.out.trim()), (Some(0), "job 2 is cancelled"));
+    let first = cluster.client(&["cancel", "1"]);
+    assert_eq!((first.code, first.out.trim()), (Some(0), "job 1 ends after its present cycle"));
+    assert_eq!(waiting.wait().code(), Some(130));
+    waiting.wait_for("digest ");
+    assert_eq!(digest_of(&cluster.json(&["watch", "3"])), reference());
+    for (job, state) in [(1, "cancelled"), (2, "cancelled"), (3, "done")] {
+        assert_eq!(cluster.job(job)["state"], state, "job {job}");
+    }
+    assert!(cluster.folder().join("spool/job-1/summary.json").is_file());
+    let again = cluster.client(&["cancel", "1"]);
+    assert_eq!(again.code, Some(1));
+    assert!(again.err.contains("a job that is cancelled cannot cancel"), "{again:?}");
+    let unknown = cluster.client(&["cancel", "9"]);
+    assert!(unknown.err.contains("no job 9"), "{unknown:?}");
+}
+
+#[test]
+fn a_bad_deck_comes_back_with_every_fault_at_its_place() {
+    let cluster = Cluster::start(BOLIDE, false);
+    let deck = repository("tests/decks/submitted.toml").display().to_string();
+    let submitted = cluster.client(&["submit", &deck]);
+    let checked = said(Command::new(BOLIDE).args(["check", &deck]));
+    assert_eq!((submitted.code, &submitted.err), (Some(1), &checked.err));
+    for place in [":9:12: read material = \"UNOBTAINIUM\"", ":10:37: read size = 0"] {
+        assert!(submitted.err.contains(&format!("{deck}{place}")), "{submitted:?}");
+    }
+    assert_eq!(cluster.json(&["jobs"]), serde_json::json!([]));
+}
+
+#[test]
+fn a_master_without_certificates_listens_on_loopback_only() {
+    let refused = said(Command::new(BOLIDE).args(["master", "--listen", "0.0.0.0:0"]));
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.err.contains("address 0.0.0.0:0 is not a loopback address"), "{refused:?}");
+    let refused = said(Command::new(BOLIDE).args(["worker", "--master", "192.0.2.1:9"]));
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.err.contains("192.0.2.1:9 is not a loopback address"), "{refused:?}");
+}
+
+#[test]
+fn a_second_worker_of_the_same_name_is_refused() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker("a", "1");
+    let second = said(&mut cluster.command("worker", &["worker", "--name", "a"]));
+    assert_eq!(second.code, Some(1));
+    assert!(second.err.contains("a worker named \"a\" is connected from 127.0.0.1:"), "{second:?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_run_of_processes_ends_at_a_whole_cycle_and_leaves_no_child() {
+    let mut command = Command::new(BOLIDE);
+    command.args(["run", &long(), "--no-output", "--processes", "--workers", "2", "--threads", "1"]);
+    let mut run = Process::start("run", &mut command);
+    let (me, children) = (run.id(), format!("/proc/{0}/task/{0}/children", run.id()));
+    let children = until(
+        || format!("two children in {children}"),
+        || {
+            let text = std::fs::read_to_string(&children).unwrap_or_default();
+            let ids: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
+            (ids.len() == 2).then_some(ids)
+        },
+    );
+    let sent = Command::new("kill").args(["-INT", &me.to_string()]).status().expect("kill is there");
+    assert!(sent.success());
+    assert_eq!(run.wait().code(), Some(130), "{}", run.text());
+    run.wait_for("digest ");
+    for id in children {
+        assert!(!std::path::Path::new(&format!("/proc/{id}")).exists(), "child {id} is left");
+    }
+}

@@ -1,0 +1,43 @@
+//! The daemons as real processes: the same digest as `bolide run`, and what goes wrong stays where it is.
+
+mod faults;
+mod peers;
+mod runs;
+
+use std::{process::Command, sync::OnceLock};
+
+use tests::cluster::{repository, said};
+
+/// The binary of this build.
+const BOLIDE: &str = env!("CARGO_BIN_EXE_bolide");
+
+/// Path of the small deck: 3,456 elements.
+fn small() -> String {
+    repository("tests/decks/plates-small.toml").display().to_string()
+}
+
+/// Path of a deck that runs for many seconds.
+fn long() -> String {
+    repository("deck/examples/plates-free-slip.toml").display().to_string()
+}
+
+/// The summary of `bolide run` of the small deck.
+fn run(arguments: &[&str]) -> serde_json::Value {
+    let mut command = Command::new(BOLIDE);
+    command.args(["run", &small(), "--no-output", "--threads", "1", "--json"]).args(arguments);
+    let said = said(&mut command);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    serde_json::from_str(&said.out).expect("a summary")
+}
+
+/// The digest after 40 cycles.
+fn reference() -> &'static str {
+    static DIGEST: OnceLock<String> = OnceLock::new();
+    DIGEST.get_or_init(|| digest_of(&run(&["--cycles", "40"])))
+}
+
+fn digest_of(summary: &serde_json::Value) -> String {
+    let digest = summary["digest"].as_str().expect("a digest");
+    assert_eq!(digest.len(), 32, "{digest}");
+    digest.to_owned()
+}

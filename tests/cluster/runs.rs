@@ -1,0 +1,124 @@
+//! Runs that go well.
+
+use std::{collections::BTreeMap, fs};
+
+use tests::cluster::{Cluster, said};
+
+use crate::{BOLIDE, digest_of, reference, run, small};
+
+/// A job on workers of speeds 1, 2 and 0.5, through every client command.
+fn three_workers_give_the_digest_of_run(tls: bool) {
+    let mut cluster = Cluster::start(BOLIDE, tls);
+    for (name, speed) in [("a", "1"), ("b", "2"), ("c", "0.5")] {
+        cluster.worker(name, speed);
+    }
+    let submitted = cluster.json(&["submit", &small(), "--cycles", "40", "--min-workers", "3"]);
+    assert_eq!(submitted["job"], 1);
+    let watched = cluster.client(&["watch", "1"]);
+    assert_eq!(watched.code, Some(0), "{watched:?}");
+    assert!(watched.err.contains("job 1 done"), "{watched:?}");
+    assert!(watched.out.contains(&format!("digest     {}", reference())), "{watched:?}");
+    let summary = cluster.json(&["watch"]);
+    assert_eq!(digest_of(&summary), reference());
+    assert_eq!(summary["workers"], 3);
+    assert!(summary["bytes_per_cycle"].as_f64() > Some(1000.0), "{summary}");
+
+    let hosts = cluster.json(&["hosts"]);
+    let speeds: BTreeMap<&str, f64> = hosts
+        .as_array()
+        .expect("rows")
+        .iter()
+        .map(|h| (h["name"].as_str().expect("a name"), h["speed"].as_f64().expect("a speed")))
+        .collect();
+    assert_eq!(speeds, BTreeMap::from([("a", 1.0), ("b", 2.0), ("c", 0.5)]));
+    let table = cluster.client(&["hosts"]).out;
+    assert_eq!(table.lines().filter(|line| line.contains(" idle ")).count(), 3, "{table}");
+
+    // The plates are 24 cells long: an index plane has 12 x 12 of the 3,456 elements.
+    let status = cluster.job(1);
+    assert_eq!(status["state"], "done");
+    let shares = status["shares"].as_array().expect("shares");
+    assert_eq!(shares.len(), 3);
+    for share in shares {
+        let ideal = 3456.0 * share["speed"].as_f64().expect("a speed") / 3.5;
+        let elements = share["elements"].as_f64().expect("a count");
+        assert!((elements - ideal).abs() <= 144.0, "{share}, ideal {ideal}");
+    }
+    assert_eq!(shares.iter().filter_map(|s| s["elements"].as_u64()).sum::<u64>(), 3456);
+    assert!(cluster.client(&["jobs"]).out.contains(" done "));
+
+    let fetched = cluster.client(&["results", "1", "--out", "fetched"]);
+    assert_eq!(fetched.code, Some(0), "{fetched:?}");
+    let (spool, out) = (cluster.folder().join("spool/job-1"), cluster.folder().join("fetched"));
+    let names = |folder: &std::path::Path| {
+        let files = fs::read_dir(folder).expect("a folder").map(|f| f.expect("a file").file_name());
+        let mut names: Vec<_> = files.collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&spool), names(&out));
+    assert!(names(&out).len() >= 5, "{:?}", names(&out));
+    let again = cluster.client(&["results", "1", "--out", "fetched"]);
+    assert!(again.code == Some(1) && again.err.contains("fetched is not empty"), "{again:?}");
+    for name in names(&out) {
+        let (theirs, ours) = (fs::read(spool.join(&name)), fs::read(out.join(&name)));
+        assert!(theirs.expect("there") == ours.expect("fetched"), "{name:?} differs");
+    }
+}
+
+#[test]
+fn three_unequal_workers_give_the_digest_of_run() {
+    three_workers_give_the_digest_of_run(false);
+}
+
+#[test]
+fn three_unequal_workers_under_tls_give_the_digest_of_run() {
+    three_workers_give_the_digest_of_run(true);
+}
+
+#[test]
+fn a_process_for_each_worker_gives_the_digest_of_one_process() {
+    let summary = run(&["--cycles", "40", "--processes", "--workers", "3", "--speeds", "1,2,0.5"]);
+    assert_eq!(digest_of(&summary), reference());
+    assert_eq!((&summary["workers"], &summary["cycles"]), (&3.into(), &40.into()));
+    // Every byte that the pipe in memory counts passes a link, and heartbeats and the like are few.
+    let embedded = run(&["--cycles", "40", "--workers", "3", "--speeds", "1,2,0.5"]);
+    let ratio = summary["bytes_per_cycle"].as_f64().expect("bytes")
+        / embedded["bytes_per_cycle"].as_f64().expect("bytes");
+    assert!((0.99..1.01).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn jobs_run_one_after_another_and_one_waits_for_its_workers() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    let submit = ["submit", &small(), "--cycles", "40", "--no-output", "--min-workers", "2"];
+    assert_eq!(cluster.json(&submit)["job"], 1);
+    assert_eq!(cluster.json(&submit[..5])["job"], 2);
+    assert_eq!(cluster.job(1)["waits_for"], "2 workers, 0 are idle");
+    cluster.worker("a", "1");
+    assert_eq!(cluster.job(1)["state"], "queued");
+    cluster.worker("b", "1");
+    for job in ["1", "2"] {
+        assert_eq!(digest_of(&cluster.json(&["watch", job])), reference(), "job {job}");
+    }
+    let none = cluster.client(&["results", "1"]);
+    assert_eq!(none.code, Some(1));
+    assert!(none.err.contains("job 1 writes no results"), "{none:?}");
+}
+
+#[test]
+fn a_worker_waits_for_a_master_that_is_not_there_yet_and_comes_back_to_a_new_one() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker("a", "1");
+    cluster.master.kill();
+    let mut master = std::process::Command::new(BOLIDE);
+    master.args(["master", "--listen", &cluster.address, "--spool"]).arg(cluster.folder().join("spool"));
+    cluster.master = tests::cluster::Process::start("second master", &mut master);
+    cluster.master.wait_for("worker a joined");
+    let said = said(
+        &mut cluster
+            .command("client", &["submit", &small(), "--cycles", "40", "--no-output", "--wait", "--json"]),
+    );
+    let summary = serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {said:?}"));
+    assert_eq!(digest_of(&summary), reference());
+}

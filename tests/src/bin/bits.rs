@@ -1,0 +1,219 @@
+//! The whole matrix of bits, through the `bolide` binary and its worker processes: prints a table of digests.
+//!
+//! `cargo run --release -p tests --bin bits -- [--bolide PATH] [--cycles N] [--deck PATH]... [--most-workers N]`
+//!
+//! Without `--bolide`, the binary beside this one; build it first with `cargo build --release -p master`. Without
+//! `--deck`, both benchmarks of 27,000 elements. Every run of a deck must have the digest, the history and the energies
+//! of the first, which is one worker of one thread; the program ends with failure if one has not.
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, ExitCode},
+};
+
+use serde_json::Value;
+
+/// What was asked on the command line.
+struct Asked {
+    bolide: PathBuf,
+    decks: Vec<PathBuf>,
+    cycles: u64,
+    most_workers: usize,
+}
+
+fn asked() -> Result<Asked, String> {
+    let here = std::env::current_exe().map_err(|e| format!("where this program is: {e}"))?;
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deck/examples");
+    let mut asked =
+        Asked { bolide: here.with_file_name("bolide"), decks: Vec::new(), cycles: 300, most_workers: 7 };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(flag) = arguments.next() {
+        let value = arguments.next().ok_or_else(|| format!("{flag}: a value is needed"))?;
+        let number = || value.parse::<u64>().map_err(|e| format!("{flag} {value}: {e}"));
+        match flag.as_str() {
+            "--bolide" => asked.bolide = value.into(),
+            "--deck" => asked.decks.push(value.into()),
+            "--cycles" => asked.cycles = number()?.max(2),
+            "--most-workers" => asked.most_workers = number()? as usize,
+            _ => return Err(format!("{flag}: read --bolide, --deck, --cycles or --most-workers")),
+        }
+    }
+    if asked.decks.is_empty() {
+        asked.decks =
+            ["plates-joined.toml", "plates-free-slip.toml"].map(|name| examples.join(name)).to_vec();
+    }
+    Ok(asked)
+}
+
+/// One row of the table: what it is called and the flags of its run.
+struct Row {
+    name: String,
+    flags: Vec<String>,
+}
+
+fn row(name: &str, flags: &str) -> Row {
+    Row { name: name.to_owned(), flags: flags.split_whitespace().map(str::to_owned).collect() }
+}
+
+/// All rows; `processes` where this binary can start its workers as processes, `lanes` those of this machine.
+fn rows(asked: &Asked, processes: bool, lanes: &[&str], snapshot: &Path) -> Vec<Row> {
+    let half = asked.cycles / 2;
+    let mut rows = vec![row("1 worker, 1 thread", "--workers 1 --threads 1")];
+    for workers in [1, 2, 3, 4, 7].into_iter().filter(|w| *w <= asked.most_workers) {
+        // One worker of one thread is the first row.
+        for threads in [1, 2].into_iter().filter(|threads| workers * threads > 1) {
+            rows.push(row(
+                &format!("{workers} workers of {threads} threads"),
+                &format!("--workers {workers} --threads {threads}"),
+            ));
+        }
+        if processes {
+            rows.push(row(
+                &format!("{workers} processes"),
+                &format!("--workers {workers} --threads 1 --processes"),
+            ));
+        }
+    }
+    rows.push(row("speeds 1, 2, 0.5", "--workers 3 --threads 1 --speeds 1,2,0.5"));
+    for lanes in lanes {
+        rows.push(row(&format!("lanes {lanes}"), &format!("--workers 2 --threads 1 --lanes {lanes}")));
+    }
+    for (name, flag) in [
+        ("sorts every cycle", "--sort-every 1"),
+        ("sorts every 7 cycles", "--sort-every 7"),
+        ("sorts by seed 11", "--sort-seed 11"),
+        ("sorts by seed 4711", "--sort-seed 4711"),
+    ] {
+        for workers in [1, 3] {
+            rows.push(row(
+                &format!("{name}, {workers} workers"),
+                &format!("--workers {workers} --threads 1 {flag}"),
+            ));
+        }
+    }
+    rows.push(row("snapshot on the way", &format!("--workers 2 --threads 1 --snapshot-at {half}")));
+    for workers in [1, 3] {
+        let mut restored =
+            row(&format!("restored on {workers} workers"), &format!("--workers {workers} --threads 1"));
+        restored.flags.extend(["--resume".to_owned(), snapshot.display().to_string()]);
+        rows.push(restored);
+    }
+    rows
+}
+
+/// What a run must have in common with the others.
+#[derive(PartialEq)]
+struct Outcome {
+    digest: String,
+    energies: Value,
+    momentum_error: Value,
+    history: String,
+}
+
+fn run(asked: &Asked, deck: &Path, row: &Row, out: &Path) -> Result<(Outcome, f64), String> {
+    let output = Command::new(&asked.bolide)
+        .arg("run")
+        .arg(deck)
+        .args(&row.flags)
+        .args(["--cycles", &asked.cycles.to_string(), "--json", "--force", "--out"])
+        .arg(out)
+        .output()
+        .map_err(|e| {
+            format!("{}: {e}; build it with `cargo build --release -p master`", asked.bolide.display())
+        })?;
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).trim().to_owned());
+    }
+    let summary: Value = serde_json::from_slice(&output.stdout).map_err(|e| format!("its summary: {e}"))?;
+    let history = out.join("history.csv");
+    let outcome = Outcome {
+        digest: summary["digest"].as_str().ok_or("a summary without a digest")?.to_owned(),
+        energies: summary["energies"].clone(),
+        momentum_error: summary["momentum_error"].clone(),
+        // Numbers are written so that they read back to the same bits: equal text is equal bits.
+        history: std::fs::read_to_string(&history).map_err(|e| format!("{}: {e}", history.display()))?,
+    };
+    Ok((outcome, summary["wall_s"].as_f64().unwrap_or(f64::NAN)))
+}
+
+/// The lanes of this machine.
+fn lanes() -> Vec<&'static str> {
+    use mechanics::lanes::Width;
+    [("scalar", Width::Scalar), ("avx2", Width::Avx2), ("avx512", Width::Avx512)]
+        .into_iter()
+        .filter(|(_, width)| width.available())
+        .map(|(name, _)| name)
+        .collect()
+}
+
+fn main() -> ExitCode {
+    match matrix() {
+        Ok(0) => ExitCode::SUCCESS,
+        Ok(different) => {
+            eprintln!("{different} runs differ");
+            ExitCode::FAILURE
+        }
+        Err(reason) => {
+            eprintln!("{reason}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs everything, prints the table and counts the runs that differ.
+/// A copy of a deck whose contact has twice the default slack; none without contact.
+fn with_doubled_slack(deck: &Path, folder: &Path) -> Result<Option<PathBuf>, String> {
+    let text = std::fs::read_to_string(deck).map_err(|e| format!("{}: {e}", deck.display()))?;
+    if !text.contains("[contact]\n") || text.contains("slack") {
+        return Ok(None);
+    }
+    let copy = folder.join("doubled-slack.toml");
+    std::fs::write(&copy, text.replace("[contact]\n", "[contact]\nslack_gaps = 5.0\n"))
+        .map_err(|e| format!("{}: {e}", copy.display()))?;
+    Ok(Some(copy))
+}
+
+fn matrix() -> Result<usize, String> {
+    let asked = asked()?;
+    let help = Command::new(&asked.bolide).args(["run", "--help"]).output().map_err(|e| {
+        format!("{}: {e}; build it with `cargo build --release -p master`", asked.bolide.display())
+    })?;
+    let processes = String::from_utf8_lossy(&help.stdout).contains("--processes");
+    if !processes {
+        println!("this binary has no --processes; workers run inside one process");
+    }
+    let folder = std::env::temp_dir().join(format!("bolide-bits-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut different = 0;
+    for deck in &asked.decks {
+        println!("\n{}, {} cycles", deck.display(), asked.cycles);
+        // Overwritten by no run but the one that takes it.
+        let kept = folder.join("snapshot.bolide");
+        let mut first: Option<Outcome> = None;
+        let wider = with_doubled_slack(deck, &folder)?;
+        let doubled = wider.iter().map(|deck| (deck, row("doubled slack", "--workers 2 --threads 1")));
+        let rows = rows(&asked, processes, &lanes(), &kept);
+        for (deck, row) in rows.into_iter().map(|row| (deck, row)).chain(doubled) {
+            let out = folder.join("results");
+            match run(&asked, deck, &row, &out) {
+                Ok((outcome, wall)) => {
+                    let same = first.as_ref().is_none_or(|first| *first == outcome);
+                    different += usize::from(!same);
+                    let verdict = if same { "same" } else { "DIFFERENT" };
+                    println!("{:<36} {} {wall:>8.2} s  {verdict}", row.name, outcome.digest);
+                    first.get_or_insert(outcome);
+                }
+                Err(reason) => {
+                    different += 1;
+                    println!("{:<36} FAILED: {reason}", row.name);
+                }
+            }
+            let taken = out.join("snapshot.bolide");
+            if taken.exists() {
+                std::fs::rename(&taken, &kept).map_err(|e| format!("{}: {e}", kept.display()))?;
+            }
+        }
+    }
+    std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    Ok(different)
+}

@@ -1,0 +1,70 @@
+//! What must be equal to the bit between two runs of one problem.
+
+use master::{event::ForceSorts, results::history::HistoryRow};
+
+use crate::solve::Solved;
+
+/// Digest of the final state, every number of the history, and the energies that are summed over cycles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fingerprint {
+    /// Digest of the final state.
+    pub digest: String,
+    /// Cycle and bits of each row.
+    rows: Vec<(u64, Vec<u64>)>,
+    /// Bits of hourglass, viscosity, friction and external energy, momentum error and worst ratios.
+    ledger: Vec<u64>,
+}
+
+impl Fingerprint {
+    /// Of a run that came to its end.
+    pub fn of(solved: &Solved) -> Self {
+        let ledger = &solved.outcome.ledger;
+        Self {
+            digest: solved.outcome.digest.clone(),
+            rows: solved.rows.iter().map(|row| (row.cycle, numbers(row))).collect(),
+            ledger: [
+                ledger.hourglass,
+                ledger.viscosity,
+                ledger.friction,
+                ledger.external,
+                ledger.momentum_error(),
+                ledger.worst_courant,
+                ledger.worst_gap_travel,
+                ledger.worst_penetration,
+            ]
+            .map(f64::to_bits)
+            .to_vec(),
+        }
+    }
+
+    /// Fails where the other run differs, and says where first.
+    ///
+    /// # Panics
+    /// If a bit is different.
+    pub fn assert_equal(&self, other: &Self, name: &str) {
+        assert!(!self.rows.is_empty(), "{name}: no history to compare");
+        for (mine, theirs) in self.rows.iter().zip(&other.rows) {
+            assert_eq!(mine, theirs, "{name}: history from cycle {} on", mine.0);
+        }
+        assert_eq!(self.rows.len(), other.rows.len(), "{name}: rows of history");
+        assert_eq!(self.digest, other.digest, "{name}: digest");
+        assert_eq!(self.ledger, other.ledger, "{name}: sums over cycles");
+    }
+}
+
+/// All numbers of a row.
+fn numbers(row: &HistoryRow) -> Vec<u64> {
+    [row.time, row.dt, row.kinetic, row.internal, row.hourglass, row.contact, row.friction]
+        .into_iter()
+        .chain([row.external, row.total, row.error])
+        .chain(row.momentum)
+        .chain(row.parts.iter().flat_map(|part| [part.kinetic, part.internal]))
+        .chain(row.gauges.iter().flat_map(|gauge| gauge.x.into_iter().chain(gauge.v)))
+        .map(f64::to_bits)
+        .collect()
+}
+
+/// The forced sorts that every comparison tries.
+pub fn forced_sorts() -> [ForceSorts; 3] {
+    [ForceSorts::Every(1), ForceSorts::Every(7), ForceSorts::Seeded(11)]
+}

@@ -1,0 +1,168 @@
+//! Looks for nodes inside elements of foreign parts; knows nothing of the contact code.
+//!
+//! A hexahedron is taken as 24 tetrahedra: its centre, the mid-point of a face, and an edge of that face. Its border is
+//! then the surface that contact sees, where a face that is not flat is split about its mid-point.
+
+use std::collections::HashMap;
+
+use mechanics::mesh::{FACES, Mesh};
+
+/// A node inside an element of a part that it does not belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Intruder {
+    /// Global node index.
+    pub node: u32,
+    /// Global element index.
+    pub element: u32,
+}
+
+/// Smallest weight of the centre that counts as inside: below it the node is on the border.
+const INSIDE: f64 = 1e-6;
+
+/// Every node that is inside an element of a part that does not have it, at positions `x` by global node index.
+pub fn intruders(mesh: &Mesh, x: &[[f64; 3]]) -> Vec<Intruder> {
+    let mut found = Vec::new();
+    for (p, part) in mesh.parts.iter().enumerate() {
+        let first = mesh.element_offsets()[p];
+        let mut mine = vec![false; mesh.n_nodes()];
+        for &n in &part.nodes {
+            mine[n as usize] = true;
+        }
+        let corners: Vec<[[f64; 3]; 8]> =
+            (0..part.n_elements()).map(|e| part.corners(e).map(|n| x[n as usize])).collect();
+        let boxes: Vec<[[f64; 3]; 2]> = corners.iter().map(bounds).collect();
+        let side = boxes
+            .iter()
+            .flat_map(|[low, high]| (0..3).map(move |a| high[a] - low[a]))
+            .fold(f64::MIN_POSITIVE, f64::max);
+        let cell = |p: [f64; 3]| p.map(|c| (c / side).floor() as i64);
+        let mut bins: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+        for (e, [low, high]) in boxes.iter().enumerate() {
+            let (low, high) = (cell(*low), cell(*high));
+            for i in low[0]..=high[0] {
+                for j in low[1]..=high[1] {
+                    for k in low[2]..=high[2] {
+                        bins.entry([i, j, k]).or_default().push(e as u32);
+                    }
+                }
+            }
+        }
+        for (n, &point) in x.iter().enumerate().filter(|(n, _)| !mine[*n]) {
+            for &e in bins.get(&cell(point)).into_iter().flatten() {
+                let [low, high] = boxes[e as usize];
+                let near = (0..3).all(|a| low[a] < point[a] && point[a] < high[a]);
+                if near && holds(&corners[e as usize], point) {
+                    found.push(Intruder { node: n as u32, element: first as u32 + e });
+                    break;
+                }
+            }
+        }
+    }
+    found
+}
+
+fn bounds(corners: &[[f64; 3]; 8]) -> [[f64; 3]; 2] {
+    corners.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], c| {
+        [[0, 1, 2].map(|a| low[a].min(c[a])), [0, 1, 2].map(|a| high[a].max(c[a]))]
+    })
+}
+
+/// Whether a point is inside a hexahedron.
+pub fn holds(corners: &[[f64; 3]; 8], point: [f64; 3]) -> bool {
+    let mean = |of: &[[f64; 3]]| [0, 1, 2].map(|a| of.iter().map(|c| c[a]).sum::<f64>() / of.len() as f64);
+    let centre = mean(corners);
+    FACES.iter().any(|face| {
+        let face = face.map(|c| corners[c]);
+        let middle = mean(&face);
+        (0..4).any(|i| in_tetrahedron([centre, middle, face[i], face[(i + 1) % 4]], point))
+    })
+}
+
+/// Whether a point is in a tetrahedron and not on the face opposite to its first corner.
+fn in_tetrahedron(corners: [[f64; 3]; 4], point: [f64; 3]) -> bool {
+    let whole = triple(corners[0], corners[1], corners[2], corners[3]);
+    if whole == 0.0 {
+        return false;
+    }
+    let weight = |i: usize| {
+        let mut moved = corners;
+        moved[i] = point;
+        triple(moved[0], moved[1], moved[2], moved[3]) / whole
+    };
+    weight(0) > INSIDE && (1..4).all(|i| weight(i) >= -1e-12)
+}
+
+/// Six times the signed volume of a tetrahedron.
+fn triple(o: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> f64 {
+    let [a, b, c] = [a, b, c].map(|p| [0, 1, 2].map(|i| p[i] - o[i]));
+    a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::model;
+
+    const SKEWED: [[f64; 3]; 8] = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.2, 1.1, 0.1],
+        [0.0, 1.0, 0.2],
+        [0.1, 0.0, 1.0],
+        [1.0, 0.2, 1.3],
+        [1.1, 1.0, 1.0],
+        [-0.1, 1.0, 0.9],
+    ];
+
+    #[test]
+    fn points_pulled_in_from_the_faces_are_inside_and_pushed_out_are_not() {
+        let centre = [0, 1, 2].map(|a| SKEWED.iter().map(|c| c[a]).sum::<f64>() / 8.0);
+        for face in FACES {
+            let c = face.map(|i| SKEWED[i]);
+            for edge in 0..4 {
+                let (a, b) = (c[edge], c[(edge + 1) % 4]);
+                let middle = [0, 1, 2].map(|i| 0.25 * (c[0][i] + c[1][i] + c[2][i] + c[3][i]));
+                let on = [0, 1, 2].map(|i| 0.5 * middle[i] + 0.3 * a[i] + 0.2 * b[i]);
+                for (towards, inside) in
+                    [(0.999, true), (0.5, true), (0.01, true), (1.001, false), (1.5, false)]
+                {
+                    let point = [0, 1, 2].map(|i| centre[i] + towards * (on[i] - centre[i]));
+                    assert_eq!(holds(&SKEWED, point), inside, "{towards} of {on:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_planted_node_is_found_and_bodies_apart_have_none() {
+        let deck = r#"
+            title = "two boxes"
+            units = "SI"
+            [control]
+            end_cycle = 1
+            [[part]]
+            name = "left"
+            material = "CU_OFHC"
+            box = { origin = [0, 0, 0], size = [3, 3, 3], cells = [3, 3, 3] }
+            [[part]]
+            name = "right"
+            material = "CU_OFHC"
+            box = { origin = [3.1, 0.2, 0.2], size = [2, 2, 2], cells = [2, 2, 2] }
+        "#;
+        let mesh = model(deck).mesh;
+        assert_eq!(intruders(&mesh, &mesh.positions), []);
+        let node = mesh.parts[1].nodes[0];
+        let mut x = mesh.positions.clone();
+        x[node as usize] = [2.9, 0.2, 0.2];
+        assert_eq!(intruders(&mesh, &x), [Intruder { node, element: 2 }]);
+        // The other way round: a corner of the first part in the middle of an element of the second.
+        let corner = mesh.parts[0].nodes[63];
+        let mut x = mesh.positions.clone();
+        x[corner as usize] = [4.6, 1.7, 1.7];
+        // Drawn so far, the last element of the first part has swallowed a node as well.
+        let found = intruders(&mesh, &x);
+        assert!(found.contains(&Intruder { node: corner, element: 27 + 7 }), "{found:?}");
+    }
+}

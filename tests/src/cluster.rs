@@ -1,0 +1,298 @@
+//! CLUSTER: a master and workers as real processes on port 0, and clients that talk to them.
+//!
+//! The path of the binary comes from the caller. Nothing sleeps for a fixed time: a test waits for a printed line or a
+//! condition, and fails at a deadline with all that was printed. Processes are ended by their id when a value is
+//! dropped.
+
+use std::{
+    io::{BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+    process::{Child, Command, ExitStatus, Stdio},
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+
+/// The longest that a test waits for anything.
+pub const DEADLINE: Duration = Duration::from_secs(120);
+/// Between two looks at a condition that nothing announces.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+
+/// A folder of this repository, from its root.
+pub fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+/// A running process and the lines it has printed.
+pub struct Process {
+    name: String,
+    child: Child,
+    printed: Arc<Printed>,
+}
+
+#[derive(Default)]
+struct Printed {
+    lines: Mutex<Vec<String>>,
+    more: Condvar,
+}
+
+impl Printed {
+    fn lines(&self) -> MutexGuard<'_, Vec<String>> {
+        self.lines.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn collect(self: &Arc<Self>, from: impl Read + Send + 'static) {
+        let printed = Arc::clone(self);
+        std::thread::spawn(move || {
+            for line in BufReader::new(from).lines() {
+                let Ok(line) = line else { return };
+                printed.lines().push(line);
+                printed.more.notify_all();
+            }
+        });
+    }
+}
+
+impl Process {
+    /// Starts a command and collects what it prints.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start(name: &str, command: &mut Command) -> Self {
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the binary starts");
+        let printed = Arc::new(Printed::default());
+        printed.collect(child.stdout.take().expect("piped"));
+        printed.collect(child.stderr.take().expect("piped"));
+        Self { name: name.to_owned(), child, printed }
+    }
+
+    /// The first line with `words` in it, now or later.
+    ///
+    /// # Panics
+    /// At the deadline, with all lines so far.
+    pub fn wait_for(&self, words: &str) -> String {
+        let deadline = Instant::now() + DEADLINE;
+        let mut lines = self.printed.lines();
+        loop {
+            if let Some(line) = lines.iter().find(|line| line.contains(words)) {
+                return line.clone();
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            assert!(!left.is_zero(), "{} never printed {words:?}, only:\n{}", self.name, lines.join("\n"));
+            lines = self.printed.more.wait_timeout(lines, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// How many of the lines so far have `words` in them.
+    pub fn count(&self, words: &str) -> usize {
+        self.printed.lines().iter().filter(|line| line.contains(words)).count()
+    }
+
+    /// Everything printed so far.
+    pub fn text(&self) -> String {
+        self.printed.lines().join("\n")
+    }
+
+    /// Its id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Whether it runs.
+    pub fn is_alive(&mut self) -> bool {
+        self.child.try_wait().is_ok_and(|status| status.is_none())
+    }
+
+    /// Ends it as `kill -9` does.
+    pub fn kill(&mut self) {
+        // It may have ended by itself; both fail only then.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Panics
+    /// At the deadline.
+    pub fn wait(&mut self) -> ExitStatus {
+        let name = self.name.clone();
+        let printed = Arc::clone(&self.printed);
+        until(
+            || format!("the end of {name}; it printed:\n{}", printed.lines().join("\n")),
+            || self.child.try_wait().ok().flatten(),
+        )
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// Looks until there is something.
+///
+/// # Panics
+/// At the deadline, naming `what`.
+pub fn until<T>(what: impl Fn() -> String, mut look: impl FnMut() -> Option<T>) -> T {
+    let deadline = Instant::now() + DEADLINE;
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(Instant::now() < deadline, "waited in vain for {}", what());
+        std::thread::sleep(LOOK_EVERY);
+    }
+}
+
+/// What a client printed and how it ended.
+#[derive(Debug)]
+pub struct Said {
+    /// Its exit code.
+    pub code: Option<i32>,
+    /// Standard output.
+    pub out: String,
+    /// Standard error.
+    pub err: String,
+}
+
+/// A master, its workers, and a folder for all their files.
+pub struct Cluster {
+    binary: PathBuf,
+    folder: tempfile::TempDir,
+    /// The master.
+    pub master: Process,
+    /// Where it listens.
+    pub address: String,
+    workers: Vec<(String, Process)>,
+    tls: bool,
+}
+
+impl Cluster {
+    /// Starts a master; with `tls` certificates are made for it, for workers and for clients.
+    ///
+    /// # Panics
+    /// If it does not come up.
+    pub fn start(binary: &str, tls: bool) -> Self {
+        let binary = PathBuf::from(binary);
+        let folder = tempfile::tempdir().expect("a folder for the test");
+        let certs = folder.path().join("certs");
+        if tls {
+            make_certificates(&binary, &certs);
+        }
+        let mut command = Command::new(&binary);
+        command.args(["master", "--listen", "127.0.0.1:0", "--spool"]).arg(folder.path().join("spool"));
+        if tls {
+            command.arg("--certs").arg(certs.join("master"));
+        }
+        let master = Process::start("master", command.env("BOLIDE_LOG", "info"));
+        let line = master.wait_for("listening on ");
+        let address = line.trim_start_matches("listening on ").to_owned();
+        Self { binary, folder, master, address, workers: Vec::new(), tls }
+    }
+
+    /// The folder of this cluster's files, gone with it.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// A command of the binary that talks to this master with the certificates of `host`.
+    pub fn command(&self, host: &str, arguments: &[&str]) -> Command {
+        let mut command = Command::new(&self.binary);
+        command.args(arguments).args(["--master", &self.address]).current_dir(self.folder.path());
+        if self.tls {
+            command.arg("--certs").arg(self.folder.path().join("certs").join(host));
+        }
+        command
+    }
+
+    /// Starts a worker with one thread and waits until it has joined.
+    ///
+    /// # Panics
+    /// If it does not join.
+    pub fn worker(&mut self, name: &str, speed: &str) {
+        let arguments = ["worker", "--name", name, "--speed", speed, "--threads", "1"];
+        let worker = Process::start(name, &mut self.command("worker", &arguments));
+        worker.wait_for("joined");
+        self.master.wait_for(&format!("worker {name} joined"));
+        self.workers.push((name.to_owned(), worker));
+    }
+
+    /// Ends a worker as `kill -9` does.
+    ///
+    /// # Panics
+    /// If there is none of that name.
+    pub fn kill_worker(&mut self, name: &str) {
+        let worker = self.workers.iter_mut().find(|(n, _)| n == name);
+        worker.expect("a worker of that name").1.kill();
+    }
+
+    /// Runs a client to its end.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn client(&self, arguments: &[&str]) -> Said {
+        said(&mut self.command("client", arguments))
+    }
+
+    /// What a client prints with `--json`.
+    ///
+    /// # Panics
+    /// If that is no JSON.
+    pub fn json(&self, arguments: &[&str]) -> serde_json::Value {
+        let mut arguments = arguments.to_vec();
+        arguments.push("--json");
+        let said = self.client(&arguments);
+        serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{arguments:?}: {e} in {said:?}"))
+    }
+
+    /// The status of a job, as `jobs --json` gives it.
+    ///
+    /// # Panics
+    /// If there is no such job.
+    pub fn job(&self, job: u64) -> serde_json::Value {
+        self.find_job(job).unwrap_or_else(|| panic!("no job {job}"))
+    }
+
+    fn find_job(&self, job: u64) -> Option<serde_json::Value> {
+        self.json(&["jobs"]).as_array().and_then(|jobs| jobs.iter().find(|s| s["job"] == job).cloned())
+    }
+
+    /// Waits until a job is under way in its cycles.
+    pub fn wait_until_running(&self, job: u64) {
+        let status = std::cell::RefCell::new(serde_json::Value::Null);
+        until(
+            || format!("job {job} to run; {}", status.borrow()),
+            || {
+                *status.borrow_mut() = self.find_job(job).unwrap_or_default();
+                let status = status.borrow();
+                (status["state"] == "running" && status["cycle"].as_u64() > Some(0)).then_some(())
+            },
+        );
+    }
+}
+
+/// Runs a command to its end.
+///
+/// # Panics
+/// If it cannot be started.
+pub fn said(command: &mut Command) -> Said {
+    let output = command.output().expect("the binary starts");
+    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
+    Said { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+}
+
+/// A CA in `folder` with the hosts `master`, `worker` and `client`, made by the binary.
+///
+/// # Panics
+/// If the binary does not make them.
+pub fn make_certificates(binary: &Path, folder: &Path) {
+    let made = said(Command::new(binary).args(["certs", "ca"]).arg(folder));
+    assert_eq!(made.code, Some(0), "{made:?}");
+    for role in ["master", "worker", "client"] {
+        let mut command = Command::new(binary);
+        command.args(["certs", "host"]).arg(folder).args([role, "--role", role, "--address", "127.0.0.1"]);
+        let made = said(&mut command);
+        assert_eq!(made.code, Some(0), "{made:?}");
+    }
+}

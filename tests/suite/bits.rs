@@ -1,0 +1,200 @@
+//! Same bits: the cut, the threads, the lanes, the sorts and a restart change nothing of a run.
+//!
+//! The whole matrix, with worker processes, is the program `bits` of this package.
+
+use mechanics::lanes::Width;
+use tests::{
+    bits::{Fingerprint, forced_sorts},
+    solve::{Crew, example, model, solve},
+};
+
+use deck::Model;
+use master::event::{ForceSorts, Options};
+
+fn fingerprint(model: &Model, crew: Crew) -> Fingerprint {
+    Fingerprint::of(&solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}")))
+}
+
+/// A crew with these options.
+fn asked(workers: usize, options: Options) -> Crew {
+    Crew { options, ..Crew::of(workers) }
+}
+
+/// Every crew whose bits are compared with those of one worker of one thread.
+fn crews() -> Vec<(String, Crew)> {
+    let mut crews = Vec::new();
+    for workers in [2, 3, 7] {
+        crews.push((format!("{workers} workers"), Crew::of(workers)));
+    }
+    for workers in [1, 2] {
+        crews.push((format!("{workers} workers of 2 threads"), Crew { threads: 2, ..Crew::of(workers) }));
+    }
+    crews.push(("speeds 1, 2, 0.5".to_owned(), Crew { speeds: vec![1.0, 2.0, 0.5], ..Crew::default() }));
+    for width in Width::ALL.into_iter().filter(|width| width.available()) {
+        let options = Options { lanes: Some(width.to_string()), ..Options::default() };
+        crews.push((format!("{width}, 2 workers"), asked(2, options)));
+    }
+    crews
+}
+
+/// Compares runs of a problem on all crews, with sorts forced, and over a snapshot.
+fn same_bits(model: &Model) {
+    let cycles = model.setup.control.end_cycle;
+    let alone = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    let one = Fingerprint::of(&alone);
+    assert_eq!(alone.state.cycle, cycles);
+    let met = alone.outcome.ledger.worst_penetration > 0.0;
+    assert_eq!(met, model.setup.contact.is_some(), "contact without a hit compares nothing");
+    for (name, crew) in crews() {
+        one.assert_equal(&fingerprint(model, crew), &name);
+    }
+    if model.setup.contact.is_some() {
+        for sorts in forced_sorts() {
+            for workers in [1, 3] {
+                let options = Options { force_sorts: sorts, ..Options::default() };
+                let name = format!("{workers} workers, sorts {sorts:?}");
+                one.assert_equal(&fingerprint(model, asked(workers, options)), &name);
+            }
+        }
+        let mut slack = model.clone();
+        slack.setup.contact.as_mut().expect("just asked").slack *= 2.0;
+        one.assert_equal(&fingerprint(&slack, Crew::of(2)), "doubled slack");
+    }
+    let options = Options { snapshot_at: Some(cycles / 2), ..Options::default() };
+    let whole = solve(model.clone(), asked(2, options)).unwrap_or_else(|e| panic!("{e}"));
+    one.assert_equal(&Fingerprint::of(&whole), "a snapshot taken on the way");
+    let snapshot = whole.snapshot.expect("a snapshot was asked for");
+    assert_eq!(snapshot.state.cycle, cycles / 2);
+    for workers in [1, 3] {
+        let options = Options { force_sorts: ForceSorts::Seeded(5), ..Options::default() };
+        let crew = Crew { resume: Some(snapshot.clone()), ..asked(workers, options) };
+        one.assert_equal(&fingerprint(model, crew), &format!("restored on {workers} workers"));
+    }
+}
+
+#[test]
+fn free_slip_plates_of_27000_elements_have_the_same_bits_on_any_crew() {
+    let mut model = example("plates-free-slip");
+    model.setup.control.end_cycle = 24;
+    model.output.history_cycles = 1;
+    same_bits(&model);
+}
+
+#[test]
+fn small_plates_that_slide_and_bounce_have_the_same_bits_for_longer() {
+    same_bits(&model(
+        r#"
+        title = "small plates"
+        units = "cm-g-us"
+        [control]
+        end_cycle = 400
+        end_time = 1e3
+        [[part]]
+        name = "target"
+        material = "AL_2024_T351"
+        box = { origin = [0, 0, 0], size = [9, 8, 4], cells = [9, 8, 4] }
+        [[part]]
+        name = "projectile"
+        material = "STEEL_1006"
+        velocity = [0.02, 0.01, -0.05]
+        box = { origin = [1.3, 0.7, 4.2], size = [5, 6, 3], cells = [5, 6, 3] }
+        rotate = { axis = [1, 2, 0], degrees = 2, point = [4, 4, 4.2] }
+        translate = [0, 0, 0.2]
+        [contact]
+        gap_length = 0.15
+        friction = 0.1
+        [output]
+        history_cycles = 1
+        [[gauge]]
+        name = "struck face"
+        part = "target"
+        point = [4, 4, 4]
+        "#,
+    ));
+}
+
+#[test]
+fn joined_parts_on_a_wall_have_the_same_bits() {
+    same_bits(&model(
+        r#"
+        title = "joined bar on a wall"
+        units = "mm-ms-kg"
+        [control]
+        end_cycle = 600
+        end_time = 1
+        [[part]]
+        name = "front"
+        material = "COPPER_TAYLOR_BENCHMARK"
+        velocity = [0, 0, -227]
+        cylinder = { base = [0, 0, 0], radius = 3.2, length = 8, sector = "quarter", cells = [3, 3, 10] }
+        [[part]]
+        name = "rear"
+        material = "STEEL_4340"
+        velocity = [0, 0, -227]
+        cylinder = { base = [0, 0, 8], radius = 3.2, length = 8, sector = "quarter", cells = [3, 3, 10] }
+        [[join]]
+        parts = "all"
+        [[boundary]]
+        type = "symmetry"
+        axis = "x"
+        [[boundary]]
+        type = "symmetry"
+        axis = "y"
+        [[wall]]
+        point = [0, 0, 0]
+        normal = [0, 0, 1]
+        friction = 0.2
+        [output]
+        history_cycles = 7
+        [[gauge]]
+        name = "rear"
+        point = [0, 0, 16]
+        "#,
+    ));
+}
+
+#[test]
+fn a_split_ring_that_closes_on_itself_has_the_same_bits() {
+    let mut model = model(
+        r#"
+        title = "split ring"
+        units = "mm-ms-kg"
+        [control]
+        end_cycle = 300
+        end_time = 1
+        [[part]]
+        name = "ring"
+        material = "MILD_STEEL"
+        [part.tube]
+        axis = "y"
+        base = [0, 0, 0]
+        inner_radius = 9
+        outer_radius = 11
+        length = 4
+        start_degrees = 94
+        angle_degrees = 352
+        cells = [3, 72, 5]
+        [contact]
+        self_interaction = "all"
+        friction = 0.2
+        [output]
+        history_cycles = 5
+        "#,
+    );
+    for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
+        if x[0] > 7.0 {
+            v[2] = -100.0 * x[2].signum();
+        }
+    }
+    same_bits(&model);
+}
+
+#[test]
+fn another_problem_has_other_bits() {
+    let mut model = example("two-bars");
+    model.setup.control.end_cycle = 20;
+    let one = fingerprint(&model, Crew::default());
+    model.velocity[0][0] = f64::from_bits(model.velocity[0][0].to_bits() + 1);
+    let other = fingerprint(&model, Crew::default());
+    assert_ne!(one.digest, other.digest);
+}

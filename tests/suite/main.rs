@@ -1,0 +1,23 @@
+//! The whole system against closed forms, published figures, and itself.
+//!
+//! `cargo test --release -p tests --test suite -- --nocapture` prints every figure of the book.
+
+mod bits;
+mod book;
+
+/// A row that nobody computes would look like one that holds.
+#[test]
+fn every_row_of_the_reference_is_computed_by_a_case() {
+    let book = [
+        include_str!("../src/book/element.rs"),
+        include_str!("../src/book/wave.rs"),
+        include_str!("../src/book/solid.rs"),
+        include_str!("../src/book/contact.rs"),
+    ]
+    .concat();
+    for name in tests::case::names() {
+        // Rows of a family are named `family @ of what`, and the family's case makes their names.
+        let family = name.split(" @ ").next().unwrap_or(name);
+        assert!(book.contains(family), "no case computes \"{name}\"");
+    }
+}

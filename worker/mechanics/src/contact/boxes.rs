@@ -1,0 +1,211 @@
+//! Stage one in lanes: which faces' boxes hold which nodes.
+//!
+//! A point is kept as `x, y, z, -x, -y, -z` and two zeros, a box as its least such values over its corners, less
+//! what it is grown by, and two zeros: one comparison of eight numbers is the whole test, and it is
+//! [`Bounds::holds`](super::search::Bounds::holds) because changing a sign is exact.
+
+use super::search::Candidates;
+use crate::lanes::{Lane, SET, Width, scalar::Scalar};
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{avx2::Avx2, avx512::Avx512};
+
+/// Points of nodes and boxes of faces in one cycle.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Boxes {
+    points: Vec<f64>,
+    faces: Vec<f64>,
+}
+
+impl Boxes {
+    /// Measures the boxes of faces, given as batch nodes, grown by `grow`. `x` by batch node.
+    ///
+    /// # Panics
+    /// If a node is out of range or the machine lacks the width.
+    pub(super) fn measure(&mut self, width: Width, x: &[Vec<f64>; 3], faces: &[[u32; 4]], grow: f64) {
+        assert!(width.available(), "lane width {width} on a machine that lacks it");
+        let n = x[0].len();
+        self.points.resize(SET * n, 0.0);
+        let axes = x[0].iter().zip(&x[1][..n]).zip(&x[2][..n]);
+        for (point, ((&x, &y), &z)) in self.points.chunks_exact_mut(SET).zip(axes) {
+            point.copy_from_slice(&[x, y, z, -x, -y, -z, 0.0, 0.0]);
+        }
+        self.faces.resize(SET * faces.len(), 0.0);
+        let grown = [grow, grow, grow, grow, grow, grow, 0.0, 0.0];
+        let highest = faces.iter().flatten().fold(0, |highest, &i| if i > highest { i } else { highest });
+        assert!(faces.is_empty() || (highest as usize) < n, "node {highest} of {n}");
+        match width {
+            // SAFETY: there are as many boxes as faces, and all nodes are in range; the width is available.
+            Width::Scalar => unsafe { self.boxes::<Scalar>(faces, &grown) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Width::Avx2 => unsafe { self.boxes_on_avx2(faces, &grown) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Width::Avx512 => unsafe { self.boxes_on_avx512(faces, &grown) },
+            #[cfg(not(target_arch = "x86_64"))]
+            Width::Avx2 | Width::Avx512 => unreachable!("not available"),
+        }
+    }
+
+    /// # Safety
+    /// A box for each face, and all nodes in range.
+    #[inline(always)]
+    unsafe fn boxes<L: Lane>(&mut self, faces: &[[u32; 4]], grown: &[f64; SET]) {
+        for (f, nodes) in faces.iter().enumerate() {
+            let mut at = 0;
+            while at < SET {
+                // SAFETY: the caller's.
+                unsafe {
+                    let a = L::load(&self.points, SET * nodes[0] as usize + at);
+                    let b = L::load(&self.points, SET * nodes[1] as usize + at);
+                    let c = L::load(&self.points, SET * nodes[2] as usize + at);
+                    let d = L::load(&self.points, SET * nodes[3] as usize + at);
+                    let least = a.min(b).min(c.min(d)) - L::load(grown, at);
+                    least.store(&mut self.faces, SET * f + at);
+                }
+                at += L::N;
+            }
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    unsafe fn boxes_on_avx2(&mut self, faces: &[[u32; 4]], grown: &[f64; SET]) {
+        // SAFETY: the caller's.
+        unsafe { self.boxes::<Avx2>(faces, grown) }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+    unsafe fn boxes_on_avx512(&mut self, faces: &[[u32; 4]], grown: &[f64; SET]) {
+        // SAFETY: the caller's.
+        unsafe { self.boxes::<Avx512>(faces, grown) }
+    }
+
+    /// The candidates of nodes `first..end` of the list whose boxes hold them: faces in `held`, and the end of
+    /// those of each node in `ends`.
+    ///
+    /// # Panics
+    /// If a candidate has not been measured or the machine lacks the width.
+    pub(super) fn hold(
+        &self,
+        width: Width,
+        candidates: &Candidates,
+        (first, end): (usize, usize),
+        held: &mut Vec<u32>,
+        ends: &mut Vec<u32>,
+    ) {
+        assert!(width.available(), "lane width {width} on a machine that lacks it");
+        match width {
+            Width::Scalar => self.held::<Scalar>(candidates, (first, end), held, ends),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the width is available.
+            Width::Avx2 => unsafe { self.held_on_avx2(candidates, (first, end), held, ends) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the width is available.
+            Width::Avx512 => unsafe { self.held_on_avx512(candidates, (first, end), held, ends) },
+            #[cfg(not(target_arch = "x86_64"))]
+            Width::Avx2 | Width::Avx512 => unreachable!("not available"),
+        }
+    }
+
+    #[inline(always)]
+    fn held<L: Lane>(
+        &self,
+        candidates: &Candidates,
+        (first, end): (usize, usize),
+        held: &mut Vec<u32>,
+        ends: &mut Vec<u32>,
+    ) {
+        let starts = &candidates.starts[first..=end];
+        // Room for all; each is written where the next held one goes.
+        held.clear();
+        held.resize((starts[end - first] - starts[0]) as usize + 1, 0);
+        ends.clear();
+        let mut n = 0;
+        for (bounds, &node) in starts.windows(2).zip(&candidates.nodes[first..end]) {
+            let point = &self.points[SET * node as usize..][..SET];
+            for &face in &candidates.faces[bounds[0] as usize..bounds[1] as usize] {
+                held[n] = face;
+                n += usize::from(holds::<L>(&self.faces[SET * face as usize..][..SET], point));
+            }
+            ends.push(n as u32);
+        }
+        held.truncate(n);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    unsafe fn held_on_avx2(
+        &self,
+        candidates: &Candidates,
+        range: (usize, usize),
+        held: &mut Vec<u32>,
+        ends: &mut Vec<u32>,
+    ) {
+        self.held::<Avx2>(candidates, range, held, ends);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+    unsafe fn held_on_avx512(
+        &self,
+        candidates: &Candidates,
+        range: (usize, usize),
+        held: &mut Vec<u32>,
+        ends: &mut Vec<u32>,
+    ) {
+        self.held::<Avx512>(candidates, range, held, ends);
+    }
+}
+
+/// Whether a box holds a point.
+#[inline(always)]
+fn holds<L: Lane>(least: &[f64], point: &[f64]) -> bool {
+    assert!(least.len() == SET && point.len() == SET, "one set each");
+    let mut inside = (1_u32 << L::N) - 1;
+    let mut at = 0;
+    while at < SET {
+        // SAFETY: both slices hold a set, and N divides it.
+        let (least, value) = unsafe { (L::load(least, at), L::load(point, at)) };
+        inside &= L::bits(least.less_equal(value));
+        at += L::N;
+    }
+    inside == (1_u32 << L::N) - 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::search::Bounds;
+
+    #[test]
+    fn every_width_finds_the_faces_whose_bounds_hold_a_node() {
+        let mut seed = 9_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            // A coarse grid, so that nodes lie on borders.
+            ((seed >> 60) as f64 - 8.0) * 0.25
+        };
+        let x: [Vec<f64>; 3] = [0; 3].map(|_| (0..200).map(|_| random()).collect());
+        let at = |n: u32| [x[0][n as usize], x[1][n as usize], x[2][n as usize]];
+        let faces: Vec<[u32; 4]> = (0..40).map(|f| [4 * f, 4 * f + 1, 4 * f + 2, 4 * f + 3]).collect();
+        let (nodes, all): (Vec<u32>, Vec<u32>) = ((100..200).collect(), (0..40).collect());
+        let holds = |n: u32, f: u32| Bounds::of(&faces[f as usize].map(at), 0.25).holds(at(n));
+        let wanted: Vec<Vec<u32>> =
+            nodes.iter().map(|&n| all.iter().copied().filter(|&f| holds(n, f)).collect()).collect();
+        assert!(wanted.concat().len() > 500);
+        let starts: Vec<u32> = (0..=100).map(|i| 40 * i).collect();
+        let candidates = Candidates { nodes: nodes.clone(), starts, faces: all.repeat(100) };
+        for width in Width::ALL.into_iter().filter(|width| width.available()) {
+            let (mut boxes, mut held, mut ends) = (Boxes::default(), vec![], vec![]);
+            boxes.measure(width, &x, &faces, 0.25);
+            boxes.hold(width, &candidates, (0, 100), &mut held, &mut ends);
+            assert_eq!(held, wanted.concat(), "{width}");
+            assert_eq!(ends.last(), Some(&(held.len() as u32)));
+            assert_eq!(held[ends[6] as usize..ends[7] as usize], wanted[7]);
+            boxes.hold(width, &candidates, (7, 9), &mut held, &mut ends);
+            assert_eq!(held, wanted[7..9].concat(), "{width}");
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! Forces of many hits at a time without friction, to the bits of [`react`](super::react).
+
+use super::BOTH_SIDES;
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{avx2::Avx2, avx512::Avx512};
+use crate::{
+    contact::pairs::Pairs,
+    exact::Quantum,
+    lanes::{Lane, SET, Width, scalar::Scalar},
+};
+
+/// Static data of nodes and faces.
+#[derive(Clone, Debug, Default)]
+pub(in crate::contact) struct Statics {
+    /// By batch node: the deck's factor times the node's share.
+    pub(in crate::contact) factor: Vec<f64>,
+    /// By batch node: `K A^2 / V` (force per length).
+    pub(in crate::contact) stiffness: Vec<f64>,
+    /// By batch node: one over its mass.
+    pub(in crate::contact) inverse_mass: Vec<f64>,
+    /// By face: `K A^2 / V` (force per length).
+    pub(in crate::contact) face_stiffness: Vec<f64>,
+}
+
+/// Features near nodes, by pair of a [`Pairs`]; those beyond the gap have depth zero.
+#[derive(Clone, Copy)]
+pub(in crate::contact) struct Pushes<'a> {
+    /// Index of the face among the static data.
+    pub(in crate::contact) face: &'a [u32],
+    /// Depth in the zone (length).
+    pub(in crate::contact) depth: &'a [f64],
+    /// Unit vector of the force on the node.
+    pub(in crate::contact) direction: &'a [Vec<f64>; 3],
+    /// Share of the push.
+    pub(in crate::contact) share: &'a [f64],
+    /// How many springs act on the node along one direction.
+    pub(in crate::contact) stacking: &'a [f64],
+    /// Shape functions of the corners.
+    pub(in crate::contact) weights: &'a [Vec<f64>; 4],
+}
+
+/// Forces by pair: three of the node, then three of each corner; multiples of the force quantum.
+pub(in crate::contact) type Terms = [Vec<f64>; 15];
+
+/// What all pairs together say.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::contact) struct Sums {
+    /// Energy in the springs, an exact sum.
+    pub(in crate::contact) energy: f64,
+    /// Greatest component of a force.
+    pub(in crate::contact) force_bound: f64,
+    /// Greatest squared frequency.
+    pub(in crate::contact) frequency2: f64,
+    /// Greatest depth (length).
+    pub(in crate::contact) deepest: f64,
+}
+
+/// Forces of all pairs. The result does not depend on the width.
+///
+/// # Panics
+/// If a list is shorter than the pairs, an index is out of range or the machine lacks the width.
+pub(in crate::contact) fn push(
+    width: Width,
+    statics: &Statics,
+    pairs: &Pairs,
+    pushes: Pushes,
+    (force_quantum, energy_quantum): (Quantum, Quantum),
+    terms: &mut Terms,
+) -> Sums {
+    let n = pairs.node.len();
+    let highest = pushes.face.iter().fold(0, |highest, &i| if i > highest { i } else { highest });
+    assert!(pushes.face.len() == n && (n == 0 || (highest as usize) < statics.face_stiffness.len()));
+    let n_nodes = statics.factor.len();
+    assert!(statics.stiffness.len() == n_nodes && statics.inverse_mass.len() == n_nodes);
+    let lists = pushes.direction.iter().chain(pushes.weights).map(Vec::len);
+    let lengths = lists.chain([pushes.depth.len(), pushes.share.len(), pushes.stacking.len()]);
+    lengths.for_each(|length| assert!(length == n, "{length} values of {n} pairs"));
+    pairs.check_nodes(width, n_nodes);
+    terms.iter_mut().for_each(|values| values.resize(n, 0.0));
+    let magic = [force_quantum.magic(), energy_quantum.magic()];
+    match width {
+        // SAFETY: indices, lengths and width have been checked.
+        Width::Scalar => unsafe { kernel::<Scalar>(statics, pairs, pushes, magic, terms) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Width::Avx2 => unsafe { on_avx2(statics, pairs, pushes, magic, terms) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Width::Avx512 => unsafe { on_avx512(statics, pairs, pushes, magic, terms) },
+        #[cfg(not(target_arch = "x86_64"))]
+        Width::Avx2 | Width::Avx512 => unreachable!("not available"),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn on_avx2(
+    statics: &Statics,
+    pairs: &Pairs,
+    pushes: Pushes,
+    magic: [f64; 2],
+    terms: &mut Terms,
+) -> Sums {
+    // SAFETY: the caller's.
+    unsafe { kernel::<Avx2>(statics, pairs, pushes, magic, terms) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+unsafe fn on_avx512(
+    statics: &Statics,
+    pairs: &Pairs,
+    pushes: Pushes,
+    magic: [f64; 2],
+    terms: &mut Terms,
+) -> Sums {
+    // SAFETY: the caller's.
+    unsafe { kernel::<Avx512>(statics, pairs, pushes, magic, terms) }
+}
+
+/// # Safety
+/// All lists as long as the pairs, whole sets; indices in range.
+#[inline(always)]
+unsafe fn kernel<L: Lane>(
+    statics: &Statics,
+    pairs: &Pairs,
+    pushes: Pushes,
+    magic: [f64; 2],
+    terms: &mut Terms,
+) -> Sums {
+    let zero = L::splat(0.0);
+    let (force_magic, energy_magic) = (L::splat(magic[0]), L::splat(magic[1]));
+    let (mut energy, mut bound, mut frequency2, mut deepest) = (zero, zero, zero, zero);
+    let mut at = 0;
+    while at < pairs.node.len() {
+        // SAFETY: the caller's; `at + N` is within the lists because N divides SET.
+        unsafe {
+            let factor = L::gather(&statics.factor, &pairs.node, at);
+            let of_node = L::gather(&statics.stiffness, &pairs.node, at);
+            let of_face = L::gather(&statics.face_stiffness, pushes.face, at);
+            let sum = of_node + of_face;
+            let mean = L::splat(2.0) * of_node * of_face / sum;
+            let k = L::select(zero.less(sum), factor * mean, zero);
+            let weights = [
+                L::load(&pushes.weights[0], at),
+                L::load(&pushes.weights[1], at),
+                L::load(&pushes.weights[2], at),
+                L::load(&pushes.weights[3], at),
+            ];
+            let mut inverse_mass = L::gather(&statics.inverse_mass, &pairs.node, at);
+            let mut i = 0;
+            while i < 4 {
+                let of_corner = L::gather(&statics.inverse_mass, &pairs.corners[i], at);
+                inverse_mass = (weights[i] * weights[i]).mul_add(of_corner, inverse_mass);
+                i += 1;
+            }
+            let stacking = L::load(pushes.stacking, at);
+            frequency2 = (L::splat(BOTH_SIDES) * stacking * k * inverse_mass).max(frequency2);
+            let depth = L::load(pushes.depth, at);
+            deepest = depth.max(deepest);
+            let normal = (k * L::load(pushes.share, at)) * depth;
+            let mut a = 0;
+            while a < 3 {
+                let force = normal * L::load(&pushes.direction[a], at);
+                let corners = [
+                    (-(weights[0] * force) + force_magic) - force_magic,
+                    (-(weights[1] * force) + force_magic) - force_magic,
+                    (-(weights[2] * force) + force_magic) - force_magic,
+                    (-(weights[3] * force) + force_magic) - force_magic,
+                ];
+                let node = -((corners[0] + corners[1]) + (corners[2] + corners[3]));
+                bound = node.abs().max(bound);
+                node.store(&mut terms[a], at);
+                corners[0].store(&mut terms[3 + a], at);
+                corners[1].store(&mut terms[6 + a], at);
+                corners[2].store(&mut terms[9 + a], at);
+                corners[3].store(&mut terms[12 + a], at);
+                a += 1;
+            }
+            let stored = L::splat(0.5) * normal * depth;
+            energy = energy + ((stored + energy_magic) - energy_magic);
+        }
+        at += L::N;
+    }
+    let mut sums = Sums::default();
+    let (energy, bound) = (energy.to_array(), bound.to_array());
+    let (frequency2, deepest) = (frequency2.to_array(), deepest.to_array());
+    for i in 0..SET {
+        sums.energy += energy[i];
+        sums.force_bound = if bound[i] > sums.force_bound { bound[i] } else { sums.force_bound };
+        sums.deepest = if deepest[i] > sums.deepest { deepest[i] } else { sums.deepest };
+        sums.frequency2 = if frequency2[i] > sums.frequency2 { frequency2[i] } else { sums.frequency2 };
+    }
+    sums
+}

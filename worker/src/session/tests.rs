@@ -1,0 +1,164 @@
+//! A session without a master, sockets or clocks.
+
+use super::*;
+use mechanics::{cycle::Guest, setup::Control, setup::Setup, vote::Quanta};
+
+fn assign(cycle: u64) -> Box<Assign> {
+    let quantum = Quantum::for_reference(1.0, 42);
+    Box::new(Assign {
+        setup: Setup {
+            materials: Vec::new(),
+            control: Control {
+                end_time: 1.0,
+                end_cycle: 10,
+                safety_factor: 0.6666,
+                growth: 1.05,
+                linear_viscosity: 0.2,
+                quadratic_viscosity: 1.0,
+                hourglass: 0.1,
+                sort_lag: 2,
+                plan_interval: 50,
+            },
+            contact: None,
+            constraints: Vec::new(),
+            walls: Vec::new(),
+            detonations: Vec::new(),
+        },
+        n_parts: 1,
+        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
+        subdomains: Vec::new(),
+        gauges: Vec::new(),
+        lanes: None,
+        cycle,
+        dt_previous: 0.0,
+        route: Route::Master,
+        plan: Plan { exchange: vec![4], ..Plan::default() },
+        plan_hash: 7,
+        guest_state: Vec::new(),
+    })
+}
+
+fn orders(next: u64) -> Orders {
+    let force_quantum = Quantum::for_reference(1.0, 42);
+    Orders { next, dt: 1e-3, force_quantum, gather: false, collect: false, stop: false }
+}
+
+fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
+    session.apply(Event::Message(message))
+}
+
+fn done(session: &mut Session, outcome: Outcome) -> Vec<Action> {
+    session.apply(Event::Done(outcome))
+}
+
+fn forces() -> Outcome {
+    Outcome::Forces { partials: vec![0.0; 3], gathered: Vec::new() }
+}
+
+fn vote() -> Outcome {
+    Outcome::Integrated(Box::new(Vote::empty(1)))
+}
+
+/// A session that has sent its first frame and computes the interior; `second` are the orders for cycle 0.
+fn in_first_cycle(second: Orders) -> Session {
+    let mut session = Session::new();
+    let load = hear(&mut session, ToWorker::Assign(assign(0)));
+    assert!(matches!(load[..], [Action::Compute(Task::Load { prepare: true, .. })]));
+    let ready = done(&mut session, Outcome::Loaded { vote: None, lanes: "scalar".into() });
+    assert!(matches!(ready[..], [Action::Send(ToMaster::Ready { .. })]));
+    let border = hear(&mut session, ToWorker::Start { orders: [orders(u64::MAX), second] });
+    assert!(matches!(border[..], [Action::Compute(Task::Border { .. })]));
+    let sent = done(&mut session, forces());
+    assert!(matches!(
+        sent[..],
+        [Action::Send(ToMaster::Cycle { cycle: 0, .. }), Action::Compute(Task::Interior { .. })]
+    ));
+    session
+}
+
+#[test]
+fn totals_may_come_before_the_interior_is_done() {
+    let mut session = in_first_cycle(orders(0));
+    assert!(
+        hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] }).is_empty()
+    );
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Integrate { .. })]));
+    let actions = done(&mut session, vote());
+    assert!(matches!(actions[..], [Action::Compute(Task::Border { .. })]));
+    assert_eq!(session.cycle(), 1);
+}
+
+#[test]
+fn a_plan_is_installed_when_it_and_the_guests_are_there() {
+    let mut session = in_first_cycle(Orders { gather: true, ..orders(0) });
+    done(&mut session, Outcome::Computed);
+    hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+    let actions = done(&mut session, vote());
+    assert!(
+        matches!(actions[..], [Action::Compute(Task::Border { gather: true, .. })]),
+        "gathers at cycle 1"
+    );
+    for cycle in 1..3 {
+        done(&mut session, forces());
+        done(&mut session, Outcome::Computed);
+        hear(&mut session, ToWorker::Totals { cycle, orders: orders(cycle + 1), totals: vec![0.0; 3] });
+        let actions = done(&mut session, vote());
+        assert_eq!(actions.is_empty(), cycle == 2, "cycle 3 waits for the plan: {actions:?}");
+    }
+    let plan =
+        Box::new(Plan { guests: vec![Guest { node: 9, mass: 1.0, constraint: 0 }], ..Plan::default() });
+    let actions = hear(&mut session, ToWorker::Plan { acts_at: 3, plan, hash: 8 });
+    assert!(matches!(actions[..], [Action::Compute(Task::Transfer { .. })]));
+    let actions = done(&mut session, Outcome::Transferred(vec![0.0; 6]));
+    assert!(matches!(
+        actions[..],
+        [Action::Send(ToMaster::Transfer { cycle: 3, .. }), Action::Compute(Task::Elements { .. })]
+    ));
+    assert!(done(&mut session, Outcome::Computed).is_empty(), "waits for the guests");
+    let actions = hear(&mut session, ToWorker::Transfer { cycle: 3, state: vec![0.0; 6] });
+    assert!(matches!(actions[..], [Action::Compute(Task::Install { .. })]));
+    assert_eq!(session.plan_hash(), 8);
+}
+
+#[test]
+fn more_totals_than_two_cycles_end_the_session() {
+    let mut session = in_first_cycle(orders(0));
+    for cycle in 0..2 {
+        let totals = vec![0.0; 3];
+        assert!(hear(&mut session, ToWorker::Totals { cycle, orders: orders(cycle + 1), totals }).is_empty());
+    }
+    let actions = hear(&mut session, ToWorker::Totals { cycle: 2, orders: orders(3), totals: vec![0.0; 3] });
+    assert!(
+        matches!(&actions[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("at most 2"))
+    );
+}
+
+#[test]
+fn a_second_assignment_names_the_phase() {
+    let mut session = in_first_cycle(orders(0));
+    let actions = hear(&mut session, ToWorker::Assign(assign(0)));
+    assert!(
+        matches!(&actions[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("Interior"))
+    );
+}
+
+#[test]
+fn release_forgets_the_job_in_any_phase() {
+    let mut session = in_first_cycle(orders(0));
+    assert!(matches!(hear(&mut session, ToWorker::Release)[..], [Action::Forget]));
+    assert!(done(&mut session, Outcome::Computed).is_empty(), "an outcome of the job before is ignored");
+    let load = hear(&mut session, ToWorker::Assign(assign(5)));
+    assert!(matches!(load[..], [Action::Compute(Task::Load { prepare: false, .. })]));
+}
+
+#[test]
+fn stop_sends_the_image_with_the_last_vote() {
+    let mut session = in_first_cycle(Orders { stop: true, ..orders(0) });
+    done(&mut session, Outcome::Computed);
+    hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+    let actions = done(&mut session, vote());
+    assert!(matches!(actions[..], [Action::Compute(Task::Image)]));
+    let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
+    assert!(matches!(actions[..], [Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. })]));
+}
