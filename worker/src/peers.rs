@@ -196,3 +196,6 @@ pub enum What {
     /// The link has ended.
     Ended(Error),
 }
+
+#[cfg(test)]
+mod tests;
