@@ -232,6 +232,31 @@ async fn a_peer_that_cannot_be_reached_is_found_out_and_relayed() {
     assert_eq!(high.links.send(0, message(1, 3), 0), [message(1, 3)]);
 }
 
+#[tokio::test]
+async fn another_worker_than_the_one_dialled_is_noticed() {
+    let mut low = side(any_port().await).await;
+    let mut high = side(any_port().await).await;
+    // The address of worker 0 leads to worker 1.
+    let addresses = [low.address, low.address, high.address];
+    low.introduce(1, &addresses);
+    high.introduce(2, &addresses);
+    high.links.want([0]);
+    match high.next().await.what {
+        What::Failed(error) => assert!(error.to_string().contains("worker 1 answers there"), "{error}"),
+        _ => panic!("it was taken for worker 0"),
+    }
+    let member = |address: &str| Some(address.parse().expect("an address"));
+    let mut who = introduction(2, &addresses);
+    who.members[0].address = member("127.0.0.1:9");
+    who.members[2].address = member("192.0.2.1:9");
+    high.links.introduce(Key { epoch: 2, ..KEY }, who);
+    high.links.want([0]);
+    match high.next().await.what {
+        What::Failed(error) => assert!(error.to_string().contains("by a loopback address"), "{error}"),
+        _ => panic!("loopback of another host"),
+    }
+}
+
 /// Both send more than all sockets between them hold before either takes anything off its queue.
 #[tokio::test]
 async fn large_frames_cross_over_sockets_of_four_kilobytes() {
