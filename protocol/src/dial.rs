@@ -56,7 +56,7 @@ pub async fn dial(master: &str, certificates: Option<&Arc<ClientConfig>>, hello:
     };
     let connecting = TcpStream::connect(addresses.as_slice());
     let stream = tokio::time::timeout(CONNECT_LIMIT, connecting).await.map_err(|_| late())?.map_err(fault)?;
-    link::tune(&stream)?;
+    let stream = link::Socket::new(stream)?;
     let (sender, receiver) = match certificates {
         None => link::split(stream, Settings::default()),
         Some(config) => {
