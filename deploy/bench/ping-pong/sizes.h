@@ -13,7 +13,7 @@ static const size_t SIZES[] = {8, 64, 512, 4096, 16384, 65536, 262144, 1048576, 
 /* Round trips per size that are timed; a tenth as many go before, untimed. */
 static int trips(size_t bytes)
 {
-    return bytes <= 4096 ? 4000 : bytes <= 65536 ? 1000 : bytes <= 262144 ? 300 : 60;
+    return bytes <= 4096 ? 1000 : bytes <= 65536 ? 500 : bytes <= 262144 ? 200 : 40;
 }
 
 static double seconds(void)

@@ -83,17 +83,17 @@ fn print_table(rows: &[Row]) {
     println!("{:>10}  {:>5}  {:>3}  {:>14}  {:>8}", "bytes", "kind", "TLS", "half trip (us)", "MB/s");
     for row in rows {
         let (tls, half, rate) = (if row.tls { "on" } else { "off" }, row.half_round_trip_us, row.mb_per_s);
-        println!("{:>10}  {:>5}  {tls:>3}  {half:>14.1}  {rate:>8.0}", row.bytes, row.kind);
+        println!("{:>10}  {:>5}  {tls:>3}  {half:>14.2}  {rate:>8.0}", row.bytes, row.kind);
     }
 }
 
 /// Round trips that are timed; a tenth as many go before.
 const fn trips(bytes: usize) -> u64 {
     match bytes {
-        0..=4096 => 4000,
-        4097..=0x1_0000 => 1000,
-        0x1_0001..=0x4_0000 => 300,
-        _ => 60,
+        0..=4096 => 1000,
+        4097..=0x1_0000 => 500,
+        0x1_0001..=0x4_0000 => 200,
+        _ => 40,
     }
 }
 

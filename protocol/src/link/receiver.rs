@@ -298,8 +298,11 @@ impl Receiver {
             if let Poll::Ready(result) =
                 self.incoming.poll_some(read, &mut Context::from_waker(Waker::noop()))
             {
-                if start.is_some() {
-                    self.habit.found();
+                match start.map(|start: std::time::Instant| start.elapsed()) {
+                    None => {}
+                    Some(wait) if wait <= EAGER => self.habit.found(),
+                    // Another process took the processor meanwhile; a sleeper would have been given it back sooner.
+                    Some(_) => self.habit.in_vain(),
                 }
                 return Some(result);
             }
