@@ -165,5 +165,5 @@ awk -v rounds="$rounds" -v programs="${programs[*]}" '
 awk -v rounds="$rounds" '
     BEGIN { printf "{\"rounds\": %d, \"rows\": [", rounds }
     { printf "%s\n{\"placement\": \"%s\", \"program\": \"%s\", \"bytes\": %d, \"half_round_trip_us\": %s, \"least_us\": %s, \"most_us\": %s, \"mb_per_s\": %.1f}",
-        NR > 1 ? "," : "", $1, $2, $3, $4, $5, $6, $3 / $4 }
+        (NR > 1 ? "," : ""), $1, $2, $3, $4, $5, $6, $3 / $4 }
     END { print "\n]}" }' medians.txt > result.json
