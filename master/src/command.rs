@@ -72,6 +72,12 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
+    /// Measure what this machine's parts cost
+    Bench {
+        /// What to measure
+        #[command(subcommand)]
+        what: Bench,
+    },
     /// Make certificates: a CA, and one folder for each host
     Certs {
         /// What to make
@@ -334,6 +340,38 @@ pub struct SubmitArgs {
     /// The master
     #[command(flatten)]
     pub at: ClientArgs,
+}
+
+/// What `bench` measures.
+#[derive(Debug, Subcommand)]
+pub enum Bench {
+    /// Messages: half a round trip between two processes, on this machine unless --to names another
+    Messages(MessagesArgs),
+}
+
+/// Flags of `bench messages`.
+#[derive(Args, Clone, Debug)]
+pub struct MessagesArgs {
+    /// Be the far end at this address for one caller; other than loopback only with --certs
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "to")]
+    pub listen: Option<SocketAddr>,
+    /// The far end, HOST:PORT, where `bolide bench messages --listen` runs; otherwise one is started here
+    #[arg(long, value_name = "HOST:PORT")]
+    pub to: Option<String>,
+    /// Folder with this host's certificates, as `bolide certs host` makes it; the far end's must be a master's.
+    /// Without --to both ways are measured, with certificates made for it
+    #[arg(long, value_name = "FOLDER")]
+    pub certs: Option<PathBuf>,
+    /// Bytes of the messages
+    #[arg(long, value_delimiter = ',', default_value = "8,64,512,4096,16384,65536,262144,1048576,4194304")]
+    #[arg(value_parser = crate::bench::messages::message_size)]
+    pub sizes: Vec<usize>,
+    /// Rounds per size, of which the median is printed
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub rounds: u32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What `certs` makes.

@@ -78,7 +78,7 @@ impl Gate {
     /// # Errors
     /// Why it ended, unless a client left.
     pub async fn take(self: Arc<Self>, stream: TcpStream, address: String) -> Result<()> {
-        link::tune(&stream)?;
+        let stream = link::Socket::new(stream)?;
         match self.tls.clone() {
             None => self.serve(stream, address, None).await,
             Some(config) => {

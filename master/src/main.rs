@@ -7,8 +7,8 @@ use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 use clap::Parser;
 
 use master::{
-    certs, client,
-    command::{Certs, Cli, Command, WorkerArgs},
+    bench, certs, client,
+    command::{Bench, Certs, Cli, Command, WorkerArgs},
     daemon, processes, run, simulate,
 };
 use worker::daemon::Listen;
@@ -33,6 +33,7 @@ fn main() -> ExitCode {
         Command::Hosts { at } => client::hosts(&at),
         Command::Cancel { job, at } => client::cancel(job, &at),
         Command::Results { job, out, force, at } => client::results(job, out, force, &at),
+        Command::Bench { what: Bench::Messages(args) } => bench::messages::run(&args),
         Command::Certs { what } => make_certificates(what),
         Command::Check { deck } => check(&deck),
         Command::Materials => {

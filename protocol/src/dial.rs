@@ -44,7 +44,7 @@ pub fn certificates(folder: Option<&Path>) -> Result<Option<Arc<ClientConfig>>> 
 
 /// A connection that has not been greeted over.
 pub struct Reached {
-    stream: TcpStream,
+    stream: link::Socket,
     host: String,
     certificates: Option<Arc<ClientConfig>>,
     /// What the other side's certificate may be for.
@@ -126,7 +126,7 @@ pub async fn reach(master: &str, certificates: Option<&Arc<ClientConfig>>) -> Re
     })
 }
 
-async fn connect(addresses: &[SocketAddr], name: &str) -> Result<TcpStream> {
+async fn connect(addresses: &[SocketAddr], name: &str) -> Result<link::Socket> {
     let doing = || format!("connecting to {name}");
     let fault = |error: std::io::Error| Error::io(doing(), &error);
     let late = || {
@@ -135,8 +135,7 @@ async fn connect(addresses: &[SocketAddr], name: &str) -> Result<TcpStream> {
     };
     let connecting = TcpStream::connect(addresses);
     let stream = tokio::time::timeout(CONNECT_LIMIT, connecting).await.map_err(|_| late())?.map_err(fault)?;
-    link::tune(&stream)?;
-    Ok(stream)
+    link::Socket::new(stream)
 }
 
 /// Greets over a link that stands.

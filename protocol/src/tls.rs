@@ -20,13 +20,16 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
-use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::io::{AsyncRead, AsyncWrite, BufReader};
 use tokio_rustls::{TlsAcceptor, TlsConnector, TlsStream};
 use x509_parser::extensions::GeneralName;
 use x509_parser::prelude::{FromDer, X509Certificate};
 
 /// The longest a TLS handshake may take: a peer that dials and says nothing holds a task no longer.
 pub const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
+
+/// Bytes asked of the stream at a time: four records. TLS by itself asks for a quarter of one.
+pub const READ_BUFFER: usize = 64 << 10;
 
 /// What a URI in a certificate starts with when it names a role.
 pub const ROLE_PREFIX: &str = "bolide:";
@@ -143,10 +146,11 @@ pub fn peer_config(paths: &Paths) -> Result<Arc<ClientConfig>> {
 /// # Errors
 /// [`Error::Io`] or [`Error::Certificate`] in one line; a caller that takes longer than
 /// [`HANDSHAKE_LIMIT`].
-pub async fn accept<S>(stream: S, config: &Arc<ServerConfig>) -> Result<(TlsStream<S>, Identity)>
+pub async fn accept<S>(stream: S, config: &Arc<ServerConfig>) -> Result<(TlsStream<BufReader<S>>, Identity)>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
+    let stream = BufReader::with_capacity(READ_BUFFER, stream);
     let stream = in_time(TlsAcceptor::from(Arc::clone(config)).accept(stream)).await?;
     let identity = peer_identity(stream.get_ref().1.peer_certificates())?;
     Ok((TlsStream::Server(stream), identity))
@@ -165,7 +169,7 @@ pub async fn connect<S>(
     host: &str,
     config: &Arc<ClientConfig>,
     role: Role,
-) -> Result<(TlsStream<S>, Identity)>
+) -> Result<(TlsStream<BufReader<S>>, Identity)>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
@@ -181,12 +185,13 @@ pub async fn connect_any<S>(
     host: &str,
     config: &Arc<ClientConfig>,
     roles: &[Role],
-) -> Result<(TlsStream<S>, Identity)>
+) -> Result<(TlsStream<BufReader<S>>, Identity)>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
     let name = ServerName::try_from(host.to_owned())
         .map_err(|_| Error::Certificate(format!("{host:?} is neither a host's name nor an address")))?;
+    let stream = BufReader::with_capacity(READ_BUFFER, stream);
     let stream = in_time(TlsConnector::from(Arc::clone(config)).connect(name, stream)).await?;
     let identity = peer_identity(stream.get_ref().1.peer_certificates())?;
     if !roles.contains(&identity.role) {

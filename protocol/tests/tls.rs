@@ -13,6 +13,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
+use tokio::io::BufReader;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsStream;
 
@@ -55,7 +56,7 @@ impl Authority {
 }
 
 /// One side of a connection after its handshake.
-type Side = Result<(TlsStream<TcpStream>, Identity)>;
+type Side = Result<(TlsStream<BufReader<TcpStream>>, Identity)>;
 
 /// Dials `host` on a free port of 127.0.0.1, expecting a master there.
 async fn meet(client: &Arc<ClientConfig>, host: &str, server: &Arc<ServerConfig>) -> (Side, Side) {

@@ -46,7 +46,7 @@ pub(super) async fn listen(listener: TcpListener, shared: Arc<Shared>) {
 
 /// Serves a connection to its end. What happens once it stands is told to the compute thread.
 async fn take(shared: &Shared, stream: TcpStream) -> Result<()> {
-    link::tune(&stream)?;
+    let stream = link::Socket::new(stream)?;
     match &shared.certificates {
         None => {
             let (sender, receiver) = link::split(stream, settings());
