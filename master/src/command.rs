@@ -3,7 +3,7 @@
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use protocol::{request::JobOptions, tls};
+use protocol::{request::JobOptions, shape::Rate, tls};
 
 /// Explicit Lagrangian impact simulation on whatever PCs a lab has.
 #[derive(Debug, Parser)]
@@ -253,6 +253,9 @@ pub struct MasterArgs {
     /// Folder for the results of jobs
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
+    /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
+    #[arg(long, value_name = "RATE")]
+    pub link: Option<Rate>,
 }
 
 /// Flags of `worker`.
@@ -279,6 +282,9 @@ pub struct WorkerArgs {
     /// End when the master ends the connection, instead of dialling again
     #[arg(long)]
     pub once: bool,
+    /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
+    #[arg(long, value_name = "RATE")]
+    pub link: Option<Rate>,
 }
 
 /// How a client reaches a master, and how it prints.

@@ -57,6 +57,7 @@ fn work(args: WorkerArgs) -> Result<ExitCode, String> {
         patience: Duration::from_secs(args.patience),
         once: args.once,
         token: std::env::var(processes::TOKEN).ok(),
+        link: args.link,
     };
     worker::daemon::run(&options).map(|()| ExitCode::SUCCESS)
 }

@@ -9,6 +9,7 @@ use crate::{
     Error, Result,
     handshake::{self, Hello, Welcome},
     link::{self, Receiver, Sender, Settings},
+    shape::{Shape, Shaped},
     tls,
 };
 
@@ -43,6 +44,19 @@ pub fn certificates(folder: Option<&Path>) -> Result<Option<Arc<ClientConfig>>> 
 /// # Errors
 /// [`Error::Io`] when nobody answers, [`Error::Address`], [`Error::Certificate`], or what [`link::greet`] gives.
 pub async fn dial(master: &str, certificates: Option<&Arc<ClientConfig>>, hello: &Hello) -> Result<Call> {
+    dial_from(master, certificates, hello, None).await
+}
+
+/// As [`dial`], through a shape: this host's emulated port.
+///
+/// # Errors
+/// As for [`dial`].
+pub async fn dial_from(
+    master: &str,
+    certificates: Option<&Arc<ClientConfig>>,
+    hello: &Hello,
+    shape: Option<&Shape>,
+) -> Result<Call> {
     let (host, port) = split_address(master)?;
     let doing = || format!("connecting to {master}");
     let fault = |error: std::io::Error| Error::io(doing(), &error);
@@ -57,6 +71,7 @@ pub async fn dial(master: &str, certificates: Option<&Arc<ClientConfig>>, hello:
     let connecting = TcpStream::connect(addresses.as_slice());
     let stream = tokio::time::timeout(CONNECT_LIMIT, connecting).await.map_err(|_| late())?.map_err(fault)?;
     link::tune(&stream)?;
+    let stream = Shaped::new(stream, shape);
     let (sender, receiver) = match certificates {
         None => link::split(stream, Settings::default()),
         Some(config) => {

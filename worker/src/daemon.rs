@@ -21,6 +21,7 @@ use protocol::{
     link::Receiver,
     message::{ToMaster, ToWorker},
     order::{BULK_ON_THE_WAY, Inbox, Outbox, Place},
+    shape::{Rate, Shape, Wire},
     tls::ClientConfig,
     wire,
 };
@@ -59,6 +60,8 @@ pub struct Options {
     pub once: bool,
     /// The secret that the master asks for.
     pub token: Option<String>,
+    /// Rate of this host's emulated port; none for what the network gives.
+    pub link: Option<Rate>,
 }
 
 /// Computes for a master until a signal, a refusal, or until the master has been away for too long.
@@ -130,10 +133,11 @@ async fn stay(
     hello: &Hello,
     pool: &Arc<ThreadPool>,
 ) -> std::result::Result<(), String> {
+    let port = options.link.map(|rate| Shape::port(Wire::ethernet(rate)));
     let mut alone_since = Instant::now();
     let mut pause = FIRST_PAUSE;
     loop {
-        let error = match dial::dial(&options.master, certificates, hello).await {
+        let error = match dial::dial_from(&options.master, certificates, hello, port.as_ref()).await {
             Ok(call) => {
                 info!(
                     host = call.welcome.host,
