@@ -131,37 +131,35 @@ impl Way {
         cx: &mut Context<'_>,
         buf: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        loop {
-            while self.last.is_none() && self.held_bytes < HELD_BYTES {
-                let mut taken = ReadBuf::new(&mut self.scratch);
-                match inner.as_mut().poll_read(cx, &mut taken) {
-                    Poll::Pending => break,
-                    Poll::Ready(Err(error)) => self.last = Some(Err(error)),
-                    Poll::Ready(Ok(())) if taken.filled().is_empty() => self.last = Some(Ok(())),
-                    Poll::Ready(Ok(())) => {
-                        let bytes = taken.filled().to_vec();
-                        self.held_bytes += bytes.len();
-                        self.held.push_back((self.shape.arrive(Instant::now(), bytes.len()), bytes));
-                    }
+        while self.last.is_none() && self.held_bytes < HELD_BYTES {
+            let mut taken = ReadBuf::new(&mut self.scratch);
+            match inner.as_mut().poll_read(cx, &mut taken) {
+                Poll::Pending => break,
+                Poll::Ready(Err(error)) => self.last = Some(Err(error)),
+                Poll::Ready(Ok(())) if taken.filled().is_empty() => self.last = Some(Ok(())),
+                Poll::Ready(Ok(())) => {
+                    let bytes = taken.filled().to_vec();
+                    self.held_bytes += bytes.len();
+                    self.held.push_back((self.shape.arrive(Instant::now(), bytes.len()), bytes));
                 }
             }
-            let Some((due, bytes)) = self.held.front() else {
-                return match &mut self.last {
-                    None => Poll::Pending,
-                    Some(last) => Poll::Ready(std::mem::replace(last, Ok(()))),
-                };
-            };
-            ready!(self.reading.poll(*due, cx));
-            let end = bytes.len().min(self.given + buf.remaining());
-            buf.put_slice(&bytes[self.given..end]);
-            if end == bytes.len() {
-                self.held_bytes -= bytes.len();
-                self.held.pop_front();
-                self.given = 0;
-            } else {
-                self.given = end;
-            }
-            return Poll::Ready(Ok(()));
         }
+        let Some((due, bytes)) = self.held.front() else {
+            return match &mut self.last {
+                None => Poll::Pending,
+                Some(last) => Poll::Ready(std::mem::replace(last, Ok(()))),
+            };
+        };
+        ready!(self.reading.poll(*due, cx));
+        let end = bytes.len().min(self.given + buf.remaining());
+        buf.put_slice(&bytes[self.given..end]);
+        if end == bytes.len() {
+            self.held_bytes -= bytes.len();
+            self.held.pop_front();
+            self.given = 0;
+        } else {
+            self.given = end;
+        }
+        Poll::Ready(Ok(()))
     }
 }
