@@ -3,7 +3,11 @@
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use protocol::{request::JobOptions, shape::Rate, tls};
+use protocol::{
+    request::{JobOptions, RouteChoice},
+    shape::Rate,
+    tls,
+};
 
 /// Explicit Lagrangian impact simulation on whatever PCs a lab has.
 #[derive(Debug, Parser)]
@@ -87,15 +91,18 @@ pub enum Command {
 /// How partial forces travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Route {
+    /// Direct with two workers or more that all take peers, else master
+    Auto,
     /// All through the master, which adds them
     Master,
     /// From worker to worker; votes and orders pass the master
     Direct,
 }
 
-impl From<Route> for protocol::message::Route {
+impl From<Route> for RouteChoice {
     fn from(route: Route) -> Self {
         match route {
+            Route::Auto => Self::Auto,
             Route::Master => Self::Master,
             Route::Direct => Self::Direct,
         }
@@ -129,7 +136,7 @@ impl Lanes {
 #[derive(Args, Clone, Debug)]
 pub struct JobArgs {
     /// Route of the shared-node forces
-    #[arg(long, value_enum, default_value = "master")]
+    #[arg(long, value_enum, default_value = "auto")]
     pub route: Route,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
     #[arg(long)]
@@ -167,6 +174,7 @@ impl JobArgs {
             sort_every: self.sort_every,
             sort_seed: self.sort_seed,
             min_workers: 1,
+            trace: false,
         }
     }
 }
@@ -197,6 +205,9 @@ pub struct RunArgs {
     /// Replace the results in an existing folder
     #[arg(long)]
     pub force: bool,
+    /// Write what every worker did in its last cycles as a trace that Perfetto opens
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Print the summary alone, as JSON, on standard output
     #[arg(long)]
     pub json: bool,
@@ -285,6 +296,15 @@ pub struct WorkerArgs {
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
     #[arg(long, value_name = "RATE")]
     pub link: Option<Rate>,
+    /// Port for other workers, on the interface that leads to the master [default: any]
+    #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
+    pub peer_port: u16,
+    /// Port that other workers dial, where it is forwarded to --peer-port
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
+    pub peer_announce: Option<u16>,
+    /// Take no other workers and dial none: what it exchanges with them passes the master
+    #[arg(long, conflicts_with_all = ["peer_port", "peer_announce"])]
+    pub no_peers: bool,
 }
 
 /// How a client reaches a master, and how it prints.
@@ -312,6 +332,9 @@ pub struct SubmitArgs {
     /// Follow the job until it ends, then print its summary
     #[arg(long)]
     pub wait: bool,
+    /// Write trace.json into the results: what every worker did in its last cycles, for Perfetto
+    #[arg(long, conflicts_with = "no_output")]
+    pub trace: bool,
     /// The job
     #[command(flatten)]
     pub job: JobArgs,

@@ -22,7 +22,10 @@ use mechanics::{
     state::GlobalState,
     vote::{Quanta, Vote},
 };
-use protocol::message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work};
+use protocol::{
+    message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work},
+    phase::Report,
+};
 
 use crate::{
     event::{Action, Event, Limit, Options, Outcome, Progress},
@@ -103,6 +106,7 @@ pub struct Job {
     sorts: u64,
     census: mechanics::contact::Census,
     work: Vec<Work>,
+    reports: Vec<Report>,
     imbalance: f64,
     over: bool,
 }
@@ -121,6 +125,11 @@ impl Job {
     /// Surface of the problem; none without contact.
     pub fn surface(&self) -> Option<&Surface> {
         self.bench.as_ref().map(|bench| bench.sorter.surface())
+    }
+
+    /// How partial forces travel.
+    pub fn route(&self) -> Route {
+        self.options.route
     }
 
     /// Whether it has ended.
@@ -176,6 +185,7 @@ impl Job {
             sorts: self.sorts,
             census: self.census,
             work: self.work.clone(),
+            reports: std::mem::take(&mut self.reports),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
             route: match self.options.route {
@@ -200,6 +210,11 @@ impl Job {
                     ));
                 }
                 actions.push(Action::Send(to as usize, ToWorker::Relayed { from: worker as u32, message }));
+                Ok(())
+            }
+            ToMaster::Report(report) => {
+                report.check(self.n_workers).map_err(|error| format!("worker {worker}: {error}"))?;
+                self.reports[worker] = *report;
                 Ok(())
             }
             ToMaster::Transfer { cycle, state } => self.transfer(worker, cycle, state, actions),

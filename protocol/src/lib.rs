@@ -17,6 +17,7 @@ pub mod handshake;
 pub mod link;
 pub mod message;
 pub mod order;
+pub mod phase;
 pub mod request;
 pub mod shape;
 pub mod tls;

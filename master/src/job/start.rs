@@ -15,7 +15,10 @@ use mechanics::{
     piece,
     vote::Quanta,
 };
-use protocol::message::{Assign, ToWorker, Work};
+use protocol::{
+    message::{Assign, ToWorker, Work},
+    phase::Report,
+};
 
 use super::{Bench, Job};
 use crate::{
@@ -209,6 +212,7 @@ impl Job {
             sorts: u64::from(census.units > 0),
             census,
             work: vec![Work::default(); n],
+            reports: vec![Report::default(); n],
             imbalance,
             over: false,
             state,
