@@ -228,9 +228,12 @@ pub struct SimulateArgs {
     /// Print the cluster file's tables instead of one run
     #[arg(long)]
     pub table: bool,
-    /// What tells the time: costs and messages, replayed
+    /// What tells the time: a replay of costs and messages, or threads, links and a real clock
     #[arg(long, value_enum, default_value = "virtual")]
     pub clock: Clock,
+    /// Real seconds by emulated second, for --clock real [default: such that tasks rarely overrun]
+    #[arg(long, value_name = "X")]
+    pub dilation: Option<f64>,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u64).range(4..))]
     pub cycles: u64,
@@ -250,6 +253,8 @@ pub struct SimulateArgs {
 pub enum Clock {
     /// Costs and messages, replayed: the same figures on every machine
     Virtual,
+    /// Workers on threads, frames over shaped loopback links, both stretched to the emulated speed
+    Real,
 }
 
 /// Flags of `master`.

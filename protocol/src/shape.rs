@@ -31,7 +31,7 @@ pub use stream::Shaped;
 /// Resolution of the runtime's timer.
 pub const TICK: Duration = Duration::from_millis(1);
 /// How far a lane may be ahead of its rate after it was idle: what late ticks cost is made up for by this much.
-pub const BURST: Duration = Duration::from_millis(2);
+pub const BURST: Duration = Duration::from_millis(4);
 /// Payload of a TCP segment over Ethernet, with time stamps (bytes).
 pub const SEGMENT: u64 = 1448;
 /// What a segment takes beside it: 20 IP, 32 TCP, 14 Ethernet, 4 check sum, 8 preamble, 12 gap (bytes).

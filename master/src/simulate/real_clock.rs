@@ -211,7 +211,8 @@ pub fn run(
     let options = Options { route, dealing: scheme.dealing, ..Options::default() };
     let (job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
     let (send, receive) = mpsc::channel();
-    let arrived = wires::into_channel(send.clone(), |arrival| News(Instant::now(), Brought::Arrived(arrival)));
+    let arrived =
+        wires::into_channel(send.clone(), |arrival| News(Instant::now(), Brought::Arrived(arrival)));
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads())
         .thread_name(|i| format!("compute-{i}"))
@@ -315,7 +316,12 @@ impl Clock<'_> {
                 self.strain.cpu_seconds += ns as f64 * 1e-9;
                 self.places[worker].machine = Some(machine);
                 let task = self.places[worker].task.as_mut().ok_or("the end of a task that was not begun")?;
+                let kind = task.kind;
                 task.outcome = Some(outcome);
+                if matches!(kind, Kind::Load | Kind::Install) {
+                    let load = self.places[worker].machine.as_ref().map(|m| m.load()).unwrap_or_default();
+                    self.charge_rest(worker, kind, load)?;
+                }
                 self.complete(worker)
             }
             Brought::Sorted(number, sorted, ns) => {
@@ -485,6 +491,117 @@ impl Clock<'_> {
         }
         Ok(())
     }
+
+    /// Gives a task to a thread and, where its charge is known, to the host's processor.
+    fn compute(&mut self, worker: usize, task: Task) -> Result<(), String> {
+        let kind = kind_of(&task);
+        let place = &mut self.places[worker];
+        let mut machine = place.machine.take().ok_or("a worker asked for two tasks at once")?;
+        let mut under_way = UnderWay::new(kind, 0.0, self.now);
+        let known = !matches!(kind, Kind::Load | Kind::Install);
+        if known {
+            under_way.charge = self.machines.costs.of(kind, &place.load).busy();
+        }
+        let charge = under_way.charge;
+        place.task = Some(under_way);
+        if known {
+            self.enter(worker, kind);
+            self.processors[worker].add(self.now, Rank::Compute, charge, Begun(self.now, Work::Task(worker)));
+        }
+        let send = self.send.clone();
+        self.pool.spawn(move || {
+            let (outcome, ns) = cpu_time(|| machine.run(task));
+            drop(machine.take_laps());
+            // The receiver is gone only when the run is over.
+            let _ = send.send(News(Instant::now(), Brought::Done(worker, machine, outcome, ns)));
+        });
+        Ok(())
+    }
+
+    /// The charge of a task that changes what the worker holds is known when it is done: what is left of it is waited for.
+    fn charge_rest(&mut self, worker: usize, kind: Kind, load: Load) -> Result<(), String> {
+        let charge = self.machines.costs.of(kind, &load).busy();
+        self.places[worker].load = load;
+        self.enter(worker, kind);
+        let speed = self.processors[worker].speed();
+        let task = self.places[worker].task.as_mut().ok_or("the end of a task that was not begun")?;
+        task.charge = charge;
+        let left = charge - (self.now - task.begun) * speed;
+        if left > 0.0 {
+            self.processors[worker].add(self.now, Rank::Compute, left, Begun(self.now, Work::Task(worker)));
+        } else {
+            task.due = Some(task.begun + charge / speed);
+        }
+        Ok(())
+    }
+
+    /// Enters a task in the timeline.
+    fn enter(&mut self, worker: usize, kind: Kind) {
+        if kind == Kind::Load {
+            return;
+        }
+        let (load, cycle) = (self.places[worker].load, self.places[worker].session.cycle());
+        let (costs, speed) = (self.machines.costs.of(kind, &load), self.machines.speeds[worker]);
+        phases_at(&mut self.timeline.phases[worker], cycle).charge(&costs, speed);
+        count(&mut self.timeline.counts, kind, cycle, &load);
+    }
+
+    fn master_acts(&mut self, actions: Vec<Action>) -> Result<(), String> {
+        for action in actions {
+            match action {
+                Action::Send(worker, message) => {
+                    if let ToWorker::Plan { acts_at, .. } = &message {
+                        self.timeline.boundaries.push(*acts_at);
+                    }
+                    let packed = wire::pack_to_worker(&message).map_err(|e| e.to_string())?;
+                    self.post(End::Master, End::Worker(worker), packed);
+                }
+                Action::Sort(bench, x) => {
+                    let cycle = (self.timeline.counts.len() as u64).saturating_sub(1);
+                    counts_at(&mut self.timeline.counts, cycle).sorted += x.len() as u64;
+                    let seconds = self.machines.costs.sort * x.len() as f64;
+                    let number = self.first_sort + self.sorts.len() as u64;
+                    self.sorts.push_back(UnderWay::new(Kind::Sort, seconds, self.now));
+                    self.processors[0].add(self.now, Rank::Idle, seconds, Begun(self.now, Work::Sort));
+                    let send = self.send.clone();
+                    self.pool.spawn(move || {
+                        let (sorted, ns) = cpu_time(|| Box::new(bench.sort(&x)));
+                        // The receiver is gone only when the run is over.
+                        let _ = send.send(News(Instant::now(), Brought::Sorted(number, sorted, ns)));
+                    });
+                }
+                Action::Over(outcome) => {
+                    if let Some(reason) = outcome.failure {
+                        return Err(reason);
+                    }
+                    self.timeline.digest = outcome.digest;
+                    self.over = true;
+                }
+                Action::Row(_) | Action::State(_) | Action::Snapshot(_) | Action::Progress(_) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Least seconds of this machine that a cycle may take: links and timers are exact to a tick of a millisecond.
+const SHORTEST_CYCLE: f64 = 0.2;
+/// Fastest wire over loopback (bit/s): beyond, carrying frames takes this machine longer than they should.
+const FASTEST_WIRE: f64 = 1e9;
+/// Least stretch of computing on one thread of this machine; workers that share it need more.
+const LEAST_STRETCH: f64 = 4.0;
+
+/// A dilation at which overruns should be rare: `bound` is the time of a cycle (emulated s), `cpu` is what one worker
+/// alone takes here for a cycle (s), and `alone` what a host of speed 1 is charged for it (emulated s).
+pub fn choose_dilation(machines: &Machines, bound: f64, cpu: f64, alone: f64) -> f64 {
+    let fastest = machines.speeds.iter().copied().fold(0.0, f64::max);
+    let stretch = LEAST_STRETCH * (1.0 + machines.speeds.len() as f64 / threads() as f64);
+    let least =
+        [SHORTEST_CYCLE / bound, machines.network.rate / FASTEST_WIRE, stretch * cpu * fastest / alone];
+    let least = least.into_iter().filter(|d| d.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
+    // Two digits, upward: a number that can be given again.
+    let digit = 10f64.powf(least.log10().floor() - 1.0);
+    (least / digit).ceil() * digit
 }
 
 /// Thread-CPU time of some work (ns).

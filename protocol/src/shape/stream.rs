@@ -14,8 +14,10 @@ use tokio::{
 
 use super::{Shape, Wait};
 
-/// Bytes taken from the stream before those taken earlier are due: what a network card holds.
-const HELD_BYTES: usize = 64 << 10;
+/// Most bytes taken from the stream at a time.
+const TAKEN_BYTES: usize = 128 << 10;
+/// Pieces that may be taken in before those taken earlier are due: what a network card holds.
+const HELD_PIECES: usize = 4;
 
 /// A stream, shaped or not. Cancel safe as the stream underneath.
 #[derive(Debug)]
@@ -46,9 +48,8 @@ impl<S> Shaped<S> {
     /// Wraps `stream`; without a shape it passes everything as it is.
     pub fn new(stream: S, shape: Option<&Shape>) -> Self {
         let way = shape.map(|shape| {
-            let piece = shape.into.as_ref().map_or(HELD_BYTES, |lane| lane.wire.piece);
             Box::new(Way {
-                scratch: vec![0; piece.clamp(1, HELD_BYTES)].into_boxed_slice(),
+                scratch: vec![0; shape.out.wire.piece.clamp(1, TAKEN_BYTES)].into_boxed_slice(),
                 shape: shape.clone(),
                 granted: None,
                 writing: Wait::default(),
@@ -131,7 +132,8 @@ impl Way {
         cx: &mut Context<'_>,
         buf: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        while self.last.is_none() && self.held_bytes < HELD_BYTES {
+        let most = HELD_PIECES * self.scratch.len();
+        while self.last.is_none() && self.held_bytes < most {
             let mut taken = ReadBuf::new(&mut self.scratch);
             match inner.as_mut().poll_read(cx, &mut taken) {
                 Poll::Pending => break,
