@@ -234,6 +234,9 @@ pub struct SimulateArgs {
     /// Real seconds by emulated second, for --clock real [default: such that tasks rarely overrun]
     #[arg(long, value_name = "X")]
     pub dilation: Option<f64>,
+    /// Use only so many hosts, the first of the file
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "table")]
+    pub hosts: Option<u32>,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u64).range(4..))]
     pub cycles: u64,

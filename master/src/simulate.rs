@@ -44,8 +44,20 @@ pub fn run(args: &SimulateArgs) -> Result<ExitCode, String> {
         return Err("--dilation is for --clock real; the virtual clock has none".to_owned());
     }
     match &args.deck {
-        Some(deck) => one(args, &cluster, deck),
+        Some(deck) => one(args, &first_hosts(args, cluster)?, deck),
         None => tables(args, &cluster),
+    }
+}
+
+/// The cluster with as many hosts as are asked for.
+fn first_hosts(args: &SimulateArgs, cluster: Cluster) -> Result<Cluster, String> {
+    match args.hosts.map(|n| n as usize) {
+        None => Ok(cluster),
+        Some(n) if n <= cluster.speeds.len() => Ok(cluster.first(n)),
+        Some(n) => {
+            let (file, there) = (args.cluster.display(), cluster.speeds.len());
+            Err(format!("{file}: {there} hosts, --hosts asks for {n}"))
+        }
     }
 }
 
