@@ -92,8 +92,8 @@ tbf() {
         done
     done
 }
-# 4 ms of a rate, as our shaper has it, but three packets at least.
-burst() { awk -v r="$1" 'BEGIN { u = r ~ /gbit/ ? 1e9 : r ~ /mbit/ ? 1e6 : r ~ /kbit/ ? 1e3 : 1; b = int(r * u / 8 * 0.004); print b < 4614 ? 4614 : b }'; }
+# A millisecond of a rate, as our shaper has it, but two packets at least.
+burst() { awk -v r="$1" 'BEGIN { u = r ~ /gbit/ ? 1e9 : r ~ /mbit/ ? 1e6 : r ~ /kbit/ ? 1e3 : 1; b = int(r * u / 8 * 0.001); print b < 3076 ? 3076 : b }'; }
 
 "$BOLIDE" certs ca "$FOLDER/ca" >/dev/null || fail "no CA"
 for i in $(seq 0 "$WORKERS"); do
@@ -108,7 +108,7 @@ on() { ip netns exec $P-"$1" "${@:2}"; }
 goodput() {
     local bytes link=${2:+link=$2}
     bytes=$(awk -v r="$1" 'BEGIN { u = r ~ /gbit/ ? 1e9 : r ~ /mbit/ ? 1e6 : r ~ /kbit/ ? 1e3 : 1; print int(r * u / 2) }')
-    on 0 "$GOODPUT" receive 10.77.0.1:7200 certs="$(certs 0)" $link >"$FOLDER/goodput" &
+    ip netns exec $P-0 "$GOODPUT" receive 10.77.0.1:7200 certs="$(certs 0)" $link >"$FOLDER/goodput" &
     local receiver=$!
     for _ in $(seq 50); do on 0 ss -ltn 2>/dev/null | grep -q :7200 && break || sleep 0.05; done
     on 1 "$GOODPUT" send 10.77.0.1:7200 bytes="$bytes" certs="$(certs 1)" $link || { kill $receiver; fail "goodput: nothing sent"; }
@@ -127,10 +127,11 @@ wall() {
 # cycles LINK: starts daemons; seconds of a cycle by route.
 cycles() {
     local link=${1:+--link $1} i route few many
-    on 0 "$BOLIDE" master --listen 10.77.0.1:7117 --certs "$(certs 0)" --spool "$FOLDER/spool" $link >"$FOLDER/log-0" 2>&1 &
+    # Without a shell between: what is ended must be the daemon itself.
+    ip netns exec $P-0 "$BOLIDE" master --listen 10.77.0.1:7117 --certs "$(certs 0)" --spool "$FOLDER/spool" $link >"$FOLDER/log-0" 2>&1 &
     DAEMONS+=($!)
     for i in $(seq "$WORKERS"); do
-        on "$i" "$BOLIDE" worker --master 10.77.0.1 --certs "$(certs "$i")" --threads 1 --name host-"$i" $link >"$FOLDER/log-$i" 2>&1 &
+        ip netns exec $P-"$i" "$BOLIDE" worker --master 10.77.0.1 --certs "$(certs "$i")" --threads 1 --name host-"$i" $link >"$FOLDER/log-$i" 2>&1 &
         DAEMONS+=($!)
     done
     for _ in $(seq 100); do

@@ -6,8 +6,9 @@
 //! below TLS, so what is counted is what a wire would carry: the bytes, and for each packet the headers, check sum,
 //! preamble and gap of Ethernet, IP and TCP. Acknowledgements, losses and collisions are not emulated.
 //!
-//! Granted times are kept exactly, waits end on the nearest tick of the runtime's timer ([`TICK`]): the rate is exact
-//! over many packets, one packet may be half a tick early or late. Time is tokio's, so that tests can pause it.
+//! Granted times are kept exactly, waits end on a tick of the runtime's timer ([`TICK`]): the rate is exact over many
+//! packets, one packet may be a tick early or late. A stream that is woken late while more waits makes up for it. Time is
+//! tokio's, so that tests can pause it.
 
 use std::{
     fmt,
@@ -30,8 +31,8 @@ pub use stream::Shaped;
 
 /// Resolution of the runtime's timer.
 pub const TICK: Duration = Duration::from_millis(1);
-/// How far a lane may be ahead of its rate after it was idle: what late ticks cost is made up for by this much.
-pub const BURST: Duration = Duration::from_millis(4);
+/// How far a lane may be ahead of its rate after it was idle.
+pub const BURST: Duration = TICK;
 /// Payload of a TCP segment over Ethernet, with time stamps (bytes).
 pub const SEGMENT: u64 = 1448;
 /// What a segment takes beside it: 20 IP, 32 TCP, 14 Ethernet, 4 check sum, 8 preamble, 12 gap (bytes).
@@ -218,14 +219,14 @@ impl Shape {
     }
 }
 
-/// Waits until the tick that is nearest to a time.
+/// Waits until a tick near a time.
 #[derive(Debug, Default)]
 struct Wait(Option<Pin<Box<Sleep>>>);
 
 impl Wait {
     fn poll(&mut self, until: Instant, cx: &mut Context<'_>) -> Poll<()> {
-        // The timer rounds up to whole ticks.
-        let until = until.checked_sub(TICK / 2).unwrap_or(until);
+        // The timer rounds up to a whole tick, and so does the wait of the thread that drives it.
+        let until = until.checked_sub(TICK).unwrap_or(until);
         if until <= Instant::now() {
             return Poll::Ready(());
         }

@@ -5,6 +5,7 @@ use std::{
     io::{self, IoSlice},
     pin::Pin,
     task::{Context, Poll, ready},
+    time::Duration,
 };
 
 use tokio::{
@@ -12,8 +13,10 @@ use tokio::{
     time::Instant,
 };
 
-use super::{Shape, Wait};
+use super::{Shape, TICK, Wait};
 
+/// The most that a stream makes up for when it was woken too late.
+const CATCH_UP: Duration = Duration::from_millis(50);
 /// Most bytes taken from the stream at a time.
 const TAKEN_BYTES: usize = 128 << 10;
 /// Pieces that may be taken in before those taken earlier are due: what a network card holds.
@@ -31,12 +34,16 @@ struct Way {
     shape: Shape,
     /// Bytes that may be written, and from when.
     granted: Option<(Instant, usize)>,
+    /// When the last piece was to leave, and when it was written.
+    left: Option<(Instant, Instant)>,
     writing: Wait,
     /// Bytes that have come, with the time they are due.
     held: VecDeque<(Instant, Vec<u8>)>,
     held_bytes: usize,
     /// How much of the first of them was given away.
     given: usize,
+    /// When the last piece is due, where the stream had more at once.
+    backlog: Option<Instant>,
     /// Where bytes are taken in.
     scratch: Box<[u8]>,
     /// What came after them: the end, or a fault.
@@ -52,6 +59,8 @@ impl<S> Shaped<S> {
                 scratch: vec![0; shape.out.wire.piece.clamp(1, TAKEN_BYTES)].into_boxed_slice(),
                 shape: shape.clone(),
                 granted: None,
+                left: None,
+                backlog: None,
                 writing: Wait::default(),
                 held: VecDeque::new(),
                 held_bytes: 0,
@@ -75,14 +84,25 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Shaped<S> {
             Some(granted) => granted,
             None => {
                 let bytes = buf.len().min(way.shape.out.wire.piece);
-                let from = way.shape.leave(Instant::now(), bytes);
+                let now = Instant::now();
+                let ready = match way.left {
+                    // It was ready when the piece before was: a timer that was late costs nothing.
+                    Some((due, written)) if now - written < TICK => late(due, now),
+                    _ => now,
+                };
+                let from = way.shape.leave(ready, bytes);
                 way.granted = Some((from, bytes));
                 (from, bytes)
             }
         };
         ready!(way.writing.poll(from, cx));
         let end = bytes.min(buf.len());
-        let written = ready!(Pin::new(&mut this.inner).poll_write(cx, &buf[..end]))?;
+        let Poll::Ready(written) = Pin::new(&mut this.inner).poll_write(cx, &buf[..end])? else {
+            // The other side is slower: it is not this one that is late.
+            way.granted = Some((Instant::now(), bytes));
+            return Poll::Pending;
+        };
+        way.left = Some((from, Instant::now()));
         way.granted = (written < bytes).then(|| (from, bytes - written));
         Poll::Ready(Ok(written))
     }
@@ -124,6 +144,11 @@ impl<S: AsyncRead + Unpin> AsyncRead for Shaped<S> {
     }
 }
 
+/// When what follows a piece that was due at `due` was ready, if it waited for its turn.
+fn late(due: Instant, now: Instant) -> Instant {
+    due.min(now).max(now.checked_sub(CATCH_UP).unwrap_or(now))
+}
+
 impl Way {
     /// Takes in what has come, then gives what is due.
     fn poll_read<S: AsyncRead>(
@@ -136,13 +161,20 @@ impl Way {
         while self.last.is_none() && self.held_bytes < most {
             let mut taken = ReadBuf::new(&mut self.scratch);
             match inner.as_mut().poll_read(cx, &mut taken) {
-                Poll::Pending => break,
+                Poll::Pending => {
+                    self.backlog = None;
+                    break;
+                }
                 Poll::Ready(Err(error)) => self.last = Some(Err(error)),
                 Poll::Ready(Ok(())) if taken.filled().is_empty() => self.last = Some(Ok(())),
                 Poll::Ready(Ok(())) => {
                     let bytes = taken.filled().to_vec();
                     self.held_bytes += bytes.len();
-                    self.held.push_back((self.shape.arrive(Instant::now(), bytes.len()), bytes));
+                    let now = Instant::now();
+                    let ready = self.backlog.map_or(now, |due| late(due, now));
+                    let due = self.shape.arrive(ready, bytes.len());
+                    self.backlog = Some(due);
+                    self.held.push_back((due, bytes));
                 }
             }
         }
