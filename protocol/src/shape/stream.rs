@@ -29,13 +29,23 @@ pub struct Shaped<S> {
     way: Option<Box<Way>>,
 }
 
+/// The last piece that was written.
+#[derive(Debug)]
+struct Left {
+    /// When it was to leave.
+    due: Instant,
+    written: Instant,
+    /// Whether more was at hand with it.
+    more: bool,
+}
+
 #[derive(Debug)]
 struct Way {
     shape: Shape,
     /// Bytes that may be written, and from when.
     granted: Option<(Instant, usize)>,
-    /// When the last piece was to leave, and when it was written.
-    left: Option<(Instant, Instant)>,
+    /// The last piece that was written.
+    left: Option<Left>,
     writing: Wait,
     /// Bytes that have come, with the time they are due.
     held: VecDeque<(Instant, Vec<u8>)>,
@@ -73,10 +83,10 @@ impl<S> Shaped<S> {
     }
 }
 
-impl<S: AsyncWrite + Unpin> AsyncWrite for Shaped<S> {
-    fn poll_write(self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &[u8]) -> Poll<io::Result<usize>> {
-        let this = self.get_mut();
-        let Some(way) = &mut this.way else { return Pin::new(&mut this.inner).poll_write(cx, buf) };
+impl<S: AsyncWrite + Unpin> Shaped<S> {
+    /// Writes a piece of `buf` when it is granted; `more` follows at once.
+    fn poll_piece(&mut self, cx: &mut Context<'_>, buf: &[u8], more: bool) -> Poll<io::Result<usize>> {
+        let Some(way) = &mut self.way else { return Pin::new(&mut self.inner).poll_write(cx, buf) };
         if buf.is_empty() {
             return Poll::Ready(Ok(0));
         }
@@ -87,7 +97,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Shaped<S> {
                 let now = Instant::now();
                 let ready = match way.left {
                     // It was ready when the piece before was: a timer that was late costs nothing.
-                    Some((due, written)) if now - written < TICK => late(due, now),
+                    Some(Left { due, written, more }) if more || now - written < TICK => late(due, now),
                     _ => now,
                 };
                 let from = way.shape.leave(ready, bytes);
@@ -97,14 +107,20 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Shaped<S> {
         };
         ready!(way.writing.poll(from, cx));
         let end = bytes.min(buf.len());
-        let Poll::Ready(written) = Pin::new(&mut this.inner).poll_write(cx, &buf[..end])? else {
+        let Poll::Ready(written) = Pin::new(&mut self.inner).poll_write(cx, &buf[..end])? else {
             // The other side is slower: it is not this one that is late.
             way.granted = Some((Instant::now(), bytes));
             return Poll::Pending;
         };
-        way.left = Some((from, Instant::now()));
+        way.left = Some(Left { due: from, written: Instant::now(), more: buf.len() > written || more });
         way.granted = (written < bytes).then(|| (from, bytes - written));
         Poll::Ready(Ok(written))
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for Shaped<S> {
+    fn poll_write(self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &[u8]) -> Poll<io::Result<usize>> {
+        self.get_mut().poll_piece(cx, buf, false)
     }
 
     fn poll_flush(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
@@ -124,8 +140,9 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Shaped<S> {
         if this.way.is_none() {
             return Pin::new(&mut this.inner).poll_write_vectored(cx, bufs);
         }
-        let first = bufs.iter().find(|buf| !buf.is_empty()).map_or(&[][..], |buf| buf);
-        Pin::new(this).poll_write(cx, first)
+        let mut full = bufs.iter().filter(|buf| !buf.is_empty());
+        let first = full.next().map_or(&[][..], |buf| buf);
+        this.poll_piece(cx, first, full.next().is_some())
     }
 
     fn is_write_vectored(&self) -> bool {
