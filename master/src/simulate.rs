@@ -1,7 +1,7 @@
 //! `bolide simulate`: what an emulated cluster would take for a deck, on one machine.
 //!
-//! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`processor`]) and
-//! wires ([`network`]); [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
+//! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`machines`],
+//! [`processor`]) and wires ([`network`]), [`timeline`] says what came of it; [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
 //! seconds of a cluster file into costs of work. [`table`] prints the tables of the paper ([`mod@paper`]) beside
 //! modelled ones, [`figure`] draws them. All figures are modelled, and say so.
 
@@ -13,11 +13,13 @@ use serde::Serialize;
 pub mod calibrate;
 pub mod cluster;
 pub mod figure;
+pub mod machines;
 pub mod network;
 pub mod paper;
 pub mod processor;
 pub mod table;
 pub mod tape;
+pub mod timeline;
 pub mod virtual_clock;
 
 use crate::{
@@ -26,7 +28,8 @@ use crate::{
 };
 
 use cluster::{Cluster, ElementCost};
-use virtual_clock::{Machines, Phases, Scheme, Timeline};
+use machines::{Machines, Scheme};
+use timeline::{Phases, Timeline};
 
 /// Does what `bolide simulate` is asked for.
 ///

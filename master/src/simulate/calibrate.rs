@@ -8,7 +8,8 @@ use protocol::message::Route;
 
 use super::{
     cluster::{Cluster, ElementCost},
-    virtual_clock::{self, Costs, Machines, Scheme},
+    machines::{Costs, Machines, Scheme},
+    virtual_clock,
 };
 
 /// Work of one cycle of a problem on one host: elements, nodes, pairs, pairs of new plans, surface nodes sorted.

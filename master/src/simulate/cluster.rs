@@ -12,8 +12,8 @@ use deck::{
 use toml::de::DeTable;
 
 use super::{
+    machines::Change,
     network::{Network, Wires},
-    virtual_clock::Change,
 };
 
 /// Longest cluster file (bytes).

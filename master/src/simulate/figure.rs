@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::{
     table::Row,
-    virtual_clock::{Kind, Span, Timeline},
+    timeline::{Kind, Span, Timeline},
 };
 
 /// Cycles that the space-time diagram shows.

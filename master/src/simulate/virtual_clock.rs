@@ -6,10 +6,11 @@
 //! and ties go to what was due first: the same run gives the same figures to the last digit.
 //!
 //! Host `i` runs worker `i`, and host 0 the master too. A host has one processor ([`Processor`]). Work is charged by
-//! [`Costs`], messages by [`Network`].
+//! [`super::machines::Costs`], messages by [`super::network::Network`].
+
+mod agenda;
 
 use std::{
-    cmp::Ordering,
     collections::{BinaryHeap, VecDeque},
     sync::Arc,
 };
@@ -17,343 +18,24 @@ use std::{
 use deck::model::Model;
 use mechanics::cycle::Load;
 use protocol::{
-    message::{Route, ToWorker},
+    message::ToWorker,
     wire::{self, Packed},
 };
-use worker::session::{self, Outcome, Session, Task};
+use worker::session::{self, Session, Task};
 
 use super::{
-    network::{Network, Stage, Traffic},
+    machines::{Machines, Scheme},
+    network::{Stage, Traffic},
     processor::{Processor, Rank},
     tape::{Player, Tape},
+    timeline::{Flight, Kind, Span, Timeline, counts_at, phases_at},
 };
 use crate::{
-    balance::Dealing,
     event::{Action, Event, Hand, Options},
     job::Job,
     sort::Sorted,
 };
-
-/// What work costs on a host of speed 1 (s).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Costs {
-    /// An element in a cycle.
-    pub element: f64,
-    /// Integrating a node in a cycle.
-    pub node: f64,
-    /// A node-face pair on the lists, in a cycle.
-    pub pair: f64,
-    /// A pair, once when its plan starts to act: finding it, and setting up what the plan needs.
-    pub search: f64,
-    /// A surface node in a sort.
-    pub sort: f64,
-}
-
-impl Costs {
-    /// Contact, elements and integration of a task (s).
-    fn of(&self, task: Kind, load: &Load) -> Phases {
-        let elements = |n: u64| self.element * n as f64;
-        let contact = self.pair * load.pairs as f64;
-        let none = Phases::default();
-        match task {
-            Kind::Load | Kind::Elements => Phases { border: elements(load.border + load.interior), ..none },
-            Kind::Install => Phases { contact: contact + self.search * load.pairs as f64, ..none },
-            Kind::Border => Phases { contact, border: elements(load.border), ..none },
-            Kind::Interior => Phases { interior: elements(load.interior), ..none },
-            Kind::Integrate => Phases { integrate: self.node * load.nodes as f64, ..none },
-            Kind::Transfer | Kind::Image | Kind::Sort | Kind::Send | Kind::Receive => none,
-        }
-    }
-}
-
-/// The cluster that a run is put on.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Machines {
-    /// Relative speed of each host.
-    pub speeds: Vec<f64>,
-    /// What the master believes of them: the speeds by which it deals out work.
-    pub believed: Vec<f64>,
-    /// Costs of work.
-    pub costs: Costs,
-    /// The network.
-    pub network: Network,
-    /// Changes of speed, by cycle.
-    pub changes: Vec<Change>,
-}
-
-/// A host's speed changes when its worker starts a cycle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Change {
-    /// Host, from 0.
-    pub host: usize,
-    /// The cycle.
-    pub cycle: u64,
-    /// Relative speed from then on.
-    pub speed: f64,
-}
-
-/// How the program itself goes about it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Scheme {
-    /// Route of the partial forces.
-    pub route: Route,
-    /// How work units are dealt.
-    pub dealing: Dealing,
-    /// Whether messages leave before the interior elements are computed.
-    pub overlap: bool,
-}
-
-impl Scheme {
-    /// What Bolide does, on a route.
-    pub fn bolide(route: Route) -> Self {
-        Self { route, dealing: Dealing::Owners, overlap: true }
-    }
-
-    /// The control: a star without overlap, units dealt by weight alone.
-    pub fn control() -> Self {
-        Self { route: Route::Master, dealing: Dealing::Weights, overlap: false }
-    }
-}
-
-/// Seconds of a worker's cycle by what they went into, at the speed of its host.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Phases {
-    /// Elements before the partial forces leave.
-    pub border: f64,
-    /// Contact.
-    pub contact: f64,
-    /// Elements while partial forces travel.
-    pub interior: f64,
-    /// Processor time of messages, at both ends.
-    pub send: f64,
-    /// Integrating.
-    pub integrate: f64,
-    /// Everything else: waiting, and on host 1 the master's work.
-    pub wait: f64,
-}
-
-impl Phases {
-    fn busy(&self) -> f64 {
-        self.border + self.contact + self.interior + self.send + self.integrate
-    }
-}
-
-/// What a host does for a while.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Building the domain.
-    Load,
-    /// State of nodes for other workers.
-    Transfer,
-    /// All elements, at a plan boundary.
-    Elements,
-    /// A new plan, and contact by it.
-    Install,
-    /// Contact and border elements.
-    Border,
-    /// Interior elements.
-    Interior,
-    /// Integrating.
-    Integrate,
-    /// An image.
-    Image,
-    /// The master sorts.
-    Sort,
-    /// A message leaves.
-    Send,
-    /// A message comes in.
-    Receive,
-}
-
-/// Something a host did, for pictures.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
-    /// Host, from 0.
-    pub host: usize,
-    /// The master's work, not the worker's.
-    pub master: bool,
-    /// What.
-    pub kind: Kind,
-    /// The worker's cycle.
-    pub cycle: u64,
-    /// From, to (s).
-    pub time: (f64, f64),
-}
-
-/// A message as it travelled between two hosts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Flight {
-    /// Hosts, from 0.
-    pub hosts: (usize, usize),
-    /// The cycle it belongs to: that of its sender, or of the receiver if the master sent it.
-    pub cycle: u64,
-    /// Bytes with the frames' headers, without those of packets.
-    pub bytes: u64,
-    /// Handed to the processor of the sender; all of it at the receiver (s).
-    pub time: (f64, f64),
-}
-
-/// What was worked on in one cycle, by all workers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Counts {
-    /// Elements.
-    pub elements: u64,
-    /// Nodes, copies included.
-    pub nodes: u64,
-    /// Pairs.
-    pub pairs: u64,
-    /// Pairs of plans that start to act.
-    pub searched: u64,
-    /// Surface nodes sorted, where this cycle gathered.
-    pub sorted: u64,
-}
-
-/// What a run under a virtual clock shows.
-#[derive(Clone, Debug, Default)]
-pub struct Timeline {
-    /// By worker and cycle: when the cycle ended (s).
-    pub ends: Vec<Vec<f64>>,
-    /// By worker and cycle.
-    pub phases: Vec<Vec<Phases>>,
-    /// By cycle.
-    pub counts: Vec<Counts>,
-    /// Cycles at which plans began to act.
-    pub boundaries: Vec<u64>,
-    /// What hosts did.
-    pub spans: Vec<Span>,
-    /// Messages between hosts.
-    pub flights: Vec<Flight>,
-    /// Digest of the final state.
-    pub digest: String,
-}
-
-impl Timeline {
-    /// The cycles that averages are taken over: from the first plan boundary to the last if there are several, so that
-    /// sorts weigh at their real rate; else without the first two.
-    pub fn window(&self) -> std::ops::Range<u64> {
-        let n = self.counts.len() as u64;
-        let within: Vec<u64> = self.boundaries.iter().copied().filter(|&b| b >= 2 && b <= n).collect();
-        match (within.first(), within.last()) {
-            (Some(&first), Some(&last)) if last > first => first..last,
-            _ => 2.min(n.saturating_sub(1))..n,
-        }
-    }
-
-    /// When the slowest worker had ended the cycles before `cycle` (s).
-    pub fn reached(&self, cycle: u64) -> f64 {
-        let Some(index) = (cycle as usize).checked_sub(1) else { return 0.0 };
-        self.ends.iter().filter_map(|ends| ends.get(index)).copied().fold(0.0, f64::max)
-    }
-
-    /// Mean time of a cycle over the window (s).
-    pub fn seconds_per_cycle(&self) -> f64 {
-        let window = self.window();
-        let cycles = (window.end - window.start).max(1) as f64;
-        (self.reached(window.end) - self.reached(window.start)) / cycles
-    }
-
-    /// Mean bytes between hosts in a cycle of the window.
-    pub fn bytes_per_cycle(&self) -> f64 {
-        let window = self.window();
-        let sent = self.flights.iter().filter(|f| window.contains(&f.cycle));
-        sent.map(|f| f.bytes).sum::<u64>() as f64 / (window.end - window.start).max(1) as f64
-    }
-
-    /// Work per cycle of the window: elements, nodes, pairs, pairs of new plans, surface nodes sorted.
-    pub fn work_per_cycle(&self) -> [f64; 5] {
-        let window = self.window();
-        let mut sum = [0.0; 5];
-        for counts in &self.counts[window.start as usize..window.end as usize] {
-            let Counts { elements, nodes, pairs, searched, sorted } = *counts;
-            for (sum, count) in sum.iter_mut().zip([elements, nodes, pairs, searched, sorted]) {
-                *sum += count as f64;
-            }
-        }
-        sum.map(|s| s / (window.end - window.start).max(1) as f64)
-    }
-
-    /// Mean phases of a worker over the window.
-    pub fn mean_phases(&self, worker: usize) -> Phases {
-        let window = self.window();
-        let cycles = (window.end - window.start).max(1) as f64;
-        let mut mean = Phases::default();
-        for p in &self.phases[worker][window.start as usize..window.end as usize] {
-            mean.border += p.border / cycles;
-            mean.contact += p.contact / cycles;
-            mean.interior += p.interior / cycles;
-            mean.send += p.send / cycles;
-            mean.integrate += p.integrate / cycles;
-            mean.wait += p.wait / cycles;
-        }
-        mean
-    }
-}
-
-/// One end of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum End {
-    Master,
-    Worker(usize),
-}
-
-impl End {
-    fn host(self) -> usize {
-        match self {
-            Self::Master => 0,
-            Self::Worker(worker) => worker,
-        }
-    }
-}
-
-struct Parcel {
-    from: End,
-    to: End,
-    packed: Packed,
-    bytes: u64,
-    cycle: u64,
-    sent: f64,
-}
-
-enum Work {
-    Task(usize, Kind, Outcome),
-    Sort(Box<Sorted>),
-    Send(Parcel),
-    Receive(Parcel),
-}
-
-/// Work with the time it began.
-struct Begun(f64, Work);
-
-enum What {
-    /// A processor may have ended something, if nothing changed since this version.
-    Processor(usize, u64),
-    Enters(Parcel),
-    Arrives(Parcel),
-}
-
-struct Due {
-    time: f64,
-    order: u64,
-    what: What,
-}
-
-impl PartialEq for Due {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Due {}
-impl PartialOrd for Due {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Due {
-    /// The earliest is the greatest, as the heap gives the greatest first.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.time.total_cmp(&self.time).then(other.order.cmp(&self.order))
-    }
-}
+use agenda::{Begun, Due, End, Parcel, What, Work};
 
 struct Place {
     session: Session,
@@ -728,18 +410,4 @@ fn kind_of(task: &Task) -> Kind {
         Task::Integrate { .. } => Kind::Integrate,
         Task::Image => Kind::Image,
     }
-}
-
-fn phases_at(phases: &mut Vec<Phases>, cycle: u64) -> &mut Phases {
-    if phases.len() <= cycle as usize {
-        phases.resize(cycle as usize + 1, Phases::default());
-    }
-    &mut phases[cycle as usize]
-}
-
-fn counts_at(counts: &mut Vec<Counts>, cycle: u64) -> &mut Counts {
-    if counts.len() <= cycle as usize {
-        counts.resize(cycle as usize + 1, Counts::default());
-    }
-    &mut counts[cycle as usize]
 }
