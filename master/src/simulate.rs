@@ -14,9 +14,12 @@ pub mod calibrate;
 pub mod cluster;
 pub mod figure;
 pub mod machines;
+pub mod measure;
+pub mod mixed;
 pub mod network;
 pub mod paper;
 pub mod processor;
+pub mod sweep;
 pub mod table;
 pub mod tape;
 pub mod timeline;
@@ -38,6 +41,8 @@ use timeline::{Phases, Timeline};
 pub fn run(args: &SimulateArgs) -> Result<ExitCode, String> {
     let cluster = cluster::read_file(&args.cluster)?;
     match &args.deck {
+        None if args.decomposition => decomposition(args, &cluster),
+        Some(deck) if args.measure_costs => measured(args, &cluster, deck),
         Some(deck) => one(args, &cluster, deck),
         None => tables(args, &cluster),
     }
@@ -49,12 +54,57 @@ fn model(path: &Path, cycles: u64) -> Result<Arc<Model>, String> {
     Ok(Arc::new(model))
 }
 
+/// A JSON object by line.
+fn print_rows<T: Serialize>(rows: &[T]) -> Result<ExitCode, String> {
+    for row in rows {
+        println!("{}", serde_json::to_string(row).map_err(|e| e.to_string())?);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
+    let rows =
+        mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, cluster.pair)?;
+    if args.json {
+        return print_rows(&rows);
+    }
+    print!("{}", mixed::print(&rows, cluster.pair));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
+    let (all, medians) = measure::run(&model(deck, args.cycles)?, args.repetitions)?;
+    if args.json {
+        println!("{}", serde_json::to_string(&medians).map_err(|e| e.to_string())?);
+    } else {
+        print!("{}", measure::print(&all, &medians));
+        println!(
+            "the cluster file: node = {}, pair = {}, search = {}, sort = {}, message_seconds = {:e}, byte_seconds = {:e}",
+            cluster.node,
+            cluster.pair,
+            cluster.search,
+            cluster.sort,
+            cluster.network.message,
+            cluster.network.byte
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
     let tables = cluster
         .tables
         .as_ref()
         .ok_or_else(|| format!("{}: no [tables]; add decks and hosts", args.cluster.display()))?;
     let models = [model(&tables.decks[0], args.cycles)?, model(&tables.decks[1], args.cycles)?];
+    if !tables.rates.is_empty() {
+        let rows = sweep::run(cluster, tables, &models, &mut |cell| eprintln!("{cell}"))?;
+        if args.json {
+            return print_rows(&rows);
+        }
+        print!("{}", sweep::print(cluster, &rows));
+        return Ok(ExitCode::SUCCESS);
+    }
     let report = table::run(cluster, tables, &models, &mut |cell| eprintln!("{cell}"))?;
     if let Some(folder) = &args.out {
         pictures(folder, &cluster.title, &report.last)?;
@@ -63,12 +113,9 @@ fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
         std::fs::write(&path, picture).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     if args.json {
-        for row in &report.rows {
-            println!("{}", serde_json::to_string(row).map_err(|e| e.to_string())?);
-        }
-    } else {
-        print!("{}", table::print(cluster, &report));
+        return print_rows(&report.rows);
     }
+    print!("{}", table::print(cluster, &report));
     Ok(ExitCode::SUCCESS)
 }
 

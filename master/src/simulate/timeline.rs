@@ -1,5 +1,7 @@
 //! What a run under a virtual clock shows: what hosts did when, what travelled, and averages of it.
 
+use worker::session::Task;
+
 /// Seconds of a worker's cycle by what they went into, at the speed of its host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Phases {
@@ -51,6 +53,22 @@ pub enum Kind {
     Receive,
 }
 
+impl Kind {
+    /// What a task is.
+    pub fn of(task: &Task) -> Self {
+        match task {
+            Task::Load { .. } => Kind::Load,
+            Task::Transfer { .. } => Kind::Transfer,
+            Task::Elements { .. } => Kind::Elements,
+            Task::Install { .. } => Kind::Install,
+            Task::Border { .. } => Kind::Border,
+            Task::Interior { .. } => Kind::Interior,
+            Task::Integrate { .. } => Kind::Integrate,
+            Task::Image => Kind::Image,
+        }
+    }
+}
+
 /// Something a host did, for pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
@@ -64,11 +82,15 @@ pub struct Span {
     pub cycle: u64,
     /// From, to (s).
     pub time: (f64, f64),
+    /// Number of the message that leaves or comes in.
+    pub message: Option<u64>,
 }
 
 /// A message as it travelled between two hosts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flight {
+    /// Number of the message.
+    pub message: u64,
     /// Hosts, from 0.
     pub hosts: (usize, usize),
     /// The cycle it belongs to: that of its sender, or of the receiver if the master sent it.

@@ -31,6 +31,7 @@ use super::{
     timeline::{Flight, Kind, Span, Timeline, counts_at, phases_at},
 };
 use crate::{
+    embedded::timed_sort,
     event::{Action, Event, Hand, Options},
     job::Job,
     sort::Sorted,
@@ -51,12 +52,15 @@ struct Clock<'a> {
     places: Vec<Place>,
     sorts: VecDeque<Sorted>,
     sorts_kept: Vec<Sorted>,
+    sort_ns: Vec<f64>,
     live: bool,
     processors: Vec<Processor<Begun>>,
     traffic: Traffic,
     /// By host: when its last message was handled (s).
     message_ended: Vec<f64>,
     heap: BinaryHeap<Due>,
+    /// Messages so far.
+    parcels: u64,
     order: u64,
     now: f64,
     timeline: Timeline,
@@ -99,11 +103,13 @@ pub fn run(
             .collect(),
         sorts: tape.map(|tape| tape.sorts.iter().cloned().collect()).unwrap_or_default(),
         sorts_kept: Vec::new(),
+        sort_ns: Vec::new(),
         live: tape.is_none(),
         processors: machines.speeds.iter().map(|&speed| Processor::new(speed)).collect(),
         traffic: Traffic::new(&machines.network, n),
         message_ended: vec![0.0; n],
         heap: BinaryHeap::new(),
+        parcels: 0,
         order: 0,
         now: 0.0,
         timeline: Timeline { ends: vec![Vec::new(); n], phases: vec![Vec::new(); n], ..Timeline::default() },
@@ -111,7 +117,7 @@ pub fn run(
     };
     clock.master_acts(first)?;
     clock.drive()?;
-    let Clock { mut timeline, places, sorts_kept, .. } = clock;
+    let Clock { mut timeline, places, sorts_kept, sort_ns, .. } = clock;
     timeline.boundaries.dedup();
     if let Some(tape) = tape {
         timeline.digest.clone_from(&tape.digest);
@@ -125,7 +131,7 @@ pub fn run(
         })
         .collect();
     let digest = timeline.digest.clone();
-    Ok((timeline, Some(Tape { workers, sorts: sorts_kept, digest })))
+    Ok((timeline, Some(Tape { workers, sorts: sorts_kept, sort_ns, digest })))
 }
 
 impl Clock<'_> {
@@ -174,11 +180,12 @@ impl Clock<'_> {
         self.hand_over(parcel);
     }
 
-    fn parcel(&self, from: End, to: End, packed: Packed) -> Parcel {
+    fn parcel(&mut self, from: End, to: End, packed: Packed) -> Parcel {
         let bytes = packed.wire_bytes();
         let worker = if from == End::Master { to.host() } else { from.host() };
         let cycle = self.places[worker].session.cycle();
-        Parcel { from, to, packed, bytes, cycle, sent: self.now }
+        self.parcels += 1;
+        Parcel { number: self.parcels, from, to, packed, bytes, cycle, sent: self.now }
     }
 
     fn hand_over(&mut self, parcel: Parcel) {
@@ -194,7 +201,13 @@ impl Clock<'_> {
         if parcel.from.host() != host {
             let hosts = (parcel.from.host(), host);
             let time = (parcel.sent, self.now);
-            self.timeline.flights.push(Flight { hosts, cycle: parcel.cycle, bytes: parcel.bytes, time });
+            self.timeline.flights.push(Flight {
+                message: parcel.number,
+                hosts,
+                cycle: parcel.cycle,
+                bytes: parcel.bytes,
+                time,
+            });
         }
         let seconds = self.machines.network.handling(parcel.bytes);
         self.charge_message(parcel.to, seconds);
@@ -210,9 +223,9 @@ impl Clock<'_> {
         }
     }
 
-    fn span(&mut self, host: usize, master: bool, kind: Kind, from: f64) {
+    fn span(&mut self, host: usize, master: bool, kind: Kind, from: f64, message: Option<u64>) {
         let cycle = self.places[host].session.cycle();
-        self.timeline.spans.push(Span { host, master, kind, cycle, time: (from, self.now) });
+        self.timeline.spans.push(Span { host, master, kind, cycle, time: (from, self.now), message });
     }
 
     fn ended(&mut self, host: usize, Begun(from, work): Begun) -> Result<(), String> {
@@ -225,7 +238,7 @@ impl Clock<'_> {
         };
         match work {
             Work::Send(parcel) => {
-                self.span(host, parcel.from == End::Master, Kind::Send, from);
+                self.span(host, parcel.from == End::Master, Kind::Send, from, Some(parcel.number));
                 if parcel.to.host() == host {
                     self.take_in(parcel);
                 } else {
@@ -237,16 +250,16 @@ impl Clock<'_> {
                 Ok(())
             }
             Work::Receive(parcel) => {
-                self.span(host, parcel.to == End::Master, Kind::Receive, from);
+                self.span(host, parcel.to == End::Master, Kind::Receive, from, Some(parcel.number));
                 self.deliver(parcel)
             }
             Work::Sort(sorted) => {
-                self.span(host, true, Kind::Sort, from);
+                self.span(host, true, Kind::Sort, from, None);
                 let actions = self.job.apply(Event::Sorted(sorted));
                 self.master_acts(actions)
             }
             Work::Task(worker, kind, outcome) => {
-                self.span(host, false, kind, from);
+                self.span(host, false, kind, from, None);
                 for parcel in std::mem::take(&mut self.places[worker].held) {
                     self.hand_over(parcel);
                 }
@@ -320,7 +333,7 @@ impl Clock<'_> {
     }
 
     fn compute(&mut self, worker: usize, task: Task) -> Result<(), String> {
-        let kind = kind_of(&task);
+        let kind = Kind::of(&task);
         let cycle = self.places[worker].session.cycle();
         let (outcome, load) = self.places[worker].player.run(task)?;
         let costs = self.machines.costs.of(kind, &load);
@@ -372,9 +385,10 @@ impl Clock<'_> {
                 }
                 Action::Sort(bench, x) => {
                     let sorted = if self.live {
-                        let sorted = bench.sort(&x);
-                        self.sorts_kept.push(sorted.clone());
-                        sorted
+                        let (sorted, ns) = timed_sort(&bench, &x);
+                        self.sorts_kept.push((*sorted).clone());
+                        self.sort_ns.push(ns as f64 / x.len().max(1) as f64);
+                        *sorted
                     } else {
                         self.sorts.pop_front().ok_or("the tape of a run has fewer sorts than the run")?
                     };
@@ -396,18 +410,5 @@ impl Clock<'_> {
             }
         }
         Ok(())
-    }
-}
-
-fn kind_of(task: &Task) -> Kind {
-    match task {
-        Task::Load { .. } => Kind::Load,
-        Task::Transfer { .. } => Kind::Transfer,
-        Task::Elements { .. } => Kind::Elements,
-        Task::Install { .. } => Kind::Install,
-        Task::Border { .. } => Kind::Border,
-        Task::Interior { .. } => Kind::Interior,
-        Task::Integrate { .. } => Kind::Integrate,
-        Task::Image => Kind::Image,
     }
 }

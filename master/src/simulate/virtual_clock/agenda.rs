@@ -29,6 +29,8 @@ impl End {
 
 /// A message on its way.
 pub struct Parcel {
+    /// Its number in the run.
+    pub number: u64,
     /// Sender.
     pub from: End,
     /// Receiver.
