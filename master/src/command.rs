@@ -220,7 +220,10 @@ pub struct RunArgs {
 #[derive(Args, Clone, Debug)]
 pub struct SimulateArgs {
     /// The deck (TOML)
-    #[arg(required_unless_present = "table", conflicts_with = "table")]
+    #[arg(
+        required_unless_present_any = ["table", "decomposition"],
+        conflicts_with_all = ["table", "decomposition"]
+    )]
     pub deck: Option<PathBuf>,
     /// The cluster file (TOML)
     #[arg(long)]
@@ -228,6 +231,18 @@ pub struct SimulateArgs {
     /// Print the cluster file's tables instead of one run
     #[arg(long)]
     pub table: bool,
+    /// Measure what work costs on this machine by the deck, beside the cluster file's constants
+    #[arg(long, conflicts_with_all = ["table", "decomposition"])]
+    pub measure_costs: bool,
+    /// How often to measure; medians count
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repetitions: u32,
+    /// Print how near hosts of random speeds come to their bound, contact included, instead of one run
+    #[arg(long, conflicts_with = "table")]
+    pub decomposition: bool,
+    /// How many sets of random speeds
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
     /// What tells the time: a replay of costs and messages, or threads, links and a real clock
     #[arg(long, value_enum, default_value = "virtual")]
     pub clock: Clock,

@@ -1,7 +1,8 @@
 //! `bolide simulate`: what an emulated cluster would take for a deck, on one machine.
 //!
-//! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`processor`]) and
-//! wires ([`network`]), [`real_clock`] does so on threads, links and real time; [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
+//! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`machines`],
+//! [`processor`]) and wires ([`network`]), [`real_clock`] does so on threads, links and real time; [`timeline`] says what
+//! came of it. [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
 //! seconds of a cluster file into costs of work. [`table`] prints the tables of the paper ([`mod@paper`]) beside
 //! modelled ones, [`figure`] draws them. All figures are modelled, and say so.
 
@@ -14,12 +15,17 @@ use serde::Serialize;
 pub mod calibrate;
 pub mod cluster;
 pub mod figure;
+pub mod machines;
+pub mod measure;
+pub mod mixed;
 pub mod network;
 pub mod paper;
 pub mod processor;
 pub mod real_clock;
+pub mod sweep;
 pub mod table;
 pub mod tape;
+pub mod timeline;
 pub mod virtual_clock;
 
 use crate::{
@@ -28,8 +34,9 @@ use crate::{
 };
 
 use cluster::{Cluster, ElementCost};
+use machines::{Machines, Scheme};
 use real_clock::Strain;
-use virtual_clock::{Machines, Phases, Scheme, Timeline};
+use timeline::{Phases, Timeline};
 
 /// Does what `bolide simulate` is asked for.
 ///
@@ -44,6 +51,8 @@ pub fn run(args: &SimulateArgs) -> Result<ExitCode, String> {
         return Err("--dilation is for --clock real; the virtual clock has none".to_owned());
     }
     match &args.deck {
+        None if args.decomposition => decomposition(args, &cluster),
+        Some(deck) if args.measure_costs => measured(args, &cluster, deck),
         Some(deck) => one(args, &first_hosts(args, cluster)?, deck),
         None => tables(args, &cluster),
     }
@@ -67,12 +76,57 @@ fn model(path: &Path, cycles: u64) -> Result<Arc<Model>, String> {
     Ok(Arc::new(model))
 }
 
+/// A JSON object by line.
+fn print_rows<T: Serialize>(rows: &[T]) -> Result<ExitCode, String> {
+    for row in rows {
+        println!("{}", serde_json::to_string(row).map_err(|e| e.to_string())?);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
+    let rows =
+        mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, cluster.pair)?;
+    if args.json {
+        return print_rows(&rows);
+    }
+    print!("{}", mixed::print(&rows, cluster.pair));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
+    let (all, medians) = measure::run(&model(deck, args.cycles)?, args.repetitions)?;
+    if args.json {
+        println!("{}", serde_json::to_string(&medians).map_err(|e| e.to_string())?);
+    } else {
+        print!("{}", measure::print(&all, &medians));
+        println!(
+            "the cluster file: node = {}, pair = {}, search = {}, sort = {}, message_seconds = {:e}, byte_seconds = {:e}",
+            cluster.node,
+            cluster.pair,
+            cluster.search,
+            cluster.sort,
+            cluster.network.message,
+            cluster.network.byte
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
     let tables = cluster
         .tables
         .as_ref()
         .ok_or_else(|| format!("{}: no [tables]; add decks and hosts", args.cluster.display()))?;
     let models = [model(&tables.decks[0], args.cycles)?, model(&tables.decks[1], args.cycles)?];
+    if !tables.rates.is_empty() {
+        let rows = sweep::run(cluster, tables, &models, &mut |cell| eprintln!("{cell}"))?;
+        if args.json {
+            return print_rows(&rows);
+        }
+        print!("{}", sweep::print(cluster, &rows));
+        return Ok(ExitCode::SUCCESS);
+    }
     let report = table::run(cluster, tables, &models, &mut |cell| eprintln!("{cell}"))?;
     if let Some(folder) = &args.out {
         pictures(folder, &cluster.title, &report.last)?;
@@ -81,12 +135,9 @@ fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
         std::fs::write(&path, picture).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     if args.json {
-        for row in &report.rows {
-            println!("{}", serde_json::to_string(row).map_err(|e| e.to_string())?);
-        }
-    } else {
-        print!("{}", table::print(cluster, &report));
+        return print_rows(&report.rows);
     }
+    print!("{}", table::print(cluster, &report));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -27,7 +27,7 @@ pub struct Snapshot {
 }
 
 /// First bytes of a snapshot file.
-const MAGIC: &[u8; 8] = b"BLDSNAP1";
+const MAGIC: &[u8; 8] = b"BLDSNAP2";
 
 /// Writes a snapshot: temporary file, checksum, fsync, rename.
 ///

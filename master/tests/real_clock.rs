@@ -11,9 +11,11 @@ use deck::model::Model;
 use master::{
     run::read_deck,
     simulate::{
+        machines::{Change, Costs, Machines, Scheme},
         network::{Network, Wires},
         real_clock::{self, Strain},
-        virtual_clock::{self, Change, Costs, Machines, Phases, Scheme, Timeline},
+        timeline::{Phases, Timeline},
+        virtual_clock,
     },
 };
 use protocol::{message::Route, shape::TICK};

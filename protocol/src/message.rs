@@ -216,7 +216,8 @@ pub enum ToMaster {
 }
 
 /// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
-pub const IMAGE_VERSION: u32 = 1;
+/// 2: with damage and the time until an explosive is lit behind them.
+pub const IMAGE_VERSION: u32 = 2;
 
 /// Thread-CPU time of a worker's compute threads (ns).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 //! real time.
 //!
 //! Emulated time is time since the start over the *dilation*. Every worker computes on a thread of this machine; then it
-//! waits until what the task is charged on its host, by the same [`Costs`](super::virtual_clock::Costs) as under the
+//! waits until what the task is charged on its host, by the same [`Costs`](super::machines::Costs) as under the
 //! virtual clock, has gone by since the task's start, times the dilation. Messages are frames over loopback TCP that
 //! pass shaped [`wires`]; what they cost a processor is charged to the hosts at both ends, and the master shares host 1,
 //! in the ranks of [`Processor`]. A task that is not done when its charge is over is an *overrun*: it makes its host
@@ -31,8 +31,9 @@ use worker::{
 };
 
 use super::{
+    machines::{Machines, Scheme},
     processor::{Processor, Rank},
-    virtual_clock::{Flight, Kind, Machines, Scheme, Span, Timeline, count, counts_at, kind_of, phases_at},
+    timeline::{Flight, Kind, Span, Timeline, counts_at, phases_at},
 };
 use crate::{
     event::{Action, Event, Hand, Options},
@@ -103,6 +104,8 @@ impl End {
 /// What is known of a message beside its bytes.
 #[derive(Clone, Copy)]
 struct Slip {
+    /// Its number.
+    message: u64,
     from: End,
     to: End,
     bytes: u64,
@@ -168,6 +171,8 @@ struct Clock<'a> {
     sorts: VecDeque<UnderWay<Box<Sorted>>>,
     first_sort: u64,
     processors: Vec<Processor<Begun>>,
+    /// Messages so far.
+    messages: u64,
     /// By host: when its last message was handled (s).
     message_ended: Vec<f64>,
     wires: Wires,
@@ -232,6 +237,7 @@ pub fn run(
         sorts: VecDeque::new(),
         first_sort: 0,
         processors: machines.speeds.iter().map(|&speed| Processor::new(speed)).collect(),
+        messages: 0,
         message_ended: vec![0.0; n],
         wires: Wires::new(&machines.network, dilation, n, route == Route::Direct, &arrived)?,
         slips: BTreeMap::new(),
@@ -345,15 +351,16 @@ impl Clock<'_> {
         let bytes = packed.wire_bytes();
         let worker = if from == End::Master { to.host() } else { from.host() };
         let cycle = self.places[worker].session.cycle();
-        let slip = Slip { from, to, bytes, cycle, sent: self.now };
+        self.messages += 1;
+        let slip = Slip { message: self.messages, from, to, bytes, cycle, sent: self.now };
         self.charge_message(from, Begun(self.now, Work::Send(slip, packed)), bytes);
     }
 
     fn take_in(&mut self, slip: Slip, letter: Letter) {
-        let Slip { from, to, bytes, cycle, sent } = slip;
+        let Slip { message, from, to, bytes, cycle, sent } = slip;
         if from.host() != to.host() {
             let hosts = (from.host(), to.host());
-            self.timeline.flights.push(Flight { hosts, cycle, bytes, time: (sent, self.now) });
+            self.timeline.flights.push(Flight { message, hosts, cycle, bytes, time: (sent, self.now) });
         }
         self.charge_message(to, Begun(self.now, Work::Receive(slip, letter)), bytes);
     }
@@ -368,9 +375,9 @@ impl Clock<'_> {
         self.processors[end.host()].add(self.now, Rank::Message, seconds, work);
     }
 
-    fn span(&mut self, host: usize, master: bool, kind: Kind, from: f64) {
+    fn span(&mut self, host: usize, master: bool, kind: Kind, from: f64, message: Option<u64>) {
         let cycle = self.places[host].session.cycle();
-        self.timeline.spans.push(Span { host, master, kind, cycle, time: (from, self.now) });
+        self.timeline.spans.push(Span { host, master, kind, cycle, time: (from, self.now), message });
     }
 
     /// A processor is done with something.
@@ -379,14 +386,14 @@ impl Clock<'_> {
             Work::Send(slip, packed) => {
                 // Messages are handled one after the other, from when the one before was done.
                 let from = std::mem::replace(&mut self.message_ended[host], self.now).max(from);
-                self.span(host, slip.from == End::Master, Kind::Send, from);
+                self.span(host, slip.from == End::Master, Kind::Send, from, Some(slip.message));
                 let control = packed.kind == frame::Kind::Control;
                 self.slips.entry((slip.from, slip.to, control)).or_default().push_back(slip);
                 self.wires.send(slip.from, slip.to, packed)
             }
             Work::Receive(slip, letter) => {
                 let from = std::mem::replace(&mut self.message_ended[host], self.now).max(from);
-                self.span(host, slip.to == End::Master, Kind::Receive, from);
+                self.span(host, slip.to == End::Master, Kind::Receive, from, Some(slip.message));
                 self.deliver(slip, &letter)
             }
             Work::Task(worker) => {
@@ -416,7 +423,7 @@ impl Clock<'_> {
     fn complete(&mut self, worker: usize) -> Result<(), String> {
         let Some(task) = self.places[worker].task.take_if(|task| task.is_over()) else { return Ok(()) };
         self.book(&task);
-        self.span(worker, false, task.kind, task.begun);
+        self.span(worker, false, task.kind, task.begun, None);
         if task.kind == Kind::Integrate {
             self.end_cycle(worker);
         }
@@ -430,7 +437,7 @@ impl Clock<'_> {
         while let Some(sort) = self.sorts.pop_front_if(|sort| sort.is_over()) {
             self.first_sort += 1;
             self.book(&sort);
-            self.span(0, true, Kind::Sort, sort.begun);
+            self.span(0, true, Kind::Sort, sort.begun, None);
             if let Some(sorted) = sort.outcome {
                 let actions = self.job.apply(Event::Sorted(sorted));
                 self.master_acts(actions)?;
@@ -441,11 +448,7 @@ impl Clock<'_> {
 
     fn end_cycle(&mut self, worker: usize) {
         let cycle = self.places[worker].session.cycle();
-        let ends = &mut self.timeline.ends[worker];
-        let wall = self.now - ends.last().copied().unwrap_or(0.0);
-        ends.push(self.now);
-        let phases = phases_at(&mut self.timeline.phases[worker], cycle);
-        phases.wait = (wall - phases.busy()).max(0.0);
+        self.timeline.end_cycle(worker, cycle, self.now);
         for change in self.machines.changes.iter().filter(|c| c.host == worker && c.cycle == cycle + 1) {
             self.processors[worker].set_speed(self.now, change.speed);
         }
@@ -494,7 +497,7 @@ impl Clock<'_> {
 
     /// Gives a task to a thread and, where its charge is known, to the host's processor.
     fn compute(&mut self, worker: usize, task: Task) -> Result<(), String> {
-        let kind = kind_of(&task);
+        let kind = Kind::of(&task);
         let place = &mut self.places[worker];
         let mut machine = place.machine.take().ok_or("a worker asked for two tasks at once")?;
         let mut under_way = UnderWay::new(kind, 0.0, self.now);
@@ -537,13 +540,9 @@ impl Clock<'_> {
 
     /// Enters a task in the timeline.
     fn enter(&mut self, worker: usize, kind: Kind) {
-        if kind == Kind::Load {
-            return;
-        }
         let (load, cycle) = (self.places[worker].load, self.places[worker].session.cycle());
         let (costs, speed) = (self.machines.costs.of(kind, &load), self.machines.speeds[worker]);
-        phases_at(&mut self.timeline.phases[worker], cycle).charge(&costs, speed);
-        count(&mut self.timeline.counts, kind, cycle, &load);
+        self.timeline.enter((worker, cycle), (kind, &load), &costs, speed);
     }
 
     fn master_acts(&mut self, actions: Vec<Action>) -> Result<(), String> {

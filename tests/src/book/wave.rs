@@ -2,7 +2,7 @@
 //!
 //! Bars are columns of cubes without Poisson's ratio, free at their sides; shocks run in columns held at their sides.
 
-use tests::{
+use crate::{
     case::Sheet,
     solve::{Solved, crossing, example, mean, model, run, run_with_states},
 };
@@ -66,8 +66,7 @@ fn forces(solved: &Solved) -> Vec<(f64, f64)> {
         .collect()
 }
 
-#[test]
-fn a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages() {
+pub(super) fn a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages(sheet: &mut Sheet) {
     // Viscosity smears the front over a length that shrinks as the root of the cell size only: at 100 cells the
     // bar rebounds with 9.64 m/s, at 400 with 9.82 m/s, and the rest of the energy is left as vibration.
     let bar = Bar { name: "bar", from: 0.0, length: 0.1, cells: 1600, velocity: -10.0, material: BAR };
@@ -80,15 +79,12 @@ fn a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages() {
     let (end, _) = force.iter().rfind(|(_, f)| *f > 0.01 * plateau).expect("the wall pushes");
     let section = (0.1_f64 / 1600.0).powi(2);
     let mass = 8000.0 * 0.1 * section;
-    let mut sheet = Sheet::default();
     sheet.add("bar on wall: face stress", plateau / section);
     sheet.add("bar on wall: contact time", *end);
     sheet.add("bar on wall: rebound velocity", solved.outcome.ledger.last.momentum[0] / mass);
-    sheet.close();
 }
 
-#[test]
-fn of_two_equal_bars_the_first_stops_and_the_second_flies_on() {
+pub(super) fn of_two_equal_bars_the_first_stops_and_the_second_flies_on(sheet: &mut Sheet) {
     let mut model = example("two-bars");
     model.output.period = Some(20e-6);
     let solved = run_with_states(model);
@@ -99,31 +95,25 @@ fn of_two_equal_bars_the_first_stops_and_the_second_flies_on() {
     let level = 0.25 * mean(spring().filter(|(t, _)| (10e-6..30e-6).contains(t)).map(|(_, e)| e));
     let begin = crossing(spring(), level).expect("they meet");
     let end = crossing(spring().filter(|(t, _)| *t > 20e-6), level).expect("they part");
-    let mut sheet = Sheet::default();
     sheet.add("equal bars: stress in the striker", sides[0]);
     sheet.add("equal bars: stress in the struck", sides[1]);
     sheet.add("equal bars: contact time", end - begin);
     sheet.add("equal bars: striker afterwards", solved.part_velocity(0)[0]);
     sheet.add("equal bars: struck afterwards", solved.part_velocity(1)[0]);
-    sheet.close();
 }
 
-#[test]
-fn a_short_bar_stops_on_a_long_one_that_flies_on_slower() {
+pub(super) fn a_short_bar_stops_on_a_long_one_that_flies_on_slower(sheet: &mut Sheet) {
     // The spring of the gap is as soft as a cell or two: with cells of 1 mm the restitution is 0.4105.
     let short = Bar { name: "short", from: -0.1, length: 0.1, cells: 200, velocity: 10.0, material: BAR };
     let long = Bar { name: "long", from: 1e-4, length: 0.25, cells: 500, velocity: 0.0, material: BAR };
     let solved = run(model(&bars(90e-6, "", &[short, long], "[contact]\ngap_length = 1e-4\n")));
     let (short, long) = (solved.part_velocity(0)[0], solved.part_velocity(1)[0]);
-    let mut sheet = Sheet::default();
     sheet.add("unequal bars: short afterwards", short);
     sheet.add("unequal bars: long afterwards", long);
     sheet.add("unequal bars: restitution", (long - short) / 10.0);
-    sheet.close();
 }
 
-#[test]
-fn a_free_end_doubles_the_velocity_and_turns_the_stress() {
+pub(super) fn a_free_end_doubles_the_velocity_and_turns_the_stress(sheet: &mut Sheet) {
     let head = Bar { name: "head", from: 0.0, length: 0.02, cells: 20, velocity: 10.0, material: BAR };
     let rest = Bar { name: "rest", from: 0.02, length: 0.08, cells: 80, velocity: 0.0, material: BAR };
     let more = "[[join]]\nparts = \"all\"\n[[gauge]]\nname = \"middle\"\npoint = [0.06, 0, 0]\n\
@@ -134,10 +124,8 @@ fn a_free_end_doubles_the_velocity_and_turns_the_stress() {
     let middle = |[x, _, _]: [f64; 3]| (0.055..0.065).contains(&x);
     let there = solved.element_mean(solved.state_at(12e-6), 1, middle, stress);
     let back = solved.element_mean(solved.state_at(28e-6), 1, middle, stress);
-    let mut sheet = Sheet::default();
     sheet.add("free end: velocity over that of the pulse", v(1, 18e-6, 22e-6) / v(0, 10e-6, 14e-6));
     sheet.add("free end: stress over that of the pulse", back / there);
-    sheet.close();
 }
 
 const STEEL: &str = "{ density = 7850, eos = { type = \"linear\", bulk = 70e9 }, \
@@ -145,9 +133,7 @@ const STEEL: &str = "{ density = 7850, eos = { type = \"linear\", bulk = 70e9 },
 const ALUMINIUM: &str = "{ density = 2700, eos = { type = \"linear\", bulk = 23.333333333333333e9 }, \
                          strength = { type = \"elastic\", shear = 35e9 } }";
 
-#[test]
-fn a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances() {
-    let mut sheet = Sheet::default();
+pub(super) fn a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances(sheet: &mut Sheet) {
     for (name, first, second) in
         [("steel to aluminium", STEEL, ALUMINIUM), ("aluminium to steel", ALUMINIUM, STEEL)]
     {
@@ -165,11 +151,9 @@ fn a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances() {
         sheet.add(&format!("impedance @ {name}, transmitted"), through / pulse);
         sheet.add(&format!("impedance @ {name}, reflected"), back / pulse);
     }
-    sheet.close();
 }
 
-#[test]
-fn a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front() {
+pub(super) fn a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front(sheet: &mut Sheet) {
     // Hardening H of plastic strain so that stress rises with E H / (E + H) = 2 GPa of strain.
     let bilinear = "{ density = 8000, eos = { type = \"linear\", bulk = 66.66666666666667e9 }, strength = \
                     { type = \"von-mises\", shear = 100e9, yield_stress = 300e6, hardening = 2.0202020202020203e9 } }";
@@ -195,7 +179,6 @@ fn a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front() {
             .filter(|(_, x)| (0.015..0.035).contains(&x[0]))
             .map(|(n, _)| state.v[n][0]),
     );
-    let mut sheet = Sheet::default();
     sheet.add("bilinear bar: velocity step at yield", between + 20.0);
     sheet.add(
         "bilinear bar: stress behind the plastic front",
@@ -203,7 +186,6 @@ fn a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front() {
     );
     sheet.add("bilinear bar: plastic strain", strain);
     sheet.add("bilinear bar: plastic front", speed);
-    sheet.close();
 }
 
 /// Angular frequency of a gauge's velocity along x that is one mode: for a harmonic series of equal steps
@@ -231,22 +213,17 @@ fn ringing(cells: u32, safety: f64, more: &str, mode: impl Fn(f64) -> f64) -> So
     run(model)
 }
 
-#[test]
-fn bars_of_forty_cells_ring_at_their_frequencies() {
+pub(super) fn bars_of_forty_cells_ring_at_their_frequencies(sheet: &mut Sheet) {
     use std::f64::consts::PI;
     let free = ringing(40, 0.6666, "", |x| (PI * x).cos());
     let fixed = "[[boundary]]\ntype = \"fixed\"\nface = \"i-min\"\naxes = \"x\"\n";
     let clamped = ringing(40, 0.6666, fixed, |x| (0.5 * PI * x).sin());
-    let mut sheet = Sheet::default();
     sheet.add("ringing bar: free at both ends", frequency(&free) / (2.0 * PI));
     sheet.add("ringing bar: fixed at one end", frequency(&clamped) / (2.0 * PI));
-    sheet.close();
 }
 
-#[test]
-fn short_waves_are_slow_by_what_central_differences_say() {
+pub(super) fn short_waves_are_slow_by_what_central_differences_say(sheet: &mut Sheet) {
     use std::f64::consts::PI;
-    let mut sheet = Sheet::default();
     for (per_wave, courant) in [(10, 0.5), (10, 0.9), (20, 0.5)] {
         // 40 cells hold whole half waves, so that the mode is one of the mesh.
         let waves = 40.0 / f64::from(per_wave);
@@ -255,7 +232,6 @@ fn short_waves_are_slow_by_what_central_differences_say() {
         let speed = frequency(&solved) / wave_number;
         sheet.add(&format!("dispersion @ {per_wave} cells a wave, Courant number {courant}"), speed / 5000.0);
     }
-    sheet.close();
 }
 
 /// Density, c0, s and Grueneisen coefficient of the shock tests, in SI units; the last is said by no jump condition.
@@ -356,9 +332,7 @@ impl Collision {
     }
 }
 
-#[test]
-fn symmetric_impacts_reach_the_hugoniot() {
-    let mut sheet = Sheet::default();
+pub(super) fn symmetric_impacts_reach_the_hugoniot(sheet: &mut Sheet) {
     for (name, material) in [
         ("copper", COPPER),
         ("aluminium 2024", AL_2024),
@@ -375,12 +349,9 @@ fn symmetric_impacts_reach_the_hugoniot() {
             sheet.add("shock overshoot", hit.overshoot(1));
         }
     }
-    sheet.close();
 }
 
-#[test]
-fn impacts_of_two_materials_match_their_impedances() {
-    let mut sheet = Sheet::default();
+pub(super) fn impacts_of_two_materials_match_their_impedances(sheet: &mut Sheet) {
     for (name, flyer, target) in [
         ("steel 1006 on aluminium 2024", STEEL_1006, AL_2024),
         ("copper on aluminium 2024", COPPER, AL_2024),
@@ -399,12 +370,11 @@ fn impacts_of_two_materials_match_their_impedances() {
             sheet.add("shock overshoot", hit.overshoot(1).max(hit.overshoot(0)));
         }
     }
-    sheet.close();
 }
 
-#[test]
-fn an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longitudinal_speed() {
-    let mut sheet = Sheet::default();
+pub(super) fn an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longitudinal_speed(
+    sheet: &mut Sheet,
+) {
     for (name, material, shear, yield_stress, velocity, cells) in [
         ("copper", COPPER, 46.4e9, 90e6, 100.0, 800),
         ("aluminium 2024", AL_2024, 27.6e9, 265e6, 200.0, 400),
@@ -456,5 +426,4 @@ fn an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longitudinal_spee
         let excess = -solved.element_mean(&solved.state, 1, behind_front, stress) - fluid;
         sheet.add("stress behind a plastic front", (fluid + excess) / (fluid + 2.0 / 3.0 * yield_stress));
     }
-    sheet.close();
 }

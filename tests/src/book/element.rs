@@ -1,6 +1,6 @@
 //! Elements and nodes, through the whole system: what single elements do is tested beside the mechanics.
 
-use tests::{
+use crate::{
     case::Sheet,
     solve::{model, run},
 };
@@ -19,8 +19,9 @@ box = { origin = [0, 0, 0], size = [0.013, 0.007, 0.011], cells = [2, 2, 3], gra
 rotate = { axis = [1, 2, 3], degrees = 40 }
 "#;
 
-#[test]
-fn mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_for_ten_thousand_cycles() {
+pub(super) fn mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_for_ten_thousand_cycles(
+    sheet: &mut Sheet,
+) {
     let mut model = model(LUMP);
     for (v, [x, y, z]) in model.velocity.iter_mut().zip(&model.mesh.positions) {
         // Flies, spins about a skew axis, and shakes.
@@ -41,9 +42,7 @@ fn mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_for_ten_thous
         .map(|(v, m)| m * v.iter().map(|c| c * c).sum::<f64>().sqrt())
         .sum();
     let change = (0..3).map(|a| (after[a] - before[a]).powi(2)).sum::<f64>().sqrt();
-    let mut sheet = Sheet::default();
     sheet.add("free body: mass over density and volume", mass / (7896.0 * 0.013 * 0.007 * 0.011));
     sheet.add("free body: momentum after 10,000 cycles", change / scale);
     sheet.add("free body: energy error after 10,000 cycles", solved.outcome.ledger.last.error);
-    sheet.close();
 }

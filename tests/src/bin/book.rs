@@ -1,0 +1,138 @@
+//! The verification book: computes its cases, prints every figure, and writes the table of `tests/VERIFICATION.md`.
+//!
+//! `cargo run --release -p tests --bin book -- [--quick] [WORD]...`
+//!
+//! With words, only cases whose name contains one of them; with `--quick`, only those of the suite. The file is written
+//! when all cases were computed. The program fails if a figure missed whose row does not give the reason.
+
+use std::{
+    collections::BTreeMap,
+    fmt::Write as _,
+    panic::catch_unwind,
+    path::Path,
+    process::ExitCode,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use tests::{
+    book::{ENTRIES, Entry},
+    case::{Case, Sheet, number},
+};
+
+/// What came of an entry: its figures, or what it said when it broke off.
+type Done = Result<Sheet, String>;
+
+fn main() -> ExitCode {
+    let (flags, words): (Vec<String>, Vec<String>) =
+        std::env::args().skip(1).partition(|argument| argument.starts_with("--"));
+    if let Some(flag) = flags.iter().find(|flag| *flag != "--quick") {
+        eprintln!("{flag}: read --quick, or words of the names of cases");
+        return ExitCode::from(2);
+    }
+    let chosen: Vec<&Entry> = ENTRIES
+        .iter()
+        .filter(|entry| flags.is_empty() || entry.quick)
+        .filter(|entry| words.is_empty() || words.iter().any(|word| entry.name.contains(word)))
+        .collect();
+    if chosen.is_empty() {
+        let names: Vec<&str> = ENTRIES.iter().map(|entry| entry.name).collect();
+        eprintln!("no case is called so; they are\n{}", names.join("\n"));
+        return ExitCode::from(2);
+    }
+    let done = compute(&chosen);
+    let mut fine = true;
+    for (entry, done) in chosen.iter().zip(&done) {
+        if let Err(words) = done {
+            println!("{}: broke off: {words}", entry.name);
+        }
+        fine &= done.as_ref().is_ok_and(Sheet::is_as_stated);
+    }
+    if chosen.len() == ENTRIES.len() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("VERIFICATION.md");
+        if let Err(error) = std::fs::write(&path, table(&chosen, &done)) {
+            eprintln!("{}: {error}", path.display());
+            return ExitCode::FAILURE;
+        }
+        println!("{} is written", path.display());
+    }
+    if fine { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Computes entries on as many threads as there are cores, each entry on one.
+fn compute(entries: &[&Entry]) -> Vec<Done> {
+    let next = AtomicUsize::new(0);
+    let done: Vec<Mutex<Done>> = entries.iter().map(|_| Mutex::new(Err("not begun".to_owned()))).collect();
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..cores.min(entries.len()) {
+            scope.spawn(|| {
+                while let at = next.fetch_add(1, Ordering::Relaxed)
+                    && let Some(entry) = entries.get(at)
+                {
+                    let result = catch_unwind(|| entry.run()).map_err(|panic| {
+                        let text = panic.downcast_ref::<String>().map(String::as_str);
+                        text.or_else(|| panic.downcast_ref::<&str>().copied())
+                            .unwrap_or("no words")
+                            .to_owned()
+                    });
+                    *done[at].lock().unwrap_or_else(PoisonError::into_inner) = result;
+                }
+            });
+        }
+    });
+    done.into_iter().map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner)).collect()
+}
+
+/// The figure of each row that is furthest off: a row may be met by several runs.
+fn worst(cases: &[Case]) -> Vec<&Case> {
+    let mut by_name: BTreeMap<&str, (usize, &Case)> = BTreeMap::new();
+    for (at, case) in cases.iter().enumerate() {
+        let off = |case: &Case| (case.ours - case.reference).abs();
+        let slot = by_name.entry(&case.name).or_insert((at, case));
+        if off(case) > off(slot.1) {
+            slot.1 = case;
+        }
+    }
+    let mut rows: Vec<(usize, &Case)> = by_name.into_values().collect();
+    rows.sort_by_key(|(at, _)| *at);
+    rows.into_iter().map(|(_, case)| case).collect()
+}
+
+/// `VERIFICATION.md`.
+fn table(entries: &[&Entry], done: &[Done]) -> String {
+    let rows: Vec<Vec<&Case>> =
+        done.iter().map(|d| d.as_ref().map_or(Vec::new(), |s| worst(s.cases()))).collect();
+    let all = rows.iter().map(Vec::len).sum::<usize>();
+    let passed = rows.iter().flatten().filter(|case| case.holds()).count();
+    let mut out = format!(
+        "# Verification\n\nWritten by `cargo run --release -p tests --bin book`; {passed} of {all} figures pass. What a case \
+         sets up stands in `tests/src/book/`, its references in `tests/reference.toml`. Figures are in SI units unless the \
+         row says otherwise; where several runs meet one row, the one furthest off is shown.\n"
+    );
+    for ((entry, done), rows) in entries.iter().zip(done).zip(&rows) {
+        let _ = write!(out, "\n## {}\n\n", entry.name.replace('_', " "));
+        if let Err(words) = done {
+            let _ = writeln!(out, "Broke off: {words}\n");
+            continue;
+        }
+        out += "| case | reference | source | ours | difference | tolerance | verdict |\n|---|---|---|---|---|---|---|\n";
+        for case in rows {
+            let reason = case.miss.as_ref().map_or(String::new(), |why| format!(": {why}"));
+            let _ = writeln!(
+                out,
+                "| {} | {} | {} | {} | {} | {} | {}{reason} |",
+                case.name,
+                number(case.reference),
+                case.source.replace('|', "\\|"),
+                number(case.ours),
+                case.difference(),
+                case.tolerance,
+                case.verdict()
+            );
+        }
+    }
+    out
+}

@@ -1,0 +1,94 @@
+//! The verification book: what the whole system gives beside closed forms and published figures.
+//!
+//! A case computes figures and adds them to a [`Sheet`], which compares them with rows of `reference.toml`. The quick
+//! cases are tests of the suite; `cargo run --release -p tests --bin book` runs all of them, or those whose names contain
+//! a word, and writes the table of `VERIFICATION.md`. To add a case, write a function beside its neighbours, its rows into
+//! `reference.toml`, and its name into the list below.
+
+mod contact;
+mod element;
+mod solid;
+mod structure;
+mod wave;
+
+use crate::case::Sheet;
+
+/// Calls a macro with every case as `room: case kind;`, kind `quick` or `long`: the one list of the book.
+#[macro_export]
+macro_rules! each_case_of_the_book {
+    ($then:ident) => {
+        $then! {
+            element: mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_for_ten_thousand_cycles quick;
+            wave: a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages quick;
+            wave: of_two_equal_bars_the_first_stops_and_the_second_flies_on quick;
+            wave: a_short_bar_stops_on_a_long_one_that_flies_on_slower quick;
+            wave: a_free_end_doubles_the_velocity_and_turns_the_stress quick;
+            wave: a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances quick;
+            wave: a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front quick;
+            wave: bars_of_forty_cells_ring_at_their_frequencies quick;
+            wave: short_waves_are_slow_by_what_central_differences_say quick;
+            wave: symmetric_impacts_reach_the_hugoniot quick;
+            wave: impacts_of_two_materials_match_their_impedances quick;
+            wave: an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longitudinal_speed quick;
+            solid: the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find quick;
+            solid: finer_copper_bars_come_nearer_to_what_others_converge_to long;
+            solid: the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds quick;
+            solid: a_soft_sphere_bounces_off_a_wall_as_hertz_says long;
+            solid: a_rigid_wall_gives_its_impulse_along_its_normal_and_coulombs_share_beside_it quick;
+            structure: the_impulsive_panel_is_dented_as_deep_as_measured long;
+            structure: the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds quick;
+            structure: a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness quick;
+            contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
+            contact: struck_plates_conserve_keep_apart_and_move_together quick;
+            contact: strengthless_plates_reach_the_impedance_match_on_the_axis quick;
+            contact: no_node_of_a_body_thrown_at_another_ends_inside_it quick;
+            contact: bodies_that_close_in_from_both_sides_are_sorted_in_time quick;
+            contact: meshes_of_three_and_five_faces_press_on_each_other_evenly quick;
+            contact: a_cube_stacked_at_45_degrees_is_stopped_by_the_zones_of_edges_if_the_gap_reaches_them quick;
+        }
+    };
+}
+
+/// A case of the book.
+#[derive(Clone, Copy)]
+pub struct Entry {
+    /// `room: what it claims`.
+    pub name: &'static str,
+    /// Short enough for every run of the tests.
+    pub quick: bool,
+    compute: fn(&mut Sheet),
+}
+
+impl Entry {
+    /// Computes its figures.
+    ///
+    /// # Panics
+    /// If the case has no figures: its run failed, or what must be was not.
+    pub fn run(&self) -> Sheet {
+        let mut sheet = Sheet::default();
+        (self.compute)(&mut sheet);
+        sheet
+    }
+}
+
+macro_rules! entries {
+    ($($room:ident: $case:ident $kind:ident;)*) => {
+        &[$(Entry {
+            name: concat!(stringify!($room), ": ", stringify!($case)),
+            quick: matches!(stringify!($kind).as_bytes(), b"quick"),
+            compute: $room::$case,
+        }),*]
+    };
+}
+
+/// All cases, in the order of the book.
+pub const ENTRIES: &[Entry] = each_case_of_the_book!(entries);
+
+/// Runs one case and fails with every figure that missed.
+///
+/// # Panics
+/// If a figure missed, or there is no such case.
+pub fn check(name: &str) {
+    let entry = ENTRIES.iter().find(|entry| entry.name == name);
+    entry.unwrap_or_else(|| panic!("the book has no case \"{name}\"")).run().close();
+}
