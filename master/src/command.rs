@@ -5,6 +5,7 @@ use std::{net::SocketAddr, path::PathBuf};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::{
     request::{JobOptions, RouteChoice},
+    shape::Rate,
     tls,
 };
 
@@ -225,7 +226,10 @@ pub struct RunArgs {
 #[derive(Args, Clone, Debug)]
 pub struct SimulateArgs {
     /// The deck (TOML)
-    #[arg(required_unless_present = "table", conflicts_with = "table")]
+    #[arg(
+        required_unless_present_any = ["table", "decomposition"],
+        conflicts_with_all = ["table", "decomposition"]
+    )]
     pub deck: Option<PathBuf>,
     /// The cluster file (TOML)
     #[arg(long)]
@@ -233,9 +237,27 @@ pub struct SimulateArgs {
     /// Print the cluster file's tables instead of one run
     #[arg(long)]
     pub table: bool,
-    /// What tells the time: costs and messages, replayed
+    /// Measure what work costs on this machine by the deck, beside the cluster file's constants
+    #[arg(long, conflicts_with_all = ["table", "decomposition"])]
+    pub measure_costs: bool,
+    /// How often to measure; medians count
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repetitions: u32,
+    /// Print how near hosts of random speeds come to their bound, contact included, instead of one run
+    #[arg(long, conflicts_with = "table")]
+    pub decomposition: bool,
+    /// How many sets of random speeds
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// What tells the time: a replay of costs and messages, or threads, links and a real clock
     #[arg(long, value_enum, default_value = "virtual")]
     pub clock: Clock,
+    /// Real seconds by emulated second, for --clock real [default: such that tasks rarely overrun]
+    #[arg(long, value_name = "X")]
+    pub dilation: Option<f64>,
+    /// Use only so many hosts, the first of the file
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "table")]
+    pub hosts: Option<u32>,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u64).range(4..))]
     pub cycles: u64,
@@ -255,6 +277,8 @@ pub struct SimulateArgs {
 pub enum Clock {
     /// Costs and messages, replayed: the same figures on every machine
     Virtual,
+    /// Workers on threads, frames over shaped loopback links, both stretched to the emulated speed
+    Real,
 }
 
 /// Flags of `master`.
@@ -269,6 +293,9 @@ pub struct MasterArgs {
     /// Folder for the results of jobs
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
+    /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
+    #[arg(long, value_name = "RATE")]
+    pub link: Option<Rate>,
 }
 
 /// Flags of `worker`.
@@ -295,6 +322,9 @@ pub struct WorkerArgs {
     /// End when the master ends the connection, instead of dialling again
     #[arg(long)]
     pub once: bool,
+    /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
+    #[arg(long, value_name = "RATE")]
+    pub link: Option<Rate>,
     /// Port for other workers, on the interface that leads to the master [default: any]
     #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
     pub peer_port: u16,

@@ -22,6 +22,7 @@ use protocol::{
     wire,
 };
 use tokio::sync::mpsc;
+use worker::compute::lowest_priority;
 
 use crate::{
     embedded::{Sink, Traffic, timed_sort},
@@ -273,12 +274,18 @@ impl Driver<'_> {
     }
 
     fn sort(&self, bench: Arc<Bench>, x: Vec<[f64; 3]>) {
-        let send = self.send.clone();
-        rayon::spawn(move || {
+        let (send, failed) = (self.send.clone(), self.send.clone());
+        // On a thread of the lowest priority: a worker on this host computes first, the sort takes what is idle.
+        let work = move || {
+            lowest_priority();
             let sorted = catch_unwind(AssertUnwindSafe(|| timed_sort(&bench, &x)));
             let sorted = sorted.map_err(|_| "a bug in the sort; the log has its words".to_owned());
             // The receiver is gone only when the job is over.
             let _ = send.blocking_send(Input::Sorted(sorted));
-        });
+        };
+        if let Err(error) = std::thread::Builder::new().name("sort".to_owned()).spawn(work) {
+            // As above.
+            let _ = failed.try_send(Input::Sorted(Err(format!("a thread to sort on: {error}"))));
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! SERVICE: one job of the queue, from its deck's text to its summary. Runs on a thread of its own.
 
 use std::{
+    net::{SocketAddr, UdpSocket},
     panic::{AssertUnwindSafe, catch_unwind},
     path::PathBuf,
     sync::{Arc, atomic::AtomicBool},
@@ -8,6 +9,7 @@ use std::{
 };
 
 use deck::model::Model;
+use mechanics::contact::Surface;
 use protocol::{
     message::ToWorker,
     request::{Ended, JobOptions, Share, Status},
@@ -15,9 +17,10 @@ use protocol::{
 use tokio::sync::watch;
 
 use crate::{
+    balance,
     drive::{Seat, drive},
     embedded::Sink,
-    event::Action,
+    event::{Action, Hand},
     job::Job,
     queue::Event,
     results::{Folder, TRACE, trace},
@@ -59,12 +62,36 @@ pub fn serve(order: &Order) -> (Event, Ended) {
     result.unwrap_or_else(|reason| (Event::Fail, Ended { failure: Some(reason), ..Ended::default() }))
 }
 
+/// Whether an address is one of this machine: then it can be bound to.
+fn is_here(address: &str) -> bool {
+    let ip = address.parse::<SocketAddr>().map(|address| address.ip());
+    ip.is_ok_and(|ip| ip.is_loopback() || UdpSocket::bind((ip, 0)).is_ok())
+}
+
+/// Workers on this machine are dealt less, for sorts run beside them ([`balance::beside_sorts`]).
+fn share_with_sorts(model: &Model, hands: &mut [Hand], beside: &[bool]) {
+    if model.setup.contact.is_none() || !beside.contains(&true) {
+        return;
+    }
+    let surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
+    let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
+    let sort = balance::SORT_ELEMENTS * surface.nodes.len() as f64;
+    let elements = model.mesh.n_elements() as f64;
+    let lag = model.setup.control.sort_lag;
+    let left = balance::beside_sorts(&speeds, beside, elements, sort, lag);
+    for (hand, speed) in hands.iter_mut().zip(left) {
+        hand.speed = speed;
+    }
+}
+
 fn run(order: &Order) -> Result<(Event, Ended), String> {
     let mut model = deck::read(&order.text, &order.name)
         .map_err(|faults| faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
     limit(&mut model, &order.options)?;
     let model = Arc::new(model);
-    let hands: Vec<_> = order.seats.iter().map(|seat| seat.hand.clone()).collect();
+    let mut hands: Vec<_> = order.seats.iter().map(|seat| seat.hand.clone()).collect();
+    let beside: Vec<bool> = order.seats.iter().map(|seat| is_here(&seat.address)).collect();
+    share_with_sorts(&model, &mut hands, &beside);
     let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
     let options = options_for(&order.options, hands.len(), all_take_peers);
     let (job, first) = Job::new(Arc::clone(&model), &hands, options, None)?;

@@ -14,10 +14,12 @@ use master::{
     simulate::{
         calibrate,
         cluster::{self, Cluster},
+        machines::{Change, Costs, Machines, Scheme},
         network::{Network, Wires},
         paper::{self, Verdict},
         table,
-        virtual_clock::{self, Change, Costs, Machines, Scheme, Timeline},
+        timeline::Timeline,
+        virtual_clock,
     },
 };
 use protocol::message::Route;

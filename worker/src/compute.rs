@@ -50,6 +50,15 @@ impl ThreadClock {
     }
 }
 
+/// Gives the calling thread the lowest priority of the machine's ordinary ones, for good: it runs on what others leave
+/// idle. A machine that refuses leaves it as it was.
+pub fn lowest_priority() {
+    let _ = rustix::process::setpriority_process(Some(rustix::thread::gettid()), LOWEST);
+}
+
+/// The highest nice value of Linux.
+const LOWEST: i32 = 19;
+
 fn thread_cpu_ns() -> u64 {
     let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64

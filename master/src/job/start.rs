@@ -22,6 +22,7 @@ use protocol::{
 
 use super::{Bench, Job};
 use crate::{
+    balance::INTERACTIONS_PER_ELEMENT,
     decompose::decompose,
     event::{Action, Hand, Options},
     exchange::{Exchange, Holdings},
@@ -222,10 +223,6 @@ impl Job {
         Ok((job, actions))
     }
 }
-
-/// Most an element's interactions weigh against an element when imbalance is reported: an element-cycle costs about as
-/// much as this many interactions.
-const INTERACTIONS_PER_ELEMENT: f64 = 60.0;
 
 /// Largest over mean of cost over speed, workers without a speed aside.
 fn imbalance(elements: &[f64], interactions: &[u64], speeds: &[f64]) -> f64 {

@@ -1,11 +1,11 @@
 //! Pictures: the speed-up as the paper's figure 4 draws it, the space-time diagram of the hosts, and the same as a trace
 //! that Perfetto and chrome://tracing open.
 
-use std::fmt::Write as _;
+use std::{collections::HashMap, fmt::Write as _};
 
 use super::{
     table::Row,
-    virtual_clock::{Kind, Span, Timeline},
+    timeline::{Kind, Span, Timeline},
 };
 
 /// Cycles that the space-time diagram shows.
@@ -205,15 +205,15 @@ pub fn trace(timeline: &Timeline) -> String {
             "ts": span.time.0 * 1e6, "dur": (span.time.1 - span.time.0) * 1e6, "args": { "cycle": span.cycle }
         }));
     }
-    for (id, flight) in timeline.flights.iter().enumerate() {
-        for (phase, host, time) in
-            [("s", flight.hosts.0, flight.time.0), ("f", flight.hosts.1, flight.time.1)]
-        {
-            events.push(serde_json::json!({
-                "ph": phase, "bp": "e", "name": "message", "cat": "message", "id": id, "pid": host + 1, "tid": 1,
-                "ts": time * 1e6, "args": { "bytes": flight.bytes }
-            }));
-        }
+    // An arrow binds to the slices that enclose its ends, so it starts and ends in the middle of theirs.
+    let bytes: HashMap<u64, u64> = timeline.flights.iter().map(|f| (f.message, f.bytes)).collect();
+    for span in &timeline.spans {
+        let Some((id, bytes)) = span.message.and_then(|id| Some((id, bytes.get(&id)?))) else { continue };
+        let phase = if span.kind == Kind::Send { "s" } else { "f" };
+        events.push(serde_json::json!({
+            "ph": phase, "bp": "e", "name": "message", "cat": "message", "id": id, "pid": span.host + 1,
+            "tid": lane(span), "ts": 0.5 * (span.time.0 + span.time.1) * 1e6, "args": { "bytes": bytes }
+        }));
     }
     serde_json::json!({ "displayTimeUnit": "ms", "traceEvents": events }).to_string()
 }
