@@ -18,7 +18,7 @@ use protocol::request::JobOptions;
 use crate::{
     command::RunArgs,
     embedded::{self, Sink, Traffic},
-    event::{Action, ForceSorts, Hand, Limit, Options, Outcome, Progress},
+    event::{Action, ForceSorts, Hand, Keep, Limit, Options, Outcome, Progress},
     job::Job,
     processes::Processes,
     results::{
@@ -83,6 +83,9 @@ pub fn options_for(asked: &JobOptions) -> Options {
         route: asked.route,
         dealing: crate::balance::Dealing::Owners,
         snapshot_at: asked.snapshot_at,
+        keep: asked.keep_every.map_or(Keep::Never, Keep::Seconds),
+        balance: asked.balance,
+        waits: false,
         states: !asked.no_output,
         force_sorts: match (asked.sort_every, asked.sort_seed) {
             (Some(n), _) => ForceSorts::Every(n),
@@ -132,7 +135,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let folder = if asked.no_output { None } else { Some(folder_for(args)) };
     let folder =
         folder.map(|path| Folder::create(&path, args.force)).transpose().map_err(|e| e.to_string())?;
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&asked), resume)?;
+    let mut options = options_for(&asked);
+    if !args.processes {
+        // Nobody is lost who shares this process.
+        options.keep = Keep::Never;
+    }
+    let (job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
     let census = Census::of(&job, &model);
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     for row in job.rows_before() {
@@ -153,7 +161,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     drop(children);
     output.finish();
     let total_threads = (n * threads) as u32;
-    conclude(&model, &census, &outcome, traffic, n as u32, total_threads, wall, &output, args.json)
+    conclude(&model, &census, &outcome, traffic, total_threads, wall, &output, args.json)
 }
 
 /// Counts of the surface, taken before the run.
@@ -188,13 +196,12 @@ pub fn conclude(
     census: &Census,
     outcome: &Outcome,
     traffic: Traffic,
-    workers: u32,
     threads: u32,
     wall_s: f64,
     output: &Output,
     json: bool,
 ) -> Result<ExitCode, String> {
-    let summary = summarise(model, census, outcome, traffic, workers, threads, wall_s);
+    let summary = summarise(model, census, outcome, traffic, threads, wall_s);
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
     }
@@ -219,7 +226,6 @@ pub fn summarise(
     census: &Census,
     outcome: &Outcome,
     traffic: Traffic,
-    workers: u32,
     threads: u32,
     wall_s: f64,
 ) -> Summary {
@@ -238,7 +244,7 @@ pub fn summarise(
         surface_elements: census.elements,
         surface_faces: census.faces,
         surface_nodes: census.nodes,
-        workers,
+        workers: outcome.n_workers as u32,
         threads,
         route: outcome.route.to_owned(),
         lanes: outcome.lanes.clone(),
@@ -273,6 +279,8 @@ pub fn summarise(
         worst_courant: ledger.worst_courant,
         worst_gap_travel: ledger.worst_gap_travel,
         worst_penetration: ledger.worst_penetration,
+        rebalances: outcome.rebalances.clone(),
+        losses: outcome.losses.clone(),
         digest: outcome.digest.clone(),
     }
 }
@@ -321,7 +329,10 @@ pub struct Output {
     bar: Option<ProgressBar>,
     started: Instant,
     last_line: Instant,
-    last_state_time: Option<f64>,
+    /// Length of the history before its first row and after each (bytes).
+    row_ends: Vec<u64>,
+    /// Cycle and time of each state written.
+    states: Vec<(u64, f64)>,
 }
 
 impl Output {
@@ -340,15 +351,17 @@ impl Output {
             }
             bar
         });
+        let row_ends = history.iter().map(History::length).collect();
         Ok(Self {
             model,
             folder,
             history,
+            row_ends,
+            states: Vec::new(),
             series,
             bar,
             started: Instant::now(),
             last_line: Instant::now(),
-            last_state_time: None,
         })
     }
 
@@ -357,7 +370,22 @@ impl Output {
     /// # Errors
     /// What the disk refused.
     pub fn row(&mut self, row: &HistoryRow) -> Result<(), String> {
-        self.history.as_mut().map_or(Ok(()), |history| history.append(row)).map_err(|e| e.to_string())
+        let Some(history) = &mut self.history else { return Ok(()) };
+        history.append(row).map_err(|e| e.to_string())?;
+        self.row_ends.push(history.length());
+        Ok(())
+    }
+
+    /// Drops all rows but the first so many, and states of later cycles than this.
+    fn rewind(&mut self, rows: usize, cycle: u64) -> Result<(), String> {
+        let fault = |e: crate::results::Error| e.to_string();
+        self.row_ends.truncate(rows + 1);
+        if let (Some(history), Some(&end)) = (&mut self.history, self.row_ends.last()) {
+            history.roll_back(end).map_err(fault)?;
+        }
+        self.states.retain(|(written, _)| *written <= cycle);
+        let times: Vec<f64> = self.states.iter().map(|(_, time)| *time).collect();
+        self.series.as_mut().map_or(Ok(()), |series| series.roll_back(&times)).map_err(fault)
     }
 
     /// Writes a state, unless one of that time was the last.
@@ -365,15 +393,16 @@ impl Output {
     /// # Errors
     /// What the disk refused.
     pub fn state(&mut self, state: &mechanics::state::GlobalState) -> Result<(), String> {
-        if self.last_state_time == Some(state.time) {
+        if self.states.last().is_some_and(|(_, time)| *time == state.time) {
             return Ok(());
         }
-        self.last_state_time = Some(state.time);
         let model = &self.model;
         self.series
             .as_mut()
             .map_or(Ok(()), |series| series.write(model, state, None))
-            .map_err(|e| e.to_string())
+            .map_err(|e| e.to_string())?;
+        self.states.push((state.cycle, state.time));
+        Ok(())
     }
 
     fn progress(&mut self, progress: Progress) {
@@ -434,7 +463,10 @@ impl Sink for Output {
                 self.progress(progress);
                 Ok(())
             }
-            Action::Send(..) | Action::Sort(..) | Action::Over(_) => Ok(()),
+            Action::Rewind { rows, cycle } => self.rewind(rows, cycle),
+            Action::Send(..) | Action::Sort(..) | Action::Timer(_) | Action::Dealt(_) | Action::Over(_) => {
+                Ok(())
+            }
         }
     }
 }

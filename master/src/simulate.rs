@@ -22,6 +22,7 @@ pub mod virtual_clock;
 
 use crate::{
     command::{Route, SimulateArgs},
+    event::Rebalance,
     run::read_deck,
 };
 
@@ -86,6 +87,8 @@ struct Summary<'a> {
     bytes_per_cycle: f64,
     /// Mean phases of a cycle by worker (s).
     phases: Vec<Phases>,
+    /// When work was dealt out by other speeds.
+    rebalances: &'a [Rebalance],
     digest: &'a str,
 }
 
@@ -119,7 +122,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         network: cluster.network.clone(),
         changes: cluster.changes.clone(),
     };
-    let scheme = Scheme::bolide(args.route.into());
+    let scheme = Scheme { balance: args.balance.into(), ..Scheme::bolide(args.route.into()) };
     let (timeline, _) = virtual_clock::run(&model, &machines, scheme, None)?;
     let window = timeline.window();
     let summary = Summary {
@@ -137,6 +140,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         bound: calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>(),
         bytes_per_cycle: timeline.bytes_per_cycle(),
         phases: (0..cluster.speeds.len()).map(|worker| timeline.mean_phases(worker)).collect(),
+        rebalances: &timeline.rebalances,
         digest: &timeline.digest,
     };
     if let Some(folder) = &args.out {
@@ -173,6 +177,11 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
             p.send,
             p.integrate,
             p.wait
+        );
+    }
+    for Rebalance { cycle, imbalance_before, imbalance_after, .. } in summary.rebalances {
+        println!(
+            "cycle {cycle}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}"
         );
     }
     println!("digest {}", summary.digest);

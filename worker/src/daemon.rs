@@ -19,7 +19,7 @@ use protocol::{
     frame::Header,
     handshake::{Hello, Role},
     link::Receiver,
-    message::{ToMaster, ToWorker},
+    message::{ToMaster, ToWorker, Work},
     order::{BULK_ON_THE_WAY, Inbox, Outbox, Place},
     tls::ClientConfig,
     wire,
@@ -238,6 +238,7 @@ fn compute(mut outbox: Outbox, mut messages: mpsc::Receiver<(Header, ToWorker)>)
     let mut session = Session::new();
     let mut machine = Machine::new();
     let mut watch = Watch::default();
+    let mut busy = Duration::ZERO;
     while let Some((header, message)) = messages.blocking_recv() {
         watch.heard(&header, &message)?;
         let mut events = VecDeque::from([Event::Message(message)]);
@@ -245,6 +246,7 @@ fn compute(mut outbox: Outbox, mut messages: mpsc::Receiver<(Header, ToWorker)>)
             for action in session.apply(event) {
                 match action {
                     Action::Send(message) => {
+                        let message = message.stamped(share(busy, machine.work()));
                         let place = watch.said(&message, session.plan_hash());
                         outbox.send(place, wire::pack_to_master(&message)?)?;
                     }
@@ -255,7 +257,9 @@ fn compute(mut outbox: Outbox, mut messages: mpsc::Receiver<(Header, ToWorker)>)
                         outbox.send(place, wire::pack_to_master(&relay)?)?;
                     }
                     Action::Compute(task) => {
+                        let started = Instant::now();
                         let outcome = catch_unwind(AssertUnwindSafe(|| machine.run(task)));
+                        busy += started.elapsed();
                         let outcome = outcome.unwrap_or_else(|panic| {
                             machine = Machine::new();
                             Outcome::Failed(format!("a bug in the worker: {}", words(panic.as_ref())))
@@ -268,6 +272,14 @@ fn compute(mut outbox: Outbox, mut messages: mpsc::Receiver<(Header, ToWorker)>)
         }
     }
     Ok(())
+}
+
+/// What tasks took on this host, with the share of contact as the threads' own clocks have it. The wall clock tells that
+/// others want the host's cores too; the clocks of threads do not.
+fn share(busy: Duration, threads: Work) -> Work {
+    let busy = busy.as_nanos() as u64;
+    let contact = busy as f64 * threads.contact_ns as f64 / threads.compute_ns.max(1) as f64;
+    Work { compute_ns: busy, contact_ns: contact as u64 }
 }
 
 /// What a panic said.
@@ -355,7 +367,13 @@ mod tests {
     #[test]
     fn frames_of_another_job_cycle_or_plan_are_named() {
         let place = Place { job: 3, epoch: 0, plan: 8 };
-        let sent = ToMaster::Cycle { cycle: 5, vote: None, partials: Vec::new(), gathered: Vec::new() };
+        let sent = ToMaster::Cycle {
+            cycle: 5,
+            vote: None,
+            partials: Vec::new(),
+            gathered: Vec::new(),
+            busy: Work::default(),
+        };
         let fresh = || {
             let mut watch = Watch { place, plans: VecDeque::new() };
             assert_eq!(watch.said(&sent, 8), place);

@@ -29,7 +29,7 @@ use super::{
 };
 use crate::{
     balance::Dealing,
-    event::{Action, Event, Hand, Options},
+    event::{Action, Balance, Event, Hand, Options, Rebalance},
     job::Job,
     sort::Sorted,
 };
@@ -101,17 +101,19 @@ pub struct Scheme {
     pub dealing: Dealing,
     /// Whether messages leave before the interior elements are computed.
     pub overlap: bool,
+    /// What speeds work is dealt out by.
+    pub balance: Balance,
 }
 
 impl Scheme {
     /// What Bolide does, on a route.
     pub fn bolide(route: Route) -> Self {
-        Self { route, dealing: Dealing::Owners, overlap: true }
+        Self { route, dealing: Dealing::Owners, overlap: true, balance: Balance::Given }
     }
 
     /// The control: a star without overlap, units dealt by weight alone.
     pub fn control() -> Self {
-        Self { route: Route::Master, dealing: Dealing::Weights, overlap: false }
+        Self { route: Route::Master, dealing: Dealing::Weights, overlap: false, balance: Balance::Given }
     }
 }
 
@@ -223,6 +225,8 @@ pub struct Timeline {
     pub spans: Vec<Span>,
     /// Messages between hosts.
     pub flights: Vec<Flight>,
+    /// When work was dealt out by other speeds.
+    pub rebalances: Vec<Rebalance>,
     /// Digest of the final state.
     pub digest: String,
 }
@@ -310,6 +314,8 @@ struct Parcel {
     to: End,
     packed: Packed,
     bytes: u64,
+    /// Epoch and cycle of the worker at one of its ends.
+    epoch: u32,
     cycle: u64,
     sent: f64,
 }
@@ -358,6 +364,8 @@ impl Ord for Due {
 struct Place {
     session: Session,
     player: Player,
+    /// What its tasks took so far, at the speeds that its host had (virtual ns).
+    busy: protocol::message::Work,
     /// Messages that wait for the end of a task: without overlap.
     held: Vec<Parcel>,
 }
@@ -398,7 +406,12 @@ pub fn run(
         .enumerate()
         .map(|(i, &speed)| Hand { name: format!("host-{}", i + 1), speed, threads: 1 })
         .collect();
-    let options = Options { route: scheme.route, dealing: scheme.dealing, ..Options::default() };
+    let options = Options {
+        route: scheme.route,
+        dealing: scheme.dealing,
+        balance: scheme.balance,
+        ..Options::default()
+    };
     let (job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
     let players: Vec<Player> = match tape {
         None => (0..n).map(|_| Player::live()).collect(),
@@ -413,7 +426,12 @@ pub fn run(
         job,
         places: players
             .into_iter()
-            .map(|player| Place { session: Session::new(), player, held: Vec::new() })
+            .map(|player| Place {
+                session: Session::new(),
+                player,
+                busy: Default::default(),
+                held: Vec::new(),
+            })
             .collect(),
         sorts: tape.map(|tape| tape.sorts.iter().cloned().collect()).unwrap_or_default(),
         sorts_kept: Vec::new(),
@@ -495,8 +513,8 @@ impl Clock<'_> {
     fn parcel(&self, from: End, to: End, packed: Packed) -> Parcel {
         let bytes = packed.wire_bytes();
         let worker = if from == End::Master { to.host() } else { from.host() };
-        let cycle = self.places[worker].session.cycle();
-        Parcel { from, to, packed, bytes, cycle, sent: self.now }
+        let session = &self.places[worker].session;
+        Parcel { from, to, packed, bytes, epoch: session.epoch(), cycle: session.cycle(), sent: self.now }
     }
 
     fn hand_over(&mut self, parcel: Parcel) {
@@ -589,14 +607,16 @@ impl Clock<'_> {
     }
 
     fn deliver(&mut self, parcel: Parcel) -> Result<(), String> {
-        let Parcel { from, to, packed, .. } = parcel;
+        let Parcel { from, to, packed, epoch, .. } = parcel;
         let fault = |e: protocol::Error| e.to_string();
         match (from, to) {
             (End::Worker(from), End::Master) => {
                 let message = wire::unpack_to_master(packed.kind, &packed.bytes).map_err(fault)?;
-                let actions = self.job.apply(Event::Message(from, message));
+                let actions = self.job.apply(Event::Message(from, epoch, message));
                 self.master_acts(actions)
             }
+            // Of an epoch that is over: nobody hears it.
+            (End::Worker(_), End::Worker(to)) if self.places[to].session.epoch() != epoch => Ok(()),
             (End::Worker(from), End::Worker(to)) => {
                 let message = wire::unpack_to_peer(packed.kind, &packed.bytes).map_err(fault)?;
                 self.step(to, session::Event::Peer(from as u32, message))
@@ -620,6 +640,7 @@ impl Clock<'_> {
                 }
                 session::Action::Forget => continue,
                 session::Action::Send(message) => {
+                    let message = message.stamped(self.places[worker].busy);
                     (End::Master, wire::pack_to_master(&message).map_err(|e| e.to_string())?)
                 }
                 session::Action::SendPeer(to, message) => {
@@ -651,6 +672,10 @@ impl Clock<'_> {
             phases.integrate += costs.integrate / speed;
             self.count(kind, cycle, &load);
         }
+        let speed = self.processors[worker].speed();
+        let busy = &mut self.places[worker].busy;
+        busy.compute_ns += (costs.busy() / speed * 1e9) as u64;
+        busy.contact_ns += (costs.contact / speed * 1e9) as u64;
         let work = Begun(self.now, Work::Task(worker, kind, outcome));
         self.processors[worker].add(self.now, Rank::Compute, costs.busy(), work);
         self.foresee(worker);
@@ -708,9 +733,16 @@ impl Clock<'_> {
                         return Err(reason);
                     }
                     self.timeline.digest = outcome.digest;
+                    self.timeline.rebalances = outcome.rebalances;
                     self.over = true;
                 }
-                Action::Row(_) | Action::State(_) | Action::Snapshot(_) | Action::Progress(_) => {}
+                Action::Row(_)
+                | Action::State(_)
+                | Action::Snapshot(_)
+                | Action::Progress(_)
+                | Action::Dealt(_)
+                | Action::Rewind { .. }
+                | Action::Timer(_) => {}
             }
         }
         Ok(())
