@@ -449,12 +449,12 @@ impl Job {
         let gathered_at = self.epoch.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
         let acts_at = gathered_at + u64::from(self.model.setup.control.sort_lag);
         self.census = sorted.census;
-        let Sorted { exchange, interactions, .. } = sorted;
+        let exchange = Arc::new(sorted.exchange);
         self.send_all(actions, |worker| {
             let plan = Box::new(exchange.plans[worker].clone());
             ToWorker::Plan { acts_at, plan, hash: exchange.hash }
         });
-        self.epoch.exchanges.push_back(Acting { at: acts_at, exchange: Arc::new(exchange), interactions });
+        self.epoch.exchanges.push_back(Acting { at: acts_at, exchange });
         // A late sort: the cycles before its own are complete, and workers wait for the plan. It is in force from here, as
         // it would be had it come in time, so that the cycles of further sorts do not depend on how long this one took.
         if acts_at <= self.epoch.completed {

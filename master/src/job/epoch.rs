@@ -81,8 +81,6 @@ pub(super) struct Step {
 pub(super) struct Acting {
     pub(super) at: u64,
     pub(super) exchange: Arc<Exchange>,
-    /// Interactions by position.
-    pub(super) interactions: Vec<u64>,
 }
 
 /// All that is fixed for one epoch or counted in it. *Positions* are indices into its crew.

@@ -1,7 +1,7 @@
 //! Measured balance: what workers take for their share, and when it pays to deal it out anew.
 //!
 //! Each frame of a cycle says how long its worker has worked so far. The medians of a few cycles give its true speed:
-//! elements and interactions, weighed against each other by what they take, over time. Speeds that users gave, or that
+//! its elements over the time that they took; contact is taken to go at the same speed. Speeds that users gave, or that
 //! were measured before, stand as long as measurement agrees with them; corrected are those that are off by more than
 //! [`AGREES`]. Work is dealt out anew when the slowest worker takes more than [`THRESHOLD`] longer than the slowest would
 //! with the new cut; and after a change that brought nothing the next has to wait, each time twice as long. So noise
@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 
 use protocol::message::Work;
 
-use super::{Job, start::INTERACTIONS_PER_ELEMENT};
+use super::Job;
 use crate::{
     decompose::decompose,
     event::{Balance, Rebalance},
@@ -106,23 +106,13 @@ impl Job {
 
     fn propose(&self, medians: &[[f64; 2]], slowest: f64) -> Option<Proposal> {
         let epoch = &self.epoch;
-        let interactions: Vec<f64> =
-            epoch.exchanges.front()?.interactions.iter().map(|&count| count as f64).collect();
-        let sum = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>();
-        let (all, contact) = (sum(&mut medians.iter().map(|m| m[0])), sum(&mut medians.iter().map(|m| m[1])));
-        let (n_elements, n_interactions) =
-            (sum(&mut epoch.elements.iter().copied()), sum(&mut interactions.iter().copied()));
-        // An interaction in elements.
-        let weight = if contact > 0.0 && n_interactions > 0.0 && all > contact {
-            (contact / n_interactions) / ((all - contact) / n_elements)
-        } else {
-            1.0 / INTERACTIONS_PER_ELEMENT
-        };
-        // Work over time, by position; none for workers without any.
-        let measured: Vec<Option<f64>> = (0..epoch.n())
-            .map(|w| {
-                let load = epoch.elements[w] + weight * interactions[w];
-                (load > 0.0 && medians[w][0] > 0.0).then(|| load / medians[w][0])
+        let n = epoch.n();
+        // Elements over time, by position; none for workers without any.
+        let measured: Vec<Option<f64>> = medians
+            .iter()
+            .zip(&epoch.elements)
+            .map(|([all, contact], &elements)| {
+                (elements > 0.0 && all > contact).then(|| elements / (all - contact))
             })
             .collect();
         let mut ratios: Vec<f64> =
@@ -140,16 +130,17 @@ impl Job {
         if speeds == epoch.speeds {
             return None;
         }
-        let mut elements = vec![0.0; epoch.n()];
+        let mut elements = vec![0.0; n];
         for subdomain in decompose(&self.model.mesh, &speeds) {
             elements[subdomain.worker] += subdomain.region.n_elements() as f64;
         }
-        let speed = sum(&mut speeds.iter().copied());
-        let true_speed = |w: usize| measured[w].unwrap_or(speeds[w] * usual);
-        let foreseen = (0..epoch.n())
-            .map(|w| (elements[w] + weight * n_interactions * speeds[w] / speed) / true_speed(w))
-            .fold(0.0, f64::max);
-        let bound = (n_elements + weight * n_interactions) / sum(&mut (0..epoch.n()).map(true_speed));
+        // Contact in elements, dealt out by speed.
+        let truly: Vec<f64> = (0..n).map(|w| measured[w].unwrap_or(speeds[w] * usual)).collect();
+        let contact: f64 = medians.iter().zip(&truly).map(|([_, contact], speed)| contact * speed).sum();
+        let dealt: f64 = speeds.iter().sum();
+        let foreseen =
+            (0..n).map(|w| (elements[w] + contact * speeds[w] / dealt) / truly[w]).fold(0.0, f64::max);
+        let bound = (elements.iter().sum::<f64>() + contact) / truly.iter().sum::<f64>();
         (slowest > (1.0 + THRESHOLD) * foreseen).then(|| Proposal {
             speeds,
             imbalance: [slowest / bound, foreseen / bound],

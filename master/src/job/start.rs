@@ -214,7 +214,7 @@ impl Job {
                 .map(|(hand, &e)| Deal { name: hand.name.clone(), speed: hand.speed, elements: e as u64 })
                 .collect(),
         ));
-        epoch.exchanges = VecDeque::from([Acting { at: state.cycle, exchange, interactions }]);
+        epoch.exchanges = VecDeque::from([Acting { at: state.cycle, exchange }]);
         epoch.ready = vec![false; n];
         epoch.meter = Meter::new(n);
         epoch.crew = crew;
@@ -338,7 +338,7 @@ impl Cut {
 
 /// Most an element's interactions weigh against an element when imbalance is reported: an element-cycle costs about as
 /// much as this many interactions.
-pub(super) const INTERACTIONS_PER_ELEMENT: f64 = 60.0;
+const INTERACTIONS_PER_ELEMENT: f64 = 60.0;
 
 /// Largest over mean of cost over speed, workers without a speed aside.
 fn imbalance(elements: &[f64], interactions: &[u64], speeds: &[f64]) -> f64 {

@@ -672,7 +672,9 @@ impl Clock<'_> {
             phases.integrate += costs.integrate / speed;
             self.count(kind, cycle, &load);
         }
-        let speed = self.processors[worker].speed();
+        // Host 0 keeps some of its time for the master's sorts; it is slower by that.
+        let kept = if worker == 0 { self.machines.believed[0] / self.machines.speeds[0] } else { 1.0 };
+        let speed = self.processors[worker].speed() * kept;
         let busy = &mut self.places[worker].busy;
         busy.compute_ns += (costs.busy() / speed * 1e9) as u64;
         busy.contact_ns += (costs.contact / speed * 1e9) as u64;
