@@ -8,6 +8,7 @@
 //! 5. what spans entries ([`crate::check`]).
 
 mod boundary;
+mod burn;
 mod contact;
 mod output;
 mod part;
@@ -101,6 +102,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
     let conditions = boundary::read(&deck, &names, &parts, &assembly);
     let contact = contact::read(&deck, &names, &assembly, &materials.list, &conditions);
     let output = output::read(&deck, &names, &assembly);
+    let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
     check::spans(&parts, &assembly, contact.as_ref(), faults);
     let contact = contact.map(|c| c.settings);
@@ -127,6 +129,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
             contact,
             constraints: conditions.constraints,
             walls: conditions.walls,
+            detonations,
         },
         output,
     })
@@ -209,8 +212,14 @@ impl Materials {
     }
 
     /// The index of the material a part names or writes inline.
-    pub(crate) fn resolve(&mut self, value: Value<'_>, part: &str) -> Option<u32> {
-        let material = if value.is_table() {
+    /// `fracture` is the value of the part that asks for the fracture constants of the library, if it does.
+    pub(crate) fn resolve(
+        &mut self,
+        value: Value<'_>,
+        part: &str,
+        fracture: Option<Value<'_>>,
+    ) -> Option<u32> {
+        let mut material = if value.is_table() {
             let table = value.table(format!("material of \"{part}\""))?;
             let name = table.get("name").map_or(Some(part.to_string()), |v| v.name());
             library::read_material(table, name?)?
@@ -232,6 +241,15 @@ impl Materials {
                 return None;
             }
         };
+        if let Some(fracture) = fracture {
+            match library::fracture(&material.name) {
+                Some(failure) => material.failure = self.units.failure_from_si(failure),
+                None => fracture.fault(
+                    "a material of the library with fracture constants",
+                    "remove it, or give the failure of a [[material]]",
+                ),
+            }
+        }
         let index = self.list.iter().position(|m| *m == material).unwrap_or_else(|| {
             self.list.push(material);
             self.list.len() - 1

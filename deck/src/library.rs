@@ -3,12 +3,12 @@
 
 use std::sync::OnceLock;
 
-use mechanics::material::{Eos, Material, Strength};
+use mechanics::material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength};
 use toml::de::DeTable;
 
 use crate::{
     fault::Faults,
-    table::{Range, Table},
+    table::{Range, Table, Value},
 };
 
 /// The library as it stands in the repository, SI.
@@ -17,6 +17,8 @@ const TEXT: &str = include_str!("../materials.toml");
 /// A library entry.
 struct Entry {
     material: Material,
+    /// Failure that a part has to ask for.
+    fracture: Option<Failure>,
     source: String,
 }
 
@@ -28,6 +30,11 @@ pub fn names() -> Vec<&'static str> {
 /// The material of that name, SI.
 pub fn find(name: &str) -> Option<&'static Material> {
     entries().iter().find(|entry| entry.material.name == name).map(|entry| &entry.material)
+}
+
+/// The fracture constants of a library material, which apply to the parts that ask for them.
+pub fn fracture(name: &str) -> Option<Failure> {
+    entries().iter().find(|entry| entry.material.name == name).and_then(|entry| entry.fracture)
 }
 
 /// Where the constants of a library material come from.
@@ -49,8 +56,11 @@ fn entries() -> &'static [Entry] {
                     let table = Table::new(table, value.span().start, format!("[{name}]"), &faults);
                     let source =
                         table.require("source", "the origin of the constants").and_then(|v| v.text());
+                    let fracture = table
+                        .get("fracture")
+                        .and_then(|v| read_failure(v, v.table(format!("fracture of \"{name}\""))?, None));
                     if let (Some(material), Some(source)) = (read_material(table, name), source) {
-                        entries.push(Entry { material, source: source.to_string() });
+                        entries.push(Entry { material, fracture, source: source.to_string() });
                     }
                 }
             }
@@ -66,36 +76,93 @@ fn entries() -> &'static [Entry] {
 pub(crate) fn read_material(table: Table<'_>, name: String) -> Option<Material> {
     let density = table.number("density", Range::Positive);
     let eos = table
-        .require("eos", "an equation of state { type = \"linear\" | \"shock\", ... }")
+        .require("eos", "an equation of state { type = ..., ... }")
         .and_then(|v| v.table(format!("eos of \"{name}\"")))
         .and_then(read_eos);
-    let strength = match table.get("strength") {
+    let strength_value = table.get("strength");
+    let strength = match strength_value {
         None => Some(Strength::Hydro),
         Some(v) => v.table(format!("strength of \"{name}\"")).and_then(read_strength),
     };
+    let failure_value = table.get("failure");
+    let failure = match failure_value {
+        None => Some(Failure::None),
+        Some(v) => {
+            v.table(format!("failure of \"{name}\"")).and_then(|t| read_failure(v, t, strength.as_ref()))
+        }
+    };
     table.finish();
-    Some(Material { name, density: density?, eos: eos?, strength: strength? })
+    let material = Material { name, density: density?, eos: eos?, strength: strength?, failure: failure? };
+    if material.is_gas() {
+        if let Some(value) = strength_value.filter(|_| material.strength != Strength::Hydro) {
+            value.fault("no strength in a gas or an explosive", "remove it");
+        }
+        if let Some(value) = failure_value {
+            value.fault("no failure in a gas or an explosive", "remove it");
+        }
+    }
+    Some(material)
 }
 
+/// The equations of state by the word a deck writes.
+const EQUATIONS: [&str; 5] = ["linear", "polynomial", "shock", "ideal-gas", "jwl"];
+
 fn read_eos(table: Table<'_>) -> Option<Eos> {
-    let kind = table.require("type", "one of linear, shock")?.one_of(&["linear", "shock"])?;
-    let eos = if kind == 0 {
-        table.number("bulk", Range::Positive).map(|bulk| Eos::Linear { bulk })
-    } else {
-        let c0 = table.number("c0", Range::Positive);
-        let s = table.number("s", Range::NotNegative);
-        let gamma = table.number("gamma", Range::NotNegative);
-        c0.zip(s).zip(gamma).map(|((c0, s), gamma)| Eos::Shock { c0, s, gamma })
+    let words = EQUATIONS.join(", ");
+    let kind = table.require("type", &format!("one of {words}"))?.one_of(&EQUATIONS)?;
+    let positive = |key| table.number(key, Range::Positive);
+    let eos = match EQUATIONS[kind] {
+        "linear" => positive("bulk").map(|bulk| Eos::Linear { bulk }),
+        "polynomial" => {
+            let a1 = positive("a1");
+            let (a2, a3) = (table.number_or("a2", 0.0, Range::Any), table.number_or("a3", 0.0, Range::Any));
+            let b0 = table.number_or("b0", 0.0, Range::NotNegative);
+            let b1 = table.number_or("b1", 0.0, Range::NotNegative);
+            let t1 = table.number_or("t1", a1.unwrap_or_default(), Range::Positive);
+            let t2 = table.number_or("t2", 0.0, Range::Any);
+            a1.map(|a1| Eos::Polynomial { a1, a2, a3, b0, b1, t1, t2 })
+        }
+        "shock" => {
+            let c0 = positive("c0");
+            let s = table.number("s", Range::NotNegative);
+            let gamma = table.number("gamma", Range::NotNegative);
+            c0.zip(s).zip(gamma).map(|((c0, s), gamma)| Eos::Shock { c0, s, gamma })
+        }
+        "ideal-gas" => {
+            let gamma = table.number("gamma", Range::Within(1.0, 10.0, "a number above 1 and at most 10"));
+            let energy = positive("energy");
+            gamma.zip(energy).map(|(gamma, energy)| Eos::IdealGas { gamma, energy })
+        }
+        _ => read_jwl(&table),
     };
     table.finish();
     eos
 }
 
+fn read_jwl(table: &Table<'_>) -> Option<Eos> {
+    let positive = |key| table.number(key, Range::Positive);
+    let (a, b) = (positive("a"), table.number("b", Range::NotNegative));
+    let (r1, r2, omega) = (positive("r1"), positive("r2"), positive("omega"));
+    let (energy, detonation) = (positive("energy"), positive("detonation"));
+    let cj_pressure = positive("cj_pressure");
+    Some(Eos::Jwl {
+        a: a?,
+        b: b?,
+        r1: r1?,
+        r2: r2?,
+        omega: omega?,
+        energy: energy?,
+        detonation: detonation?,
+        cj_pressure: cj_pressure?,
+    })
+}
+
 /// The strength laws by the word a deck writes.
-const STRENGTHS: [&str; 4] = ["hydro", "elastic", "von-mises", "johnson-cook"];
+const STRENGTHS: [&str; 5] = ["hydro", "elastic", "von-mises", "tabulated", "johnson-cook"];
 
 fn read_strength(table: Table<'_>) -> Option<Strength> {
-    let kind = table.require("type", "one of hydro, elastic, von-mises, johnson-cook")?.one_of(&STRENGTHS)?;
+    let words = STRENGTHS.join(", ");
+    let kind = table.require("type", &format!("one of {words}"))?.one_of(&STRENGTHS)?;
     let strength = match STRENGTHS[kind] {
         "hydro" => Some(Strength::Hydro),
         "elastic" => table.number("shear", Range::Positive).map(|shear| Strength::Elastic { shear }),
@@ -103,16 +170,109 @@ fn read_strength(table: Table<'_>) -> Option<Strength> {
             let shear = table.number("shear", Range::Positive);
             let yield_stress = table.number("yield_stress", Range::Positive);
             let hardening = table.number_or("hardening", 0.0, Range::NotNegative);
-            shear.zip(yield_stress).map(|(shear, yield_stress)| Strength::VonMises {
+            let rate = read_cowper_symonds(&table);
+            shear.zip(yield_stress).zip(rate).map(|((shear, yield_stress), rate)| Strength::VonMises {
                 shear,
                 yield_stress,
                 hardening,
+                rate,
+            })
+        }
+        "tabulated" => {
+            let shear = table.number("shear", Range::Positive);
+            let hardening =
+                table.require("points", "[[plastic strain, yield stress], ...]").and_then(read_hardening);
+            let rate = read_cowper_symonds(&table);
+            shear.zip(hardening).zip(rate).map(|((shear, hardening), rate)| Strength::Tabulated {
+                shear,
+                hardening,
+                rate,
             })
         }
         _ => read_johnson_cook(&table),
     };
     table.finish();
     strength
+}
+
+/// The rate factor of a yield stress, if it has one; `None` after reporting what is wrong.
+fn read_cowper_symonds(table: &Table<'_>) -> Option<Option<CowperSymonds>> {
+    let Some(value) = table.get("cowper_symonds") else { return Some(None) };
+    let inner = value.table(format!("cowper_symonds in {}", table.title))?;
+    let reference = inner.number("reference", Range::Positive);
+    let exponent = inner.number("exponent", Range::Positive);
+    inner.finish();
+    Some(Some(CowperSymonds { reference: reference?, exponent: exponent? }))
+}
+
+/// Points of a hardening curve.
+fn read_hardening(value: Value<'_>) -> Option<Hardening> {
+    let items = value.items()?;
+    if items.is_empty() || items.len() > MAX_HARDENING {
+        value.fault(&format!("1 to {MAX_HARDENING} points"), "leave out those that lie on a line");
+        return None;
+    }
+    let mut hardening = Hardening {
+        n_points: items.len() as u32,
+        strain: [0.0; MAX_HARDENING],
+        stress: [0.0; MAX_HARDENING],
+    };
+    for (i, item) in items.iter().enumerate() {
+        let [strain, stress] = item.numbers::<2>("[plastic strain, yield stress]", Range::NotNegative)?;
+        let fits = match i.checked_sub(1) {
+            None => strain == 0.0 && stress > 0.0,
+            Some(last) => strain > hardening.strain[last] && stress >= hardening.stress[last],
+        };
+        if !fits {
+            let expected =
+                "plastic strains from 0 upwards, each with a yield stress above 0 not below the one before";
+            item.fault(expected, "order the points, or flatten what softens");
+            return None;
+        }
+        (hardening.strain[i], hardening.stress[i]) = (strain, stress);
+    }
+    Some(hardening)
+}
+
+/// The failure laws by the word a deck writes.
+const FAILURES: [&str; 4] = ["plastic-strain", "principal-stress", "hydrostatic", "johnson-cook"];
+
+/// Reads a failure law under `value`, which is to fit `strength` where that is known.
+fn read_failure(value: Value<'_>, table: Table<'_>, strength: Option<&Strength>) -> Option<Failure> {
+    let words = FAILURES.join(", ");
+    let kind = table.require("type", &format!("one of {words}"))?.one_of(&FAILURES)?;
+    let failure = match FAILURES[kind] {
+        "plastic-strain" => {
+            if matches!(strength, Some(Strength::Hydro | Strength::Elastic { .. })) {
+                value.fault("a strength that yields beside it", "choose another failure or strength");
+            }
+            table.number("limit", Range::Positive).map(|limit| Failure::PlasticStrain { limit })
+        }
+        "principal-stress" => {
+            table.number("tension", Range::Positive).map(|tension| Failure::PrincipalStress { tension })
+        }
+        "hydrostatic" => {
+            let heals = table.get("heals").map_or(Some(false), |v| v.boolean());
+            table
+                .number("tension", Range::Positive)
+                .zip(heals)
+                .map(|(tension, heals)| Failure::Hydrostatic { tension, heals })
+        }
+        _ => {
+            if strength.is_some_and(|s| !matches!(s, Strength::JohnsonCook { .. })) {
+                value.fault(
+                    "a johnson-cook strength beside it, whose rate0, t_room and t_melt it shares",
+                    "choose another failure or strength",
+                );
+            }
+            let d = ["d1", "d2", "d3", "d4", "d5"].map(|key| table.number(key, Range::Any));
+            d.iter()
+                .all(Option::is_some)
+                .then(|| Failure::JohnsonCook { d: d.map(Option::unwrap_or_default) })
+        }
+    };
+    table.finish();
+    failure
 }
 
 fn read_johnson_cook(table: &Table<'_>) -> Option<Strength> {
@@ -155,20 +315,35 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_library_holds_nineteen_sets_each_with_a_source() {
-        assert_eq!(names().len(), 19);
+    fn the_library_holds_twenty_seven_sets_each_with_a_source() {
+        assert_eq!(names().len(), 27);
         for name in names() {
             assert!(source(name).is_some_and(|s| s.len() > 20), "{name}");
         }
     }
 
     #[test]
-    fn shear_and_bulk_of_every_set_give_a_poisson_ratio_between_0_2_and_0_5() {
-        for name in names() {
+    fn shear_and_bulk_of_every_solid_give_a_poisson_ratio_between_0_2_and_0_5() {
+        let solids = names().into_iter().filter(|n| find(n).is_some_and(|m| m.shear() > 0.0));
+        assert_eq!(solids.clone().count(), 19);
+        for name in solids {
             let material = find(name).expect("a name of the list");
             let (k, g) = (material.bulk(), material.shear());
             let poisson = (3.0 * k - 2.0 * g) / (2.0 * (3.0 * k + g));
             assert!((0.2..0.5).contains(&poisson), "{name}: {poisson}");
         }
+    }
+
+    #[test]
+    fn fluids_of_the_library_have_the_pressures_they_are_known_for() {
+        let of = |name: &str| find(name).expect("a name of the list");
+        assert!((of("AIR").initial_pressure() / 101.33e3 - 1.0).abs() < 1e-3);
+        assert!((of("WATER").bulk() / 2.195e9 - 1.0).abs() < 1e-3);
+        assert_eq!(of("WATER").failure, Failure::Hydrostatic { tension: 1e5, heals: true });
+        let explosives = names().into_iter().filter_map(|name| find(name)?.detonation_speed());
+        assert_eq!(explosives.collect::<Vec<_>>(), [8193.0, 7980.0, 7530.0, 8300.0, 6930.0, 6930.0]);
+        assert_eq!(names().into_iter().filter(|name| fracture(name).is_some()).count(), 9);
+        let steel = Failure::JohnsonCook { d: [0.05, 3.44, -2.12, 0.002, 0.61] };
+        assert_eq!(fracture("STEEL_4340"), Some(steel));
     }
 }

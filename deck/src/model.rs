@@ -4,7 +4,7 @@ use mechanics::{mesh::Mesh, setup::Setup};
 use serde::{Deserialize, Serialize};
 
 /// Names that [`Output::fields`] may hold: fields of nodes and elements in the results.
-pub const FIELD_NAMES: [&str; 20] = [
+pub const FIELD_NAMES: [&str; 22] = [
     "velocity",
     "displacement",
     "node_id",
@@ -15,6 +15,7 @@ pub const FIELD_NAMES: [&str; 20] = [
     "von_mises",
     "plastic_strain",
     "temperature",
+    "damage",
     "density",
     "energy",
     "stress",
@@ -25,6 +26,7 @@ pub const FIELD_NAMES: [&str; 20] = [
     "stress_yz",
     "stress_zx",
     "mass",
+    "time_to_light",
 ];
 
 /// A checked problem in one consistent set of units.

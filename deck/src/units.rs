@@ -3,7 +3,7 @@
 //! Each unit is a power of ten of its SI unit, so that a conversion is one correctly rounded
 //! multiplication or division by an exact power of ten.
 
-use mechanics::material::{Eos, Material, Strength};
+use mechanics::material::{CowperSymonds, Eos, Failure, Material, Strength};
 
 /// A consistent set: one deck unit is ten to this power of the SI unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,15 +51,44 @@ impl Units {
             eos: match material.eos {
                 Eos::Linear { bulk } => Eos::Linear { bulk: stress(bulk) },
                 Eos::Shock { c0, s, gamma } => Eos::Shock { c0: scale(c0, self.velocity()), s, gamma },
+                Eos::Polynomial { a1, a2, a3, b0, b1, t1, t2 } => Eos::Polynomial {
+                    a1: stress(a1),
+                    a2: stress(a2),
+                    a3: stress(a3),
+                    b0,
+                    b1,
+                    t1: stress(t1),
+                    t2: stress(t2),
+                },
+                Eos::IdealGas { gamma, energy } => {
+                    Eos::IdealGas { gamma, energy: scale(energy, self.specific_energy()) }
+                }
+                // Energy per volume is a stress.
+                Eos::Jwl { a, b, r1, r2, omega, energy, detonation, cj_pressure } => Eos::Jwl {
+                    a: stress(a),
+                    b: stress(b),
+                    r1,
+                    r2,
+                    omega,
+                    energy: stress(energy),
+                    detonation: scale(detonation, self.velocity()),
+                    cj_pressure: stress(cj_pressure),
+                },
             },
             strength: match material.strength {
                 Strength::Hydro => Strength::Hydro,
                 Strength::Elastic { shear } => Strength::Elastic { shear: stress(shear) },
-                Strength::VonMises { shear, yield_stress, hardening } => Strength::VonMises {
+                Strength::VonMises { shear, yield_stress, hardening, rate } => Strength::VonMises {
                     shear: stress(shear),
                     yield_stress: stress(yield_stress),
                     hardening: stress(hardening),
+                    rate: rate.map(|rate| self.cowper_symonds(rate)),
                 },
+                Strength::Tabulated { shear, mut hardening, rate } => {
+                    hardening.stress = hardening.stress.map(stress);
+                    let rate = rate.map(|rate| self.cowper_symonds(rate));
+                    Strength::Tabulated { shear: stress(shear), hardening, rate }
+                }
                 Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => {
                     Strength::JohnsonCook {
                         shear: stress(shear),
@@ -75,7 +104,25 @@ impl Units {
                     }
                 }
             },
+            failure: self.failure_from_si(material.failure),
         }
+    }
+
+    /// A failure law with SI constants, in this set.
+    pub fn failure_from_si(&self, failure: Failure) -> Failure {
+        let stress = |x| scale(x, self.stress());
+        match failure {
+            Failure::PrincipalStress { tension } => Failure::PrincipalStress { tension: stress(tension) },
+            Failure::Hydrostatic { tension, heals } => {
+                Failure::Hydrostatic { tension: stress(tension), heals }
+            }
+            // Strains alone.
+            Failure::None | Failure::PlasticStrain { .. } | Failure::JohnsonCook { .. } => failure,
+        }
+    }
+
+    fn cowper_symonds(&self, law: CowperSymonds) -> CowperSymonds {
+        CowperSymonds { reference: scale(law.reference, -self.time), ..law }
     }
 }
 

@@ -1,7 +1,11 @@
 //! What a deck's tables become in the Model.
 
 use deck::Model;
-use mechanics::{material::Strength, mesh::Topology};
+use mechanics::{
+    burn::Detonation,
+    material::{CowperSymonds, Eos, Failure, Strength},
+    mesh::Topology,
+};
 
 const HEAD: &str = "title = \"t\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n";
 
@@ -133,6 +137,31 @@ fn library_values_come_in_the_units_of_the_deck() {
     let read = [shear, a, specific_heat, rate0, t_melt];
     let expected = [0.818, 0.0035, 452e-8, 1e-6, 1811.0];
     assert!(read.iter().zip(expected).all(|(r, e)| (r / e - 1.0).abs() < 1e-15), "{read:?}");
+}
+
+#[test]
+fn laws_come_in_the_units_of_the_deck_and_fracture_only_where_a_part_asks() {
+    let model = good("laws");
+    let [tnt, water, air, pipe, pane, whole, breaking] = &model.setup.materials[..] else {
+        panic!("{:?}", model.setup.materials)
+    };
+    let near = |x: f64, y: f64| assert!((x / y - 1.0).abs() < 1e-14, "{x} {y}");
+    let Eos::Jwl { a, energy, detonation, .. } = tnt.eos else { panic!("{tnt:?}") };
+    near(a, 371.2);
+    near(energy, 7.0);
+    near(detonation, 6930.0);
+    assert_eq!(water.failure, Failure::Hydrostatic { tension: 1e-4, heals: true });
+    let Eos::IdealGas { energy, .. } = air.eos else { panic!("{air:?}") };
+    near(energy, 206_800.0);
+    let Eos::Polynomial { a1, t1, t2, .. } = pipe.eos else { panic!("{pipe:?}") };
+    assert_eq!([a1, t1, t2], [164.0, 164.0, 0.0]);
+    let Strength::Tabulated { hardening, rate, .. } = pipe.strength else { panic!("{pipe:?}") };
+    assert_eq!((hardening.n_points, hardening.stress[2], hardening.strain[1]), (3, 0.5, 0.02));
+    assert_eq!(rate, Some(CowperSymonds { reference: 0.0404, exponent: 5.0 }));
+    assert_eq!(pane.failure, Failure::PrincipalStress { tension: 0.1 });
+    assert_eq!(whole.failure, Failure::None);
+    assert_eq!(breaking.failure, Failure::JohnsonCook { d: [0.05, 3.44, -2.12, 0.002, 0.61] });
+    assert_eq!(model.setup.detonations, [Detonation { point: [5.0, 5.0, 0.0], time: 0.001 }]);
 }
 
 #[test]

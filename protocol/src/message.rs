@@ -205,7 +205,8 @@ impl ToMaster {
 }
 
 /// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
-pub const IMAGE_VERSION: u32 = 1;
+/// 2: with damage and the time until an explosive is lit behind them.
+pub const IMAGE_VERSION: u32 = 2;
 
 /// Time that a worker has computed for (ns): of its threads in an image, of its host in the frame of a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -8,6 +8,7 @@
 mod contact;
 mod element;
 mod solid;
+mod structure;
 mod wave;
 
 use crate::case::Sheet;
@@ -30,6 +31,13 @@ macro_rules! each_case_of_the_book {
             wave: impacts_of_two_materials_match_their_impedances quick;
             wave: an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longitudinal_speed quick;
             solid: the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find quick;
+            solid: finer_copper_bars_come_nearer_to_what_others_converge_to long;
+            solid: the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds quick;
+            solid: a_soft_sphere_bounces_off_a_wall_as_hertz_says long;
+            solid: a_rigid_wall_gives_its_impulse_along_its_normal_and_coulombs_share_beside_it quick;
+            structure: the_impulsive_panel_is_dented_as_deep_as_measured long;
+            structure: the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds quick;
+            structure: a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness quick;
             contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
             contact: struck_plates_conserve_keep_apart_and_move_together quick;
             contact: strengthless_plates_reach_the_impedance_match_on_the_axis quick;

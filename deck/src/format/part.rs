@@ -63,9 +63,10 @@ pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials) -> Vec<Par
             }
         }
         let name = name.unwrap_or_else(|| format!("part {}", n + 1));
+        let fracture = table.get("fracture").filter(|v| v.boolean() == Some(true));
         let material = table
             .require("material", "a material by name or as an inline table")
-            .and_then(|v| materials.resolve(v, &name));
+            .and_then(|v| materials.resolve(v, &name, fracture));
         let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
         let (mut block, explicit) = read_mesh(&table, &name, &mut budget);
         if let Some(block) = &mut block {

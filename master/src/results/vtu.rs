@@ -18,8 +18,17 @@ const VTK_HEXAHEDRON: u8 = 12;
 const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
 
 /// Fields that follow from others or never change: written only if the deck names them.
-const ON_REQUEST: [&str; 8] =
-    ["stress", "relative_volume", "stress_xx", "stress_yy", "stress_xy", "stress_yz", "stress_zx", "mass"];
+const ON_REQUEST: [&str; 9] = [
+    "stress",
+    "relative_volume",
+    "stress_xx",
+    "stress_yy",
+    "stress_xy",
+    "stress_yz",
+    "stress_zx",
+    "mass",
+    "time_to_light",
+];
 
 /// Which fields a state file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,7 +39,7 @@ pub struct Fields {
 
 impl Fields {
     /// The fields of `output.fields`; an empty list selects all but the relative volume,
-    /// the components of stress and the nodal mass.
+    /// the components of stress, the nodal mass and the time until the detonation arrives.
     ///
     /// # Errors
     /// [`Error::UnknownField`].
@@ -168,8 +177,8 @@ pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
 ///
 /// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`,
 /// `mass`. Element fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
-/// `temperature` (K), `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
-/// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric).
+/// `temperature` (K), `damage`, `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
+/// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric), `time_to_light`.
 /// `worker` gives, by global element index, the worker that computes the element, and becomes the element
 /// field of that name. Units are the deck's.
 ///
@@ -276,7 +285,7 @@ fn data_arrays<'a>(
     let value = |field: usize| move |e: usize| state.elements[field][e];
     let (pressure, plastic_strain) = (value(field::PRESSURE), value(field::PLASTIC_STRAIN));
     let (temperature, energy) = (value(field::TEMPERATURE), value(field::ENERGY));
-    let relative_volume = value(field::RELATIVE_VOLUME);
+    let (relative_volume, damage) = (value(field::RELATIVE_VOLUME), value(field::DAMAGE));
     let deviator = move |e: usize| {
         [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX].map(|f| state.elements[f][e])
     };
@@ -297,6 +306,7 @@ fn data_arrays<'a>(
         Array::f64("von_mises", n_elements, move |e| [von_mises(deviator(e))]),
         Array::f64("plastic_strain", n_elements, move |e| [plastic_strain(e)]),
         Array::f64("temperature", n_elements, move |e| [temperature(e)]),
+        Array::f64("damage", n_elements, move |e| [damage(e)]),
         Array::f64("density", n_elements, move |e| [elements.density(e) / relative_volume(e)]),
         // Energy is held per initial volume.
         Array::f64("energy", n_elements, move |e| [energy(e) / elements.density(e)]),
@@ -313,6 +323,7 @@ fn data_arrays<'a>(
             ("stress_xy", field::SXY),
             ("stress_yz", field::SYZ),
             ("stress_zx", field::SZX),
+            ("time_to_light", field::TIME_TO_LIGHT),
         ]
         .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
     );

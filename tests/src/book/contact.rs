@@ -264,10 +264,6 @@ pub(super) fn no_node_of_a_body_thrown_at_another_ends_inside_it(sheet: &mut She
                 let solved = throw(&case, fraction, speed).unwrap_or_else(|e| panic!("{named}: {e}"));
                 let ledger = &solved.outcome.ledger;
                 let found = intruders(&solved.model.mesh, &solved.state.x);
-                println!(
-                    "{named}: {:.2} gaps deep, {} sorts",
-                    ledger.worst_penetration, solved.outcome.sorts
-                );
                 assert!(ledger.worst_penetration > 0.0, "{named}: they did not meet");
                 inside += found.len();
                 deepest = deepest.max(ledger.worst_penetration);

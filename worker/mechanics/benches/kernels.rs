@@ -13,7 +13,7 @@ use mechanics::{
     exact::Quantum,
     initial,
     lanes::Width,
-    material::{Eos, Material, Strength},
+    material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
     piece::{Region, cut},
     setup::{Constraint, Control, Setup},
@@ -160,6 +160,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
             density,
             eos: Eos::Shock { c0, s, gamma },
             strength: Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 },
+            failure: Failure::None,
         }
     });
     let setup = Setup {
@@ -178,6 +179,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         contact: None,
         constraints: vec![Constraint::default()],
         walls: Vec::new(),
+        detonations: Vec::new(),
     };
     let falls = |n: u32| [0.0, 0.0, if n / plane > below { -500.0 } else { 0.0 }];
     let velocity: Vec<[f64; 3]> = mesh.node_ids.iter().map(|&n| falls(n)).collect();
@@ -306,14 +308,18 @@ fn kernels() {
     let laws = [
         ("hydro + linear", Eos::Linear { bulk: 164e9 }, Strength::Hydro),
         ("elastic + linear", Eos::Linear { bulk: 164e9 }, Strength::Elastic { shear }),
-        ("von Mises + shock", shock, Strength::VonMises { shear, yield_stress: 350e6, hardening: 1e8 }),
+        (
+            "von Mises + shock",
+            shock,
+            Strength::VonMises { shear, yield_stress: 350e6, hardening: 1e8, rate: None },
+        ),
         ("Johnson-Cook (m = 1) + shock", shock, johnson_cook(1.0)),
         ("Johnson-Cook (m = 1.03) + shock", shock, johnson_cook(1.03)),
     ];
     println!("element kernel alone, ns per element and cycle, median and (least)");
     println!("{:<34}{:<9}{:>16}{:>16}", "laws", "width", "structured", "explicit");
     for (name, eos, strength) in laws {
-        let material = Material { name: name.into(), density: 7896.0, eos, strength };
+        let material = Material { name: name.into(), density: 7896.0, eos, strength, failure: Failure::None };
         for width in Width::ALL {
             match width.require() {
                 Ok(width) => {

@@ -18,12 +18,16 @@ use crate::{
         ElementVote, Step,
         hex8::{self, Laws, Layout, View},
     },
-    eos::{EquationOfState, Linear, Shock},
+    eos::{EquationOfState, IdealGas, Jwl, Linear, Polynomial, Shock},
+    failure::{
+        Failing, FailureLaw, Unfailing, hydrostatic::Hydrostatic, johnson_cook::JohnsonCookDamage,
+        plastic_strain::PlasticStrain, principal_stress::PrincipalStress,
+    },
     lanes::{SET, Width, scalar::Scalar},
-    material::{Eos, Material, Strength},
+    material::{Eos, Failure, Material, Strength},
     mesh::Topology,
     state::N_FIELDS,
-    strength::{Elastic, Hydro, JohnsonCook, StrengthLaw, VonMises},
+    strength::{Elastic, Hydro, JohnsonCook, RateFactor, StrengthLaw, Tabulated, VonMises},
 };
 
 /// Stands for the global element index in a slot without an element.
@@ -276,6 +280,30 @@ impl Block {
                 let eos = Shock { bulk: material.density * c0 * c0, s, gamma };
                 self.compute_with(eos, material, sets, step, width, vote);
             }
+            Eos::Polynomial { a1, a2, a3, b0, b1, t1, t2 } => {
+                let eos = Polynomial { a: [a1, a2, a3], b: [b0, b1], t: [t1, t2] };
+                self.compute_with(eos, material, sets, step, width, vote);
+            }
+            // Gases have no strength, so nothing in them fails.
+            Eos::IdealGas { gamma, .. } => {
+                let (density, eos) = (material.density, IdealGas { gamma });
+                let laws = Laws { density, eos, strength: Hydro, failure: Unfailing };
+                self.run(laws, sets, step, width, vote);
+            }
+            Eos::Jwl { a, b, r1, r2, omega, energy: _, detonation, cj_pressure } => {
+                let density = material.density;
+                let unburnt_stiffness = density * detonation * detonation;
+                let eos = Jwl {
+                    amplitude: [a, b],
+                    decay: [r1, r2],
+                    omega,
+                    detonation,
+                    unburnt_stiffness,
+                    inverse_compression: unburnt_stiffness / cj_pressure,
+                };
+                let laws = Laws { density, eos, strength: Hydro, failure: Unfailing };
+                self.run(laws, sets, step, width, vote);
+            }
         }
     }
 
@@ -288,15 +316,39 @@ impl Block {
         width: Width,
         vote: &mut ElementVote,
     ) {
+        match failing(material) {
+            None => self.compute_failing(eos, Unfailing, material, sets, step, width, vote),
+            Some(failure) => self.compute_failing(eos, failure, material, sets, step, width, vote),
+        }
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "one level of the dispatch, called twice just above")]
+    fn compute_failing<E: EquationOfState, F: FailureLaw>(
+        &mut self,
+        eos: E,
+        failure: F,
+        material: &Material,
+        sets: &[Range<u32>],
+        step: &Step,
+        width: Width,
+        vote: &mut ElementVote,
+    ) {
         let density = material.density;
         match material.strength {
-            Strength::Hydro => self.run(Laws { density, eos, strength: Hydro }, sets, step, width, vote),
-            Strength::Elastic { shear } => {
-                self.run(Laws { density, eos, strength: Elastic { shear } }, sets, step, width, vote);
+            Strength::Hydro => {
+                self.run(Laws { density, eos, strength: Hydro, failure }, sets, step, width, vote);
             }
-            Strength::VonMises { shear, yield_stress, hardening } => {
-                let strength = VonMises { shear, yield_stress, hardening };
-                self.run(Laws { density, eos, strength }, sets, step, width, vote);
+            Strength::Elastic { shear } => {
+                let strength = Elastic { shear };
+                self.run(Laws { density, eos, strength, failure }, sets, step, width, vote);
+            }
+            Strength::VonMises { shear, yield_stress, hardening, rate } => {
+                let strength = VonMises { shear, yield_stress, hardening, rate: RateFactor::of(rate) };
+                self.run(Laws { density, eos, strength, failure }, sets, step, width, vote);
+            }
+            Strength::Tabulated { shear, hardening, rate } => {
+                let strength = Tabulated::new(shear, &hardening, RateFactor::of(rate));
+                self.run(Laws { density, eos, strength, failure }, sets, step, width, vote);
             }
             Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => {
                 let strength = JohnsonCook {
@@ -311,14 +363,14 @@ impl Block {
                     heating: 1.0 / (density * specific_heat),
                     inverse_rate0: 1.0 / rate0,
                 };
-                self.run(Laws { density, eos, strength }, sets, step, width, vote);
+                self.run(Laws { density, eos, strength, failure }, sets, step, width, vote);
             }
         }
     }
 
-    fn run<E: EquationOfState, S: StrengthLaw>(
+    fn run<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
         &mut self,
-        laws: Laws<E, S>,
+        laws: Laws<E, S, F>,
         sets: &[Range<u32>],
         step: &Step,
         width: Width,
@@ -357,6 +409,28 @@ impl Block {
             }
         }
     }
+}
+
+/// The failure law of a material made ready, if it has one.
+fn failing(material: &Material) -> Option<Failing> {
+    Some(match material.failure {
+        Failure::None => return None,
+        Failure::PlasticStrain { limit } => {
+            Failing::PlasticStrain(PlasticStrain { inverse_limit: 1.0 / limit })
+        }
+        Failure::PrincipalStress { tension } => Failing::PrincipalStress(PrincipalStress { tension }),
+        Failure::Hydrostatic { tension, heals } => Failing::Hydrostatic(Hydrostatic { tension, heals }),
+        Failure::JohnsonCook { d } => {
+            // Zeros make the factors of rate and temperature 1.
+            let (inverse_rate0, t_room, inverse_range) = match material.strength {
+                Strength::JohnsonCook { rate0, t_room, t_melt, .. } => {
+                    (1.0 / rate0, t_room, 1.0 / (t_melt - t_room))
+                }
+                _ => (0.0, 0.0, 0.0),
+            };
+            Failing::JohnsonCook(JohnsonCookDamage { d, inverse_rate0, t_room, inverse_range })
+        }
+    })
 }
 
 /// Layout of an index space, the slot of each element, and the length that node arrays need.
@@ -398,9 +472,9 @@ fn explicit(hexahedra: &[[u32; 8]], n_nodes: usize) -> (Layout, Vec<u32>, usize)
 
 /// # Safety
 /// As [`hex8::compute`].
-unsafe fn on_scalar<E: EquationOfState, S: StrengthLaw>(
+unsafe fn on_scalar<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     view: &mut View<'_>,
-    laws: &Laws<E, S>,
+    laws: &Laws<E, S, F>,
     step: &Step,
     sets: &[Range<u32>],
     vote: &mut ElementVote,
@@ -412,7 +486,7 @@ unsafe fn on_scalar<E: EquationOfState, S: StrengthLaw>(
         return;
     }
     // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Scalar, E, S>(view, laws, step, sets, vote) };
+    unsafe { hex8::compute::<Scalar, E, S, F>(view, laws, step, sets, vote) };
 }
 
 /// # Safety
@@ -420,43 +494,43 @@ unsafe fn on_scalar<E: EquationOfState, S: StrengthLaw>(
 /// with the same bits.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "fma")]
-unsafe fn on_scalar_fma<E: EquationOfState, S: StrengthLaw>(
+unsafe fn on_scalar_fma<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     view: &mut View<'_>,
-    laws: &Laws<E, S>,
+    laws: &Laws<E, S, F>,
     step: &Step,
     sets: &[Range<u32>],
     vote: &mut ElementVote,
 ) {
     // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Scalar, E, S>(view, laws, step, sets, vote) };
+    unsafe { hex8::compute::<Scalar, E, S, F>(view, laws, step, sets, vote) };
 }
 
 /// # Safety
 /// As [`hex8::compute`], on a machine with [`Width::Avx2`].
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2<E: EquationOfState, S: StrengthLaw>(
+unsafe fn on_avx2<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     view: &mut View<'_>,
-    laws: &Laws<E, S>,
+    laws: &Laws<E, S, F>,
     step: &Step,
     sets: &[Range<u32>],
     vote: &mut ElementVote,
 ) {
     // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Avx2, E, S>(view, laws, step, sets, vote) };
+    unsafe { hex8::compute::<Avx2, E, S, F>(view, laws, step, sets, vote) };
 }
 
 /// # Safety
 /// As [`hex8::compute`], on a machine with [`Width::Avx512`].
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512<E: EquationOfState, S: StrengthLaw>(
+unsafe fn on_avx512<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     view: &mut View<'_>,
-    laws: &Laws<E, S>,
+    laws: &Laws<E, S, F>,
     step: &Step,
     sets: &[Range<u32>],
     vote: &mut ElementVote,
 ) {
     // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Avx512, E, S>(view, laws, step, sets, vote) };
+    unsafe { hex8::compute::<Avx512, E, S, F>(view, laws, step, sets, vote) };
 }

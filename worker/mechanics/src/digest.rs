@@ -1,9 +1,14 @@
 //! Digest: one hash of the final state, in canonical order, so that equal bits give equal text.
 
-use crate::state::GlobalState;
+use crate::state::{FIELDS, GlobalState};
+
+/// Fields that only some laws use. Where they are zero everywhere they leave no trace in the digest, so that a run
+/// without such a law has the digest that it had before the law was there.
+const LAW_FIELDS: [&str; 2] = ["damage", "time_to_light"];
 
 /// BLAKE3 over cycle, time, positions, velocities (by global node index) and element fields (field by field, by global
-/// element index), each number as its eight little-endian bytes; the first 32 hexadecimal digits.
+/// element index; [`LAW_FIELDS`] after their names, if anything is in them), each number as its eight little-endian
+/// bytes; the first 32 hexadecimal digits.
 pub fn digest(state: &GlobalState) -> String {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&state.cycle.to_le_bytes());
@@ -15,7 +20,13 @@ pub fn digest(state: &GlobalState) -> String {
             }
         }
     }
-    for field in &state.elements {
+    for (name, field) in FIELDS.iter().zip(&state.elements) {
+        if LAW_FIELDS.contains(name) {
+            if field.iter().all(|value| value.to_bits() == 0) {
+                continue;
+            }
+            hasher.update(name.as_bytes());
+        }
         for value in field {
             hasher.update(&value.to_le_bytes());
         }

@@ -2,22 +2,45 @@
 //!
 //! Every law here has the form `p = a(v) + b(v) E`, with v the volume and E the internal energy, both per
 //! initial volume. The energy equation of a cycle is then solved in closed form, and one formula gives the
-//! isentropic stiffness of all of them.
+//! isentropic stiffness of all of them. A law that burns is given the fraction that has burnt; the others leave it
+//! unread. A new law is a file like its neighbours here: constants, [`EquationOfState`], tests of points and slopes.
 
 use crate::lanes::Lane;
 
+pub(crate) mod ideal_gas;
+pub(crate) mod jwl;
 pub(crate) mod linear;
+pub(crate) mod polynomial;
 pub(crate) mod shock;
 
-pub(crate) use {linear::Linear, shock::Shock};
+pub(crate) use {ideal_gas::IdealGas, jwl::Jwl, linear::Linear, polynomial::Polynomial, shock::Shock};
 
 /// A law of pressure.
 pub(crate) trait EquationOfState: Copy {
-    /// The line and its slope at relative volumes `v > 0`.
-    fn line<L: Lane>(&self, v: L) -> Line<L>;
+    /// Whether the law burns, hence reads the time until it is lit.
+    const BURNS: bool = false;
+
+    /// The line and its slope at relative volumes `v > 0`, with the burnt fraction `burnt`.
+    fn line<L: Lane>(&self, v: L, burnt: L) -> Line<L>;
 
     /// Least bulk stiffness used for the sound speed (stress), where tension has softened the law.
-    fn least_stiffness(&self) -> f64;
+    fn least_stiffness<L: Lane>(&self, burnt: L) -> L;
+
+    /// Time until lighting (negative after it) as the compression may have shortened it, and the fraction burnt, in an
+    /// element of this initial volume.
+    #[inline(always)]
+    fn burn<L: Lane>(&self, time_to_light: L, _v: L, _initial_volume: L) -> (L, L) {
+        (time_to_light, L::splat(1.0))
+    }
+}
+
+/// Slope of the isentrope by differences, for the tests of the laws: `-v dp/dv` with `dE = -p dv`.
+#[cfg(test)]
+pub(crate) fn difference_stiffness<E: EquationOfState>(law: &E, v: f64, energy: f64, burnt: f64) -> f64 {
+    use crate::lanes::scalar::Scalar;
+    let at = |v: f64, energy: f64| law.line(Scalar(v), Scalar(burnt)).pressure(Scalar(energy)).0;
+    let (p, h) = (at(v, energy), 1e-6 * v);
+    -v * (at(v + h, energy - p * h) - at(v - h, energy + p * h)) / (2.0 * h)
 }
 
 /// `p = a + b E` at one relative volume, and the derivatives of a and b with respect to it.

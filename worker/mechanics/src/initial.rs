@@ -1,6 +1,8 @@
-//! The state a run starts from: masses by eighths of element masses, stress-free elements at rest volume.
+//! The state a run starts from: masses by eighths of element masses, elements at rest volume without deviatoric stress,
+//! gases at their pressure, explosives with the time until they are lit.
 
 use crate::{
+    burn::lighting_time,
     contact::Extent,
     element::hex8,
     exact::Quantum,
@@ -37,7 +39,8 @@ pub fn state(
     for part in &mesh.parts {
         let material = &setup.materials[part.material as usize];
         for e in 0..part.n_elements() {
-            let v = hex8::volume(&part.corners(e).map(|n| mesh.positions[n as usize]));
+            let corners = part.corners(e).map(|n| mesh.positions[n as usize]);
+            let v = hex8::volume(&corners);
             if v <= 0.0 || !v.is_finite() {
                 return Err(format!(
                     "element {} of part `{}`: volume {v:e}, must be positive",
@@ -48,6 +51,13 @@ pub fn state(
             state.initial_volume.push(v);
             state.elements[field::TEMPERATURE][index] = material.initial_temperature();
             state.elements[field::RELATIVE_VOLUME][index] = 1.0;
+            state.elements[field::ENERGY][index] = material.initial_energy();
+            state.elements[field::PRESSURE][index] = material.initial_pressure();
+            if let Some(speed) = material.detonation_speed() {
+                let centre = std::array::from_fn(|a| corners.iter().map(|x| x[a]).sum::<f64>() * 0.125);
+                state.elements[field::TIME_TO_LIGHT][index] =
+                    lighting_time(&setup.detonations, centre, speed);
+            }
             mass_of.push(material.density * v);
         }
     }
@@ -70,9 +80,11 @@ pub fn state(
 
 /// The quanta of a run's sums, from the deck's data alone.
 ///
-/// Force: `F_ref = A max(K + 4G/3, rho v^2)` with A the largest initial face, 42 bits. Energy: the initial kinetic
-/// energy plus a thousandth of the bulk modulus over the whole volume, 46 bits. Momentum: all mass at the greatest
-/// initial or prescribed speed, or a thousandth of the fastest sound, 50 bits.
+/// Force: `F_ref = A max(K + 4G/3, rho v^2)` with A the largest initial face, 42 bits; the bulk modulus K of a gas is
+/// more than its pressure at the start, that of an explosive (`rho D^2`) more than the pressure of detonation. Energy:
+/// the initial kinetic energy plus, over the whole volume, a thousandth of the bulk modulus or the internal energy at
+/// the start, 46 bits. Momentum: all mass at the greatest initial or prescribed speed, a thousandth of the fastest
+/// sound, or the speed to which its internal energy at the start could bring a material, 50 bits.
 pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     let speed2 = state.v.iter().map(|v| v.iter().map(|c| c * c).sum::<f64>()).fold(0.0, f64::max);
     let prescribed2 = setup
@@ -81,17 +93,18 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         .map(|c| c.velocity.iter().map(|v| v.map_or(0.0, |v| v * v)).sum::<f64>())
         .fold(0.0, f64::max);
     let top_speed2 = speed2.max(prescribed2);
-    let (mut force, mut stored, mut sound) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut force, mut stored, mut sound, mut driven2) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
     let mut index = 0;
     for part in &mesh.parts {
         let material = &setup.materials[part.material as usize];
         let modulus = material.bulk() + 4.0 / 3.0 * material.shear();
         sound = sound.max((modulus / material.density).sqrt());
+        driven2 = driven2.max(2.0 * material.initial_energy() / material.density);
         let strength = modulus.max(material.density * top_speed2);
         for e in 0..part.n_elements() {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
             force = force.max(largest_face(&x) * strength);
-            stored += 1e-3 * material.bulk() * state.initial_volume[index];
+            stored += (1e-3 * material.bulk()).max(material.initial_energy()) * state.initial_volume[index];
             index += 1;
         }
     }
@@ -101,7 +114,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     Quanta {
         force: Quantum::for_reference(force, 42),
         energy: Quantum::for_reference(kinetic + stored, 46),
-        momentum: Quantum::for_reference(total_mass * top_speed2.sqrt().max(1e-3 * sound), 50),
+        momentum: Quantum::for_reference(total_mass * top_speed2.max(driven2).sqrt().max(1e-3 * sound), 50),
     }
 }
 

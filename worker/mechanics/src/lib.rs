@@ -19,12 +19,14 @@
 //! 6. votes (time step, displacement spread, energies) join the next frame.
 
 pub mod block;
+pub mod burn;
 pub mod contact;
 pub mod cycle;
 pub mod digest;
 pub mod element;
 mod eos;
 pub mod exact;
+mod failure;
 mod home;
 pub mod initial;
 pub mod lanes;

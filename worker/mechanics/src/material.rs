@@ -1,7 +1,10 @@
-//! Laws: a material is an equation of state and a strength law.
+//! Laws: a material is an equation of state, a strength law and a failure law.
 //!
-//! The enums hold constants only; the lane code that evaluates them stands in `eos/` and `strength/`, one
-//! file per law.
+//! The enums hold constants only; the lane code that evaluates them stands in `eos/`, `strength/` and `failure/`, one
+//! file per law. To add a law: a variant here with the units of its constants, a file beside the others of its kind
+//! (copy a neighbour: constants, the trait, tests of points and slopes), an arm in [`crate::block`]'s dispatch, a
+//! reader in the deck's `library.rs` and the powers of its units in `units.rs`, and an entry in the list of laws that
+//! the tests of bits run.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,8 +17,10 @@ pub struct Material {
     pub density: f64,
     /// Pressure from compression and energy.
     pub eos: Eos,
-    /// Deviatoric stress.
+    /// Deviatoric stress. Gases and products of detonation have none, whatever stands here.
     pub strength: Strength,
+    /// When and how an element breaks.
+    pub failure: Failure,
 }
 
 /// Equation of state: pressure from `mu = rho/rho0 - 1` and internal energy.
@@ -34,6 +39,50 @@ pub enum Eos {
         s: f64,
         /// Grueneisen coefficient Gamma0.
         gamma: f64,
+    },
+    /// With `mu = rho/rho0 - 1`: `a1 mu + a2 mu^2 + a3 mu^3 + (b0 + b1 mu) E` in compression,
+    /// `t1 mu + t2 mu^2 + b0 E` in tension, E per initial volume.
+    Polynomial {
+        /// A1 (stress): the bulk modulus.
+        a1: f64,
+        /// A2 (stress).
+        a2: f64,
+        /// A3 (stress).
+        a3: f64,
+        /// B0.
+        b0: f64,
+        /// B1.
+        b1: f64,
+        /// T1 (stress).
+        t1: f64,
+        /// T2 (stress).
+        t2: f64,
+    },
+    /// `p = (gamma - 1) rho e`.
+    IdealGas {
+        /// Ratio of specific heats.
+        gamma: f64,
+        /// Internal energy at the start (energy per mass).
+        energy: f64,
+    },
+    /// Products of detonation after Jones, Wilkins and Lee, lit by a programmed burn.
+    Jwl {
+        /// A (stress).
+        a: f64,
+        /// B (stress).
+        b: f64,
+        /// R1.
+        r1: f64,
+        /// R2.
+        r2: f64,
+        /// omega.
+        omega: f64,
+        /// Energy of detonation (energy per initial volume).
+        energy: f64,
+        /// Speed of detonation D (velocity).
+        detonation: f64,
+        /// Pressure of detonation (stress), that of the Chapman-Jouguet state.
+        cj_pressure: f64,
     },
 }
 
@@ -55,6 +104,17 @@ pub enum Strength {
         yield_stress: f64,
         /// `d Y / d plastic strain`.
         hardening: f64,
+        /// Factor for the strain rate.
+        rate: Option<CowperSymonds>,
+    },
+    /// Von Mises yield, the yield stress a line from point to point of the plastic strain and constant beyond.
+    Tabulated {
+        /// Shear modulus G (stress).
+        shear: f64,
+        /// Yield stress by plastic strain.
+        hardening: Hardening,
+        /// Factor for the strain rate.
+        rate: Option<CowperSymonds>,
     },
     /// `Y = (A + B e^n)(1 + C ln max(rate/rate0, 1))(1 - T*^m)`, `T* = (T - t_room)/(t_melt - t_room)` clamped
     /// to 0..1; T rises by plastic work over `density * specific_heat` (Johnson and Cook 1983).
@@ -82,22 +142,116 @@ pub enum Strength {
     },
 }
 
+/// Most points of a [`Hardening`].
+pub const MAX_HARDENING: usize = 10;
+
+/// Yield stress at growing plastic strains.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hardening {
+    /// Points in use, 1 to [`MAX_HARDENING`].
+    pub n_points: u32,
+    /// Effective plastic strain: the first is 0, the others ascend.
+    pub strain: [f64; MAX_HARDENING],
+    /// Yield stress there (stress), positive and not descending.
+    pub stress: [f64; MAX_HARDENING],
+}
+
+/// `1 + (rate / reference)^(1/exponent)`, a factor on the yield stress (Cowper and Symonds 1957).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CowperSymonds {
+    /// D, the rate that doubles the yield stress (1/time).
+    pub reference: f64,
+    /// q.
+    pub exponent: f64,
+}
+
+/// Failure law. A failed element bears neither tension nor shear, keeps its mass and its place in the mesh, and still
+/// resists compression. The stress falls in the cycle after the one in which the damage came to 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Failure {
+    /// Never.
+    None,
+    /// At an effective plastic strain.
+    PlasticStrain {
+        /// The strain.
+        limit: f64,
+    },
+    /// When the largest principal stress comes to a limit.
+    PrincipalStress {
+        /// The limit (stress, positive in tension).
+        tension: f64,
+    },
+    /// When the mean stress comes to a limit, which it does not pass.
+    Hydrostatic {
+        /// The limit (stress, positive in tension).
+        tension: f64,
+        /// Whether compression makes the element whole again, as in a fluid.
+        heals: bool,
+    },
+    /// Damage `sum of (plastic strain increment / e_f)`,
+    /// `e_f = (d1 + d2 exp(d3 eta))(1 + d4 ln max(rate/rate0, 1))(1 + d5 T*)`, `eta = -p / von Mises stress`
+    /// (Johnson and Cook 1985). `rate0` and the temperatures of T* are those of the Johnson-Cook strength; with another
+    /// strength both factors are 1.
+    JohnsonCook {
+        /// d1 to d5.
+        d: [f64; 5],
+    },
+}
+
 impl Material {
     /// Shear modulus G (stress); zero without strength.
     pub fn shear(&self) -> f64 {
+        if self.is_gas() {
+            return 0.0;
+        }
         match self.strength {
             Strength::Hydro => 0.0,
             Strength::Elastic { shear }
             | Strength::VonMises { shear, .. }
+            | Strength::Tabulated { shear, .. }
             | Strength::JohnsonCook { shear, .. } => shear,
         }
     }
 
-    /// Bulk modulus K of the undeformed material (stress).
+    /// Whether the equation of state is that of a gas, which has no strength.
+    pub fn is_gas(&self) -> bool {
+        matches!(self.eos, Eos::IdealGas { .. } | Eos::Jwl { .. })
+    }
+
+    /// Bulk modulus of the undeformed material (stress): K, `gamma p` of a gas at the start, `rho D^2` of an
+    /// explosive, which bounds the stiffness and the pressure of its products.
     pub fn bulk(&self) -> f64 {
         match self.eos {
             Eos::Linear { bulk } => bulk,
             Eos::Shock { c0, .. } => self.density * c0 * c0,
+            Eos::Polynomial { a1, .. } => a1,
+            Eos::IdealGas { gamma, .. } => gamma * self.initial_pressure(),
+            Eos::Jwl { detonation, .. } => self.density * detonation * detonation,
+        }
+    }
+
+    /// Internal energy at the start (energy per initial volume).
+    pub fn initial_energy(&self) -> f64 {
+        match self.eos {
+            Eos::IdealGas { energy, .. } => self.density * energy,
+            Eos::Jwl { energy, .. } => energy,
+            Eos::Linear { .. } | Eos::Shock { .. } | Eos::Polynomial { .. } => 0.0,
+        }
+    }
+
+    /// Pressure at the start (stress); an explosive has none before it is lit.
+    pub fn initial_pressure(&self) -> f64 {
+        match self.eos {
+            Eos::IdealGas { gamma, .. } => (gamma - 1.0) * self.initial_energy(),
+            _ => 0.0,
+        }
+    }
+
+    /// Speed of detonation of an explosive (velocity).
+    pub fn detonation_speed(&self) -> Option<f64> {
+        match self.eos {
+            Eos::Jwl { detonation, .. } => Some(detonation),
+            _ => None,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{contact, material::Material};
+use crate::{burn::Detonation, contact, material::Material};
 
 /// The rules of a run. Equal on every worker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,6 +17,8 @@ pub struct Setup {
     pub constraints: Vec<Constraint>,
     /// Planar rigid walls.
     pub walls: Vec<RigidWall>,
+    /// Where explosives are lit.
+    pub detonations: Vec<Detonation>,
 }
 
 /// What holds a node: prescribed velocities and walls. A node's constraint is the same on every holder.

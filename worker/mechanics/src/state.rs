@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 /// Element state fields in their order inside [`GlobalState::elements`] and inside a block.
 ///
 /// Deviatoric stress (zz is minus the sum of xx and yy), pressure, internal energy per initial volume,
-/// effective plastic strain, temperature, and current volume over initial volume.
-pub const FIELDS: [&str; 10] = [
+/// effective plastic strain, temperature, current volume over initial volume, damage, and the time until the
+/// detonation arrives.
+pub const FIELDS: [&str; 12] = [
     "stress_xx",
     "stress_yy",
     "stress_xy",
@@ -17,6 +18,8 @@ pub const FIELDS: [&str; 10] = [
     "plastic_strain",
     "temperature",
     "relative_volume",
+    "damage",
+    "time_to_light",
 ];
 
 /// Number of element state fields.
@@ -44,6 +47,11 @@ pub mod field {
     pub const TEMPERATURE: usize = 8;
     /// Volume over initial volume.
     pub const RELATIVE_VOLUME: usize = 9;
+    /// Damage, 0 (whole) to 1 (failed).
+    pub const DAMAGE: usize = 10;
+    /// Time until the detonation arrives (time), negative after that; runs down with the steps. Zero where nothing
+    /// burns.
+    pub const TIME_TO_LIGHT: usize = 11;
 }
 
 /// The whole state of a run at the start of a cycle. Node arrays by global node index, element arrays by

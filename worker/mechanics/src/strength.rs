@@ -1,16 +1,22 @@
 //! Strength laws on lanes: what becomes of a trial deviator.
 //!
 //! The element turns the deviatoric stress and adds the elastic increment `2 G dev(D) dt`; a law returns this
-//! trial to its yield surface and keeps the history. Lanes whose trial lies inside the surface come back
+//! trial to its yield surface and keeps the history. A new law is a file like its neighbours here: constants,
+//! [`StrengthLaw`], tests. Lanes whose trial lies inside the surface come back
 //! unchanged to the bit, so that leaving out the plastic branch for a set without yielding lanes changes nothing.
 
 use crate::lanes::Lane;
 
+pub(crate) mod cowper_symonds;
 pub(crate) mod elastic;
 pub(crate) mod johnson_cook;
+pub(crate) mod tabulated;
 pub(crate) mod von_mises;
 
-pub(crate) use {elastic::Elastic, elastic::Hydro, johnson_cook::JohnsonCook, von_mises::VonMises};
+pub(crate) use {
+    cowper_symonds::RateFactor, elastic::Elastic, elastic::Hydro, johnson_cook::JohnsonCook,
+    tabulated::Tabulated, von_mises::VonMises,
+};
 
 /// Deviatoric stress, or the deviator of the rate of deformation.
 #[derive(Clone, Copy)]

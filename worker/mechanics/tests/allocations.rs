@@ -9,7 +9,7 @@ use mechanics::{
     cycle::{Domain, Meter, Plan, Sets, Subdomain},
     initial,
     lanes::Width,
-    material::{Eos, Material, Strength},
+    material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
     piece::{Region, cut},
     setup::{Constraint, Control, Setup},
@@ -86,7 +86,13 @@ fn domain() -> Domain {
     };
     let eos = Eos::Shock { c0: 0.457, s: 1.49, gamma: 2.17 };
     let setup = Setup {
-        materials: vec![Material { name: "steel".into(), density: 7.9, eos, strength }],
+        materials: vec![Material {
+            name: "steel".into(),
+            density: 7.9,
+            eos,
+            strength,
+            failure: Failure::None,
+        }],
         control: Control {
             end_time: 1.0,
             end_cycle: 100,
@@ -101,6 +107,7 @@ fn domain() -> Domain {
         contact: None,
         constraints: vec![Constraint::default(), Constraint { velocity: [None, None, Some(0.0)], walls: 0 }],
         walls: Vec::new(),
+        detonations: Vec::new(),
     };
     let base = (cells[0] + 1) * (cells[1] + 1);
     let held: Vec<u16> = (0..n_nodes).map(|n| u16::from(n < base)).collect();

@@ -23,6 +23,7 @@ fn assign(cycle: u64) -> Box<Assign> {
             contact: None,
             constraints: Vec::new(),
             walls: Vec::new(),
+            detonations: Vec::new(),
         },
         n_parts: 1,
         quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },

@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     eos::EquationOfState,
+    failure::{FailureLaw, Loading},
     lanes::{Lane, SET, scalar::Scalar},
     state::{N_FIELDS, field},
     strength::{Deviator, History, Strain, StrengthLaw},
@@ -95,10 +96,11 @@ impl View<'_> {
 
 /// A material made ready for kernels.
 #[derive(Clone, Copy)]
-pub(crate) struct Laws<E, S> {
+pub(crate) struct Laws<E, S, F> {
     pub density: f64,
     pub eos: E,
     pub strength: S,
+    pub failure: F,
 }
 
 /// Running sums and extremes by lane. Sums are exact and extremes order-free, so lanes join in any way.
@@ -127,9 +129,9 @@ impl<L: Lane> Tally<L> {
 /// Sets are below the number of sets of the block, and every corner of every slot, phantoms included, is
 /// inside the node arrays with [`SET`] lanes behind it in a structured layout.
 #[inline(always)]
-pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw>(
+pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     view: &mut View<'_>,
-    laws: &Laws<E, S>,
+    laws: &Laws<E, S, F>,
     step: &Step,
     sets: &[Range<u32>],
     vote: &mut ElementVote,
@@ -149,7 +151,7 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw>(
             while lane < SET {
                 let slot = set as usize * SET + lane;
                 // SAFETY: handed on from the caller.
-                unsafe { slots::<L, E, S>(view, laws, step, slot, &mut tally, vote) };
+                unsafe { slots::<L, E, S, F>(view, laws, step, slot, &mut tally, vote) };
                 lane += L::N;
             }
         }
@@ -168,9 +170,9 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw>(
 /// # Safety
 /// As [`compute`].
 #[inline(always)]
-unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
+unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     view: &mut View<'_>,
-    laws: &Laws<E, S>,
+    laws: &Laws<E, S, F>,
     step: &Step,
     slot: usize,
     tally: &mut Tally<L>,
@@ -209,7 +211,11 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let volume_rate = gradient.x.x + gradient.y.y + gradient.z.z;
 
     // 2. Deviatoric stress: rotation, elastic increment, yield; its power.
+    let damage: L = if F::FAILS { view.state(slot, field::DAMAGE) } else { zero };
+    let failed = one.less_equal(damage);
     let mut history = History { plastic_strain: zero, temperature: zero };
+    let mut strain = Strain { rate: zero, increment: zero };
+    let mut plastic_before = zero;
     let mut stress = Deviator::zero();
     let mut deviatoric_power = zero;
     if S::DEVIATORIC {
@@ -240,16 +246,20 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
         // Half of the increment turns with the stress, half does not: second order in the spin.
         let half_increment = L::splat(laws.strength.shear() * step.dt);
         let turned = rotated(&rate.mul_add(half_increment, &before), &spin);
-        let trial = rate.mul_add(half_increment, &turned);
+        let mut trial = rate.mul_add(half_increment, &turned);
+        if F::FAILS {
+            trial = trial.scaled(L::select(failed, zero, one));
+        }
         if S::PLASTIC {
             history.plastic_strain = view.state(slot, field::PLASTIC_STRAIN);
+            plastic_before = history.plastic_strain;
         }
         if S::THERMAL {
             history.temperature = view.state(slot, field::TEMPERATURE);
         }
         let rate_square = rate.contract(&rate);
         let effective = (L::splat(2.0 / 3.0) * rate_square).sqrt();
-        let strain = Strain { rate: effective, increment: effective * dt };
+        strain = Strain { rate: effective, increment: effective * dt };
         stress = laws.strength.update(trial, strain, &mut history, alive);
         // The stress before, turned, is `turned` less its half of the increment.
         let turned_power = half_increment.neg_mul_add(rate_square, turned.contract(&rate));
@@ -283,11 +293,16 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     // The deviator works on the middle volume.
     let middle = at_mid.volume() * inverse_initial;
     let energy_before = (deviatoric_power * dt).mul_add(middle, energy_before);
-    let line = laws.eos.line(relative_volume);
+    let mut burnt = one;
+    let mut time_to_light = zero;
+    if E::BURNS {
+        let left = view.state::<L>(slot, field::TIME_TO_LIGHT) - dt;
+        (time_to_light, burnt) = laws.eos.burn(left, relative_volume, initial_volume);
+    }
+    let line = laws.eos.line(relative_volume, burnt);
     let energy = pressure_before.neg_mul_add(volume_change, energy_before);
-    let bulk = line
-        .stiffness(relative_volume, line.pressure(energy), energy)
-        .max(L::splat(laws.eos.least_stiffness()));
+    let bulk =
+        line.stiffness(relative_volume, line.pressure(energy), energy).max(laws.eos.least_stiffness(burnt));
     let stiffness = bulk + L::splat(4.0 / 3.0 * laws.strength.shear());
     let sound_square = stiffness * relative_volume * L::splat(1.0 / laws.density);
     let sound = sound_square.sqrt();
@@ -301,8 +316,20 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
     let viscosity = density * damping * closing;
 
     // 6. Energy and pressure together.
-    let energy = line.energy_after(energy_before, pressure_before, viscosity, volume_change);
-    let pressure = line.pressure(energy);
+    let mut energy = line.energy_after(energy_before, pressure_before, viscosity, volume_change);
+    let mut pressure = line.pressure(energy);
+    let mut damage_after = damage;
+    if F::FAILS {
+        let least = L::select(failed, zero, L::splat(laws.failure.least_pressure()));
+        let cut = pressure.less(least);
+        let resistance = half.mul_add(pressure_before + least, viscosity);
+        energy = L::select(cut, resistance.neg_mul_add(volume_change, energy_before), energy);
+        pressure = L::select(cut, least, pressure);
+        let plastic_strain = [plastic_before, history.plastic_strain];
+        let temperature = history.temperature;
+        let loading = Loading { stress, pressure, strain, plastic_strain, temperature };
+        damage_after = laws.failure.damage(damage, &loading);
+    }
 
     // 7. Which elements count.
     let check = energy + pressure + viscosity + hourglass.square() + stress.contract(&stress);
@@ -356,6 +383,12 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw>(
         }
         if S::THERMAL {
             view.set_state(slot, field::TEMPERATURE, history.temperature, active);
+        }
+        if F::FAILS {
+            view.set_state(slot, field::DAMAGE, damage_after, active);
+        }
+        if E::BURNS {
+            view.set_state(slot, field::TIME_TO_LIGHT, time_to_light, active);
         }
         view.set_state(slot, field::PRESSURE, pressure, active);
         view.set_state(slot, field::ENERGY, energy, active);

@@ -12,14 +12,14 @@ pub(crate) struct Linear {
 
 impl EquationOfState for Linear {
     #[inline(always)]
-    fn line<L: Lane>(&self, v: L) -> Line<L> {
+    fn line<L: Lane>(&self, v: L, _burnt: L) -> Line<L> {
         let bulk = L::splat(self.bulk);
         let zero = L::splat(0.0);
         Line { a: -(bulk * ln(v)), b: zero, slope_a: -(bulk / v), slope_b: zero }
     }
 
     #[inline(always)]
-    fn least_stiffness(&self) -> f64 {
-        0.1 * self.bulk
+    fn least_stiffness<L: Lane>(&self, _burnt: L) -> L {
+        L::splat(0.1 * self.bulk)
     }
 }

@@ -1,9 +1,9 @@
 //! Von Mises yield with linear isotropic hardening, returned radially.
 
-use super::{Deviator, History, Strain, StrengthLaw};
+use super::{Deviator, History, RateFactor, Strain, StrengthLaw};
 use crate::lanes::Lane;
 
-/// `Y = yield_stress + hardening * plastic strain`, not below zero.
+/// `Y = (yield_stress + hardening * plastic strain) * rate factor`, not below zero.
 #[derive(Clone, Copy)]
 pub(crate) struct VonMises {
     /// G (stress).
@@ -12,6 +12,8 @@ pub(crate) struct VonMises {
     pub yield_stress: f64,
     /// `d Y / d plastic strain` (stress).
     pub hardening: f64,
+    /// Factor for the strain rate.
+    pub rate: RateFactor,
 }
 
 impl StrengthLaw for VonMises {
@@ -29,20 +31,22 @@ impl StrengthLaw for VonMises {
     fn update<L: Lane>(
         &self,
         trial: Deviator<L>,
-        _strain: Strain<L>,
+        strain: Strain<L>,
         history: &mut History<L>,
         active: L::Mask,
     ) -> Deviator<L> {
         let sigma = (L::splat(1.5) * trial.contract(&trial)).sqrt();
-        let yield_stress = L::splat(self.hardening)
-            .mul_add(history.plastic_strain, L::splat(self.yield_stress))
+        let factor = self.rate.at(strain.rate);
+        let hardening = L::splat(self.hardening) * factor;
+        let yield_stress = hardening
+            .mul_add(history.plastic_strain, L::splat(self.yield_stress) * factor)
             .max(L::splat(0.0));
         let yields = yield_stress.less(sigma);
         if !L::any(L::both(yields, active)) {
             return trial;
         }
         let three_g = 3.0 * self.shear;
-        let slip = (sigma - yield_stress) / L::splat(three_g + self.hardening);
+        let slip = (sigma - yield_stress) / (L::splat(three_g) + hardening);
         let factor = L::splat(three_g).neg_mul_add(slip, sigma) / sigma;
         let zero = L::splat(0.0);
         history.plastic_strain = history.plastic_strain + L::select(yields, slip, zero);

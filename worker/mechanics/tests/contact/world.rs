@@ -3,7 +3,7 @@
 use mechanics::{
     contact::{Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, initial_pairs, sort},
     exact::Quantum,
-    material::{Eos, Material, Strength},
+    material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
 };
 
@@ -36,6 +36,7 @@ pub fn materials() -> Vec<Material> {
         density: 1.0,
         eos: Eos::Linear { bulk: BULK },
         strength: Strength::Hydro,
+        failure: Failure::None,
     }]
 }
 

@@ -4,7 +4,7 @@ use mechanics::{
     block::{Block, Piece},
     element::{ElementVote, Fault},
     lanes::Width,
-    material::Material,
+    material::{Failure, Material},
     mesh::{Part, Topology},
     state::{N_FIELDS, field},
 };
@@ -59,11 +59,16 @@ fn written_out(piece: &Piece) -> Piece {
     Piece { topology: Topology::Explicit { hexahedra }, ..piece.clone() }
 }
 
+/// Every law there is.
+fn with_gases() -> Vec<Material> {
+    all_laws().into_iter().chain(gases()).collect()
+}
+
 const SHAPES: [[u32; 3]; 5] = [[7, 5, 3], [1, 1, 3], [8, 2, 2], [3, 1, 1], [2, 9, 1]];
 
 #[test]
 fn every_width_and_both_topologies_give_the_same_bits_for_every_law() {
-    for (seed, material) in (1..).zip(all_laws()) {
+    for (seed, material) in (1..).zip(with_gases()) {
         for shape in SHAPES {
             let piece = stirred(&material, shape, seed);
             let reference = three_cycles(&piece, &material, Width::Scalar);
@@ -72,7 +77,7 @@ fn every_width_and_both_topologies_give_the_same_bits_for_every_law() {
                     println!("not compared: {error}");
                     continue;
                 }
-                let name = format!("{width}, {shape:?}, {:?}", material.strength);
+                let name = format!("{width}, {shape:?}, {material:?}");
                 assert!(three_cycles(&piece, &material, width) == reference, "{name}");
                 let explicit = written_out(&piece);
                 assert!(three_cycles(&explicit, &material, width) == reference, "explicit, {name}");
@@ -91,6 +96,32 @@ fn stirred_bodies_yield_in_part() {
             |e: usize| block.field(e, field::PLASTIC_STRAIN) > piece.fields[field::PLASTIC_STRAIN][e];
         let n = (0..105).filter(|&e| flowed(e)).count();
         assert!((10..95).contains(&n), "{n} of 105 flow");
+    }
+}
+
+#[test]
+fn stirred_bodies_are_whole_failed_unlit_burning_and_burnt_in_part() {
+    for material in with_gases() {
+        let failing = material.failure != Failure::None;
+        let burning = material.detonation_speed().is_some();
+        let piece = stirred(&material, [7, 5, 3], 5);
+        let count = |field: usize, low: f64, high: f64| {
+            piece.fields[field].iter().filter(|&&x| (low..high).contains(&x)).count()
+        };
+        if failing {
+            let (whole, failed) = (count(field::DAMAGE, 0.0, 0.001), count(field::DAMAGE, 1.0, 2.0));
+            assert!(whole > 10 && failed > 10 && whole + failed < 95, "{whole} {failed}");
+        }
+        if burning {
+            let (unlit, burnt) =
+                (count(field::TIME_TO_LIGHT, 3e-7, 1.0), count(field::TIME_TO_LIGHT, -1.0, -3.7e-6));
+            assert!(unlit > 10 && burnt > 5 && unlit + burnt < 95, "{unlit} {burnt}");
+        }
+        let mut block = Block::new(&piece);
+        compute(&mut block, &material, &full_step(2e-7), Width::best());
+        let changed = |field: usize| (0..105).any(|e| block.field(e, field) != piece.fields[field][e]);
+        assert_eq!(changed(field::TIME_TO_LIGHT), burning);
+        assert!(failing || !changed(field::DAMAGE));
     }
 }
 
@@ -123,7 +154,7 @@ fn half(piece: &Piece, cut: u32, low: bool) -> Piece {
 
 #[test]
 fn two_halves_add_to_the_whole() {
-    for (seed, material) in (11..).zip(all_laws()) {
+    for (seed, material) in (11..).zip(with_gases()) {
         let piece = stirred(&material, [9, 4, 3], seed);
         let step = full_step(2e-7);
         let mut whole = Block::new(&piece);
@@ -211,7 +242,7 @@ fn an_image_returns_to_the_bit() {
 
 #[test]
 fn phantoms_and_padding_touch_nothing() {
-    for material in all_laws() {
+    for material in with_gases() {
         for shape in SHAPES {
             let piece = stirred(&material, shape, 21);
             let step = full_step(2e-7);
@@ -233,7 +264,7 @@ fn phantoms_and_padding_touch_nothing() {
 
 #[test]
 fn a_preparing_pass_leaves_the_state_and_gives_the_forces_of_it() {
-    for material in all_laws() {
+    for material in with_gases() {
         let mut piece = stirred(&material, [3, 2, 2], 9);
         piece.v.fill([0.0; 3]);
         piece.x.iter_mut().flatten().for_each(|x| *x *= 0.99);
@@ -271,7 +302,7 @@ fn an_inverted_element_is_named_gives_no_force_and_keeps_its_state() {
 
 #[test]
 fn the_vote_is_the_least_of_the_elements_alone() {
-    for material in all_laws() {
+    for material in with_gases() {
         let mut piece = stirred(&material, [7, 5, 3], 41);
         piece.elements.iter_mut().for_each(|element| *element += 1000);
         let step = full_step(2e-7);

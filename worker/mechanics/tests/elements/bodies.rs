@@ -5,7 +5,7 @@ use mechanics::{
     element::{ElementVote, Step, hex8},
     exact::Quantum,
     lanes::Width,
-    material::{Eos, Material, Strength},
+    material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength},
     mesh::{Part, Topology},
     state::{N_FIELDS, field},
 };
@@ -33,7 +33,7 @@ pub const SKEWED: [[f64; 3]; 8] = [
 ];
 
 pub fn material(density: f64, eos: Eos, strength: Strength) -> Material {
-    Material { name: "test".into(), density, eos, strength }
+    Material { name: "test".into(), density, eos, strength, failure: Failure::None }
 }
 
 /// Elastic with a linear equation of state.
@@ -41,29 +41,76 @@ pub fn elastic(density: f64, bulk: f64, shear: f64) -> Material {
     material(density, Eos::Linear { bulk }, Strength::Elastic { shear })
 }
 
-/// Every strength law with every equation of state, steel-like in SI.
+/// Johnson-Cook strength, steel-like in SI.
+pub fn johnson_cook() -> Strength {
+    Strength::JohnsonCook {
+        shear: 81.8e9,
+        a: 350e6,
+        b: 275e6,
+        n: 0.36,
+        c: 0.022,
+        m: 1.03,
+        t_melt: 1811.0,
+        t_room: 300.0,
+        specific_heat: 452.0,
+        rate0: 1.0,
+    }
+}
+
+/// Hardening by a table of three points, doubled at a rate of 40 per second.
+pub fn tabulated() -> Strength {
+    let mut hardening = Hardening { n_points: 3, strain: [0.0; MAX_HARDENING], stress: [0.0; MAX_HARDENING] };
+    hardening.strain[..3].copy_from_slice(&[0.0, 0.05, 0.3]);
+    hardening.stress[..3].copy_from_slice(&[2e8, 3e8, 3.5e8]);
+    Strength::Tabulated {
+        shear: 81.8e9,
+        hardening,
+        rate: Some(CowperSymonds { reference: 40.4, exponent: 5.0 }),
+    }
+}
+
+/// Every law of solids and liquids, steel-like in SI: each equation of state with each of the first strength laws, then
+/// the other strength laws and the failure laws once each.
 pub fn all_laws() -> Vec<Material> {
     let shear = 81.8e9;
-    let strengths = [
-        Strength::Hydro,
-        Strength::Elastic { shear },
-        Strength::VonMises { shear, yield_stress: 4e8, hardening: 1e9 },
-        Strength::JohnsonCook {
-            shear,
-            a: 350e6,
-            b: 275e6,
-            n: 0.36,
-            c: 0.022,
-            m: 1.03,
-            t_melt: 1811.0,
-            t_room: 300.0,
-            specific_heat: 452.0,
-            rate0: 1.0,
-        },
-    ];
-    let equations = [Eos::Linear { bulk: 164e9 }, Eos::Shock { c0: 4569.0, s: 1.49, gamma: 2.17 }];
-    let pairs = strengths.iter().flat_map(|&s| equations.map(|e| (e, s)));
-    pairs.map(|(eos, strength)| material(7896.0, eos, strength)).collect()
+    let von_mises = |rate| Strength::VonMises { shear, yield_stress: 4e8, hardening: 1e9, rate };
+    let strengths = [Strength::Hydro, Strength::Elastic { shear }, von_mises(None), johnson_cook()];
+    let (linear, shock) = (Eos::Linear { bulk: 164e9 }, Eos::Shock { c0: 4569.0, s: 1.49, gamma: 2.17 });
+    let polynomial =
+        Eos::Polynomial { a1: 164e9, a2: 294e9, a3: 500e9, b0: 2.0, b1: 1.5, t1: 164e9, t2: 50e9 };
+    let pairs = strengths.iter().flat_map(|&s| [linear, shock].map(|e| (e, s)));
+    let mut materials: Vec<Material> = pairs.map(|(eos, strength)| material(7896.0, eos, strength)).collect();
+    let mut add = |eos, strength, failure| {
+        materials.push(Material { failure, ..material(7896.0, eos, strength) });
+    };
+    add(polynomial, von_mises(Some(CowperSymonds { reference: 40.4, exponent: 5.0 })), Failure::None);
+    add(polynomial, Strength::Hydro, Failure::Hydrostatic { tension: 2e8, heals: true });
+    add(linear, tabulated(), Failure::None);
+    add(shock, tabulated(), Failure::PlasticStrain { limit: 0.4 });
+    add(linear, Strength::Elastic { shear }, Failure::PrincipalStress { tension: 3e8 });
+    add(shock, von_mises(None), Failure::Hydrostatic { tension: 2e8, heals: false });
+    add(shock, johnson_cook(), Failure::JohnsonCook { d: [0.05, 0.3, -2.12, 0.002, 0.61] });
+    materials
+}
+
+/// Air and products of TNT in SI.
+pub fn gases() -> Vec<Material> {
+    vec![material(1.225, Eos::IdealGas { gamma: 1.4, energy: 2.068e5 }, Strength::Hydro), tnt()]
+}
+
+/// TNT in SI.
+pub fn tnt() -> Material {
+    let eos = Eos::Jwl {
+        a: 371.2e9,
+        b: 3.231e9,
+        r1: 4.15,
+        r2: 0.95,
+        omega: 0.30,
+        energy: 7.0e9,
+        detonation: 6930.0,
+        cj_pressure: 21.0e9,
+    };
+    material(1630.0, eos, Strength::Hydro)
 }
 
 /// Reproducible draws between -0.5 and 0.5.
@@ -102,6 +149,8 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
     let mut fields: [Vec<f64>; N_FIELDS] = std::array::from_fn(|_| vec![0.0; n_elements]);
     fields[field::RELATIVE_VOLUME].fill(1.0);
     fields[field::TEMPERATURE].fill(material.initial_temperature());
+    fields[field::ENERGY].fill(material.initial_energy());
+    fields[field::PRESSURE].fill(material.initial_pressure());
     Piece {
         part: 0,
         material: 0,
@@ -153,13 +202,22 @@ pub fn stirred(material: &Material, cells: [u32; 3], seed: u64) -> Piece {
                 set(component, 4e8 * draws.next());
             }
         }
-        set(field::ENERGY, 1e7 * (draws.next() + 0.5));
+        set(field::ENERGY, material.initial_energy() + 1e7 * (draws.next() + 0.5));
         set(field::RELATIVE_VOLUME, 1.0 + 0.01 * draws.next());
-        if matches!(material.strength, Strength::VonMises { .. } | Strength::JohnsonCook { .. }) {
+        if material.failure != Failure::None {
+            // Some are whole, some failed.
+            set(field::DAMAGE, (3.0 * draws.next()).clamp(0.0, 1.0));
+        }
+        if material.detonation_speed().is_some() {
+            // Some are not lit yet, some burn, some have burnt.
+            set(field::TIME_TO_LIGHT, 1e-5 * draws.next());
+        }
+        use Strength::{JohnsonCook, Tabulated, VonMises};
+        if matches!(material.strength, VonMises { .. } | Tabulated { .. } | JohnsonCook { .. }) {
             // Some are virgin and cold.
             let strain = draws.next().max(0.0);
             set(field::PLASTIC_STRAIN, strain);
-            if matches!(material.strength, Strength::JohnsonCook { .. }) {
+            if matches!(material.strength, JohnsonCook { .. }) {
                 set(field::TEMPERATURE, 300.0 + 800.0 * strain);
             }
         }

@@ -202,7 +202,7 @@ fn simple_shear_follows_the_jaumann_rate() {
 fn uniaxial_strain_yields_hardens_by_volume_and_unloads_as_the_book_says() {
     let (young, poisson): (f64, f64) = (210e9, 0.3);
     let (bulk, shear) = (young / 3.0 / (1.0 - 2.0 * poisson), young / 2.0 / (1.0 + poisson));
-    let strength = Strength::VonMises { shear, yield_stress: 400e6, hardening: 0.0 };
+    let strength = Strength::VonMises { shear, yield_stress: 400e6, hardening: 0.0, rate: None };
     let material = material(7850.0, Eos::Linear { bulk }, strength);
     let mut block = Block::new(&one(&material, &UNIT_CUBE));
     let dt = 1e-6;

@@ -4,3 +4,5 @@ mod bits;
 mod bodies;
 mod book;
 mod energy;
+mod laws;
+mod waves;

@@ -1,0 +1,145 @@
+//! Thin structures of solid elements under impulses, and the tones of a cantilever.
+
+use mechanics::setup::Constraint;
+
+use crate::{
+    case::Sheet,
+    solve::{Solved, model, run},
+};
+
+/// An inch (m), and a pound of force per square inch (Pa).
+const INCH: f64 = 0.0254;
+const PSI: f64 = 6_894.757_293_168;
+/// lbf s2/in4 in kg/m3.
+const DENSITY: f64 = PSI / (INCH * INCH);
+
+/// A linear-elastic, perfectly plastic material.
+fn perfectly_plastic(density: f64, young: f64, poisson: f64, yield_stress: f64) -> String {
+    let bulk = young / (3.0 * (1.0 - 2.0 * poisson));
+    let shear = young / (2.0 * (1.0 + poisson));
+    format!(
+        "{{ density = {density:e}, eos = {{ type = \"linear\", bulk = {bulk:e} }}, strength = {{ type = \"von-mises\", \
+         shear = {shear:e}, yield_stress = {yield_stress:e} }} }}"
+    )
+}
+
+/// How far the node of a gauge has gone against an axis: the greatest, and all by time.
+fn deflections(solved: &Solved, gauge: usize, axis: usize) -> (f64, Vec<(f64, f64)>) {
+    let start = solved.model.mesh.positions[solved.model.output.gauges[gauge].node as usize][axis];
+    let path: Vec<(f64, f64)> =
+        solved.rows.iter().map(|row| (row.time + row.dt, start - row.gauges[gauge].x[axis])).collect();
+    (path.iter().map(|(_, d)| *d).fold(0.0, f64::max), path)
+}
+
+/// Balmer and Witmer's panel: 120 degrees of a cylinder, straight edges clamped, ends hinged, explosively thrown
+/// inward over 60 degrees and 10.205 in from one end. Half of it, with 4 elements through the thickness.
+pub(super) fn the_impulsive_panel_is_dented_as_deep_as_measured(sheet: &mut Sheet) {
+    let (radius, thickness, length) = (2.9375 * INCH, 0.125 * INCH, 12.56 * INCH);
+    let material = perfectly_plastic(2.5e-4 * DENSITY, 10.5e6 * PSI, 0.33, 44_000.0 * PSI);
+    let deck = format!(
+        "title = \"impulsive panel\"\nunits = \"SI\"\n[control]\nend_time = 600e-6\nlinear_viscosity = 0.06\nhourglass = 0.03\n\
+         [[part]]\nname = \"panel\"\nmaterial = {material}\n\
+         tube = {{ base = [0, 0, 0], inner_radius = {:e}, outer_radius = {:e}, length = {length:e}, start_degrees = 30, \
+         angle_degrees = 60, cells = [4, 32, 64] }}\n\
+         [[boundary]]\ntype = \"fixed\"\nparts = [\"panel\"]\nface = \"j-min\"\n\
+         [[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n\
+         [[gauge]]\nname = \"middle\"\npoint = [0, {radius:e}, {:e}]\n\
+         [[gauge]]\nname = \"three quarters\"\npoint = [0, {radius:e}, {:e}]\n",
+        radius - 0.5 * thickness,
+        radius + 0.5 * thickness,
+        0.5 * length,
+        9.42 * INCH
+    );
+    let mut model = model(&deck);
+    let clamped = model
+        .setup
+        .constraints
+        .iter()
+        .position(|c| c.velocity == [Some(0.0); 3])
+        .expect("the straight edge is clamped") as u16;
+    // Hinged: held across the panel, free to slide along it.
+    let hinged = model.setup.constraints.len() as u16;
+    model.setup.constraints.push(Constraint { velocity: [Some(0.0), Some(0.0), None], walls: 0 });
+    for n in 0..model.mesh.n_nodes() {
+        let [x, y, z] = model.mesh.positions[n];
+        let (r, angle) = (x.hypot(y), x.atan2(y).to_degrees());
+        let near = 1e-6 * INCH;
+        if (r - radius).abs() < near && (z < near || z > length - near) {
+            model.constraint[n] = hinged;
+        } else if angle.abs() <= 30.0 + 1e-6 && z <= 10.205 * INCH && model.constraint[n] != clamped {
+            model.velocity[n] = [-5650.0 * INCH * x / r, -5650.0 * INCH * y / r, 0.0];
+        }
+    }
+    let solved = run(model);
+    for (gauge, name) in [(0, "half way"), (1, "at three quarters")] {
+        let (greatest, _) = deflections(&solved, gauge, 1);
+        sheet.add(&format!("impulsive panel @ {name}, deflection (in)"), greatest / INCH);
+    }
+    sheet.add("impulsive panel: energy error", solved.outcome.ledger.last.error);
+}
+
+/// A clamped beam of 10 x 1.2 x 0.125 in, its middle 2 in thrown at 5,000 in/s; a quarter of it.
+pub(super) fn the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds(sheet: &mut Sheet) {
+    let material = perfectly_plastic(2.61e-4 * DENSITY, 10.4e6 * PSI, 0.3, 41_400.0 * PSI);
+    let deck = format!(
+        "title = \"impulsive beam\"\nunits = \"SI\"\n[control]\nend_time = 2e-3\nlinear_viscosity = 0.06\nhourglass = 0.03\n\
+         [[part]]\nname = \"beam\"\nmaterial = {material}\n\
+         box = {{ origin = [0, 0, 0], size = [{:e}, {:e}, {:e}], cells = [80, 6, 4] }}\n\
+         [[boundary]]\ntype = \"fixed\"\nparts = [\"beam\"]\nface = \"i-max\"\n\
+         [[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"y\"\n\
+         [[gauge]]\nname = \"middle\"\npoint = [0, 0, {:e}]\n",
+        5.0 * INCH,
+        0.6 * INCH,
+        0.125 * INCH,
+        0.0625 * INCH
+    );
+    let mut model = model(&deck);
+    for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
+        if x[0] <= (1.0 + 1e-6) * INCH {
+            v[2] = -5000.0 * INCH;
+        }
+    }
+    let solved = run(model);
+    let (greatest, path) = deflections(&solved, 0, 2);
+    let peak_at = path.iter().find(|(_, d)| *d == greatest).map_or(0.0, |(t, _)| *t);
+    let after: Vec<f64> = path.iter().filter(|(t, _)| *t > 1.5 * peak_at).map(|(_, d)| *d).collect();
+    sheet.add("impulsive beam: greatest deflection (in)", greatest / INCH);
+    sheet.add(
+        "impulsive beam: mean deflection afterwards (in)",
+        after.iter().sum::<f64>() / after.len() as f64 / INCH,
+    );
+}
+
+/// A cantilever of 0.2 m with a section of 10 mm square, four elements high, without hourglass control.
+pub(super) fn a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness(sheet: &mut Sheet) {
+    let deck = "title = \"cantilever\"\nunits = \"SI\"\n[control]\nend_time = 0.016\nlinear_viscosity = 0\nquadratic_viscosity = 0\n\
+         hourglass = 0\n[output]\nhistory_cycles = 10\n\
+         [[part]]\nname = \"beam\"\nmaterial = { density = 8000, eos = { type = \"linear\", bulk = 166.66666666666666e9 }, \
+         strength = { type = \"elastic\", shear = 76.92307692307692e9 } }\n\
+         box = { origin = [0, 0, 0], size = [0.2, 0.01, 0.01], cells = [80, 4, 4] }\n\
+         [[boundary]]\ntype = \"fixed\"\nparts = [\"beam\"]\nface = \"i-min\"\n\
+         [[gauge]]\nname = \"tip\"\npoint = [0.2, 0.005, 0.005]\n";
+    let mut model = model(deck);
+    // The first mode of a clamped-free beam: beta L = 1.8751.
+    let (beta, ratio) = (1.875_104_068_711_961, 0.734_095_513_756_963_2);
+    let shape =
+        |s: f64| (beta * s).cosh() - (beta * s).cos() - ratio * ((beta * s).sinh() - (beta * s).sin());
+    for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
+        if x[0] > 0.0 {
+            v[2] = 1e-3 * shape(x[0] / 0.2);
+        }
+    }
+    let solved = run(model);
+    // Displacement of the tip passes through 0 twice a period.
+    let start = solved.model.mesh.positions[solved.model.output.gauges[0].node as usize][2];
+    let path: Vec<(f64, f64)> =
+        solved.rows.iter().map(|row| (row.time + row.dt, row.gauges[0].x[2] - start)).collect();
+    let zeros: Vec<f64> = path
+        .windows(2)
+        .filter(|w| w[0].1 * w[1].1 < 0.0)
+        .map(|w| w[0].0 + (w[1].0 - w[0].0) * w[0].1 / (w[0].1 - w[1].1))
+        .collect();
+    assert!(zeros.len() >= 4, "{} passages", zeros.len());
+    let periods = 0.5 * (zeros.len() - 1) as f64;
+    sheet.add("cantilever: frequency (Hz)", periods / (zeros[zeros.len() - 1] - zeros[0]));
+}
