@@ -87,6 +87,7 @@ fn random(seed: u64) -> impl FnMut(u64) -> u64 {
 #[test]
 fn a_loss_at_any_instant_changes_no_bit() {
     let (one, written, arrivals) = undisturbed();
+    let (mut lost, mut midway) = (0, 0);
     for seed in 0..60 {
         let mut draw = random(seed);
         let route = [Route::Master, Route::Direct][draw(2) as usize];
@@ -112,8 +113,12 @@ fn a_loss_at_any_instant_changes_no_bit() {
             if keep == Keep::Cycles(1) {
                 assert!(loss.cycle - loss.back_to < 20, "{name}: {loss:?}");
             }
+            lost += 1;
+            midway += usize::from(loss.back_to > 0);
         }
     }
+    println!("{lost} workers lost in 60 runs, {midway} times the run went back to a state on its way");
+    assert!(lost >= 60 && midway >= 15, "{lost} losses, {midway} to a state on the way");
 }
 
 #[test]
