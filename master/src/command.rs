@@ -3,7 +3,11 @@
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use protocol::{request::JobOptions, tls};
+use protocol::{
+    request::{JobOptions, RouteChoice},
+    shape::Rate,
+    tls,
+};
 
 /// Explicit Lagrangian impact simulation on whatever PCs a lab has.
 #[derive(Debug, Parser)]
@@ -87,15 +91,18 @@ pub enum Command {
 /// How partial forces travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Route {
+    /// Direct with two workers or more that all take peers, else master
+    Auto,
     /// All through the master, which adds them
     Master,
     /// From worker to worker; votes and orders pass the master
     Direct,
 }
 
-impl From<Route> for protocol::message::Route {
+impl From<Route> for RouteChoice {
     fn from(route: Route) -> Self {
         match route {
+            Route::Auto => Self::Auto,
             Route::Master => Self::Master,
             Route::Direct => Self::Direct,
         }
@@ -147,7 +154,7 @@ impl Lanes {
 #[derive(Args, Clone, Debug)]
 pub struct JobArgs {
     /// Route of the shared-node forces
-    #[arg(long, value_enum, default_value = "master")]
+    #[arg(long, value_enum, default_value = "auto")]
     pub route: Route,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
     #[arg(long)]
@@ -193,6 +200,7 @@ impl JobArgs {
             min_workers: 1,
             balance: self.balance.into(),
             keep_every: (self.keep_every > 0.0).then_some(self.keep_every),
+            trace: false,
         }
     }
 }
@@ -223,6 +231,9 @@ pub struct RunArgs {
     /// Replace the results in an existing folder
     #[arg(long)]
     pub force: bool,
+    /// Write what every worker did in its last cycles as a trace that Perfetto opens
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Print the summary alone, as JSON, on standard output
     #[arg(long)]
     pub json: bool,
@@ -243,9 +254,15 @@ pub struct SimulateArgs {
     /// Print the cluster file's tables instead of one run
     #[arg(long)]
     pub table: bool,
-    /// What tells the time: costs and messages, replayed
+    /// What tells the time: a replay of costs and messages, or threads, links and a real clock
     #[arg(long, value_enum, default_value = "virtual")]
     pub clock: Clock,
+    /// Real seconds by emulated second, for --clock real [default: such that tasks rarely overrun]
+    #[arg(long, value_name = "X")]
+    pub dilation: Option<f64>,
+    /// Use only so many hosts, the first of the file
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "table")]
+    pub hosts: Option<u32>,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u64).range(4..))]
     pub cycles: u64,
@@ -268,6 +285,8 @@ pub struct SimulateArgs {
 pub enum Clock {
     /// Costs and messages, replayed: the same figures on every machine
     Virtual,
+    /// Workers on threads, frames over shaped loopback links, both stretched to the emulated speed
+    Real,
 }
 
 /// Flags of `master`.
@@ -282,6 +301,9 @@ pub struct MasterArgs {
     /// Folder for the results of jobs
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
+    /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
+    #[arg(long, value_name = "RATE")]
+    pub link: Option<Rate>,
 }
 
 /// Flags of `worker`.
@@ -308,6 +330,18 @@ pub struct WorkerArgs {
     /// End when the master ends the connection, instead of dialling again
     #[arg(long)]
     pub once: bool,
+    /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
+    #[arg(long, value_name = "RATE")]
+    pub link: Option<Rate>,
+    /// Port for other workers, on the interface that leads to the master [default: any]
+    #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
+    pub peer_port: u16,
+    /// Port that other workers dial, where it is forwarded to --peer-port
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
+    pub peer_announce: Option<u16>,
+    /// Take no other workers and dial none: what it exchanges with them passes the master
+    #[arg(long, conflicts_with_all = ["peer_port", "peer_announce"])]
+    pub no_peers: bool,
 }
 
 /// How a client reaches a master, and how it prints.
@@ -335,6 +369,9 @@ pub struct SubmitArgs {
     /// Follow the job until it ends, then print its summary
     #[arg(long)]
     pub wait: bool,
+    /// Write trace.json into the results: what every worker did in its last cycles, for Perfetto
+    #[arg(long, conflicts_with = "no_output")]
+    pub trace: bool,
     /// The job
     #[command(flatten)]
     pub job: JobArgs,

@@ -3,9 +3,12 @@
 //! TLS if there are certificates, the greeting, then messages of a worker to its job's thread, or requests of a client
 //! to the [`desk`](crate::desk). Every fault ends this connection with one line in the log, and nothing else.
 
-use std::sync::{
-    Arc, Mutex,
-    atomic::{AtomicBool, AtomicU32, Ordering},
+use std::{
+    net::SocketAddr,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicU32, Ordering},
+    },
 };
 
 use protocol::{
@@ -15,6 +18,7 @@ use protocol::{
     link::{self, Receiver, Sender, Settings},
     message::ToMaster,
     order::{BULK_ON_THE_WAY, Inbox, Outbox},
+    shape::{Shape, Shaped},
     tls::{self, ServerConfig},
     wire,
 };
@@ -44,6 +48,8 @@ pub struct Gate {
     token: Option<String>,
     /// Certificates; none on loopback.
     tls: Option<Arc<ServerConfig>>,
+    /// This host's emulated port, which all connections pass.
+    port: Option<Shape>,
     /// The last incarnation that was given.
     incarnations: AtomicU32,
     ending: AtomicBool,
@@ -57,7 +63,15 @@ impl Gate {
         token: Option<String>,
         tls: Option<Arc<ServerConfig>>,
     ) -> Self {
-        Self { events, roles, token, tls, incarnations: AtomicU32::new(0), ending: AtomicBool::new(false) }
+        let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
+        Self { events, roles, token, tls, port: None, incarnations, ending }
+    }
+
+    /// All connections pass this emulated port.
+    #[must_use]
+    pub fn behind(mut self, port: Option<Shape>) -> Self {
+        self.port = port;
+        self
     }
 
     /// This side ends all connections from now on, so that their ends are no faults.
@@ -76,6 +90,7 @@ impl Gate {
     /// Why it ended, unless a client left.
     pub async fn take(self: Arc<Self>, stream: TcpStream, address: String) -> Result<()> {
         link::tune(&stream)?;
+        let stream = Shaped::new(stream, self.port.as_ref());
         match self.tls.clone() {
             None => self.serve(stream, address, None).await,
             Some(config) => {
@@ -147,6 +162,7 @@ impl Gate {
                 let seat = Seat {
                     hand: Hand { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
                     address: address.clone(),
+                    peer: peer_address(&address, hello.peer_port),
                     incarnation,
                     outbox: Arc::new(Mutex::new(Outbox::new(sender.clone(), 0))),
                     route: Arc::clone(&route),
@@ -167,6 +183,12 @@ impl Gate {
         let _ = self.events.send(Event::Left { incarnation, why: error.to_string() }).await;
         Err(error)
     }
+}
+
+/// Where other workers find one that calls from `address` and takes peers on `port`; none if it takes none.
+fn peer_address(address: &str, port: u16) -> Option<SocketAddr> {
+    let caller: SocketAddr = address.parse().ok().filter(|_| port != 0)?;
+    Some(SocketAddr::new(caller.ip(), port))
 }
 
 /// Hands a worker's messages to its job; ends with the link.

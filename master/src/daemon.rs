@@ -18,6 +18,7 @@ use std::{
 use protocol::{
     handshake::{Hello, Role},
     request::{Ended, HostRow, JobOptions, State, Status},
+    shape::{Shape, Wire},
     tls,
 };
 use tokio::{
@@ -101,6 +102,7 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
+    let port = args.link.map(|rate| Shape::port(Wire::ethernet(rate)));
     let first = first_job(&args.spool)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -113,7 +115,8 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         let address = listener.local_addr().map_err(|e| e.to_string())?;
         announce(address, tls.is_some());
         let (events, heard) = mpsc::channel(WAITING_EVENTS);
-        let gate = Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls));
+        let gate =
+            Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls).behind(port));
         tokio::spawn(listen(listener, Arc::clone(&gate)));
         let stop = crate::run::stop_on_interrupt("ending; the job under way writes its results");
         Owner::new(args.spool.clone(), first, events).run(heard, &stop, &gate).await;

@@ -5,6 +5,7 @@
 
 use std::{
     collections::VecDeque,
+    net::SocketAddr,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex, PoisonError,
@@ -27,6 +28,7 @@ use crate::{
     embedded::{Sink, Traffic, timed_sort},
     event::{Action, Event, Hand, Outcome},
     job::{Bench, Job},
+    peers,
     sort::Sorted,
 };
 
@@ -59,6 +61,8 @@ pub struct Seat {
     pub hand: Hand,
     /// Where it calls from.
     pub address: String,
+    /// Where it takes other workers, if it does.
+    pub peer: Option<SocketAddr>,
     /// Its connection.
     pub incarnation: u32,
     /// The way to it.
@@ -68,7 +72,8 @@ pub struct Seat {
 }
 
 impl Seat {
-    fn send(&self, place: Place, message: &ToWorker) -> protocol::Result<()> {
+    /// Queues a message to it.
+    pub(crate) fn send(&self, place: Place, message: &ToWorker) -> protocol::Result<()> {
         let packed = wire::pack_to_worker(message)?;
         self.outbox.lock().unwrap_or_else(PoisonError::into_inner).send(place, packed)
     }
@@ -172,6 +177,7 @@ pub fn drive(
     for seat in seats {
         driver.seat(seat.clone());
     }
+    driver.introduce();
     let result = driver.run(first, sink, stop);
     for seat in &driver.seats {
         seat.route.close();
@@ -181,7 +187,10 @@ pub fn drive(
         }
     }
     let bytes = driver.seats.iter().map(Seat::bytes).sum::<u64>() - driver.bytes_before;
-    result.map(|outcome| (outcome, Traffic { bytes, sort_ns: driver.sort_ns }))
+    result.map(|outcome| {
+        let peer_bytes = outcome.reports.iter().map(|report| report.peer_bytes).sum();
+        (outcome, Traffic { bytes: bytes + peer_bytes, peer_bytes, sort_ns: driver.sort_ns })
+    })
 }
 
 struct Driver {
@@ -210,6 +219,15 @@ impl Driver {
             self.lost.push_back((index, why));
         }
         self.seats.push(seat);
+    }
+
+    /// Tells the epoch's workers where they find each other, before they are dealt their work.
+    fn introduce(&mut self) {
+        if self.job.route() == protocol::message::Route::Direct {
+            let crew: Vec<(usize, &Seat)> =
+                self.job.crew().iter().map(|&index| (index, &self.seats[index])).collect();
+            self.lost.extend(peers::introduce(&crew, self.place));
+        }
     }
 
     fn run(&mut self, first: Vec<Action>, sink: &mut dyn Sink, stop: &AtomicBool) -> Result<Outcome, String> {
@@ -286,7 +304,10 @@ impl Driver {
     }
 
     fn act(&mut self, actions: Vec<Action>, sink: &mut dyn Sink) -> Result<(), String> {
-        self.place.epoch = self.job.epoch();
+        if self.place.epoch != self.job.epoch() {
+            self.place.epoch = self.job.epoch();
+            self.introduce();
+        }
         for action in actions {
             match action {
                 Action::Send(worker, message) => {

@@ -5,7 +5,7 @@
 //! task of a worker at a time.
 
 use std::{
-    collections::VecDeque,
+    collections::{BTreeMap, VecDeque},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -15,10 +15,15 @@ use std::{
 };
 
 use mechanics::cycle::Meter;
-use protocol::wire::{self, Packed};
+use protocol::{
+    message::{ToMaster, ToPeer},
+    phase::{Phase, Report},
+    wire::{self, Packed},
+};
 use worker::{
     compute::{Machine, ThreadClock},
     session::{self, Session, Task},
+    stopwatch::{Lap, Stopwatch},
 };
 
 use crate::{
@@ -41,6 +46,8 @@ pub trait Sink {
 pub struct Traffic {
     /// Bytes of all messages with their headers.
     pub bytes: u64,
+    /// Of these, bytes that passed from worker to worker.
+    pub peer_bytes: u64,
     /// Thread-CPU time of sorts (ns).
     pub sort_ns: u64,
 }
@@ -70,11 +77,30 @@ struct Place {
     /// Away while a task runs.
     machine: Option<Box<Machine>>,
     lost: bool,
+    stopwatch: Stopwatch,
+    /// Of this epoch: bytes sent to each neighbour.
+    peers: (u32, BTreeMap<u32, u64>),
 }
 
 impl Place {
     fn new() -> Self {
-        Self { session: Session::new(), machine: Some(Box::default()), lost: false }
+        Self {
+            session: Session::new(),
+            machine: Some(Box::default()),
+            stopwatch: Stopwatch::new(),
+            lost: false,
+            peers: (0, BTreeMap::new()),
+        }
+    }
+
+    fn report(&self) -> Report {
+        let (epoch, peers) = &self.peers;
+        let now = *epoch == self.session.epoch();
+        Report {
+            peer_bytes: peers.values().sum(),
+            linked: if now { peers.keys().copied().collect() } else { Vec::new() },
+            ..self.stopwatch.report()
+        }
     }
 }
 
@@ -205,8 +231,12 @@ impl Host {
                         self.step(worker, session::Event::Peer(from, message))?;
                     }
                 }
-                Arrival::Done(worker, machine, outcome) => {
-                    self.places[worker].machine = Some(machine);
+                Arrival::Done(worker, mut machine, outcome) => {
+                    let place = &mut self.places[worker];
+                    for lap in machine.take_laps() {
+                        place.stopwatch.book(place.session.cycle(), lap);
+                    }
+                    place.machine = Some(machine);
                     self.step(worker, session::Event::Done(outcome))?;
                 }
                 Arrival::Sorted(sorted, ns) => {
@@ -252,25 +282,16 @@ impl Host {
         let epoch = place.session.epoch();
         for action in actions {
             match action {
-                session::Action::Send(message) => {
-                    let worked = self.places[worker].machine.as_ref().map(|m| m.work()).unwrap_or_default();
-                    let packed = wire::pack_to_master(&message.stamped(worked)).map_err(|e| e.to_string())?;
-                    self.traffic.bytes += packed.wire_bytes();
-                    self.queue.push_back(Arrival::ToMaster(worker, epoch, packed));
-                }
-                session::Action::SendPeer(to, message) => {
-                    // Of an epoch that is over, there is nobody to hear it.
-                    if epoch != self.job.epoch() {
-                        continue;
+                session::Action::Send(message) => self.timed(worker, |host| {
+                    if let ToMaster::Image { last: Some(_), .. } = message {
+                        let report = Box::new(host.places[worker].report());
+                        host.send(worker, epoch, &ToMaster::Report(report))?;
                     }
-                    let crew = self.job.crew();
-                    let from = crew.iter().position(|&member| member == worker);
-                    let (Some(from), Some(&to)) = (from, crew.get(to as usize)) else {
-                        return Err(format!("worker {worker} writes to {to}, there are {}", crew.len()));
-                    };
-                    let packed = wire::pack_to_peer(&message);
-                    self.traffic.bytes += packed.wire_bytes();
-                    self.queue.push_back(Arrival::ToPeer(from as u32, to, epoch, packed));
+                    let worked = host.places[worker].machine.as_ref().map(|m| m.work()).unwrap_or_default();
+                    host.send(worker, epoch, &message.stamped(worked))
+                })?,
+                session::Action::SendPeer(to, message) => {
+                    self.timed(worker, |host| host.send_peer(worker, epoch, to, &message))?;
                 }
                 session::Action::Compute(task) => self.compute(worker, task)?,
                 session::Action::Forget => {
@@ -281,6 +302,49 @@ impl Host {
             }
         }
         Ok(())
+    }
+
+    fn send_peer(&mut self, worker: usize, epoch: u32, to: u32, message: &ToPeer) -> Result<(), String> {
+        // Of an epoch that is over, there is nobody to hear it.
+        if epoch != self.job.epoch() {
+            return Ok(());
+        }
+        let crew = self.job.crew();
+        let from = crew.iter().position(|&member| member == worker);
+        let (Some(from), Some(&member)) = (from, crew.get(to as usize)) else {
+            return Err(format!("worker {worker} writes to {to}, there are {}", crew.len()));
+        };
+        let packed = wire::pack_to_peer(message);
+        let bytes = packed.wire_bytes();
+        self.traffic.bytes += bytes;
+        self.traffic.peer_bytes += bytes;
+        let (of, sent) = &mut self.places[worker].peers;
+        if std::mem::replace(of, epoch) != epoch {
+            sent.clear();
+        }
+        *sent.entry(to).or_default() += bytes;
+        self.queue.push_back(Arrival::ToPeer(from as u32, member, epoch, packed));
+        Ok(())
+    }
+
+    fn send(&mut self, worker: usize, epoch: u32, message: &ToMaster) -> Result<(), String> {
+        let packed = wire::pack_to_master(message).map_err(|e| e.to_string())?;
+        self.traffic.bytes += packed.wire_bytes();
+        self.queue.push_back(Arrival::ToMaster(worker, epoch, packed));
+        Ok(())
+    }
+
+    /// Books what is done for a worker's messages as its sending.
+    fn timed(
+        &mut self,
+        worker: usize,
+        work: impl FnOnce(&mut Self) -> Result<(), String>,
+    ) -> Result<(), String> {
+        let (cycle, from) = (self.places[worker].session.cycle(), Instant::now());
+        let result = work(self);
+        let lap = Lap { phase: Phase::Send, from, to: Instant::now() };
+        self.places[worker].stopwatch.book(cycle, lap);
+        result
     }
 
     fn compute(&mut self, worker: usize, task: Task) -> Result<(), String> {

@@ -3,8 +3,11 @@
 use std::sync::Arc;
 
 use mechanics::{contact::Census, state::GlobalState};
-use protocol::message::{Route, ToMaster, ToWorker, Work};
 pub use protocol::request::Balance;
+use protocol::{
+    message::{Route, ToMaster, ToWorker, Work},
+    phase::Report,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -221,6 +224,8 @@ pub struct Outcome {
     pub census: Census,
     /// Compute time of each worker.
     pub work: Vec<Work>,
+    /// How the time of each worker went; empty where a worker did not come to the end.
+    pub reports: Vec<Report>,
     /// Largest over mean of cost over speed.
     pub imbalance: f64,
     /// Lane width of the workers.
@@ -229,8 +234,8 @@ pub struct Outcome {
     pub route: &'static str,
     /// Cycles of this session of the run: not those before a snapshot that it resumed from.
     pub cycles_run: u64,
-    /// Workers at the end.
-    pub n_workers: usize,
+    /// Names of the workers at the end.
+    pub workers: Vec<String>,
     /// When work was dealt out by other speeds.
     pub rebalances: Vec<Rebalance>,
     /// Workers that were lost at work.

@@ -21,7 +21,10 @@ use mechanics::{
     state::GlobalState,
     vote::{Quanta, Vote},
 };
-use protocol::message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work};
+use protocol::{
+    message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work},
+    phase::Report,
+};
 
 use crate::{
     event::{Action, Event, Limit, Loss, Options, Outcome, Progress, Rebalance},
@@ -89,6 +92,8 @@ pub struct Job {
     census: Census,
     /// By member.
     work: Vec<Work>,
+    /// By member, of its last stop.
+    reports: Vec<Report>,
     imbalance: f64,
     rebalances: Vec<Rebalance>,
     losses: Vec<Loss>,
@@ -109,6 +114,11 @@ impl Job {
     /// Surface of the problem; none without contact.
     pub fn surface(&self) -> Option<&Surface> {
         self.epoch.bench.as_ref().map(|bench| bench.sorter.surface())
+    }
+
+    /// How partial forces travel.
+    pub fn route(&self) -> Route {
+        self.options.route
     }
 
     /// Whether it has ended.
@@ -177,6 +187,12 @@ impl Job {
             sorts: self.sorts,
             census: self.census,
             work: self.work.clone(),
+            reports: self
+                .epoch
+                .crew
+                .iter()
+                .map(|&m| self.reports.get(m).cloned().unwrap_or_default())
+                .collect(),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
             route: match self.options.route {
@@ -184,7 +200,7 @@ impl Job {
                 Route::Direct => "direct",
             },
             cycles_run,
-            n_workers: self.epoch.n(),
+            workers: self.epoch.crew.iter().map(|&m| self.members[m].hand.name.clone()).collect(),
             rebalances: std::mem::take(&mut self.rebalances),
             losses: std::mem::take(&mut self.losses),
         })));
@@ -226,6 +242,13 @@ impl Job {
                     ));
                 };
                 actions.push(Action::Send(member, ToWorker::Relayed { from: worker as u32, message }));
+                Ok(())
+            }
+            ToMaster::Report(report) => {
+                report.check(self.epoch.n()).map_err(|error| format!("worker {worker}: {error}"))?;
+                let member = self.epoch.crew[worker];
+                self.reports.resize(self.members.len(), Report::default());
+                self.reports[member] = *report;
                 Ok(())
             }
             ToMaster::Transfer { cycle, state } => self.transfer(worker, cycle, state, actions),

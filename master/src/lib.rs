@@ -20,6 +20,7 @@ pub mod exchange;
 pub mod hosts;
 pub mod job;
 pub mod ledger;
+pub mod peers;
 pub mod processes;
 pub mod queue;
 pub mod results;

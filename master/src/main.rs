@@ -5,11 +5,14 @@
 use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 
 use clap::Parser;
+
 use master::{
     certs, client,
     command::{Certs, Cli, Command, WorkerArgs},
     daemon, processes, run, simulate,
 };
+use protocol::shape::{Shape, Wire};
+use worker::daemon::Listen;
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt()
@@ -57,6 +60,12 @@ fn work(args: WorkerArgs) -> Result<ExitCode, String> {
         patience: Duration::from_secs(args.patience),
         once: args.once,
         token: std::env::var(processes::TOKEN).ok(),
+        port: args.link.map(|rate| Shape::port(Wire::ethernet(rate))),
+        peers: if args.no_peers {
+            Listen::Nowhere
+        } else {
+            Listen::Port { port: args.peer_port, announce: args.peer_announce }
+        },
     };
     worker::daemon::run(&options).map(|()| ExitCode::SUCCESS)
 }

@@ -18,7 +18,7 @@ use crate::{
     event::{Action, Deal, Options},
     job::Job,
     queue::Event,
-    results::Folder,
+    results::{Folder, TRACE, trace},
     run::{Census, Output, limit, options_for, progress_line, summarise},
 };
 
@@ -65,7 +65,9 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     limit(&mut model, &order.options)?;
     let model = Arc::new(model);
     let hands: Vec<_> = order.seats.iter().map(|seat| seat.hand.clone()).collect();
-    let options = Options { waits: true, ..options_for(&order.options) };
+    let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
+    let options = options_for(&order.options, hands.len(), all_take_peers);
+    let options = Options { waits: true, ..options };
     let (job, first) = Job::new(Arc::clone(&model), &hands, options, None)?;
     let line = order.line.lock().unwrap_or_else(PoisonError::into_inner).take();
     let line = line.unwrap_or_else(|| drive::channel(order.seats.len()));
@@ -82,6 +84,10 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
+        if order.options.trace {
+            trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
+                .map_err(|e| e.to_string())?;
+        }
     }
     order.status.send_modify(|status| {
         status.cycle = summary.cycles;

@@ -138,7 +138,7 @@ fn a_worker_that_joins_is_used_from_the_next_boundary_and_changes_no_bit() {
         let solved = solved.unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         one.assert_equal(&Fingerprint::of(&solved), &format!("seed {seed}"));
         assert_eq!(states(&solved), written, "seed {seed}: states");
-        assert_eq!(solved.outcome.n_workers, 3 - solved.outcome.losses.len(), "seed {seed}");
+        assert_eq!(solved.outcome.workers.len(), 3 - solved.outcome.losses.len(), "seed {seed}");
     }
 }
 
@@ -157,7 +157,7 @@ fn with_no_worker_left_a_job_that_waits_goes_on_with_the_next_and_another_ends()
         let solved = solve_through(plates(), crew(2, waiting), &mut fate).unwrap_or_else(|e| panic!("{e}"));
         one.assert_equal(&Fingerprint::of(&solved), &format!("seed {seed}"));
         assert_eq!(states(&solved), written, "seed {seed}: states");
-        assert_eq!((solved.outcome.losses.len(), solved.outcome.n_workers), (2, 1));
+        assert_eq!((solved.outcome.losses.len(), solved.outcome.workers.len()), (2, 1));
         let ends = solve_through(plates(), crew(2, options(Keep::Cycles(10), Route::Master)), &mut fate);
         let why = ends.err().expect("nobody is left");
         assert!(why.contains("is lost") && why.contains("no other is left"), "{why}");

@@ -25,7 +25,7 @@ use tokio::{
     net::{TcpSocket, TcpStream},
     sync::mpsc,
 };
-use worker::daemon::compute_pool;
+use worker::daemon::{Service, compute_pool};
 
 const PLATES: &str = include_str!("../../deck/examples/plates-free-slip.toml");
 /// The longest that a run over links may take.
@@ -91,7 +91,8 @@ where
         tokio::spawn(async move {
             let (sender, receiver) = split(far, Settings::default());
             let call = dial::greet(sender, receiver, &hello).await.expect("taken in");
-            worker::daemon::serve(call, compute_pool(1).expect("threads")).await
+            let pool = compute_pool(1).expect("threads");
+            worker::daemon::serve(call, Service { pool, peers: None }).await
         });
     }
     let mut seats: Vec<Seat> = Vec::new();

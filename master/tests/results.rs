@@ -9,7 +9,7 @@ use deck::model::{Gauge, Model, Output};
 use master::results::{
     self, Error, Folder,
     history::{GaugeRow, History, HistoryRow, PartEnergy, Table},
-    summary::{Energies, Summary, WorkUnits},
+    summary::{Energies, Summary, WorkUnits, WorkerTimes},
     vtu::{Fields, Series, von_mises, write_vtu},
 };
 use mechanics::{
@@ -159,6 +159,8 @@ fn summary(model: &Model) -> Summary {
         workers: 4,
         threads: 8,
         route: "direct".into(),
+        linked_pairs: 5,
+        relayed_pairs: 1,
         lanes: "avx512".into(),
         cycles: 1200,
         end_time: 1.0 / 3.0,
@@ -178,6 +180,8 @@ fn summary(model: &Model) -> Summary {
         },
         imbalance: 1.012,
         bytes_per_cycle: 431_234.7,
+        master_bytes_per_cycle: 31_234.7,
+        worker_times: vec![WorkerTimes { name: "pc-1".into(), wait_s: 0.25, ..WorkerTimes::default() }],
         energies: Energies {
             kinetic: 7.1e-1,
             internal: 0.1 + 0.2,

@@ -2,7 +2,8 @@
 //!
 //! A run, seen from one worker: `Assign` -> `Ready`; `Start`; then per cycle `Cycle` -> `Totals`; at a sort,
 //! `Plan` arrives ahead of its cycle and `Transfer` goes both ways at that cycle; `Image` when asked; at the end
-//! `Image` with `last`, then `Release`.
+//! `Report` and `Image` with `last`, then `Release`. On route direct `Peers` comes before `Assign`, and partial forces go
+//! from worker to worker as [`ToPeer`].
 //!
 //! A job that is dealt out anew - a worker was lost, one joined, speeds turned out to be others - sends a further
 //! `Assign` of the next epoch, at any time; what the worker still does for the epoch before comes to nothing.
@@ -18,6 +19,9 @@ use mechanics::{
     vote::{Quanta, Vote},
 };
 use serde::{Deserialize, Serialize};
+use std::net::SocketAddr;
+
+use crate::phase::Report;
 
 /// From the master to a worker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,6 +67,30 @@ pub enum ToWorker {
     },
     /// The job is over or given up; the worker forgets it.
     Release,
+    /// Before `Assign` on route direct: where the other workers of this job and epoch are found.
+    Peers(Box<Introduction>),
+}
+
+/// Who computes a job, for links between its workers. Its frame names the job and the epoch.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Introduction {
+    /// The index of the worker that is told.
+    pub me: u32,
+    /// Known to the workers of this epoch alone; whoever dials shows it.
+    pub secret: String,
+    /// By index.
+    pub members: Vec<Member>,
+}
+
+/// A worker as the others see it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Member {
+    /// Name of the host, for messages.
+    pub name: String,
+    /// Where it takes peers: the host as the master saw it, and its own word for the port; none where it takes none.
+    pub address: Option<SocketAddr>,
+    /// The incarnation that its frames carry.
+    pub incarnation: u32,
 }
 
 /// From one worker to another, on route direct: once per cycle to each neighbour of the plan.
@@ -184,6 +212,8 @@ pub enum ToMaster {
         /// What this worker's compute threads have used so far.
         work: Work,
     },
+    /// Before the last `Image`: how the worker's time went, from its runtime.
+    Report(Box<Report>),
     /// The worker cannot go on.
     Failed {
         /// The cycle.

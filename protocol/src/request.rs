@@ -93,7 +93,7 @@ pub struct JobOptions {
     /// Lane width by name; the widest of each machine if none.
     pub lanes: Option<String>,
     /// How partial forces travel.
-    pub route: Route,
+    pub route: RouteChoice,
     /// Write no results folder.
     pub no_output: bool,
     /// Store the run at the start of this cycle.
@@ -108,6 +108,8 @@ pub struct JobOptions {
     pub balance: Balance,
     /// Seconds from one state kept in memory to the next; none if it is never kept, so that a loss begins the run anew.
     pub keep_every: Option<f64>,
+    /// Write `trace.json`: what every worker did in its last cycles.
+    pub trace: bool,
 }
 
 /// What speeds work is dealt out by. No bit of a result depends on it.
@@ -118,6 +120,31 @@ pub enum Balance {
     Given,
     /// Those, corrected by what is measured.
     Measured,
+}
+
+/// How a user wants partial forces to travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RouteChoice {
+    /// As [`RouteChoice::choose`] says.
+    #[default]
+    Auto,
+    /// Through the master.
+    Master,
+    /// From worker to worker; pairs that cannot reach each other are relayed by the master.
+    Direct,
+}
+
+impl RouteChoice {
+    /// The route of a job on so many workers. Auto is direct with two workers or more when every one of them takes peers
+    /// (`all_take_peers`), and master otherwise: one worker has nobody to exchange with, and what is relayed passes the
+    /// master's link twice as often as sums do.
+    pub const fn choose(self, workers: usize, all_take_peers: bool) -> Route {
+        match self {
+            Self::Direct => Route::Direct,
+            Self::Auto if workers > 1 && all_take_peers => Route::Direct,
+            Self::Master | Self::Auto => Route::Master,
+        }
+    }
 }
 
 /// Where a job stands.

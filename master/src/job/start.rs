@@ -16,7 +16,10 @@ use mechanics::{
     state::GlobalState,
     vote::Quanta,
 };
-use protocol::message::{Assign, ToWorker, Work};
+use protocol::{
+    message::{Assign, ToWorker, Work},
+    phase::Report,
+};
 
 use super::{
     Bench, Job,
@@ -126,6 +129,7 @@ impl Job {
             sorts: 0,
             census: Census::default(),
             work: vec![Work::default(); hands.len()],
+            reports: vec![Report::default(); hands.len()],
             imbalance: 1.0,
             rebalances: Vec::new(),
             losses: Vec::new(),

@@ -1,12 +1,12 @@
 //! A job without workers, sockets or clocks.
 
-use std::sync::Arc;
+use std::{collections::VecDeque, sync::Arc};
 
 use mechanics::vote::Vote;
 use protocol::message::{IMAGE_VERSION, ToMaster, ToWorker, Work};
 
 use super::Job;
-use crate::event::{Action, Event, Hand, Options};
+use crate::event::{Action, Balance, Event, Hand, Options};
 
 const DECK: &str = r#"
     title = "two cubes"
@@ -238,4 +238,87 @@ fn a_node_inside_a_foreign_gap_is_refused_with_its_number() {
     let text = DECK.replace("1.1]", "1.02]");
     let faults = deck::read(&text, "two cubes").map(|_| ()).expect_err("zones overlap");
     assert!(faults[0].to_string().contains("low"), "{}", faults[0]);
+}
+
+/// Four workers without contact whose elements take what `nanoseconds` says of worker and cycle; gives the cycles at which
+/// work was dealt out anew.
+fn dealt_anew(cycles: u64, mut nanoseconds: impl FnMut(usize, u64) -> f64) -> Vec<u64> {
+    let text = format!(
+        "title = \"bar\"\nunits = \"SI\"\n[control]\nend_cycle = {cycles}\nplan_interval = 20\n[[part]]\nname = \"bar\"\nmaterial = \"LEAD\"\nbox = {{ origin = [0, 0, 0], size = [4, 1, 1], cells = [40, 10, 10] }}\n"
+    );
+    let model = Arc::new(deck::read(&text, "bar").expect("a good deck"));
+    let options = Options { balance: Balance::Measured, ..Options::default() };
+    let (mut job, first) = Job::new(model, &hands(4), options, None).expect("a good problem");
+    let vote = || Some(Box::new(Vote { courant: 1e-9, ..Vote::empty(1) }));
+    let mut busy = [0.0; 4];
+    let mut actions: VecDeque<Action> = first.into();
+    let (mut elements, mut exchange) = ([0.0; 4], [0; 4]);
+    while let Some(action) = actions.pop_front() {
+        let (worker, message) = match action {
+            Action::Send(worker, ToWorker::Assign(assign)) => {
+                let pieces = assign.subdomains.iter().flat_map(|s| &s.pieces);
+                elements[worker] = pieces.map(|piece| piece.elements.len()).sum::<usize>() as f64;
+                exchange[worker] = assign.plan.exchange.len();
+                let vote = if assign.cycle == 0 { vote() } else { None };
+                (worker, ToMaster::Ready { vote, lanes: "scalar".into() })
+            }
+            Action::Send(worker, ToWorker::Start { orders: [before, _] }) => {
+                (worker, frame(before.next.wrapping_add(1), true, exchange[worker], busy[worker]))
+            }
+            Action::Send(worker, ToWorker::Totals { cycle, orders, .. }) => {
+                busy[worker] += elements[worker] * nanoseconds(worker, cycle);
+                // Orders of the cycle before say whether this is the last one.
+                if orders.next != cycle + 1 {
+                    panic!("orders for {} after cycle {cycle}", orders.next);
+                }
+                let stops = job.epoch.stop_at == Some(cycle + 1);
+                if stops {
+                    let (pieces, work) = (Vec::new(), Work::default());
+                    let last = vote();
+                    (worker, ToMaster::Image { cycle: cycle + 1, version: IMAGE_VERSION, pieces, last, work })
+                } else {
+                    (worker, frame(cycle + 1, false, exchange[worker], busy[worker]))
+                }
+            }
+            Action::Over(outcome) => {
+                assert_eq!(outcome.failure, None);
+                return outcome.rebalances.iter().map(|r| r.cycle).collect();
+            }
+            _ => continue,
+        };
+        actions.extend(job.apply(Event::Message(worker, job.epoch(), message)));
+    }
+    panic!("the job never ends");
+}
+
+fn frame(cycle: u64, first: bool, n_exchange: usize, busy: f64) -> ToMaster {
+    let vote = (!first).then(|| Box::new(Vote { courant: 1e-9, ..Vote::empty(1) }));
+    let busy = Work { compute_ns: busy as u64, contact_ns: 0 };
+    ToMaster::Cycle { cycle, vote, partials: vec![0.0; 3 * n_exchange], gathered: Vec::new(), busy }
+}
+
+/// Uniform between 1 - `by` and 1 + `by`.
+fn noise(state: &mut u64, by: f64) -> f64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    1.0 + by * ((*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0)
+}
+
+#[test]
+fn noise_does_not_make_elements_wander() {
+    for (by, most) in [(0.05, 1), (0.3, 8)] {
+        let mut state = 7;
+        let dealt = dealt_anew(2000, |_, _| 100.0 * noise(&mut state, by));
+        assert!(dealt.len() <= most, "noise of {by}: dealt out anew at {dealt:?}");
+    }
+}
+
+#[test]
+fn a_worker_that_turns_slow_under_noise_is_relieved_once_within_two_boundaries() {
+    let mut state = 3;
+    let slow = |worker, cycle| if worker == 2 && cycle >= 110 { 200.0 } else { 100.0 };
+    let dealt = dealt_anew(400, |worker, cycle| slow(worker, cycle) * noise(&mut state, 0.05));
+    assert!(dealt.first().is_some_and(|first| (118..=140).contains(first)), "{dealt:?}");
+    assert!(dealt.len() <= 2, "{dealt:?}");
 }

@@ -32,7 +32,7 @@ impl<W> Processor<W> {
         Self { speed, queues: [const { VecDeque::new() }; 3], updated: 0.0, version: 0 }
     }
 
-    /// Relative speed at present.
+    /// Relative speed now.
     pub fn speed(&self) -> f64 {
         self.speed
     }

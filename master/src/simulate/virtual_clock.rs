@@ -51,7 +51,7 @@ pub struct Costs {
 
 impl Costs {
     /// Contact, elements and integration of a task (s).
-    fn of(&self, task: Kind, load: &Load) -> Phases {
+    pub(super) fn of(&self, task: Kind, load: &Load) -> Phases {
         let elements = |n: u64| self.element * n as f64;
         let contact = self.pair * load.pairs as f64;
         let none = Phases::default();
@@ -135,7 +135,15 @@ pub struct Phases {
 }
 
 impl Phases {
-    fn busy(&self) -> f64 {
+    /// Adds what a task costs at speed 1, on a host of `speed`.
+    pub(super) fn charge(&mut self, costs: &Self, speed: f64) {
+        self.border += costs.border / speed;
+        self.contact += costs.contact / speed;
+        self.interior += costs.interior / speed;
+        self.integrate += costs.integrate / speed;
+    }
+
+    pub(super) fn busy(&self) -> f64 {
         self.border + self.contact + self.interior + self.send + self.integrate
     }
 }
@@ -666,11 +674,8 @@ impl Clock<'_> {
         if kind != Kind::Load {
             let speed = self.machines.speeds[worker];
             let phases = phases_at(&mut self.timeline.phases[worker], cycle);
-            phases.border += costs.border / speed;
-            phases.contact += costs.contact / speed;
-            phases.interior += costs.interior / speed;
-            phases.integrate += costs.integrate / speed;
-            self.count(kind, cycle, &load);
+            phases.charge(&costs, speed);
+            count(&mut self.timeline.counts, kind, cycle, &load);
         }
         // Host 0 keeps some of its time for the master's sorts; it is slower by that.
         let kept = if worker == 0 { self.machines.believed[0] / self.machines.speeds[0] } else { 1.0 };
@@ -682,27 +687,6 @@ impl Clock<'_> {
         self.processors[worker].add(self.now, Rank::Compute, costs.busy(), work);
         self.foresee(worker);
         Ok(())
-    }
-
-    fn count(&mut self, kind: Kind, cycle: u64, load: &Load) {
-        if kind == Kind::Image {
-            return;
-        }
-        let counts = counts_at(&mut self.timeline.counts, cycle);
-        match kind {
-            Kind::Elements => counts.elements += load.border + load.interior,
-            Kind::Border => {
-                counts.elements += load.border;
-                counts.pairs += load.pairs;
-            }
-            Kind::Interior => counts.elements += load.interior,
-            Kind::Install => {
-                counts.pairs += load.pairs;
-                counts.searched += load.pairs;
-            }
-            Kind::Integrate => counts.nodes += load.nodes,
-            _ => {}
-        }
     }
 
     fn master_acts(&mut self, actions: Vec<Action>) -> Result<(), String> {
@@ -751,7 +735,29 @@ impl Clock<'_> {
     }
 }
 
-fn kind_of(task: &Task) -> Kind {
+/// Enters what a task works on in the counts of its cycle.
+pub(super) fn count(counts: &mut Vec<Counts>, kind: Kind, cycle: u64, load: &Load) {
+    if kind == Kind::Image {
+        return;
+    }
+    let counts = counts_at(counts, cycle);
+    match kind {
+        Kind::Elements => counts.elements += load.border + load.interior,
+        Kind::Border => {
+            counts.elements += load.border;
+            counts.pairs += load.pairs;
+        }
+        Kind::Interior => counts.elements += load.interior,
+        Kind::Install => {
+            counts.pairs += load.pairs;
+            counts.searched += load.pairs;
+        }
+        Kind::Integrate => counts.nodes += load.nodes,
+        _ => {}
+    }
+}
+
+pub(super) fn kind_of(task: &Task) -> Kind {
     match task {
         Task::Load { .. } => Kind::Load,
         Task::Transfer { .. } => Kind::Transfer,
@@ -764,14 +770,14 @@ fn kind_of(task: &Task) -> Kind {
     }
 }
 
-fn phases_at(phases: &mut Vec<Phases>, cycle: u64) -> &mut Phases {
+pub(super) fn phases_at(phases: &mut Vec<Phases>, cycle: u64) -> &mut Phases {
     if phases.len() <= cycle as usize {
         phases.resize(cycle as usize + 1, Phases::default());
     }
     &mut phases[cycle as usize]
 }
 
-fn counts_at(counts: &mut Vec<Counts>, cycle: u64) -> &mut Counts {
+pub(super) fn counts_at(counts: &mut Vec<Counts>, cycle: u64) -> &mut Counts {
     if counts.len() <= cycle as usize {
         counts.resize(cycle as usize + 1, Counts::default());
     }
