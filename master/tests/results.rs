@@ -459,13 +459,17 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
     assert_eq!(
         keys(&json),
         "bytes_per_cycle contact_share cycles digest elements end_time energies grind_ns imbalance lanes \
-         losses momentum_error nodes rebalances route sorts surface_elements surface_faces surface_nodes threads title wall_s \
-         work_units workers worst_courant worst_gap_travel worst_penetration"
+         linked_pairs losses master_bytes_per_cycle momentum_error nodes rebalances relayed_pairs route sorts surface_elements surface_faces surface_nodes threads title wall_s \
+         work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
     );
     assert_eq!(keys(&json["energies"]), "contact error external hourglass internal kinetic viscosity");
     assert_eq!(
         keys(&json["work_units"]),
         "count faces_max faces_mean faces_min interactions nodes_max nodes_mean nodes_min"
+    );
+    assert_eq!(
+        keys(&json["worker_times"][0]),
+        "border_s contact_s integrate_s interior_s name other_s peer_bytes send_s wait_s"
     );
     let read: Summary = serde_json::from_str(&text).expect("a summary");
     assert_eq!(format!("{read:?}"), format!("{summary:?}"));

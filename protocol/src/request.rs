@@ -269,6 +269,20 @@ mod tests {
     use super::*;
 
     #[test]
+    fn auto_is_direct_where_there_is_somebody_to_exchange_with_who_can_be_reached() {
+        use RouteChoice::{Auto, Direct, Master};
+        for (choice, workers, all_take_peers, route) in [
+            (Auto, 2, true, Route::Direct),
+            (Auto, 1, true, Route::Master),
+            (Auto, 9, false, Route::Master),
+            (Direct, 1, false, Route::Direct),
+            (Master, 9, true, Route::Master),
+        ] {
+            assert_eq!(choice.choose(workers, all_take_peers), route, "{choice:?} of {workers}");
+        }
+    }
+
+    #[test]
     fn file_names_cannot_leave_their_folder() {
         for good in ["state-000001.vtu", "history.csv", "results.pvd"] {
             assert_eq!(check_file_name(good), Ok(()));

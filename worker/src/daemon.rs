@@ -31,8 +31,8 @@ use crate::{
     runner::{Input, Runner},
 };
 
-/// Messages that may wait for the compute thread; a master sends at most a few ahead.
-pub const WAITING_MESSAGES: usize = 64;
+/// Messages that may wait for the compute thread: a master sends at most a few ahead, a neighbour two.
+pub const WAITING_MESSAGES: usize = 256;
 /// The first pause before dialling again; each next one is twice as long.
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
 /// The longest pause before dialling again.
@@ -209,6 +209,7 @@ async fn join(
             Some(Arc::new(Peers::start(listener, options.certs.as_deref(), options.port.clone())?));
         *listening = Some(ip);
         hello.peer_port = announce.unwrap_or(bound.port());
+        info!(announced = hello.peer_port, "listening for other workers on {bound}");
     }
     reached.greet(hello).await
 }

@@ -139,11 +139,22 @@ async fn reach(shared: &Shared, circle: &Circle, other: u32) -> Result<dial::Cal
     let who = &circle.who;
     let no_address = || Error::Message("it takes no peers".into());
     let address = who.members.get(other as usize).and_then(|member| member.address).ok_or_else(no_address)?;
-    let name = who.members.get(who.me as usize).map_or("", |member| &member.name);
+    let me = who.members.get(who.me as usize);
+    if address.ip().is_loopback() && me.and_then(|me| me.address).is_some_and(|a| !a.ip().is_loopback()) {
+        return Err(Error::Message(
+            "the master knows it by a loopback address; start it with the master's outward address".into(),
+        ));
+    }
+    let name = me.map_or("", |member| &member.name);
     let mut hello = Hello::new(Role::Peer, name, 1.0, 1, "none", 0);
     hello.token = Some(who.secret.clone());
     hello.member = Some(Membership { job: circle.key.job, epoch: circle.key.epoch, index: who.me });
     let certificates = shared.certificates.as_ref().map(|(_, config)| config);
     let reached = dial::reach_peer(address, certificates, settings()).await?;
-    reached.through(shared.port.as_ref()).greet(&hello).await
+    let call = reached.through(shared.port.as_ref()).greet(&hello).await?;
+    let found = call.welcome.host;
+    if found != other {
+        return Err(Error::Message(format!("worker {found} answers there")));
+    }
+    Ok(call)
 }
