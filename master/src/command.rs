@@ -115,6 +115,24 @@ impl From<Route> for RouteChoice {
     }
 }
 
+/// What speeds work is dealt out by; the bits do not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Balance {
+    /// Those that workers were started with
+    Given,
+    /// Those, corrected by what the workers take
+    Measured,
+}
+
+impl From<Balance> for protocol::request::Balance {
+    fn from(balance: Balance) -> Self {
+        match balance {
+            Balance::Given => Self::Given,
+            Balance::Measured => Self::Measured,
+        }
+    }
+}
+
 /// Lane width of the kernels; the bits do not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Lanes {
@@ -159,6 +177,12 @@ pub struct JobArgs {
     /// Store the run at the start of this cycle, as snapshot.bolide in the results folder
     #[arg(long, value_name = "CYCLE")]
     pub snapshot_at: Option<u64>,
+    /// Speeds that work is dealt out by
+    #[arg(long, value_enum, default_value = "given")]
+    pub balance: Balance,
+    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for the start alone
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    pub keep_every: f64,
     /// Extra sorts every so many cycles, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_every: Option<u64>,
@@ -180,6 +204,8 @@ impl JobArgs {
             sort_every: self.sort_every,
             sort_seed: self.sort_seed,
             min_workers: 1,
+            balance: self.balance.into(),
+            keep_every: (self.keep_every > 0.0).then_some(self.keep_every),
             trace: false,
         }
     }
@@ -264,6 +290,9 @@ pub struct SimulateArgs {
     /// Route of the shared-node forces
     #[arg(long, value_enum, default_value = "direct")]
     pub route: Route,
+    /// Speeds that work is dealt out by, in a run of one deck
+    #[arg(long, value_enum, default_value = "given", conflicts_with = "table")]
+    pub balance: Balance,
     /// Folder for pictures and the trace; without it none are drawn
     #[arg(long)]
     pub out: Option<PathBuf>,

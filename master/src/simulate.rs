@@ -30,6 +30,7 @@ pub mod virtual_clock;
 
 use crate::{
     command::{Clock, SimulateArgs},
+    event::{Balance, Rebalance},
     run::read_deck,
 };
 
@@ -158,6 +159,8 @@ struct Summary<'a> {
     bytes_per_cycle: f64,
     /// Mean phases of a cycle by worker (s).
     phases: Vec<Phases>,
+    /// When work was dealt out by other speeds.
+    rebalances: &'a [Rebalance],
     digest: &'a str,
     /// Under the real clock.
     strain: Option<Strain>,
@@ -197,7 +200,10 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         changes: cluster.changes.clone(),
     };
     let route = RouteChoice::from(args.route).choose(cluster.speeds.len(), true);
-    let scheme = Scheme::bolide(route);
+    let scheme = Scheme { balance: args.balance.into(), ..Scheme::bolide(route) };
+    if args.clock == Clock::Real && scheme.balance != Balance::Given {
+        return Err("--balance measured is followed under --clock virtual only".to_owned());
+    }
     let bound = calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>();
     let (timeline, strain) = match args.clock {
         Clock::Virtual => (virtual_clock::run(&model, &machines, scheme, None)?.0, None),
@@ -228,6 +234,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         bound,
         bytes_per_cycle: timeline.bytes_per_cycle(),
         phases: (0..cluster.speeds.len()).map(|worker| timeline.mean_phases(worker)).collect(),
+        rebalances: &timeline.rebalances,
         digest: &timeline.digest,
         strain,
         refused: strain.is_some_and(|strain| strain.refused()),
@@ -279,6 +286,11 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
             p.send,
             p.integrate,
             p.wait
+        );
+    }
+    for Rebalance { cycle, imbalance_before, imbalance_after, .. } in summary.rebalances {
+        println!(
+            "cycle {cycle}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}"
         );
     }
     println!("digest {}", summary.digest);

@@ -16,8 +16,10 @@ pub struct Snapshot {
     pub dt_previous: f64,
     /// `dt` of the cycle to come (time).
     pub dt: f64,
-    /// Quantum of forces.
-    pub force_quantum: Quantum,
+    /// Quantum of forces in the cycle to come, and from the one after it on.
+    pub force_quanta: [Quantum; 2],
+    /// Rate at which bodies moved against each other (length per cycle), for the sorts to come.
+    pub spread_rate: f64,
     /// The whole vote of the cycle before, still to take effect.
     pub vote: Vote,
     /// Energies and worst ratios so far.

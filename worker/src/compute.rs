@@ -101,6 +101,11 @@ impl Machine {
         self.domain.as_ref().map(Domain::load).unwrap_or_default()
     }
 
+    /// Thread-CPU time of its tasks so far, over all epochs of a job.
+    pub fn work(&self) -> Work {
+        self.clock.work()
+    }
+
     /// What the tasks since the last call took, by wall clock, in their order.
     pub fn take_laps(&mut self) -> impl Iterator<Item = Lap> + use<> {
         std::mem::take(&mut self.laps.0).into_iter()
@@ -173,6 +178,8 @@ impl Machine {
             }
             None => Width::best(),
         };
+        // The domain of the epoch before goes first: there need not be room for two.
+        let further_epoch = self.domain.take().is_some();
         let mut domain = Domain::new(
             assign.setup,
             assign.n_parts as usize,
@@ -184,7 +191,9 @@ impl Machine {
         drop(assign.subdomains);
         domain.install(&assign.plan, &assign.guest_state)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
-        self.clock = ThreadClock::default();
+        if !further_epoch {
+            self.clock = ThreadClock::default();
+        }
         self.domain = Some(domain);
         Ok(Outcome::Loaded { vote, lanes: width.to_string() })
     }

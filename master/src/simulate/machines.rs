@@ -7,7 +7,7 @@ use super::{
     network::Network,
     timeline::{Kind, Phases},
 };
-use crate::balance::Dealing;
+use crate::{balance::Dealing, event::Balance};
 
 /// What work costs on a host of speed 1 (s).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,16 +76,18 @@ pub struct Scheme {
     pub dealing: Dealing,
     /// Whether messages leave before the interior elements are computed.
     pub overlap: bool,
+    /// What speeds work is dealt out by.
+    pub balance: Balance,
 }
 
 impl Scheme {
     /// What Bolide does, on a route.
     pub fn bolide(route: Route) -> Self {
-        Self { route, dealing: Dealing::Owners, overlap: true }
+        Self { route, dealing: Dealing::Owners, overlap: true, balance: Balance::Given }
     }
 
     /// The control: a star without overlap, units dealt by weight alone.
     pub fn control() -> Self {
-        Self { route: Route::Master, dealing: Dealing::Weights, overlap: false }
+        Self { route: Route::Master, dealing: Dealing::Weights, overlap: false, balance: Balance::Given }
     }
 }

@@ -460,7 +460,8 @@ impl Clock<'_> {
         match (slip.from, slip.to) {
             (End::Worker(from), End::Master) => {
                 let message = wire::unpack_to_master(kind, bytes).map_err(fault)?;
-                let actions = self.job.apply(Event::Message(from, message));
+                let actions =
+                    self.job.apply(Event::Message(from, self.places[from].session.epoch(), message));
                 self.master_acts(actions)
             }
             (End::Worker(from), End::Worker(to)) => {
@@ -576,7 +577,13 @@ impl Clock<'_> {
                     self.timeline.digest = outcome.digest;
                     self.over = true;
                 }
-                Action::Row(_) | Action::State(_) | Action::Snapshot(_) | Action::Progress(_) => {}
+                Action::Row(_)
+                | Action::State(_)
+                | Action::Snapshot(_)
+                | Action::Progress(_)
+                | Action::Dealt(_)
+                | Action::Rewind { .. }
+                | Action::Timer(_) => {}
             }
         }
         Ok(())

@@ -3,6 +3,8 @@
 use mechanics::cycle::Load;
 use worker::session::Task;
 
+use crate::event::Rebalance;
+
 /// Seconds of a worker's cycle by what they went into, at the speed of its host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Phases {
@@ -132,6 +134,8 @@ pub struct Timeline {
     pub spans: Vec<Span>,
     /// Messages between hosts.
     pub flights: Vec<Flight>,
+    /// When work was dealt out by other speeds.
+    pub rebalances: Vec<Rebalance>,
     /// Digest of the final state.
     pub digest: String,
 }

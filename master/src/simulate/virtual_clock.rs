@@ -40,6 +40,8 @@ use agenda::{Begun, Due, End, Parcel, What, Work};
 struct Place {
     session: Session,
     player: Player,
+    /// What its tasks took so far, at the speeds that its host had (virtual ns).
+    busy: protocol::message::Work,
     /// Messages that wait for the end of a task: without overlap.
     held: Vec<Parcel>,
 }
@@ -83,7 +85,12 @@ pub fn run(
         .enumerate()
         .map(|(i, &speed)| Hand { name: format!("host-{}", i + 1), speed, threads: 1 })
         .collect();
-    let options = Options { route: scheme.route, dealing: scheme.dealing, ..Options::default() };
+    let options = Options {
+        route: scheme.route,
+        dealing: scheme.dealing,
+        balance: scheme.balance,
+        ..Options::default()
+    };
     let (job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
     let players: Vec<Player> = match tape {
         None => (0..n).map(|_| Player::live()).collect(),
@@ -98,7 +105,12 @@ pub fn run(
         job,
         places: players
             .into_iter()
-            .map(|player| Place { session: Session::new(), player, held: Vec::new() })
+            .map(|player| Place {
+                session: Session::new(),
+                player,
+                busy: Default::default(),
+                held: Vec::new(),
+            })
             .collect(),
         sorts: tape.map(|tape| tape.sorts.iter().cloned().collect()).unwrap_or_default(),
         sorts_kept: Vec::new(),
@@ -182,9 +194,10 @@ impl Clock<'_> {
     fn parcel(&mut self, from: End, to: End, packed: Packed) -> Parcel {
         let bytes = packed.wire_bytes();
         let worker = if from == End::Master { to.host() } else { from.host() };
-        let cycle = self.places[worker].session.cycle();
+        let session = &self.places[worker].session;
+        let (epoch, cycle) = (session.epoch(), session.cycle());
         self.parcels += 1;
-        Parcel { number: self.parcels, from, to, packed, bytes, cycle, sent: self.now }
+        Parcel { number: self.parcels, from, to, packed, bytes, epoch, cycle, sent: self.now }
     }
 
     fn hand_over(&mut self, parcel: Parcel) {
@@ -279,14 +292,16 @@ impl Clock<'_> {
     }
 
     fn deliver(&mut self, parcel: Parcel) -> Result<(), String> {
-        let Parcel { from, to, packed, .. } = parcel;
+        let Parcel { from, to, packed, epoch, .. } = parcel;
         let fault = |e: protocol::Error| e.to_string();
         match (from, to) {
             (End::Worker(from), End::Master) => {
                 let message = wire::unpack_to_master(packed.kind, &packed.bytes).map_err(fault)?;
-                let actions = self.job.apply(Event::Message(from, message));
+                let actions = self.job.apply(Event::Message(from, epoch, message));
                 self.master_acts(actions)
             }
+            // Of an epoch that is over: nobody hears it.
+            (End::Worker(_), End::Worker(to)) if self.places[to].session.epoch() != epoch => Ok(()),
             (End::Worker(from), End::Worker(to)) => {
                 let message = wire::unpack_to_peer(packed.kind, &packed.bytes).map_err(fault)?;
                 self.step(to, session::Event::Peer(from as u32, message))
@@ -310,6 +325,7 @@ impl Clock<'_> {
                 }
                 session::Action::Forget => continue,
                 session::Action::Send(message) => {
+                    let message = message.stamped(self.places[worker].busy);
                     (End::Master, wire::pack_to_master(&message).map_err(|e| e.to_string())?)
                 }
                 session::Action::SendPeer(to, message) => {
@@ -334,6 +350,12 @@ impl Clock<'_> {
         let costs = self.machines.costs.of(kind, &load);
         let speed = self.machines.speeds[worker];
         self.timeline.enter((worker, cycle), (kind, &load), &costs, speed);
+        // Host 0 keeps some of its time for the master's sorts; it is slower by that.
+        let kept = if worker == 0 { self.machines.believed[0] / self.machines.speeds[0] } else { 1.0 };
+        let speed = self.processors[worker].speed() * kept;
+        let busy = &mut self.places[worker].busy;
+        busy.compute_ns += (costs.busy() / speed * 1e9) as u64;
+        busy.contact_ns += (costs.contact / speed * 1e9) as u64;
         let work = Begun(self.now, Work::Task(worker, kind, outcome));
         self.processors[worker].add(self.now, Rank::Compute, costs.busy(), work);
         self.foresee(worker);
@@ -371,9 +393,16 @@ impl Clock<'_> {
                         return Err(reason);
                     }
                     self.timeline.digest = outcome.digest;
+                    self.timeline.rebalances = outcome.rebalances;
                     self.over = true;
                 }
-                Action::Row(_) | Action::State(_) | Action::Snapshot(_) | Action::Progress(_) => {}
+                Action::Row(_)
+                | Action::State(_)
+                | Action::Snapshot(_)
+                | Action::Progress(_)
+                | Action::Dealt(_)
+                | Action::Rewind { .. }
+                | Action::Timer(_) => {}
             }
         }
         Ok(())

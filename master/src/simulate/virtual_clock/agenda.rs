@@ -39,6 +39,8 @@ pub struct Parcel {
     pub packed: Packed,
     /// Its bytes with the frames' headers.
     pub bytes: u64,
+    /// The epoch of the worker at one of its ends.
+    pub epoch: u32,
     /// The cycle of the worker at one of its ends.
     pub cycle: u64,
     /// When it was handed to the sender's processor (s).
