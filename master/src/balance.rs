@@ -24,7 +24,7 @@ pub enum Dealing {
 }
 
 /// A surface node in a sort, in element-cycles of this code on one thread (`bolide simulate --measure-costs`).
-pub const SORT_ELEMENTS: f64 = 2.4;
+pub const SORT_ELEMENTS: f64 = 3.1;
 
 /// Least share of its speed that a worker keeps beside sorts.
 const LEAST_BESIDE_SORTS: f64 = 0.1;

@@ -81,6 +81,15 @@ pub fn speed_up(title: &str, rows: &[Row]) -> String {
         line(format!("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{n}</text>", x(0.0) - 6.0, y(n) + 4.0));
     }
     line(format!("<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">hosts</text>", width / 2.0, height - 14.0));
+    line(format!(
+        "<text transform=\"translate(20 {}) rotate(-90)\" text-anchor=\"middle\">speed-up</text>",
+        height / 2.0
+    ));
+    line(format!(
+        "<text x=\"{}\" y=\"{}\" fill=\"gray\" text-anchor=\"end\">dashed: perfect speed-up; circles: the paper's</text>",
+        x(most),
+        y(0.0) - 10.0
+    ));
     let mut series: Vec<(usize, u32)> = rows.iter().map(|r| (r.benchmark, r.k)).collect();
     series.sort_unstable();
     series.dedup();
@@ -107,7 +116,7 @@ pub fn speed_up(title: &str, rows: &[Row]) -> String {
             }
         }
         line(format!(
-            "<text x=\"{}\" y=\"{}\" fill=\"{colour}\">benchmark {benchmark}, k = {k} (circles: the paper's)</text>",
+            "<text x=\"{}\" y=\"{}\" fill=\"{colour}\">benchmark {benchmark}, k = {k}</text>",
             margin + 16.0,
             56.0 + 18.0 * i as f64
         ));
