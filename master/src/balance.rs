@@ -1,10 +1,13 @@
 //! Balance: work units to workers by speed and ownership, at each sort (paper section 4).
 //!
-//! A unit weighs its interaction count. Contact is shared out so that each worker ends its elements and its units
-//! together at one time ([`shares`]). A unit stays with the worker that owns most of its nodes' elements unless that
+//! A unit weighs the pairs that a cycle will look at ([`pairs`]). Contact is shared out so that workers end their
+//! sub-domains and units at one time. A unit stays with the worker that owns most of its nodes' elements unless that
 //! worker has more than its share; then its lightest-bound units go to the workers with the most room. Deterministic.
 
-use mechanics::contact::WorkUnit;
+use mechanics::contact::{Settings, Surface, WorkUnit};
+
+/// A node-face pair in a cycle, in element-cycles of this code (`bolide simulate --measure-costs`).
+pub const PAIR: f64 = 1.2;
 
 /// Interactions that cost as much as one element-cycle: of the plates of 64,000 elements 4.6 make a pair, and a pair costs
 /// 1.2 elements (`bolide simulate --decomposition --json`, `--measure-costs`).
@@ -21,7 +24,7 @@ pub enum Dealing {
 }
 
 /// A surface node in a sort, in element-cycles of this code on one thread (`bolide simulate --measure-costs`).
-pub const SORT_ELEMENTS: f64 = 2.4;
+pub const SORT_ELEMENTS: f64 = 3.1;
 
 /// Least share of its speed that a worker keeps beside sorts.
 const LEAST_BESIDE_SORTS: f64 = 0.1;
@@ -61,26 +64,47 @@ pub fn assign_by_weight(units: &[WorkUnit], speeds: &[f64]) -> Vec<usize> {
 /// nodes in every cycle.
 const TOLERANCE: f64 = 0.004;
 
-/// Interactions that each worker should have so that elements and contact together end as evenly as they can:
-/// `max(0, speed * finish - elements)`, with the finish at which all `interactions` are dealt. Contact so levels what
-/// index planes left uneven.
-pub fn shares(speeds: &[f64], elements: &[f64], interactions: u64) -> Vec<f64> {
-    let contact = interactions as f64 / INTERACTIONS_PER_ELEMENT;
+/// When all workers have ended if pairs fill up those that end their sub-domains first (element-cycles at speed 1).
+/// Contact so levels what index planes left uneven.
+fn level(speeds: &[f64], work: &[f64], contact: f64) -> f64 {
     let mut order: Vec<usize> = (0..speeds.len()).collect();
-    let finish = |w: usize| elements[w] / speeds[w];
+    let finish = |w: usize| work[w] / speeds[w];
     order.sort_by(|&a, &b| finish(a).total_cmp(&finish(b)).then(a.cmp(&b)));
-    // Those that end their elements first take contact, as many as are needed.
     let (mut speed, mut load, mut level) = (0.0, contact, 0.0);
     for &w in &order {
         if speed > 0.0 && finish(w) >= level {
             break;
         }
         speed += speeds[w];
-        load += elements[w];
+        load += work[w];
         level = load / speed;
     }
-    let share = |w: usize| (speeds[w].mul_add(level, -elements[w])).max(0.0) * INTERACTIONS_PER_ELEMENT;
-    (0..speeds.len()).map(share).collect()
+    level
+}
+
+/// Pairs of each unit of which the node lies in the face's box grown by the reach: what a cycle looks at, and what a
+/// unit weighs.
+pub fn pairs(units: &[WorkUnit], surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> Vec<u64> {
+    let reach = settings.reach();
+    let of_unit = |unit: &WorkUnit| {
+        let of_face = |&face: &u32| {
+            let face = &surface.faces[face as usize];
+            let corners = face.nodes.map(|n| x[n as usize]);
+            let near = |node: u32| {
+                let p = x[node as usize];
+                settings.permits(surface.node_part[node as usize], face.part)
+                    && (0..3).all(|a| {
+                        let along = corners.map(|c| c[a]);
+                        let low = along.into_iter().fold(f64::INFINITY, f64::min);
+                        let high = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                        p[a] >= low - reach && p[a] <= high + reach
+                    })
+            };
+            unit.nodes.iter().filter(|&&node| near(node)).count() as u64
+        };
+        unit.faces.iter().map(of_face).sum()
+    };
+    units.iter().map(of_unit).collect()
 }
 
 /// Worker of each unit that owns most of its nodes, and how many.
@@ -110,11 +134,13 @@ pub fn assign_to_owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usi
     owners(units, n, owner).into_iter().map(|(worker, _)| worker).collect()
 }
 
-/// Worker of each unit. `elements` are the workers' elements, `owner` gives the worker that owns a surface node's.
+/// Worker of each unit. `weights` are the units' [`pairs`], `work` what the workers' sub-domains cost in
+/// element-cycles; `owner` gives the worker that owns a surface node's elements.
 pub fn assign(
     units: &[WorkUnit],
+    weights: &[u64],
     speeds: &[f64],
-    elements: &[f64],
+    work: &[f64],
     owner: &dyn Fn(u32) -> usize,
 ) -> Vec<usize> {
     let n = speeds.len();
@@ -123,25 +149,24 @@ pub fn assign(
     }
     let (mut chosen, bound): (Vec<usize>, Vec<usize>) = owners(units, n, owner).into_iter().unzip();
     let mut load = vec![0_u64; n];
-    for (unit, &worker) in units.iter().zip(&chosen) {
-        load[worker] += unit.interactions;
+    for (weight, &worker) in weights.iter().zip(&chosen) {
+        load[worker] += weight;
     }
-    let share = shares(speeds, elements, load.iter().sum());
-    let most: Vec<f64> =
-        (0..n).map(|w| share[w] + TOLERANCE * (share[w] + elements[w] * INTERACTIONS_PER_ELEMENT)).collect();
+    let limit = level(speeds, work, PAIR * load.iter().sum::<u64>() as f64) * (1.0 + TOLERANCE);
+    let finish = |w: usize, load: u64| PAIR.mul_add(load as f64, work[w]) / speeds[w];
     let mut giving: Vec<usize> =
-        (0..units.len()).filter(|&u| load[chosen[u]] as f64 > most[chosen[u]]).collect();
+        (0..units.len()).filter(|&u| weights[u] > 0 && finish(chosen[u], load[chosen[u]]) > limit).collect();
     // Loosely bound units first, the heavier of equals first: fewer moves.
-    giving.sort_by_key(|&u| (bound[u], std::cmp::Reverse(units[u].interactions), u));
+    giving.sort_by_key(|&u| (bound[u], std::cmp::Reverse(weights[u]), u));
     for u in giving {
-        let from = chosen[u];
-        let weight = units[u].interactions;
-        if load[from] as f64 <= most[from] {
+        let (from, weight) = (chosen[u], weights[u]);
+        let before = finish(from, load[from]);
+        if before <= limit {
             continue;
         }
-        let room = |w: usize| share[w] - load[w] as f64;
-        let to = (0..n).fold(0, |best, w| if room(w) > room(best) { w } else { best });
-        if room(to) >= weight as f64 * 0.5 {
+        let after = |w: usize| finish(w, load[w] + weight);
+        let to = (0..n).fold(0, |best, w| if after(w) < after(best) { w } else { best });
+        if to != from && after(to) < before {
             load[from] -= weight;
             load[to] += weight;
             chosen[u] = to;
@@ -162,7 +187,7 @@ mod tests {
     fn units_stay_with_the_owner_of_their_nodes_when_loads_fit() {
         let units: Vec<_> = (0..8).map(|i| unit(i, vec![i as u32], 10)).collect();
         let owner = |n: u32| (n % 2) as usize;
-        assert_eq!(assign(&units, &[1.0, 1.0], &[100.0; 2], &owner), [0, 1, 0, 1, 0, 1, 0, 1]);
+        assert_eq!(assign(&units, &[10; 8], &[1.0, 1.0], &[1e4; 2], &owner), [0, 1, 0, 1, 0, 1, 0, 1]);
     }
 
     #[test]
@@ -176,7 +201,7 @@ mod tests {
     fn an_overloaded_worker_gives_units_until_shares_follow_speeds() {
         let units: Vec<_> = (0..400).map(|i| unit(i, vec![i as u32], 10)).collect();
         let speeds = [1.0, 2.0, 1.0];
-        let chosen = assign(&units, &speeds, &[500.0, 1000.0, 500.0], &|_| 0);
+        let chosen = assign(&units, &[10; 400], &speeds, &[500.0, 1000.0, 500.0], &|_| 0);
         for (w, s) in speeds.iter().enumerate() {
             let load = chosen.iter().filter(|&&c| c == w).count() as f64;
             let share = 100.0 * s;
@@ -186,20 +211,19 @@ mod tests {
 
     #[test]
     fn contact_levels_what_index_planes_left_uneven() {
-        let total = (40.0 * INTERACTIONS_PER_ELEMENT) as u64;
-        let share = shares(&[1.0, 1.0, 2.0], &[100.0, 110.0, 220.0], total);
-        let end =
-            |w: usize, speed: f64, elements: f64| (elements + share[w] / INTERACTIONS_PER_ELEMENT) / speed;
-        for (w, (speed, elements)) in [(1.0, 100.0), (1.0, 110.0), (2.0, 220.0)].into_iter().enumerate() {
-            assert!((end(w, speed, elements) - 117.5).abs() < 1e-9, "{share:?}");
-        }
+        assert!((level(&[1.0, 1.0, 2.0], &[100.0, 110.0, 220.0], 40.0) - 117.5).abs() < 1e-9);
+        let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 1)).collect();
+        let chosen = assign(&units, &[1; 100], &[1.0, 1.0], &[1000.0, 1060.0], &|_| 1);
+        let first = chosen.iter().filter(|&&w| w == 0).count();
+        // 120 elements' worth of pairs: 90 to the first, 30 to the other.
+        assert!((70..=76).contains(&first), "{first}");
     }
 
     #[test]
     fn a_worker_that_ends_its_elements_last_gets_no_contact() {
-        let total = (8.0 * INTERACTIONS_PER_ELEMENT) as u64;
-        let share = shares(&[1.0, 1.0], &[100.0, 110.0], total);
-        assert!((share[0] - 8.0 * INTERACTIONS_PER_ELEMENT).abs() < 1e-6 && share[1] == 0.0, "{share:?}");
+        assert_eq!(level(&[1.0, 1.0], &[100.0, 110.0], 8.0), 108.0);
+        let units: Vec<_> = (0..6).map(|i| unit(i, vec![i as u32], 1)).collect();
+        assert_eq!(assign(&units, &[1; 6], &[1.0, 1.0], &[100.0, 110.0], &|_| 1), [0; 6]);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use mechanics::{
 
 use protocol::message::Route;
 
-use crate::decompose::Subdomain;
+use crate::decompose::{self, Subdomain};
 
 /// Which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
 pub struct Holdings {
@@ -22,8 +22,8 @@ pub struct Holdings {
     pub owner_subdomain: Vec<u32>,
     /// Worker of that sub-domain.
     pub owner_worker: Vec<u32>,
-    /// Elements of each worker.
-    pub elements: Vec<f64>,
+    /// What each worker's sub-domains cost in a cycle ([`decompose::work`]).
+    pub work: Vec<f64>,
     /// Other workers that hold a node, ascending; most nodes have none and no entry.
     others: HashMap<u32, Vec<u32>>,
 }
@@ -34,10 +34,8 @@ impl Holdings {
         let mut owner_subdomain = vec![u32::MAX; n_nodes];
         let mut owner_worker = vec![u32::MAX; n_nodes];
         let mut others: HashMap<u32, Vec<u32>> = HashMap::new();
-        let mut elements = vec![0.0; n_workers];
         for (id, (subdomain, nodes)) in subdomains.iter().zip(nodes).enumerate() {
             let worker = subdomain.worker as u32;
-            elements[subdomain.worker] += subdomain.region.n_elements() as f64;
             for &node in nodes {
                 let owner = &mut owner_subdomain[node as usize];
                 if *owner == u32::MAX {
@@ -51,7 +49,13 @@ impl Holdings {
                 }
             }
         }
-        Self { n_workers, owner_subdomain, owner_worker, elements, others }
+        Self {
+            n_workers,
+            owner_subdomain,
+            owner_worker,
+            work: decompose::work(subdomains, n_workers),
+            others,
+        }
     }
 
     /// Whether a sub-domain of the worker has the node.

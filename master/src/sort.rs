@@ -91,7 +91,10 @@ impl Sorter {
         let census = Census::of(&units);
         let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
         let worker_of = match self.dealing {
-            Dealing::Owners => balance::assign(&units, &self.speeds, &holdings.elements, &owner),
+            Dealing::Owners => {
+                let weights = balance::pairs(&units, &self.surface, x, &self.settings);
+                balance::assign(&units, &weights, &self.speeds, &holdings.work, &owner)
+            }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
         };
         let n = self.speeds.len();

@@ -2,7 +2,7 @@
 //!
 //! The benchmark's plates with so many elements along an edge are dealt to as many hosts as the cluster file has, of
 //! random integer speeds; one sort of the initial state gives the contact of each. Nothing is integrated. A host's time
-//! is `(elements + pair x pairs) / speed`, the bound is the sum of work over the sum of speeds. Beside it stand slabs
+//! is `(elements + node x nodes + pair x pairs) / speed`, the bound is the sum of that over the sum of speeds. Beside it stand slabs
 //! along the first axis, in proportion to speeds and rounded to planes, whose units stay with the owners of their nodes.
 
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use crate::{
     balance,
-    decompose::{Subdomain, decompose},
+    decompose::{Subdomain, decompose, work},
 };
 
 /// Edges of the problems (elements), and the goal of each: time over the bound.
@@ -42,9 +42,11 @@ pub struct Row {
     pub speeds: Vec<f64>,
     /// Elements alone: time over the bound.
     pub elements_over_bound: f64,
-    /// Contact included.
+    /// Nodes and contact included.
     pub time_over_bound: f64,
-    /// Slabs, contact included.
+    /// Work of all hosts without contact over that of one: nodes that several hosts have.
+    pub copies: f64,
+    /// Slabs, nodes and contact included.
     pub slabs_over_bound: f64,
     /// Node-face pairs of all hosts.
     pub pairs: usize,
@@ -93,6 +95,7 @@ pub struct Sorted {
     exclusions: Exclusions,
     x: Vec<[f64; 3]>,
     units: Vec<WorkUnit>,
+    weights: Vec<u64>,
 }
 
 impl Sorted {
@@ -107,7 +110,8 @@ impl Sorted {
             surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
         let exclusions = Exclusions::new(&surface, &initial_pairs(&surface, &x, settings));
         let units = contact::sort(&surface, &x, settings, &exclusions);
-        Ok(Self { model, surface, exclusions, x, units })
+        let weights = balance::pairs(&units, &surface, &x, settings);
+        Ok(Self { model, surface, exclusions, x, units, weights })
     }
 
     /// What hosts of these speeds come to. `pair` is the cost of a pair in elements.
@@ -117,11 +121,12 @@ impl Sorted {
         let elements = elements_of(&layout, speeds.len());
         let owner = owners(mesh, &layout);
         let owner = |node: u32| owner[self.surface.nodes[node as usize] as usize] as usize;
-        let chosen = balance::assign(&self.units, speeds, &elements, &owner);
+        let held = work(&layout, speeds.len());
+        let chosen = balance::assign(&self.units, &self.weights, speeds, &held, &owner);
         let pairs = self.pairs(&chosen, speeds.len());
 
         let slabs = slabs(mesh, speeds);
-        let slab_elements = elements_of(&slabs, speeds.len());
+        let whole = decompose(mesh, &[1.0]);
         let slab_owner = owners(mesh, &slabs);
         let slab_owner = |node: u32| slab_owner[self.surface.nodes[node as usize] as usize] as usize;
         let slab_chosen = balance::assign_to_owners(&self.units, speeds.len(), &slab_owner);
@@ -133,8 +138,9 @@ impl Sorted {
             hosts: speeds.len(),
             speeds: speeds.to_vec(),
             elements_over_bound: over_bound(&elements, &vec![0; speeds.len()], pair, speeds),
-            time_over_bound: over_bound(&elements, &pairs, pair, speeds),
-            slabs_over_bound: over_bound(&slab_elements, &slab_pairs, pair, speeds),
+            time_over_bound: over_bound(&held, &pairs, pair, speeds),
+            slabs_over_bound: over_bound(&work(&slabs, speeds.len()), &slab_pairs, pair, speeds),
+            copies: held.iter().sum::<f64>() / work(&whole, 1)[0],
             pairs: pairs.iter().sum(),
             interactions: self.units.iter().map(|unit| unit.interactions).sum(),
         }
@@ -246,8 +252,8 @@ pub fn run(hosts: usize, edges: &[u32], seeds: u64, pair: f64) -> Result<Vec<Row
 /// The rows as a table for people.
 pub fn print(rows: &[Row], pair: f64) -> String {
     let mut text = format!(
-        "slowest host over the bound, modelled: elements and contact of one sort, a pair costs {pair} elements\n  \
-         elements  seed  hosts  sum of speeds  elements alone  contact included     goal  slabs\n"
+        "slowest host over the bound, modelled: elements, nodes and contact of one sort, a pair costs {pair} elements\n  \
+         elements  seed  hosts  sum of speeds  elements alone  contact included     goal  slabs  copies\n"
     );
     for row in rows {
         let goal = EDGES.iter().find(|(edge, _)| *edge == row.edge).filter(|_| row.seed > 0);
@@ -255,13 +261,14 @@ pub fn print(rows: &[Row], pair: f64) -> String {
         let seed = if row.seed == 0 { "equal".to_owned() } else { row.seed.to_string() };
         let _ = writeln!(
             text,
-            "  {:8} {seed:>5} {:6} {:14} {:15.4} {:17.4}  {goal:>8} {:6.3}",
+            "  {:8} {seed:>5} {:6} {:14} {:15.4} {:17.4}  {goal:>8} {:6.3}  {:6.3}",
             row.elements,
             row.hosts,
             row.speeds.iter().sum::<f64>(),
             row.elements_over_bound,
             row.time_over_bound,
-            row.slabs_over_bound
+            row.slabs_over_bound,
+            row.copies
         );
     }
     text
