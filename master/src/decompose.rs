@@ -396,20 +396,21 @@ mod tests {
     #[test]
     fn facing_columns_of_thin_plates_fall_on_one_worker() {
         let speeds = mixed_lab(3);
-        let owner = |cells: [u32; 3]| {
-            let mut owner = vec![usize::MAX; 1600];
-            for s in decompose(&plate(cells), &speeds) {
-                let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
-                assert_eq!((low[2], high[2]), (0, cells[2]), "the thin axis stays whole");
-                for j in low[1]..high[1] {
-                    for i in low[0]..high[0] {
-                        owner[(j * 40 + i) as usize] = s.worker;
-                    }
+        // Both plates in one problem, which has one grouping and one set of shares.
+        let thick = [4, 3];
+        let mut both = plate([40, 40, thick[0]]);
+        both.parts.extend(plate([40, 40, thick[1]]).parts);
+        let mut owners = [vec![usize::MAX; 1600], vec![usize::MAX; 1600]];
+        for s in decompose(&both, &speeds) {
+            let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
+            assert_eq!((low[2], high[2]), (0, thick[s.part]), "the thin axis stays whole");
+            for j in low[1]..high[1] {
+                for i in low[0]..high[0] {
+                    owners[s.part][(j * 40 + i) as usize] = s.worker;
                 }
             }
-            owner
-        };
-        assert_eq!(owner([40, 40, 4]), owner([40, 40, 3]));
+        }
+        assert!(owners[0] == owners[1], "columns of the two plates have different workers");
     }
 
     #[test]
