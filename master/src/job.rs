@@ -21,6 +21,7 @@ use mechanics::{
     digest,
     state::GlobalState,
     vote::{Quanta, Vote},
+    wall::{self, Pose},
 };
 use protocol::message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work};
 
@@ -99,6 +100,8 @@ pub struct Job {
     stop_at: Option<u64>,
     failure: Option<String>,
     ledger: Ledger,
+    /// Poses of the walls of finite mass in the newest cycle that was ordered.
+    walls: Vec<Pose>,
     rows: Vec<HistoryRow>,
     sorts: u64,
     census: mechanics::contact::Census,
@@ -261,6 +264,8 @@ impl Job {
         let before = Orders {
             next: first.wrapping_sub(1),
             dt: 0.0,
+            time,
+            walls: self.walls.clone(),
             force_quantum: self.quanta.force,
             gather: false,
             collect: snapshot_now || at_end,
@@ -272,9 +277,10 @@ impl Job {
         if at_end {
             self.stop_at = Some(first);
         }
-        let orders = self.orders_for(first, dt, time + dt, None);
+        let orders = self.orders_for(first, dt, [time, time + dt], None);
         for worker in 0..self.n_workers {
-            actions.push(Action::Send(worker, ToWorker::Start { orders: [before, orders] }));
+            let orders = [before.clone(), orders.clone()];
+            actions.push(Action::Send(worker, ToWorker::Start { orders }));
         }
         Ok(())
     }
@@ -361,6 +367,7 @@ impl Job {
                 dt: dt_now,
                 force_quantum: self.quanta.force,
                 vote: vote.clone(),
+                walls: self.walls.clone(),
                 ledger: self.ledger.clone(),
                 rows: self.rows.clone(),
             });
@@ -378,7 +385,8 @@ impl Job {
             self.steps.pop_first();
         }
         let coarser = self.rescaled(&vote)?;
-        let mut orders = self.orders_for(cycle + 1, dt, time_after, Some(&vote));
+        wall::advance(&self.model.setup.walls, &vote.walls, dt_now, &mut self.walls)?;
+        let mut orders = self.orders_for(cycle + 1, dt, [time_next, time_after], Some(&vote));
         if let Some(quantum) = coarser {
             self.quanta.force = quantum;
             orders.force_quantum = quantum;
@@ -386,6 +394,7 @@ impl Job {
         let exchange = self.exchange_at(cycle)?;
         for worker in 0..self.n_workers {
             let totals = exchange.of_worker(worker, &arrivals.totals);
+            let orders = orders.clone();
             actions.push(Action::Send(worker, ToWorker::Totals { cycle, orders, totals }));
         }
         self.retire(cycle);

@@ -83,8 +83,8 @@ impl Machine {
         Ok(match task {
             Task::Load { .. } => return Err("a second assignment".to_owned()),
             Task::Transfer { nodes } => Outcome::Transferred(domain.transfer(&nodes)?),
-            Task::Elements { dt_previous, quantum } => {
-                domain.set_force_quantum(quantum);
+            Task::Elements { dt_previous, quantum, time } => {
+                domain.begin(quantum, time);
                 domain.elements(Sets::All, dt_previous, clock);
                 Outcome::Computed
             }
@@ -96,9 +96,9 @@ impl Machine {
                 domain.contact(dt_previous, clock);
                 Outcome::Forces { partials: domain.partials(clock), gathered }
             }
-            Task::Border { dt_previous, quantum, gather } => {
+            Task::Border { dt_previous, quantum, time, gather } => {
                 let gathered = if gather { domain.gather() } else { Vec::new() };
-                domain.set_force_quantum(quantum);
+                domain.begin(quantum, time);
                 domain.contact(dt_previous, clock);
                 domain.elements(Sets::Border, dt_previous, clock);
                 Outcome::Forces { partials: domain.partials(clock), gathered }
@@ -107,8 +107,8 @@ impl Machine {
                 domain.elements(Sets::Interior, dt_previous, clock);
                 Outcome::Computed
             }
-            Task::Integrate { totals, dt_previous, dt } => {
-                Outcome::Integrated(Box::new(domain.integrate(&totals, dt_previous, dt, clock)?))
+            Task::Integrate { totals, dt_previous, dt, walls } => {
+                Outcome::Integrated(Box::new(domain.integrate(&totals, dt_previous, dt, &walls, clock)?))
             }
             Task::Image => Outcome::Image { pieces: domain.pieces(), work: clock.work() },
         })

@@ -1,6 +1,6 @@
 //! Images of all sub-domains become a state, a snapshot or the end of the run.
 
-use mechanics::{block::Piece, exact::Quantum, piece, vote::Vote};
+use mechanics::{block::Piece, exact::Quantum, piece, vote::Vote, wall::Pose};
 
 use super::Job;
 use crate::{event::Action, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot};
@@ -10,6 +10,7 @@ pub(super) struct SnapshotRest {
     pub(super) dt: f64,
     pub(super) force_quantum: Quantum,
     pub(super) vote: Vote,
+    pub(super) walls: Vec<Pose>,
     pub(super) ledger: Ledger,
     pub(super) rows: Vec<HistoryRow>,
 }
@@ -84,8 +85,8 @@ impl Job {
         if let (Some(_), Some(_)) = (&self.snapshot_state, &self.snapshot_rest)
             && let (Some(state), Some(rest)) = (self.snapshot_state.take(), self.snapshot_rest.take())
         {
-            let SnapshotRest { dt_previous, dt, force_quantum, vote, ledger, rows } = rest;
-            let snapshot = Snapshot { state, dt_previous, dt, force_quantum, vote, ledger, rows };
+            let SnapshotRest { dt_previous, dt, force_quantum, vote, walls, ledger, rows } = rest;
+            let snapshot = Snapshot { state, dt_previous, dt, force_quantum, vote, walls, ledger, rows };
             actions.push(Action::Snapshot(Box::new(snapshot)));
         }
     }

@@ -14,6 +14,7 @@ use mechanics::{
     mesh::Mesh,
     piece,
     vote::Quanta,
+    wall,
 };
 use protocol::message::{Assign, ToWorker, Work};
 
@@ -45,16 +46,21 @@ impl Job {
         initial::bind_walls(&model.mesh, &mut setup, &mut constraint)?;
         let start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
         let fresh_quanta = initial::quanta(&model.mesh, &setup, &start);
-        let (state, quanta, ledger, rows, steps, vote_before) = match resume {
+        let (state, quanta, ledger, walls, rows, steps, vote_before) = match resume {
             None => {
                 let ledger = Ledger::new(&model, &start.mass);
-                (start, fresh_quanta, ledger, Vec::new(), BTreeMap::new(), None)
+                let walls = wall::first_poses(&setup.walls);
+                (start, fresh_quanta, ledger, walls, Vec::new(), BTreeMap::new(), None)
             }
             Some(snapshot) => {
                 if snapshot.state.x.len() != start.x.len()
                     || snapshot.state.initial_volume != start.initial_volume
+                    || snapshot.walls.len() != wall::first_poses(&setup.walls).len()
                 {
-                    return Err("the snapshot is of another problem: its mesh is not this deck's".to_owned());
+                    return Err(
+                        "the snapshot is of another problem: its mesh or its walls are not this deck's"
+                            .to_owned(),
+                    );
                 }
                 let cycle = snapshot.state.cycle;
                 let time = snapshot.state.time;
@@ -64,7 +70,8 @@ impl Job {
                 }
                 steps.insert(cycle, (snapshot.dt, time));
                 let quanta = Quanta { force: snapshot.force_quantum, ..fresh_quanta };
-                (snapshot.state, quanta, snapshot.ledger, snapshot.rows, steps, Some(snapshot.vote))
+                let Snapshot { state, ledger, walls, rows, vote, .. } = snapshot;
+                (state, quanta, ledger, walls, rows, steps, Some(vote))
             }
         };
         let mut model = model;
@@ -205,6 +212,7 @@ impl Job {
             stop_at: None,
             failure: None,
             ledger,
+            walls,
             rows,
             sorts: u64::from(census.units > 0),
             census,
