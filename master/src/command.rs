@@ -3,7 +3,10 @@
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use protocol::{request::JobOptions, tls};
+use protocol::{
+    request::{JobOptions, RouteChoice},
+    tls,
+};
 
 /// Explicit Lagrangian impact simulation on whatever PCs a lab has.
 #[derive(Debug, Parser)]
@@ -69,6 +72,12 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
+    /// Measure what this machine's parts cost
+    Bench {
+        /// What to measure
+        #[command(subcommand)]
+        what: Bench,
+    },
     /// Make certificates: a CA, and one folder for each host
     Certs {
         /// What to make
@@ -87,15 +96,18 @@ pub enum Command {
 /// How partial forces travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Route {
+    /// Direct with two workers or more that all take peers, else master
+    Auto,
     /// All through the master, which adds them
     Master,
     /// From worker to worker; votes and orders pass the master
     Direct,
 }
 
-impl From<Route> for protocol::message::Route {
+impl From<Route> for RouteChoice {
     fn from(route: Route) -> Self {
         match route {
+            Route::Auto => Self::Auto,
             Route::Master => Self::Master,
             Route::Direct => Self::Direct,
         }
@@ -129,7 +141,7 @@ impl Lanes {
 #[derive(Args, Clone, Debug)]
 pub struct JobArgs {
     /// Route of the shared-node forces
-    #[arg(long, value_enum, default_value = "master")]
+    #[arg(long, value_enum, default_value = "auto")]
     pub route: Route,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
     #[arg(long)]
@@ -167,6 +179,7 @@ impl JobArgs {
             sort_every: self.sort_every,
             sort_seed: self.sort_seed,
             min_workers: 1,
+            trace: false,
         }
     }
 }
@@ -197,6 +210,9 @@ pub struct RunArgs {
     /// Replace the results in an existing folder
     #[arg(long)]
     pub force: bool,
+    /// Write what every worker did in its last cycles as a trace that Perfetto opens
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Print the summary alone, as JSON, on standard output
     #[arg(long)]
     pub json: bool,
@@ -279,6 +295,15 @@ pub struct WorkerArgs {
     /// End when the master ends the connection, instead of dialling again
     #[arg(long)]
     pub once: bool,
+    /// Port for other workers, on the interface that leads to the master [default: any]
+    #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
+    pub peer_port: u16,
+    /// Port that other workers dial, where it is forwarded to --peer-port
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
+    pub peer_announce: Option<u16>,
+    /// Take no other workers and dial none: what it exchanges with them passes the master
+    #[arg(long, conflicts_with_all = ["peer_port", "peer_announce"])]
+    pub no_peers: bool,
 }
 
 /// How a client reaches a master, and how it prints.
@@ -306,12 +331,47 @@ pub struct SubmitArgs {
     /// Follow the job until it ends, then print its summary
     #[arg(long)]
     pub wait: bool,
+    /// Write trace.json into the results: what every worker did in its last cycles, for Perfetto
+    #[arg(long, conflicts_with = "no_output")]
+    pub trace: bool,
     /// The job
     #[command(flatten)]
     pub job: JobArgs,
     /// The master
     #[command(flatten)]
     pub at: ClientArgs,
+}
+
+/// What `bench` measures.
+#[derive(Debug, Subcommand)]
+pub enum Bench {
+    /// Messages: half a round trip between two processes, on this machine unless --to names another
+    Messages(MessagesArgs),
+}
+
+/// Flags of `bench messages`.
+#[derive(Args, Clone, Debug)]
+pub struct MessagesArgs {
+    /// Be the far end at this address for one caller; other than loopback only with --certs
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "to")]
+    pub listen: Option<SocketAddr>,
+    /// The far end, HOST:PORT, where `bolide bench messages --listen` runs; otherwise one is started here
+    #[arg(long, value_name = "HOST:PORT")]
+    pub to: Option<String>,
+    /// Folder with this host's certificates, as `bolide certs host` makes it; the far end's must be a master's.
+    /// Without --to both ways are measured, with certificates made for it
+    #[arg(long, value_name = "FOLDER")]
+    pub certs: Option<PathBuf>,
+    /// Bytes of the messages
+    #[arg(long, value_delimiter = ',', default_value = "8,64,512,4096,16384,65536,262144,1048576,4194304")]
+    #[arg(value_parser = crate::bench::messages::message_size)]
+    pub sizes: Vec<usize>,
+    /// Rounds per size, of which the median is printed
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub rounds: u32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What `certs` makes.

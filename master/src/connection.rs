@@ -3,9 +3,12 @@
 //! TLS if there are certificates, the greeting, then messages of a worker to its job's thread, or requests of a client
 //! to the [`desk`](crate::desk). Every fault ends this connection with one line in the log, and nothing else.
 
-use std::sync::{
-    Arc, Mutex,
-    atomic::{AtomicBool, AtomicU32, Ordering},
+use std::{
+    net::SocketAddr,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicU32, Ordering},
+    },
 };
 
 use protocol::{
@@ -75,7 +78,7 @@ impl Gate {
     /// # Errors
     /// Why it ended, unless a client left.
     pub async fn take(self: Arc<Self>, stream: TcpStream, address: String) -> Result<()> {
-        link::tune(&stream)?;
+        let stream = link::Socket::new(stream)?;
         match self.tls.clone() {
             None => self.serve(stream, address, None).await,
             Some(config) => {
@@ -147,6 +150,7 @@ impl Gate {
                 let seat = Seat {
                     hand: Hand { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
                     address: address.clone(),
+                    peer: peer_address(&address, hello.peer_port),
                     incarnation,
                     outbox: Arc::new(Mutex::new(Outbox::new(sender.clone(), 0))),
                     route: Arc::clone(&route),
@@ -167,6 +171,12 @@ impl Gate {
         let _ = self.events.send(Event::Left { incarnation, why: error.to_string() }).await;
         Err(error)
     }
+}
+
+/// Where other workers find one that calls from `address` and takes peers on `port`; none if it takes none.
+fn peer_address(address: &str, port: u16) -> Option<SocketAddr> {
+    let caller: SocketAddr = address.parse().ok().filter(|_| port != 0)?;
+    Some(SocketAddr::new(caller.ip(), port))
 }
 
 /// Hands a worker's messages to its job; ends with the link.

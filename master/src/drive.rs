@@ -5,6 +5,7 @@
 
 use std::{
     collections::VecDeque,
+    net::SocketAddr,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex, PoisonError,
@@ -26,6 +27,7 @@ use crate::{
     embedded::{Sink, Traffic, timed_sort},
     event::{Action, Event, Hand, Outcome},
     job::{Bench, Job},
+    peers,
     sort::Sorted,
 };
 
@@ -49,6 +51,8 @@ pub struct Seat {
     pub hand: Hand,
     /// Where it calls from.
     pub address: String,
+    /// Where it takes other workers, if it does.
+    pub peer: Option<SocketAddr>,
     /// Its connection.
     pub incarnation: u32,
     /// The way to it.
@@ -58,7 +62,8 @@ pub struct Seat {
 }
 
 impl Seat {
-    fn send(&self, place: Place, message: &ToWorker) -> protocol::Result<()> {
+    /// Queues a message to it.
+    pub(crate) fn send(&self, place: Place, message: &ToWorker) -> protocol::Result<()> {
         let packed = wire::pack_to_worker(message)?;
         self.outbox.lock().unwrap_or_else(PoisonError::into_inner).send(place, packed)
     }
@@ -161,6 +166,9 @@ pub fn drive(
             driver.lost.push_back((index, why));
         }
     }
+    if driver.job.route() == protocol::message::Route::Direct {
+        driver.lost.extend(peers::introduce(seats, driver.place));
+    }
     let result = driver.run(first, sink, stop);
     for seat in seats {
         seat.route.close();
@@ -170,7 +178,10 @@ pub fn drive(
         }
     }
     let bytes = seats.iter().map(Seat::bytes).sum::<u64>() - bytes_before;
-    result.map(|outcome| (outcome, Traffic { bytes, sort_ns: driver.sort_ns }))
+    result.map(|outcome| {
+        let peer_bytes = outcome.reports.iter().map(|report| report.peer_bytes).sum();
+        (outcome, Traffic { bytes: bytes + peer_bytes, peer_bytes, sort_ns: driver.sort_ns })
+    })
 }
 
 struct Driver<'a> {

@@ -5,19 +5,25 @@
 //! task of a worker at a time.
 
 use std::{
-    collections::VecDeque,
+    collections::{BTreeMap, VecDeque},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
         mpsc,
     },
+    time::Instant,
 };
 
 use mechanics::cycle::Meter;
-use protocol::wire::{self, Packed};
+use protocol::{
+    message::ToMaster,
+    phase::{Phase, Report},
+    wire::{self, Packed},
+};
 use worker::{
     compute::{Machine, ThreadClock},
     session::{self, Session, Task},
+    stopwatch::{Lap, Stopwatch},
 };
 
 use crate::{
@@ -40,6 +46,8 @@ pub trait Sink {
 pub struct Traffic {
     /// Bytes of all messages with their headers.
     pub bytes: u64,
+    /// Of these, bytes that passed from worker to worker.
+    pub peer_bytes: u64,
     /// Thread-CPU time of sorts (ns).
     pub sort_ns: u64,
 }
@@ -58,6 +66,28 @@ struct Place {
     session: Session,
     /// Away while a task runs.
     machine: Option<Box<Machine>>,
+    stopwatch: Stopwatch,
+    /// Bytes sent to each neighbour.
+    peers: BTreeMap<u32, u64>,
+}
+
+impl Place {
+    fn new() -> Self {
+        Self {
+            session: Session::new(),
+            machine: Some(Box::default()),
+            stopwatch: Stopwatch::new(),
+            peers: BTreeMap::new(),
+        }
+    }
+
+    fn report(&self) -> Report {
+        Report {
+            peer_bytes: self.peers.values().sum(),
+            linked: self.peers.keys().copied().collect(),
+            ..self.stopwatch.report()
+        }
+    }
 }
 
 /// Runs a job to its end. `threads` is the size of the pool.
@@ -81,9 +111,7 @@ pub fn run(
     let (send, receive) = mpsc::channel();
     let mut host = Host {
         job,
-        places: (0..n_workers)
-            .map(|_| Place { session: Session::new(), machine: Some(Box::default()) })
-            .collect(),
+        places: (0..n_workers).map(|_| Place::new()).collect(),
         queue: VecDeque::new(),
         // With one worker, tasks run where the loop runs: on the pool.
         pool: (n_workers > 1).then(|| Arc::clone(&pool)),
@@ -150,8 +178,12 @@ impl Host {
                         wire::unpack_to_peer(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
                     self.step(worker, session::Event::Peer(from, message))?;
                 }
-                Arrival::Done(worker, machine, outcome) => {
-                    self.places[worker].machine = Some(machine);
+                Arrival::Done(worker, mut machine, outcome) => {
+                    let place = &mut self.places[worker];
+                    for lap in machine.take_laps() {
+                        place.stopwatch.book(place.session.cycle(), lap);
+                    }
+                    place.machine = Some(machine);
                     self.step(worker, session::Event::Done(outcome))?;
                 }
                 Arrival::Sorted(sorted, ns) => {
@@ -186,16 +218,22 @@ impl Host {
     fn step(&mut self, worker: usize, event: session::Event) -> Result<(), String> {
         for action in self.places[worker].session.apply(event) {
             match action {
-                session::Action::Send(message) => {
-                    let packed = wire::pack_to_master(&message).map_err(|e| e.to_string())?;
-                    self.traffic.bytes += packed.wire_bytes();
-                    self.queue.push_back(Arrival::ToMaster(worker, packed));
-                }
-                session::Action::SendPeer(to, message) => {
+                session::Action::Send(message) => self.timed(worker, |host| {
+                    if let ToMaster::Image { last: Some(_), .. } = message {
+                        let report = Box::new(host.places[worker].report());
+                        host.send(worker, &ToMaster::Report(report))?;
+                    }
+                    host.send(worker, &message)
+                })?,
+                session::Action::SendPeer(to, message) => self.timed(worker, |host| {
                     let packed = wire::pack_to_peer(&message);
-                    self.traffic.bytes += packed.wire_bytes();
-                    self.queue.push_back(Arrival::ToPeer(worker as u32, to as usize, packed));
-                }
+                    let bytes = packed.wire_bytes();
+                    host.traffic.bytes += bytes;
+                    host.traffic.peer_bytes += bytes;
+                    *host.places[worker].peers.entry(to).or_default() += bytes;
+                    host.queue.push_back(Arrival::ToPeer(worker as u32, to as usize, packed));
+                    Ok(())
+                })?,
                 session::Action::Compute(task) => self.compute(worker, task)?,
                 session::Action::Forget => {
                     if let Some(machine) = &mut self.places[worker].machine {
@@ -205,6 +243,26 @@ impl Host {
             }
         }
         Ok(())
+    }
+
+    fn send(&mut self, worker: usize, message: &ToMaster) -> Result<(), String> {
+        let packed = wire::pack_to_master(message).map_err(|e| e.to_string())?;
+        self.traffic.bytes += packed.wire_bytes();
+        self.queue.push_back(Arrival::ToMaster(worker, packed));
+        Ok(())
+    }
+
+    /// Books what is done for a worker's messages as its sending.
+    fn timed(
+        &mut self,
+        worker: usize,
+        work: impl FnOnce(&mut Self) -> Result<(), String>,
+    ) -> Result<(), String> {
+        let (cycle, from) = (self.places[worker].session.cycle(), Instant::now());
+        let result = work(self);
+        let lap = Lap { phase: Phase::Send, from, to: Instant::now() };
+        self.places[worker].stopwatch.book(cycle, lap);
+        result
     }
 
     fn compute(&mut self, worker: usize, task: Task) -> Result<(), String> {

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use mechanics::{contact::Census, state::GlobalState};
-use protocol::message::{Route, ToMaster, ToWorker, Work};
+use protocol::{
+    message::{Route, ToMaster, ToWorker, Work},
+    phase::Report,
+};
 
 use crate::{
     balance::Dealing, job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot,
@@ -144,6 +147,8 @@ pub struct Outcome {
     pub census: Census,
     /// Compute time of each worker.
     pub work: Vec<Work>,
+    /// How the time of each worker went; empty where a worker did not come to the end.
+    pub reports: Vec<Report>,
     /// Largest over mean of cost over speed.
     pub imbalance: f64,
     /// Lane width of the workers.

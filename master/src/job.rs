@@ -23,7 +23,10 @@ use mechanics::{
     vote::{Quanta, Vote},
     wall::{self, Pose},
 };
-use protocol::message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work};
+use protocol::{
+    message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work},
+    phase::Report,
+};
 
 use crate::{
     event::{Action, Event, Limit, Options, Outcome, Progress},
@@ -106,6 +109,7 @@ pub struct Job {
     sorts: u64,
     census: mechanics::contact::Census,
     work: Vec<Work>,
+    reports: Vec<Report>,
     imbalance: f64,
     over: bool,
 }
@@ -124,6 +128,11 @@ impl Job {
     /// Surface of the problem; none without contact.
     pub fn surface(&self) -> Option<&Surface> {
         self.bench.as_ref().map(|bench| bench.sorter.surface())
+    }
+
+    /// How partial forces travel.
+    pub fn route(&self) -> Route {
+        self.options.route
     }
 
     /// Whether it has ended.
@@ -179,6 +188,7 @@ impl Job {
             sorts: self.sorts,
             census: self.census,
             work: self.work.clone(),
+            reports: std::mem::take(&mut self.reports),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
             route: match self.options.route {
@@ -203,6 +213,11 @@ impl Job {
                     ));
                 }
                 actions.push(Action::Send(to as usize, ToWorker::Relayed { from: worker as u32, message }));
+                Ok(())
+            }
+            ToMaster::Report(report) => {
+                report.check(self.n_workers).map_err(|error| format!("worker {worker}: {error}"))?;
+                self.reports[worker] = *report;
                 Ok(())
             }
             ToMaster::Transfer { cycle, state } => self.transfer(worker, cycle, state, actions),

@@ -5,11 +5,13 @@
 use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 
 use clap::Parser;
+
 use master::{
-    certs, client,
-    command::{Certs, Cli, Command, WorkerArgs},
+    bench, certs, client,
+    command::{Bench, Certs, Cli, Command, WorkerArgs},
     daemon, processes, run, simulate,
 };
+use worker::daemon::Listen;
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt()
@@ -31,6 +33,7 @@ fn main() -> ExitCode {
         Command::Hosts { at } => client::hosts(&at),
         Command::Cancel { job, at } => client::cancel(job, &at),
         Command::Results { job, out, force, at } => client::results(job, out, force, &at),
+        Command::Bench { what: Bench::Messages(args) } => bench::messages::run(&args),
         Command::Certs { what } => make_certificates(what),
         Command::Check { deck } => check(&deck),
         Command::Materials => {
@@ -57,6 +60,11 @@ fn work(args: WorkerArgs) -> Result<ExitCode, String> {
         patience: Duration::from_secs(args.patience),
         once: args.once,
         token: std::env::var(processes::TOKEN).ok(),
+        peers: if args.no_peers {
+            Listen::Nowhere
+        } else {
+            Listen::Port { port: args.peer_port, announce: args.peer_announce }
+        },
     };
     worker::daemon::run(&options).map(|()| ExitCode::SUCCESS)
 }

@@ -16,6 +16,7 @@ use std::{
 
 pub mod history;
 pub mod summary;
+pub mod trace;
 pub mod vtu;
 
 /// Name of the index of states.
@@ -24,6 +25,8 @@ pub const PVD: &str = "results.pvd";
 pub const HISTORY: &str = "history.csv";
 /// Name of the summary.
 pub const SUMMARY: &str = "summary.json";
+/// Name of the trace of a job's workers.
+pub const TRACE: &str = "trace.json";
 
 pub use deck::model::FIELD_NAMES;
 
@@ -158,7 +161,7 @@ pub fn state_name(index: u32) -> String {
 fn is_written_by_a_run(name: &str) -> bool {
     let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".tmp")).unwrap_or(name);
     let state = stem.strip_prefix("state-").and_then(|n| n.strip_suffix(".vtu"));
-    [PVD, HISTORY, SUMMARY].contains(&stem)
+    [PVD, HISTORY, SUMMARY, TRACE].contains(&stem)
         || state.is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
 }
 

@@ -1,6 +1,7 @@
 //! `bolide run`: one deck, here, to its summary.
 
 use std::{
+    collections::BTreeSet,
     io::IsTerminal,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -13,7 +14,10 @@ use std::{
 
 use deck::model::Model;
 use indicatif::{ProgressBar, ProgressStyle};
-use protocol::request::JobOptions;
+use protocol::{
+    phase::{Phase, Report},
+    request::JobOptions,
+};
 
 use crate::{
     command::RunArgs,
@@ -24,7 +28,8 @@ use crate::{
     results::{
         Folder,
         history::{History, HistoryRow},
-        summary::{Energies, Summary, WorkUnits},
+        summary::{Energies, Summary, WorkUnits, WorkerTimes},
+        trace,
         vtu::Series,
     },
     snapshot,
@@ -76,11 +81,12 @@ pub fn limit(model: &mut Model, options: &JobOptions) -> Result<(), String> {
     Ok(())
 }
 
-/// The options of a job from what was asked.
-pub fn options_for(asked: &JobOptions) -> Options {
+/// The options of a job from what was asked, on so many workers; `all_take_peers` as for
+/// [`RouteChoice::choose`](protocol::request::RouteChoice::choose).
+pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> Options {
     Options {
         lanes: asked.lanes.clone(),
-        route: asked.route,
+        route: asked.route.choose(workers, all_take_peers),
         dealing: crate::balance::Dealing::Owners,
         snapshot_at: asked.snapshot_at,
         states: !asked.no_output,
@@ -132,7 +138,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let folder = if asked.no_output { None } else { Some(folder_for(args)) };
     let folder =
         folder.map(|path| Folder::create(&path, args.force)).transpose().map_err(|e| e.to_string())?;
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&asked), resume)?;
+    let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&asked, n, true), resume)?;
     let census = Census::of(&job, &model);
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     for row in job.rows_before() {
@@ -152,8 +158,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let wall = started.elapsed().as_secs_f64();
     drop(children);
     output.finish();
+    let names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
+    if let Some(path) = &args.trace {
+        trace::write(path, &names, &outcome.reports).map_err(|e| e.to_string())?;
+    }
     let total_threads = (n * threads) as u32;
-    conclude(&model, &census, &outcome, traffic, n as u32, total_threads, wall, &output, args.json)
+    conclude(&model, &census, &outcome, traffic, &names, total_threads, wall, &output, args.json)
 }
 
 /// Counts of the surface, taken before the run.
@@ -188,7 +198,7 @@ pub fn conclude(
     census: &Census,
     outcome: &Outcome,
     traffic: Traffic,
-    workers: u32,
+    workers: &[&str],
     threads: u32,
     wall_s: f64,
     output: &Output,
@@ -219,7 +229,7 @@ pub fn summarise(
     census: &Census,
     outcome: &Outcome,
     traffic: Traffic,
-    workers: u32,
+    workers: &[&str],
     threads: u32,
     wall_s: f64,
 ) -> Summary {
@@ -238,9 +248,11 @@ pub fn summarise(
         surface_elements: census.elements,
         surface_faces: census.faces,
         surface_nodes: census.nodes,
-        workers,
+        workers: workers.len() as u32,
         threads,
         route: outcome.route.to_owned(),
+        linked_pairs: pairs(&outcome.reports).0,
+        relayed_pairs: pairs(&outcome.reports).1,
         lanes: outcome.lanes.clone(),
         cycles,
         end_time: outcome.state.as_ref().map_or(ledger.last.time, |s| s.time),
@@ -260,6 +272,8 @@ pub fn summarise(
         },
         imbalance: outcome.imbalance,
         bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
+        master_bytes_per_cycle: per((traffic.bytes - traffic.peer_bytes) as f64, run_cycles),
+        worker_times: worker_times(workers, &outcome.reports),
         energies: Energies {
             kinetic: ledger.last.kinetic,
             internal: ledger.last.internal,
@@ -275,6 +289,33 @@ pub fn summarise(
         worst_penetration: ledger.worst_penetration,
         digest: outcome.digest.clone(),
     }
+}
+
+/// Pairs of workers that exchange over a link of their own, and those that the master relays for.
+fn pairs(reports: &[Report]) -> (u64, u64) {
+    let pair = |me: usize, other: &u32| (me.min(*other as usize), me.max(*other as usize));
+    let of = |list: fn(&Report) -> &Vec<u32>| -> BTreeSet<(usize, usize)> {
+        let lists = reports.iter().enumerate();
+        lists.flat_map(|(me, report)| list(report).iter().map(move |other| pair(me, other))).collect()
+    };
+    let (linked, relayed) = (of(|report| &report.linked), of(|report| &report.relayed));
+    (linked.difference(&relayed).count() as u64, relayed.len() as u64)
+}
+
+/// How the time of each worker went.
+fn worker_times(names: &[&str], reports: &[Report]) -> Vec<WorkerTimes> {
+    let of = |(name, report): (&&str, &Report)| WorkerTimes {
+        name: (*name).to_owned(),
+        border_s: report.seconds(Phase::Border),
+        contact_s: report.seconds(Phase::Contact),
+        interior_s: report.seconds(Phase::Interior),
+        send_s: report.seconds(Phase::Send),
+        wait_s: report.seconds(Phase::Wait),
+        integrate_s: report.seconds(Phase::Integrate),
+        other_s: report.seconds(Phase::Other),
+        peer_bytes: report.peer_bytes,
+    };
+    names.iter().zip(reports).map(of).collect()
 }
 
 /// A flag that Ctrl-C or SIGTERM sets, saying `what` happens now; a second one ends the process at once.

@@ -20,7 +20,7 @@ use crate::{
     event::Action,
     job::Job,
     queue::Event,
-    results::Folder,
+    results::{Folder, TRACE, trace},
     run::{Census, Output, limit, options_for, progress_line, summarise},
 };
 
@@ -65,7 +65,9 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     limit(&mut model, &order.options)?;
     let model = Arc::new(model);
     let hands: Vec<_> = order.seats.iter().map(|seat| seat.hand.clone()).collect();
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&order.options), None)?;
+    let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
+    let options = options_for(&order.options, hands.len(), all_take_peers);
+    let (job, first) = Job::new(Arc::clone(&model), &hands, options, None)?;
     let shares = shares(&order.seats, &first);
     order.status.send_modify(|status| status.shares = shares);
     let folder = order.folder.as_ref().map(|path| Folder::create(path, false)).transpose();
@@ -77,9 +79,13 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     let (outcome, traffic) = drive(job, first, order.number, &order.seats, &mut reporter, &order.stop)?;
     let wall = started.elapsed().as_secs_f64();
     let threads = hands.iter().map(|hand| hand.threads).sum();
-    let summary = summarise(&model, &census, &outcome, traffic, hands.len() as u32, threads, wall);
+    let names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
+    let summary = summarise(&model, &census, &outcome, traffic, &names, threads, wall);
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
+        if order.options.trace {
+            trace::write(&folder.file(TRACE), &names, &outcome.reports).map_err(|e| e.to_string())?;
+        }
     }
     order.status.send_modify(|status| {
         status.cycle = summary.cycles;

@@ -8,6 +8,7 @@
 use std::{path::Path, process::ExitCode, sync::Arc};
 
 use deck::model::Model;
+use protocol::{message::Route, request::RouteChoice};
 use serde::Serialize;
 
 pub mod calibrate;
@@ -20,10 +21,7 @@ pub mod table;
 pub mod tape;
 pub mod virtual_clock;
 
-use crate::{
-    command::{Route, SimulateArgs},
-    run::read_deck,
-};
+use crate::{command::SimulateArgs, run::read_deck};
 
 use cluster::{Cluster, ElementCost};
 use virtual_clock::{Machines, Phases, Scheme, Timeline};
@@ -119,13 +117,14 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         network: cluster.network.clone(),
         changes: cluster.changes.clone(),
     };
-    let scheme = Scheme::bolide(args.route.into());
+    let route = RouteChoice::from(args.route).choose(cluster.speeds.len(), true);
+    let scheme = Scheme::bolide(route);
     let (timeline, _) = virtual_clock::run(&model, &machines, scheme, None)?;
     let window = timeline.window();
     let summary = Summary {
         cluster: &cluster.title,
         clock: "virtual",
-        route: match args.route {
+        route: match route {
             Route::Master => "master",
             Route::Direct => "direct",
         },

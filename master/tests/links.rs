@@ -19,13 +19,17 @@ use protocol::{
     dial,
     handshake::{Hello, Role},
     link::{Settings, split},
+    message::Route,
 };
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpSocket, TcpStream},
     sync::mpsc,
 };
-use worker::daemon::compute_pool;
+use worker::{
+    daemon::{Service, compute_pool},
+    peers::Peers,
+};
 
 const PLATES: &str = include_str!("../../deck/examples/plates-free-slip.toml");
 /// The longest that a run over links may take.
@@ -76,7 +80,7 @@ fn embedded_run(model: &Arc<Model>, hands: &[Hand]) -> (String, Option<Box<Snaps
 
 /// Runs the plates over these pairs of streams: the master's end and the worker's. Assignments and images are long
 /// enough to travel in bulk, which frames of cycles overtake.
-async fn run_over<S>(pairs: Vec<(S, S)>)
+async fn run_over<S>(pairs: Vec<(S, S)>, route: Route)
 where
     S: AsyncRead + AsyncWrite + Send + 'static,
 {
@@ -86,12 +90,22 @@ where
     let (events, mut heard) = mpsc::channel(16);
     let gate = Arc::new(Gate::new(events, vec![Role::Worker], None, None));
     for (i, ((near, far), hand)) in pairs.into_iter().zip(&hands).enumerate() {
-        tokio::spawn(Arc::clone(&gate).serve(near, format!("pair {i}"), None));
-        let hello = Hello::new(Role::Worker, &hand.name, hand.speed, 1, "any", i as u64);
+        let mut hello = Hello::new(Role::Worker, &hand.name, hand.speed, 1, "any", i as u64);
+        let peers = match route {
+            Route::Master => None,
+            Route::Direct => {
+                // What it accepts has the buffers of what it listens on.
+                let listener = tight_socket("127.0.0.1:0").listen(16).expect("listens");
+                hello.peer_port = listener.local_addr().expect("bound").port();
+                Some(Arc::new(Peers::start(listener, None).expect("no certificates")))
+            }
+        };
+        tokio::spawn(Arc::clone(&gate).serve(near, format!("127.0.0.1:{}", i + 1), None));
         tokio::spawn(async move {
             let (sender, receiver) = split(far, Settings::default());
             let call = dial::greet(sender, receiver, &hello).await.expect("taken in");
-            worker::daemon::serve(call, compute_pool(1).expect("threads")).await
+            let pool = compute_pool(1).expect("threads");
+            worker::daemon::serve(call, Service { pool, peers }).await
         });
     }
     let mut seats: Vec<Seat> = Vec::new();
@@ -108,7 +122,8 @@ where
     }
     seats.sort_by(|a, b| a.hand.name.cmp(&b.hand.name));
     let running = tokio::task::spawn_blocking(move || {
-        let (job, first) = Job::new(model, &hands, options(), None).expect("it starts");
+        let options = Options { route, ..options() };
+        let (job, first) = Job::new(model, &hands, options, None).expect("it starts");
         let mut sink = Keep::default();
         let ran = drive(job, first, 1, &seats, &mut sink, &AtomicBool::new(false));
         ran.map(|(outcome, traffic)| (outcome, traffic, sink.0))
@@ -117,6 +132,9 @@ where
     let (outcome, traffic, stored) = ran.expect("no bug").expect("a sink that takes all");
     assert_eq!(digest(&outcome), expected);
     assert!(traffic.bytes > 10 << 20, "{}", traffic.bytes);
+    assert!(outcome.reports.iter().all(|report| report.relayed.is_empty()));
+    let linked = outcome.reports.iter().map(|report| report.linked.len()).sum::<usize>();
+    assert_eq!(linked > 0, route == Route::Direct, "{linked}");
     let stored = stored.expect("it was asked for");
     assert_eq!(stored.state.cycle, 17);
     assert!(snapshot.is_some_and(|snapshot| snapshot == stored), "the halves of a snapshot are of one cycle");
@@ -124,23 +142,23 @@ where
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_job_finishes_over_pipes_of_a_thousand_bytes() {
-    run_over((0..3).map(|_| tokio::io::duplex(1024)).collect()).await;
+    run_over((0..3).map(|_| tokio::io::duplex(1024)).collect(), Route::Master).await;
 }
 
 /// Two ends of a TCP connection whose buffers in the system are the smallest it has.
 async fn tight_pair() -> (TcpStream, TcpStream) {
-    let socket = |()| {
-        let socket = TcpSocket::new_v4().expect("a socket");
-        socket.set_send_buffer_size(4096).expect("a buffer");
-        socket.set_recv_buffer_size(4096).expect("a buffer");
-        socket
-    };
-    let listening = socket(());
-    listening.bind("127.0.0.1:0".parse().expect("an address")).expect("a port");
-    let listener = listening.listen(1).expect("listens");
+    let listener = tight_socket("127.0.0.1:0").listen(1).expect("listens");
     let address = listener.local_addr().expect("bound");
-    let (far, near) = tokio::join!(socket(()).connect(address), listener.accept());
+    let (far, near) = tokio::join!(tight_socket("127.0.0.1:0").connect(address), listener.accept());
     (near.expect("taken").0, far.expect("connected"))
+}
+
+fn tight_socket(address: &str) -> TcpSocket {
+    let socket = TcpSocket::new_v4().expect("a socket");
+    socket.set_send_buffer_size(4096).expect("a buffer");
+    socket.set_recv_buffer_size(4096).expect("a buffer");
+    socket.bind(address.parse().expect("an address")).expect("a port");
+    socket
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -149,7 +167,16 @@ async fn a_job_finishes_over_sockets_of_four_kilobytes() {
     for _ in 0..3 {
         pairs.push(tight_pair().await);
     }
-    run_over(pairs).await;
+    run_over(pairs, Route::Master).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_job_finishes_over_links_between_workers_of_four_kilobytes() {
+    let mut pairs = Vec::new();
+    for _ in 0..3 {
+        pairs.push(tight_pair().await);
+    }
+    run_over(pairs, Route::Direct).await;
 }
 
 #[test]

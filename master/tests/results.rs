@@ -9,7 +9,7 @@ use deck::model::{Gauge, Model, Output};
 use master::results::{
     self, Error, Folder,
     history::{GaugeRow, History, HistoryRow, PartEnergy, Table},
-    summary::{Energies, Summary, WorkUnits},
+    summary::{Energies, Summary, WorkUnits, WorkerTimes},
     vtu::{Fields, Series, von_mises, write_vtu},
 };
 use mechanics::{
@@ -160,6 +160,8 @@ fn summary(model: &Model) -> Summary {
         workers: 4,
         threads: 8,
         route: "direct".into(),
+        linked_pairs: 5,
+        relayed_pairs: 1,
         lanes: "avx512".into(),
         cycles: 1200,
         end_time: 1.0 / 3.0,
@@ -179,6 +181,8 @@ fn summary(model: &Model) -> Summary {
         },
         imbalance: 1.012,
         bytes_per_cycle: 431_234.7,
+        master_bytes_per_cycle: 31_234.7,
+        worker_times: vec![WorkerTimes { name: "pc-1".into(), wait_s: 0.25, ..WorkerTimes::default() }],
         energies: Energies {
             kinetic: 7.1e-1,
             internal: 0.1 + 0.2,
@@ -454,13 +458,17 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
     assert_eq!(
         keys(&json),
         "bytes_per_cycle contact_share cycles digest elements end_time energies grind_ns imbalance lanes \
-         momentum_error nodes route sorts surface_elements surface_faces surface_nodes threads title wall_s \
-         work_units workers worst_courant worst_gap_travel worst_penetration"
+         linked_pairs master_bytes_per_cycle momentum_error nodes relayed_pairs route sorts surface_elements surface_faces surface_nodes threads title wall_s \
+         work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
     );
     assert_eq!(keys(&json["energies"]), "contact error external hourglass internal kinetic viscosity");
     assert_eq!(
         keys(&json["work_units"]),
         "count faces_max faces_mean faces_min interactions nodes_max nodes_mean nodes_min"
+    );
+    assert_eq!(
+        keys(&json["worker_times"][0]),
+        "border_s contact_s integrate_s interior_s name other_s peer_bytes send_s wait_s"
     );
     let read: Summary = serde_json::from_str(&text).expect("a summary");
     assert_eq!(format!("{read:?}"), format!("{summary:?}"));

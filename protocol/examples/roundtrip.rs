@@ -3,7 +3,7 @@
 //! `cargo run --release -p protocol --example roundtrip`; both ends on one thread.
 
 use protocol::frame::{Frame, Header, Kind};
-use protocol::link::{Receiver, Sender, Settings, split, tune};
+use protocol::link::{Receiver, Sender, Settings, Socket, split};
 use std::time::{Duration, Instant};
 use tokio::net::{TcpListener, TcpStream};
 
@@ -46,8 +46,8 @@ async fn main() -> Result<(), Fault> {
     let listener = TcpListener::bind("127.0.0.1:0").await?;
     let (near, far) = tokio::join!(TcpStream::connect(listener.local_addr()?), listener.accept());
     let (near, far) = (near?, far?.0);
-    tune(&near)?;
-    tune(&far)?;
+    let near = Socket::new(near)?;
+    let far = Socket::new(far)?;
     let (mut near, mut far) = (split(near, Settings::default()), split(far, Settings::default()));
     println!("{:>9}  {:>14}  {:>8}", "bytes", "half trip, us", "MB/s");
     for (bytes, times) in [(8, 20_000), (64 << 10, 4000), (1 << 20, 400), (4 << 20, 100)] {

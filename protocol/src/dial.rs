@@ -1,6 +1,11 @@
-//! DIAL: from the address of a master to a link that has greeted it.
+//! DIAL: from the address of a master, or of another worker, to a link that has greeted it.
 
-use std::{net::SocketAddr, path::Path, sync::Arc, time::Duration};
+use std::{
+    net::{IpAddr, SocketAddr},
+    path::Path,
+    sync::Arc,
+    time::Duration,
+};
 
 use crate::tls::ClientConfig;
 use tokio::net::TcpStream;
@@ -37,34 +42,100 @@ pub fn certificates(folder: Option<&Path>) -> Result<Option<Arc<ClientConfig>>> 
     folder.map(|folder| tls::client_config(&tls::Paths::in_folder(folder))).transpose()
 }
 
+/// A connection that has not been greeted over.
+pub struct Reached {
+    stream: link::Socket,
+    host: String,
+    certificates: Option<Arc<ClientConfig>>,
+    /// What the other side's certificate may be for.
+    roles: &'static [tls::Role],
+    settings: Settings,
+}
+
+impl Reached {
+    /// The address of this side: of the interface that the other side is reached by.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the system does not know it.
+    pub fn local_ip(&self) -> Result<IpAddr> {
+        let address = self.stream.local_addr();
+        address.map(|address| address.ip()).map_err(|e| Error::io("the address of a connection", &e))
+    }
+
+    /// TLS if there are certificates, then the greeting.
+    ///
+    /// # Errors
+    /// [`Error::Certificate`], or what [`link::greet`] gives.
+    pub async fn greet(self, hello: &Hello) -> Result<Call> {
+        let (sender, receiver) = match &self.certificates {
+            None => link::split(self.stream, self.settings),
+            Some(config) => {
+                let (stream, _) = tls::connect_any(self.stream, &self.host, config, self.roles).await?;
+                link::split(stream, self.settings)
+            }
+        };
+        greet(sender, receiver, hello).await
+    }
+}
+
 /// Dials `master` (`HOST`, `HOST:PORT` or `[V6]:PORT`) and greets it. Without certificates only loopback addresses are
 /// dialled.
 ///
 /// # Errors
 /// [`Error::Io`] when nobody answers, [`Error::Address`], [`Error::Certificate`], or what [`link::greet`] gives.
 pub async fn dial(master: &str, certificates: Option<&Arc<ClientConfig>>, hello: &Hello) -> Result<Call> {
+    reach(master, certificates).await?.greet(hello).await
+}
+
+/// Connects to another worker, which may hold a certificate of a worker or of a master; `certificates` as
+/// [`tls::peer_config`] gives them. Without any only loopback addresses are dialled.
+///
+/// # Errors
+/// [`Error::Io`] when nobody answers, [`Error::Address`].
+pub async fn reach_peer(
+    address: SocketAddr,
+    certificates: Option<&Arc<ClientConfig>>,
+    settings: Settings,
+) -> Result<Reached> {
+    if certificates.is_none() {
+        tls::loopback_only(address)?;
+    }
+    let stream = connect(&[address], &address.to_string()).await?;
+    let roles = &[tls::Role::Worker, tls::Role::Master];
+    let host = address.ip().to_string();
+    Ok(Reached { stream, host, certificates: certificates.cloned(), roles, settings })
+}
+
+/// Connects to `master` as [`dial`] does, without a greeting.
+///
+/// # Errors
+/// [`Error::Io`] when nobody answers, [`Error::Address`].
+pub async fn reach(master: &str, certificates: Option<&Arc<ClientConfig>>) -> Result<Reached> {
     let (host, port) = split_address(master)?;
-    let doing = || format!("connecting to {master}");
-    let fault = |error: std::io::Error| Error::io(doing(), &error);
+    let fault = |error: std::io::Error| Error::io(format!("connecting to {master}"), &error);
     let addresses: Vec<SocketAddr> = tokio::net::lookup_host((host, port)).await.map_err(fault)?.collect();
     if certificates.is_none() {
         addresses.iter().try_for_each(|address| tls::loopback_only(*address))?;
     }
+    Ok(Reached {
+        stream: connect(&addresses, master).await?,
+        host: host.to_owned(),
+        certificates: certificates.cloned(),
+        roles: &[tls::Role::Master],
+        settings: Settings::default(),
+    })
+}
+
+async fn connect(addresses: &[SocketAddr], name: &str) -> Result<link::Socket> {
+    let doing = || format!("connecting to {name}");
+    let fault = |error: std::io::Error| Error::io(doing(), &error);
     let late = || {
         let why = format!("no answer after {} s", CONNECT_LIMIT.as_secs());
         Error::Io { doing: doing(), kind: std::io::ErrorKind::TimedOut, why }
     };
-    let connecting = TcpStream::connect(addresses.as_slice());
+    let connecting = TcpStream::connect(addresses);
     let stream = tokio::time::timeout(CONNECT_LIMIT, connecting).await.map_err(|_| late())?.map_err(fault)?;
-    link::tune(&stream)?;
-    let (sender, receiver) = match certificates {
-        None => link::split(stream, Settings::default()),
-        Some(config) => {
-            let (stream, _) = tls::connect(stream, host, config, tls::Role::Master).await?;
-            link::split(stream, Settings::default())
-        }
-    };
-    greet(sender, receiver, hello).await
+    link::Socket::new(stream)
 }
 
 /// Greets over a link that stands.

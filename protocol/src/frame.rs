@@ -23,6 +23,7 @@
 //! What a payload means is not known here.
 
 use crate::{Error, Result};
+use crc_fast::{CrcAlgorithm, Digest};
 use std::fmt;
 
 /// The first four bytes of every frame.
@@ -197,7 +198,7 @@ impl Frame {
     /// [`Error::TooLong`] when the payload is over the limit of its kind.
     pub fn seal(&mut self) -> Result<()> {
         self.header.length = checked_length(self.header.kind, self.payload.len() as u64)?;
-        self.header.crc = crc32c::crc32c(&self.payload);
+        self.header.crc = crc_fast::crc32_iscsi(&self.payload);
         Ok(())
     }
 
@@ -207,6 +208,11 @@ impl Frame {
     /// [`Error::Truncated`] or [`Error::Trailing`] for a payload of another length,
     /// [`Error::PayloadChecksum`] for other bytes.
     pub fn verify(&self) -> Result<()> {
+        self.verify_as(crc_fast::crc32_iscsi(&self.payload))
+    }
+
+    /// The same, where the checksum of the payload has been computed while it came.
+    pub(crate) fn verify_as(&self, computed: u32) -> Result<()> {
         let (found, needed) = (self.payload.len() as u64, u64::from(self.header.length));
         if found < needed {
             return Err(Error::Truncated { what: self.header.kind.name(), found, needed });
@@ -214,11 +220,35 @@ impl Frame {
         if found > needed {
             return Err(Error::Trailing { used: needed, found });
         }
-        let computed = crc32c::crc32c(&self.payload);
         if computed != self.header.crc {
             return Err(Error::PayloadChecksum { kind: self.header.kind, stated: self.header.crc, computed });
         }
         Ok(())
+    }
+}
+
+/// The CRC-32C of a payload that comes in pieces, each looked at while it is still in the cache.
+pub(crate) struct Checksum {
+    /// The register, before its last inversion.
+    state: u64,
+}
+
+impl Checksum {
+    /// Of no bytes.
+    pub(crate) const fn new() -> Self {
+        Self { state: 0xffff_ffff }
+    }
+
+    /// Goes on with `bytes`.
+    pub(crate) fn update(&mut self, bytes: &[u8]) {
+        let mut digest = Digest::new_with_init_state(CrcAlgorithm::Crc32Iscsi, self.state);
+        digest.update(bytes);
+        self.state = digest.get_state();
+    }
+
+    /// The checksum of all bytes so far.
+    pub(crate) const fn value(&self) -> u32 {
+        !(self.state as u32)
     }
 }
 
@@ -248,7 +278,7 @@ pub fn encode_header(header: &Header) -> [u8; HEADER_LEN] {
     bytes[32..40].copy_from_slice(&header.plan.to_le_bytes());
     bytes[40..44].copy_from_slice(&header.sequence.to_le_bytes());
     bytes[44..48].copy_from_slice(&header.crc.to_le_bytes());
-    let crc = crc32c::crc32c(&bytes[..48]);
+    let crc = crc_fast::crc32_iscsi(&bytes[..48]);
     bytes[48..52].copy_from_slice(&crc.to_le_bytes());
     bytes
 }
@@ -269,7 +299,7 @@ pub fn decode_header(bytes: &[u8; HEADER_LEN]) -> Result<Header> {
     if theirs != VERSION {
         return Err(Error::FrameVersion { theirs, ours: VERSION });
     }
-    let (stated, computed) = (u32_at(bytes, 48), crc32c::crc32c(&bytes[..48]));
+    let (stated, computed) = (u32_at(bytes, 48), crc_fast::crc32_iscsi(&bytes[..48]));
     if stated != computed {
         return Err(Error::HeaderChecksum { stated, computed });
     }

@@ -11,8 +11,8 @@ use std::fmt;
 
 /// The version of the messages in this module and in the control messages, stated first in [`Hello`].
 ///
-/// 1: the first.
-pub const VERSION: u16 = 1;
+/// 1: the first. 2: links between workers (`peer_port` and `member` in [`Hello`]), introductions and reports.
+pub const VERSION: u16 = 2;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;
@@ -64,6 +64,17 @@ impl fmt::Display for Role {
     }
 }
 
+/// Where a peer stands in a job, as the master told it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Membership {
+    /// The job.
+    pub job: u32,
+    /// Its epoch.
+    pub epoch: u32,
+    /// The caller's index among the workers of the job.
+    pub index: u32,
+}
+
 /// The greeting. Sent by the dialling side, once; answered by Welcome or Refuse.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
@@ -83,6 +94,10 @@ pub struct Hello {
     pub nonce: u64,
     /// The secret that the listening side asks for, as a master gives one to the peers of a job.
     pub token: Option<String>,
+    /// Of a worker: the port under which other workers reach it, 0 where it takes none. 0 for other roles.
+    pub peer_port: u16,
+    /// Of a peer: its place in the job; none for other roles.
+    pub member: Option<Membership>,
 }
 
 impl Hello {
@@ -96,7 +111,23 @@ impl Hello {
         nonce: u64,
     ) -> Self {
         let (name, lanes) = (name.into(), lanes.into());
-        Self { version: VERSION, role, name, speed, threads, lanes, nonce, token: None }
+        Self {
+            version: VERSION,
+            role,
+            name,
+            speed,
+            threads,
+            lanes,
+            nonce,
+            token: None,
+            peer_port: 0,
+            member: None,
+        }
+    }
+
+    /// Whether its token is `secret`; takes a time that does not tell where they differ.
+    pub fn holds(&self, secret: &str) -> bool {
+        self.token.as_ref().is_some_and(|theirs| same(secret, theirs))
     }
 
     /// The reason to refuse the greeting whoever sent it, naming what was found and what is expected.
@@ -354,7 +385,7 @@ impl Server {
             return Err(format!("role {role}, the certificate is for a {certificate}"));
         }
         if let Some(token) = &self.policy.token
-            && !hello.token.as_ref().is_some_and(|theirs| same(token, theirs))
+            && !hello.holds(token)
         {
             return Err("token missing or wrong".into());
         }

@@ -1,48 +1,60 @@
 //! The link: frames both ways over one byte stream, neither way waiting for the other.
 //!
 //! [`split`] takes any stream (TCP, TLS, a pipe in memory) apart into a [`Sender`] and a [`Receiver`].
-//! Sending puts a frame into a bounded queue and returns; a task of the link writes it. So two peers that
-//! both send more than their sockets hold do not wait for each other, as long as each of them receives.
-//! The queue has two priorities: chunks of bulk messages go only when nothing else is queued, so a cycle
-//! frame waits for at most the link's own write buffer ([`WRITE_BUFFER`]) and what the system has taken
-//! ([`UNSENT_BYTES`]).
+//! Sending puts a frame into a bounded queue and returns; what the stream takes of it at once is written
+//! there and then, the rest by a task of the link. So two peers that both send more than their sockets hold
+//! do not wait for each other, as long as each of them receives. The queue has two priorities: chunks of
+//! bulk messages go one at a time and only when nothing else is queued, so a cycle frame waits for at most
+//! one chunk inside the link and what the system has taken ([`UNSENT_BYTES`]).
+//!
+//! A receiver that did not wait long for its last frame does not sleep at once for the next: it looks for up
+//! to [`EAGER`], giving way to other threads. Peers that answer each other within microseconds are spared the
+//! time it takes to wake a thread; one that waits for a computation sleeps as before.
 //!
 //! A link ends as a whole: a bad frame, a silent peer, the receiver's drop or [`Sender::abort`] closes it
 //! both ways. Only a clean end is one-sided: when the last sender is dropped, what is queued is written
 //! and the stream's sending side closed, while the receiver goes on. What frames mean is not known here, except
 //! that heartbeats are swallowed.
 //!
-//! Pass a TCP stream through [`tune`] before splitting it: otherwise the system's own send buffer holds
+//! Make a [`Socket`] of a TCP stream before splitting it: otherwise nobody can look, and the system's own send buffer holds
 //! megabytes of bulk that no cycle frame can overtake.
 
 mod greeting;
 mod receiver;
 mod sender;
+mod socket;
+mod writer;
 
 pub use greeting::{GREETING_LIMIT, admit, greet, hear};
 pub use receiver::Receiver;
 pub use sender::Sender;
+pub use socket::Socket;
 
 use crate::codec::{MESSAGE_LIMIT, OPEN_STREAMS};
-use crate::frame::Frame;
+use crate::frame::{Frame, Kind};
 use crate::{Error, Result};
 use sender::Queue;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpStream;
 use tokio::sync::{Notify, watch};
 use tokio::time::Instant;
+use writer::Writer;
 
-/// Bytes gathered before they are handed to the stream; at most this much bulk is ahead of a cycle frame
-/// inside the link.
+/// Bytes of short frames that are handed to the stream together.
 pub const WRITE_BUFFER: usize = 128 << 10;
 /// Bytes that the system takes of a tuned TCP stream before it has sent what it took earlier: 10 ms of a
 /// 100 Mbit/s link.
 pub const UNSENT_BYTES: u32 = 128 << 10;
-/// Bytes asked of the stream at a time for small frames.
-pub const READ_BUFFER: usize = 64 << 10;
+/// Bytes asked of the stream at a time for headers and short frames; what they do not hold of a payload is
+/// read straight to its place.
+pub const READ_BUFFER: usize = 8 << 10;
+/// Bytes of payload asked of the stream at a time: its checksum is taken while they are in the cache.
+pub const READ_AT_ONCE: usize = 256 << 10;
+/// How long a receiver looks for bytes before it sleeps, if its last wait was no longer.
+pub const EAGER: Duration = Duration::from_micros(30);
 /// Bytes of payload that are allocated before as many have come: a lying header costs no more.
 pub const FIRST_ALLOCATION: usize = 256 << 10;
 /// Heartbeats that a peer may miss before it counts as dead: a busy PC may swap for seconds.
@@ -120,9 +132,9 @@ where
     S: AsyncRead + AsyncWrite + Send + 'static,
 {
     let (read, write) = tokio::io::split(stream);
-    let shared = Arc::new(Shared::new(settings));
+    let shared = Arc::new(Shared::new(settings, Writer::new(Box::new(write))));
     let receiver = Receiver::new(Box::new(read), Arc::clone(&shared));
-    (Sender::start(write, shared), receiver)
+    (Sender::start(shared), receiver)
 }
 
 /// What the two halves and the writing task know together.
@@ -131,6 +143,8 @@ struct Shared {
     start: Instant,
     /// Microseconds from `start` to the last byte received.
     last_seen: AtomicU64,
+    /// Microseconds from `start` to the last frame handed to the stream.
+    last_sent: AtomicU64,
     heartbeat_us: AtomicU64,
     silence_us: AtomicU64,
     frames_sent: AtomicU64,
@@ -138,6 +152,10 @@ struct Shared {
     frames_received: AtomicU64,
     bytes_received: AtomicU64,
     queue: Mutex<Queue>,
+    /// There may be something queued or under way; a hint, written under the lock of `queue`.
+    unwritten: AtomicBool,
+    /// Locked before `queue` where both are; none once the link has ended.
+    writer: Mutex<Option<Writer>>,
     /// There is something to write, or the interval has changed.
     work: Notify,
     /// Why the link ended, once it has.
@@ -148,11 +166,12 @@ struct Shared {
 }
 
 impl Shared {
-    fn new(settings: Settings) -> Self {
+    fn new(settings: Settings, writer: Writer) -> Self {
         Self {
             settings,
             start: Instant::now(),
             last_seen: AtomicU64::new(0),
+            last_sent: AtomicU64::new(0),
             heartbeat_us: AtomicU64::new(micros(settings.heartbeat)),
             silence_us: AtomicU64::new(micros(settings.silence)),
             frames_sent: AtomicU64::new(0),
@@ -160,6 +179,8 @@ impl Shared {
             frames_received: AtomicU64::new(0),
             bytes_received: AtomicU64::new(0),
             queue: Mutex::default(),
+            unwritten: AtomicBool::new(false),
+            writer: Mutex::new(Some(writer)),
             work: Notify::new(),
             end: watch::Sender::new(None),
             written: watch::Sender::new(false),
@@ -202,24 +223,35 @@ impl Shared {
 
     /// An empty buffer, one that has been used before if there is any.
     fn buffer(&self) -> Vec<u8> {
+        let mut buffer = self.used_buffer();
+        buffer.clear();
+        buffer
+    }
+
+    /// A buffer with whatever it held when it was given back: its bytes need no zeros before they are read into.
+    fn used_buffer(&self) -> Vec<u8> {
         lock(&self.spare).pop().unwrap_or_default()
     }
 
     /// Keeps a buffer for reuse, within [`SPARE_BUFFERS`] and [`SPARE_BYTES`].
-    fn recycle(&self, mut buffer: Vec<u8>) {
+    fn recycle(&self, buffer: Vec<u8>) {
         if buffer.capacity() == 0 || buffer.capacity() > SPARE_BYTES {
             return;
         }
-        buffer.clear();
         let mut spare = lock(&self.spare);
         if spare.len() < SPARE_BUFFERS {
             spare.push(buffer);
         }
     }
 
+    /// Counts a frame that the stream has taken, and keeps its buffer.
     fn sent(&self, frame: Frame, header_and_payload: usize) {
         self.frames_sent.fetch_add(1, Relaxed);
         self.bytes_sent.fetch_add(header_and_payload as u64, Relaxed);
+        self.last_sent.store(micros(self.start.elapsed()), Relaxed);
+        if frame.header.kind != Kind::Bulk {
+            lock(&self.queue).written(frame.payload.len());
+        }
         self.recycle(frame.payload);
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! A run, seen from one worker: `Assign` -> `Ready`; `Start`; then per cycle `Cycle` -> `Totals`; at a sort,
 //! `Plan` arrives ahead of its cycle and `Transfer` goes both ways at that cycle; `Image` when asked; at the end
-//! `Image` with `last`, then `Release`.
+//! `Report` and `Image` with `last`, then `Release`. On route direct `Peers` comes before `Assign`, and partial forces go
+//! from worker to worker as [`ToPeer`].
 //!
 //! Orders act with a lag that is the same on every route: the orders that answer cycle `n` give the time step of
 //! cycle `n + 1` and what happens at the start of cycle `n + 2`.
@@ -16,6 +17,9 @@ use mechanics::{
     wall::Pose,
 };
 use serde::{Deserialize, Serialize};
+use std::net::SocketAddr;
+
+use crate::phase::Report;
 
 /// From the master to a worker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,6 +65,30 @@ pub enum ToWorker {
     },
     /// The job is over or given up; the worker forgets it.
     Release,
+    /// Before `Assign` on route direct: where the other workers of this job and epoch are found.
+    Peers(Box<Introduction>),
+}
+
+/// Who computes a job, for links between its workers. Its frame names the job and the epoch.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Introduction {
+    /// The index of the worker that is told.
+    pub me: u32,
+    /// Known to the workers of this epoch alone; whoever dials shows it.
+    pub secret: String,
+    /// By index.
+    pub members: Vec<Member>,
+}
+
+/// A worker as the others see it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Member {
+    /// Name of the host, for messages.
+    pub name: String,
+    /// Where it takes peers: the host as the master saw it, and its own word for the port; none where it takes none.
+    pub address: Option<SocketAddr>,
+    /// The incarnation that its frames carry.
+    pub incarnation: u32,
 }
 
 /// From one worker to another, on route direct: once per cycle to each neighbour of the plan.
@@ -181,6 +209,8 @@ pub enum ToMaster {
         /// What this worker's compute threads have used so far.
         work: Work,
     },
+    /// Before the last `Image`: how the worker's time went, from its runtime.
+    Report(Box<Report>),
     /// The worker cannot go on.
     Failed {
         /// The cycle.

@@ -93,7 +93,7 @@ pub struct JobOptions {
     /// Lane width by name; the widest of each machine if none.
     pub lanes: Option<String>,
     /// How partial forces travel.
-    pub route: Route,
+    pub route: RouteChoice,
     /// Write no results folder.
     pub no_output: bool,
     /// Store the run at the start of this cycle.
@@ -104,6 +104,33 @@ pub struct JobOptions {
     pub sort_seed: Option<u64>,
     /// Start when so many workers are there.
     pub min_workers: u32,
+    /// Write `trace.json`: what every worker did in its last cycles.
+    pub trace: bool,
+}
+
+/// How a user wants partial forces to travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RouteChoice {
+    /// As [`RouteChoice::choose`] says.
+    #[default]
+    Auto,
+    /// Through the master.
+    Master,
+    /// From worker to worker; pairs that cannot reach each other are relayed by the master.
+    Direct,
+}
+
+impl RouteChoice {
+    /// The route of a job on so many workers. Auto is direct with two workers or more when every one of them takes peers
+    /// (`all_take_peers`), and master otherwise: one worker has nobody to exchange with, and what is relayed passes the
+    /// master's link twice as often as sums do.
+    pub const fn choose(self, workers: usize, all_take_peers: bool) -> Route {
+        match self {
+            Self::Direct => Route::Direct,
+            Self::Auto if workers > 1 && all_take_peers => Route::Direct,
+            Self::Master | Self::Auto => Route::Master,
+        }
+    }
 }
 
 /// Where a job stands.
@@ -226,6 +253,20 @@ pub fn check_file_name(name: &str) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn auto_is_direct_where_there_is_somebody_to_exchange_with_who_can_be_reached() {
+        use RouteChoice::{Auto, Direct, Master};
+        for (choice, workers, all_take_peers, route) in [
+            (Auto, 2, true, Route::Direct),
+            (Auto, 1, true, Route::Master),
+            (Auto, 9, false, Route::Master),
+            (Direct, 1, false, Route::Direct),
+            (Master, 9, true, Route::Master),
+        ] {
+            assert_eq!(choice.choose(workers, all_take_peers), route, "{choice:?} of {workers}");
+        }
+    }
 
     #[test]
     fn file_names_cannot_leave_their_folder() {

@@ -7,11 +7,12 @@
 
 use crate::{Error, Result};
 use rustls::client::WebPkiServerVerifier;
+use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
 use rustls::crypto::{CryptoProvider, aws_lc_rs};
 use rustls::pki_types::pem::PemObject;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
 use rustls::server::WebPkiClientVerifier;
-use rustls::{AlertDescription, CertificateError, RootCertStore};
+use rustls::{AlertDescription, CertificateError, DigitallySignedStruct, RootCertStore, SignatureScheme};
 pub use rustls::{ClientConfig, ServerConfig};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -19,13 +20,16 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
-use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::io::{AsyncRead, AsyncWrite, BufReader};
 use tokio_rustls::{TlsAcceptor, TlsConnector, TlsStream};
 use x509_parser::extensions::GeneralName;
 use x509_parser::prelude::{FromDer, X509Certificate};
 
 /// The longest a TLS handshake may take: a peer that dials and says nothing holds a task no longer.
 pub const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
+
+/// Bytes asked of the stream at a time: four records. TLS by itself asks for a quarter of one.
+pub const READ_BUFFER: usize = 64 << 10;
 
 /// What a URI in a certificate starts with when it names a role.
 pub const ROLE_PREFIX: &str = "bolide:";
@@ -125,15 +129,28 @@ pub fn client_config(paths: &Paths) -> Result<Arc<ClientConfig>> {
     files.client(paths)
 }
 
+/// The dialling side's configuration toward another worker, which the master names by address and whose certificate
+/// need not list that address: it must be of the same CA, and what it may be is checked by [`connect_any`]. Whom to
+/// dial comes from the master, over a link whose host was proved.
+///
+/// # Errors
+/// As for [`server_config`].
+pub fn peer_config(paths: &Paths) -> Result<Arc<ClientConfig>> {
+    let files = Files::load(paths)?;
+    files.check_dates(&paths.certificate, SystemTime::now())?;
+    files.peer(paths)
+}
+
 /// Takes a connection: the TLS handshake, then the caller's identity.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Certificate`] in one line; a caller that takes longer than
 /// [`HANDSHAKE_LIMIT`].
-pub async fn accept<S>(stream: S, config: &Arc<ServerConfig>) -> Result<(TlsStream<S>, Identity)>
+pub async fn accept<S>(stream: S, config: &Arc<ServerConfig>) -> Result<(TlsStream<BufReader<S>>, Identity)>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
+    let stream = BufReader::with_capacity(READ_BUFFER, stream);
     let stream = in_time(TlsAcceptor::from(Arc::clone(config)).accept(stream)).await?;
     let identity = peer_identity(stream.get_ref().1.peer_certificates())?;
     Ok((TlsStream::Server(stream), identity))
@@ -152,18 +169,37 @@ pub async fn connect<S>(
     host: &str,
     config: &Arc<ClientConfig>,
     role: Role,
-) -> Result<(TlsStream<S>, Identity)>
+) -> Result<(TlsStream<BufReader<S>>, Identity)>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
+    connect_any(stream, host, config, &[role]).await
+}
+
+/// As [`connect`], with a host that may hold a certificate for any of `roles`.
+///
+/// # Errors
+/// As for [`connect`].
+pub async fn connect_any<S>(
+    stream: S,
+    host: &str,
+    config: &Arc<ClientConfig>,
+    roles: &[Role],
+) -> Result<(TlsStream<BufReader<S>>, Identity)>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
     let name = ServerName::try_from(host.to_owned())
         .map_err(|_| Error::Certificate(format!("{host:?} is neither a host's name nor an address")))?;
+    let stream = BufReader::with_capacity(READ_BUFFER, stream);
     let stream = in_time(TlsConnector::from(Arc::clone(config)).connect(name, stream)).await?;
     let identity = peer_identity(stream.get_ref().1.peer_certificates())?;
-    if identity.role != role {
+    if !roles.contains(&identity.role) {
+        let expected: Vec<&str> = roles.iter().map(|role| role.name()).collect();
         return Err(Error::Certificate(format!(
-            "the certificate of {host:?} is for a {}, expected a {role}",
-            identity.role
+            "the certificate of {host:?} is for a {}, expected a {}",
+            identity.role,
+            expected.join(" or a ")
         )));
     }
     Ok((TlsStream::Client(stream), identity))
@@ -277,6 +313,68 @@ impl Files {
             })
             .map_err(|error| unusable(&paths.certificate, &error))?;
         Ok(Arc::new(config))
+    }
+
+    fn peer(self, paths: &Paths) -> Result<Arc<ClientConfig>> {
+        let verifier = WebPkiServerVerifier::builder_with_provider(self.roots, provider())
+            .build()
+            .map_err(|error| unusable(&paths.ca, &error))?;
+        let config = ClientConfig::builder_with_provider(provider())
+            .with_protocol_versions(&[&rustls::version::TLS13])
+            .and_then(|config| {
+                config
+                    .dangerous()
+                    .with_custom_certificate_verifier(Arc::new(AnyHost(verifier)))
+                    .with_client_auth_cert(self.chain, self.key)
+            })
+            .map_err(|error| unusable(&paths.certificate, &error))?;
+        Ok(Arc::new(config))
+    }
+}
+
+/// Accepts any host with a certificate of the CA, whatever names the certificate lists.
+#[derive(Debug)]
+struct AnyHost(Arc<WebPkiServerVerifier>);
+
+impl ServerCertVerifier for AnyHost {
+    fn verify_server_cert(
+        &self,
+        end_entity: &CertificateDer<'_>,
+        intermediates: &[CertificateDer<'_>],
+        server_name: &ServerName<'_>,
+        ocsp_response: &[u8],
+        now: UnixTime,
+    ) -> std::result::Result<ServerCertVerified, rustls::Error> {
+        let verdict = self.0.verify_server_cert(end_entity, intermediates, server_name, ocsp_response, now);
+        match verdict {
+            // The chain is verified before the name is looked at.
+            Err(rustls::Error::InvalidCertificate(
+                CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. },
+            )) => Ok(ServerCertVerified::assertion()),
+            verdict => verdict,
+        }
+    }
+
+    fn verify_tls12_signature(
+        &self,
+        message: &[u8],
+        certificate: &CertificateDer<'_>,
+        signature: &DigitallySignedStruct,
+    ) -> std::result::Result<HandshakeSignatureValid, rustls::Error> {
+        self.0.verify_tls12_signature(message, certificate, signature)
+    }
+
+    fn verify_tls13_signature(
+        &self,
+        message: &[u8],
+        certificate: &CertificateDer<'_>,
+        signature: &DigitallySignedStruct,
+    ) -> std::result::Result<HandshakeSignatureValid, rustls::Error> {
+        self.0.verify_tls13_signature(message, certificate, signature)
+    }
+
+    fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
+        self.0.supported_verify_schemes()
     }
 }
 

@@ -13,6 +13,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
+use tokio::io::BufReader;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsStream;
 
@@ -55,7 +56,7 @@ impl Authority {
 }
 
 /// One side of a connection after its handshake.
-type Side = Result<(TlsStream<TcpStream>, Identity)>;
+type Side = Result<(TlsStream<BufReader<TcpStream>>, Identity)>;
 
 /// Dials `host` on a free port of 127.0.0.1, expecting a master there.
 async fn meet(client: &Arc<ClientConfig>, host: &str, server: &Arc<ServerConfig>) -> (Side, Side) {
@@ -130,6 +131,36 @@ async fn right_certificates_carry_frames_and_roles() {
     };
     let both = async { tokio::join!(exchange(near, 1, 2), exchange(far, 2, 1)) };
     tokio::time::timeout(Duration::from_secs(60), both).await.expect("no deadlock");
+}
+
+#[tokio::test]
+async fn a_peer_is_known_by_its_ca_and_role_whatever_its_address() {
+    let (lab, other) = (Authority::new("lab"), Authority::new("lab"));
+    let elsewhere = |params: &mut CertificateParams| {
+        params.subject_alt_names.retain(|name| matches!(name, SanType::URI(_)));
+    };
+    let (_d, dials) = lab.host("bolide:worker", usual);
+    let client = tls::peer_config(&dials).expect("usable");
+    for (authority, role, words) in [
+        (&lab, "bolide:worker", ""),
+        (&lab, "bolide:client", "is for a client, expected a worker or a master"),
+        (&other, "bolide:worker", "is from another CA than this host's ca.pem"),
+    ] {
+        let (_l, listens) = authority.host(role, elsewhere);
+        let server = tls::server_config(&listens).expect("usable");
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+        let address = listener.local_addr().expect("bound");
+        let dial = async {
+            let stream = TcpStream::connect(address).await.expect("it listens");
+            tls::connect_any(stream, "127.0.0.1", &client, &[Role::Worker, Role::Master]).await
+        };
+        let listen = async { tls::accept(listener.accept().await.expect("it dials").0, &server).await };
+        let (near, _far) = tokio::join!(dial, listen);
+        match near {
+            Ok((_, identity)) => assert_eq!((identity.role, words), (Role::Worker, "")),
+            Err(error) => assert!(!words.is_empty() && error.to_string().contains(words), "{error}"),
+        }
+    }
 }
 
 #[tokio::test]

@@ -1,6 +1,7 @@
 //! The daemons as real processes: the same digest as `bolide run`, and what goes wrong stays where it is.
 
 mod faults;
+mod links;
 mod peers;
 mod runs;
 

@@ -12,7 +12,7 @@ fn three_workers_give_the_digest_of_run(tls: bool) {
     for (name, speed) in [("a", "1"), ("b", "2"), ("c", "0.5")] {
         cluster.worker(name, speed);
     }
-    let submitted = cluster.json(&["submit", &small(), "--cycles", "40", "--min-workers", "3"]);
+    let submitted = cluster.json(&["submit", &small(), "--cycles", "40", "--min-workers", "3", "--trace"]);
     assert_eq!(submitted["job"], 1);
     let watched = cluster.client(&["watch", "1"]);
     assert_eq!(watched.code, Some(0), "{watched:?}");
@@ -57,7 +57,8 @@ fn three_workers_give_the_digest_of_run(tls: bool) {
         names
     };
     assert_eq!(names(&spool), names(&out));
-    assert!(names(&out).len() >= 5, "{:?}", names(&out));
+    assert!(names(&out).len() >= 6, "{:?}", names(&out));
+    assert!(names(&out).iter().any(|name| name == "trace.json"), "{:?}", names(&out));
     let again = cluster.client(&["results", "1", "--out", "fetched"]);
     assert!(again.code == Some(1) && again.err.contains("fetched is not empty"), "{again:?}");
     for name in names(&out) {

@@ -7,6 +7,7 @@
 
 mod contact;
 mod element;
+mod gas;
 mod load;
 mod solid;
 mod structure;
@@ -31,6 +32,9 @@ macro_rules! each_case_of_the_book {
             wave: symmetric_impacts_reach_the_hugoniot quick;
             wave: impacts_of_two_materials_match_their_impedances quick;
             wave: an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longitudinal_speed quick;
+            gas: sods_tube_has_its_plateaus_and_its_shock_in_place quick;
+            gas: gas_that_runs_together_is_compressed_as_noh_says long;
+            gas: the_blast_of_lulesh_reaches_sedovs_radius quick;
             solid: the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find quick;
             solid: finer_copper_bars_come_nearer_to_what_others_converge_to long;
             solid: the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds quick;

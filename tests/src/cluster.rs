@@ -211,11 +211,40 @@ impl Cluster {
     /// # Panics
     /// If it does not join.
     pub fn worker(&mut self, name: &str, speed: &str) {
-        let arguments = ["worker", "--name", name, "--speed", speed, "--threads", "1"];
-        let worker = Process::start(name, &mut self.command("worker", &arguments));
+        self.worker_with(name, speed, &[]);
+    }
+
+    /// The same with further flags.
+    ///
+    /// # Panics
+    /// If it does not join.
+    pub fn worker_with(&mut self, name: &str, speed: &str, flags: &[&str]) {
+        let mut arguments = vec!["worker", "--name", name, "--speed", speed, "--threads", "1"];
+        arguments.extend(flags);
+        let worker = Process::start(name, self.command("worker", &arguments).env("BOLIDE_LOG", "info"));
         worker.wait_for("joined");
         self.master.wait_for(&format!("worker {name} joined"));
         self.workers.push((name.to_owned(), worker));
+    }
+
+    /// The process of a worker.
+    ///
+    /// # Panics
+    /// If there is none of that name.
+    pub fn process(&self, name: &str) -> &Process {
+        let worker = self.workers.iter().find(|(n, _)| n == name);
+        &worker.expect("a worker of that name").1
+    }
+
+    /// Where a worker takes other workers.
+    ///
+    /// # Panics
+    /// If it does not say so.
+    pub fn peer_address(&self, name: &str) -> String {
+        let words = "listening for other workers on ";
+        let line = self.process(name).wait_for(words);
+        let rest = line.split(words).nth(1).and_then(|rest| rest.split_whitespace().next());
+        rest.expect("an address").to_owned()
     }
 
     /// Ends a worker as `kill -9` does.

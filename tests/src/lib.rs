@@ -1,7 +1,8 @@
 //! What the tests of the whole system share.
 //!
-//! [`solve`] takes a deck through master and workers in this process; [`cluster`] runs real processes on loopback;
-//! [`book`] holds the cases, [`case`] compares a figure with a published or derived one of `reference.toml` and says how it went; [`checker`]
+//! [`solve`] takes a deck through master and workers in this process; [`cluster`] runs real processes on loopback,
+//! [`proxy`] stands between them; [`book`] holds the cases, [`case`] compares a figure with a published or derived one
+//! of `reference.toml` and says how it went; [`checker`]
 //! looks for nodes inside foreign bodies, without asking the contact code.
 
 pub mod bits;
@@ -9,4 +10,5 @@ pub mod book;
 pub mod case;
 pub mod checker;
 pub mod cluster;
+pub mod proxy;
 pub mod solve;

@@ -11,6 +11,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
     let book = [
         include_str!("../src/book/element.rs"),
         include_str!("../src/book/wave.rs"),
+        include_str!("../src/book/gas.rs"),
         include_str!("../src/book/solid.rs"),
         include_str!("../src/book/structure.rs"),
         include_str!("../src/book/contact.rs"),

@@ -1,14 +1,23 @@
 //! Does what a session asks: the domain, the lanes, the clock of compute threads.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::{
+    sync::atomic::{AtomicU64, Ordering},
+    time::Instant,
+};
 
 use mechanics::{
     cycle::{Domain, Load, Meter, Sets},
     lanes::Width,
 };
-use protocol::message::{Assign, Work};
+use protocol::{
+    message::{Assign, Work},
+    phase::Phase,
+};
 
-use crate::session::{Outcome, Task};
+use crate::{
+    session::{Outcome, Task},
+    stopwatch::Lap,
+};
 
 /// Counts thread-CPU time of compute threads (ns).
 #[derive(Debug, Default)]
@@ -51,6 +60,20 @@ fn thread_cpu_ns() -> u64 {
 pub struct Machine {
     domain: Option<Domain>,
     clock: ThreadClock,
+    laps: Laps,
+}
+
+/// Phases of the tasks since they were last taken.
+#[derive(Default)]
+struct Laps(Vec<Lap>);
+
+impl Laps {
+    fn time<T>(&mut self, phase: Phase, work: impl FnOnce() -> T) -> T {
+        let from = Instant::now();
+        let result = work();
+        self.0.push(Lap { phase, from, to: Instant::now() });
+        result
+    }
 }
 
 impl Machine {
@@ -69,6 +92,11 @@ impl Machine {
         self.domain.as_ref().map(Domain::load).unwrap_or_default()
     }
 
+    /// What the tasks since the last call took, by wall clock, in their order.
+    pub fn take_laps(&mut self) -> impl Iterator<Item = Lap> + use<> {
+        std::mem::take(&mut self.laps.0).into_iter()
+    }
+
     /// Does one task. Failures are outcomes.
     pub fn run(&mut self, task: Task) -> Outcome {
         self.try_run(task).unwrap_or_else(Outcome::Failed)
@@ -78,39 +106,50 @@ impl Machine {
         if let Task::Load { assign, prepare } = task {
             return self.build(*assign, prepare);
         }
-        let clock = &self.clock;
+        let (clock, laps) = (&self.clock, &mut self.laps);
         let domain = self.domain.as_mut().ok_or("a task without an assignment")?;
         Ok(match task {
             Task::Load { .. } => return Err("a second assignment".to_owned()),
-            Task::Transfer { nodes } => Outcome::Transferred(domain.transfer(&nodes)?),
+            Task::Transfer { nodes } => {
+                Outcome::Transferred(laps.time(Phase::Other, || domain.transfer(&nodes))?)
+            }
             Task::Elements { dt_previous, quantum, time } => {
                 domain.begin(quantum, time);
-                domain.elements(Sets::All, dt_previous, clock);
+                laps.time(Phase::Interior, || domain.elements(Sets::All, dt_previous, clock));
                 Outcome::Computed
             }
-            Task::Install { plan, guest_state, dt_previous, gather } => {
+            Task::Install { plan, guest_state, dt_previous, gather } => laps.time(Phase::Contact, || {
                 let gathered = if gather { domain.gather() } else { Vec::new() };
                 let mark = clock.start();
                 domain.install(&plan, &guest_state)?;
                 clock.stop(mark, true);
                 domain.contact(dt_previous, clock);
-                Outcome::Forces { partials: domain.partials(clock), gathered }
-            }
+                Ok::<_, String>(Outcome::Forces { partials: domain.partials(clock), gathered })
+            })?,
             Task::Border { dt_previous, quantum, time, gather } => {
-                let gathered = if gather { domain.gather() } else { Vec::new() };
-                domain.begin(quantum, time);
-                domain.contact(dt_previous, clock);
-                domain.elements(Sets::Border, dt_previous, clock);
-                Outcome::Forces { partials: domain.partials(clock), gathered }
+                let gathered = laps.time(Phase::Contact, || {
+                    let gathered = if gather { domain.gather() } else { Vec::new() };
+                    domain.begin(quantum, time);
+                    domain.contact(dt_previous, clock);
+                    gathered
+                });
+                laps.time(Phase::Border, || {
+                    domain.elements(Sets::Border, dt_previous, clock);
+                    Outcome::Forces { partials: domain.partials(clock), gathered }
+                })
             }
             Task::Interior { dt_previous } => {
-                domain.elements(Sets::Interior, dt_previous, clock);
+                laps.time(Phase::Interior, || domain.elements(Sets::Interior, dt_previous, clock));
                 Outcome::Computed
             }
             Task::Integrate { totals, dt_previous, dt, walls } => {
-                Outcome::Integrated(Box::new(domain.integrate(&totals, dt_previous, dt, &walls, clock)?))
+                let vote = laps
+                    .time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, &walls, clock))?;
+                Outcome::Integrated(Box::new(vote))
             }
-            Task::Image => Outcome::Image { pieces: domain.pieces(), work: clock.work() },
+            Task::Image => {
+                laps.time(Phase::Other, || Outcome::Image { pieces: domain.pieces(), work: clock.work() })
+            }
         })
     }
 

@@ -1,12 +1,11 @@
 //! The worker as a process: dials a master, greets it, and carries bytes between the link and the session.
 //!
-//! One task receives frames and hands messages through a bounded queue to the compute thread, which owns session and
-//! machine and sends through the link's queue without waiting. So heartbeats go on while it computes. Nothing is
-//! decided here except when to dial again.
+//! One task receives frames and hands messages through a bounded queue to the compute thread ([`crate::runner`]), which
+//! owns session and machine and sends through the link's queue without waiting. So heartbeats go on while it computes.
+//! Nothing is decided here except when to dial again.
 
 use std::{
-    collections::VecDeque,
-    panic::{AssertUnwindSafe, catch_unwind},
+    net::IpAddr,
     path::PathBuf,
     sync::Arc,
     time::{Duration, Instant},
@@ -16,11 +15,9 @@ use mechanics::lanes::Width;
 use protocol::{
     Error, Result,
     dial::{self, Call},
-    frame::Header,
     handshake::{Hello, Role},
     link::Receiver,
-    message::{ToMaster, ToWorker},
-    order::{BULK_ON_THE_WAY, Inbox, Outbox, Place},
+    order::{BULK_ON_THE_WAY, Inbox, Outbox},
     tls::ClientConfig,
     wire,
 };
@@ -29,12 +26,12 @@ use tokio::sync::{mpsc, oneshot};
 use tracing::{info, warn};
 
 use crate::{
-    compute::Machine,
-    session::{Action, Event, Outcome, Session},
+    peers::{Peers, links::Links},
+    runner::{Input, Runner},
 };
 
-/// Messages that may wait for the compute thread; a master sends at most a few ahead.
-pub const WAITING_MESSAGES: usize = 64;
+/// Messages that may wait for the compute thread: a master sends at most a few ahead, a neighbour two.
+pub const WAITING_MESSAGES: usize = 256;
 /// The first pause before dialling again; each next one is twice as long.
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
 /// The longest pause before dialling again.
@@ -59,6 +56,31 @@ pub struct Options {
     pub once: bool,
     /// The secret that the master asks for.
     pub token: Option<String>,
+    /// Whether and where it takes other workers.
+    pub peers: Listen,
+}
+
+/// Whether and where a worker takes other workers, for links of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Listen {
+    /// Nowhere, and it dials none: the master relays.
+    Nowhere,
+    /// On the interface that it reaches the master by.
+    Port {
+        /// The port to listen on; 0 for any.
+        port: u16,
+        /// The port that others dial, where it is not the same: of a port that is forwarded.
+        announce: Option<u16>,
+    },
+}
+
+/// What computing for a master needs beside the connection.
+#[derive(Clone)]
+pub struct Service {
+    /// Compute threads.
+    pub pool: Arc<ThreadPool>,
+    /// Where other workers call; without it the master relays.
+    pub peers: Option<Arc<Peers>>,
 }
 
 /// Computes for a master until a signal, a refusal, or until the master has been away for too long.
@@ -130,10 +152,13 @@ async fn stay(
     hello: &Hello,
     pool: &Arc<ThreadPool>,
 ) -> std::result::Result<(), String> {
+    let mut service = Service { pool: Arc::clone(pool), peers: None };
+    let mut hello = hello.clone();
+    let mut listening = None;
     let mut alone_since = Instant::now();
     let mut pause = FIRST_PAUSE;
     loop {
-        let error = match dial::dial(&options.master, certificates, hello).await {
+        let error = match join(options, certificates, &mut hello, &mut listening, &mut service).await {
             Ok(call) => {
                 info!(
                     host = call.welcome.host,
@@ -141,7 +166,7 @@ async fn stay(
                     "joined {}",
                     options.master
                 );
-                let error = serve(call, Arc::clone(pool)).await;
+                let error = serve(call, service.clone()).await;
                 if options.once {
                     return Ok(());
                 }
@@ -161,6 +186,30 @@ async fn stay(
     }
 }
 
+/// Reaches the master, listens for other workers on the interface that leads there, and greets.
+async fn join(
+    options: &Options,
+    certificates: Option<&Arc<ClientConfig>>,
+    hello: &mut Hello,
+    listening: &mut Option<IpAddr>,
+    service: &mut Service,
+) -> Result<Call> {
+    let reached = dial::reach(&options.master, certificates).await?;
+    let ip = reached.local_ip()?;
+    if let Listen::Port { port, announce } = options.peers
+        && *listening != Some(ip)
+    {
+        service.peers = None;
+        let listener = Peers::bind(ip, port).await?;
+        let bound = listener.local_addr().map_err(|e| Error::io("the port for other workers", &e))?;
+        service.peers = Some(Arc::new(Peers::start(listener, options.certs.as_deref())?));
+        *listening = Some(ip);
+        hello.peer_port = announce.unwrap_or(bound.port());
+        info!(announced = hello.peer_port, "listening for other workers on {bound}");
+    }
+    reached.greet(hello).await
+}
+
 /// Whether dialling again would meet the same.
 fn is_final(error: &Error) -> bool {
     match error {
@@ -171,19 +220,23 @@ fn is_final(error: &Error) -> bool {
         | Error::Magic { .. }
         | Error::FrameVersion { .. } => true,
         // What TLS refuses.
-        Error::Io { kind, .. } => *kind == std::io::ErrorKind::InvalidData,
+        Error::Io { kind: std::io::ErrorKind::InvalidData, .. } => true,
+        // The port for other workers.
+        Error::Io { kind, .. } => *kind == std::io::ErrorKind::AddrInUse,
         _ => false,
     }
 }
 
 /// Computes for the master at the other end until the connection ends; gives the reason.
-pub async fn serve(call: Call, pool: Arc<ThreadPool>) -> Error {
+pub async fn serve(call: Call, Service { pool, peers }: Service) -> Error {
     let Call { sender, mut receiver, welcome } = call;
     let (send, messages) = mpsc::channel(WAITING_MESSAGES);
     let (fail, mut failed) = oneshot::channel();
     let outbox = Outbox::new(sender.clone(), welcome.incarnation);
+    let links = Links::new(peers.as_deref(), send.downgrade());
     let computing = std::thread::Builder::new().name("session".to_owned()).spawn(move || {
-        if let Err(error) = pool.install(|| compute(outbox, messages)) {
+        let runner = Runner::new(outbox, links);
+        if let Err(error) = pool.install(|| runner.run(messages)) {
             // The receiver is gone when the connection has ended already.
             let _ = fail.send(error);
         }
@@ -207,7 +260,7 @@ pub async fn serve(call: Call, pool: Arc<ThreadPool>) -> Error {
 }
 
 /// Hands every message on, in order; ends with the link.
-async fn listen(receiver: &mut Receiver, send: &mpsc::Sender<(Header, ToWorker)>) -> Error {
+async fn listen(receiver: &mut Receiver, send: &mpsc::Sender<Input>) -> Error {
     let mut inbox = Inbox::new(0, BULK_ON_THE_WAY);
     loop {
         if let Err(error) = hand_on(receiver, &mut inbox, send).await {
@@ -216,166 +269,15 @@ async fn listen(receiver: &mut Receiver, send: &mpsc::Sender<(Header, ToWorker)>
     }
 }
 
-async fn hand_on(
-    receiver: &mut Receiver,
-    inbox: &mut Inbox,
-    send: &mpsc::Sender<(Header, ToWorker)>,
-) -> Result<()> {
+async fn hand_on(receiver: &mut Receiver, inbox: &mut Inbox, send: &mpsc::Sender<Input>) -> Result<()> {
     inbox.accept(receiver.receive().await?)?;
     while let Some(letter) = inbox.take() {
         let message = wire::unpack_to_worker(letter.header.kind, &letter.bytes)?;
         receiver.recycle(letter.bytes);
-        if send.send((letter.header, message)).await.is_err() {
+        if send.send(Input::Master(letter.header, message)).await.is_err() {
             // The compute thread says why in its own words.
             std::future::pending::<()>().await;
         }
     }
     Ok(())
-}
-
-/// The compute thread: session and machine, one message after another.
-fn compute(mut outbox: Outbox, mut messages: mpsc::Receiver<(Header, ToWorker)>) -> Result<()> {
-    let mut session = Session::new();
-    let mut machine = Machine::new();
-    let mut watch = Watch::default();
-    while let Some((header, message)) = messages.blocking_recv() {
-        watch.heard(&header, &message)?;
-        let mut events = VecDeque::from([Event::Message(message)]);
-        while let Some(event) = events.pop_front() {
-            for action in session.apply(event) {
-                match action {
-                    Action::Send(message) => {
-                        let place = watch.said(&message, session.plan_hash());
-                        outbox.send(place, wire::pack_to_master(&message)?)?;
-                    }
-                    // No links between workers yet: the master passes it on.
-                    Action::SendPeer(to, message) => {
-                        let relay = ToMaster::Relay { to, message };
-                        let place = watch.said(&relay, session.plan_hash());
-                        outbox.send(place, wire::pack_to_master(&relay)?)?;
-                    }
-                    Action::Compute(task) => {
-                        let outcome = catch_unwind(AssertUnwindSafe(|| machine.run(task)));
-                        let outcome = outcome.unwrap_or_else(|panic| {
-                            machine = Machine::new();
-                            Outcome::Failed(format!("a bug in the worker: {}", words(panic.as_ref())))
-                        });
-                        events.push_back(Event::Done(outcome));
-                    }
-                    Action::Forget => machine.forget(),
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// What a panic said.
-fn words(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no words").to_owned()
-}
-
-/// Compares what frames say of themselves with the job in hand.
-#[derive(Debug, Default)]
-struct Watch {
-    place: Place,
-    /// Plan hashes of the cycles whose totals are still to come.
-    plans: VecDeque<(u64, u64)>,
-}
-
-impl Watch {
-    /// A message came: of the job in hand, of the cycle its frame names, following the plan its cycle was sent by.
-    fn heard(&mut self, header: &Header, message: &ToWorker) -> Result<()> {
-        if let ToWorker::Assign(assign) = message {
-            self.place = Place { job: header.job, epoch: header.epoch, plan: assign.plan_hash };
-            self.plans.clear();
-            return Ok(());
-        }
-        let (theirs, ours) = ((header.job, header.epoch), (self.place.job, self.place.epoch));
-        if theirs != ours {
-            return Err(Error::Message(format!(
-                "{} frame of job {} epoch {}, this worker has job {} epoch {}",
-                header.kind, theirs.0, theirs.1, ours.0, ours.1
-            )));
-        }
-        if let ToWorker::Totals { cycle, .. } = message {
-            let plan = match self.plans.pop_front() {
-                Some((sent, plan)) if sent == *cycle && header.cycle == *cycle => plan,
-                sent => {
-                    return Err(Error::Message(format!(
-                        "totals of cycle {cycle} in a frame of cycle {}, those of {:?} are next",
-                        header.cycle,
-                        sent.map(|(cycle, _)| cycle)
-                    )));
-                }
-            };
-            if plan != header.plan {
-                return Err(Error::Message(format!(
-                    "totals of cycle {cycle} follow plan {:016x}, sent was plan {plan:016x}",
-                    header.plan
-                )));
-            }
-        }
-        Ok(())
-    }
-
-    /// A message goes out under the plan in force.
-    fn said(&mut self, message: &ToMaster, plan: u64) -> Place {
-        self.place.plan = plan;
-        if let ToMaster::Cycle { cycle, .. } = message {
-            self.plans.push_back((*cycle, plan));
-        }
-        self.place
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use protocol::frame::Kind;
-
-    fn header(job: u32, cycle: u64, plan: u64) -> Header {
-        Header { job, cycle, plan, ..Header::new(Kind::Totals) }
-    }
-
-    fn totals(cycle: u64) -> ToWorker {
-        let quantum = mechanics::exact::Quantum::for_reference(1.0, 42);
-        let orders = protocol::message::Orders {
-            next: cycle + 1,
-            dt: 1.0,
-            time: 0.0,
-            walls: Vec::new(),
-            force_quantum: quantum,
-            gather: false,
-            collect: false,
-            stop: false,
-        };
-        ToWorker::Totals { cycle, orders, totals: Vec::new() }
-    }
-
-    #[test]
-    fn frames_of_another_job_cycle_or_plan_are_named() {
-        let place = Place { job: 3, epoch: 0, plan: 8 };
-        let sent = ToMaster::Cycle { cycle: 5, vote: None, partials: Vec::new(), gathered: Vec::new() };
-        let fresh = || {
-            let mut watch = Watch { place, plans: VecDeque::new() };
-            assert_eq!(watch.said(&sent, 8), place);
-            watch
-        };
-        assert_eq!(fresh().heard(&header(3, 5, 8), &totals(5)), Ok(()));
-        for (header, message, words) in [
-            (header(2, 5, 8), totals(5), "of job 2 epoch 0, this worker has job 3 epoch 0"),
-            (
-                header(3, 6, 8),
-                totals(6),
-                "totals of cycle 6 in a frame of cycle 6, those of Some(5) are next",
-            ),
-            (header(3, 6, 8), totals(5), "totals of cycle 5 in a frame of cycle 6"),
-            (header(3, 5, 9), totals(5), "follow plan 0000000000000009, sent was plan 0000000000000008"),
-        ] {
-            let error = fresh().heard(&header, &message).expect_err(words).to_string();
-            assert!(error.contains(words), "{error}");
-        }
-    }
 }

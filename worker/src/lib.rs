@@ -1,13 +1,17 @@
 //! The worker: holds sub-domains and work units, computes, exchanges.
 //!
 //! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics; [`daemon`]
-//! carries bytes between the session and a master.
+//! carries bytes between a master and the compute thread of [`runner`]; [`peers`] between that and other workers.
+//! [`stopwatch`] tells where the time goes.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 
 pub mod compute;
 pub mod daemon;
+pub mod peers;
+pub mod runner;
 pub mod session;
+pub mod stopwatch;
 
 /// A number that no other process draws: for nonces and tokens.
 pub fn random() -> u64 {

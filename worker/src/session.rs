@@ -247,6 +247,16 @@ impl Session {
         self.plan_hash
     }
 
+    /// Hash of the plan that acts at a cycle, this one or a later one; none while that plan has not come.
+    pub fn plan_at(&self, cycle: u64) -> Option<u64> {
+        match self.boundaries.iter().rev().find(|acts_at| **acts_at <= cycle) {
+            None => Some(self.plan_hash),
+            Some(boundary) => {
+                self.plans.iter().find(|(acts_at, ..)| acts_at == boundary).map(|(_, hash, _)| *hash)
+            }
+        }
+    }
+
     /// Takes an event, says what to do.
     pub fn apply(&mut self, event: Event) -> Vec<Action> {
         let mut actions = Vec::new();
@@ -300,6 +310,8 @@ impl Session {
             },
             _ if self.phase == Phase::Over || self.phase == Phase::Idle => Ok(()),
             ToWorker::Relayed { from, message } => self.hear_peer(from, message, actions),
+            // Links are the runtime's affair.
+            ToWorker::Peers(_) => Ok(()),
             ToWorker::Start { orders } => {
                 for order in orders {
                     self.orders.insert(order.next, order);

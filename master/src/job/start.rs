@@ -16,7 +16,10 @@ use mechanics::{
     vote::Quanta,
     wall,
 };
-use protocol::message::{Assign, ToWorker, Work};
+use protocol::{
+    message::{Assign, ToWorker, Work},
+    phase::Report,
+};
 
 use super::{Bench, Job};
 use crate::{
@@ -217,6 +220,7 @@ impl Job {
             sorts: u64::from(census.units > 0),
             census,
             work: vec![Work::default(); n],
+            reports: vec![Report::default(); n],
             imbalance,
             over: false,
             state,

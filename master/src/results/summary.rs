@@ -33,6 +33,10 @@ pub struct Summary {
     pub threads: u32,
     /// Route of the exchange: `master` or `direct`.
     pub route: String,
+    /// Pairs of workers that exchanged over a link of their own; 0 on route master.
+    pub linked_pairs: u64,
+    /// Pairs of workers that the master relayed for, because they could not reach each other or their link broke.
+    pub relayed_pairs: u64,
     /// Lane width of the workers: `scalar`, `avx2` or `avx512`; joined by `+` where they differ.
     pub lanes: String,
     /// Cycles completed.
@@ -53,6 +57,10 @@ pub struct Summary {
     pub imbalance: f64,
     /// Bytes on all links over cycles.
     pub bytes_per_cycle: f64,
+    /// Of these, bytes on the links of the master.
+    pub master_bytes_per_cycle: f64,
+    /// How the time of each worker went.
+    pub worker_times: Vec<WorkerTimes>,
     /// Energies at the end.
     pub energies: Energies,
     /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
@@ -65,6 +73,29 @@ pub struct Summary {
     pub worst_penetration: f64,
     /// Hash of the final state (hexadecimal).
     pub digest: String,
+}
+
+/// Wall-clock time of a worker since its first cycle, by what it did (s).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WorkerTimes {
+    /// Name of the host.
+    pub name: String,
+    /// Elements that touch nodes of the exchange, and packing partial forces.
+    pub border_s: f64,
+    /// Contact, and the installation of plans.
+    pub contact_s: f64,
+    /// All other elements; at a plan boundary all elements.
+    pub interior_s: f64,
+    /// Packing messages and queueing them; links send beside the computation.
+    pub send_s: f64,
+    /// Without a task: frames of others or orders were awaited.
+    pub wait_s: f64,
+    /// Integration of all nodes, and the vote.
+    pub integrate_s: f64,
+    /// Images and transfers.
+    pub other_s: f64,
+    /// Bytes that it sent to other workers over links of its own.
+    pub peer_bytes: u64,
 }
 
 /// Sizes of contact work units. Zero without contact.
@@ -156,7 +187,14 @@ impl Summary {
             100.0 * self.contact_share,
             self.imbalance
         )?;
-        writeln!(out, "  traffic    {} bytes per cycle", grouped(self.bytes_per_cycle.round() as u64))?;
+        writeln!(
+            out,
+            "  traffic    {} bytes per cycle, {} of them at the master; {} of {} pairs relayed",
+            grouped(self.bytes_per_cycle.round() as u64),
+            grouped(self.master_bytes_per_cycle.round() as u64),
+            grouped(self.relayed_pairs),
+            grouped(self.relayed_pairs + self.linked_pairs)
+        )?;
         let WorkUnits {
             count,
             nodes_min,

@@ -1,14 +1,14 @@
-//! The sending half: two bounded queues, and the task that writes them out.
+//! The sending half: two bounded queues.
 
-use super::{Counters, Shared, WRITE_BUFFER, lock, micros};
+use super::writer::{DIRECT_BYTES, write_at_once, write_out};
+use super::{Counters, Shared, lock, micros};
 use crate::codec::{Chunker, OPEN_STREAMS};
-use crate::frame::{Frame, HEADER_LEN, Header, Kind, checked_length, encode_header};
+use crate::frame::{Frame, Header, Kind, checked_length};
 use crate::{Error, Result};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
-use tokio::io::{AsyncWrite, AsyncWriteExt, BufWriter};
 use tokio::time::Instant;
 
 /// The sending half of a link. Clones feed the same queue; when the last is dropped the link writes
@@ -21,6 +21,9 @@ pub struct Sender {
 #[derive(Default)]
 pub(super) struct Queue {
     urgent: VecDeque<Frame>,
+    /// Frames other than bulk that are not wholly written, those under way included.
+    urgent_frames: usize,
+    /// Bytes of their payloads.
     urgent_bytes: usize,
     bulk: VecDeque<Chunker>,
     bulk_bytes: usize,
@@ -31,12 +34,26 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    /// The next frame to write, bulk only when nothing else waits; `spare` gives a chunk its buffer.
-    fn pop(&mut self, spare: impl FnOnce() -> Vec<u8>) -> Option<Frame> {
-        if let Some(frame) = self.urgent.pop_front() {
-            self.urgent_bytes -= frame.payload.len();
-            return Some(frame);
-        }
+    /// The oldest frame that is no bulk. It counts as queued until [`Queue::written`].
+    pub(super) fn pop_urgent(&mut self) -> Option<Frame> {
+        self.urgent.pop_front()
+    }
+
+    /// Appends a frame that is no bulk.
+    pub(super) fn push_urgent(&mut self, frame: Frame) {
+        self.urgent_frames += 1;
+        self.urgent_bytes += frame.payload.len();
+        self.urgent.push_back(frame);
+    }
+
+    /// A frame of `bytes` of payload that is no bulk has left.
+    pub(super) const fn written(&mut self, bytes: usize) {
+        self.urgent_frames -= 1;
+        self.urgent_bytes -= bytes;
+    }
+
+    /// The next chunk of bulk; `spare` gives it its buffer.
+    pub(super) fn pop_bulk(&mut self, spare: impl FnOnce() -> Vec<u8>) -> Option<Frame> {
         if self.bulk.is_empty() {
             return None;
         }
@@ -53,21 +70,28 @@ impl Queue {
         chunk
     }
 
-    fn over(&self) -> bool {
-        self.finishing || self.senders == 0
+    /// Whether a bulk message is not wholly cut yet.
+    pub(super) fn has_bulk(&self) -> bool {
+        !self.bulk.is_empty()
+    }
+
+    /// Whether nothing is queued and nothing will be.
+    pub(super) fn is_over(&self) -> bool {
+        (self.finishing || self.senders == 0) && self.urgent.is_empty() && self.bulk.is_empty()
     }
 }
 
 impl Sender {
-    /// Spawns the task that writes to `write`.
-    pub(super) fn start<W: AsyncWrite + Send + 'static>(write: W, shared: Arc<Shared>) -> Self {
+    /// Spawns the writing task.
+    pub(super) fn start(shared: Arc<Shared>) -> Self {
         lock(&shared.queue).senders = 1;
-        tokio::spawn(write_out(write, Arc::clone(&shared)));
+        tokio::spawn(write_out(Arc::clone(&shared)));
         Self { shared }
     }
 
     /// Queues `frame` ahead of all bulk and returns at once; length and checksum are filled in when it
-    /// is written. May be called from any thread.
+    /// is written. A short frame that nothing is ahead of is written here and now, as far as the stream
+    /// takes it without waiting. May be called from any thread.
     ///
     /// # Errors
     /// [`Error::TooLong`] over the limit of its kind, [`Error::QueueFull`] when the peer does not read,
@@ -81,13 +105,16 @@ impl Sender {
         let settings = &self.shared.settings;
         let mut queue = lock(&self.shared.queue);
         self.open(&queue)?;
-        within("frame queue", queue.urgent.len() + 1, settings.queued_frames)?;
+        within("frame queue", queue.urgent_frames + 1, settings.queued_frames)?;
         let bytes = queue.urgent_bytes + frame.payload.len();
         within("bytes of the frame queue", bytes, settings.queued_bytes)?;
-        queue.urgent_bytes = bytes;
-        queue.urgent.push_back(frame);
+        let short = frame.payload.len() <= DIRECT_BYTES;
+        queue.push_urgent(frame);
+        self.shared.unwritten.store(true, Relaxed);
         drop(queue);
-        self.shared.work.notify_one();
+        if !(short && write_at_once(&self.shared)) {
+            self.shared.work.notify_one();
+        }
         Ok(())
     }
 
@@ -108,6 +135,7 @@ impl Sender {
         within("bytes of the bulk queue", bytes, settings.bulk_bytes)?;
         queue.bulk_bytes = bytes;
         queue.bulk.push_back(message);
+        self.shared.unwritten.store(true, Relaxed);
         drop(queue);
         self.shared.work.notify_one();
         Ok(())
@@ -154,10 +182,10 @@ impl Sender {
         self.shared.last_seen()
     }
 
-    /// Frames and bulk bytes that are queued and not yet being written.
+    /// Frames that are not wholly written, and bytes of bulk messages that are not wholly cut.
     pub fn queued(&self) -> (usize, usize) {
         let queue = lock(&self.shared.queue);
-        (queue.urgent.len(), queue.bulk_bytes)
+        (queue.urgent_frames, queue.bulk_bytes)
     }
 
     fn open(&self, queue: &Queue) -> Result<()> {
@@ -187,67 +215,5 @@ fn within(queue: &'static str, length: usize, limit: usize) -> Result<()> {
     if length > limit {
         return Err(Error::QueueFull { queue, length: length as u64, limit: limit as u64 });
     }
-    Ok(())
-}
-
-/// The writing task: until the link ends, or everything is written and no sender is left.
-async fn write_out<W: AsyncWrite + Send + 'static>(write: W, shared: Arc<Shared>) {
-    let mut end = shared.end.subscribe();
-    let mut write = Box::pin(BufWriter::with_capacity(WRITE_BUFFER, write));
-    let result = tokio::select! {
-        biased;
-        // Being cancelled in the middle of a frame does no harm: nothing is written after it.
-        _ = end.wait_for(Option::is_some) => Ok(()),
-        result = write_queue(&mut write, &shared) => result,
-    };
-    if let Err(error) = result {
-        // The receiving half goes on: what the peer said before it closed is still to be read.
-        shared.fail(Error::io("writing to the peer", &error));
-    }
-    drop(write);
-    shared.written.send_replace(true);
-}
-
-async fn write_queue<W: AsyncWrite + Unpin>(write: &mut W, shared: &Shared) -> std::io::Result<()> {
-    let mut last = Instant::now();
-    loop {
-        while let Some(frame) = next(shared) {
-            write_frame(write, frame, shared).await?;
-            last = Instant::now();
-        }
-        write.flush().await?;
-        if lock(&shared.queue).over() {
-            // A frame may have been queued between the last look and this one.
-            match next(shared) {
-                Some(frame) => write_frame(write, frame, shared).await?,
-                None => return write.shutdown().await,
-            }
-            continue;
-        }
-        let interval = Duration::from_micros(shared.heartbeat_us.load(Relaxed));
-        tokio::select! {
-            () = shared.work.notified() => {}
-            () = tokio::time::sleep(interval.saturating_sub(last.elapsed())) => {
-                write_frame(write, Frame::new(Header::new(Kind::Heartbeat), Vec::new()), shared).await?;
-                last = Instant::now();
-            }
-        }
-    }
-}
-
-fn next(shared: &Shared) -> Option<Frame> {
-    lock(&shared.queue).pop(|| shared.buffer())
-}
-
-async fn write_frame<W: AsyncWrite + Unpin>(
-    write: &mut W,
-    mut frame: Frame,
-    shared: &Shared,
-) -> std::io::Result<()> {
-    frame.seal().map_err(std::io::Error::other)?;
-    write.write_all(&encode_header(&frame.header)).await?;
-    write.write_all(&frame.payload).await?;
-    let bytes = HEADER_LEN + frame.payload.len();
-    shared.sent(frame, bytes);
     Ok(())
 }

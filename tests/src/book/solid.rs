@@ -24,7 +24,7 @@ const HELD: &str = "[[boundary]]\ntype = \"fixed\"\nparts = [\"bar\"]\nface = \"
 
 /// The copper bar with `[core, ring, length]` cells of a quarter.
 fn copper_bar(sheet: &mut Sheet, cells: [u32; 3], foot: &str) {
-    let name = if foot == WALL { "free" } else { "held" };
+    let family = if foot == WALL { "taylor copper, free foot" } else { "taylor copper, held foot" };
     let deck = format!(
         "title = \"Taylor bar, copper\"\nunits = \"mm-ms-kg\"\n\
          [control]\nend_time = 0.08\nlinear_viscosity = 0.06\nquadratic_viscosity = 1.2247\nhourglass = 0.03\n\
@@ -36,7 +36,7 @@ fn copper_bar(sheet: &mut Sheet, cells: [u32; 3], foot: &str) {
     let n = solved.model.mesh.n_elements();
     let [length, radius, strain] = shape(&solved);
     let ledger = &solved.outcome.ledger;
-    let of = format!("taylor copper, {name} foot @ {n} elements");
+    let of = format!("{family} @ {n} elements");
     sheet.add(&format!("{of}, length (mm)"), length);
     sheet.add(&format!("{of}, radius of the foot (mm)"), radius);
     sheet.add(&format!("{of}, greatest plastic strain"), strain);

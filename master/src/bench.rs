@@ -1,0 +1,3 @@
+//! BENCH: what this machine's parts cost, measured on the real ones.
+
+pub mod messages;

@@ -1,0 +1,220 @@
+//! Gases: Sod's tube, Noh's implosion in one, two and three directions, Sedov's blast as LULESH sets it up.
+
+use mechanics::state::field;
+
+use crate::{
+    case::Sheet,
+    solve::{Solved, mean, model, run},
+};
+
+fn gas(gamma: f64, density: f64, energy: f64) -> String {
+    format!(
+        "{{ density = {density:e}, eos = {{ type = \"ideal-gas\", gamma = {gamma:?}, energy = {energy:e} }} }}"
+    )
+}
+
+/// A column along x of square cells with closed ends and sides.
+fn column(name: &str, from: f64, cells: u32, side: f64, material: &str) -> String {
+    format!(
+        "[[part]]\nname = \"{name}\"\nmaterial = {material}\n\
+         box = {{ origin = [{from:?}, 0, 0], size = [{:?}, {side:?}, {side:?}], cells = [{cells}, 1, 1] }}\n",
+        f64::from(cells) * side
+    )
+}
+
+fn density(solved: &Solved, part: usize, e: usize, at_first: &[f64]) -> f64 {
+    at_first[part] / solved.state.elements[field::RELATIVE_VOLUME][e]
+}
+
+/// Centre of an element at the end, and density.
+fn profile(solved: &Solved, at_first: &[f64]) -> Vec<([f64; 3], f64, usize)> {
+    let mesh = &solved.model.mesh;
+    let offsets = mesh.element_offsets();
+    let mut all = Vec::new();
+    for (p, part) in mesh.parts.iter().enumerate() {
+        for e in 0..part.n_elements() {
+            let corners = part.corners(e).map(|n| solved.state.x[n as usize]);
+            let centre = [0, 1, 2].map(|a| corners.iter().map(|x| x[a]).sum::<f64>() / 8.0);
+            let element = offsets[p] + e;
+            all.push((centre, density(solved, p, element, at_first), element));
+        }
+    }
+    all
+}
+
+/// Sod's density at `x` for `t = 0.2`, the membrane at 0.5.
+fn sod(x: f64) -> f64 {
+    let (head, tail, contact, shock) = (0.263_357, 0.485_945, 0.685_491, 0.850_431);
+    if x < head {
+        1.0
+    } else if x < tail {
+        // Inside the rarefaction: u + c is (x - 0.5)/t ahead of a state at rest with c = sqrt 1.4.
+        let sound = 1.4_f64.sqrt();
+        let c = sound - 0.4 / 2.4 * (sound + (x - 0.5) / 0.2);
+        (c / sound).powf(5.0)
+    } else if x < contact {
+        0.426_319
+    } else if x < shock {
+        0.265_574
+    } else {
+        0.125
+    }
+}
+
+pub(super) fn sods_tube_has_its_plateaus_and_its_shock_in_place(sheet: &mut Sheet) {
+    let side = 0.01;
+    let deck = format!(
+        "title = \"Sod\"\nunits = \"SI\"\n[control]\nend_time = 0.2\nsafety_factor = 0.3\nlinear_viscosity = 0.06\n{}{}[[join]]\nparts = \"all\"\n\
+         [[boundary]]\ntype = \"fixed\"\naxes = \"yz\"\n\
+         [[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\nat = 1\n",
+        column("high", 0.0, 50, side, &gas(1.4, 1.0, 2.5)),
+        column("low", 0.5, 50, side, &gas(1.4, 0.125, 2.0))
+    );
+    let solved = run(model(&deck));
+    let cells = profile(&solved, &[1.0, 0.125]);
+    let off = mean(cells.iter().map(|([x, ..], rho, _)| (rho - sod(*x)).abs()))
+        / mean(cells.iter().map(|c| sod(c.0[0])));
+    let plateau = |from: f64, to: f64, read: &dyn Fn(usize, f64) -> f64| {
+        mean(cells.iter().filter(|(x, ..)| (from..to).contains(&x[0])).map(|(_, rho, e)| read(*e, *rho)))
+    };
+    sheet.add("Sod: mean error of density over mean density", off);
+    sheet.add("Sod: density left of the contact", plateau(0.55, 0.66, &|_, rho| rho));
+    sheet.add("Sod: density right of the contact", plateau(0.73, 0.81, &|_, rho| rho));
+    sheet.add(
+        "Sod: pressure between rarefaction and shock",
+        plateau(0.53, 0.81, &|e, _| solved.state.elements[field::PRESSURE][e]),
+    );
+    let speed = solved.model.mesh.parts[1]
+        .nodes
+        .iter()
+        .filter(|n| (0.70..0.81).contains(&solved.state.x[**n as usize][0]))
+        .map(|n| solved.state.v[*n as usize][0]);
+    sheet.add("Sod: velocity between rarefaction and shock", mean(speed));
+    // Energy by mass is E over density at first; at the contact the start leaves an overshoot that stays.
+    let energy = |e: usize, first: f64| solved.state.elements[field::ENERGY][e] / first;
+    let beside =
+        mean(cells.iter().filter(|(x, ..)| (0.73..0.81).contains(&x[0])).map(|(_, _, e)| energy(*e, 0.125)));
+    let at_contact = cells.iter().find(|(_, _, e)| *e == 50).map_or(0.0, |(_, _, e)| energy(*e, 0.125));
+    sheet.add("Sod: heating at the contact", at_contact / beside - 1.0);
+}
+
+/// Gas that runs together: along x, towards the axis z, or towards a point; all at unit speed. Viscosity heats gas that
+/// converges before any shock, the more the coarser the cells: its quadratic coefficient is smaller than by default.
+fn noh(directions: usize, cells: u32) -> Solved {
+    let side = 1.0 / f64::from(cells);
+    let count = [0, 1, 2].map(|a| if a < directions { cells } else { 1 });
+    let size = count.map(|c| f64::from(c) * side);
+    let planes: String = ["x", "y", "z"]
+        .iter()
+        .map(|a| format!("[[boundary]]\ntype = \"symmetry\"\naxis = \"{a}\"\n"))
+        .chain(["x", "y", "z"].iter().enumerate().skip(directions).map(|(a, name)| {
+            format!("[[boundary]]\ntype = \"symmetry\"\naxis = \"{name}\"\nat = {:?}\n", size[a])
+        }))
+        .collect();
+    let deck = format!(
+        "title = \"Noh\"\nunits = \"SI\"\n[control]\nend_time = 0.6\nsafety_factor = 0.3\nquadratic_viscosity = 0.7\n[[part]]\nname = \"gas\"\nmaterial = {}\n\
+         box = {{ origin = [0, 0, 0], size = {size:?}, cells = {count:?} }}\n{planes}",
+        gas(5.0 / 3.0, 1.0, 1e-9)
+    );
+    let mut model = model(&deck);
+    for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
+        let r = x[..directions].iter().map(|c| c * c).sum::<f64>().sqrt();
+        if r > 0.0 {
+            *v = [0, 1, 2].map(|a| if a < directions { -x[a] / r } else { 0.0 });
+        }
+    }
+    run(model)
+}
+
+pub(super) fn gas_that_runs_together_is_compressed_as_noh_says(sheet: &mut Sheet) {
+    for (directions, cells, name) in [(1, 200, "plane"), (2, 60, "cylinder"), (3, 60, "sphere")] {
+        let solved = noh(directions, cells);
+        let shocked: Vec<(f64, usize)> = profile(&solved, &[1.0])
+            .into_iter()
+            .filter(|(x, ..)| {
+                let r = x[..directions].iter().map(|c| c * c).sum::<f64>().sqrt();
+                // Away from the heated origin and from the front at 0.2.
+                (0.1..0.16).contains(&r)
+            })
+            .map(|(_, rho, e)| (rho, e))
+            .collect();
+        sheet.add(
+            &format!("Noh @ {name}, density behind the shock"),
+            mean(shocked.iter().map(|(rho, _)| *rho)),
+        );
+        sheet.add(
+            &format!("Noh @ {name}, pressure behind the shock"),
+            mean(shocked.iter().map(|(_, e)| solved.state.elements[field::PRESSURE][*e])),
+        );
+        sheet.add("Noh: energy error", solved.outcome.ledger.last.error);
+    }
+}
+
+/// LULESH's problem: a cube of 1.125 with `n` cells an edge; all energy in the element at the origin.
+fn blast(n: u32) -> Solved {
+    let h = 1.125 / f64::from(n);
+    let rest = 1.125 - h;
+    let energy = 3.948_746e7 * (f64::from(n) / 45.0).powi(3);
+    let block = |name: &str, origin: [f64; 3], size: [f64; 3], cells: [u32; 3], energy: f64| {
+        format!(
+            "[[part]]\nname = \"{name}\"\nmaterial = {}\nbox = {{ origin = {origin:?}, size = {size:?}, cells = {cells:?} }}\n",
+            gas(5.0 / 3.0, 1.0, energy)
+        )
+    };
+    let cold = 1e-9;
+    let deck = format!(
+        "title = \"blast\"\nunits = \"SI\"\n[control]\nend_time = 0.01\n{}{}{}{}[[join]]\nparts = \"all\"\n\
+         [[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"y\"\n\
+         [[boundary]]\ntype = \"symmetry\"\naxis = \"z\"\n",
+        block("origin", [0.0; 3], [h; 3], [1; 3], energy),
+        block("row", [h, 0.0, 0.0], [rest, h, h], [n - 1, 1, 1], cold),
+        block("plate", [0.0, h, 0.0], [1.125, rest, h], [n, n - 1, 1], cold),
+        block("rest", [0.0, 0.0, h], [1.125, 1.125, rest], [n, n, n - 1], cold),
+    );
+    run(model(&deck))
+}
+
+pub(super) fn the_blast_of_lulesh_reaches_sedovs_radius(sheet: &mut Sheet) {
+    let n = 30;
+    let solved = blast(n);
+    let h = 1.125 / f64::from(n);
+    let cells = profile(&solved, &[1.0; 4]);
+    // Mean pressure over shells of half a cell, and where it falls to half of its peak outside.
+    let mut shells = vec![(0.0, 0_usize); 80];
+    for (x, _, e) in &cells {
+        let r = x.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if let Some(shell) = shells.get_mut((r / (0.5 * h)) as usize) {
+            shell.0 += solved.state.elements[field::PRESSURE][*e];
+            shell.1 += 1;
+        }
+    }
+    let pressure: Vec<(f64, f64)> = shells
+        .iter()
+        .enumerate()
+        .filter(|(_, (_, count))| *count > 0)
+        .map(|(i, (sum, count))| ((i as f64 + 0.5) * 0.5 * h, sum / *count as f64))
+        .collect();
+    let peak = (0..pressure.len())
+        .max_by(|a, b| pressure[*a].1.total_cmp(&pressure[*b].1))
+        .expect("there are shells");
+    let half = 0.5 * pressure[peak].1;
+    let outer = (peak + 1..pressure.len()).find(|&i| pressure[i].1 < half).expect("the blast has an edge");
+    let (inside, outside) = (pressure[outer - 1], pressure[outer]);
+    let radius = inside.0 + (outside.0 - inside.0) * (inside.1 - half) / (inside.1 - outside.1);
+    sheet.add("blast: radius of the shock", radius);
+    // The mesh and the problem look the same along x, y and z.
+    let mesh = &solved.model.mesh;
+    let key = |x: [f64; 3]| x.map(|c| (c / h).round() as i64);
+    let at: std::collections::BTreeMap<[i64; 3], usize> =
+        mesh.positions.iter().enumerate().map(|(i, x)| (key(*x), i)).collect();
+    let mut skew = 0.0_f64;
+    for (i, x) in mesh.positions.iter().enumerate() {
+        let [a, b, c] = key(*x);
+        let turned = at[&[b, c, a]];
+        let (x, y) = (solved.state.x[i], solved.state.x[turned]);
+        skew = skew.max((x[1] - y[0]).abs()).max((x[2] - y[1]).abs()).max((x[0] - y[2]).abs());
+    }
+    sheet.add("blast: difference of the three directions", skew);
+    sheet.add("blast: energy of the element at the origin", solved.state.elements[field::ENERGY][0]);
+    sheet.add("blast: energy error", solved.outcome.ledger.last.error);
+}

@@ -1,0 +1,105 @@
+//! PROXY: a port of this machine that passes bytes on to another, until it is cut.
+
+use std::{
+    io::{Read, Write},
+    net::{Shutdown, TcpListener, TcpStream},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+};
+
+/// A forwarded port. Its threads end with their connections, the listening one with the process.
+pub struct Proxy {
+    /// The port that callers dial.
+    pub port: u16,
+    shared: Arc<Shared>,
+}
+
+#[derive(Default)]
+struct Shared {
+    /// Where to; none refuses callers.
+    to: Mutex<Option<String>>,
+    connections: Mutex<Vec<TcpStream>>,
+    frozen: AtomicBool,
+    bytes: AtomicU64,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Proxy {
+    /// Takes callers on a free port and hangs up on them, until [`Proxy::forward`].
+    ///
+    /// # Panics
+    /// If there is no free port.
+    pub fn start() -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let port = listener.local_addr().expect("bound").port();
+        let shared = Arc::new(Shared::default());
+        let of_thread = Arc::clone(&shared);
+        std::thread::spawn(move || {
+            for near in listener.incoming().flatten() {
+                let Some(to) = lock(&of_thread.to).clone() else { continue };
+                let Ok(far) = TcpStream::connect(to) else { continue };
+                of_thread.join(&near, &far);
+                of_thread.join(&far, &near);
+            }
+        });
+        Self { port, shared }
+    }
+
+    /// Passes callers on to this address from now on.
+    pub fn forward(&self, to: &str) {
+        *lock(&self.shared.to) = Some(to.to_owned());
+    }
+
+    /// Ends every connection in the middle, and takes no more callers; gives how many stood.
+    pub fn cut(&self) -> usize {
+        *lock(&self.shared.to) = None;
+        let ends = std::mem::take(&mut *lock(&self.shared.connections));
+        for end in &ends {
+            // It may be closed already.
+            let _ = end.shutdown(Shutdown::Both);
+        }
+        ends.len() / 2
+    }
+
+    /// Passes no byte on any more and says nothing, as a pulled cable; gives how many connections stand.
+    pub fn freeze(&self) -> usize {
+        *lock(&self.shared.to) = None;
+        self.shared.frozen.store(true, Ordering::Relaxed);
+        lock(&self.shared.connections).len() / 2
+    }
+
+    /// Bytes passed on so far, both ways.
+    pub fn bytes(&self) -> u64 {
+        self.shared.bytes.load(Ordering::Relaxed)
+    }
+}
+
+impl Shared {
+    /// Starts a thread that passes bytes one way.
+    fn join(self: &Arc<Self>, from: &TcpStream, to: &TcpStream) {
+        let clone = |stream: &TcpStream| stream.try_clone().expect("a file descriptor");
+        let (mut from, mut to) = (clone(from), clone(to));
+        to.set_nodelay(true).expect("an option of every system");
+        lock(&self.connections).push(clone(&from));
+        let shared = Arc::clone(self);
+        std::thread::spawn(move || {
+            let mut buffer = vec![0; 64 << 10];
+            while let Ok(n @ 1..) = from.read(&mut buffer) {
+                while shared.frozen.load(Ordering::Relaxed) {
+                    std::thread::park();
+                }
+                if to.write_all(&buffer[..n]).is_err() {
+                    break;
+                }
+                shared.bytes.fetch_add(n as u64, Ordering::Relaxed);
+            }
+            // The other side has gone, or the proxy was cut.
+            let _ = to.shutdown(Shutdown::Write);
+        });
+    }
+}

@@ -1,0 +1,303 @@
+//! RUNNER: the compute thread of a worker, which owns session and machine and takes one input after another.
+//!
+//! What it sends goes into the queues of links without waiting. Nothing is decided here except whether what comes
+//! belongs to the job in hand.
+
+use std::{
+    collections::VecDeque,
+    panic::{AssertUnwindSafe, catch_unwind},
+    time::Instant,
+};
+
+use protocol::{
+    Error, Result,
+    frame::Header,
+    message::{ToMaster, ToPeer, ToWorker},
+    order::{Outbox, Place},
+    phase::Phase,
+    wire,
+};
+use tokio::sync::mpsc;
+
+use crate::{
+    compute::Machine,
+    peers::{
+        Key, News,
+        links::{Links, Step},
+    },
+    session::{Action, Event, Outcome, Session},
+    stopwatch::{Lap, Stopwatch},
+};
+
+/// What the compute thread hears.
+pub enum Input {
+    /// A message of the master, with the header of its frame.
+    Master(Header, ToWorker),
+    /// Of a link to another worker.
+    Peer(News),
+}
+
+/// The compute thread's own.
+pub struct Runner {
+    outbox: Outbox,
+    session: Session,
+    machine: Machine,
+    watch: Watch,
+    stopwatch: Stopwatch,
+    links: Links,
+    /// The answer to an assignment, while links are being made.
+    ready: Option<ToMaster>,
+}
+
+impl Runner {
+    /// Without a job.
+    pub fn new(outbox: Outbox, links: Links) -> Self {
+        Self {
+            outbox,
+            session: Session::new(),
+            machine: Machine::new(),
+            watch: Watch::default(),
+            stopwatch: Stopwatch::new(),
+            links,
+            ready: None,
+        }
+    }
+
+    /// Takes one input after another until there can be no more.
+    ///
+    /// # Errors
+    /// Why the connection to the master must end.
+    pub fn run(mut self, mut inputs: mpsc::Receiver<Input>) -> Result<()> {
+        while let Some(input) = inputs.blocking_recv() {
+            match input {
+                Input::Master(header, message) => self.master(&header, message)?,
+                Input::Peer(news) => {
+                    let step = self.links.hear(news, &self.session);
+                    self.step(step)?;
+                }
+            }
+            if !self.links.are_dialling()
+                && let Some(ready) = self.ready.take()
+            {
+                self.send(&ready)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn master(&mut self, header: &Header, message: ToWorker) -> Result<()> {
+        let key = Key { job: header.job, epoch: header.epoch };
+        if let ToWorker::Peers(introduction) = message {
+            self.links.introduce(key, *introduction);
+            return Ok(());
+        }
+        self.watch.heard(header, &message)?;
+        match message {
+            ToWorker::Assign(assign) => {
+                if self.links.key() != Some(key) {
+                    self.links.leave("another job begins");
+                }
+                self.ready = None;
+                self.stopwatch = Stopwatch::new();
+                let neighbours: Vec<u32> = assign.plan.neighbours.iter().map(|n| n.worker).collect();
+                self.links.want(neighbours);
+                self.apply(Event::Message(ToWorker::Assign(assign)))
+            }
+            ToWorker::Plan { acts_at, plan, hash } => {
+                let neighbours: Vec<u32> = plan.neighbours.iter().map(|n| n.worker).collect();
+                self.links.want(neighbours);
+                self.apply(Event::Message(ToWorker::Plan { acts_at, plan, hash }))?;
+                for step in self.links.release(&self.session) {
+                    self.step(step)?;
+                }
+                Ok(())
+            }
+            ToWorker::Relayed { from, message } => match self.links.relayed(from, message) {
+                Some(message) => self.apply(Event::Peer(from, message)),
+                None => Ok(()),
+            },
+            ToWorker::Release => {
+                self.links.leave("the job is over");
+                self.ready = None;
+                self.apply(Event::Message(ToWorker::Release))
+            }
+            message => self.apply(Event::Message(message)),
+        }
+    }
+
+    fn step(&mut self, Step { heard, relay }: Step) -> Result<()> {
+        if let Some((to, messages)) = relay {
+            for message in messages {
+                self.send(&ToMaster::Relay { to, message })?;
+            }
+        }
+        match heard {
+            Some((from, message)) => self.apply(Event::Peer(from, message)),
+            None => Ok(()),
+        }
+    }
+
+    fn send(&mut self, message: &ToMaster) -> Result<()> {
+        let place = self.watch.said(message, self.session.plan_hash());
+        self.outbox.send(place, wire::pack_to_master(message)?)
+    }
+
+    /// Over the link of the pair, or relayed by the master.
+    fn send_peer(&mut self, to: u32, message: ToPeer) -> Result<()> {
+        for message in self.links.send(to, message, self.session.plan_hash()) {
+            self.send(&ToMaster::Relay { to, message })?;
+        }
+        Ok(())
+    }
+
+    fn apply(&mut self, event: Event) -> Result<()> {
+        let mut events = VecDeque::from([event]);
+        while let Some(event) = events.pop_front() {
+            for action in self.session.apply(event) {
+                match action {
+                    Action::Send(ready @ ToMaster::Ready { .. }) => self.ready = Some(ready),
+                    Action::Send(message) => self.timed(|runner| {
+                        if let ToMaster::Image { last: Some(_), .. } = message {
+                            let mut report = runner.stopwatch.report();
+                            runner.links.report(&mut report);
+                            runner.send(&ToMaster::Report(Box::new(report)))?;
+                        }
+                        runner.send(&message)
+                    })?,
+                    Action::SendPeer(to, message) => self.timed(|runner| runner.send_peer(to, message))?,
+                    Action::Compute(task) => {
+                        let machine = &mut self.machine;
+                        let outcome = catch_unwind(AssertUnwindSafe(|| machine.run(task)));
+                        for lap in self.machine.take_laps() {
+                            self.stopwatch.book(self.session.cycle(), lap);
+                        }
+                        let outcome = outcome.unwrap_or_else(|panic| {
+                            self.machine = Machine::new();
+                            Outcome::Failed(format!("a bug in the worker: {}", words(panic.as_ref())))
+                        });
+                        events.push_back(Event::Done(outcome));
+                    }
+                    Action::Forget => self.machine.forget(),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn timed(&mut self, work: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        let (cycle, from) = (self.session.cycle(), Instant::now());
+        let result = work(self);
+        self.stopwatch.book(cycle, Lap { phase: Phase::Send, from, to: Instant::now() });
+        result
+    }
+}
+
+/// What a panic said.
+fn words(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no words").to_owned()
+}
+
+/// Compares what frames say of themselves with the job in hand.
+#[derive(Debug, Default)]
+struct Watch {
+    place: Place,
+    /// Plan hashes of the cycles whose totals are still to come.
+    plans: VecDeque<(u64, u64)>,
+}
+
+impl Watch {
+    /// A message came: of the job in hand, of the cycle its frame names, following the plan its cycle was sent by.
+    fn heard(&mut self, header: &Header, message: &ToWorker) -> Result<()> {
+        if let ToWorker::Assign(assign) = message {
+            self.place = Place { job: header.job, epoch: header.epoch, plan: assign.plan_hash };
+            self.plans.clear();
+            return Ok(());
+        }
+        let (theirs, ours) = ((header.job, header.epoch), (self.place.job, self.place.epoch));
+        if theirs != ours {
+            return Err(Error::Message(format!(
+                "{} frame of job {} epoch {}, this worker has job {} epoch {}",
+                header.kind, theirs.0, theirs.1, ours.0, ours.1
+            )));
+        }
+        if let ToWorker::Totals { cycle, .. } = message {
+            let plan = match self.plans.pop_front() {
+                Some((sent, plan)) if sent == *cycle && header.cycle == *cycle => plan,
+                sent => {
+                    return Err(Error::Message(format!(
+                        "totals of cycle {cycle} in a frame of cycle {}, those of {:?} are next",
+                        header.cycle,
+                        sent.map(|(cycle, _)| cycle)
+                    )));
+                }
+            };
+            if plan != header.plan {
+                return Err(Error::Message(format!(
+                    "totals of cycle {cycle} follow plan {:016x}, sent was plan {plan:016x}",
+                    header.plan
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// A message goes out under the plan in force.
+    fn said(&mut self, message: &ToMaster, plan: u64) -> Place {
+        self.place.plan = plan;
+        if let ToMaster::Cycle { cycle, .. } = message {
+            self.plans.push_back((*cycle, plan));
+        }
+        self.place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::frame::Kind;
+
+    fn header(job: u32, cycle: u64, plan: u64) -> Header {
+        Header { job, cycle, plan, ..Header::new(Kind::Totals) }
+    }
+
+    fn totals(cycle: u64) -> ToWorker {
+        let quantum = mechanics::exact::Quantum::for_reference(1.0, 42);
+        let orders = protocol::message::Orders {
+            next: cycle + 1,
+            dt: 1.0,
+            time: 0.0,
+            walls: Vec::new(),
+            force_quantum: quantum,
+            gather: false,
+            collect: false,
+            stop: false,
+        };
+        ToWorker::Totals { cycle, orders, totals: Vec::new() }
+    }
+
+    #[test]
+    fn frames_of_another_job_cycle_or_plan_are_named() {
+        let place = Place { job: 3, epoch: 0, plan: 8 };
+        let sent = ToMaster::Cycle { cycle: 5, vote: None, partials: Vec::new(), gathered: Vec::new() };
+        let fresh = || {
+            let mut watch = Watch { place, plans: VecDeque::new() };
+            assert_eq!(watch.said(&sent, 8), place);
+            watch
+        };
+        assert_eq!(fresh().heard(&header(3, 5, 8), &totals(5)), Ok(()));
+        for (header, message, words) in [
+            (header(2, 5, 8), totals(5), "of job 2 epoch 0, this worker has job 3 epoch 0"),
+            (
+                header(3, 6, 8),
+                totals(6),
+                "totals of cycle 6 in a frame of cycle 6, those of Some(5) are next",
+            ),
+            (header(3, 6, 8), totals(5), "totals of cycle 5 in a frame of cycle 6"),
+            (header(3, 5, 9), totals(5), "follow plan 0000000000000009, sent was plan 0000000000000008"),
+        ] {
+            let error = fresh().heard(&header, &message).expect_err(words).to_string();
+            assert!(error.contains(words), "{error}");
+        }
+    }
+}
