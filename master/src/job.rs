@@ -20,6 +20,7 @@ use mechanics::{
     digest,
     state::GlobalState,
     vote::{Quanta, Vote},
+    wall::{self, Pose},
 };
 use protocol::{
     message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work},
@@ -87,6 +88,8 @@ pub struct Job {
     proposal: Option<Proposal>,
     patience: Patience,
     ledger: Ledger,
+    /// Poses of the walls of finite mass in the newest cycle that was ordered.
+    walls: Vec<Pose>,
     rows: Vec<HistoryRow>,
     sorts: u64,
     census: Census,
@@ -314,6 +317,8 @@ impl Job {
         let before = Orders {
             next: first.wrapping_sub(1),
             dt: 0.0,
+            time,
+            walls: self.walls.clone(),
             force_quantum: quantum,
             gather: false,
             collect: store || at_end,
@@ -327,8 +332,8 @@ impl Job {
         } else if store {
             self.epoch.halves.entry(first).or_default();
         }
-        let orders = self.orders_for(first, dt, time + dt, None, actions);
-        self.send_all(actions, |_| ToWorker::Start { orders: [before, orders] });
+        let orders = self.orders_for(first, dt, [time, time + dt], None, actions);
+        self.send_all(actions, |_| ToWorker::Start { orders: [before.clone(), orders.clone()] });
         Ok(())
     }
 
@@ -418,6 +423,7 @@ impl Job {
                 dt: Some(now.dt),
                 quanta: [now.quantum, self.epoch.quantum],
                 vote: Some(vote.clone()),
+                walls: self.walls.clone(),
                 ledger: self.ledger.clone(),
                 n_rows: self.rows.len(),
                 spread_rate: self.epoch.spread_rate,
@@ -438,11 +444,12 @@ impl Job {
         if let Some(coarser) = self.rescaled(&vote)? {
             self.epoch.quantum = coarser;
         }
-        let orders = self.orders_for(cycle + 1, dt, time_after, Some(&vote), actions);
+        wall::advance(&self.model.setup.walls, &vote.walls, now.dt, &mut self.walls)?;
+        let orders = self.orders_for(cycle + 1, dt, [time_next, time_after], Some(&vote), actions);
         let exchange = self.exchange_at(cycle)?;
         self.send_all(actions, |worker| {
             let totals = exchange.of_worker(worker, &arrivals.totals);
-            ToWorker::Totals { cycle, orders, totals }
+            ToWorker::Totals { cycle, orders: orders.clone(), totals }
         });
         self.retire(cycle);
         if self.epoch.sorts_under_way.contains(&cycle)

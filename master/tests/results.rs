@@ -106,6 +106,7 @@ fn plates(cells: u32) -> Model {
             constraints: vec![Constraint::default()],
             walls: Vec::new(),
             detonations: Vec::new(),
+            loads: Default::default(),
         },
         output: Output {
             period: None,

@@ -17,6 +17,7 @@ use mechanics::{
     exact::Quantum,
     setup::Setup,
     vote::{Quanta, Vote},
+    wall::Pose,
 };
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
@@ -144,12 +145,16 @@ pub struct Assign {
 }
 
 /// What the next cycles do; the same on every worker.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Orders {
     /// The cycle whose time step `dt` is.
     pub next: u64,
     /// `dt` of cycle `next` (time).
     pub dt: f64,
+    /// When cycle `next` begins (time).
+    pub time: f64,
+    /// Poses of the walls of finite mass in cycle `next`, in the order of the walls.
+    pub walls: Vec<Pose>,
     /// Quantum of forces from cycle `next + 1` on.
     pub force_quantum: Quantum,
     /// At the start of cycle `next + 1`, the positions of surface nodes travel; the plan sorted from them acts a sort

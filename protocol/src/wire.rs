@@ -63,7 +63,7 @@ struct TotalsHead {
 pub fn pack_to_worker(message: &ToWorker) -> Result<Packed> {
     match message {
         ToWorker::Totals { cycle, orders, totals } => {
-            let head = codec::encode(&TotalsHead { cycle: *cycle, orders: *orders })?;
+            let head = codec::encode(&TotalsHead { cycle: *cycle, orders: orders.clone() })?;
             Ok(Packed { kind: Kind::Totals, cycle: *cycle, bytes: with_arrays(&head, &[totals]) })
         }
         other => Ok(Packed { kind: Kind::Control, cycle: 0, bytes: codec::encode(other)? }),

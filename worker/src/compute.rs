@@ -127,8 +127,8 @@ impl Machine {
             Task::Transfer { nodes } => {
                 Outcome::Transferred(laps.time(Phase::Other, || domain.transfer(&nodes))?)
             }
-            Task::Elements { dt_previous, quantum } => {
-                domain.set_force_quantum(quantum);
+            Task::Elements { dt_previous, quantum, time } => {
+                domain.begin(quantum, time);
                 laps.time(Phase::Interior, || domain.elements(Sets::All, dt_previous, clock));
                 Outcome::Computed
             }
@@ -140,10 +140,10 @@ impl Machine {
                 domain.contact(dt_previous, clock);
                 Ok::<_, String>(Outcome::Forces { partials: domain.partials(clock), gathered })
             })?,
-            Task::Border { dt_previous, quantum, gather } => {
+            Task::Border { dt_previous, quantum, time, gather } => {
                 let gathered = laps.time(Phase::Contact, || {
                     let gathered = if gather { domain.gather() } else { Vec::new() };
-                    domain.set_force_quantum(quantum);
+                    domain.begin(quantum, time);
                     domain.contact(dt_previous, clock);
                     gathered
                 });
@@ -156,9 +156,9 @@ impl Machine {
                 laps.time(Phase::Interior, || domain.elements(Sets::Interior, dt_previous, clock));
                 Outcome::Computed
             }
-            Task::Integrate { totals, dt_previous, dt } => {
-                let vote =
-                    laps.time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, clock))?;
+            Task::Integrate { totals, dt_previous, dt, walls } => {
+                let vote = laps
+                    .time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, &walls, clock))?;
                 Outcome::Integrated(Box::new(vote))
             }
             Task::Image => {

@@ -282,6 +282,8 @@ mod tests {
         let orders = protocol::message::Orders {
             next: cycle + 1,
             dt: 1.0,
+            time: 0.0,
+            walls: Vec::new(),
             force_quantum: quantum,
             gather: false,
             collect: false,

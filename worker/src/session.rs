@@ -12,6 +12,7 @@ use mechanics::{
     cycle::{Neighbour, Plan},
     exact::Quantum,
     vote::Vote,
+    wall::Pose,
 };
 use protocol::message::{Assign, IMAGE_VERSION, Orders, Route, ToMaster, ToPeer, ToWorker, Work};
 
@@ -60,6 +61,8 @@ pub enum Task {
         dt_previous: f64,
         /// Quantum of forces from now on.
         quantum: Quantum,
+        /// When the cycle begins.
+        time: f64,
     },
     /// Install a plan; contact; partial forces.
     Install {
@@ -78,6 +81,8 @@ pub enum Task {
         dt_previous: f64,
         /// Quantum of forces from now on.
         quantum: Quantum,
+        /// When the cycle begins.
+        time: f64,
         /// Gather positions first.
         gather: bool,
     },
@@ -94,6 +99,8 @@ pub enum Task {
         dt_previous: f64,
         /// The step to take.
         dt: f64,
+        /// Poses of the walls of finite mass in this cycle.
+        walls: Vec<Pose>,
     },
     /// State of all sub-domains.
     Image,
@@ -457,8 +464,9 @@ impl Session {
                     actions.push(Action::Send(ToMaster::Transfer { cycle: self.cycle, state }));
                 }
                 self.phase = Phase::Elements;
-                let quantum = self.force_quantum()?;
-                actions.push(Action::Compute(Task::Elements { dt_previous: self.dt_previous, quantum }));
+                let (quantum, time) = self.quantum_and_time()?;
+                let dt_previous = self.dt_previous;
+                actions.push(Action::Compute(Task::Elements { dt_previous, quantum, time }));
                 Ok(())
             }
             (Phase::Elements, Outcome::Computed) => {
@@ -504,33 +512,32 @@ impl Session {
     }
 
     /// The orders whose flags act at the start of this cycle.
-    fn flags(&self) -> Result<Orders, String> {
+    fn flags(&self) -> Result<&Orders, String> {
         let before = self.cycle.wrapping_sub(1);
-        self.orders
-            .get(&before)
-            .copied()
-            .ok_or_else(|| format!("no orders for the start of cycle {}", self.cycle))
+        self.orders.get(&before).ok_or_else(|| format!("no orders for the start of cycle {}", self.cycle))
     }
 
-    fn force_quantum(&mut self) -> Result<Quantum, String> {
-        let quantum = self.flags()?.force_quantum;
+    /// The quantum of forces in this cycle, and when it begins.
+    fn quantum_and_time(&mut self) -> Result<(Quantum, f64), String> {
+        let before = self.flags()?;
+        let (quantum, time) = (before.force_quantum, before.time + before.dt);
         self.quantum = Some(quantum);
-        Ok(quantum)
+        Ok((quantum, time))
     }
 
     fn begin_cycle(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let flags = self.flags()?;
+        let Orders { stop, collect, gather, .. } = *self.flags()?;
         while let Some(entry) = self.orders.first_entry()
             && entry.key().wrapping_add(1) < self.cycle
         {
             entry.remove();
         }
-        if (flags.stop || flags.collect) && !self.imaged {
+        if (stop || collect) && !self.imaged {
             self.phase = Phase::Imaging;
             actions.push(Action::Compute(Task::Image));
             return Ok(());
         }
-        if flags.gather {
+        if gather {
             self.boundaries.push_back(self.cycle + self.sort_lag);
         }
         if self.boundaries.front() == Some(&self.cycle) {
@@ -539,12 +546,9 @@ impl Session {
             return self.try_boundary(actions);
         }
         self.phase = Phase::Border;
-        let quantum = self.force_quantum()?;
-        actions.push(Action::Compute(Task::Border {
-            dt_previous: self.dt_previous,
-            quantum,
-            gather: flags.gather,
-        }));
+        let (quantum, time) = self.quantum_and_time()?;
+        let dt_previous = self.dt_previous;
+        actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather }));
         Ok(())
     }
 
@@ -587,16 +591,18 @@ impl Session {
 
     /// A worker that shares no node needs only the orders of the cycle before.
     fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let Some(orders) = self.orders.get(&self.cycle).copied() else { return Ok(()) };
+        let Some(orders) = self.orders.get(&self.cycle) else { return Ok(()) };
+        let (dt, walls) = (orders.dt, orders.walls.clone());
         let totals = match self.route {
             _ if self.n_exchange == 0 => Some(Vec::new()),
             Route::Master => self.totals_of_master()?,
             Route::Direct => self.totals_of_peers()?,
         };
         let Some(totals) = totals else { return Ok(()) };
-        self.dt = orders.dt;
+        self.dt = dt;
         self.phase = Phase::Integrating;
-        actions.push(Action::Compute(Task::Integrate { totals, dt_previous: self.dt_previous, dt: self.dt }));
+        let dt_previous = self.dt_previous;
+        actions.push(Action::Compute(Task::Integrate { totals, dt_previous, dt, walls }));
         Ok(())
     }
 

@@ -16,7 +16,7 @@ use std::{
     sync::Arc,
 };
 
-use mechanics::{exact::Quantum, state::GlobalState, vote::Vote};
+use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
 use protocol::message::ToWorker;
 
 use super::{Arrivals, Bench, Job, images::Collecting, measure::Meter};
@@ -45,6 +45,8 @@ pub(super) struct Rest {
     pub(super) quanta: [Quantum; 2],
     /// The whole vote of the cycle before; none at the start of a run.
     pub(super) vote: Option<Vote>,
+    /// Poses of the walls of finite mass in the cycle to come.
+    pub(super) walls: Vec<Pose>,
     /// With the cycle before in it.
     pub(super) ledger: Ledger,
     /// Rows of history up to there.
@@ -179,6 +181,7 @@ impl Job {
     fn go_back(&mut self, actions: &mut Vec<Action>) {
         let rest = &self.base.rest;
         self.ledger = rest.ledger.clone();
+        self.walls.clone_from(&rest.walls);
         self.rows.truncate(rest.n_rows);
         self.failure = None;
         self.proposal = None;
@@ -202,6 +205,7 @@ impl Job {
             dt: Some(now.dt),
             quanta: [now.quantum, self.epoch.quantum],
             vote: Some(vote),
+            walls: self.walls.clone(),
             ledger: self.ledger.clone(),
             n_rows: self.rows.len(),
             spread_rate: self.epoch.spread_rate,

@@ -123,6 +123,7 @@ impl Job {
                 force_quanta: rest.quanta,
                 spread_rate: rest.spread_rate,
                 vote,
+                walls: rest.walls.clone(),
                 ledger: rest.ledger.clone(),
                 rows: self.rows[..rest.n_rows].to_vec(),
             };

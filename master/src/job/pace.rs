@@ -1,6 +1,6 @@
 //! The pace of a run: time steps, sorts, images and the end, from the votes of whole cycles.
 
-use mechanics::{contact::reach, exact::Quantum, vote::Vote};
+use mechanics::{contact::reach, exact::Quantum, vote::Vote, wall::Motion};
 use protocol::message::Orders;
 
 use super::{Job, start::output_after};
@@ -12,13 +12,14 @@ const SPREAD_MARGIN: f64 = 0.25;
 const TRAVEL_VOTE: f64 = 0.16;
 
 impl Job {
-    /// The orders that give `dt` of cycle `next`, which ends at `time_after`, and what happens then. `vote` is of the
+    /// The orders that give `dt` of cycle `next`, from `time` to `time_after`, and what happens then. Walls of finite mass
+    /// are where they are in that cycle. `vote` is of the
     /// cycle two before the sort that it may trigger could gather.
     pub(super) fn orders_for(
         &mut self,
         next: u64,
         dt: f64,
-        time_after: f64,
+        [time, time_after]: [f64; 2],
         vote: Option<&Vote>,
         actions: &mut Vec<Action>,
     ) -> Orders {
@@ -56,7 +57,8 @@ impl Job {
             self.epoch.sorts_under_way.push_back(after);
             self.epoch.last_gather = after;
         }
-        Orders { next, dt, force_quantum: self.epoch.quantum, gather, collect, stop }
+        let (walls, force_quantum) = (self.walls.clone(), self.epoch.quantum);
+        Orders { next, dt, time, walls, force_quantum, gather, collect, stop }
     }
 
     /// Plan boundaries are the cycles at which plans begin to act, and at latest every so many.
@@ -133,12 +135,25 @@ impl Job {
         offer(control.safety_factor * vote.courant, Limit::Courant, Some(vote.courant_element));
         offer(vote.volume_limit, Limit::Volume, None);
         offer(vote.contact_limit, Limit::Contact, None);
-        if let Some(contact) = &self.model.setup.contact
-            && vote.contact_speed_ahead > 0.0
-        {
-            offer(TRAVEL_VOTE * contact.gap / vote.contact_speed_ahead, Limit::Travel, None);
+        if let Some(contact) = &self.model.setup.contact {
+            // A wall may bring a node to its own speed within a cycle.
+            let speed = vote.contact_speed_ahead.max(self.wall_speed());
+            if speed > 0.0 {
+                offer(TRAVEL_VOTE * contact.gap / speed, Limit::Travel, None);
+            }
         }
         best
+    }
+
+    /// The greatest speed of a wall: that prescribed at any time, or that of now.
+    fn wall_speed(&self) -> f64 {
+        let setup = &self.model.setup;
+        let driven = setup.walls.iter().filter_map(|wall| match wall.motion {
+            Motion::Driven(velocity) => Some(velocity.map(|v| v.greatest(&setup.loads.curves))),
+            _ => None,
+        });
+        let free = self.walls.iter().map(|[_, velocity]| *velocity);
+        driven.chain(free).map(|v| v.iter().map(|c| c * c).sum::<f64>().sqrt()).fold(0.0, f64::max)
     }
 
     /// Forces nearing the bound of exact sums ask for a coarser quantum.

@@ -15,6 +15,7 @@ use mechanics::{
     piece,
     state::GlobalState,
     vote::Quanta,
+    wall,
 };
 use protocol::{
     message::{Assign, ToWorker, Work},
@@ -69,6 +70,7 @@ impl Job {
                     dt: None,
                     quanta: [quanta.force; 2],
                     vote: None,
+                    walls: wall::first_poses(&setup.walls),
                     ledger,
                     n_rows: 0,
                     spread_rate: 0.0,
@@ -78,14 +80,19 @@ impl Job {
             Some(snapshot) => {
                 if snapshot.state.x.len() != start.x.len()
                     || snapshot.state.initial_volume != start.initial_volume
+                    || snapshot.walls.len() != wall::first_poses(&setup.walls).len()
                 {
-                    return Err("the snapshot is of another problem: its mesh is not this deck's".to_owned());
+                    return Err(
+                        "the snapshot is of another problem: its mesh or its walls are not this deck's"
+                            .to_owned(),
+                    );
                 }
                 let rest = Rest {
                     dt_previous: snapshot.dt_previous,
                     dt: Some(snapshot.dt),
                     quanta: snapshot.force_quanta,
                     vote: Some(snapshot.vote),
+                    walls: snapshot.walls,
                     ledger: snapshot.ledger,
                     n_rows: snapshot.rows.len(),
                     spread_rate: snapshot.spread_rate,
@@ -118,6 +125,7 @@ impl Job {
             members: hands.iter().map(|hand| Member { hand: hand.clone(), alive: true }).collect(),
             epoch: Epoch::without_workers(0, &base, &model),
             ledger: base.rest.ledger.clone(),
+            walls: base.rest.walls.clone(),
             base: Arc::new(base),
             keep_due: false,
             first_cycle,

@@ -9,6 +9,7 @@ use mechanics::{
     cycle::{Domain, Meter, Plan, Sets, Subdomain},
     initial,
     lanes::Width,
+    load::Drive,
     material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
     piece::{Region, cut},
@@ -105,9 +106,13 @@ fn domain() -> Domain {
             plan_interval: 100,
         },
         contact: None,
-        constraints: vec![Constraint::default(), Constraint { velocity: [None, None, Some(0.0)], walls: 0 }],
+        constraints: vec![
+            Constraint::default(),
+            Constraint { velocity: [None, None, Some(Drive::constant(0.0))], ..Constraint::default() },
+        ],
         walls: Vec::new(),
         detonations: Vec::new(),
+        loads: Default::default(),
     };
     let base = (cells[0] + 1) * (cells[1] + 1);
     let held: Vec<u16> = (0..n_nodes).map(|n| u16::from(n < base)).collect();
@@ -140,7 +145,7 @@ fn a_cycle_allocates_the_packed_forces_and_the_vote_only() {
             let after_partials = CALLS.load(Ordering::Relaxed);
             domain.elements(Sets::Interior, dt_previous, &Silent);
             let after_interior = CALLS.load(Ordering::Relaxed);
-            let vote = domain.integrate(&partials, dt_previous, dt, &Silent).expect("totals of all");
+            let vote = domain.integrate(&partials, dt_previous, dt, &[], &Silent).expect("totals of all");
             let after = CALLS.load(Ordering::Relaxed);
             assert!(vote.fault.is_none() && vote.parts[0].internal > 0.0 || cycle == 0);
             // The first cycles fill the queues of the pool.

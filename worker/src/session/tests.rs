@@ -24,6 +24,7 @@ fn assign(cycle: u64) -> Box<Assign> {
             constraints: Vec::new(),
             walls: Vec::new(),
             detonations: Vec::new(),
+            loads: Default::default(),
         },
         n_parts: 1,
         quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
@@ -41,7 +42,8 @@ fn assign(cycle: u64) -> Box<Assign> {
 
 fn orders(next: u64) -> Orders {
     let force_quantum = Quantum::for_reference(1.0, 42);
-    Orders { next, dt: 1e-3, force_quantum, gather: false, collect: false, stop: false }
+    let (dt, time, walls) = (1e-3, 1e-3 * next as f64, Vec::new());
+    Orders { next, dt, time, walls, force_quantum, gather: false, collect: false, stop: false }
 }
 
 fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
