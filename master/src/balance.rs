@@ -90,15 +90,16 @@ pub fn pairs(units: &[WorkUnit], surface: &Surface, x: &[[f64; 3]], settings: &S
         let of_face = |&face: &u32| {
             let face = &surface.faces[face as usize];
             let corners = face.nodes.map(|n| x[n as usize]);
+            let bounds: [[f64; 2]; 3] = std::array::from_fn(|a| {
+                let along = corners.map(|c| c[a]);
+                let low = along.into_iter().fold(f64::INFINITY, f64::min);
+                let high = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                [low - reach, high + reach]
+            });
             let near = |node: u32| {
                 let p = x[node as usize];
-                settings.permits(surface.node_part[node as usize], face.part)
-                    && (0..3).all(|a| {
-                        let along = corners.map(|c| c[a]);
-                        let low = along.into_iter().fold(f64::INFINITY, f64::min);
-                        let high = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
-                        p[a] >= low - reach && p[a] <= high + reach
-                    })
+                (0..3).all(|a| p[a] >= bounds[a][0] && p[a] <= bounds[a][1])
+                    && settings.permits(surface.node_part[node as usize], face.part)
             };
             unit.nodes.iter().filter(|&&node| near(node)).count() as u64
         };

@@ -266,6 +266,9 @@ pub struct SimulateArgs {
     /// Measure what work costs on this machine by the deck, beside the cluster file's constants
     #[arg(long, conflicts_with_all = ["table", "decomposition"])]
     pub measure_costs: bool,
+    /// Lane width to measure with: the machines of the paper had none; the widest by default
+    #[arg(long, value_enum, requires = "measure_costs")]
+    pub lanes: Option<Lanes>,
     /// How often to measure; medians count
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repetitions: u32,

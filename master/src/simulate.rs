@@ -9,6 +9,7 @@
 use std::{path::Path, process::ExitCode, sync::Arc};
 
 use deck::model::Model;
+use mechanics::lanes::Width;
 use protocol::{message::Route, request::RouteChoice};
 use serde::Serialize;
 
@@ -96,7 +97,12 @@ fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, Str
 }
 
 fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
-    let (all, medians) = measure::run(&model(deck, args.cycles)?, args.repetitions)?;
+    let lanes = args
+        .lanes
+        .map(|lanes| lanes.name().parse::<Width>().and_then(Width::require))
+        .transpose()
+        .map_err(|e| e.to_string())?;
+    let (all, medians) = measure::run(&model(deck, args.cycles)?, lanes, args.repetitions)?;
     if args.json {
         println!("{}", serde_json::to_string(&medians).map_err(|e| e.to_string())?);
     } else {

@@ -1,6 +1,6 @@
 //! What a run is put on: hosts, what work costs on them, and how the program itself goes about it.
 
-use mechanics::cycle::Load;
+use mechanics::{cycle::Load, lanes::Width};
 use protocol::message::Route;
 
 use super::{
@@ -78,16 +78,24 @@ pub struct Scheme {
     pub overlap: bool,
     /// What speeds work is dealt out by.
     pub balance: Balance,
+    /// Lane width; none for the best of this machine. It changes no figure but measured ones.
+    pub lanes: Option<Width>,
 }
 
 impl Scheme {
     /// What Bolide does, on a route.
     pub fn bolide(route: Route) -> Self {
-        Self { route, dealing: Dealing::Owners, overlap: true, balance: Balance::Given }
+        Self { route, dealing: Dealing::Owners, overlap: true, balance: Balance::Given, lanes: None }
     }
 
     /// The control: a star without overlap, units dealt by weight alone.
     pub fn control() -> Self {
-        Self { route: Route::Master, dealing: Dealing::Weights, overlap: false, balance: Balance::Given }
+        Self {
+            route: Route::Master,
+            dealing: Dealing::Weights,
+            overlap: false,
+            balance: Balance::Given,
+            lanes: None,
+        }
     }
 }

@@ -12,7 +12,7 @@ use std::{
 };
 
 use deck::model::Model;
-use mechanics::cycle::Meter;
+use mechanics::{cycle::Meter, lanes::Width};
 use protocol::{
     frame::{self, Frame, Header},
     message::Route,
@@ -60,7 +60,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 ///
 /// # Errors
 /// Whatever keeps the run from its end, a problem without sorts, sockets.
-pub fn once(model: &Arc<Model>) -> Result<Measured, String> {
+pub fn once(model: &Arc<Model>, lanes: Option<Width>) -> Result<Measured, String> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| e.to_string())?;
     let one = Machines {
         speeds: vec![1.0],
@@ -77,7 +77,9 @@ pub fn once(model: &Arc<Model>) -> Result<Measured, String> {
         },
         changes: Vec::new(),
     };
-    let (_, tape) = pool.install(|| virtual_clock::run(model, &one, Scheme::bolide(Route::Direct), None))?;
+    let (_, tape) = pool.install(|| {
+        virtual_clock::run(model, &one, Scheme { lanes, ..Scheme::bolide(Route::Direct) }, None)
+    })?;
     let tape = tape.ok_or("a run that computes keeps a tape")?;
     let per = |kind: Kind, count: fn(&mechanics::cycle::Load) -> u64| -> Vec<f64> {
         let tasks = tape.workers.iter().flatten().filter(|taped| taped.kind() == kind);
@@ -168,8 +170,12 @@ fn messages() -> std::io::Result<[f64; 2]> {
 ///
 /// # Errors
 /// As [`once`].
-pub fn run(model: &Arc<Model>, repetitions: u32) -> Result<(Vec<Measured>, Measured), String> {
-    let all: Vec<Measured> = (0..repetitions).map(|_| once(model)).collect::<Result<_, _>>()?;
+pub fn run(
+    model: &Arc<Model>,
+    lanes: Option<Width>,
+    repetitions: u32,
+) -> Result<(Vec<Measured>, Measured), String> {
+    let all: Vec<Measured> = (0..repetitions).map(|_| once(model, lanes)).collect::<Result<_, _>>()?;
     let of = |get: fn(&Measured) -> f64| median(all.iter().map(get).collect());
     let medians = Measured {
         element_ns: of(|m| m.element_ns),

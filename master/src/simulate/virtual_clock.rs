@@ -89,6 +89,7 @@ pub fn run(
         route: scheme.route,
         dealing: scheme.dealing,
         balance: scheme.balance,
+        lanes: scheme.lanes.map(|width| width.to_string()),
         ..Options::default()
     };
     let (job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
