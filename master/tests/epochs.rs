@@ -36,6 +36,12 @@ fn plates() -> Model {
         [contact]
         gap_length = 0.15
         friction = 0.1
+        [[wall]]
+        point = [0, 0, -0.02]
+        normal = [0, 0, 1]
+        mass = 5000
+        velocity = { z = 0.001 }
+        parts = ["target"]
         [output]
         history_cycles = 3
         period = 2
