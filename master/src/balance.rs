@@ -1,10 +1,10 @@
 //! Balance: work units to workers by speed and ownership, at each sort (paper section 4).
 //!
-//! A unit weighs the pairs that a cycle will look at ([`pairs`]). Contact is shared out so that workers end their
+//! A unit weighs the pairs that a cycle will look at ([`mechanics::contact::cull`]). Contact is shared out so that workers end their
 //! sub-domains and units at one time. A unit stays with the worker that owns most of its nodes' elements unless that
 //! worker has more than its share; then its lightest-bound units go to the workers with the most room. Deterministic.
 
-use mechanics::contact::{Settings, Surface, WorkUnit};
+use mechanics::contact::WorkUnit;
 
 /// A node-face pair in a cycle, in element-cycles of this code (`bolide simulate --measure-costs`).
 pub const PAIR: f64 = 1.2;
@@ -82,32 +82,6 @@ fn level(speeds: &[f64], work: &[f64], contact: f64) -> f64 {
     level
 }
 
-/// Pairs of each unit of which the node lies in the face's box grown by the reach: what a cycle looks at, and what a
-/// unit weighs.
-pub fn pairs(units: &[WorkUnit], surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> Vec<u64> {
-    let reach = settings.reach();
-    let of_unit = |unit: &WorkUnit| {
-        let of_face = |&face: &u32| {
-            let face = &surface.faces[face as usize];
-            let corners = face.nodes.map(|n| x[n as usize]);
-            let bounds: [[f64; 2]; 3] = std::array::from_fn(|a| {
-                let along = corners.map(|c| c[a]);
-                let low = along.into_iter().fold(f64::INFINITY, f64::min);
-                let high = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
-                [low - reach, high + reach]
-            });
-            let near = |node: u32| {
-                let p = x[node as usize];
-                (0..3).all(|a| p[a] >= bounds[a][0] && p[a] <= bounds[a][1])
-                    && settings.permits(surface.node_part[node as usize], face.part)
-            };
-            unit.nodes.iter().filter(|&&node| near(node)).count() as u64
-        };
-        unit.faces.iter().map(of_face).sum()
-    };
-    units.iter().map(of_unit).collect()
-}
-
 /// Worker of each unit that owns most of its nodes, and how many.
 fn owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usize) -> Vec<(usize, usize)> {
     let mut count = vec![0_usize; n];
@@ -135,7 +109,7 @@ pub fn assign_to_owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usi
     owners(units, n, owner).into_iter().map(|(worker, _)| worker).collect()
 }
 
-/// Worker of each unit. `weights` are the units' [`pairs`], `work` what the workers' sub-domains cost in
+/// Worker of each unit. `weights` are the units' pairs, `work` what the workers' sub-domains cost in
 /// element-cycles; `owner` gives the worker that owns a surface node's elements.
 pub fn assign(
     units: &[WorkUnit],

@@ -3,7 +3,7 @@
 //! A node that more than one worker holds (in a sub-domain, or as a guest of its work units) is in the exchange: its
 //! holders' partial forces are added here and the total goes back to each of them.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 use mechanics::{
     contact::Batch,
@@ -26,6 +26,10 @@ pub struct Holdings {
     pub work: Vec<f64>,
     /// Other workers that hold a node, ascending; most nodes have none and no entry.
     others: HashMap<u32, Vec<u32>>,
+    /// Nodes that several workers hold, each with one of them, ascending by node; its owner first.
+    shared: Vec<(u32, u32)>,
+    /// By worker: how many of those it holds.
+    n_shared: Vec<usize>,
 }
 
 impl Holdings {
@@ -49,13 +53,16 @@ impl Holdings {
                 }
             }
         }
-        Self {
-            n_workers,
-            owner_subdomain,
-            owner_worker,
-            work: decompose::work(subdomains, n_workers),
-            others,
-        }
+        let of_node = |(&node, others): (&u32, &Vec<u32>)| {
+            let owner = owner_worker[node as usize];
+            std::iter::once(owner).chain(others.clone()).map(move |worker| (node, worker))
+        };
+        let mut shared: Vec<(u32, u32)> = others.iter().flat_map(of_node).collect();
+        shared.sort_by_key(|&(node, _)| node);
+        let mut n_shared = vec![0; n_workers];
+        shared.iter().for_each(|&(_, worker)| n_shared[worker as usize] += 1);
+        let work = decompose::work(subdomains, n_workers);
+        Self { n_workers, owner_subdomain, owner_worker, work, others, shared, n_shared }
     }
 
     /// Whether a sub-domain of the worker has the node.
@@ -65,6 +72,9 @@ impl Holdings {
     }
 }
 
+/// Nodes that two neighbours share, first guess.
+const ROOM: usize = 256;
+
 /// The exchange of all workers from one plan boundary to the next.
 #[derive(Clone)]
 pub struct Exchange {
@@ -73,9 +83,9 @@ pub struct Exchange {
     /// Says which exchange this is; frames carry it.
     pub hash: u64,
     route: Route,
-    /// Number of nodes in the exchange.
+    /// Number of nodes in the exchange; 0 on route direct.
     n_slots: usize,
-    /// By worker: the slot of each node of its exchange list.
+    /// By worker: the slot of each node of its exchange list; empty on route direct.
     slots: Vec<Vec<u32>>,
     /// By worker: where each guest's state comes from, (worker, position in its send list).
     sources: Vec<Vec<(u32, u32)>>,
@@ -85,13 +95,9 @@ impl Exchange {
     /// Plans for these batches (one per worker, none where there is no contact).
     pub fn new(holdings: &Holdings, batches: Vec<Option<Batch>>, state: &GlobalState, route: Route) -> Self {
         let n = holdings.n_workers;
-        let mut holders: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for (&node, others) in &holdings.others {
-            let list = holders.entry(node).or_default();
-            list.push(holdings.owner_worker[node as usize]);
-            list.extend(others);
-        }
         let mut plans: Vec<Plan> = (0..n).map(|_| Plan::default()).collect();
+        // Nodes that only guests share: each guest's worker, and once the owner.
+        let mut added: Vec<(u32, u32)> = Vec::new();
         for (worker, batch) in batches.iter().enumerate() {
             let Some(batch) = batch else { continue };
             let mut guests: Vec<u32> = batch
@@ -103,7 +109,7 @@ impl Exchange {
             guests.sort_unstable();
             for &node in &guests {
                 let owner = holdings.owner_worker[node as usize];
-                holders.entry(node).or_insert_with(|| vec![owner]).push(worker as u32);
+                added.push((node, worker as u32));
                 plans[owner as usize].send.push(node);
                 plans[worker].guests.push(Guest {
                     node,
@@ -112,29 +118,57 @@ impl Exchange {
                 });
             }
         }
+        added.sort_by_key(|&(node, _)| node);
         for plan in &mut plans {
             plan.send.sort_unstable();
             plan.send.dedup();
         }
+        for (plan, n_shared) in plans.iter_mut().zip(&holdings.n_shared) {
+            plan.exchange.reserve(n_shared + plan.guests.len() + plan.send.len());
+        }
         let mut slots = vec![Vec::new(); n];
-        let mut shared: Vec<BTreeMap<u32, Vec<u32>>> = vec![BTreeMap::new(); n];
-        for (slot, (&node, list)) in holders.iter().enumerate() {
-            for &worker in list {
-                slots[worker as usize].push(slot as u32);
+        let mut neighbours: Vec<Vec<Neighbour>> = vec![Vec::new(); n];
+        const NONE: u32 = u32::MAX;
+        // By worker and other: its place among the worker's neighbours.
+        let mut place = vec![NONE; if route == Route::Direct { n * n } else { 0 }];
+        let mut n_slots = 0;
+        let (mut held, mut added) = (holdings.shared.as_slice(), added.as_slice());
+        let mut holders = Vec::new();
+        while let Some(&(node, _)) = match (held.first(), added.first()) {
+            (Some(one), Some(other)) if other.0 < one.0 => Some(other),
+            (Some(one), _) => Some(one),
+            (None, other) => other,
+        } {
+            holders.clear();
+            take(&mut held, node, &mut holders);
+            if holders.is_empty() {
+                holders.push(holdings.owner_worker[node as usize]);
+            }
+            take(&mut added, node, &mut holders);
+            for &worker in &holders {
                 plans[worker as usize].exchange.push(node);
             }
-            if route == Route::Direct {
-                for &worker in list {
+            if route == Route::Master {
+                holders.iter().for_each(|&worker| slots[worker as usize].push(n_slots));
+                n_slots += 1;
+            } else {
+                for &worker in &holders {
                     let at = plans[worker as usize].exchange.len() as u32 - 1;
-                    for &other in list.iter().filter(|other| **other != worker) {
-                        shared[worker as usize].entry(other).or_default().push(at);
+                    for &other in holders.iter().filter(|other| **other != worker) {
+                        let of_worker = &mut neighbours[worker as usize];
+                        let place = &mut place[worker as usize * n + other as usize];
+                        if *place == NONE {
+                            *place = of_worker.len() as u32;
+                            of_worker.push(Neighbour { worker: other, shared: Vec::with_capacity(ROOM) });
+                        }
+                        of_worker[*place as usize].shared.push(at);
                     }
                 }
             }
         }
-        for (plan, shared) in plans.iter_mut().zip(shared) {
-            plan.neighbours =
-                shared.into_iter().map(|(worker, shared)| Neighbour { worker, shared }).collect();
+        for (plan, mut neighbours) in plans.iter_mut().zip(neighbours) {
+            neighbours.sort_unstable_by_key(|neighbour| neighbour.worker);
+            plan.neighbours = neighbours;
         }
         let sources = plans
             .iter()
@@ -153,7 +187,7 @@ impl Exchange {
             plan.batch = batch;
         }
         let hash = hash(&plans);
-        Self { plans, hash, route, n_slots: holders.len(), slots, sources }
+        Self { plans, hash, route, n_slots: n_slots as usize, slots, sources }
     }
 
     /// Numbers in the partial forces that a worker sends to the master: none on route direct.
@@ -218,14 +252,19 @@ impl Exchange {
     }
 }
 
-/// A 64-bit FNV-1a hash of the lists that the packed arrays follow.
+/// Takes the workers of a node off the front of pairs.
+fn take(pairs: &mut &[(u32, u32)], node: u32, workers: &mut Vec<u32>) {
+    while let Some((&(_, worker), rest)) = pairs.split_first().filter(|(pair, _)| pair.0 == node) {
+        workers.push(worker);
+        *pairs = rest;
+    }
+}
+
+/// A 64-bit hash of the lists that the packed arrays follow: FNV-1a over words.
 fn hash(plans: &[Plan]) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut eat = |value: u32| {
-        for byte in value.to_le_bytes() {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-    };
+    let mut eat =
+        |value: u32| hash = (hash ^ u64::from(value)).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
     for plan in plans {
         eat(plan.exchange.len() as u32);
         plan.exchange.iter().copied().for_each(&mut eat);

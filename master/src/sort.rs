@@ -87,12 +87,12 @@ impl Sorter {
 
     /// Sorts, balances, plans. `x` by surface node; of `state` only masses and constraints are read.
     pub fn run(&self, epoch: u32, x: &[[f64; 3]], holdings: &Holdings, state: &GlobalState) -> Sorted {
-        let units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
+        let mut units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
         let census = Census::of(&units);
         let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
         let worker_of = match self.dealing {
             Dealing::Owners => {
-                let weights = balance::pairs(&units, &self.surface, x, &self.settings);
+                let weights = contact::cull(&mut units, &self.surface, x, &self.settings, &self.exclusions);
                 balance::assign(&units, &weights, &self.speeds, &holdings.work, &owner)
             }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
@@ -100,7 +100,7 @@ impl Sorter {
         let n = self.speeds.len();
         let mut mine: Vec<Vec<&contact::WorkUnit>> = vec![Vec::new(); n];
         let mut interactions = vec![0; n];
-        for (unit, &worker) in units.iter().zip(&worker_of) {
+        for (unit, &worker) in units.iter().zip(&worker_of).filter(|(unit, _)| !unit.faces.is_empty()) {
             mine[worker].push(unit);
             interactions[worker] += unit.interactions;
         }

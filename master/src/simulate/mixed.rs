@@ -109,8 +109,8 @@ impl Sorted {
         let x: Vec<[f64; 3]> =
             surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
         let exclusions = Exclusions::new(&surface, &initial_pairs(&surface, &x, settings));
-        let units = contact::sort(&surface, &x, settings, &exclusions);
-        let weights = balance::pairs(&units, &surface, &x, settings);
+        let mut units = contact::sort(&surface, &x, settings, &exclusions);
+        let weights = contact::cull(&mut units, &surface, &x, settings, &exclusions);
         Ok(Self { model, surface, exclusions, x, units, weights })
     }
 
