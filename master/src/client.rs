@@ -25,6 +25,8 @@ use crate::{
     run::list_of_faults,
 };
 
+pub mod top;
+
 /// A connection to a master.
 struct Client {
     runtime: tokio::runtime::Runtime,

@@ -9,9 +9,13 @@ use protocol::{
     tls,
 };
 
+/// What the process ends with, as `--help` says it.
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 a fault, which is printed (deck, disk, physics, peer); 2 wrong flags; 130 \
+stopped by Ctrl-C, or the followed job was cancelled. The log goes to standard error, BOLIDE_LOG=debug for more.";
+
 /// Explicit Lagrangian impact simulation on whatever PCs a lab has.
 #[derive(Debug, Parser)]
-#[command(name = "bolide", version, about, max_term_width = 100)]
+#[command(name = "bolide", version, about, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -92,6 +96,23 @@ pub enum Command {
     },
     /// List the material library
     Materials,
+    /// Show hosts and jobs of a master, looked at once a second
+    Top {
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
+    /// Print what a shell needs to complete commands and flags
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page, or write one for each command
+    Man {
+        /// Folder for all of them
+        #[arg(long, value_name = "FOLDER")]
+        out: Option<PathBuf>,
+    },
 }
 
 /// How partial forces travel.
@@ -325,6 +346,9 @@ pub struct MasterArgs {
     /// Folder for the results of jobs
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
+    /// Serve a page and a JSON API there, 127.0.0.1:7118 for example; other than loopback only with --certs, by HTTPS
+    #[arg(long, value_name = "ADDRESS")]
+    pub http: Option<SocketAddr>,
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
     #[arg(long, value_name = "RATE")]
     pub link: Option<Rate>,

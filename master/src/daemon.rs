@@ -32,6 +32,7 @@ use crate::{
     connection::Gate,
     drive::{self, Input, Seat},
     hosts::Hosts,
+    http::{self, board::Board},
     queue::{self, Queue, is_over},
     service::{self, Order},
 };
@@ -113,13 +114,14 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     let result = runtime.block_on(async {
         let listener = TcpListener::bind(args.listen).await.map_err(|e| format!("{}: {e}", args.listen))?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
-        announce(address, tls.is_some());
+        let join = announce(address, tls.is_some());
         let (events, heard) = mpsc::channel(WAITING_EVENTS);
         let gate =
             Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls).behind(port));
         tokio::spawn(listen(listener, Arc::clone(&gate)));
+        let board = open_page(args, join, &events).await?;
         let stop = crate::run::stop_on_interrupt("ending; the job under way writes its results");
-        Owner::new(args.spool.clone(), first, events).run(heard, &stop, &gate).await;
+        Owner::new(args.spool.clone(), first, events, board).run(heard, &stop, &gate).await;
         Ok(ExitCode::SUCCESS)
     });
     runtime.shutdown_background();
@@ -155,13 +157,39 @@ pub async fn listen(listener: TcpListener, gate: Arc<Gate>) {
     }
 }
 
-/// Says where it listens and how workers join.
-fn announce(address: SocketAddr, certificates: bool) {
+/// Opens the page where one is asked for, and prints its address with its token.
+async fn open_page(
+    args: &MasterArgs,
+    join: String,
+    events: &mpsc::Sender<Event>,
+) -> Result<Option<Arc<Board>>, String> {
+    let Some(address) = args.http else { return Ok(None) };
+    let place = http::Place::open(address, args.certs.as_deref()).await?;
+    let (address, secure) = (place.address()?, place.is_secure());
+    let loopback = address.ip().is_loopback();
+    let guard = http::guard::Guard::new(&args.spool, address.port(), loopback, secure, host_name())?;
+    let scheme = if secure { "https" } else { "http" };
+    println!("page: {scheme}://{}/?token={}", reachable(address), guard.token());
+    let board = Arc::new(Board::default());
+    let office = http::Office { events: events.clone(), board: Arc::clone(&board), join, guard };
+    tokio::spawn(http::serve(place, office));
+    Ok(Some(board))
+}
+
+/// Says where it listens and how workers join; gives the line for workers.
+fn announce(address: SocketAddr, certificates: bool) -> String {
+    let certs = if certificates { " --certs FOLDER" } else { "" };
+    let join = format!("bolide worker --master {}{certs}", reachable(address));
+    println!("listening on {address}");
+    println!("workers join with: {join}");
+    join
+}
+
+/// Host and port as others write them.
+fn reachable(address: SocketAddr) -> String {
     let host = if address.ip().is_unspecified() { host_name() } else { address.ip().to_string() };
     let host = if host.contains(':') { format!("[{host}]") } else { host };
-    let certs = if certificates { " --certs FOLDER" } else { "" };
-    println!("listening on {address}");
-    println!("workers join with: bolide worker --master {host}:{}{certs}", address.port());
+    format!("{host}:{}", address.port())
 }
 
 /// The name of this machine.
@@ -195,6 +223,8 @@ struct Owner {
     queue: Queue,
     status: BTreeMap<u32, watch::Sender<Status>>,
     running: Option<Running>,
+    /// What the page shows; none without a page.
+    board: Option<Arc<Board>>,
 }
 
 /// The job under way.
@@ -215,7 +245,7 @@ impl Running {
 }
 
 impl Owner {
-    fn new(spool: PathBuf, first: u32, events: mpsc::Sender<Event>) -> Self {
+    fn new(spool: PathBuf, first: u32, events: mpsc::Sender<Event>, board: Option<Arc<Board>>) -> Self {
         Self {
             spool,
             events,
@@ -224,6 +254,7 @@ impl Owner {
             queue: Queue::new(first),
             status: BTreeMap::new(),
             running: None,
+            board,
         }
     }
 
@@ -424,6 +455,7 @@ impl Owner {
             line: Mutex::new(Some(line)),
             stop,
             status,
+            board: self.board.clone(),
         };
         self.hosts.occupy(&idle, job);
         self.running = Some(running);

@@ -252,7 +252,12 @@ impl Driver {
             };
             match input {
                 Input::Message(worker, header, message) => match self.check(&header, &message) {
-                    Ok(()) => self.apply(Event::Message(worker, header.epoch, message), sink)?,
+                    Ok(()) => {
+                        if header.epoch == self.job.epoch() {
+                            sink.heard(&self.seats[worker].hand.name, &message);
+                        }
+                        self.apply(Event::Message(worker, header.epoch, message), sink)?;
+                    }
                     Err(why) => {
                         let seat = &self.seats[worker];
                         let why = format!("{} at {}: {why}", seat.hand.name, seat.address);

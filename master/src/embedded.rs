@@ -39,6 +39,9 @@ pub trait Sink {
     /// # Errors
     /// What the disk refused; the run then ends with that as its failure.
     fn take(&mut self, action: Action) -> Result<(), String>;
+
+    /// Looks at a message of a worker before the job takes it.
+    fn heard(&mut self, _worker: &str, _message: &ToMaster) {}
 }
 
 /// What a run cost beside its outcome.

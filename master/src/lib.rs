@@ -20,6 +20,7 @@ pub mod event;
 pub mod exchange;
 pub mod holdings;
 pub mod hosts;
+pub mod http;
 pub mod job;
 pub mod ledger;
 pub mod peers;

@@ -4,7 +4,7 @@
 
 use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 
 use master::{
     bench, certs, client,
@@ -36,6 +36,12 @@ fn main() -> ExitCode {
         Command::Results { job, out, force, at } => client::results(job, out, force, &at),
         Command::Bench { what: Bench::Messages(args) } => bench::messages::run(&args),
         Command::Certs { what } => make_certificates(what),
+        Command::Top { at } => client::top::run(&at),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "bolide", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Man { out } => manual(out.as_deref()),
         Command::Check { deck } => check(&deck),
         Command::Materials => {
             for name in deck::materials() {
@@ -80,6 +86,21 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
         Certs::Host { folder, name, address, role, force } => {
             certs::make_host(&folder, &name, &address, role.role(), force).map_err(|e| e.to_string())?;
             println!("made {}; copy this folder to {name}", folder.join(&name).display());
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn manual(folder: Option<&Path>) -> Result<ExitCode, String> {
+    let command = Cli::command();
+    match folder {
+        None => clap_mangen::Man::new(command)
+            .render(&mut std::io::stdout())
+            .map_err(|e| format!("standard output: {e}"))?,
+        Some(folder) => {
+            let fault = |e: std::io::Error| format!("{}: {e}", folder.display());
+            std::fs::create_dir_all(folder).map_err(fault)?;
+            clap_mangen::generate_to(command, folder).map_err(fault)?;
         }
     }
     Ok(ExitCode::SUCCESS)

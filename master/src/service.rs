@@ -10,7 +10,10 @@ use std::{
 
 use deck::model::Model;
 use mechanics::contact::Surface;
-use protocol::request::{Ended, JobOptions, Share, Status};
+use protocol::{
+    message::ToMaster,
+    request::{Ended, JobOptions, Share, Status},
+};
 use tokio::sync::{mpsc, watch};
 use tracing::{info, warn};
 
@@ -19,6 +22,7 @@ use crate::{
     drive::{self, Input, Seat, drive},
     embedded::Sink,
     event::{Action, Deal, Hand, Options},
+    http::board::{self, Board, Sheet},
     job::Job,
     queue::Event,
     results::{Folder, TRACE, trace},
@@ -48,6 +52,8 @@ pub struct Order {
     pub stop: Arc<AtomicBool>,
     /// What watchers see.
     pub status: watch::Sender<Status>,
+    /// What the page shows of runs, if there is a page.
+    pub board: Option<Arc<Board>>,
 }
 
 /// Runs the job; gives how it ended. A bug becomes a failure of this job alone.
@@ -101,11 +107,25 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     let folder = order.folder.as_ref().map(|path| Folder::create(path, false)).transpose();
     let mut output = Output::new(Arc::clone(&model), folder.map_err(|e| e.to_string())?, true)?;
     output.state(job.start_state())?;
+    let sheet = order.board.as_ref().map(|board| board.begin(order.number, &model));
+    if let Some(sheet) = &sheet {
+        board::lock(sheet).state(&model, job.start_state());
+    }
     let census = Census::of(&job, &model);
     let started = Instant::now();
-    let mut reporter =
-        Reporter { number: order.number, output, model: &model, status: &order.status, started, last: None };
+    let mut reporter = Reporter {
+        number: order.number,
+        output,
+        model: &model,
+        status: &order.status,
+        started,
+        last: None,
+        sheet: sheet.clone(),
+    };
     let (outcome, traffic) = drive(job, first, order.number, &order.seats, line, &mut reporter, &order.stop)?;
+    if let Some(sheet) = &sheet {
+        board::lock(sheet).over(outcome.failure.is_none() && !outcome.stopped);
+    }
     let wall = started.elapsed().as_secs_f64();
     let threads = hands.iter().map(|hand| hand.threads).sum();
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
@@ -143,9 +163,25 @@ struct Reporter<'a> {
     status: &'a watch::Sender<Status>,
     started: Instant,
     last: Option<Instant>,
+    /// What the page shows.
+    sheet: Option<Arc<Mutex<Sheet>>>,
 }
 
 impl Reporter<'_> {
+    /// What the page shows of an action.
+    fn show(&self, action: &Action) {
+        let Some(sheet) = &self.sheet else { return };
+        let mut sheet = board::lock(sheet);
+        match action {
+            Action::Row(row) => sheet.row(row),
+            Action::State(state) => sheet.state(self.model, state),
+            Action::Dealt(deals) => sheet.dealt(deals),
+            Action::Rewind { cycle, .. } => sheet.rewind(*cycle),
+            Action::Progress(progress) => sheet.progress(progress),
+            _ => {}
+        }
+    }
+
     /// Work was dealt out anew; with nobody to deal it to, the job waits.
     fn dealt(&self, deals: Vec<Deal>) {
         let workers = deals.len();
@@ -161,7 +197,14 @@ impl Reporter<'_> {
 }
 
 impl Sink for Reporter<'_> {
+    fn heard(&mut self, worker: &str, message: &ToMaster) {
+        if let Some(sheet) = &self.sheet {
+            board::lock(sheet).heard(worker, message);
+        }
+    }
+
     fn take(&mut self, action: Action) -> Result<(), String> {
+        self.show(&action);
         let progress = match action {
             Action::Progress(progress) => progress,
             Action::Dealt(deals) => {

@@ -37,6 +37,9 @@ pub enum Input {
     Peer(News),
 }
 
+/// How often the master hears between cycles how the time goes.
+const REPORT_EVERY: Duration = Duration::from_secs(1);
+
 /// The compute thread's own.
 pub struct Runner {
     outbox: Outbox,
@@ -49,6 +52,8 @@ pub struct Runner {
     busy: Duration,
     /// The answer to an assignment, while links are being made.
     ready: Option<ToMaster>,
+    /// When the last report left.
+    reported: Instant,
 }
 
 impl Runner {
@@ -63,6 +68,7 @@ impl Runner {
             links,
             busy: Duration::ZERO,
             ready: None,
+            reported: Instant::now(),
         }
     }
 
@@ -163,7 +169,10 @@ impl Runner {
                 match action {
                     Action::Send(ready @ ToMaster::Ready { .. }) => self.ready = Some(ready),
                     Action::Send(message) => self.timed(|runner| {
-                        if let ToMaster::Image { last: Some(_), .. } = message {
+                        let last = matches!(message, ToMaster::Image { last: Some(_), .. });
+                        let due = runner.reported.elapsed() > REPORT_EVERY;
+                        if last || (due && matches!(message, ToMaster::Cycle { .. })) {
+                            runner.reported = Instant::now();
                             let mut report = runner.stopwatch.report();
                             runner.links.report(&mut report);
                             runner.send(&ToMaster::Report(Box::new(report)))?;
