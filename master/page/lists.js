@@ -94,7 +94,7 @@ export function facts(parent, pairs) {
     pair => element('div', {}, element('dt', { textContent: pair[0] }), element('dd')),
     (item, [name, value]) => {
       set(item.lastChild, 'textContent', value);
-      set(item.lastChild, 'className', name);
+      set(item.lastChild, 'className', name === 'digest' ? name : '');
     });
 }
 

@@ -7,6 +7,7 @@
 
 pub mod bits;
 pub mod book;
+pub mod browser;
 pub mod case;
 pub mod checker;
 pub mod cluster;
