@@ -41,7 +41,9 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     browser.wait_for("document.getElementById('link')?.textContent === 'live'");
     // The token has left the address bar; without workers the page says how to start one.
     assert_eq!(browser.evaluate("location.search"), "");
-    let join = browser.wait_for("!document.getElementById('no-hosts').hidden && document.getElementById('join').textContent");
+    let join = browser.wait_for(
+        "!document.getElementById('no-hosts').hidden && document.getElementById('join').textContent",
+    );
     assert_eq!(join, format!("bolide worker --master {address}"));
 
     // A deck with a fault: shown at its line, not submitted.
@@ -50,7 +52,8 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     let bad = deck.replace("gap_length = 0.1 ", "gap_length = -1 ");
     let line = 1 + deck.lines().position(|l| l.starts_with("gap_length")).expect("the deck has a gap");
     browser.evaluate(&drop_file("bad.toml", &bad));
-    let faults = browser.wait_for("!document.getElementById('faults').hidden && document.getElementById('faults').innerText");
+    let faults = browser
+        .wait_for("!document.getElementById('faults').hidden && document.getElementById('faults').innerText");
     let faults = faults.as_str().expect("text");
     assert!(faults.contains(&format!("line {line}")) && faults.contains("bad.toml"), "{faults}");
 

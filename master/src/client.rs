@@ -228,7 +228,11 @@ pub fn hosts(at: &ClientArgs) -> Result<ExitCode, String> {
 /// If there is no such job or it is over, or whatever went wrong on the way.
 pub fn cancel(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
     let Reply::Done(what) = Client::new(at)?.ask(&Request::Cancel { job })? else { return Err(surprise()) };
-    println!("{what}");
+    if at.json {
+        println!("{}", serde_json::json!({ "done": what }));
+    } else {
+        println!("{what}");
+    }
     Ok(ExitCode::SUCCESS)
 }
 

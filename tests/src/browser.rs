@@ -102,13 +102,15 @@ impl Browser {
 
     /// A picture of the page as PNG, base64, at a width, in light or dark.
     pub fn picture(&mut self, width: u32, height: u32, dark: bool) -> String {
-        let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
+        let metrics =
+            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
         self.call("Emulation.setDeviceMetricsOverride", metrics);
         let scheme = if dark { "dark" } else { "light" };
         let features = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
         self.call("Emulation.setEmulatedMedia", features);
         self.evaluate("new Promise(done => setTimeout(done, 1500))");
-        let shot = self.call("Page.captureScreenshot", json!({ "format": "png", "captureBeyondViewport": true }));
+        let shot =
+            self.call("Page.captureScreenshot", json!({ "format": "png", "captureBeyondViewport": true }));
         shot["data"].as_str().unwrap_or_default().to_owned()
     }
 }
