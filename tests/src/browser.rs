@@ -120,7 +120,7 @@ fn page_of(address: &str) -> Option<String> {
     use std::io::{Read, Write};
     let mut stream = TcpStream::connect(address).ok()?;
     stream.set_read_timeout(Some(Duration::from_secs(10))).ok()?;
-    write!(stream, "GET /json/list HTTP/1.0\r\nHost: {address}\r\n\r\n").ok()?;
+    write!(stream, "GET /json/list HTTP/1.1\r\nHost: {address}\r\n\r\n").ok()?;
     let mut bytes = Vec::new();
     let mut buffer = [0; 4096];
     // It may keep the connection open: the list ends with its bracket.
