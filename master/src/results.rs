@@ -1,8 +1,8 @@
 //! What a run leaves on disk: one folder with states, histories and a summary.
 //!
 //! A results folder holds `state-NNNNNN.vtu` (one file per written state, [`vtu`]), `results.pvd` (the index
-//! that ParaView opens, with the time of each state), `history.csv` ([`history`]) and `summary.json`
-//! ([`summary`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
+//! that ParaView opens, with the time of each state), `history.csv` ([`history`]), `summary.json`
+//! ([`summary`]) and `report.html` ([`report`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
 //! Only the history grows in place, by whole rows. So the folder of a killed run opens.
 //!
 //! Nothing here computes physics or decides when to write.
@@ -15,6 +15,7 @@ use std::{
 };
 
 pub mod history;
+pub mod report;
 pub mod summary;
 pub mod trace;
 pub mod vtu;
@@ -25,10 +26,13 @@ pub const PVD: &str = "results.pvd";
 pub const HISTORY: &str = "history.csv";
 /// Name of the summary.
 pub const SUMMARY: &str = "summary.json";
+/// Name of the report.
+pub const REPORT: &str = "report.html";
 /// Name of the trace of a job's workers.
 pub const TRACE: &str = "trace.json";
 
 pub use deck::model::FIELD_NAMES;
+pub use summary::Summary;
 
 /// Why results could not be written or read.
 #[derive(Debug)]
@@ -161,7 +165,7 @@ pub fn state_name(index: u32) -> String {
 fn is_written_by_a_run(name: &str) -> bool {
     let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".tmp")).unwrap_or(name);
     let state = stem.strip_prefix("state-").and_then(|n| n.strip_suffix(".vtu"));
-    [PVD, HISTORY, SUMMARY, TRACE].contains(&stem)
+    [PVD, HISTORY, SUMMARY, REPORT, TRACE].contains(&stem)
         || state.is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
 }
 

@@ -28,6 +28,7 @@ use crate::{
     results::{
         Folder,
         history::{History, HistoryRow},
+        report,
         summary::{Energies, Summary, WorkUnits, WorkerTimes},
         trace,
         vtu::Series,
@@ -214,6 +215,7 @@ pub fn conclude(
     let summary = summarise(model, census, outcome, traffic, threads, wall_s);
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
+        report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
     }
     if json {
         println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);

@@ -21,7 +21,7 @@ use crate::{
     event::{Action, Deal, Hand, Options},
     job::Job,
     queue::Event,
-    results::{Folder, TRACE, trace},
+    results::{Folder, TRACE, report, trace},
     run::{Census, Output, limit, options_for, progress_line, summarise},
 };
 
@@ -111,6 +111,7 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
+        report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
         if order.options.trace {
             trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
                 .map_err(|e| e.to_string())?;
