@@ -128,7 +128,12 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     if text.len() > DECK_LIMIT {
         return Err(format!("{name}: {} bytes, at most {DECK_LIMIT} can be sent", text.len()));
     }
-    let options = JobOptions { min_workers: args.min_workers, trace: args.trace, ..args.job.asked() };
+    let options = JobOptions {
+        min_workers: args.min_workers,
+        priority: args.priority,
+        trace: args.trace,
+        ..args.job.asked()
+    };
     let mut client = Client::new(&args.at)?;
     match client.ask(&Request::Submit { name, text, options })? {
         Reply::Submitted { job } if args.wait => {

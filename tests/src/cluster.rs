@@ -103,6 +103,15 @@ impl Process {
         self.child.try_wait().is_ok_and(|status| status.is_none())
     }
 
+    /// Sends it a signal, by its name without `SIG`.
+    ///
+    /// # Panics
+    /// If there is no such signal.
+    pub fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args([&format!("-{name}"), &self.id().to_string()]).status();
+        assert!(sent.expect("kill is there").success(), "kill -{name} {}", self.id());
+    }
+
     /// Ends it as `kill -9` does.
     pub fn kill(&mut self) {
         // It may have ended by itself; both fail only then.
@@ -166,6 +175,8 @@ pub struct Cluster {
     pub address: String,
     workers: Vec<(String, Process)>,
     tls: bool,
+    /// Of the master.
+    flags: Vec<String>,
 }
 
 impl Cluster {
@@ -174,21 +185,44 @@ impl Cluster {
     /// # Panics
     /// If it does not come up.
     pub fn start(binary: &str, tls: bool) -> Self {
+        Self::start_with(binary, tls, &[], None)
+    }
+
+    /// The same with further flags, and with faults ordered by `BOLIDE_FAIL`.
+    ///
+    /// # Panics
+    /// If it does not come up.
+    pub fn start_with(binary: &str, tls: bool, flags: &[&str], fail: Option<&str>) -> Self {
         let binary = PathBuf::from(binary);
         let folder = tempfile::tempdir().expect("a folder for the test");
-        let certs = folder.path().join("certs");
         if tls {
-            make_certificates(&binary, &certs);
+            make_certificates(&binary, &folder.path().join("certs"));
         }
-        let mut command = Command::new(&binary);
-        command.args(["master", "--listen", "127.0.0.1:0", "--spool"]).arg(folder.path().join("spool"));
-        if tls {
-            command.arg("--certs").arg(certs.join("master"));
-        }
-        let master = Process::start("master", command.env("BOLIDE_LOG", "info"));
+        let flags: Vec<String> = flags.iter().map(|&flag| flag.to_owned()).collect();
+        let master = master_of(&binary, folder.path(), "127.0.0.1:0", tls, &flags, fail);
         let line = master.wait_for("listening on ");
         let address = line.trim_start_matches("listening on ").to_owned();
-        Self { binary, folder, master, address, workers: Vec::new(), tls }
+        Self { binary, folder, master, address, workers: Vec::new(), tls, flags }
+    }
+
+    /// Starts another master at the same address on the same files, once the present one has ended.
+    ///
+    /// # Panics
+    /// If it does not come up.
+    pub fn restart_master(&mut self) {
+        self.master.wait();
+        self.master = master_of(&self.binary, self.folder.path(), &self.address, self.tls, &self.flags, None);
+        self.master.wait_for("listening on ");
+    }
+
+    /// The folder of the results of a job.
+    pub fn results(&self, job: u32) -> PathBuf {
+        self.folder().join(format!("spool/job-{job}"))
+    }
+
+    /// The folder of the snapshots of a job.
+    pub fn snapshots(&self, job: u32) -> PathBuf {
+        self.folder().join(format!("spool/queue/job-{job}.snapshots"))
     }
 
     /// The folder of this cluster's files, gone with it.
@@ -225,6 +259,28 @@ impl Cluster {
         worker.wait_for("joined");
         self.master.wait_for(&format!("worker {name} joined"));
         self.workers.push((name.to_owned(), worker));
+    }
+
+    /// Starts a worker with faults ordered by `BOLIDE_FAIL`.
+    ///
+    /// # Panics
+    /// If it does not join.
+    pub fn worker_that_fails(&mut self, name: &str, fail: &str) {
+        let arguments = ["worker", "--name", name, "--threads", "1"];
+        let mut command = self.command("worker", &arguments);
+        let worker = Process::start(name, command.env("BOLIDE_LOG", "info").env("BOLIDE_FAIL", fail));
+        worker.wait_for("joined");
+        self.master.wait_for(&format!("worker {name} joined"));
+        self.workers.push((name.to_owned(), worker));
+    }
+
+    /// The process of a worker, to wait for its end.
+    ///
+    /// # Panics
+    /// If there is none of that name.
+    pub fn process_mut(&mut self, name: &str) -> &mut Process {
+        let worker = self.workers.iter_mut().find(|(n, _)| n == name);
+        &mut worker.expect("a worker of that name").1
     }
 
     /// The process of a worker.
@@ -299,6 +355,23 @@ impl Cluster {
             },
         );
     }
+}
+
+fn master_of(
+    binary: &Path,
+    folder: &Path,
+    listen: &str,
+    tls: bool,
+    flags: &[String],
+    fail: Option<&str>,
+) -> Process {
+    let mut command = Command::new(binary);
+    command.args(["master", "--listen", listen, "--spool"]).arg(folder.join("spool")).args(flags);
+    if tls {
+        command.arg("--certs").arg(folder.join("certs/master"));
+    }
+    command.env("BOLIDE_LOG", "info").env("BOLIDE_FAIL", fail.unwrap_or_default());
+    Process::start("master", &mut command)
 }
 
 /// Runs a command to its end.

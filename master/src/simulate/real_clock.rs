@@ -580,6 +580,8 @@ impl Clock<'_> {
                 Action::Row(_)
                 | Action::State(_)
                 | Action::Snapshot(_)
+                | Action::Base { .. }
+                | Action::Dismiss(..)
                 | Action::Progress(_)
                 | Action::Dealt(_)
                 | Action::Rewind { .. }
