@@ -196,17 +196,19 @@ impl Gate {
                 self.listen(&mut receiver, hello, incarnation, &route).await
             }
         };
+        let dropped = route.dismissal();
+        let words = dropped.clone().unwrap_or_else(|| error.to_string());
         if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
-            leave(&sender, &error.to_string()).await;
+            leave(&sender, &words).await;
         }
         drop(receiver);
-        let why = format!("{} at {address}: {error}", hello.name);
+        let why = format!("{} at {address}: {words}", hello.name);
         if let Some((index, send)) = route.lose(&why) {
             // The job may be over by now.
             let _ = send.send(Input::Lost(index, why)).await;
         }
-        let dropped = route.is_dismissed();
-        let _ = self.events.send(Event::Left { incarnation, why: error.to_string(), dropped }).await;
+        let dropped = dropped.is_some();
+        let _ = self.events.send(Event::Left { incarnation, why: words, dropped }).await;
         Err(error)
     }
 
@@ -226,7 +228,7 @@ impl Gate {
             let frame = tokio::select! {
                 biased;
                 frame = receiver.receive() => Some(frame),
-                why = route.dismissed() => return Error::Message(why),
+                () = route.dismissed() => return Error::Message("its job dropped it".to_owned()),
                 _ = look.tick() => None,
             };
             let handed = match frame {

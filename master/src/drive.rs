@@ -98,7 +98,7 @@ impl Seat {
 pub struct Route {
     port: Mutex<Port>,
     /// The job will have no more to do with the worker.
-    dismissal: Notify,
+    dismissed: Notify,
 }
 
 #[derive(Default)]
@@ -109,7 +109,7 @@ struct Port {
     /// Why the connection has ended.
     gone: Option<String>,
     /// Why the job will have no more to do with the worker.
-    dismissed: Option<String>,
+    dismissal: Option<String>,
 }
 
 impl Route {
@@ -121,20 +121,18 @@ impl Route {
     fn dismiss(&self, why: String) {
         let mut port = self.port();
         port.to = None;
-        port.dismissed = Some(why);
-        self.dismissal.notify_one();
+        port.dismissal = Some(format!("dropped: {why}"));
+        self.dismissed.notify_one();
     }
 
-    /// Waits until the worker is dismissed; gives the words for it. Cancel safe.
-    pub async fn dismissed(&self) -> String {
-        self.dismissal.notified().await;
-        let why = self.port().dismissed.clone().unwrap_or_default();
-        format!("dropped: {why}")
+    /// Waits until the worker is dismissed. Cancel safe.
+    pub async fn dismissed(&self) {
+        self.dismissed.notified().await;
     }
 
-    /// Whether the worker was dismissed.
-    pub fn is_dismissed(&self) -> bool {
-        self.port().dismissed.is_some()
+    /// Why the worker was dismissed, if it was.
+    pub fn dismissal(&self) -> Option<String> {
+        self.port().dismissal.clone()
     }
 
     /// From now on messages of `job` go to `send`.

@@ -28,7 +28,7 @@ use tracing::{info, warn};
 
 use crate::{
     peers::{Peers, links::Links},
-    runner::{Input, Runner},
+    runner::{GOODBYE, Input, Runner},
 };
 
 /// Messages that may wait for the compute thread: a master sends at most a few ahead, a neighbour two.
@@ -281,15 +281,21 @@ async fn serve_until(
         }
         std::future::pending().await
     };
+    let mut released = false;
     let error = match &computing {
         Err(error) => Error::io("starting the compute thread", error),
         Ok(_) => tokio::select! {
             error = listen(&mut receiver, &send) => error,
-            Ok(error) = &mut failed => error,
+            Ok(error) = &mut failed => {
+                released = matches!(&error, Error::Message(words) if words == GOODBYE);
+                error
+            }
             error = ask => error,
         },
     };
-    if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
+    if released {
+        dial::leave(&sender, GOODBYE).await;
+    } else if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
         dial::leave(&sender, &error.to_string()).await;
     }
     drop((receiver, send));
