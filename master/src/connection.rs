@@ -24,13 +24,13 @@ use protocol::{
     tls::{self, ServerConfig},
     wire,
 };
-use tracing::{info, warn};
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::TcpStream,
     sync::{mpsc, oneshot},
     time::Instant,
 };
+use tracing::{info, warn};
 
 use crate::{
     daemon::Event,
@@ -214,13 +214,7 @@ impl Gate {
 
     /// Hands a worker's messages to its job, and says when it has been silent; ends with the link, or when the job will
     /// have no more to do with the worker.
-    async fn listen(
-        &self,
-        receiver: &mut Receiver,
-        hello: &Hello,
-        incarnation: u32,
-        route: &Route,
-    ) -> Error {
+    async fn listen(&self, receiver: &mut Receiver, hello: &Hello, incarnation: u32, route: &Route) -> Error {
         let mut inbox = Inbox::new(incarnation, BULK_ON_THE_WAY);
         let mut look = tokio::time::interval(self.dead_after.mul_f64(SUSPECT) / 4);
         let mut silent_since = None;

@@ -129,8 +129,11 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         let address = listener.local_addr().map_err(|e| e.to_string())?;
         announce(address, tls.is_some());
         let (events, heard) = mpsc::channel(WAITING_EVENTS);
-        let gate =
-            Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls).behind(port).patient_for(dead_after));
+        let gate = Arc::new(
+            Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls)
+                .behind(port)
+                .patient_for(dead_after),
+        );
         tokio::spawn(listen(listener, Arc::clone(&gate)));
         let stop = crate::run::stop_on_interrupt("ending; the job under way is stored for the next master");
         Owner::new(args.spool.clone(), spool, left, events).run(heard, &stop, &gate).await;
@@ -477,7 +480,8 @@ impl Owner {
         let idle: Vec<u32> =
             self.hosts.idle().map(|h| h.incarnation).filter(|i| self.seats.contains_key(i)).collect();
         let needed = entry.options.min_workers.max(1) as usize;
-        let back = |name: &&String| idle.iter().filter_map(|i| self.seats.get(i)).any(|s| s.hand.name == **name);
+        let back =
+            |name: &&String| idle.iter().filter_map(|i| self.seats.get(i)).any(|s| s.hand.name == **name);
         match &entry.before {
             // Any worker will do for what was begun with enough of them.
             Some(crew) => {

@@ -36,9 +36,9 @@ use crate::{
     sort::{Sorted, Sorter},
 };
 use epoch::{Acting, Base, Epoch, Member, Step};
-use stop::not_a_number;
 use measure::{Patience, Proposal};
 use start::Touching;
+use stop::not_a_number;
 
 /// What sorts work on: fixed for an epoch.
 pub struct Bench {
@@ -55,6 +55,7 @@ pub struct Bench {
 impl Bench {
     /// Does the sort that [`Action::Sort`] asks for.
     pub fn sort(&self, x: &[[f64; 3]]) -> Sorted {
+        worker::failpoint::die("die-in-sort");
         self.sorter.run(self.epoch, x, &self.holdings, &self.state)
     }
 }

@@ -29,5 +29,5 @@ pub mod run;
 pub mod service;
 pub mod simulate;
 pub mod snapshot;
-pub mod spool;
 pub mod sort;
+pub mod spool;

@@ -213,7 +213,8 @@ mod tests {
             let options = JobOptions { priority, ..JobOptions::default() };
             queue.add("d".into(), "text".into(), options, "spool".as_ref()).expect("room");
         }
-        let interrupted = Entry { id: 9, before: Some(vec!["a".into()]), ..queue.get(4).expect("added").clone() };
+        let interrupted =
+            Entry { id: 9, before: Some(vec!["a".into()]), ..queue.get(4).expect("added").clone() };
         queue.restore(interrupted);
         let mut order = Vec::new();
         while let Some(next) = queue.first().map(|job| job.id) {

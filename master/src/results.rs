@@ -153,7 +153,9 @@ impl Folder {
         for entry in fs::read_dir(&self.path).map_err(Error::io("read", &self.path))? {
             let entry = entry.map_err(Error::io("read", &self.path))?;
             let name = entry.file_name();
-            let index = name.to_str().and_then(|n| n.strip_prefix("state-")?.strip_suffix(".vtu")?.parse::<usize>().ok());
+            let index = name
+                .to_str()
+                .and_then(|n| n.strip_prefix("state-")?.strip_suffix(".vtu")?.parse::<usize>().ok());
             if index.is_some_and(|index| index >= count) {
                 fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
             }

@@ -186,11 +186,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     }
     // Nobody is lost who shares this process.
     let memory = asked.keep_every.filter(|_| args.processes);
-    let options = Options {
-        keep: keep_for(memory, interval),
-        store: folder.is_some(),
-        ..options_for(&asked, n, true)
-    };
+    let options =
+        Options { keep: keep_for(memory, interval), store: folder.is_some(), ..options_for(&asked, n, true) };
     let states = resume.as_ref().filter(|_| in_place).map(|snapshot| snapshot.states.clone());
     let (job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
     let census = Census::of(&job, &model);

@@ -1,50 +1,16 @@
 //! Masters that die or are told to leave, disks that fill, snapshots that are torn: the run goes on where it was stored,
 //! with the digest, the history and the files of one that nothing happened to.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::Command,
-    sync::OnceLock,
-};
+use std::{fs, path::PathBuf, process::Command, sync::OnceLock};
 
-use tests::cluster::{Cluster, Process, said, until};
+use tests::{
+    cluster::{Cluster, Process, said, until},
+    left::Left,
+};
 
 use crate::{BOLIDE, digest_of, small};
 
 const CYCLES: &str = "2000";
-
-/// What a run leaves: digest, energies, and the bytes of each of its files but the summary.
-struct Left {
-    digest: String,
-    energies: serde_json::Value,
-    files: Vec<(String, Vec<u8>)>,
-}
-
-impl Left {
-    fn of(folder: &Path, summary: &serde_json::Value) -> Self {
-        let mut files: Vec<(String, Vec<u8>)> = fs::read_dir(folder)
-            .expect("a results folder")
-            .map(|entry| entry.expect("readable").path())
-            .filter(|path| path.is_file() && !path.ends_with("summary.json"))
-            .map(|path| {
-                let name = path.file_name().expect("a file").to_string_lossy().into_owned();
-                (name, fs::read(&path).expect("readable"))
-            })
-            .collect();
-        files.sort();
-        Self { digest: digest_of(summary), energies: summary["energies"].clone(), files }
-    }
-
-    fn assert_same(&self, other: &Self) {
-        assert_eq!((&self.digest, &self.energies), (&other.digest, &other.energies));
-        let names = |left: &Self| left.files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-        assert_eq!(names(self), names(other));
-        for ((name, mine), (_, theirs)) in self.files.iter().zip(&other.files) {
-            assert!(mine == theirs, "{name} differs: {} and {} bytes", mine.len(), theirs.len());
-        }
-    }
-}
 
 /// The run that nothing happens to.
 fn undisturbed() -> &'static Left {
@@ -52,7 +18,9 @@ fn undisturbed() -> &'static Left {
     RUN.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("out");
-        let said = said(Command::new(BOLIDE).arg("run").arg(small()).args(flags()).arg("--json").arg("--out").arg(&out));
+        let said = said(
+            Command::new(BOLIDE).arg("run").arg(small()).args(flags()).arg("--json").arg("--out").arg(&out),
+        );
         let summary = serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {said:?}"));
         let left = Left::of(&out, &summary);
         let states = left.files.iter().filter(|(name, _)| name.ends_with(".vtu")).count();
@@ -77,7 +45,8 @@ fn running(flags: &[&str], fail: Option<&str>) -> (Cluster, Process) {
 
 fn submit(cluster: &Cluster) -> Process {
     let deck = small();
-    let arguments = ["submit", "--wait", "--cycles", CYCLES, "--min-workers", "2", "--snapshot-cycles", "100", &deck];
+    let arguments =
+        ["submit", "--wait", "--cycles", CYCLES, "--min-workers", "2", "--snapshot-cycles", "100", &deck];
     Process::start("submit", &mut cluster.command("client", &arguments))
 }
 
@@ -147,7 +116,9 @@ fn a_master_that_is_told_to_leave_stores_its_job_and_computes_no_cycle_twice() {
     cluster.master.signal("TERM");
     assert_eq!(cluster.master.wait().code(), Some(0), "{}", cluster.master.text());
     let line = cluster.master.wait_for("the job is stored and waits for the next master");
-    let cycle = |line: &str| line.rsplit("cycle=").next().and_then(|n| n.split_whitespace().next()?.parse::<u64>().ok());
+    let cycle = |line: &str| {
+        line.rsplit("cycle=").next().and_then(|n| n.split_whitespace().next()?.parse::<u64>().ok())
+    };
     let stored = cycle(&line.replace("Some(", "").replace(')', "")).expect("a cycle");
     assert!(stored >= 300, "{line}");
     cluster.restart_master();

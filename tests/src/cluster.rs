@@ -177,6 +177,8 @@ pub struct Cluster {
     tls: bool,
     /// Of the master.
     flags: Vec<String>,
+    /// Of the environment of all daemons.
+    variables: Vec<(String, String)>,
 }
 
 impl Cluster {
@@ -198,11 +200,38 @@ impl Cluster {
         if tls {
             make_certificates(&binary, &folder.path().join("certs"));
         }
+        Self::start_in(&binary, folder, tls, flags, fail, &[])
+    }
+
+    /// The same in a folder that has what it needs, with further variables of the environment for all daemons.
+    ///
+    /// # Panics
+    /// If it does not come up.
+    pub fn start_in(
+        binary: &Path,
+        folder: tempfile::TempDir,
+        tls: bool,
+        flags: &[&str],
+        fail: Option<&str>,
+        variables: &[(&str, &str)],
+    ) -> Self {
         let flags: Vec<String> = flags.iter().map(|&flag| flag.to_owned()).collect();
-        let master = master_of(&binary, folder.path(), "127.0.0.1:0", tls, &flags, fail);
+        let variables: Vec<_> =
+            variables.iter().map(|&(name, value)| (name.to_owned(), value.to_owned())).collect();
+        let mut command = master_of(binary, folder.path(), "127.0.0.1:0", tls, &flags, fail);
+        let master = Process::start("master", command.envs(variables.iter().cloned()));
         let line = master.wait_for("listening on ");
         let address = line.trim_start_matches("listening on ").to_owned();
-        Self { binary, folder, master, address, workers: Vec::new(), tls, flags }
+        Self {
+            binary: binary.to_owned(),
+            folder,
+            master,
+            address,
+            workers: Vec::new(),
+            tls,
+            flags,
+            variables,
+        }
     }
 
     /// Starts another master at the same address on the same files, once the present one has ended.
@@ -211,7 +240,9 @@ impl Cluster {
     /// If it does not come up.
     pub fn restart_master(&mut self) {
         self.master.wait();
-        self.master = master_of(&self.binary, self.folder.path(), &self.address, self.tls, &self.flags, None);
+        let mut command =
+            master_of(&self.binary, self.folder.path(), &self.address, self.tls, &self.flags, None);
+        self.master = Process::start("master", command.envs(self.variables.iter().cloned()));
         self.master.wait_for("listening on ");
     }
 
@@ -255,7 +286,9 @@ impl Cluster {
     pub fn worker_with(&mut self, name: &str, speed: &str, flags: &[&str]) {
         let mut arguments = vec!["worker", "--name", name, "--speed", speed, "--threads", "1"];
         arguments.extend(flags);
-        let worker = Process::start(name, self.command("worker", &arguments).env("BOLIDE_LOG", "info"));
+        let mut command = self.command("worker", &arguments);
+        command.envs(self.variables.iter().cloned());
+        let worker = Process::start(name, command.env("BOLIDE_LOG", "info"));
         worker.wait_for("joined");
         self.master.wait_for(&format!("worker {name} joined"));
         self.workers.push((name.to_owned(), worker));
@@ -266,8 +299,19 @@ impl Cluster {
     /// # Panics
     /// If it does not join.
     pub fn worker_that_fails(&mut self, name: &str, fail: &str) {
+        let address = self.address.clone();
+        self.worker_through(name, &address, fail);
+    }
+
+    /// Starts a worker that dials the master at another address, with faults ordered by `BOLIDE_FAIL`.
+    ///
+    /// # Panics
+    /// If it does not join.
+    pub fn worker_through(&mut self, name: &str, address: &str, fail: &str) {
         let arguments = ["worker", "--name", name, "--threads", "1"];
-        let mut command = self.command("worker", &arguments);
+        let mut command = Command::new(&self.binary);
+        command.args(arguments).args(["--master", address]).current_dir(self.folder.path());
+        command.envs(self.variables.iter().cloned());
         let worker = Process::start(name, command.env("BOLIDE_LOG", "info").env("BOLIDE_FAIL", fail));
         worker.wait_for("joined");
         self.master.wait_for(&format!("worker {name} joined"));
@@ -364,14 +408,14 @@ fn master_of(
     tls: bool,
     flags: &[String],
     fail: Option<&str>,
-) -> Process {
+) -> Command {
     let mut command = Command::new(binary);
     command.args(["master", "--listen", listen, "--spool"]).arg(folder.join("spool")).args(flags);
     if tls {
         command.arg("--certs").arg(folder.join("certs/master"));
     }
     command.env("BOLIDE_LOG", "info").env("BOLIDE_FAIL", fail.unwrap_or_default());
-    Process::start("master", &mut command)
+    command
 }
 
 /// Runs a command to its end.

@@ -36,9 +36,7 @@ pub fn passes(name: &str) -> bool {
 
 /// Whether the fault of this name is due in this cycle; each is due once.
 pub fn in_cycle(name: &str, cycle: u64) -> bool {
-    points()
-        .iter()
-        .any(|p| p.name == name && cycle >= p.at && p.passed.fetch_add(1, Ordering::Relaxed) == 0)
+    points().iter().any(|p| p.name == name && cycle >= p.at && p.passed.fetch_add(1, Ordering::Relaxed) == 0)
 }
 
 /// Whether the fault of this name is due in this cycle, every time it comes.

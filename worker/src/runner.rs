@@ -20,8 +20,8 @@ use protocol::{
 use tokio::sync::mpsc;
 
 use crate::{
-    failpoint,
     compute::Machine,
+    failpoint,
     peers::{
         Key, News,
         links::{Links, Step},
@@ -231,6 +231,9 @@ fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
         Task::Image => "die-in-image",
     };
     failpoint::die(name);
+    if let Task::Border { gather: true, .. } | Task::Install { gather: true, .. } = &task {
+        failpoint::die("die-in-gather");
+    }
     if failpoint::in_cycle("panic", cycle) || failpoint::at_cycle("panic-always", cycle) {
         panic!("a panic that a test has ordered");
     }
@@ -239,7 +242,9 @@ fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
         Outcome::Integrated(vote) if failpoint::in_cycle("nan-vote", cycle) => {
             vote.parts.iter_mut().for_each(|part| part.internal = f64::NAN);
         }
-        Outcome::Forces { partials, .. } if !partials.is_empty() && failpoint::in_cycle("nan-force", cycle) => {
+        Outcome::Forces { partials, .. }
+            if !partials.is_empty() && failpoint::in_cycle("nan-force", cycle) =>
+        {
             partials[0] = f64::NAN;
         }
         _ => {}

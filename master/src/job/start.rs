@@ -122,7 +122,10 @@ impl Job {
         let mut job = Self {
             quanta,
             touching: touching.transpose()?,
-            members: hands.iter().map(|hand| Member { hand: hand.clone(), alive: true, leaves: false }).collect(),
+            members: hands
+                .iter()
+                .map(|hand| Member { hand: hand.clone(), alive: true, leaves: false })
+                .collect(),
             epoch: Epoch::without_workers(0, &base, &model),
             ledger: base.rest.ledger.clone(),
             walls: base.rest.walls.clone(),

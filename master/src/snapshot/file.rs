@@ -139,8 +139,7 @@ pub fn read_checked(path: &Path) -> Result<(Snapshot, Written), String> {
     if sums.finalize() != blake3::Hash::from_bytes(sum) {
         return Err(fault(&"the sum of its checksums does not match; an older one is needed"));
     }
-    let snapshot: Snapshot =
-        protocol::codec::decode(&body, body.len()).map_err(|e| fault(&e))?;
+    let snapshot: Snapshot = protocol::codec::decode(&body, body.len()).map_err(|e| fault(&e))?;
     if snapshot.state.cycle != cycle {
         let found = snapshot.state.cycle;
         return Err(fault(&format_args!("state of cycle {found}, its header says {cycle}")));
