@@ -43,9 +43,9 @@ pub const WAITING_EVENTS: usize = 1024;
 pub const CONNECTIONS: usize = 4096;
 /// The longest that an ending master waits until the job under way is stored.
 const END_LIMIT: Duration = Duration::from_secs(60);
-/// How long an interrupted job waits for all of its workers before it goes on with those that are back: somewhat longer
-/// than they pause before they dial again.
-const RETURN_LIMIT: Duration = Duration::from_secs(7);
+/// How long an interrupted job waits for all of its workers before it goes on with those that are back; later ones are taken
+/// in at plan boundaries.
+const RETURN_LIMIT: Duration = Duration::from_secs(2);
 
 /// What the owner of hosts and queue hears.
 pub enum Event {
@@ -508,7 +508,7 @@ impl Owner {
             options: entry.options.clone(),
             folder: entry.folder.clone(),
             snapshots: self.spool.snapshots(job),
-            began: entry.before.is_some(),
+            crew_before: entry.before.as_ref().map(Vec::len),
             seats: idle.iter().filter_map(|i| self.seats.get(i)).cloned().collect(),
             line: Mutex::new(Some(line)),
             stop,

@@ -45,8 +45,8 @@ pub struct Order {
     pub folder: Option<PathBuf>,
     /// Where it is stored while it runs.
     pub snapshots: PathBuf,
-    /// An earlier session of it has begun.
-    pub began: bool,
+    /// Of a job that an earlier session has begun: how many workers it had.
+    pub crew_before: Option<usize>,
     /// Its workers.
     pub seats: Vec<Seat>,
     /// The way to its thread; taken when it is driven.
@@ -102,7 +102,9 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
     let interval = interval_for(&order.options, &model, Some(SNAPSHOT_SECONDS));
     let keep = keep_for(order.options.keep_every, interval);
-    let options = options_for(&order.options, hands.len(), all_take_peers);
+    // The others will be back.
+    let workers = hands.len().max(order.crew_before.unwrap_or_default());
+    let options = options_for(&order.options, workers, all_take_peers);
     let options = Options { waits: true, keep, store: true, ..options };
     let (store, found) = Store::open(&order.snapshots)?;
     for why in &found.warnings {
@@ -110,14 +112,14 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     }
     let states = found.snapshot.as_ref().map(|snapshot| snapshot.states.clone());
     let (job, first) = Job::new(Arc::clone(&model), &hands, options, found.snapshot)?;
-    if order.began {
+    if order.crew_before.is_some() {
         info!(job = order.number, cycle = job.start_state().cycle, "the job goes on");
     }
     let line = order.line.lock().unwrap_or_else(PoisonError::into_inner).take();
     let line = line.unwrap_or_else(|| drive::channel(order.seats.len()));
     let folder = order.folder.as_ref().map(|path| match &states {
         Some(_) => Folder::reopen(path),
-        None => Folder::create(path, order.began),
+        None => Folder::create(path, order.crew_before.is_some()),
     });
     let folder = folder.transpose().map_err(|e| e.to_string())?;
     let mut output = Output::new(Arc::clone(&model), folder, true)?;

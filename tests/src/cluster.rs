@@ -383,8 +383,10 @@ impl Cluster {
         self.find_job(job).unwrap_or_else(|| panic!("no job {job}"))
     }
 
-    fn find_job(&self, job: u64) -> Option<serde_json::Value> {
-        self.json(&["jobs"]).as_array().and_then(|jobs| jobs.iter().find(|s| s["job"] == job).cloned())
+    /// The same, if the master can be asked and knows the job.
+    pub fn find_job(&self, job: u64) -> Option<serde_json::Value> {
+        let jobs: serde_json::Value = serde_json::from_str(&self.client(&["jobs", "--json"]).out).ok()?;
+        jobs.as_array().and_then(|jobs| jobs.iter().find(|s| s["job"] == job).cloned())
     }
 
     /// Waits until a job is under way in its cycles.

@@ -127,7 +127,7 @@ impl Scene {
     pub fn submit(&self, cluster: Cluster) -> Running {
         let (deck, cycles) = (self.deck.display().to_string(), self.cycles.to_string());
         let arguments =
-            ["submit", "--wait", "--cycles", &cycles, "--min-workers", "3", "--snapshot-every", "0.5", &deck];
+            ["submit", "--wait", "--cycles", &cycles, "--min-workers", "3", "--snapshot-every", "0.2", &deck];
         let submitted = Process::start("submit", &mut cluster.command("client", &arguments));
         Running { cluster, _submitted: submitted }
     }
@@ -168,22 +168,22 @@ impl Scene {
 impl Running {
     /// Cycles completed.
     pub fn cycle(&self) -> u64 {
-        self.cluster.job(1)["cycle"].as_u64().unwrap_or_default()
+        self.cluster.find_job(1).and_then(|job| job["cycle"].as_u64()).unwrap_or_default()
     }
 
     /// Waits until the job has come so far, or is over.
     pub fn wait_for_cycle(&self, cycle: u64) {
         until(
-            || format!("cycle {cycle}; {}", self.cluster.job(1)),
+            || format!("cycle {cycle}; {}", self.cluster.master.text()),
             || {
-                let job = self.cluster.job(1);
-                (job["cycle"].as_u64() >= Some(cycle) || job["state"] == "done" || job["state"] == "failed")
-                    .then_some(())
+                let job = self.cluster.find_job(1)?;
+                let over = job["state"] == "done" || job["state"] == "failed";
+                (over || job["cycle"].as_u64() >= Some(cycle)).then_some(())
             },
         );
     }
 
-    /// Waits for the first snapshot of the job.
+    /// Waits until so many snapshots of the job were committed.
     pub fn wait_for_snapshots(&self, number: u64) {
         let manifest = self.cluster.snapshots(1).join("manifest.json");
         let newest = || {

@@ -243,3 +243,127 @@ pub fn write_durably(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let _ = fs::remove_file(&temporary);
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use mechanics::{exact::Quantum, state::GlobalState, vote::Vote};
+
+    use super::*;
+    use crate::ledger::Ledger;
+
+    const DECK: &str = "title = \"a cube\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"cube\"\nmaterial = \"COPPER\"\nbox = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }\n";
+
+    fn snapshot(cycle: u64) -> Snapshot {
+        let model = deck::read(DECK, "cube.toml").expect("the text above is a deck");
+        // More than two chunks.
+        let x = (0..100_000).map(|n| [n as f64, 0.5, cycle as f64]).collect();
+        let state = GlobalState { cycle, x, ..GlobalState::default() };
+        Snapshot {
+            state: Arc::new(state),
+            dt_previous: 0.1,
+            dt: 0.2,
+            force_quanta: [Quantum::for_reference(1.0, 42); 2],
+            spread_rate: 0.0,
+            vote: Vote::empty(1),
+            walls: Vec::new(),
+            ledger: Ledger::new(&model, &vec![1.0; model.mesh.n_nodes()]),
+            rows: Vec::new(),
+            states: vec![(0, 0.0), (cycle, 0.5)],
+        }
+    }
+
+    /// A store with the snapshots of cycles 10 and 20.
+    fn filled() -> (tempfile::TempDir, Store) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (mut store, found) = Store::open(&folder.path().join("snapshots")).expect("none is there");
+        assert!(found.snapshot.is_none() && found.warnings.is_empty());
+        for cycle in [5, 10, 20] {
+            store.put(&snapshot(cycle)).expect("room");
+        }
+        (folder, store)
+    }
+
+    fn newest(store: &Store) -> (Option<u64>, Vec<String>) {
+        let (_, found) = Store::open(store.folder()).expect("readable");
+        (found.snapshot.map(|s| s.state.cycle), found.warnings)
+    }
+
+    fn file(store: &Store, generation: usize) -> PathBuf {
+        store.folder().join(store.generations()[generation].file_name())
+    }
+
+    #[test]
+    fn the_two_newest_are_kept_and_come_back_whole() {
+        let (_folder, store) = filled();
+        let (again, found) = Store::open(store.folder()).expect("readable");
+        assert_eq!(found.snapshot, Some(snapshot(20)));
+        assert_eq!(again.generations(), store.generations());
+        assert_eq!(store.generations().iter().map(|g| g.cycle).collect::<Vec<_>>(), [20, 10]);
+        assert_eq!(fs::read_dir(store.folder()).expect("readable").count(), 3, "two files and the manifest");
+    }
+
+    #[test]
+    fn a_newest_that_was_cut_or_has_a_flipped_bit_anywhere_is_refused_and_the_older_is_used() {
+        let (_folder, store) = filled();
+        let path = file(&store, 0);
+        let whole = fs::read(&path).expect("it is there");
+        let step = whole.len() / 23;
+        for at in (0..whole.len()).step_by(step).chain([8, 16, 24, whole.len() - 1]) {
+            let mut flipped = whole.clone();
+            flipped[at] ^= 0x20;
+            for damaged in [&flipped[..], &whole[..at]] {
+                fs::write(&path, damaged).expect("room");
+                let (cycle, warnings) = newest(&store);
+                assert_eq!(cycle, Some(10), "byte {at}");
+                assert!(
+                    warnings.len() == 1 && warnings[0].contains("snapshot-000003.bolide"),
+                    "{warnings:?}"
+                );
+            }
+        }
+        fs::write(&path, &whole).expect("room");
+        assert_eq!(newest(&store), (Some(20), vec![]));
+    }
+
+    #[test]
+    fn with_no_manifest_or_a_torn_one_the_files_speak_for_themselves() {
+        let (_folder, store) = filled();
+        let manifest = store.folder().join(MANIFEST);
+        fs::write(&manifest, "{\"generations\": [").expect("room");
+        let (cycle, warnings) = newest(&store);
+        assert_eq!((cycle, warnings.len()), (Some(20), 1));
+        assert!(warnings[0].contains("manifest.json: "), "{warnings:?}");
+        fs::remove_file(&manifest).expect("it is there");
+        assert_eq!(newest(&store), (Some(20), vec![]));
+    }
+
+    #[test]
+    fn a_write_that_is_refused_leaves_the_older_ones_and_the_next_one_sweeps_up() {
+        let (_folder, mut store) = filled();
+        let blocked = store.folder().join("manifest.tmp");
+        fs::create_dir(&blocked).expect("room");
+        let why = store.put(&snapshot(30)).expect_err("the manifest cannot be written");
+        assert!(why.contains("manifest.json: "), "{why}");
+        assert_eq!(newest(&store), (Some(20), vec![]), "what the manifest does not name was not committed");
+        fs::remove_dir(&blocked).expect("empty");
+        fs::write(store.folder().join("snapshot-000009.tmp"), "half").expect("room");
+        store.put(&snapshot(40)).expect("room");
+        assert_eq!(newest(&store), (Some(40), vec![]));
+        assert_eq!(fs::read_dir(store.folder()).expect("readable").count(), 3);
+        remove(store.folder()).expect("ours");
+        assert!(!store.folder().exists());
+    }
+
+    #[test]
+    fn a_snapshot_that_resumed_from_the_older_one_replaces_the_torn_one() {
+        let (_folder, store) = filled();
+        fs::write(file(&store, 0), "torn").expect("room");
+        let (mut store, found) = Store::open(store.folder()).expect("readable");
+        assert_eq!(found.snapshot.map(|s| s.state.cycle), Some(10));
+        store.put(&snapshot(15)).expect("room");
+        assert_eq!(newest(&store), (Some(15), vec![]));
+        assert_eq!(store.generations().iter().map(|g| g.cycle).collect::<Vec<_>>(), [15, 10]);
+    }
+}

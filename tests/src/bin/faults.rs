@@ -30,7 +30,7 @@ fn asked() -> Result<Asked, String> {
     let mut asked = Asked {
         bolide: here.with_file_name("bolide"),
         decks: Vec::new(),
-        cycles: 400,
+        cycles: 700,
         only: None,
         tries: u64::MAX,
         out: None,
@@ -83,12 +83,13 @@ fn play() -> Result<usize, String> {
     let mut different = 0;
     let mut text = String::from(
         "# Faults\n\nWritten by `cargo run --release -p tests --bin faults`: a master and three workers of one thread each, \
-         as processes on one machine, snapshots every 0.5 s. Every run must leave the digest, the energies, `history.csv` \
+         as processes on one machine, snapshots every 0.2 s. Every run must leave the digest, the energies, `history.csv` \
          and the state files of the undisturbed one, to the byte. *Detected* is from the fault to the line of the log \
          that names it (of a killed master: until the next one goes on with the job); *time lost* until the run is as far \
          as it was. With several times: the median, and the worst.\n",
     );
     for deck in &asked.decks {
+        let deck = &deck.canonicalize().map_err(|e| format!("{}: {e}", deck.display()))?;
         let scene = Scene::new(&asked.bolide, deck, asked.cycles, 1)?;
         let name = deck.file_stem().unwrap_or_default().display().to_string();
         let mut rows = Vec::new();
