@@ -136,6 +136,10 @@ impl Shared {
                 }
                 shared.bytes.fetch_add(n as u64, Ordering::Relaxed);
             }
+            // A pulled cable does not carry the end of a connection either.
+            while shared.frozen.load(Ordering::Relaxed) {
+                std::thread::sleep(LOOK_EVERY);
+            }
             // The other side has gone, or the proxy was cut.
             let _ = to.shutdown(Shutdown::Write);
         });

@@ -214,7 +214,7 @@ fn read_network(file: &Table<'_>) -> Option<Network> {
 }
 
 fn read_changes(file: &Table<'_>, n_hosts: usize) -> Option<Vec<Change>> {
-    let mut changes = Vec::new();
+    let (mut changes, mut all) = (Vec::new(), true);
     for event in file.tables("event", MAX_ENTRIES) {
         let host =
             event.require("host", "the number of a host").and_then(|v| v.integer(1, n_hosts.max(1) as u64));
@@ -226,9 +226,14 @@ fn read_changes(file: &Table<'_>, n_hosts: usize) -> Option<Vec<Change>> {
             value.fault("a host from 2 on", "the master is on host 1, and stays");
         }
         event.finish();
-        changes.push(Change { host: host? as usize - 1, cycle: cycle?, what: what? });
+        match (host, cycle, what) {
+            (Some(host), Some(cycle), Some(what)) => {
+                changes.push(Change { host: host as usize - 1, cycle, what });
+            }
+            _ => all = false,
+        }
     }
-    Some(changes)
+    all.then_some(changes)
 }
 
 /// Exactly one of `speed`, `die`, `stop_seconds` and `join`.

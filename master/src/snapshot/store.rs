@@ -253,7 +253,7 @@ mod tests {
     use super::*;
     use crate::ledger::Ledger;
 
-    const DECK: &str = "title = \"a cube\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"cube\"\nmaterial = \"COPPER\"\nbox = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }\n";
+    const DECK: &str = "title = \"a cube\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"cube\"\nmaterial = \"AL_2024_T351\"\nbox = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }\n";
 
     fn snapshot(cycle: u64) -> Snapshot {
         let model = deck::read(DECK, "cube.toml").expect("the text above is a deck");

@@ -58,7 +58,7 @@ pub fn cases() -> Vec<Case> {
             };
             // Room for the first states and snapshots; a larger disk takes them all.
             let ballast = small.join("ballast");
-            fs::write(&ballast, vec![0; 44 << 20]).expect("room");
+            fs::write(&ballast, vec![0; 24 << 20]).expect("room");
             let full = said(&mut command(&["--out"]));
             assert_eq!(full.code, Some(1), "{}", full.err);
             assert!(full.err.contains("No space left"), "{}", full.err);

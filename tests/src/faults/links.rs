@@ -92,7 +92,7 @@ pub fn cases() -> Vec<Case> {
         case("garbage bytes in mid-stream", 1, |scene, k| {
             damaged(scene, 570 + k, Proxy::litter, "frame starts with [5a, 5a, 5a, 5a]")
         }),
-        case("a bit flipped on a link", 3, |scene, k| damaged(scene, 580 + k, Proxy::flip, "worker b at ")),
+        case("a bit flipped on a link", 3, |scene, k| damaged(scene, 580 + k, Proxy::flip, "b at ")),
         case("oversize length, wrong version, garbage, at the door", 1, |scene, k| {
             let running = scene.begin(&[], None);
             running.wait_for_cycle(scene.instant(590 + k));
