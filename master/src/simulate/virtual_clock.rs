@@ -100,6 +100,7 @@ pub fn run(
         waits: come_and_go,
         route: scheme.route,
         dealing: scheme.dealing,
+        costs: machines.costs.relative(),
         balance: scheme.balance,
         lanes: scheme.lanes.map(|width| width.to_string()),
         ..Options::default()
