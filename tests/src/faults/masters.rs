@@ -1,8 +1,12 @@
 //! Masters that die, are told to leave, and whose clock is set back.
 
-use std::{fs, process::Command, time::Instant};
+use std::{
+    fs,
+    process::Command,
+    time::{Duration, Instant},
+};
 
-use super::{Case, GOES_ON, Running, Scene, Seen, field, since};
+use super::{Case, GOES_ON, Running, Scene, Seen, field, since, workers::close};
 
 /// The list.
 pub fn cases() -> Vec<Case> {
@@ -66,6 +70,10 @@ pub fn cases() -> Vec<Case> {
             seen.note = "stored at the next cycle".to_owned();
             seen
         }),
+        case("SIGSTOP of the master for 5 s", 1, |s, k| stopped(s, 440 + k, 5, "waited for")),
+        case("SIGSTOP of the master for 13 s", 1, |s, k| {
+            stopped(s, 450 + k, 13, "workers give it up after 10 s, dial again and are taken in anew")
+        }),
         case("wall clock set back an hour, on all hosts", 1, |scene, k| {
             let Some(library) = clock_library() else {
                 return Seen {
@@ -99,6 +107,17 @@ fn restarted(scene: &Scene, k: u64, also: fn(&mut Running)) -> Seen {
     running.cluster.master.kill();
     also(&mut running);
     go_on(scene, &mut running, cycle, at)
+}
+
+/// Stops the master for so many seconds.
+fn stopped(scene: &Scene, k: u64, seconds: u64, note: &str) -> Seen {
+    let running = scene.begin(&[], None);
+    running.wait_for_cycle(scene.instant(k));
+    let (cycle, at) = (running.cycle(), Instant::now());
+    running.cluster.master.signal("STOP");
+    std::thread::sleep(Duration::from_secs(seconds));
+    running.cluster.master.signal("CONT");
+    Seen { note: note.to_owned(), ..close(scene, &running, cycle, at, None) }
 }
 
 /// A master that ends itself at a point of its work.
