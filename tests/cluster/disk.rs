@@ -10,7 +10,7 @@ use tests::{
 
 use crate::{BOLIDE, digest_of, small};
 
-const CYCLES: &str = "2000";
+const CYCLES: &str = "1200";
 
 /// The run that nothing happens to.
 fn undisturbed() -> &'static Left {
@@ -76,10 +76,12 @@ fn same_as_undisturbed(cluster: &Cluster) -> serde_json::Value {
     summary
 }
 
-/// The newest snapshot file of the job.
+/// The newest snapshot file of the job that was committed.
 fn newest_snapshot(cluster: &Cluster) -> PathBuf {
-    let files = fs::read_dir(cluster.snapshots(1)).expect("snapshots").map(|e| e.expect("readable").path());
-    files.filter(|path| path.extension().is_some_and(|e| e == "bolide")).max().expect("a snapshot")
+    let manifest = fs::read(cluster.snapshots(1).join("manifest.json")).expect("a manifest");
+    let manifest: serde_json::Value = serde_json::from_slice(&manifest).expect("whole");
+    let number = manifest["generations"][0]["number"].as_u64().expect("a number");
+    cluster.snapshots(1).join(format!("snapshot-{number:06}.bolide"))
 }
 
 #[test]

@@ -185,12 +185,15 @@ impl Running {
 
     /// Waits until so many snapshots of the job were committed.
     pub fn wait_for_snapshots(&self, number: u64) {
-        let manifest = self.cluster.snapshots(1).join("manifest.json");
-        let newest = || {
-            let manifest: Value = serde_json::from_slice(&std::fs::read(&manifest).ok()?).ok()?;
-            manifest["generations"][0]["number"].as_u64()
-        };
+        let newest = || self.newest_snapshot();
         until(|| format!("snapshot {number}"), || (newest()? >= number).then_some(()));
+    }
+
+    /// The number of the snapshot that was committed last.
+    pub fn newest_snapshot(&self) -> Option<u64> {
+        let manifest = std::fs::read(self.cluster.snapshots(1).join("manifest.json")).ok()?;
+        let manifest: Value = serde_json::from_slice(&manifest).ok()?;
+        manifest["generations"][0]["number"].as_u64()
     }
 
     /// Waits until the master has printed these words so often.

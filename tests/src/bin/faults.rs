@@ -105,13 +105,19 @@ fn play() -> Result<usize, String> {
             print!("{}", faults::table(std::slice::from_ref(&row)).lines().nth(2).unwrap_or_default());
             println!();
             rows.push(row);
+            // What was played is kept, should this program be ended.
+            let table = format!("\n## {name}, {} cycles\n\n{}", asked.cycles, faults::table(&rows));
+            write(&asked, &format!("{text}{table}"))?;
         }
         text += &format!("\n## {name}, {} cycles\n\n{}", asked.cycles, faults::table(&rows));
     }
     let minutes = started.elapsed().as_secs_f64() / 60.0;
     text += &format!("\n{different} failed; {minutes:.1} minutes in all.\n");
-    if let Some(path) = &asked.out {
-        std::fs::write(path, &text).map_err(|e| format!("{}: {e}", path.display()))?;
-    }
+    write(&asked, &text)?;
     Ok(different)
+}
+
+fn write(asked: &Asked, text: &str) -> Result<(), String> {
+    let Some(path) = &asked.out else { return Ok(()) };
+    std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
 }

@@ -147,10 +147,8 @@ fn go_on(scene: &Scene, running: &mut Running, cycle: u64, at: Instant) -> Seen 
 
 /// Does harm to the newest snapshot file.
 fn damage(running: &Running, harm: impl Fn(&mut Vec<u8>)) {
-    let files =
-        fs::read_dir(running.cluster.snapshots(1)).expect("snapshots").map(|e| e.expect("readable").path());
-    let newest =
-        files.filter(|path| path.extension().is_some_and(|e| e == "bolide")).max().expect("a snapshot");
+    let number = running.newest_snapshot().expect("one was committed");
+    let newest = running.cluster.snapshots(1).join(format!("snapshot-{number:06}.bolide"));
     let mut bytes = fs::read(&newest).expect("readable");
     harm(&mut bytes);
     fs::write(&newest, bytes).expect("room");
