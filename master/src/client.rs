@@ -1,4 +1,4 @@
-//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel` and `results`, the other end of the [`desk`](crate::desk).
+//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel`, `resume` and `results`, the other end of the [`desk`](crate::desk).
 
 use std::{
     fs::File,
@@ -273,6 +273,16 @@ pub fn hosts(at: &ClientArgs) -> Result<ExitCode, String> {
 /// If there is no such job or it is over, or whatever went wrong on the way.
 pub fn cancel(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
     let Reply::Done(what) = Client::new(at)?.ask(&Request::Cancel { job })? else { return Err(surprise()) };
+    println!("{what}");
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `bolide resume`.
+///
+/// # Errors
+/// If there is no such job or it has not failed, or whatever went wrong on the way.
+pub fn resume(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
+    let Reply::Done(what) = Client::new(at)?.ask(&Request::Resume { job })? else { return Err(surprise()) };
     println!("{what}");
     Ok(ExitCode::SUCCESS)
 }

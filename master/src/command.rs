@@ -59,6 +59,14 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
+    /// Put a job that failed back into the queue, to go on where it was stored
+    Resume {
+        /// The job
+        job: u32,
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
     /// Fetch the results of a job
     Results {
         /// The job
@@ -180,7 +188,7 @@ pub struct JobArgs {
     /// Speeds that work is dealt out by
     #[arg(long, value_enum, default_value = "given")]
     pub balance: Balance,
-    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for the start alone
+    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for no oftener than on disk
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub keep_every: f64,
     /// Store the run on disk every so many seconds, to be gone on with by --resume; 0 for never [default: the deck's; else a

@@ -99,6 +99,8 @@ pub enum Event {
     Watch(Option<u32>, oneshot::Sender<Result<watch::Receiver<Status>, String>>),
     /// A client takes a job back.
     Cancel(u32, oneshot::Sender<Result<String, String>>),
+    /// A client wants a job that failed to go on.
+    Resume(u32, oneshot::Sender<Result<String, String>>),
     /// A client asks where a job's results are.
     Folder(u32, oneshot::Sender<Result<PathBuf, String>>),
     /// A job's thread is done.
@@ -358,6 +360,9 @@ impl Owner {
             Event::Cancel(job, answer) => {
                 let _ = answer.send(self.cancel(job));
             }
+            Event::Resume(job, answer) => {
+                let _ = answer.send(self.resume(job));
+            }
             Event::Folder(job, answer) => {
                 let _ = answer.send(self.folder(job));
             }
@@ -438,6 +443,18 @@ impl Owner {
         }
         self.change(job, queue::Event::Cancel, Some(Ended::default()))?;
         Ok(format!("job {job} is cancelled"))
+    }
+
+    fn resume(&mut self, job: u32) -> Result<String, String> {
+        let state = self.queue.get(job).ok_or_else(|| format!("no job {job}"))?.state;
+        queue::after(state, queue::Event::Resume)?;
+        let text = tokio::task::block_in_place(|| self.spool.text(job))?;
+        let state = self.queue.resume(job, text)?;
+        self.record(job, None)?;
+        if let Some(status) = self.status.get(&job) {
+            status.send_modify(|status| (status.state, status.ended) = (state, None));
+        }
+        Ok(format!("job {job} goes on where it was stored"))
     }
 
     fn folder(&self, job: u32) -> Result<PathBuf, String> {

@@ -24,6 +24,8 @@ pub enum Event {
     Cancel,
     /// Its master has to leave: it is stored, to be gone on with by the next one.
     Suspend,
+    /// A user wants what failed to be gone on with.
+    Resume,
 }
 
 /// The state after an event.
@@ -36,9 +38,9 @@ pub fn after(state: State, event: Event) -> Result<State, String> {
         (State::Queued | State::Running, Event::Cancel) => Ok(State::Cancelled),
         (State::Running, Event::Finish) => Ok(State::Done),
         (State::Running, Event::Fail) => Ok(State::Failed),
-        (State::Running, Event::Suspend) => Ok(State::Queued),
-        (State::Queued, Event::Finish | Event::Fail | Event::Suspend)
-        | (State::Running, Event::Start)
+        (State::Running, Event::Suspend) | (State::Failed, Event::Resume) => Ok(State::Queued),
+        (State::Queued, Event::Finish | Event::Fail | Event::Suspend | Event::Resume)
+        | (State::Running, Event::Start | Event::Resume)
         | (State::Done | State::Failed | State::Cancelled, _) => {
             Err(format!("a job that is {} cannot {event:?}", state.name()).to_lowercase())
         }
@@ -86,6 +88,20 @@ impl Queue {
     /// Takes back a job that could not be put on disk.
     pub fn take_back(&mut self, id: u32) {
         self.jobs.remove(&id);
+    }
+
+    /// Puts a job that failed back, with its deck.
+    ///
+    /// # Errors
+    /// As for [`Queue::apply`].
+    pub fn resume(&mut self, id: u32, text: String) -> Result<State, String> {
+        let (state, _) = self.apply(id, Event::Resume)?;
+        if let Some(job) = self.jobs.get_mut(&id) {
+            job.text = Arc::new(text);
+            // Any workers will do.
+            job.before = Some(Vec::new());
+        }
+        Ok(state)
     }
 
     /// A job begins with these workers.
@@ -164,10 +180,11 @@ mod tests {
     use super::*;
 
     const STATES: [State; 5] = [State::Queued, State::Running, State::Done, State::Failed, State::Cancelled];
-    const EVENTS: [Event; 5] = [Event::Start, Event::Finish, Event::Fail, Event::Cancel, Event::Suspend];
+    const EVENTS: [Event; 6] =
+        [Event::Start, Event::Finish, Event::Fail, Event::Cancel, Event::Suspend, Event::Resume];
 
     #[test]
-    fn only_six_changes_are_legal_and_none_leaves_an_end() {
+    fn only_seven_changes_are_legal_and_none_leaves_an_end_but_that_of_a_failed_job() {
         let mut legal = Vec::new();
         for state in STATES {
             for event in EVENTS {
@@ -185,6 +202,7 @@ mod tests {
             (Running, Failed),
             (Running, Cancelled),
             (Running, Queued),
+            (Failed, Queued),
         ];
         assert_eq!(legal, expected);
     }

@@ -4,8 +4,8 @@
 //! SPOOL/lock                      held by the master that uses the folder
 //! SPOOL/job-7/                    results of job 7
 //! SPOOL/queue/job-7.json          its record: state, options, how it ended
-//! SPOOL/queue/job-7.toml          its deck, until it is over
-//! SPOOL/queue/job-7.snapshots/    where it can be gone on with, until it is over
+//! SPOOL/queue/job-7.toml          its deck, until it is done or cancelled
+//! SPOOL/queue/job-7.snapshots/    where it can be gone on with, until then
 //! ```
 //!
 //! A record is replaced whole and synchronised at every change of state, before anybody is told of the change. A job that a
@@ -122,12 +122,18 @@ impl Spool {
         }
         let text = match record.ended {
             Some(_) => String::new(),
-            None => {
-                let path = self.deck(job);
-                fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?
-            }
+            None => self.text(job)?,
         };
         Ok((record, text))
+    }
+
+    /// The deck of a job that is not done or cancelled.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn text(&self, job: u32) -> Result<String, String> {
+        let path = self.deck(job);
+        fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
     }
 
     /// Where results of a job go.
@@ -162,7 +168,7 @@ impl Spool {
         written.and_then(|()| self.change(record)).inspect_err(|_| self.forget(record.job))
     }
 
-    /// Replaces the record of a job; of one that is over, deck and snapshots go after that.
+    /// Replaces the record of a job; of one that nobody can go on with, deck and snapshots go after that.
     ///
     /// # Errors
     /// What the disk refused; the former record then stays.
@@ -170,7 +176,7 @@ impl Spool {
         let path = self.record(record.job);
         let text = serde_json::to_string_pretty(record).map_err(|e| e.to_string())?;
         write_durably(&path, text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
-        if record.ended.is_some() {
+        if matches!(record.state, State::Done | State::Cancelled) {
             // What cannot be removed takes room and harms nobody.
             let _ = fs::remove_file(self.deck(record.job));
             let _ = store::remove(&self.snapshots(record.job));

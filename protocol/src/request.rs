@@ -55,6 +55,11 @@ pub enum Request {
         /// Where to start (bytes).
         offset: u64,
     },
+    /// Put a job that failed back into the queue, to go on where it was stored. Answered by [`Reply::Done`].
+    Resume {
+        /// The job.
+        job: u32,
+    },
 }
 
 /// From the master to a client.

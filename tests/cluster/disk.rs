@@ -278,6 +278,25 @@ fn a_killed_run_goes_on_from_its_newest_whole_snapshot_into_the_same_files() {
 }
 
 #[test]
+fn a_job_that_could_not_write_its_results_fails_with_the_reason_and_can_be_gone_on_with() {
+    let (cluster, mut submitted) = running(&[], None);
+    wait_for_snapshot(&cluster, 1);
+    // A folder in the place of the next file: no user may write over it, root neither.
+    let index = cluster.results(1).join(".results.pvd.tmp");
+    until(|| "the name of the next index".to_owned(), || fs::create_dir(&index).is_ok().then_some(()));
+    assert_eq!(submitted.wait().code(), Some(1), "{}", submitted.text());
+    submitted.wait_for("results.pvd: Is a directory");
+    assert_eq!(cluster.job(1)["state"], "failed");
+    fs::remove_dir(&index).expect("empty");
+    let resumed = cluster.client(&["resume", "1"]);
+    assert_eq!((resumed.code, resumed.out.trim()), (Some(0), "job 1 goes on where it was stored"));
+    same_as_undisturbed(&cluster);
+    assert!(!cluster.master.wait_for("the job goes on").contains("cycle=0"));
+    let again = cluster.client(&["resume", "1"]);
+    assert!(again.err.contains("a job that is done cannot resume"), "{again:?}");
+}
+
+#[test]
 fn a_disk_that_refuses_snapshots_stops_nothing_and_leaves_the_older_ones() {
     let (mut cluster, mut submitted) = running(&[], None);
     wait_for_snapshot(&cluster, 1);

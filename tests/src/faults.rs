@@ -95,7 +95,9 @@ impl Scene {
         let mut command = Command::new(bolide);
         command.arg("run").arg(deck).args(["--cycles", &cycles.to_string(), "--json", "--out"]).arg(&out);
         let said = said(&mut command);
-        let summary = serde_json::from_str(&said.out).map_err(|e| format!("{e}: {said:?}"))?;
+        let summary: Value = serde_json::from_str(&said.out).map_err(|e| format!("{e}: {said:?}"))?;
+        // The deck may end before.
+        let cycles = summary["cycles"].as_u64().ok_or("a summary without cycles")?;
         let undisturbed = Left::of(&out, &summary);
         Ok(Self { bolide: bolide.to_owned(), deck: deck.to_owned(), cycles, seed, undisturbed })
     }

@@ -106,10 +106,10 @@ fn play() -> Result<usize, String> {
             println!();
             rows.push(row);
             // What was played is kept, should this program be ended.
-            let table = format!("\n## {name}, {} cycles\n\n{}", asked.cycles, faults::table(&rows));
+            let table = format!("\n## {name}, {} cycles\n\n{}", scene.cycles, faults::table(&rows));
             write(&asked, &format!("{text}{table}"))?;
         }
-        text += &format!("\n## {name}, {} cycles\n\n{}", asked.cycles, faults::table(&rows));
+        text += &format!("\n## {name}, {} cycles\n\n{}", scene.cycles, faults::table(&rows));
     }
     let minutes = started.elapsed().as_secs_f64() / 60.0;
     text += &format!("\n{different} failed; {minutes:.1} minutes in all.\n");
