@@ -35,6 +35,8 @@ pub struct Scene {
     pub cycles: u64,
     /// Of the instants.
     pub seed: u64,
+    /// The deck has contact, hence sorts.
+    pub sorts: bool,
     undisturbed: Left,
 }
 
@@ -99,7 +101,8 @@ impl Scene {
         // The deck may end before.
         let cycles = summary["cycles"].as_u64().ok_or("a summary without cycles")?;
         let undisturbed = Left::of(&out, &summary);
-        Ok(Self { bolide: bolide.to_owned(), deck: deck.to_owned(), cycles, seed, undisturbed })
+        let sorts = summary["sorts"].as_u64() > Some(0);
+        Ok(Self { bolide: bolide.to_owned(), deck: deck.to_owned(), cycles, seed, sorts, undisturbed })
     }
 
     /// A cycle between 5 and 85 % of the run, another for each try.
@@ -227,6 +230,11 @@ pub fn field(line: &str, name: &str) -> Option<u64> {
 /// Seconds since an instant.
 pub fn since(instant: Instant) -> Option<f64> {
     Some(instant.elapsed().as_secs_f64())
+}
+
+/// What a fault of sorts is where there are none.
+pub fn no_sorts() -> Seen {
+    Seen { note: "skipped: no contact, no sorts".into(), ..Seen::default() }
 }
 
 /// The table of a benchmark, as Markdown.

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Case, GOES_ON, Running, Scene, Seen, field, since, workers::close};
+use super::{Case, GOES_ON, Running, Scene, Seen, field, no_sorts, since, workers::close};
 
 /// The list.
 pub fn cases() -> Vec<Case> {
@@ -25,7 +25,9 @@ pub fn cases() -> Vec<Case> {
         case("master killed between a snapshot and its manifest", 1, |s, _| {
             killed_in(s, "die-before-manifest:2")
         }),
-        case("master killed during a sort", 1, |s, _| killed_in(s, "die-in-sort:3")),
+        case("master killed during a sort", 1, |scene, _| {
+            if scene.sorts { killed_in(scene, "die-in-sort:3") } else { no_sorts() }
+        }),
         case(
             "both holders of the newest snapshot: the master killed, its newest file torn",
             1,

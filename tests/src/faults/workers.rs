@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Case, LOST, Running, Scene, Seen, cycles_lost, since};
+use super::{Case, LOST, Running, Scene, Seen, cycles_lost, no_sorts, since};
 
 /// The list.
 pub fn cases() -> Vec<Case> {
@@ -16,15 +16,15 @@ pub fn cases() -> Vec<Case> {
         case("worker killed in interior elements", 1, |s, _| killed_in(s, "die-in-interior:120")),
         case("worker killed while it integrates", 1, |s, _| killed_in(s, "die-in-integrate:120")),
         case("worker killed while it gathers positions for a sort", 1, |s, _| {
-            killed_in(s, "die-in-gather:2")
+            killed_in_sort(s, "die-in-gather:2")
         }),
         case("worker killed at a plan boundary, in the transfer", 1, |s, _| {
-            killed_in(s, "die-in-transfer:2")
+            killed_in_sort(s, "die-in-transfer:2")
         }),
         case("worker killed at a plan boundary, in its elements", 1, |s, _| {
-            killed_in(s, "die-in-elements:2")
+            killed_in_sort(s, "die-in-elements:2")
         }),
-        case("worker killed while it installs a plan", 1, |s, _| killed_in(s, "die-in-install:2")),
+        case("worker killed while it installs a plan", 1, |s, _| killed_in_sort(s, "die-in-install:2")),
         case("worker killed while it sends its image for a snapshot", 1, |s, _| {
             killed_in(s, "die-in-image:2")
         }),
@@ -135,6 +135,10 @@ fn killed_in(scene: &Scene, fail: &str) -> Seen {
     let detected = since(at);
     let cycle = running.cycle();
     close(scene, &running, cycle, at, detected)
+}
+
+fn killed_in_sort(scene: &Scene, fail: &str) -> Seen {
+    if scene.sorts { killed_in(scene, fail) } else { no_sorts() }
 }
 
 /// A worker that is not to blame for its machine.
