@@ -129,6 +129,10 @@ impl Folder {
             if !force {
                 return Err(Error::NotEmpty { path: path.to_owned() });
             }
+            // Those of an earlier run; the store clears them.
+            if entry.path().is_dir() {
+                continue;
+            }
             if entry.file_name().to_str().is_some_and(is_written_by_a_run) {
                 fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
             }
@@ -143,6 +147,28 @@ impl Folder {
     pub fn reopen(path: &Path) -> Result<Self, Error> {
         fs::read_dir(path).map_err(Error::io("read", path))?;
         Ok(Self { path: path.to_owned() })
+    }
+
+    /// Removes the files of all states but the first so many, of which one that is missing is an error.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn keep_states(&self, count: usize) -> Result<(), Error> {
+        for entry in fs::read_dir(&self.path).map_err(Error::io("read", &self.path))? {
+            let entry = entry.map_err(Error::io("read", &self.path))?;
+            let name = entry.file_name();
+            let index = name
+                .to_str()
+                .and_then(|n| n.strip_prefix("state-")?.strip_suffix(".vtu")?.parse::<usize>().ok());
+            if index.is_some_and(|index| index >= count) {
+                fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
+            }
+        }
+        for index in 0..count {
+            let path = self.file(&state_name(index as u32));
+            fs::metadata(&path).map_err(Error::io("read", &path))?;
+        }
+        Ok(())
     }
 
     /// The folder itself.

@@ -10,5 +10,7 @@ pub mod book;
 pub mod case;
 pub mod checker;
 pub mod cluster;
+pub mod faults;
+pub mod left;
 pub mod proxy;
 pub mod solve;
