@@ -63,6 +63,14 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
+    /// Put a job that failed back into the queue, to go on where it was stored
+    Resume {
+        /// The job
+        job: u32,
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
     /// Fetch the results of a job
     Results {
         /// The job
@@ -201,15 +209,30 @@ pub struct JobArgs {
     /// Speeds that work is dealt out by
     #[arg(long, value_enum, default_value = "given")]
     pub balance: Balance,
-    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for the start alone
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for no oftener than on disk
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub keep_every: f64,
+    /// Store the run on disk every so many seconds, to be gone on with by --resume; 0 for never [default: the deck's; else a
+    /// master's jobs every 10, `run` only when it is interrupted]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub snapshot_every: Option<f64>,
+    /// The same every so many cycles
+    #[arg(long, value_name = "CYCLES", value_parser = clap::value_parser!(u64).range(1..))]
+    pub snapshot_cycles: Option<u64>,
     /// Extra sorts every so many cycles, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_every: Option<u64>,
     /// Extra sorts at pseudo-random cycles of this seed, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_seed: Option<u64>,
+}
+
+/// A number of seconds that a timer can wait for.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(seconds),
+        _ => Err("expected seconds from 0 to 1e9".to_owned()),
+    }
 }
 
 impl JobArgs {
@@ -227,6 +250,9 @@ impl JobArgs {
             min_workers: 1,
             balance: self.balance.into(),
             keep_every: (self.keep_every > 0.0).then_some(self.keep_every),
+            snapshot_every: self.snapshot_every,
+            snapshot_cycles: self.snapshot_cycles,
+            priority: 0,
             trace: false,
         }
     }
@@ -249,10 +275,10 @@ pub struct RunArgs {
     /// A process for each worker, over loopback TCP
     #[arg(long)]
     pub processes: bool,
-    /// Go on from this snapshot
-    #[arg(long, value_name = "FILE")]
+    /// Go on from a snapshot: this file, or the newest whole one of this results folder, which is then written on
+    #[arg(long, value_name = "FILE|FOLDER")]
     pub resume: Option<PathBuf>,
-    /// Results folder [default: results/<deck name>]
+    /// Results folder [default: the one resumed from, else results/<deck name>]
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Replace the results in an existing folder
@@ -343,15 +369,25 @@ pub struct MasterArgs {
     /// Folder with this host's certificates, as `bolide certs host` makes it
     #[arg(long, value_name = "FOLDER")]
     pub certs: Option<PathBuf>,
-    /// Folder for the results of jobs
+    /// Folder for jobs, their results and snapshots; a restarted master goes on with what it finds there
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
     /// Serve a page and a JSON API there, 127.0.0.1:7118 for example; other than loopback only with --certs, by HTTPS
     #[arg(long, value_name = "ADDRESS")]
     pub http: Option<SocketAddr>,
+    /// Seconds without a byte after which a worker counts as lost; it is suspect after three tenths of that
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = deadline)]
+    pub dead_after: f64,
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
     #[arg(long, value_name = "RATE")]
     pub link: Option<Rate>,
+}
+
+fn deadline(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (1.0..=3600.0).contains(&seconds) => Ok(seconds),
+        _ => Err("expected seconds from 1 to 3600".to_owned()),
+    }
 }
 
 /// Flags of `worker`.
@@ -414,6 +450,9 @@ pub struct SubmitArgs {
     /// Start when so many workers are there
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub min_workers: u32,
+    /// Jobs of a higher priority start first; of the same, the first come
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    pub priority: i32,
     /// Follow the job until it ends, then print its summary
     #[arg(long)]
     pub wait: bool,

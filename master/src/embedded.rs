@@ -382,6 +382,7 @@ impl Host {
                 Action::Timer(seconds) => {
                     self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
                 }
+                Action::Dismiss(worker, _) => self.places[worker].lost = true,
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => sink.take(other)?,
             }

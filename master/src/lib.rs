@@ -32,3 +32,4 @@ pub mod service;
 pub mod simulate;
 pub mod snapshot;
 pub mod sort;
+pub mod spool;

@@ -33,6 +33,7 @@ fn main() -> ExitCode {
         Command::Jobs { at } => client::jobs(&at),
         Command::Hosts { at } => client::hosts(&at),
         Command::Cancel { job, at } => client::cancel(job, &at),
+        Command::Resume { job, at } => client::resume(job, &at),
         Command::Results { job, out, force, at } => client::results(job, out, force, &at),
         Command::Bench { what: Bench::Messages(args) } => bench::messages::run(&args),
         Command::Certs { what } => make_certificates(what),

@@ -226,6 +226,8 @@ pub enum ToMaster {
         /// Why: a sentence for the user.
         reason: String,
     },
+    /// The worker wants to go: it computes on until it is released, at the next plan boundary.
+    Leaving,
 }
 
 impl ToMaster {

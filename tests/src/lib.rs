@@ -11,5 +11,7 @@ pub mod browser;
 pub mod case;
 pub mod checker;
 pub mod cluster;
+pub mod faults;
+pub mod left;
 pub mod proxy;
 pub mod solve;

@@ -207,7 +207,10 @@ pub fn solve_through(
         .map(|(i, &speed)| Hand { name: format!("worker-{i}"), speed, threads: crew.threads })
         .collect();
     let (job, first) = Job::new(Arc::clone(&model), &hands, crew.options, crew.resume)?;
-    let mut keep = Keep { rows: job.rows_before().to_vec(), ..Keep::default() };
+    let mut keep = Keep {
+        rows: job.rows_before().iter().map(|row| HistoryRow::clone(row)).collect(),
+        ..Keep::default()
+    };
     let stop = AtomicBool::new(false);
     let (n, threads) = (hands.len(), crew.threads as usize);
     let (mut outcome, _) = embedded::run_through(job, first, n, threads, &mut keep, &stop, fate)?;

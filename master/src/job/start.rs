@@ -30,7 +30,7 @@ use super::{
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
     decompose::{self, decompose, work},
-    event::{Action, Deal, Hand, Keep, Options},
+    event::{Action, Deal, Hand, Options},
     exchange::Exchange,
     holdings::Holdings,
     ledger::Ledger,
@@ -98,7 +98,7 @@ impl Job {
                     n_rows: snapshot.rows.len(),
                     spread_rate: snapshot.spread_rate,
                 };
-                (Base { state: Arc::new(snapshot.state), rest }, snapshot.rows)
+                (Base { state: snapshot.state, rest }, snapshot.rows)
             }
         };
         let mut model = model;
@@ -123,7 +123,10 @@ impl Job {
         let mut job = Self {
             quanta,
             touching: touching.transpose()?,
-            members: hands.iter().map(|hand| Member { hand: hand.clone(), alive: true }).collect(),
+            members: hands
+                .iter()
+                .map(|hand| Member { hand: hand.clone(), alive: true, leaves: false })
+                .collect(),
             epoch: Epoch::without_workers(0, &base, &model),
             ledger: base.rest.ledger.clone(),
             walls: base.rest.walls.clone(),
@@ -132,6 +135,8 @@ impl Job {
             first_cycle,
             lanes: String::new(),
             stop_asked: false,
+            leaves: false,
+            blamed: Vec::new(),
             failure: None,
             proposal: None,
             patience: Patience::default(),
@@ -150,7 +155,7 @@ impl Job {
         let mut actions = Vec::new();
         job.epoch = job.deal(0, (0..hands.len()).collect(), &mut actions)?;
         job.sorts = u64::from(job.census.units > 0);
-        if let Keep::Seconds(seconds) = keep {
+        if let Some(seconds) = keep.seconds() {
             actions.push(Action::Timer(seconds));
         }
         Ok((job, actions))
