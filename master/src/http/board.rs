@@ -360,14 +360,13 @@ mod tests {
     use super::*;
 
     fn sheet() -> Sheet {
-        let path = tests::cluster::repository("tests/decks/plates-small.toml");
-        let text = std::fs::read_to_string(path).expect("a deck of this repository");
-        Sheet::new(&deck::read(&text, "small").expect("without faults"))
+        let text = include_str!("../../../tests/decks/plates-small.toml");
+        Sheet::new(&deck::read(text, "small").expect("without faults"))
     }
 
     fn frame(cycle: u64, compute_ns: u64) -> ToMaster {
         let busy = Work { compute_ns, contact_ns: 0 };
-        ToMaster::Cycle { cycle, vote: None, partials: Vec::new(), gathered: None, busy }
+        ToMaster::Cycle { cycle, vote: None, partials: Vec::new(), gathered: Vec::new(), busy }
     }
 
     #[test]

@@ -103,9 +103,8 @@ mod tests {
 
     #[test]
     fn a_packed_state_gives_back_its_faces_and_its_range() {
-        let path = tests::cluster::repository("tests/decks/plates-small.toml");
-        let text = std::fs::read_to_string(path).expect("a deck of this repository");
-        let model = deck::read(&text, "small").expect("without faults");
+        let text = include_str!("../../../tests/decks/plates-small.toml");
+        let model = deck::read(text, "small").expect("without faults");
         let n = model.mesh.n_elements();
         let mut state = GlobalState {
             x: model.mesh.positions.clone(),
