@@ -82,10 +82,10 @@ fn level(speeds: &[f64], work: &[f64], contact: f64) -> f64 {
     level
 }
 
-/// Pairs of each unit of which the node lies in the face's box grown by the reach: what a cycle looks at, and what a
-/// unit weighs.
+/// Pairs of each unit of which the node lies in the face's box grown by [`Settings::near`]: what a cycle looks at, and
+/// what a unit weighs. The others on its lists cost a look once in several cycles.
 pub fn pairs(units: &[WorkUnit], surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> Vec<u64> {
-    let reach = settings.reach();
+    let reach = settings.near();
     let of_unit = |unit: &WorkUnit| {
         let of_face = |&face: &u32| {
             let face = &surface.faces[face as usize];

@@ -91,6 +91,8 @@ impl Sorter {
         let census = Census::of(&units);
         let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
         let worker_of = match self.dealing {
+            // One worker takes all, whatever it weighs.
+            Dealing::Owners if self.speeds.len() == 1 => vec![0; units.len()],
             Dealing::Owners => {
                 let weights = balance::pairs(&units, &self.surface, x, &self.settings);
                 balance::assign(&units, &weights, &self.speeds, &holdings.work, &owner)

@@ -165,12 +165,25 @@ impl Contact {
         contact.candidates = candidates;
         contact.watch =
             Watch::new(settings, &contact.candidates, &contact.faces, &contact.parts, &contact.part);
+        let (mut watch, mut work) = (std::mem::take(&mut contact.watch), Work::default());
+        contact.look(&mut watch, &mut work, x);
+        (contact.watch, contact.work) = (watch, work);
         contact
     }
 
-    /// Number of node-face pairs on the candidate list.
+    /// Number of node-face pairs that a cycle looks at.
     pub fn n_pairs(&self) -> usize {
-        self.candidates.faces.len()
+        self.watch.candidates.faces.len()
+    }
+
+    /// Lists the candidates that can be near before nodes have moved much further.
+    fn look(&self, watch: &mut Watch, work: &mut Work, x: &[Vec<f64>; 3]) {
+        let Work { boxes, held, ends, .. } = work;
+        let grow = WARNING.mul_add(self.settings.gap, watch.spread(&self.settings));
+        boxes.measure(self.width, x, &self.faces, &watch.all, grow);
+        let n = self.candidates.nodes.len();
+        boxes.hold(self.width, &self.candidates, (0, n), held, ends);
+        watch.take(x, &self.candidates.nodes, held, ends, &self.faces);
     }
 
     /// Adds the contact forces at positions `x` into `f`, and says what they mean for the cycle.
@@ -210,17 +223,7 @@ impl Contact {
         let mut frequency2 = 0.0;
         let warning = WARNING * self.settings.gap;
         if watch.is_stale(cycle.x, &self.settings) {
-            let Work { boxes, held, ends, .. } = &mut work;
-            boxes.measure(
-                self.width,
-                cycle.x,
-                &self.faces,
-                &watch.all,
-                warning + watch.spread(&self.settings),
-            );
-            let n = self.candidates.nodes.len();
-            boxes.hold(self.width, &self.candidates, (0, n), held, ends);
-            watch.take(cycle.x, &self.candidates.nodes, held, ends, &self.faces);
+            self.look(&mut watch, &mut work, cycle.x);
         }
         work.boxes.measure(self.width, cycle.x, &self.faces, &watch.listed, warning);
         let n = watch.candidates.nodes.len();

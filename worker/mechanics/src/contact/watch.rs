@@ -14,7 +14,7 @@ use super::{
 
 /// Spread of a list, in gaps: it lasts five cycles at the fastest that nodes may travel, and grows boxes by as much as
 /// the zone of warning does.
-const SPREAD: f64 = 2.0;
+pub(super) const SPREAD: f64 = 2.0;
 
 /// A list counts as stale this fraction before its spread: far more than rounding of positions can hide.
 const MARGIN: f64 = 1e-3;
