@@ -21,6 +21,7 @@ pub mod exchange;
 pub mod hosts;
 pub mod job;
 pub mod ledger;
+pub mod memory;
 pub mod peers;
 pub mod processes;
 pub mod queue;

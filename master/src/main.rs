@@ -9,12 +9,13 @@ use clap::Parser;
 use master::{
     bench, certs, client,
     command::{Bench, Certs, Cli, Command, WorkerArgs},
-    daemon, processes, run, simulate,
+    daemon, memory, processes, run, simulate,
 };
 use protocol::shape::{Shape, Wire};
 use worker::daemon::Listen;
 
 fn main() -> ExitCode {
+    memory::return_large_arrays();
     tracing_subscriber::fmt()
         .with_env_filter(
             tracing_subscriber::EnvFilter::try_from_env("BOLIDE_LOG").unwrap_or_else(|_| "info".into()),

@@ -120,6 +120,11 @@ impl Machine {
         if let Task::Load { assign, prepare } = task {
             return self.build(*assign, prepare);
         }
+        if let Task::Image { last: true } = task {
+            let domain = self.domain.take().ok_or("an image without an assignment")?;
+            let pieces = self.laps.time(Phase::Other, || domain.into_pieces());
+            return Ok(Outcome::Image { pieces, work: self.clock.work() });
+        }
         let (clock, laps) = (&self.clock, &mut self.laps);
         let domain = self.domain.as_mut().ok_or("a task without an assignment")?;
         Ok(match task {
@@ -161,7 +166,7 @@ impl Machine {
                     .time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, &walls, clock))?;
                 Outcome::Integrated(Box::new(vote))
             }
-            Task::Image => {
+            Task::Image { .. } => {
                 laps.time(Phase::Other, || Outcome::Image { pieces: domain.pieces(), work: clock.work() })
             }
         })
@@ -184,11 +189,10 @@ impl Machine {
             assign.setup,
             assign.n_parts as usize,
             assign.quanta,
-            &assign.subdomains,
+            assign.subdomains,
             &assign.gauges,
             width,
         );
-        drop(assign.subdomains);
         domain.install(&assign.plan, &assign.guest_state)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
         if !further_epoch {
