@@ -128,6 +128,9 @@ pub fn folder_for(args: &RunArgs) -> PathBuf {
 /// # Errors
 /// Whatever kept it from its end.
 pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
+    if let Some(pin) = &args.pin {
+        pin.apply()?;
+    }
     let asked = args.job.asked();
     let model = Arc::new(model_for(&args.deck, &asked)?);
     let n = args.workers as usize;

@@ -56,6 +56,17 @@ pub fn lowest_priority() {
     let _ = rustix::process::setpriority_process(Some(rustix::thread::gettid()), LOWEST);
 }
 
+/// Confines the calling thread, and all that it starts from now on, to processors of this machine.
+///
+/// # Errors
+/// If the machine has none of them, or refuses.
+pub fn pin(processors: &[usize]) -> Result<(), String> {
+    let mut set = rustix::thread::CpuSet::new();
+    processors.iter().filter(|n| **n < rustix::thread::CpuSet::MAX_CPU).for_each(|&n| set.set(n));
+    rustix::thread::sched_setaffinity(None, &set)
+        .map_err(|e| format!("processors {processors:?}: {e}; `nproc --all` says how many there are"))
+}
+
 /// The highest nice value of Linux.
 const LOWEST: i32 = 19;
 
