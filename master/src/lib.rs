@@ -22,6 +22,7 @@ pub mod holdings;
 pub mod hosts;
 pub mod job;
 pub mod ledger;
+pub mod memory;
 pub mod peers;
 pub mod processes;
 pub mod queue;

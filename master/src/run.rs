@@ -163,6 +163,9 @@ pub fn folder_for(args: &RunArgs) -> PathBuf {
 /// # Errors
 /// Whatever kept it from its end.
 pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
+    if let Some(pin) = &args.pin {
+        pin.apply()?;
+    }
     let asked = args.job.asked();
     let model = Arc::new(model_for(&args.deck, &asked)?);
     let n = args.workers as usize;
@@ -191,8 +194,10 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let options =
         Options { keep: keep_for(memory, interval), store: folder.is_some(), ..options_for(&asked, n, true) };
     let states = resume.as_ref().filter(|_| in_place).map(|snapshot| snapshot.states.clone());
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
-    let census = Census::of(&job, &model);
+    // Without contact the surface is found for its census alone, before there are states beside it.
+    let bare = model.setup.contact.is_none().then(|| Census::without_contact(&model));
+    let (mut job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
+    let census = bare.unwrap_or_else(|| Census::of(&job, &model));
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     if let Some(folder) = &output.folder {
         let snapshots = folder.file(store::FOLDER);
@@ -204,6 +209,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     }
     output.go_on(&job, states)?;
+    if !args.processes && output.keeper.is_none() {
+        job.keep_no_state();
+    }
     let stop = stop_on_interrupt("stopping after this cycle");
     let children = args.processes.then(|| Processes::start(&hands)).transpose()?;
     let started = Instant::now();
@@ -292,14 +300,18 @@ pub struct Census {
 impl Census {
     /// Of a job; without contact the surface is counted all the same.
     pub fn of(job: &Job, model: &Model) -> Self {
-        let count = |s: &mechanics::contact::Surface| Self {
-            elements: s.n_elements() as u64,
-            faces: s.faces.len() as u64,
-            nodes: s.nodes.len() as u64,
-        };
-        match job.surface() {
-            Some(surface) => count(surface),
-            None => count(&mechanics::contact::Surface::new(&model.mesh, &model.setup.materials, &|_| true)),
+        job.surface().map_or_else(|| Self::without_contact(model), Self::count)
+    }
+
+    fn without_contact(model: &Model) -> Self {
+        Self::count(&mechanics::contact::Surface::new(&model.mesh, &model.setup.materials, &|_| true))
+    }
+
+    fn count(surface: &mechanics::contact::Surface) -> Self {
+        Self {
+            elements: surface.n_elements() as u64,
+            faces: surface.faces.len() as u64,
+            nodes: surface.nodes.len() as u64,
         }
     }
 }

@@ -23,6 +23,8 @@ const GAP_FRACTION: f64 = 0.1;
 /// Default slack over the gap. Two nodes travel at most 40 % of the gap against each other in a cycle, so lists last nine
 /// cycles at the least, and a sort may take eight.
 const SLACK_GAPS: f64 = 3.5;
+/// Default slack over the gap where that is more than half a face: longer lists would cost more than sorts.
+const LEAST_SLACK_GAPS: f64 = 2.5;
 /// Default friction velocity over the largest difference of initial velocities.
 const FRICTION_VELOCITY: f64 = 0.01;
 /// Default friction velocity over the largest bulk sound speed where nothing moves at the start.
@@ -57,17 +59,16 @@ pub(crate) fn read(
     }
     read_pairs(&table, names, &mut interacts, &mut frictions);
     let faces = outer_faces(assembly);
-    let gap = read_gap(&table, smallest_face_dimension(assembly, &faces, &interacts));
+    let smallest = smallest_face_dimension(assembly, &faces, &interacts);
+    let gap = read_gap(&table, smallest);
     let slack = match (table.get("slack_gaps"), table.get("slack_length")) {
         (Some(_), Some(second)) => {
             second.fault("one of slack_gaps and slack_length", "remove one of the two");
             None
         }
         (None, Some(length)) => length.number(Range::Positive),
-        (gaps, None) => {
-            let gaps = gaps.map_or(Some(SLACK_GAPS), |v| v.number(Range::Positive));
-            gaps.zip(gap).map(|(gaps, gap)| gaps * gap)
-        }
+        (Some(gaps), None) => gaps.number(Range::Positive).zip(gap).map(|(gaps, gap)| gaps * gap),
+        (None, None) => gap.map(|gap| default_slack(gap, smallest)),
     };
     let stiffness =
         table.number_or("stiffness", 0.5, Range::Within(0.0, 1.0, "a number above 0 and at most 1"));
@@ -122,6 +123,12 @@ fn read_pairs(table: &Table<'_>, names: &Names, interacts: &mut [bool], friction
             }
         }
     }
+}
+
+/// Default slack for a gap and the smallest face dimension (lengths).
+fn default_slack(gap: f64, smallest: Option<f64>) -> f64 {
+    let wide = smallest.map_or(f64::INFINITY, |face| 0.5 * face);
+    (SLACK_GAPS * gap).min(wide).max(LEAST_SLACK_GAPS * gap)
 }
 
 /// The gap as a length; outside 10 % to 50 % of the smallest face dimension it is a fault.
