@@ -32,6 +32,7 @@ use crate::{
     assembly, check,
     fault::{Fault, Faults, nearest},
     library,
+    mesh_file::MeshFile,
     model::Model,
     table::{Range, Table, Value},
     units::{SETS, Units},
@@ -52,8 +53,11 @@ pub const MAX_PARTS: usize = 10_000;
 /// Most entries of any other array of tables.
 pub const MAX_ENTRIES: usize = 10_000;
 
+/// Mesh files by the name that the deck has for them.
+pub(crate) type Meshes = BTreeMap<String, MeshFile>;
+
 /// Reads a deck; the whole check.
-pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
+pub(crate) fn read(text: &str, file_name: &str, meshes: &Meshes) -> Result<Model, Vec<Fault>> {
     if text.len() > MAX_TEXT {
         let faults = Faults::new(file_name, "");
         faults.add(
@@ -74,7 +78,7 @@ pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     if faults.count() > 0 {
         return Err(faults.into_list());
     }
-    let model = read_document(document.get_ref(), &faults);
+    let model = read_document(document.get_ref(), meshes, &faults);
     match model {
         Some(model) if faults.count() == 0 => Ok(model),
         _ => {
@@ -84,7 +88,7 @@ pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     }
 }
 
-fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
+fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -> Option<Model> {
     let deck = Table::new(document, 0, "the deck".to_string(), faults);
     let title = deck.require("title", "a title in quotes");
     let text = title.and_then(|v| v.text()).unwrap_or_default();
@@ -98,10 +102,10 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
     let units = SETS[units.unwrap_or(0)];
     let control = read_control(&deck, faults);
     let mut materials = Materials::read(&deck, units);
-    let parts = part::read_parts(&deck, &mut materials);
+    let parts = part::read_parts(&deck, &mut materials, meshes);
     let names = Names::of(&parts);
     let joins = assembly::read_joins(&deck, &names);
-    let assembly = assembly::assemble(&parts, &joins, &materials.list, faults);
+    let assembly = assembly::assemble(&parts, &joins, &materials.list, meshes, faults);
     let conditions = boundary::read(&deck, &names, &parts, &assembly);
     let contact = contact::read(&deck, &names, &assembly, &materials.list, &conditions);
     let output = output::read(&deck, &names, &assembly);
