@@ -22,7 +22,7 @@ use crate::{
     command::{ClientArgs, SubmitArgs},
     daemon::host_name,
     results::Folder,
-    run::{gather_deck, list_of_faults},
+    run::{gather_deck, list_of_faults, warn},
 };
 
 /// A connection to a master.
@@ -127,6 +127,10 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     let text = gather_deck(&args.deck, &args.reading.options())?;
     if text.len() > DECK_LIMIT {
         return Err(format!("{name}: {} bytes, at most {DECK_LIMIT} can be sent", text.len()));
+    }
+    // The master answers with faults; what a run does otherwise than the deck says is told here.
+    if let Ok(reading) = deck::read_whole(&text, &name) {
+        warn(&reading.warnings);
     }
     let options = JobOptions { min_workers: args.min_workers, trace: args.trace, ..args.job.asked() };
     let mut client = Client::new(&args.at)?;

@@ -4,7 +4,7 @@ use std::{fs, path::Path, process::ExitCode};
 
 use deck::bundle::Options;
 
-use crate::run::{gather_deck, list_of_faults};
+use crate::run::{gather_deck, list_of_faults, warn};
 
 /// Writes `to` and its mesh.
 ///
@@ -24,9 +24,7 @@ pub fn run(deck: &Path, to: &Path, force: bool, options: &Options) -> Result<Exi
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
         list_of_faults(&lines)
     })?;
-    for warning in &converted.warnings {
-        eprintln!("warning: {warning}");
-    }
+    warn(&converted.warnings);
     for (path, text) in [(&*mesh, &converted.mesh), (to, &converted.deck)] {
         fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))?;
     }

@@ -56,10 +56,15 @@ pub fn read_deck_with(path: &Path, options: &Options) -> Result<Model, String> {
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
         list_of_faults(&lines)
     })?;
-    for warning in &reading.warnings {
+    warn(&reading.warnings);
+    Ok(reading.model)
+}
+
+/// Tells what is done otherwise than a deck says, on standard error.
+pub fn warn(warnings: &[deck::Warning]) {
+    for warning in warnings {
         eprintln!("warning: {warning}");
     }
-    Ok(reading.model)
 }
 
 /// The text of a deck with the files that it refers to.

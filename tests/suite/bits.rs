@@ -5,7 +5,7 @@
 use mechanics::lanes::Width;
 use tests::{
     bits::{Fingerprint, forced_sorts},
-    solve::{Crew, example, model, solve},
+    solve::{Crew, example, keyword, model, solve},
 };
 
 use deck::Model;
@@ -292,6 +292,40 @@ fn a_split_ring_that_closes_on_itself_has_the_same_bits() {
         }
     }
     same_bits(&model);
+}
+
+#[test]
+fn an_imported_mesh_has_the_same_bits() {
+    let mut model = keyword("block-on-plate");
+    model.setup.control.end_cycle = 300;
+    model.output.history_cycles = 1;
+    same_bits(&model);
+}
+
+#[test]
+fn nodes_that_a_wall_names_have_the_same_bits_and_the_others_pass() {
+    let mut model = keyword("bar-on-wall");
+    model.velocity.iter_mut().for_each(|v| v[2] = -190e3);
+    model.setup.control.end_cycle = 100;
+    let whole = fingerprint(&model, Crew::default());
+    let at_foot = |x: &[f64; 3]| x[2] < 1e-9 && x[0] < 1.5;
+    // The wall by nodes of its own instead of by parts.
+    model.setup.walls[0].parts.fill(false);
+    let touching: Vec<usize> = (0..model.mesh.n_nodes()).filter(|n| at_foot(&model.mesh.positions[*n])).collect();
+    assert_eq!(touching.len(), 8);
+    for node in touching {
+        let free = model.setup.constraints[usize::from(model.constraint[node])];
+        model.constraint[node] = model.setup.constraints.len() as u16;
+        model.setup.constraints.push(mechanics::setup::Constraint { walls: 1, ..free });
+    }
+    same_bits(&model);
+    let solved = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    assert_ne!(Fingerprint::of(&solved).digest, whole.digest);
+    let lowest = |named: bool| {
+        let nodes = (0..model.mesh.n_nodes()).filter(|n| at_foot(&model.mesh.positions[*n]) == named);
+        nodes.map(|n| solved.state.x[n][2]).fold(f64::INFINITY, f64::min)
+    };
+    assert!(lowest(true) >= 0.0 && lowest(false) < -0.1, "{} {}", lowest(true), lowest(false));
 }
 
 #[test]
