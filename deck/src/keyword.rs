@@ -72,7 +72,8 @@ pub(crate) fn read(bundle: &Bundle<'_>, mesh_name: Option<&str>) -> Result<Trans
         Err(faults) => {
             for fault in faults {
                 let at = draft.origin(fault.line);
-                let [read, expected] = [&fault.read, &fault.expected].map(|words| draft.relined(words, at, &log));
+                let [read, expected] =
+                    [&fault.read, &fault.expected].map(|words| draft.relined(words, at, &log));
                 log.fault(at, read, expected, fault.advice);
             }
             Err(log.into_lists().0)

@@ -23,7 +23,8 @@ fn gathered(folder: &str, name: &str, options: &Options) -> String {
 
 fn example(name: &str, case: Option<u32>) -> Reading {
     let options = Options { units: None, case };
-    deck::read_whole(&gathered(&folder("examples"), name, &options), name).unwrap_or_else(|f| panic!("{}", lines(&f)))
+    deck::read_whole(&gathered(&folder("examples"), name, &options), name)
+        .unwrap_or_else(|f| panic!("{}", lines(&f)))
 }
 
 fn lines(faults: &[Fault]) -> String {
@@ -81,7 +82,9 @@ fn block_on_plate_is_a_quarter_with_curves_sets_and_contact() {
 
 #[test]
 fn bar_on_wall_runs_the_case_that_is_chosen() {
-    for (case, speed, title) in [(101, -190e3, "Bar on a wall, 190 m/s"), (102, -100e3, "Bar on a wall, 100 m/s")] {
+    for (case, speed, title) in
+        [(101, -190e3, "Bar on a wall, 190 m/s"), (102, -100e3, "Bar on a wall, 100 m/s")]
+    {
         let Reading { model, warnings } = example("bar-on-wall.k", Some(case));
         assert_eq!((model.title.as_str(), model.units.as_str(), warnings.len()), (title, "mm-s-t", 0));
         assert!(model.velocity.iter().all(|v| v[2] == speed));
@@ -90,7 +93,11 @@ fn bar_on_wall_runs_the_case_that_is_chosen() {
         assert!(matches!(model.setup.materials[0].strength, Strength::JohnsonCook { shear: 46e3, .. }));
     }
     let undecided = example("bar-on-wall.k", None);
-    assert!(undecided.warnings[0].words.contains("--case takes one of 101, 102"), "{}", undecided.warnings[0]);
+    assert!(
+        undecided.warnings[0].words.contains("--case takes one of 101, 102"),
+        "{}",
+        undecided.warnings[0]
+    );
 }
 
 #[test]
@@ -102,7 +109,8 @@ fn a_converted_deck_is_the_same_problem() {
         mesh_file::parse(&converted.mesh, "out.mesh").unwrap_or_else(|f| panic!("{}", lines(&f)));
         let mesh = converted.mesh;
         let mut open = |path: &str| (path == "some/out.mesh").then(|| mesh.clone());
-        let packed = bundle::gather("some/out.toml", converted.deck, &Options::default(), &mut open).expect("two files");
+        let packed = bundle::gather("some/out.toml", converted.deck, &Options::default(), &mut open)
+            .expect("two files");
         let again = deck::read(&packed, "out.toml").unwrap_or_else(|f| panic!("{}", lines(&f)));
         assert_eq!(again, example(name, case).model, "{name}");
     }
@@ -126,7 +134,9 @@ fn parts_that_name_the_same_nodes_share_them() {
     let model = good(second);
     assert_eq!(model.mesh.n_nodes(), 12);
     assert_eq!(model.mesh.parts[0].nodes[4..], model.mesh.parts[1].nodes[..4]);
-    assert!(matches!(&model.mesh.parts[1].topology, Topology::Explicit { hexahedra } if hexahedra.len() == 1));
+    assert!(
+        matches!(&model.mesh.parts[1].topology, Topology::Explicit { hexahedra } if hexahedra.len() == 1)
+    );
     assert_eq!(model.setup.contact.expect("contact").interacts, [true; 4]);
 }
 
@@ -138,7 +148,8 @@ fn spinning_bodies_and_local_axes_give_each_node_its_velocity() {
     assert_eq!(model.velocity[1], [0.0, 0.0, 5.0]);
     // x of the system is global y, y is -x; the later card goes over the earlier one, in its box only.
     let system = "*DEFINE_COORDINATE_SYSTEM\n3,0,0,0,0,1,0\n-1,0,0\n*DEFINE_BOX\n7,-1,0.5,-9,9,-9,9\n";
-    let model = good(&format!("{system}*INITIAL_VELOCITY\n\n4.0\n*INITIAL_VELOCITY\n0,0,7,0,3\n1.0,2.0,0.0\n"));
+    let model =
+        good(&format!("{system}*INITIAL_VELOCITY\n\n4.0\n*INITIAL_VELOCITY\n0,0,7,0,3\n1.0,2.0,0.0\n"));
     assert_eq!(model.velocity[0], [-2.0, 1.0, 0.0]);
     assert_eq!(model.velocity[1], [4.0, 0.0, 0.0]);
 }
@@ -187,18 +198,36 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
     let refused = [
         ("*MAT_VISCOELASTIC\n2,1.0\n", "a.k:22:1: read *MAT_VISCOELASTIC; expected a material of the table"),
         ("*ELEMENT_BEAM\n1,1,1,2,3\n", "a.k:22:1: read *ELEMENT_BEAM; expected a keyword of the table"),
-        ("*CONTROL_IMPLICIT_GENERAL\n1\n", "a.k:22:1: read *CONTROL_IMPLICIT_GENERAL; expected explicit dynamics"),
-        ("*CONTACT_TIED_SURFACE_TO_SURFACE\n\n", "a.k:22:1: read *CONTACT_TIED_SURFACE_TO_SURFACE; expected a contact"),
+        (
+            "*CONTROL_IMPLICIT_GENERAL\n1\n",
+            "a.k:22:1: read *CONTROL_IMPLICIT_GENERAL; expected explicit dynamics",
+        ),
+        (
+            "*CONTACT_TIED_SURFACE_TO_SURFACE\n\n",
+            "a.k:22:1: read *CONTACT_TIED_SURFACE_TO_SURFACE; expected a contact",
+        ),
         ("*ELEMENT_SOLID\n2,1,1,2,3,4,8,7,6,5\n", "a.k:23:1: read element 2 with volume"),
-        ("*ELEMENT_SOLID\n2,1,1,2,3,4,5,6,7,99\n", "a.k:23:1: read element 2 with node 99; expected nodes of the deck"),
+        (
+            "*ELEMENT_SOLID\n2,1,1,2,3,4,5,6,7,99\n",
+            "a.k:23:1: read element 2 with node 99; expected nodes of the deck",
+        ),
         ("*ELEMENT_SOLID\n1,1,1,2,3,4,5,6,7,8\n", "a.k:23:1: read element 1; expected a number other than 1"),
-        ("*NODE\n1,5.0\n", "a.k:23:1: read 1; expected a number other than 1, which line 12 has with another place"),
+        (
+            "*NODE\n1,5.0\n",
+            "a.k:23:1: read 1; expected a number other than 1, which line 12 has with another place",
+        ),
         ("*SECTION_SOLID\n2,24\n", "a.k:23:3: read 24; expected ELFORM 1"),
         ("*BOUNDARY_SPC_SET\n5,0,1,1,1\n", "a.k:23:1: read set 5; expected a set of nodes of the deck"),
         ("*LOAD_NODE_POINT\n1,5,1,1.0\n", "a.k:23:3: read 5; expected DOF 1, 2 or 3"),
         ("*CONSTRAINED_SPOTWELD\n1,2\n", "a.k:22:1: read *CONSTRAINED_SPOTWELD"),
-        ("*SET_NODE_ADD\n1\n1\n*BOUNDARY_SPC_SET\n1,0,1\n", "a.k:23:1: read set 1; expected sets that do not hold themselves"),
-        ("*CONTACT_AUTOMATIC_SINGLE_SURFACE\n1,0,3\n0.1,0.1,0,0,0,0,1e-7\n", "a.k:24:17: read 1e-7; expected a birth time of 0"),
+        (
+            "*SET_NODE_ADD\n1\n1\n*BOUNDARY_SPC_SET\n1,0,1\n",
+            "a.k:23:1: read set 1; expected sets that do not hold themselves",
+        ),
+        (
+            "*CONTACT_AUTOMATIC_SINGLE_SURFACE\n1,0,3\n0.1,0.1,0,0,0,0,1e-7\n",
+            "a.k:24:17: read 1e-7; expected a birth time of 0",
+        ),
     ];
     for (more, expected) in refused {
         let found = fault(more);
@@ -243,9 +272,8 @@ impl Stream {
 
 /// A deck with a few changes: words, columns, lines.
 fn mutated(text: &str, stream: &mut Stream) -> String {
-    const WORDS: [&str; 14] = [
-        "-1", "0", "99999999999", "1e308", "1.5", "nan", "&x", "&(((", ",", "*", "$", "\u{e9}", "+", "1-",
-    ];
+    const WORDS: [&str; 14] =
+        ["-1", "0", "99999999999", "1e308", "1.5", "nan", "&x", "&(((", ",", "*", "$", "\u{e9}", "+", "1-"];
     let mut lines: Vec<String> = text.lines().map(str::to_string).collect();
     for _ in 0..1 + stream.below(4) {
         // Mostly where the keywords are, not in the long lists.
@@ -262,7 +290,8 @@ fn mutated(text: &str, stream: &mut Stream) -> String {
                 let cells: Vec<&str> = lines[a].split_inclusive([' ', ',']).collect();
                 if !cells.is_empty() {
                     let at = stream.below(cells.len());
-                    lines[a] = cells.iter().enumerate().map(|(i, cell)| if i == at { word } else { cell }).collect();
+                    lines[a] =
+                        cells.iter().enumerate().map(|(i, cell)| if i == at { word } else { cell }).collect();
                 }
             }
             4 => {

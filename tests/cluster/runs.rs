@@ -117,8 +117,12 @@ fn a_keyword_deck_is_submitted_with_what_it_includes() {
     let mut cluster = Cluster::start(BOLIDE, false);
     cluster.worker("a", "1");
     cluster.worker("b", "2");
-    let submitted = cluster.client(&["submit", &deck, "--cycles", "40", "--no-output", "--min-workers", "2", "--json"]);
-    assert!(submitted.err.contains("warning: ") && submitted.err.contains("*DATABASE_GLSTAT"), "{submitted:?}");
+    let submitted =
+        cluster.client(&["submit", &deck, "--cycles", "40", "--no-output", "--min-workers", "2", "--json"]);
+    assert!(
+        submitted.err.contains("warning: ") && submitted.err.contains("*DATABASE_GLSTAT"),
+        "{submitted:?}"
+    );
     assert_eq!(digest_of(&cluster.json(&["watch", "1"])), expected);
 
     // A bad deck comes back with the lines of its files.

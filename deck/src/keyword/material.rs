@@ -48,9 +48,7 @@ pub(super) enum Law {
     Null {
         cut_off: f64,
     },
-    Rigid {
-        held: [i64; 2],
-    },
+    Rigid,
 }
 
 /// An equation of state of a deck.
@@ -66,13 +64,6 @@ pub(super) enum EosCard {
         c: [f64; 7],
         energy: f64,
     },
-}
-
-/// `*MAT_ADD_EROSION`.
-pub(super) struct ErosionCard {
-    pub(super) at: Place,
-    /// Effective plastic strain at which elements are taken out, if given.
-    pub(super) plastic_strain: Option<f64>,
 }
 
 /// The name of a material by its number.
@@ -99,29 +90,7 @@ impl Problem {
         let f: [_; 8] = std::array::from_fn(|i| context.fields(&cards[i], block.width, &TENS));
         let id = f[0].id(0);
         if word == "MAT_ADD_EROSION" {
-            let used: Vec<usize> = (0..8)
-                .flat_map(|card| (0..8).map(move |i| (card, i)))
-                .filter(|(card, i)| {
-                    (*card, *i) != (0, 0) && !f[*card].blank(*i) && f[*card].real(*i, 0.0) != 0.0
-                })
-                .map(|(card, i)| 8 * card + i)
-                .collect();
-            // EXCL in the first card, EFFEPS in the second.
-            let strain = Some(f[1].real(3, 0.0)).filter(|e| *e > 0.0);
-            for other in used.iter().filter(|i| !matches!(i, 1 | 11)) {
-                let (card, i) = (other / 8, other % 8);
-                // Values equal to the number for exclusion switch their criterion off.
-                let excluded = !f[0].blank(1) && f[card].real(i, 0.0) == f[0].real(1, 0.0);
-                let count = card == 1 && i == 7;
-                if !excluded && !(count && f[1].real(7, 0.0) <= 1.0) {
-                    f[card].fault(
-                        i,
-                        "no criterion but EFFEPS",
-                        "use the effective plastic strain, or FAIL of the material",
-                    );
-                }
-            }
-            self.erosions.insert(id, ErosionCard { at: block.at, plastic_strain: strain });
+            self.erosions.insert(id, block.at);
             return;
         }
         let density = f[0].positive(1, "a density");
@@ -245,12 +214,7 @@ impl Problem {
                 if f[0].real(4, 0.0) != 0.0 {
                     f[0].fault(4, "no coupling with another program", "leave N blank");
                 }
-                let option = f[1].real(0, 0.0);
-                if option < 0.0 {
-                    f[1].fault(0, "directions of the global axes", "give CMO 0 or 1");
-                }
-                let held = if option > 0.0 { [f[1].integer(1), f[1].integer(2)] } else { [0; 2] };
-                (moduli(2), Some(Law::Rigid { held }))
+                (moduli(2), Some(Law::Rigid))
             }
             _ => {
                 log.fault(
@@ -446,7 +410,7 @@ pub(super) fn strength_words(
         })
     };
     match &material.law {
-        Law::Elastic | Law::Rigid { .. } => Some(format!("{{ type = \"elastic\", shear = {shear:?} }}")),
+        Law::Elastic | Law::Rigid => Some(format!("{{ type = \"elastic\", shear = {shear:?} }}")),
         Law::Null { .. } => Some("{ type = \"hydro\" }".to_string()),
         Law::Bilinear { yield_stress, tangent, rate } => {
             if !(0.0 <= *tangent && *tangent < young) {

@@ -22,8 +22,6 @@ pub(super) struct Node {
     pub(super) x: [f64; 3],
     /// Translations that are held: 1 x, 2 y, 3 z, 4 xy, 5 yz, 6 zx, 7 all.
     pub(super) held: u8,
-    /// Rotations that are held, likewise; only nodes of shells have any.
-    pub(super) turns: u8,
     pub(super) at: Place,
 }
 
@@ -40,8 +38,6 @@ pub(super) struct Shell {
     pub(super) id: u32,
     pub(super) part: u32,
     pub(super) nodes: [u32; 4],
-    /// Thickness at the corners, where the element has its own.
-    pub(super) thickness: Option<[f64; 4]>,
     pub(super) at: Place,
 }
 
@@ -58,12 +54,7 @@ pub(super) struct PartCard {
 /// `*SECTION_`.
 pub(super) enum Section {
     Solid,
-    Shell {
-        /// Integration points through the thickness.
-        layers: u32,
-        /// At the four corners (length).
-        thickness: [f64; 4],
-    },
+    Shell,
 }
 
 /// `*HOURGLASS`.
@@ -92,7 +83,8 @@ pub(super) struct Problem {
     pub(super) sections: BTreeMap<u32, (Place, Section)>,
     pub(super) materials: BTreeMap<u32, MaterialCard>,
     pub(super) equations: BTreeMap<u32, EosCard>,
-    pub(super) erosions: BTreeMap<u32, super::material::ErosionCard>,
+    /// Where `*MAT_ADD_EROSION` names each material.
+    pub(super) erosions: BTreeMap<u32, Place>,
     pub(super) hourglasses: BTreeMap<u32, Hourglass>,
     pub(super) sets: Sets,
     pub(super) curves: BTreeMap<u32, CurveCard>,
@@ -214,13 +206,13 @@ impl Problem {
                 f.fault(0, "a node number above 0", "give the node a number");
                 continue;
             }
-            let [held, turns] = [4, 5].map(|i| match f.integer(i) {
+            let held = match f.integer(4) {
                 code @ 0..=7 => code as u8,
                 _ => {
-                    f.fault(i, "a code from 0 to 7 of what is held", "correct it, or use *BOUNDARY_SPC_NODE");
+                    f.fault(4, "a code from 0 to 7 of what is held", "correct it, or use *BOUNDARY_SPC_NODE");
                     0
                 }
-            });
+            };
             let next = self.nodes.len() as u32;
             if let Some(first) = self.node_index.insert(id, next) {
                 let node = &self.nodes[first as usize];
@@ -233,7 +225,7 @@ impl Problem {
                 self.node_index.insert(id, first);
                 continue;
             }
-            self.nodes.push(Node { id, x: f.vector(1), held, turns, at: card.at });
+            self.nodes.push(Node { id, x: f.vector(1), held, at: card.at });
         }
     }
 
@@ -285,17 +277,11 @@ impl Problem {
                 f.fault(6, "at most four nodes", "mesh with four-node shells");
                 continue;
             }
-            let mut thickness = None;
+            // What its card of thicknesses says matters where shells are computed.
             if thick {
-                let Some(second) = cards.next() else {
-                    f.fault(0, "a second card with four thicknesses", "complete the element");
-                    return;
-                };
-                let g = context.fields(second, block.width, &[16; 5]);
-                let t = [0, 1, 2, 3].map(|i| g.real(i, 0.0));
-                thickness = (t[0] > 0.0).then_some(t.map(|c| if c > 0.0 { c } else { t[0] }));
+                let _ = cards.next();
             }
-            self.shells.push(Shell { id: f.id(0), part: f.id(1), nodes, thickness, at: card.at });
+            self.shells.push(Shell { id: f.id(0), part: f.id(1), nodes, at: card.at });
         }
     }
 
@@ -365,38 +351,7 @@ impl Problem {
     fn read_shell_sections(&mut self, block: &Block<'_>, context: &Context<'_>) {
         for cards in block.cards.chunks(2) {
             let f = context.fields(&cards[0], block.width, &TENS);
-            let form = f.integer(1);
-            match form {
-                0 | 2 => {}
-                1 | 6..=11 | 16 | -16 => context.log.warn(
-                    cards[0].at,
-                    format!("ELFORM {form}: shells are computed with one point in the plane, corrected for warping"),
-                ),
-                _ => f.fault(1, "ELFORM 2", "take the shell of one point"),
-            }
-            if f.integer(6) != 0 {
-                f.fault(6, "no composite", "leave ICOMP blank");
-            }
-            if f.real(5, 0.0) < 0.0 {
-                f.fault(5, "a rule of Gauss", "leave QR/IRID at 0");
-            }
-            let layers = match f.integer(3) {
-                0 => 2,
-                n @ 1..=10 => n as u32,
-                _ => {
-                    f.fault(3, "1 to 10 points through the thickness", "use fewer");
-                    2
-                }
-            };
-            let blank = block.card(usize::MAX);
-            let second = cards.get(1).unwrap_or(&blank);
-            let g = context.fields(second, block.width, &TENS);
-            let t = [0, 1, 2, 3].map(|i| g.real(i, 0.0));
-            let thickness = t.map(|c| if c > 0.0 { c } else { t[0] });
-            if g.real(4, 0.0) != 0.0 {
-                g.fault(4, "nodes in the middle of the thickness", "leave NLOC at 0");
-            }
-            self.sections.insert(f.id(0), (cards[0].at, Section::Shell { layers, thickness }));
+            self.sections.insert(f.id(0), (cards[0].at, Section::Shell));
         }
     }
 

@@ -146,7 +146,7 @@ impl Translation<'_> {
             };
             match problem.sections.get(&part.section) {
                 Some((_, Section::Solid)) => {}
-                Some((at, Section::Shell { .. })) => log.fault(
+                Some((at, Section::Shell)) => log.fault(
                     part.at,
                     format!("part {id} of solids with the section at line {}", at.line),
                     "a *SECTION_SOLID",
@@ -269,7 +269,7 @@ impl Translation<'_> {
                 continue;
             }
             let at = material.at;
-            if let Law::Rigid { .. } = material.law {
+            if let Law::Rigid = material.law {
                 log.fault(
                     at,
                     "a rigid part",
@@ -287,7 +287,7 @@ impl Translation<'_> {
                 );
             }
             if let Some(erosion) = problem.erosions.get(&part.material) {
-                log.fault(erosion.at, "*MAT_ADD_EROSION", "no erosion, which is not computed", "take it out");
+                log.fault(*erosion, "*MAT_ADD_EROSION", "no erosion, which is not computed", "take it out");
             }
             let curve_of = |id: u32| {
                 let curve = problem.curves.get(&id);
@@ -350,6 +350,9 @@ impl Translation<'_> {
             let inside = (given.inside != 0).then(|| problem.within(given.inside, given.at, log));
             let except =
                 if given.except != 0 { problem.node_set(given.except, given.at, log) } else { Vec::new() };
+            if given.own_turn != [0.0; 3] {
+                log.warn(given.at, "VXR, VYR, VZR: nodes of solids do not turn");
+            }
             for node in self.nodes(given.target, given.at) {
                 let Some(x) = problem.position(node) else { continue };
                 if except.binary_search(&node).is_ok() || inside.as_ref().is_some_and(|inside| !inside(x)) {
@@ -520,7 +523,9 @@ impl Translation<'_> {
     /// Forces, alike ones together.
     fn forces(&mut self) {
         let problem = self.problem;
-        let mut groups: BTreeMap<(u32, usize, u64), (Place, BTreeMap<u32, u32>)> = BTreeMap::new();
+        // By curve, axis and factor: how often each node is named.
+        type Group = (Place, BTreeMap<u32, u32>);
+        let mut groups: BTreeMap<(u32, usize, u64), Group> = BTreeMap::new();
         for given in &problem.conditions.forces {
             let key = (given.curve, given.axis, given.factor.to_bits());
             let nodes = self.nodes(given.target, given.at);
