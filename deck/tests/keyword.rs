@@ -129,6 +129,19 @@ fn a_mesh_file_that_is_missing_is_a_fault_of_the_deck() {
 }
 
 #[test]
+fn wedges_pyramids_and_tetrahedra_are_hexahedra_whose_corners_coincide() {
+    let more = "*ELEMENT_SOLID\n2,1,1,2,3,4,5,5,8,8\n3,1,1,2,3,4,5,5,5,5\n4,1,1,2,3,5,5,5,5,5\n5,1,1,2,3,5\n";
+    let model = good(more);
+    let corners = |e: usize| model.mesh.parts[0].corners(e).map(|n| model.mesh.node_ids[n as usize]);
+    assert_eq!(corners(1), [1, 2, 3, 4, 5, 5, 8, 8]);
+    assert_eq!(corners(2), [1, 2, 3, 4, 5, 5, 5, 5]);
+    assert_eq!(corners(3), [1, 2, 3, 3, 5, 5, 5, 5]);
+    assert_eq!(corners(4), corners(3));
+    let seven = fault("*ELEMENT_SOLID\n2,1,1,2,3,4,5,6,7,7\n");
+    assert!(seven.starts_with("a.k:23:1: read element 2 with 7 different corners"), "{seven}");
+}
+
+#[test]
 fn parts_that_name_the_same_nodes_share_them() {
     let second = "*NODE\n9,0,0,2\n10,1,0,2\n11,1,1,2\n12,0,1,2\n*PART\nupper\n2,1,1\n*ELEMENT_SOLID\n2,2,5,6,7,8,9,10,11,12\n*CONTACT_AUTOMATIC_SINGLE_SURFACE\n\n\n";
     let model = good(second);

@@ -294,6 +294,18 @@ fn read_file(
     for id in found.solids.iter().flat_map(|(_, corners)| corners) {
         index.entry(*id).or_insert(0);
     }
+    let distinct = |corners: &[u32; 8]| (0..8).filter(|i| !corners[..*i].contains(&corners[*i])).count();
+    let odd = found.solids.iter().find(|(_, corners)| !matches!(distinct(corners), 4 | 5 | 6 | 8));
+    if let Some((id, corners)) = odd {
+        table.faults.add(
+            at,
+            format!("element {id} with {} different corners", distinct(corners)),
+            "eight, or six, five or four of a wedge, a pyramid or a tetrahedron",
+            "correct the element",
+        );
+        table.finish();
+        return None;
+    }
     budget.take(Some((index.len() as u64, found.solids.len() as u64)), at, &title, &table)?;
     let mut positions = Vec::with_capacity(index.len());
     let mut node_ids = Vec::with_capacity(index.len());

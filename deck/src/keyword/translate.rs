@@ -82,6 +82,8 @@ impl Translation<'_> {
         let (problem, log) = (self.problem, self.log);
         let mut bodies: BTreeMap<u32, Body> = BTreeMap::new();
         let mut seen: HashMap<u32, Place> = HashMap::with_capacity(problem.solids.len());
+        // The first element whose corners coincide, and how many there are.
+        let mut collapsed: Option<(Place, usize)> = None;
         for solid in &problem.solids {
             let (id, at) = (solid.id, solid.at);
             if let Some(first) = seen.insert(id, at) {
@@ -93,7 +95,8 @@ impl Translation<'_> {
                 log.fault(at, format!("element {id} with node {node}"), "nodes of the deck", "add the node");
                 continue;
             }
-            let corners = solid.nodes.map(|node| problem.position(node).unwrap_or_default());
+            let nodes = corners_of(solid.nodes);
+            let corners = nodes.map(|node| problem.position(node).unwrap_or_default());
             if !problem.parts.contains_key(&solid.part) {
                 log.fault(
                     at,
@@ -104,14 +107,17 @@ impl Translation<'_> {
                 continue;
             }
             let distinct = solid.nodes.iter().collect::<BTreeSet<_>>().len();
-            if distinct < 8 {
+            if !matches!(distinct, 4 | 5 | 6 | 8) {
                 log.fault(
                     at,
                     format!("element {id} with {distinct} different corners"),
-                    "eight: wedges and tetrahedra are not computed",
-                    "mesh with hexahedra",
+                    "eight, or six, five or four of a wedge, a pyramid or a tetrahedron",
+                    "correct the element",
                 );
                 continue;
+            }
+            if distinct < 8 {
+                collapsed.get_or_insert((at, 0)).1 += 1;
             }
             let v = volume(&corners);
             if !(v > 0.0 && v.is_finite()) {
@@ -127,7 +133,15 @@ impl Translation<'_> {
             let body = bodies
                 .entry(solid.part)
                 .or_insert_with(|| Body { name: format!("part {}", solid.part), solids: Vec::new() });
-            body.solids.push((id, solid.nodes));
+            body.solids.push((id, nodes));
+        }
+        if let Some((at, count)) = collapsed {
+            log.warn(
+                at,
+                format!(
+                    "{count} wedges, pyramids or tetrahedra: computed as hexahedra whose corners coincide"
+                ),
+            );
         }
         if let Some(shell) = problem.shells.first() {
             log.fault(
@@ -741,6 +755,14 @@ impl Translation<'_> {
             self.draft.line(at, format!("node = {id}"));
         }
     }
+}
+
+/// Corners such that those which coincide are neighbours: a tetrahedron repeats its last node, which would leave a face
+/// of all four.
+fn corners_of(nodes: [u32; 8]) -> [u32; 8] {
+    let [a, b, c, d, rest @ ..] = nodes;
+    let tetrahedron = rest.iter().all(|node| *node == d) && a != b && b != c && c != d && a != c;
+    if tetrahedron { [a, b, c, c, d, d, d, d] } else { nodes }
 }
 
 fn material_name(material: u32, eos: u32) -> String {
