@@ -30,6 +30,7 @@ pub mod timeline;
 pub mod virtual_clock;
 
 use crate::{
+    balance::Costs,
     command::{Clock, SimulateArgs},
     event::{Balance, Rebalance},
     run::read_deck,
@@ -87,8 +88,8 @@ fn print_rows<T: Serialize>(rows: &[T]) -> Result<ExitCode, String> {
 }
 
 fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
-    let rows =
-        mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, cluster.pair)?;
+    let costs = Costs { node: cluster.node, pair: cluster.pair };
+    let rows = mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, costs)?;
     if args.json {
         return print_rows(&rows);
     }

@@ -33,7 +33,7 @@ pub mod zone;
 pub use cycle::{Contact, initial_pairs};
 pub use force::ContactVote;
 pub use reach::Extent;
-pub use search::Exclusions;
+pub use search::{Exclusions, cull};
 pub use sort::sort;
 pub use surface::{Face, Surface};
 pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
