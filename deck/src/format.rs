@@ -98,7 +98,9 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
         title.fault(&format!("at most {MAX_TITLE} characters on one line"), "shorten it");
     }
     let names = SETS.map(|set| set.name);
-    let units = deck.require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t").and_then(|v| v.one_of(&names));
+    let units = deck
+        .require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t, in-s-lbf")
+        .and_then(|v| v.one_of(&names));
     let units = SETS[units.unwrap_or(0)];
     let control = read_control(&deck, faults);
     let mut materials = Materials::read(&deck, units);
@@ -235,6 +237,12 @@ impl Materials {
             let name = value.text()?;
             if let Some(own) = self.own.iter().find(|m| m.name == name) {
                 own.clone()
+            } else if !self.units.library && library::find(name).is_some() {
+                value.fault(
+                    "a [[material]] of the deck",
+                    "write the constants in inches, seconds and pounds of force",
+                );
+                return None;
             } else if let Some(found) = library::find(name) {
                 self.units.from_si(found)
             } else if self.broken.iter().any(|b| b == name) {

@@ -113,8 +113,8 @@ pub enum Command {
 /// What an LS-DYNA keyword deck does not say itself.
 #[derive(Args, Clone, Debug)]
 pub struct ReadingArgs {
-    /// Keyword decks: their units, one of mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), SI (m-s-kg)
-    /// [default: told by the densities]
+    /// Keyword decks: their units, one of mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), in-s-lbf,
+    /// SI (m-s-kg) [default: told by the densities]
     #[arg(long)]
     pub units: Option<String>,
     /// Keyword decks: the case to run, of those that *CASE defines

@@ -15,15 +15,19 @@ struct Set {
     stress: f64,
 }
 
-const SETS: [Set; 4] = [
+const INCHES: &str = "in-s-lbf";
+
+const SETS: [Set; 5] = [
     Set { name: "mm-s-t", others: ["mm-s-tonne", "t-mm-s"], density: 1e12, stress: 1e6 },
     Set { name: "mm-ms-kg", others: ["kg-mm-ms", "mm-kg-ms"], density: 1e9, stress: 1e9 },
     Set { name: "cm-g-us", others: ["cm-us-g", "g-cm-us"], density: 1e3, stress: 1e11 },
+    // The pound of force and the inch: 175.127 kg, 0.0254 m.
+    Set { name: INCHES, others: ["lbf-in-s", "in-lbf-s"], density: 1.068_688e7, stress: 6894.757 },
     Set { name: "SI", others: ["m-s-kg", "kg-m-s"], density: 1.0, stress: 1.0 },
 ];
 
 /// Names that `--units` takes.
-pub const NAMES: &str = "mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), SI (m-s-kg)";
+pub const NAMES: &str = "mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), in-s-lbf, SI (m-s-kg)";
 
 /// Densities (kg/m3) and wave speeds (m/s) that solids and liquids have.
 const DENSITIES: std::ops::RangeInclusive<f64> = 20.0..=25_000.0;
@@ -68,8 +72,15 @@ pub(super) fn choose<'m>(
         }
         return set.name;
     }
-    let fits: Vec<&Set> =
-        SETS.iter().filter(|set| list.iter().all(|material| plausible(set, material))).collect();
+    // Foam in metric units could be steel in inches: those count only where no metric set fits.
+    let fit = |metric: bool| -> Vec<&Set> {
+        let kind = SETS.iter().filter(|set| (set.name != INCHES) == metric);
+        kind.filter(|set| list.iter().all(|material| plausible(set, material))).collect()
+    };
+    let mut fits = fit(true);
+    if fits.is_empty() {
+        fits = fit(false);
+    }
     match fits[..] {
         [set] if !list.is_empty() => set.name,
         [set, ..] => {
@@ -117,6 +128,7 @@ mod tests {
         assert_eq!(chosen(None, 7.85e-6, 210.0), ("mm-ms-kg", 0));
         assert_eq!(chosen(None, 7.85, 2.1), ("cm-g-us", 0));
         assert_eq!(chosen(None, 7850.0, 210e9), ("SI", 0));
+        assert_eq!(chosen(None, 7.34e-4, 30e6), ("in-s-lbf", 0));
         assert_eq!(chosen(Some("mm-s-tonne"), 7.85e-9, 210e3), ("mm-s-t", 0));
         assert_eq!(chosen(Some("m-s-kg"), 7.85e-9, 210e3), ("SI", 1));
         assert_eq!(chosen(Some("furlong"), 7.85e-9, 210e3).1, 1);
