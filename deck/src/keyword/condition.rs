@@ -138,12 +138,10 @@ impl Conditions {
             "INITIAL_VELOCITY"
                 | "INITIAL_VELOCITY_NODE"
                 | "INITIAL_VELOCITY_GENERATION"
-                | "INITIAL_VELOCITY_RIGID_BODY"
                 | "BOUNDARY_SPC_NODE"
                 | "BOUNDARY_SPC_SET"
                 | "BOUNDARY_PRESCRIBED_MOTION_NODE"
                 | "BOUNDARY_PRESCRIBED_MOTION_SET"
-                | "BOUNDARY_PRESCRIBED_MOTION_RIGID"
                 | "LOAD_NODE_POINT"
                 | "LOAD_NODE_SET"
                 | "LOAD_SEGMENT"
@@ -194,9 +192,8 @@ impl Conditions {
         let at = f.at;
         let of_set = word.ends_with("_SET");
         match word {
-            "INITIAL_VELOCITY_NODE" | "INITIAL_VELOCITY_RIGID_BODY" => {
-                let rigid = word.ends_with("BODY");
-                let target = if rigid { Target::Part(f.id(0)) } else { Target::Node(f.id(0)) };
+            "INITIAL_VELOCITY_NODE" => {
+                let target = Target::Node(f.id(0));
                 let turn = f.vector(4);
                 self.velocities.push(Velocity {
                     at,
@@ -249,12 +246,7 @@ impl Conditions {
                 self.bodies.push(Body { at, axis, curve: f.id(0), factor: scale(f, 1) });
             }
             _ => {
-                let rigid = word.ends_with("RIGID");
-                let target = match (rigid, of_set) {
-                    (true, _) => Target::Part(f.id(0)),
-                    (_, true) => Target::NodeSet(f.id(0)),
-                    _ => Target::Node(f.id(0)),
-                };
+                let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
                 let Some(axis) = axis_of(f, 1) else { return };
                 let meaning = match f.integer(2) {
                     0 => Meaning::Velocity,

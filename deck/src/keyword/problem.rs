@@ -95,8 +95,6 @@ pub(super) struct Problem {
     pub(super) conditions: Conditions,
     pub(super) contacts: Vec<ContactCard>,
     pub(super) control: ControlCards,
-    /// Parts that `*DEFORMABLE_TO_RIGID` makes rigid.
-    pub(super) stiffened: BTreeMap<u32, Place>,
 }
 
 impl Problem {
@@ -154,22 +152,12 @@ impl Problem {
             "DEFINE_COORDINATE_SYSTEM" | "DEFINE_COORDINATE_NODES" | "DEFINE_COORDINATE_VECTOR" => {
                 self.read_system(block, context);
             }
-            "DEFORMABLE_TO_RIGID" => {
-                for card in &block.cards {
-                    let f = context.fields(card, block.width, &TENS);
-                    if f.integer(1) != 0 {
-                        f.fault(
-                            1,
-                            "no lead part",
-                            "leave it blank, or give the parts MAT_RIGID and join them",
-                        );
-                    }
-                    if f.words(2).eq_ignore_ascii_case("PSET") {
-                        f.fault(2, "PART", "name each part on a card of its own");
-                    }
-                    self.stiffened.insert(f.id(0), card.at);
-                }
-            }
+            "DEFORMABLE_TO_RIGID" => log.fault(
+                block.at,
+                "*DEFORMABLE_TO_RIGID",
+                "parts that deform: rigid bodies are not computed",
+                "take it out; the parts then deform by their materials",
+            ),
             word if word.starts_with("SET_") => self.sets.read(block, context),
             word if word.starts_with("MAT_") => self.read_material(block, context),
             word if word.starts_with("EOS_") => self.read_eos(block, context),
