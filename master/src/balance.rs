@@ -18,7 +18,7 @@ pub struct Costs {
 impl Default for Costs {
     /// Of this code with the widest lanes (`bolide simulate --measure-costs`).
     fn default() -> Self {
-        Self { node: 0.10, pair: 1.2 }
+        Self { node: 0.09, pair: 1.2 }
     }
 }
 
@@ -36,8 +36,8 @@ pub enum Dealing {
     Weights,
 }
 
-/// A surface node in a sort, in element-cycles of this code on one thread (`bolide simulate --measure-costs`).
-pub const SORT_ELEMENTS: f64 = 3.1;
+/// A surface node in a sort for sixteen workers, in element-cycles of this code (`bolide simulate --measure-costs`).
+pub const SORT_ELEMENTS: f64 = 3.9;
 
 /// Least share of its speed that a worker keeps beside sorts.
 const LEAST_BESIDE_SORTS: f64 = 0.1;
@@ -75,7 +75,7 @@ pub fn assign_by_weight(units: &[WorkUnit], speeds: &[f64]) -> Vec<usize> {
 
 /// How far above its share a worker may be before units move, relative to its whole cycle; moving one costs shared
 /// nodes in every cycle.
-const TOLERANCE: f64 = 0.004;
+const TOLERANCE: f64 = 0.001;
 
 /// When all workers have ended if pairs fill up those that end their sub-domains first (element-cycles at speed 1).
 /// Contact so levels what index planes left uneven.

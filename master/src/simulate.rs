@@ -103,7 +103,8 @@ fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitC
         .map(|lanes| lanes.name().parse::<Width>().and_then(Width::require))
         .transpose()
         .map_err(|e| e.to_string())?;
-    let (all, medians) = measure::run(&model(deck, args.cycles)?, lanes, args.repetitions)?;
+    let (all, medians) =
+        measure::run(&model(deck, args.cycles)?, cluster.speeds.len(), lanes, args.repetitions)?;
     if args.json {
         println!("{}", serde_json::to_string(&medians).map_err(|e| e.to_string())?);
     } else {

@@ -74,6 +74,12 @@ impl Settings {
         self.interacts[a as usize * self.n_parts() + b as usize]
     }
 
+    /// Cycles between trigger and sort after which nodes cannot have left the slack at the speeds that votes allow; 0 if one
+    /// is too many.
+    pub fn longest_lag(&self) -> u32 {
+        (self.slack / reach::lag_travel(self, 1) * (1.0 + 1e-9)) as u32
+    }
+
     /// Reach of the sort (length): the zone of warning plus the slack.
     ///
     /// The paper's proximity test is the size of the detection zone plus the slack. Pairs between one gap and
