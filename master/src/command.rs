@@ -101,9 +101,44 @@ pub enum Command {
     Check {
         /// The deck
         deck: PathBuf,
+        /// What a keyword deck does not say
+        #[command(flatten)]
+        reading: ReadingArgs,
+    },
+    /// Write an LS-DYNA keyword deck as a TOML deck, with its mesh in a file beside it
+    Convert {
+        /// The keyword deck
+        deck: PathBuf,
+        /// The TOML deck to write; the mesh goes beside it, ending in .mesh
+        to: PathBuf,
+        /// Replace files that are there
+        #[arg(long)]
+        force: bool,
+        /// What a keyword deck does not say
+        #[command(flatten)]
+        reading: ReadingArgs,
     },
     /// List the material library
     Materials,
+}
+
+/// What an LS-DYNA keyword deck does not say itself.
+#[derive(Args, Clone, Debug)]
+pub struct ReadingArgs {
+    /// Keyword decks: their units, one of mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), in-s-lbf,
+    /// SI (m-s-kg) [default: told by the densities]
+    #[arg(long)]
+    pub units: Option<String>,
+    /// Keyword decks: the case to run, of those that *CASE defines
+    #[arg(long)]
+    pub case: Option<u32>,
+}
+
+impl ReadingArgs {
+    /// As the reader takes them.
+    pub fn options(&self) -> deck::bundle::Options {
+        deck::bundle::Options { units: self.units.clone(), case: self.case }
+    }
 }
 
 /// How partial forces travel.
@@ -244,8 +279,11 @@ impl JobArgs {
 /// Flags of `run`.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
-    /// The deck (TOML)
+    /// The deck (TOML, or LS-DYNA keywords)
     pub deck: PathBuf,
+    /// What a keyword deck does not say
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Number of workers
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub workers: u32,
@@ -431,8 +469,11 @@ pub struct ClientArgs {
 /// Flags of `submit`.
 #[derive(Args, Clone, Debug)]
 pub struct SubmitArgs {
-    /// The deck (TOML)
+    /// The deck (TOML, or LS-DYNA keywords); files that it refers to are sent along
     pub deck: PathBuf,
+    /// What a keyword deck does not say
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Start when so many workers are there
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub min_workers: u32,

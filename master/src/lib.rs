@@ -11,6 +11,7 @@ pub mod certs;
 pub mod client;
 pub mod command;
 pub mod connection;
+pub mod convert;
 pub mod daemon;
 pub mod decompose;
 pub mod desk;

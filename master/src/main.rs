@@ -5,11 +5,12 @@
 use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 
 use clap::Parser;
+use deck::bundle::Options;
 
 use master::{
     bench, certs, client,
     command::{Bench, Certs, Cli, Command, Speed, WorkerArgs},
-    daemon, memory, processes, run, simulate,
+    convert, daemon, memory, processes, run, simulate,
 };
 use protocol::shape::{Shape, Wire};
 use worker::daemon::Listen;
@@ -39,7 +40,8 @@ fn main() -> ExitCode {
         Command::Bench { what: Some(Bench::Messages(args)), .. } => bench::messages::run(&args),
         Command::Bench { what: None, grind } => bench::grind::run(&grind),
         Command::Certs { what } => make_certificates(what),
-        Command::Check { deck } => check(&deck),
+        Command::Check { deck, reading } => check(&deck, &reading.options()),
+        Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
         Command::Materials => {
             for name in deck::materials() {
                 println!("{name}");
@@ -99,8 +101,8 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn check(path: &Path) -> Result<ExitCode, String> {
-    let model = run::read_deck(path)?;
+fn check(path: &Path, options: &Options) -> Result<ExitCode, String> {
+    let model = run::read_deck_with(path, options)?;
     println!(
         "{}: no fault; {} parts, {} elements, {} nodes",
         path.display(),

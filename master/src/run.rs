@@ -12,7 +12,10 @@ use std::{
     time::Instant,
 };
 
-use deck::model::Model;
+use deck::{
+    bundle::{self, Options},
+    model::Model,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::{
     phase::{Phase, Report},
@@ -23,7 +26,7 @@ use tracing::{info, warn};
 use crate::{
     command::RunArgs,
     embedded::{self, Sink, Traffic},
-    event::{Action, ForceSorts, Hand, Keep, Limit, Options, Outcome, Progress},
+    event::{self, Action, ForceSorts, Hand, Keep, Limit, Outcome, Progress},
     job::Job,
     processes::Processes,
     results::{
@@ -46,11 +49,48 @@ use crate::{
 /// # Errors
 /// Every fault of it, one per line.
 pub fn read_deck(path: &Path) -> Result<Model, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    deck::read(&text, &path.display().to_string()).map_err(|faults| {
+    read_deck_with(path, &Options::default())
+}
+
+/// Reads and checks a deck with what it does not say itself; warnings go to standard error.
+///
+/// # Errors
+/// Every fault of it, one per line.
+pub fn read_deck_with(path: &Path, options: &Options) -> Result<Model, String> {
+    let text = gather_deck(path, options)?;
+    let reading = deck::read_whole(&text, &path.display().to_string()).map_err(|faults| {
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
         list_of_faults(&lines)
-    })
+    })?;
+    warn(&reading.warnings);
+    Ok(reading.model)
+}
+
+/// Tells what is done otherwise than a deck says, on standard error.
+pub fn warn(warnings: &[deck::Warning]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}
+
+/// The text of a deck with the files that it refers to.
+///
+/// # Errors
+/// If the deck cannot be opened, or is too large.
+pub fn gather_deck(path: &Path, options: &Options) -> Result<String, String> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
+    // Comments of keyword decks are written in all kinds of encodings.
+    let text = match String::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) if error.as_bytes().iter().any(|b| matches!(b, b'*' | b'$')) => {
+            String::from_utf8_lossy(error.as_bytes()).into_owned()
+        }
+        Err(error) => return Err(format!("{name}: {error}")),
+    };
+    let mut open =
+        |path: &str| std::fs::read(path).ok().map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    bundle::gather(&name, text, options, &mut open)
 }
 
 /// Every fault of a deck, one per line, under their number.
@@ -63,8 +103,8 @@ pub fn list_of_faults(lines: &[String]) -> String {
 ///
 /// # Errors
 /// Faults of the deck or of the flags.
-pub fn model_for(deck: &Path, options: &JobOptions) -> Result<Model, String> {
-    let mut model = read_deck(deck)?;
+pub fn model_for(deck: &Path, reading: &Options, options: &JobOptions) -> Result<Model, String> {
+    let mut model = read_deck_with(deck, reading)?;
     limit(&mut model, options)?;
     Ok(model)
 }
@@ -89,8 +129,8 @@ pub fn limit(model: &mut Model, options: &JobOptions) -> Result<(), String> {
 
 /// The options of a job from what was asked, on so many workers; `all_take_peers` as for
 /// [`RouteChoice::choose`](protocol::request::RouteChoice::choose).
-pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> Options {
-    Options {
+pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> event::Options {
+    event::Options {
         lanes: asked.lanes.clone(),
         route: asked.route.choose(workers, all_take_peers),
         dealing: crate::balance::Dealing::Owners,
@@ -167,7 +207,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         pin.apply()?;
     }
     let asked = args.job.asked();
-    let model = Arc::new(model_for(&args.deck, &asked)?);
+    let model = Arc::new(model_for(&args.deck, &args.reading.options(), &asked)?);
     let n = args.workers as usize;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = args.threads.map_or(cores, |t| t as usize);

@@ -5,7 +5,7 @@ use mechanics::{contact::Settings, load::Drive, material::Material, setup::Const
 use super::{MAX_CONTACT_PARTS, MAX_ENTRIES, Names, boundary::Conditions};
 use crate::{
     assembly::Assembly,
-    check::{Face, outer_faces, smallest_face_dimension},
+    check::{Face, clearance, outer_faces, smallest_face_dimension},
     fault::short,
     geometry::{norm, sub},
     table::{Range, Table},
@@ -20,6 +20,11 @@ pub(crate) struct ContactDraft {
 
 /// Default gap over the smallest face dimension.
 const GAP_FRACTION: f64 = 0.1;
+/// Least gap over the smallest face dimension that fits itself to bodies which start close: the time step shrinks with
+/// the gap.
+const FIT_LEAST: f64 = 0.01;
+/// A gap that fits over the distance of the bodies.
+const FIT_SHARE: f64 = 0.95;
 /// Default slack over the gap. Two nodes travel at most 40 % of the gap against each other in a cycle, so lists last nine
 /// cycles at the least, and a sort may take eight.
 const SLACK_GAPS: f64 = 3.5;
@@ -50,7 +55,8 @@ pub(crate) fn read(
         return None;
     }
     let friction = table.number_or("friction", 0.0, Range::NotNegative);
-    let mut interacts: Vec<bool> = (0..n * n).map(|i| i / n != i % n).collect();
+    let others = table.get("default_interacts").and_then(|v| v.boolean()).unwrap_or(true);
+    let mut interacts: Vec<bool> = (0..n * n).map(|i| others && i / n != i % n).collect();
     let mut frictions = vec![friction; n * n];
     if let Some(value) = table.get("self_interaction") {
         for p in names.several(value).unwrap_or_default() {
@@ -60,7 +66,18 @@ pub(crate) fn read(
     read_pairs(&table, names, &mut interacts, &mut frictions);
     let faces = outer_faces(assembly);
     let smallest = smallest_face_dimension(assembly, &faces, &interacts);
-    let gap = read_gap(&table, smallest);
+    let gap = match table.get("gap_fraction").filter(|v| v.is_text()) {
+        Some(value) if value.one_of(&["fit"]).is_some() => {
+            let fit = |face: f64| {
+                let most = GAP_FRACTION * face;
+                let clearance = clearance(assembly, &interacts, &faces, most);
+                clearance.map_or(most, |d| (FIT_SHARE * d).clamp(FIT_LEAST * face, most))
+            };
+            smallest.map(fit)
+        }
+        Some(_) => None,
+        None => read_gap(&table, smallest),
+    };
     let slack = match (table.get("slack_gaps"), table.get("slack_length")) {
         (Some(_), Some(second)) => {
             second.fault("one of slack_gaps and slack_length", "remove one of the two");
@@ -177,6 +194,7 @@ fn read_gap(table: &Table<'_>, smallest: Option<f64>) -> Option<f64> {
 /// rest where there is a wall or one part only); where nothing moves, 1e-5 of the largest sound speed.
 fn default_friction_velocity(assembly: &Assembly, materials: &[Material], conditions: &Conditions) -> f64 {
     let mut velocities = assembly.part_velocity.clone();
+    velocities.extend(&assembly.file_velocities);
     // At its greatest, where it follows a curve.
     let speed = |v: Drive| v.greatest(&conditions.loads.curves).copysign(v.factor);
     let of_constraint = |c: &Constraint| c.velocity.map(|v| v.map_or(0.0, speed));
