@@ -231,8 +231,11 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     }
     // Nobody is lost who shares this process.
     let memory = asked.keep_every.filter(|_| args.processes);
-    let options =
-        Options { keep: keep_for(memory, interval), store: folder.is_some(), ..options_for(&asked, n, true) };
+    let options = event::Options {
+        keep: keep_for(memory, interval),
+        store: folder.is_some(),
+        ..options_for(&asked, n, true)
+    };
     let states = resume.as_ref().filter(|_| in_place).map(|snapshot| snapshot.states.clone());
     // Without contact the surface is found for its census alone, before there are states beside it.
     let bare = model.setup.contact.is_none().then(|| Census::without_contact(&model));
