@@ -23,7 +23,7 @@ use crate::{
     command::{ClientArgs, SubmitArgs},
     daemon::host_name,
     results::Folder,
-    run::list_of_faults,
+    run::{gather_deck, list_of_faults, warn},
 };
 
 pub mod top;
@@ -141,9 +141,13 @@ fn line_of(status: &Status) -> String {
 /// Faults of the deck, or whatever went wrong on the way.
 pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     let name = args.deck.display().to_string();
-    let text = std::fs::read_to_string(&args.deck).map_err(|e| format!("{name}: {e}"))?;
+    let text = gather_deck(&args.deck, &args.reading.options())?;
     if text.len() > DECK_LIMIT {
         return Err(format!("{name}: {} bytes, at most {DECK_LIMIT} can be sent", text.len()));
+    }
+    // The master answers with faults; what a run does otherwise than the deck says is told here.
+    if let Ok(reading) = deck::read_whole(&text, &name) {
+        warn(&reading.warnings);
     }
     let options = JobOptions {
         min_workers: args.min_workers,

@@ -85,11 +85,15 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Measure what this machine's parts cost
+    /// Measure what this machine takes for elements, contact, sorts and messages, and its --speed
+    #[command(args_conflicts_with_subcommands = true)]
     Bench {
-        /// What to measure
+        /// What to measure instead
         #[command(subcommand)]
-        what: Bench,
+        what: Option<Bench>,
+        /// Grind times
+        #[command(flatten)]
+        grind: GrindArgs,
     },
     /// Make certificates: a CA, and one folder for each host
     Certs {
@@ -101,6 +105,22 @@ pub enum Command {
     Check {
         /// The deck
         deck: PathBuf,
+        /// What a keyword deck does not say
+        #[command(flatten)]
+        reading: ReadingArgs,
+    },
+    /// Write an LS-DYNA keyword deck as a TOML deck, with its mesh in a file beside it
+    Convert {
+        /// The keyword deck
+        deck: PathBuf,
+        /// The TOML deck to write; the mesh goes beside it, ending in .mesh
+        to: PathBuf,
+        /// Replace files that are there
+        #[arg(long)]
+        force: bool,
+        /// What a keyword deck does not say
+        #[command(flatten)]
+        reading: ReadingArgs,
     },
     /// List the material library
     Materials,
@@ -121,6 +141,25 @@ pub enum Command {
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
+}
+
+/// What an LS-DYNA keyword deck does not say itself.
+#[derive(Args, Clone, Debug)]
+pub struct ReadingArgs {
+    /// Keyword decks: their units, one of mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), in-s-lbf,
+    /// SI (m-s-kg) [default: told by the densities]
+    #[arg(long)]
+    pub units: Option<String>,
+    /// Keyword decks: the case to run, of those that *CASE defines
+    #[arg(long)]
+    pub case: Option<u32>,
+}
+
+impl ReadingArgs {
+    /// As the reader takes them.
+    pub fn options(&self) -> deck::bundle::Options {
+        deck::bundle::Options { units: self.units.clone(), case: self.case }
+    }
 }
 
 /// How partial forces travel.
@@ -261,8 +300,11 @@ impl JobArgs {
 /// Flags of `run`.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
-    /// The deck (TOML)
+    /// The deck (TOML, or LS-DYNA keywords)
     pub deck: PathBuf,
+    /// What a keyword deck does not say
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Number of workers
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub workers: u32,
@@ -275,6 +317,9 @@ pub struct RunArgs {
     /// A process for each worker, over loopback TCP
     #[arg(long)]
     pub processes: bool,
+    /// Run on these processors only, as in 0,2-3
+    #[arg(long, value_name = "LIST")]
+    pub pin: Option<Processors>,
     /// Go on from a snapshot: this file, or the newest whole one of this results folder, which is then written on
     #[arg(long, value_name = "FILE|FOLDER")]
     pub resume: Option<PathBuf>,
@@ -396,9 +441,12 @@ pub struct WorkerArgs {
     /// The master: HOST, HOST:PORT or [ADDRESS]:PORT
     #[arg(long)]
     pub master: String,
-    /// Speed relative to the other workers
-    #[arg(long, default_value_t = 1.0)]
-    pub speed: f64,
+    /// Speed relative to the other workers; auto measures it: 1 is a thread that takes 100 ns for an element-cycle
+    #[arg(long, default_value = "1", value_name = "NUMBER|auto")]
+    pub speed: Speed,
+    /// Run on these processors only, as in 0,2-3
+    #[arg(long, value_name = "LIST")]
+    pub pin: Option<Processors>,
     /// Compute threads [default: all cores]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
@@ -445,8 +493,11 @@ pub struct ClientArgs {
 /// Flags of `submit`.
 #[derive(Args, Clone, Debug)]
 pub struct SubmitArgs {
-    /// The deck (TOML)
+    /// The deck (TOML, or LS-DYNA keywords); files that it refers to are sent along
     pub deck: PathBuf,
+    /// What a keyword deck does not say
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Start when so many workers are there
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub min_workers: u32,
@@ -465,6 +516,83 @@ pub struct SubmitArgs {
     /// The master
     #[command(flatten)]
     pub at: ClientArgs,
+}
+
+/// Flags of `bench` alone.
+#[derive(Args, Clone, Debug)]
+pub struct GrindArgs {
+    /// Rounds, of which the median and the least are printed
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub rounds: u32,
+    /// Elements along each side of the cube of two plates
+    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(6..=120))]
+    pub side: u32,
+    /// Lane width; the widest by default
+    #[arg(long, value_enum)]
+    pub lanes: Option<Lanes>,
+    /// Run on these processors only, as in 0,2-3
+    #[arg(long, value_name = "LIST")]
+    pub pin: Option<Processors>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Processors of this machine, as in `0,2-3`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Processors(Vec<usize>);
+
+impl Processors {
+    /// The highest number that is read.
+    const LAST: usize = 1023;
+
+    /// Confines this process to them: the calling thread, and all that it starts from now on.
+    ///
+    /// # Errors
+    /// If this machine has none of them.
+    pub fn apply(&self) -> Result<(), String> {
+        worker::compute::pin(&self.0)
+    }
+}
+
+impl std::str::FromStr for Processors {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let fault = || format!("processors {text:?}: a list of numbers up to {} as in 0,2-3", Self::LAST);
+        let number =
+            |digits: &str| digits.trim().parse::<usize>().ok().filter(|n| *n <= Self::LAST).ok_or_else(fault);
+        let mut processors = Vec::new();
+        for range in text.split(',') {
+            let (first, last) = range.split_once('-').unwrap_or((range, range));
+            let (first, last) = (number(first)?, number(last)?);
+            if first > last {
+                return Err(fault());
+            }
+            processors.extend(first..=last);
+        }
+        Ok(Self(processors))
+    }
+}
+
+/// A worker's speed relative to the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Speed {
+    /// Measured when the worker starts.
+    Auto,
+    /// As it was said.
+    Given(f64),
+}
+
+impl std::str::FromStr for Speed {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        text.parse().map(Self::Given).map_err(|_| format!("speed {text:?}: a number, or auto to measure it"))
+    }
 }
 
 /// What `bench` measures.
@@ -547,5 +675,25 @@ impl CertRole {
             Self::Worker => tls::Role::Worker,
             Self::Client => tls::Role::Client,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_of_processors_and_speeds_are_read_and_faults_say_what_was_read() {
+        assert_eq!("0,2-3".parse(), Ok(Processors(vec![0, 2, 3])));
+        for text in ["", "a", "3-2", "1024", "0,,1", "-1"] {
+            let fault = text.parse::<Processors>().expect_err(text);
+            assert!(fault.starts_with(&format!("processors {text:?}: ")), "{fault}");
+        }
+        assert_eq!("auto".parse(), Ok(Speed::Auto));
+        assert_eq!("0.5".parse(), Ok(Speed::Given(0.5)));
+        assert_eq!(
+            "fast".parse::<Speed>(),
+            Err("speed \"fast\": a number, or auto to measure it".to_owned())
+        );
     }
 }

@@ -84,6 +84,8 @@ pub struct Job {
     base: Arc<Base>,
     /// The time for a new base has come.
     keep_due: bool,
+    /// No state is kept to go back to.
+    lean: bool,
     first_cycle: u64,
     lanes: String,
     stop_asked: bool,

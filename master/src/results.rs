@@ -253,6 +253,7 @@ impl Units {
             "cm-g-us" => ("cm", "g", "us", "Mbar*cm3"),
             "mm-ms-kg" => ("mm", "kg", "ms", "J"),
             "mm-s-t" => ("mm", "t", "s", "mJ"),
+            "in-s-lbf" => ("in", "lbf*s2/in", "s", "in*lbf"),
             _ => ("length", "mass", "time", "energy"),
         };
         Self { length, mass, time, energy }
@@ -287,6 +288,7 @@ mod tests {
             "J" => 1.0,
             "mJ" => 1e-3,
             "Mbar*cm3" => 1e11 * 1e-6,
+            "in*lbf" => 0.0254 * 4.448_221_615_260_5,
             other => panic!("no size known for {other}"),
         };
         for (name, expected) in [
@@ -294,6 +296,7 @@ mod tests {
             ("cm-g-us", joule(1e-3, 1e-2, 1e-6)),
             ("mm-ms-kg", joule(1.0, 1e-3, 1e-3)),
             ("mm-s-t", joule(1e3, 1e-3, 1.0)),
+            ("in-s-lbf", joule(4.448_221_615_260_5 / 0.0254, 0.0254, 1.0)),
         ] {
             let named = size(Units::named(name).energy);
             assert!((named / expected - 1.0).abs() < 1e-12, "{name}: {named} J named, {expected} J derived");

@@ -12,7 +12,10 @@ use std::{
     time::Instant,
 };
 
-use deck::model::Model;
+use deck::{
+    bundle::{self, Options},
+    model::Model,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::{
     phase::{Phase, Report},
@@ -23,7 +26,7 @@ use tracing::{info, warn};
 use crate::{
     command::RunArgs,
     embedded::{self, Sink, Traffic},
-    event::{Action, ForceSorts, Hand, Keep, Limit, Options, Outcome, Progress},
+    event::{self, Action, ForceSorts, Hand, Keep, Limit, Outcome, Progress},
     job::Job,
     processes::Processes,
     results::{
@@ -46,11 +49,48 @@ use crate::{
 /// # Errors
 /// Every fault of it, one per line.
 pub fn read_deck(path: &Path) -> Result<Model, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    deck::read(&text, &path.display().to_string()).map_err(|faults| {
+    read_deck_with(path, &Options::default())
+}
+
+/// Reads and checks a deck with what it does not say itself; warnings go to standard error.
+///
+/// # Errors
+/// Every fault of it, one per line.
+pub fn read_deck_with(path: &Path, options: &Options) -> Result<Model, String> {
+    let text = gather_deck(path, options)?;
+    let reading = deck::read_whole(&text, &path.display().to_string()).map_err(|faults| {
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
         list_of_faults(&lines)
-    })
+    })?;
+    warn(&reading.warnings);
+    Ok(reading.model)
+}
+
+/// Tells what is done otherwise than a deck says, on standard error.
+pub fn warn(warnings: &[deck::Warning]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}
+
+/// The text of a deck with the files that it refers to.
+///
+/// # Errors
+/// If the deck cannot be opened, or is too large.
+pub fn gather_deck(path: &Path, options: &Options) -> Result<String, String> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
+    // Comments of keyword decks are written in all kinds of encodings.
+    let text = match String::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) if error.as_bytes().iter().any(|b| matches!(b, b'*' | b'$')) => {
+            String::from_utf8_lossy(error.as_bytes()).into_owned()
+        }
+        Err(error) => return Err(format!("{name}: {error}")),
+    };
+    let mut open =
+        |path: &str| std::fs::read(path).ok().map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    bundle::gather(&name, text, options, &mut open)
 }
 
 /// Every fault of a deck, one per line, under their number.
@@ -63,8 +103,8 @@ pub fn list_of_faults(lines: &[String]) -> String {
 ///
 /// # Errors
 /// Faults of the deck or of the flags.
-pub fn model_for(deck: &Path, options: &JobOptions) -> Result<Model, String> {
-    let mut model = read_deck(deck)?;
+pub fn model_for(deck: &Path, reading: &Options, options: &JobOptions) -> Result<Model, String> {
+    let mut model = read_deck_with(deck, reading)?;
     limit(&mut model, options)?;
     Ok(model)
 }
@@ -89,8 +129,8 @@ pub fn limit(model: &mut Model, options: &JobOptions) -> Result<(), String> {
 
 /// The options of a job from what was asked, on so many workers; `all_take_peers` as for
 /// [`RouteChoice::choose`](protocol::request::RouteChoice::choose).
-pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> Options {
-    Options {
+pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> event::Options {
+    event::Options {
         lanes: asked.lanes.clone(),
         route: asked.route.choose(workers, all_take_peers),
         dealing: crate::balance::Dealing::Owners,
@@ -163,8 +203,11 @@ pub fn folder_for(args: &RunArgs) -> PathBuf {
 /// # Errors
 /// Whatever kept it from its end.
 pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
+    if let Some(pin) = &args.pin {
+        pin.apply()?;
+    }
     let asked = args.job.asked();
-    let model = Arc::new(model_for(&args.deck, &asked)?);
+    let model = Arc::new(model_for(&args.deck, &args.reading.options(), &asked)?);
     let n = args.workers as usize;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = args.threads.map_or(cores, |t| t as usize);
@@ -188,11 +231,16 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     }
     // Nobody is lost who shares this process.
     let memory = asked.keep_every.filter(|_| args.processes);
-    let options =
-        Options { keep: keep_for(memory, interval), store: folder.is_some(), ..options_for(&asked, n, true) };
+    let options = event::Options {
+        keep: keep_for(memory, interval),
+        store: folder.is_some(),
+        ..options_for(&asked, n, true)
+    };
     let states = resume.as_ref().filter(|_| in_place).map(|snapshot| snapshot.states.clone());
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
-    let census = Census::of(&job, &model);
+    // Without contact the surface is found for its census alone, before there are states beside it.
+    let bare = model.setup.contact.is_none().then(|| Census::without_contact(&model));
+    let (mut job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
+    let census = bare.unwrap_or_else(|| Census::of(&job, &model));
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     if let Some(folder) = &output.folder {
         let snapshots = folder.file(store::FOLDER);
@@ -204,6 +252,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     }
     output.go_on(&job, states)?;
+    if !args.processes && output.keeper.is_none() {
+        job.keep_no_state();
+    }
     let stop = stop_on_interrupt("stopping after this cycle");
     let children = args.processes.then(|| Processes::start(&hands)).transpose()?;
     let started = Instant::now();
@@ -292,14 +343,18 @@ pub struct Census {
 impl Census {
     /// Of a job; without contact the surface is counted all the same.
     pub fn of(job: &Job, model: &Model) -> Self {
-        let count = |s: &mechanics::contact::Surface| Self {
-            elements: s.n_elements() as u64,
-            faces: s.faces.len() as u64,
-            nodes: s.nodes.len() as u64,
-        };
-        match job.surface() {
-            Some(surface) => count(surface),
-            None => count(&mechanics::contact::Surface::new(&model.mesh, &model.setup.materials, &|_| true)),
+        job.surface().map_or_else(|| Self::without_contact(model), Self::count)
+    }
+
+    fn without_contact(model: &Model) -> Self {
+        Self::count(&mechanics::contact::Surface::new(&model.mesh, &model.setup.materials, &|_| true))
+    }
+
+    fn count(surface: &mechanics::contact::Surface) -> Self {
+        Self {
+            elements: surface.n_elements() as u64,
+            faces: surface.faces.len() as u64,
+            nodes: surface.nodes.len() as u64,
         }
     }
 }

@@ -32,6 +32,15 @@ pub fn example(name: &str) -> Model {
     model(&std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}")))
 }
 
+/// Reads an example of a keyword deck, with what it includes.
+///
+/// # Panics
+/// If it is not there or has faults.
+pub fn keyword(name: &str) -> Model {
+    let path = format!("{}/../deck/examples/{name}.k", env!("CARGO_MANIFEST_DIR"));
+    master::run::read_deck(std::path::Path::new(&path)).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
 /// Who computes, and what is asked beside the deck.
 #[derive(Clone, Debug)]
 pub struct Crew {

@@ -236,7 +236,7 @@ fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
         Task::Border { .. } => "die-in-border",
         Task::Interior { .. } => "die-in-interior",
         Task::Integrate { .. } => "die-in-integrate",
-        Task::Image => "die-in-image",
+        Task::Image { .. } => "die-in-image",
     };
     failpoint::die(name);
     if let Task::Border { gather: true, .. } | Task::Install { gather: true, .. } = &task {

@@ -103,7 +103,10 @@ pub enum Task {
         walls: Vec<Pose>,
     },
     /// State of all sub-domains.
-    Image,
+    Image {
+        /// Nothing is computed on them after that.
+        last: bool,
+    },
 }
 
 /// What came of a task.
@@ -541,7 +544,7 @@ impl Session {
         }
         if (stop || collect) && !self.imaged {
             self.phase = Phase::Imaging;
-            actions.push(Action::Compute(Task::Image));
+            actions.push(Action::Compute(Task::Image { last: stop }));
             return Ok(());
         }
         if gather {

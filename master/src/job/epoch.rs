@@ -239,6 +239,9 @@ impl Job {
         let crew: Vec<usize> = (0..self.members.len()).filter(|&m| self.members[m].alive).collect();
         let nobody = crew.is_empty();
         self.epoch = self.deal(number, crew, actions)?;
+        if self.lean {
+            self.forget_base();
+        }
         if nobody && self.leaves {
             self.suspend_at_base(actions);
         } else if nobody && self.stop_asked {

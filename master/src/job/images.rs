@@ -46,8 +46,9 @@ impl Job {
             return Ok(());
         }
         let Some(collected) = self.epoch.collecting.remove(&cycle) else { return Ok(()) };
-        let mut state = GlobalState::clone(&self.base.state);
-        for piece in &collected.pieces {
+        let before = &self.base.state;
+        let mut state = if before.is_static() { before.to_fill() } else { GlobalState::clone(before) };
+        for piece in collected.pieces {
             piece::put_back(piece, &mut state)?;
         }
         state.cycle = cycle;
@@ -96,7 +97,9 @@ impl Job {
         if state.cycle > self.first_cycle && last != Some(state.cycle - 1) {
             self.row(actions);
         }
-        actions.push(Action::State(Box::new(state.clone())));
+        if self.options.states {
+            actions.push(Action::State(Box::new(state.clone())));
+        }
         self.finish(Some(state), actions);
         Ok(())
     }

@@ -132,6 +132,7 @@ impl Job {
             walls: base.rest.walls.clone(),
             base: Arc::new(base),
             keep_due: false,
+            lean: false,
             first_cycle,
             lanes: String::new(),
             stop_asked: false,
@@ -161,6 +162,21 @@ impl Job {
         Ok((job, actions))
     }
 
+    /// From now on no state is kept to go back to: for a crew of which nobody can be lost, as it shares this process.
+    pub fn keep_no_state(&mut self) {
+        self.lean = true;
+        self.forget_base();
+    }
+
+    /// Drops what only going back would need of the base that has been dealt out.
+    pub(super) fn forget_base(&mut self) {
+        let state = Arc::new(self.base.state.statics());
+        if let Some(bench) = self.epoch.bench.as_mut().and_then(Arc::get_mut) {
+            bench.state = Arc::clone(&state);
+        }
+        self.base = Arc::new(Base { state, rest: self.base.rest.clone() });
+    }
+
     /// Deals the base out to a crew, as epoch `number`.
     pub(super) fn deal(
         &mut self,
@@ -169,6 +185,9 @@ impl Job {
         actions: &mut Vec<Action>,
     ) -> Result<Epoch, String> {
         let base = Arc::clone(&self.base);
+        if base.state.is_static() {
+            return Err(format!("no state of cycle {} is kept to go back to", base.state.cycle));
+        }
         let mut epoch = Epoch::without_workers(number, &base, &self.model);
         let n = crew.len();
         if n == 0 {

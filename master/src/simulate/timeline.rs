@@ -67,7 +67,7 @@ impl Kind {
             Task::Border { .. } => Kind::Border,
             Task::Interior { .. } => Kind::Interior,
             Task::Integrate { .. } => Kind::Integrate,
-            Task::Image => Kind::Image,
+            Task::Image { .. } => Kind::Image,
         }
     }
 }
