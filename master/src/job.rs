@@ -33,7 +33,7 @@ use crate::{
     exchange::Exchange,
     holdings::Holdings,
     ledger::Ledger,
-    results::history::HistoryRow,
+    results::{history::HistoryRow, surface::Probe},
     sort::{Sorted, Sorter},
 };
 use epoch::{Acting, Base, Epoch, Member, Step};
@@ -127,6 +127,18 @@ impl Job {
     /// Surface of the problem; none without contact.
     pub fn surface(&self) -> Option<&Surface> {
         self.epoch.bench.as_ref().map(|bench| bench.sorter.surface())
+    }
+
+    /// What computes contact again from a state; none without contact.
+    pub fn probe(&self) -> Option<Probe> {
+        let (touching, settings) = self.touching.as_ref().zip(self.model.setup.contact.clone())?;
+        let (surface, exclusions) = touching.parts();
+        Some(Probe { surface, settings, exclusions, quantum: self.quanta.force })
+    }
+
+    /// Speeds that work is dealt out by, by worker.
+    pub fn speeds(&self) -> &[f64] {
+        &self.epoch.speeds
     }
 
     /// How partial forces travel.

@@ -26,6 +26,7 @@ pub mod job;
 pub mod ledger;
 pub mod memory;
 pub mod peers;
+pub mod picture;
 pub mod processes;
 pub mod queue;
 pub mod results;

@@ -10,7 +10,7 @@ use deck::bundle::Options;
 use master::{
     bench, certs, client,
     command::{Bench, Certs, Cli, Command, Speed, WorkerArgs},
-    convert, daemon, memory, processes, run, simulate,
+    convert, daemon, memory, picture, processes, run, simulate,
 };
 use protocol::shape::{Shape, Wire};
 use worker::daemon::Listen;
@@ -48,6 +48,7 @@ fn main() -> ExitCode {
         Command::Man { out } => manual(out.as_deref()),
         Command::Check { deck, reading } => check(&deck, &reading.options()),
         Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
+        Command::Picture(args) => picture::run(&args),
         Command::Materials => {
             for name in deck::materials() {
                 println!("{name}");

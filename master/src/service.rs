@@ -150,6 +150,7 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
         sheet: sheet.clone(),
     };
     let (outcome, traffic) = drive(job, first, order.number, &order.seats, line, &mut reporter, &order.stop)?;
+    reporter.output.flush()?;
     if let Some(sheet) = &sheet {
         board::lock(sheet).over(outcome.failure.is_none() && !outcome.stopped);
     }
@@ -244,8 +245,8 @@ impl Sink for Reporter<'_> {
         let progress = match action {
             Action::Progress(progress) => progress,
             Action::Dealt(deals) => {
-                self.dealt(deals);
-                return Ok(());
+                self.dealt(deals.clone());
+                return self.output.take(Action::Dealt(deals));
             }
             Action::Rewind { cycle, .. } => {
                 warn!(job = self.number, "a worker is lost: back to cycle {cycle}");

@@ -14,7 +14,7 @@ use mechanics::{
     mesh::Mesh,
     piece,
     state::GlobalState,
-    vote::Quanta,
+    vote::{Quanta, Watched},
     wall,
 };
 use protocol::{
@@ -42,6 +42,13 @@ use crate::{
 pub(super) struct Touching {
     surface: Arc<Surface>,
     exclusions: Arc<Exclusions>,
+}
+
+impl Touching {
+    /// Surface and exclusions.
+    pub(super) fn parts(&self) -> (Arc<Surface>, Arc<Exclusions>) {
+        (Arc::clone(&self.surface), Arc::clone(&self.exclusions))
+    }
 }
 
 impl Job {
@@ -230,6 +237,10 @@ impl Job {
         self.imbalance = imbalance(&elements, &interactions, &speeds);
         let exchange = Arc::new(exchange);
         let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
+        let watched = Watched {
+            elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
+            contacts: model.output.contact_forces.clone(),
+        };
         for (position, subdomains) in cut.by_worker.into_iter().enumerate() {
             let assign = Assign {
                 epoch: number,
@@ -238,6 +249,7 @@ impl Job {
                 quanta: Quanta { force: base.rest.quanta[0], ..self.quanta },
                 subdomains,
                 gauges: gauges.clone(),
+                watched: watched.clone(),
                 lanes: self.options.lanes.clone(),
                 cycle: state.cycle,
                 dt_previous: base.rest.dt_previous,

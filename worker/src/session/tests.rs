@@ -30,6 +30,7 @@ fn assign(cycle: u64) -> Box<Assign> {
         quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
         subdomains: Vec::new(),
         gauges: Vec::new(),
+        watched: Default::default(),
         lanes: None,
         cycle,
         dt_previous: 0.0,
