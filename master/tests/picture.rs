@@ -8,6 +8,7 @@ use std::{
 
 use master::results::{
     self, Folder,
+    history::History,
     vtu::{
         Series,
         read::{self, Piece},
@@ -45,6 +46,8 @@ fn block(name: &str, compress: bool, hot: [usize; 3]) -> (Folder, GlobalState) {
     let (mesh, setup) = (&model.mesh, &model.setup);
     let mut state = initial::state(mesh, setup, &model.velocity, &model.constraint).expect("sound elements");
     let folder = Folder::create(&scratch(name), false).expect("fresh");
+    // Units are told by the headings of the history.
+    drop(History::create(&folder, &model).expect("fresh"));
     let mut series = Series::new(&folder, &model).expect("known fields");
     series.write(&model, &state, None).expect("written");
     state.time = 0.5;

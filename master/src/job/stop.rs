@@ -91,6 +91,9 @@ pub(super) fn not_a_number(vote: &Vote) -> Option<String> {
     }
     let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
     let numbers = energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external]);
-    let bad = numbers.chain([vote.force_bound, vote.contact_speed_squared]).find(|value| !value.is_finite());
+    let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);
+    let seen = seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| *state));
+    let numbers = numbers.chain(seen).chain([vote.force_bound, vote.contact_speed_squared]);
+    let bad = numbers.into_iter().find(|value| !value.is_finite());
     bad.map(|value| format!("an energy, momentum or force of its vote is {value}, must be finite"))
 }

@@ -15,13 +15,16 @@ const MOST_DOTS: u64 = 40_000_000;
 /// Where light comes from: right, up, towards the viewer.
 const LIGHT: [f64; 3] = [-0.35, 0.5, 0.79];
 /// Light on a face that is turned away from it.
-const AMBIENT: f64 = 0.52;
+const AMBIENT: f64 = 0.64;
 /// Lines lie this much nearer than the faces they belong to, as a share of all that is seen.
 const NEARER: f64 = 2e-3;
 /// Edges of elements fade away where they are shorter than so many pixels.
 const SHORT_EDGE: f64 = 7.0;
 /// How opaque they are where they are long.
-const EDGE: f64 = 0.28;
+const EDGE: f64 = 0.3;
+/// Lines on dark faces, which ink would not be seen on, and how dark those are (sum of the three).
+const CHALK: Colour = [168, 164, 188];
+const DARK: u32 = 190;
 
 /// A picture: rows of pixels from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,9 +104,9 @@ impl Canvas {
         for &([a, b], outline) in &skin.lines {
             let ends = [at[a as usize], at[b as usize]];
             if outline {
-                self.line(ends, nearer, 0.75, self.fine as i64 - 1);
+                self.line(ends, nearer, 0.75, true);
             } else if edges && fade > 0.02 {
-                self.line(ends, nearer, fade, 0);
+                self.line(ends, nearer, fade, false);
             }
         }
     }
@@ -153,8 +156,10 @@ impl Canvas {
         }
     }
 
-    /// Draws a line over what is not in front of it by more than `nearer`; `wide` dots wider than one.
-    fn line(&mut self, [p, q]: [[f64; 3]; 2], nearer: f64, share: f64, wide: i64) {
+    /// Draws a line over what is not in front of it by more than `nearer`: an outline, or an edge of an element, opaque by
+    /// `share`.
+    fn line(&mut self, [p, q]: [[f64; 3]; 2], nearer: f64, share: f64, outline: bool) {
+        let wide = if outline { self.fine as i64 - 1 } else { 0 };
         let steps = (p[0] - q[0]).abs().max((p[1] - q[1]).abs()).ceil();
         if !steps.is_finite() || steps > 1e6 {
             return;
@@ -172,7 +177,9 @@ impl Canvas {
                 }
                 let dot = (y * columns + x) as usize;
                 if (near + nearer) as f32 >= self.near[dot] {
-                    self.dots[dot] = blend(self.dots[dot], INK, share);
+                    let under = self.dots[dot];
+                    let dark = under.iter().map(|&c| u32::from(c)).sum::<u32>() < DARK;
+                    self.dots[dot] = blend(under, if dark && !outline { CHALK } else { INK }, share);
                 }
             }
         }

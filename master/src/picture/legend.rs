@@ -129,8 +129,10 @@ impl Legend {
         let (width, height) = (i64::from(image.width), i64::from(image.height));
         let [left, top, wide, _] = frame((image.width, image.height)).map(|x| x as i64);
         let room = width - 2 * left;
-        let large = if width >= 700 { RasterHeight::Size20 } else { RasterHeight::Size16 };
         let heading = if self.title.is_empty() { &self.field } else { &self.title };
+        let needs = heading.chars().count() * get_raster_width(FontWeight::Regular, RasterHeight::Size20);
+        let fits = width >= 700 && needs as i64 <= room;
+        let large = if fits { RasterHeight::Size20 } else { RasterHeight::Size16 };
         write(image, (left, 12), large, INK, &fitting(heading, large, room));
         let below = if self.title.is_empty() {
             self.moment.clone()

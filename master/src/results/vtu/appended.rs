@@ -177,7 +177,7 @@ mod tests {
         for end in [0, 7, 8, 23, 30, 100, bytes.len() - 1] {
             decode(&bytes[..end], true, 480_000).expect_err("cut short");
         }
-        for (at, value) in [(0, 9), (7, 0xff), (8, 1), (15, 0xff), (24, 3), (31, 0x7f), (60, 0x55)] {
+        for (at, value) in [(0, 9), (7, 0xff), (10, 1), (15, 0xff), (24, 3), (31, 0x7f), (60, 0x55)] {
             let mut wrong = bytes.clone();
             wrong[at] = value;
             decode(&wrong, true, 480_000).expect_err("a byte changed");

@@ -3,8 +3,9 @@
 use crate::{exact::Quantum, vote::PairVote};
 
 /// A sum over all contacts of a pair has far more terms than one over those of a node, so it has a quantum that is
-/// `2^20` times as large. Of the 42 bits below the stiffest face force 22 are left.
-const COARSER: u32 = 20;
+/// `2^12` times as large: `2^21` terms at which a coarser quantum is asked for are added exactly. Of the 42 bits below the
+/// stiffest face force 30 are left.
+const COARSER: u32 = 12;
 
 /// No pair.
 const NONE: u32 = u32::MAX;
