@@ -437,6 +437,7 @@ impl Job {
         let time_next = now.time + now.dt;
         let remaining = (control.end_time - time_next).max(0.0);
         let (dt, limit) = if remaining < dt * 1.000_000_1 { (remaining, Limit::End) } else { (dt, limit) };
+        self.check_floor(cycle + 1, dt, limit, element);
         let time_after = if limit == Limit::End { control.end_time } else { time_next + dt };
         self.epoch.steps.insert(cycle + 1, Step { dt, time: time_next, quantum: self.epoch.quantum });
         while self.epoch.steps.len() > 4 {
