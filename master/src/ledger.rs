@@ -80,7 +80,7 @@ impl Ledger {
 
     /// Books the whole vote of a cycle that began at `time` with step `dt`; `gap` where there is contact.
     pub fn book(&mut self, vote: &Vote, cycle: u64, time: f64, dt: f64, gap: Option<f64>) {
-        let sum = |f: &dyn Fn(&mechanics::vote::PartVote) -> f64| vote.parts.iter().map(f).sum::<f64>();
+        let sum = |f: &dyn Fn(&PartVote) -> f64| vote.parts.iter().map(f).sum::<f64>();
         self.hourglass += sum(&|p| p.hourglass);
         self.viscosity += sum(&|p| p.viscosity);
         self.friction += vote.friction;
