@@ -63,7 +63,7 @@ impl Bench {
 
 /// Share of the allowed time step that a run begins with where bodies hold energy. Where a gas meets a thinner one, the
 /// first steps raise velocities from nothing, and viscosity with them, before a vote can tell.
-const START: f64 = 0.5;
+const START: f64 = 0.2;
 
 /// Share of the time step that `vote`, of the time before the first cycle, allows.
 fn first_share(vote: &Vote) -> f64 {

@@ -405,7 +405,9 @@ fn history_reads_back_to_the_same_bits_under_names_with_units() {
         let mut expected = vec![row.cycle as f64, row.time, row.dt, row.kinetic, row.internal, row.hourglass];
         expected.extend([row.contact, row.friction, row.external, row.total, row.error]);
         expected.extend(row.momentum);
-        expected.extend(row.parts.iter().flat_map(|p| [p.kinetic, p.internal]));
+        expected.extend(
+            row.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity, p.external]),
+        );
         expected.extend(row.gauges.iter().flat_map(|g| g.x.into_iter().chain(g.v)));
         assert_eq!(bytes_of(read.iter().copied()), bytes_of(expected), "cycle {cycle}");
     }
