@@ -12,8 +12,9 @@ use std::fmt;
 /// The version of the messages in this module and in the control messages, stated first in [`Hello`].
 ///
 /// 1: the first. 2: links between workers (`peer_port` and `member` in [`Hello`]), introductions and reports.
-/// 3: what is watched in assignments, and in votes what was seen.
-pub const VERSION: u16 = 3;
+/// 3: the work of loads by part in votes.
+/// 4: what is watched in assignments, and in votes what was seen.
+pub const VERSION: u16 = 4;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

@@ -61,8 +61,29 @@ pub struct HistoryRow {
 pub struct PartEnergy {
     /// Kinetic energy.
     pub kinetic: f64,
-    /// Internal energy.
+    /// Internal energy, with what artificial viscosity put in.
     pub internal: f64,
+    /// Energy taken by hourglass forces so far.
+    pub hourglass: f64,
+    /// Work of artificial viscosity so far (part of internal energy).
+    pub viscosity: f64,
+    /// Work done on it from outside so far.
+    pub external: f64,
+}
+
+impl PartEnergy {
+    /// Names of the columns, in the order of [`PartEnergy::numbers`].
+    pub const NAMES: [&'static str; 5] = ["kinetic", "internal", "hourglass", "viscosity", "external"];
+
+    /// Its numbers, in the order of the columns.
+    pub fn numbers(&self) -> [f64; 5] {
+        [self.kinetic, self.internal, self.hourglass, self.viscosity, self.external]
+    }
+
+    /// What the part has by itself: kinetic, internal and hourglass energy less the work done on it.
+    pub fn own(&self) -> f64 {
+        self.kinetic + self.internal + self.hourglass - self.external
+    }
 }
 
 /// What a gauge reads.
@@ -173,7 +194,7 @@ impl History {
             .into_iter()
             .chain([row.external, row.total, row.error])
             .chain(row.momentum)
-            .chain(row.parts.iter().flat_map(|part| [part.kinetic, part.internal]))
+            .chain(row.parts.iter().flat_map(PartEnergy::numbers))
             .chain(row.gauges.iter().zip(&self.gauges).flat_map(|(gauge, start)| {
                 let moved: [f64; 3] = std::array::from_fn(|axis| gauge.x[axis] - start[axis]);
                 gauge.x.into_iter().chain(gauge.v).chain(moved)
@@ -268,7 +289,7 @@ fn header(model: &Model) -> String {
     columns.push("error".to_owned());
     columns.extend(["x", "y", "z"].iter().map(|axis| format!("momentum_{axis} [{mass}*{length}/{time}]")));
     for part in &model.mesh.parts {
-        columns.extend(["kinetic", "internal"].iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
+        columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
     }
     for gauge in &model.output.gauges {
         columns.extend(["x", "y", "z"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));
