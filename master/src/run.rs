@@ -607,7 +607,11 @@ impl Output {
         }
         let Some(writer) = &self.writer else { return Ok(()) };
         if let Some(probe) = job.probe().filter(|_| self.model.output.contact_surface) {
-            writer.with(|series| Ok(series.with_contact(probe))).map_err(|e| e.to_string())?;
+            let on = |series: &mut Series| {
+                series.with_contact(probe);
+                Ok(())
+            };
+            writer.with(on).map_err(|e| e.to_string())?;
         }
         self.dealt(job.speeds());
         let Some(states) = states else { return self.state(Box::new(job.start_state().clone())) };

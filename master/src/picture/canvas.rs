@@ -126,7 +126,7 @@ impl Canvas {
     /// Fills a triangle; the colour follows from values at its corners.
     fn triangle(&mut self, [a, b, c]: [[f64; 3]; 3], values: [f64; 3], light: f64) {
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        if !(area.abs() > 1e-9) {
+        if area.is_nan() || area.abs() <= 1e-9 {
             return;
         }
         let columns = self.columns();
