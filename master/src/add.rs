@@ -2,7 +2,7 @@
 //!
 //! What runs on a host is a short script for `sh`, given to it on standard input, so that no shell of the user quotes
 //! anything anew. It starts the worker in the background with its log in `~/.bolide`, waits until the log says that
-//! the worker has joined, and ends: no connection of ssh stays. Whatever ssh or the worker say against it is printed.
+//! the worker has joined, and ends: no connection of ssh stays. A worker that ends at once leaves the log of one before. Whatever ssh or the worker say against it is printed.
 
 use std::{fmt::Write, process::ExitCode, process::Stdio, time::Duration};
 
@@ -160,16 +160,21 @@ fn script(host: &Host, master: &str) -> String {
     let _ = write!(
         text,
         r#"mkdir -p "$HOME/.bolide" || exit 1
-log="$HOME/.bolide/worker-{name}.log"
+log="$HOME/.bolide/worker-{name}.log" new="$HOME/.bolide/worker-{name}.log.$$"
 command -v {path} >/dev/null || {{ echo "no program "{path}" on $(uname -n)" >&2; exit 127; }}
-BOLIDE_LOG=${{BOLIDE_LOG:-info}} nohup {worker} >"$log" 2>&1 </dev/null &
+BOLIDE_LOG=${{BOLIDE_LOG:-info}} nohup {worker} >"$new" 2>&1 </dev/null &
 worker=$! tenths=0
 while [ $tenths -lt {JOIN_TENTHS} ]; do
-    if grep -q ' joined ' "$log"; then echo "joined $worker"; exit 0; fi
-    if ! kill -0 $worker 2>/dev/null; then tail -n 2 "$log" >&2; exit 1; fi
+    if grep -q ' joined ' "$new"; then mv "$new" "$log"; echo "joined $worker"; exit 0; fi
+    if ! kill -0 $worker 2>/dev/null; then
+        grep '^bolide: ' "$new" >&2 || tail -n 2 "$new" >&2
+        rm "$new"
+        exit 1
+    fi
     sleep 0.1
     tenths=$((tenths + 1))
 done
+mv "$new" "$log"
 echo "dialling $worker"
 "#
     );

@@ -286,6 +286,12 @@ deferred = true
     }
 
     #[test]
+    fn the_example_has_no_fault() {
+        let lab = read(include_str!("../../../deploy/hosts/hosts.toml"), "hosts.toml").expect("no fault");
+        assert_eq!((lab.hosts.len(), lab.choose(&[]).map(|hosts| hosts.len())), (3, Ok(2)));
+    }
+
+    #[test]
     fn deferred_hosts_are_started_by_name_only() {
         let lab = read(LAB, "hosts.toml").expect("no fault");
         let names = |asked: &[&str]| {
