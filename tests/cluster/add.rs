@@ -1,4 +1,4 @@
-//! `bolide add` over a real sshd, and what daemons tell a service manager.
+//! `bolide add` over a real sshd, what daemons tell a service manager, and `bolide top` on a terminal.
 
 use std::{
     fs,
@@ -11,6 +11,7 @@ use std::{
 use tests::{
     cluster::{Cluster, DEADLINE, Process, said},
     sshd::{self, Sshd},
+    terminal::Terminal,
 };
 
 use crate::{BOLIDE, digest_of, reference, small};
@@ -194,4 +195,19 @@ fn daemons_say_when_they_are_ready_give_signs_of_life_and_say_when_they_end() {
     while let Ok(state) = worker_says.recv_timeout(Duration::from_millis(10)) {
         assert!(!state.contains("WATCHDOG"), "{state}");
     }
+}
+
+#[test]
+fn top_shows_hosts_and_jobs_on_a_terminal_and_q_leaves() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker("pc-1", "1");
+    cluster.worker("pc-2", "2");
+    assert_eq!(cluster.json(&["submit", &small(), "--cycles", "40", "--wait"])["workers"], 2);
+    let mut top = Terminal::start(&format!("{BOLIDE} top --master {}", cluster.address), 120, 20);
+    let screen = top.wait_for(reference());
+    for words in ["2 hosts, 0 jobs running", "pc-1", "pc-2", "done", "q leaves"] {
+        assert!(screen.text().contains(words), "{words} in\n{}", screen.text());
+    }
+    top.press("q");
+    assert_eq!(top.wait(), Some(0));
 }
