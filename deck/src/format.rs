@@ -11,6 +11,7 @@ mod boundary;
 mod burn;
 mod contact;
 mod curve;
+mod erosion;
 mod load;
 mod output;
 mod part;
@@ -108,6 +109,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = control
         .map(|control| Control { sort_lag: sort_lag(&deck, control.sort_lag, settings, faults), ..control });
+    let erosion = erosion::read(&deck, &parts, settings.is_some());
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
@@ -138,6 +140,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
             walls: conditions.walls,
             detonations,
             loads: conditions.loads,
+            erosion,
         },
         output,
     })

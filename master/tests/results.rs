@@ -107,6 +107,7 @@ fn plates(cells: u32) -> Model {
             walls: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
+            erosion: Default::default(),
         },
         output: Output {
             period: None,

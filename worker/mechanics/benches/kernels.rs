@@ -181,6 +181,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         walls: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
+        erosion: Default::default(),
     };
     let falls = |n: u32| [0.0, 0.0, if n / plane > below { -500.0 } else { 0.0 }];
     let velocity: Vec<[f64; 3]> = mesh.node_ids.iter().map(|&n| falls(n)).collect();

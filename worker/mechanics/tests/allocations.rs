@@ -113,6 +113,7 @@ fn domain() -> Domain {
         walls: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
+        erosion: Default::default(),
     };
     let base = (cells[0] + 1) * (cells[1] + 1);
     let held: Vec<u16> = (0..n_nodes).map(|n| u16::from(n < base)).collect();

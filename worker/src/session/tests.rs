@@ -25,6 +25,7 @@ fn assign(cycle: u64) -> Box<Assign> {
             walls: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
+            erosion: Default::default(),
         },
         n_parts: 1,
         quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
