@@ -188,7 +188,7 @@ impl Census {
         let count = |s: &mechanics::contact::Surface| Self {
             elements: s.n_elements() as u64,
             faces: s.faces.len() as u64,
-            nodes: s.nodes.len() as u64,
+            nodes: s.active.iter().filter(|active| **active).count() as u64,
         };
         match job.surface() {
             Some(surface) => count(surface),
@@ -282,6 +282,9 @@ pub fn summarise(
         bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
         master_bytes_per_cycle: per((traffic.bytes - traffic.peer_bytes) as f64, run_cycles),
         worker_times: worker_times(&outcome.workers, &outcome.reports),
+        eroded_elements: ledger.eroded_elements,
+        eroded_mass: ledger.eroded_mass,
+        eroded_energy: ledger.eroded,
         energies: Energies {
             kinetic: ledger.last.kinetic,
             internal: ledger.last.internal,

@@ -31,7 +31,7 @@ pub struct Snapshot {
 }
 
 /// First bytes of a snapshot file.
-const MAGIC: &[u8; 8] = b"BLDSNAP3";
+const MAGIC: &[u8; 8] = b"BLDSNAP4";
 
 /// Writes a snapshot: temporary file, checksum, fsync, rename.
 ///

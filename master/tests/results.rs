@@ -147,6 +147,8 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         constraint: vec![0; model.mesh.n_nodes()],
         initial_volume: vec![1.0; n],
         elements,
+        eroded: Vec::new(),
+        strain: Vec::new(),
     }
 }
 
@@ -200,6 +202,7 @@ fn summary(model: &Model) -> Summary {
         rebalances: Vec::new(),
         losses: Vec::new(),
         digest: "00ff".repeat(16),
+        ..Summary::default()
     }
 }
 
@@ -214,6 +217,9 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
         hourglass: -0.0,
         contact: 1e-7,
         friction: 1e16,
+        eroded: 0.0,
+        eroded_elements: 0,
+        eroded_mass: 0.0,
         external: 2.0,
         total: x.sqrt(),
         error: -1.0 / 7.0,
