@@ -145,6 +145,28 @@ impl Folder {
         Ok(Self { path: path.to_owned() })
     }
 
+    /// Removes the files of all states but the first so many, of which one that is missing is an error.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn keep_states(&self, count: usize) -> Result<(), Error> {
+        for entry in fs::read_dir(&self.path).map_err(Error::io("read", &self.path))? {
+            let entry = entry.map_err(Error::io("read", &self.path))?;
+            let name = entry.file_name();
+            let index = name
+                .to_str()
+                .and_then(|n| n.strip_prefix("state-")?.strip_suffix(".vtu")?.parse::<usize>().ok());
+            if index.is_some_and(|index| index >= count) {
+                fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
+            }
+        }
+        for index in 0..count {
+            let path = self.file(&state_name(index as u32));
+            fs::metadata(&path).map_err(Error::io("read", &path))?;
+        }
+        Ok(())
+    }
+
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path
@@ -227,6 +249,7 @@ impl Units {
             "cm-g-us" => ("cm", "g", "us", "Mbar*cm3"),
             "mm-ms-kg" => ("mm", "kg", "ms", "J"),
             "mm-s-t" => ("mm", "t", "s", "mJ"),
+            "in-s-lbf" => ("in", "lbf*s2/in", "s", "in*lbf"),
             _ => ("length", "mass", "time", "energy"),
         };
         Self { length, mass, time, energy }
@@ -261,6 +284,7 @@ mod tests {
             "J" => 1.0,
             "mJ" => 1e-3,
             "Mbar*cm3" => 1e11 * 1e-6,
+            "in*lbf" => 0.0254 * 4.448_221_615_260_5,
             other => panic!("no size known for {other}"),
         };
         for (name, expected) in [
@@ -268,6 +292,7 @@ mod tests {
             ("cm-g-us", joule(1e-3, 1e-2, 1e-6)),
             ("mm-ms-kg", joule(1.0, 1e-3, 1e-3)),
             ("mm-s-t", joule(1e3, 1e-3, 1.0)),
+            ("in-s-lbf", joule(4.448_221_615_260_5 / 0.0254, 0.0254, 1.0)),
         ] {
             let named = size(Units::named(name).energy);
             assert!((named / expected - 1.0).abs() < 1e-12, "{name}: {named} J named, {expected} J derived");

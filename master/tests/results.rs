@@ -110,6 +110,8 @@ fn plates(cells: u32) -> Model {
             erosion: Default::default(),
         },
         output: Output {
+            snapshot_seconds: None,
+            snapshot_cycles: None,
             period: None,
             history_cycles: 1,
             fields: Vec::new(),

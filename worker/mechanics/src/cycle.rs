@@ -20,7 +20,7 @@ use crate::{
     block::{Block, Piece},
     contact::{Batch, Contact},
     element::{ElementVote, Step},
-    erosion::Eroding,
+    erosion::{Eroding, PieceErosion},
     home::Home,
     lanes::{SET, Width},
     load::face::{self, FaceVote, LoadedFace},
@@ -170,6 +170,11 @@ impl Room {
         booked
     }
 
+    /// Which elements have eroded and how far the others are, where they can.
+    fn erosion(&self) -> Option<PieceErosion> {
+        self.eroding.as_ref().map(|eroding| eroding.state(&self.block))
+    }
+
     fn is_booked(&self, local: u32) -> bool {
         self.sets[local as usize / SET].booked >> (local as usize % SET) & 1 == 1
     }
@@ -240,7 +245,7 @@ impl Domain {
         setup: Setup,
         n_parts: usize,
         quanta: Quanta,
-        (subdomains, cycle): (&[Subdomain], u64),
+        (subdomains, cycle): (Vec<Subdomain>, u64),
         gauges: &[u32],
         width: Width,
     ) -> Self {
@@ -248,14 +253,15 @@ impl Domain {
         let pieces = subdomains.iter().flat_map(|subdomain| &subdomain.pieces);
         let home = Home::new(pieces.map(|piece| piece.nodes.as_slice()));
         let mut gather = Vec::new();
-        for subdomain in subdomains {
+        for Subdomain { pieces, unowned, surface, .. } in subdomains {
             let first = rooms.len();
-            for piece in &subdomain.pieces {
-                let mut block = Block::new(piece);
+            for mut piece in pieces {
+                let erosion = piece.erosion.take();
+                let mut block = Block::take(piece);
                 let all = 0..block.n_sets();
                 let material = &setup.materials[block.material as usize];
                 let eroding = setup.erosion.of_part(block.part as usize).map(|criteria| {
-                    Eroding::new(criteria, piece, &mut block, material, setup.control.safety_factor)
+                    Eroding::new(criteria, erosion.as_ref(), &mut block, material, setup.control.safety_factor)
                 });
                 let faces = face::faces_of(&block, &setup.loads, material);
                 rooms.push(Room {
@@ -279,15 +285,15 @@ impl Domain {
             for room in own.clone() {
                 for local in 0..rooms[room as usize].block.nodes.len() as u32 {
                     let node = rooms[room as usize].block.nodes[local as usize];
-                    let owned = subdomain.unowned.binary_search(&node).is_err();
+                    let owned = unowned.binary_search(&node).is_err();
                     if owned && first_copy(node) == Some((room, local)) {
                         rooms[room as usize].sets[local as usize / SET].booked |= 1 << (local as usize % SET);
                     }
                 }
             }
-            for &node in &subdomain.surface {
+            for &node in &surface {
                 if let Some((room, local)) = first_copy(node) {
-                    if subdomain.unowned.binary_search(&node).is_err() {
+                    if unowned.binary_search(&node).is_err() {
                         gather.push((room, local));
                     }
                     rooms[room as usize].sets[local as usize / SET].surface |= 1 << (local as usize % SET);
@@ -789,11 +795,13 @@ impl Domain {
 
     /// The state of all blocks, to be put back into a global state.
     pub fn pieces(&self) -> Vec<Piece> {
-        let image = |room: &Room| Piece {
-            erosion: room.eroding.as_ref().map(|eroding| eroding.state(&room.block)),
-            ..room.block.piece()
-        };
-        self.rooms.iter().map(image).collect()
+        self.rooms.iter().map(|room| Piece { erosion: room.erosion(), ..room.block.piece() }).collect()
+    }
+
+    /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
+    pub fn into_pieces(self) -> Vec<Piece> {
+        let image = |room: Room| Piece { erosion: room.erosion(), ..room.block.into_piece() };
+        self.rooms.into_iter().map(image).collect()
     }
 }
 

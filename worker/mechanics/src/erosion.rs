@@ -17,7 +17,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    block::{Block, Piece},
+    block::Block,
     element::{Step, modes::modes_of},
     lanes::{Width, scalar::Scalar},
     material::Material,
@@ -133,11 +133,11 @@ pub(crate) struct Eroding {
 }
 
 impl Eroding {
-    /// The erosion of a block that was laid out from `piece`; elements that have eroded are taken out of the block. A part without
+    /// The erosion of a block whose piece carried `state`; elements that have eroded are taken out of the block. A part without
     /// criteria has nothing to watch, and none of its elements has eroded.
     pub(crate) fn new(
         criteria: &Criteria,
-        piece: &Piece,
+        state: Option<&PieceErosion>,
         block: &mut Block,
         material: &Material,
         safety_factor: f64,
@@ -155,7 +155,7 @@ impl Eroding {
             casualties: Casualties::default(),
             changed: false,
         };
-        let Some(state) = &piece.erosion else { return eroding };
+        let Some(state) = state else { return eroding };
         for (e, &cycle) in state.eroded.iter().enumerate().take(block.elements.len()) {
             let slot = block.slot(e);
             eroding.eroded[slot] = cycle;
