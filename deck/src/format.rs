@@ -205,6 +205,8 @@ fn read_control(deck: &Table<'_>, faults: &Faults<'_>) -> Option<Control> {
             Range::Within(0.0, 1.0, "a number above 0 and at most 1"),
         ),
         growth: control.number_or("growth", 1.05, Range::Within(1.0, 2.0, "a number above 1 and at most 2")),
+        energy_error: control.number_or("energy_error", 0.5, Range::Positive),
+        time_step_floor: control.number_or("time_step_floor", 0.0, Range::NotNegative),
         linear_viscosity: control.number_or("linear_viscosity", 0.2, coefficient),
         quadratic_viscosity: control.number_or("quadratic_viscosity", 1.0, coefficient),
         hourglass: control.number_or("hourglass", 0.1, coefficient),

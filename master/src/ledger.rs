@@ -1,7 +1,10 @@
 //! The ledger of a run: energies and momentum from votes, the worst ratios, rows of history.
 
 use deck::model::Model;
-use mechanics::{element::hex8, vote::Vote};
+use mechanics::{
+    element::hex8,
+    vote::{PartVote, Vote},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::results::history::{GaugeRow, HistoryRow, PartEnergy};
@@ -29,6 +32,12 @@ pub struct Ledger {
     pub initial_total: Option<f64>,
     /// Greatest kinetic energy so far.
     pub greatest_kinetic: f64,
+    /// Greatest size of the external work so far.
+    pub greatest_external: f64,
+    /// Sums of each part after the first cycle, and up to now; empty before it.
+    pub parts: [Vec<PartEnergy>; 2],
+    /// The first time step that was booked (time); none before it.
+    pub first_step: Option<f64>,
     /// Momentum before the first cycle.
     pub initial_momentum: [f64; 3],
     /// Greatest momentum of a part before the first cycle.
@@ -72,6 +81,9 @@ impl Ledger {
             eroded_mass: 0.0,
             initial_total: None,
             greatest_kinetic: 0.0,
+            greatest_external: 0.0,
+            parts: Default::default(),
+            first_step: None,
             initial_momentum: momentum_of(&mut (0..model.mesh.n_nodes())),
             part_momentum,
             worst_courant: 0.0,
@@ -83,7 +95,7 @@ impl Ledger {
 
     /// Books the whole vote of a cycle that began at `time` with step `dt`; `gap` where there is contact.
     pub fn book(&mut self, vote: &Vote, cycle: u64, time: f64, dt: f64, gap: Option<f64>) {
-        let sum = |f: &dyn Fn(&mechanics::vote::PartVote) -> f64| vote.parts.iter().map(f).sum::<f64>();
+        let sum = |f: &dyn Fn(&PartVote) -> f64| vote.parts.iter().map(f).sum::<f64>();
         self.hourglass += sum(&|p| p.hourglass);
         self.viscosity += sum(&|p| p.viscosity);
         self.friction += vote.friction;
@@ -97,6 +109,9 @@ impl Ledger {
         let total = kinetic + internal + self.hourglass + vote.contact + self.friction + self.eroded;
         let initial = *self.initial_total.get_or_insert(total - self.external);
         self.greatest_kinetic = self.greatest_kinetic.max(kinetic);
+        self.greatest_external = self.greatest_external.max(self.external.abs());
+        self.first_step.get_or_insert(dt);
+        self.book_parts(&vote.parts);
         let scale = initial.abs().max(self.greatest_kinetic);
         let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
         self.worst_courant = self.worst_courant.max(dt / vote.courant);
@@ -120,11 +135,7 @@ impl Ledger {
             total,
             error,
             momentum: vote.momentum,
-            parts: vote
-                .parts
-                .iter()
-                .map(|p| PartEnergy { kinetic: p.kinetic, internal: p.internal })
-                .collect(),
+            parts: self.parts[1].clone(),
             gauges: vote
                 .gauges
                 .iter()
@@ -150,6 +161,39 @@ impl Ledger {
         self.eroded_elements += vote.eroded.len() as u64;
         self.last.eroded_elements = self.eroded_elements;
         self.last.eroded_mass = self.eroded_mass;
+    }
+
+    fn book_parts(&mut self, votes: &[PartVote]) {
+        let [first, now] = &mut self.parts;
+        now.resize(votes.len(), PartEnergy::default());
+        for (part, vote) in now.iter_mut().zip(votes) {
+            (part.kinetic, part.internal) = (vote.kinetic, vote.internal);
+            part.hourglass += vote.hourglass;
+            part.viscosity += vote.viscosity;
+            part.external += vote.external;
+        }
+        if first.is_empty() {
+            first.clone_from(now);
+        }
+    }
+
+    /// Energy that appeared or vanished over the scale of the problem, by which a run is judged: the largest of initial
+    /// energy, greatest kinetic energy and greatest external work, so that slow loading is not judged by the little
+    /// kinetic energy it has.
+    pub fn imbalance(&self) -> f64 {
+        let Some(initial) = self.initial_total else { return 0.0 };
+        let scale = initial.abs().max(self.greatest_kinetic).max(self.greatest_external);
+        if scale > 0.0 { (self.last.total - self.external - initial) / scale } else { 0.0 }
+    }
+
+    /// The part whose own energy grew most since the first cycle: its index and what it gained; the first of equals.
+    pub fn greediest_part(&self) -> Option<(usize, f64)> {
+        let [first, now] = &self.parts;
+        let gains = first.iter().zip(now).map(|(first, now)| now.own() - first.own()).enumerate();
+        gains.fold(None, |best, (p, gain)| match best {
+            Some((_, most)) if most >= gain => best,
+            _ => Some((p, gain)),
+        })
     }
 
     /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.

@@ -60,8 +60,29 @@ pub struct HistoryRow {
 pub struct PartEnergy {
     /// Kinetic energy.
     pub kinetic: f64,
-    /// Internal energy.
+    /// Internal energy, with what artificial viscosity put in.
     pub internal: f64,
+    /// Energy taken by hourglass forces so far.
+    pub hourglass: f64,
+    /// Work of artificial viscosity so far (part of internal energy).
+    pub viscosity: f64,
+    /// Work done on it from outside so far.
+    pub external: f64,
+}
+
+impl PartEnergy {
+    /// Names of the columns, in the order of [`PartEnergy::numbers`].
+    pub const NAMES: [&'static str; 5] = ["kinetic", "internal", "hourglass", "viscosity", "external"];
+
+    /// Its numbers, in the order of the columns.
+    pub fn numbers(&self) -> [f64; 5] {
+        [self.kinetic, self.internal, self.hourglass, self.viscosity, self.external]
+    }
+
+    /// What the part has by itself: kinetic, internal and hourglass energy less the work done on it.
+    pub fn own(&self) -> f64 {
+        self.kinetic + self.internal + self.hourglass - self.external
+    }
 }
 
 /// What a gauge reads.
@@ -164,7 +185,7 @@ impl History {
             .chain([row.external, row.total, row.error])
             .chain(row.momentum)
             .chain([row.eroded, row.eroded_mass].into_iter().filter(|_| self.erodes))
-            .chain(row.parts.iter().flat_map(|part| [part.kinetic, part.internal]))
+            .chain(row.parts.iter().flat_map(PartEnergy::numbers))
             .chain(row.gauges.iter().flat_map(|gauge| gauge.x.into_iter().chain(gauge.v)));
         for number in numbers {
             let _ = write!(self.row, ",{number:?}");
@@ -205,7 +226,7 @@ fn header(model: &Model) -> String {
         columns.push(format!("eroded mass [{mass}]"));
     }
     for part in &model.mesh.parts {
-        columns.extend(["kinetic", "internal"].iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
+        columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
     }
     for gauge in &model.output.gauges {
         columns.extend(["x", "y", "z"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));

@@ -171,6 +171,8 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
             end_cycle: u64::MAX,
             safety_factor: 0.6666,
             growth: 1.05,
+            energy_error: 0.5,
+            time_step_floor: 0.0,
             linear_viscosity: 0.2,
             quadratic_viscosity: 1.0,
             hourglass: 0.1,

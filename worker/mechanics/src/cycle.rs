@@ -771,6 +771,7 @@ impl Domain {
             room.walls.fill(WallVote::default());
             vote.parts[part].kinetic += room.booked.kinetic;
             vote.external += room.booked.external;
+            vote.parts[part].external += room.booked.external;
             for a in 0..3 {
                 vote.momentum[a] += room.booked.momentum[a];
             }

@@ -93,6 +93,8 @@ pub struct PartVote {
     pub hourglass: f64,
     /// Work of artificial viscosity in this cycle (part of `internal`).
     pub viscosity: f64,
+    /// Work of prescribed velocities, walls and loads in this cycle.
+    pub external: f64,
 }
 
 impl Vote {
@@ -148,6 +150,7 @@ impl Vote {
             mine.internal += theirs.internal;
             mine.hourglass += theirs.hourglass;
             mine.viscosity += theirs.viscosity;
+            mine.external += theirs.external;
         }
         for (mine, theirs) in self.extents.iter_mut().zip(&other.extents) {
             mine.merge(theirs);

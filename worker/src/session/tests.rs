@@ -14,6 +14,8 @@ fn assign(cycle: u64) -> Box<Assign> {
                 end_cycle: 10,
                 safety_factor: 0.6666,
                 growth: 1.05,
+                energy_error: 0.5,
+                time_step_floor: 0.0,
                 linear_viscosity: 0.2,
                 quadratic_viscosity: 1.0,
                 hourglass: 0.1,

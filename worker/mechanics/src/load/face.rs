@@ -198,6 +198,8 @@ mod tests {
             end_cycle: 1,
             safety_factor: 1.0,
             growth: 1.05,
+            energy_error: 0.5,
+            time_step_floor: 0.0,
             linear_viscosity: 0.0,
             quadratic_viscosity: 0.0,
             hourglass: 0.0,
