@@ -354,7 +354,7 @@ impl Census {
         Self {
             elements: surface.n_elements() as u64,
             faces: surface.faces.len() as u64,
-            nodes: surface.nodes.len() as u64,
+            nodes: surface.active.iter().filter(|active| **active).count() as u64,
         }
     }
 }
@@ -444,6 +444,9 @@ pub fn summarise(
         bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
         master_bytes_per_cycle: per((traffic.bytes - traffic.peer_bytes) as f64, run_cycles),
         worker_times: worker_times(&outcome.workers, &outcome.reports),
+        eroded_elements: ledger.eroded_elements,
+        eroded_mass: ledger.eroded_mass,
+        eroded_energy: ledger.eroded,
         energies: Energies {
             kinetic: ledger.last.kinetic,
             internal: ledger.last.internal,

@@ -35,9 +35,15 @@ pub struct HistoryRow {
     pub contact: f64,
     /// Energy taken by friction.
     pub friction: f64,
+    /// Energy that left with eroded elements and dropped nodes.
+    pub eroded: f64,
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass.
+    pub eroded_mass: f64,
     /// Work done on the bodies from outside, by prescribed velocities and walls.
     pub external: f64,
-    /// Sum of kinetic, internal, hourglass, contact and friction energy.
+    /// Sum of kinetic, internal, hourglass, contact, friction and eroded energy.
     pub total: f64,
     /// Energy error, relative, as in the summary.
     pub error: f64,
@@ -99,6 +105,8 @@ pub struct History {
     length: u64,
     n_parts: usize,
     n_gauges: usize,
+    /// Whether anything can erode: then rows say what has.
+    erodes: bool,
     row: String,
 }
 
@@ -134,6 +142,7 @@ impl History {
             length,
             n_parts: model.mesh.parts.len(),
             n_gauges: model.output.gauges.len(),
+            erodes: model.setup.erosion.is_on(),
             row: String::new(),
         };
         history.cut()?;
@@ -175,10 +184,14 @@ impl History {
             .into_iter()
             .chain([row.external, row.total, row.error])
             .chain(row.momentum)
+            .chain([row.eroded, row.eroded_mass].into_iter().filter(|_| self.erodes))
             .chain(row.parts.iter().flat_map(PartEnergy::numbers))
             .chain(row.gauges.iter().flat_map(|gauge| gauge.x.into_iter().chain(gauge.v)));
         for number in numbers {
             let _ = write!(self.row, ",{number:?}");
+        }
+        if self.erodes {
+            let _ = write!(self.row, ",{}", row.eroded_elements);
         }
         self.row.push('\n');
         if let Err(source) = self.file.write_all(self.row.as_bytes()) {
@@ -208,6 +221,10 @@ fn header(model: &Model) -> String {
     columns.extend(energies.iter().map(|name| format!("{name} [{energy}]")));
     columns.push("error".to_owned());
     columns.extend(["x", "y", "z"].iter().map(|axis| format!("momentum_{axis} [{mass}*{length}/{time}]")));
+    if model.setup.erosion.is_on() {
+        columns.push(format!("eroded [{energy}]"));
+        columns.push(format!("eroded mass [{mass}]"));
+    }
     for part in &model.mesh.parts {
         columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
     }
@@ -215,6 +232,9 @@ fn header(model: &Model) -> String {
         columns.extend(["x", "y", "z"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));
         columns
             .extend(["vx", "vy", "vz"].iter().map(|axis| format!("{}:{axis} [{length}/{time}]", gauge.name)));
+    }
+    if model.setup.erosion.is_on() {
+        columns.push("eroded elements".to_owned());
     }
     let mut header = columns.iter().map(|column| cell(column)).collect::<Vec<_>>().join(",");
     header.push('\n');
