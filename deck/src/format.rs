@@ -11,6 +11,7 @@ mod boundary;
 mod burn;
 mod contact;
 mod curve;
+mod erosion;
 mod load;
 mod output;
 mod part;
@@ -114,6 +115,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = control
         .map(|control| Control { sort_lag: sort_lag(&deck, control.sort_lag, settings, faults), ..control });
+    let erosion = erosion::read(&deck, &parts, settings.is_some());
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
@@ -144,6 +146,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
             walls: conditions.walls,
             detonations,
             loads: conditions.loads,
+            erosion,
         },
         output,
     })

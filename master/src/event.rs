@@ -194,6 +194,8 @@ pub enum Action {
         /// The run stops here.
         last: bool,
     },
+    /// The worker of every element from now on, by global index, where the deck wants states to say it.
+    Owners(Arc<[u32]>),
     /// Have no more to do with a worker, and tell it why. It is not lost by itself, so it must not come back.
     Dismiss(usize, String),
     /// Tell the user how far it is.

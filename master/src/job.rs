@@ -4,6 +4,7 @@
 //! ledger. It knows no socket, clock, disk or thread: those are events and actions.
 
 mod epoch;
+mod erosion;
 mod images;
 mod measure;
 mod pace;
@@ -36,28 +37,49 @@ use crate::{
     results::{history::HistoryRow, surface::Probe},
     sort::{Sorted, Sorter},
 };
-use epoch::{Acting, Base, Epoch, Member, Step};
+use epoch::{Acting, Base, Epoch, Member, SortUnderWay, Step};
+pub(crate) use erosion::surface_of;
 use measure::{Patience, Proposal};
 use start::Touching;
 use stop::not_a_number;
 
-/// What sorts work on: fixed for an epoch.
+/// What sorts work on: fixed for an epoch, but for the surface where elements erode.
 pub struct Bench {
     /// Number of the epoch.
     pub epoch: u32,
     /// Surface, settings, speeds.
     pub sorter: Sorter,
     /// Who holds which nodes.
-    pub holdings: Holdings,
+    pub holdings: Arc<Holdings>,
     /// Masses and constraints (positions are those of the epoch's start).
     pub state: Arc<GlobalState>,
+    /// Nodes (global, ascending) that leave the run with the plan of the sort.
+    pub dropped: Vec<u32>,
 }
 
 impl Bench {
     /// Does the sort that [`Action::Sort`] asks for.
     pub fn sort(&self, x: &[[f64; 3]]) -> Sorted {
         worker::failpoint::die("die-in-sort");
-        self.sorter.run(self.epoch, x, &self.holdings, &self.state)
+        let mut sorted = self.sorter.run(self.epoch, x, &self.holdings, &self.state);
+        if !self.dropped.is_empty() {
+            for (worker, plan) in (0..).zip(&mut sorted.exchange.plans) {
+                plan.dropped =
+                    self.dropped.iter().copied().filter(|&node| self.holdings.holds(worker, node)).collect();
+            }
+        }
+        sorted
+    }
+
+    /// The same with another surface.
+    fn with_surface(&self, surface: Arc<Surface>, dropped: Vec<u32>) -> Self {
+        Self {
+            epoch: self.epoch,
+            sorter: self.sorter.with_surface(surface),
+            holdings: Arc::clone(&self.holdings),
+            state: Arc::clone(&self.state),
+            dropped,
+        }
     }
 }
 
@@ -145,9 +167,9 @@ impl Job {
         Some(Probe { surface, settings, exclusions, quantum: self.quanta.force })
     }
 
-    /// Speeds that work is dealt out by, by worker.
-    pub fn speeds(&self) -> &[f64] {
-        &self.epoch.speeds
+    /// The worker of every element, where the deck wants states to say it.
+    pub fn owners(&self) -> Option<Arc<[u32]>> {
+        self.epoch.owners.clone()
     }
 
     /// How partial forces travel.
@@ -359,13 +381,18 @@ impl Job {
         let Step { dt, time, quantum } = self.epoch.steps[&first];
         let at_end = time >= control.end_time || first >= control.end_cycle;
         let store = self.options.snapshot_at == Some(first) && self.epoch.number == 0;
+        let blocking = !at_end && self.surface_changes_at(first);
+        if blocking {
+            self.gather_at(first, true);
+        }
         let before = Orders {
             next: first.wrapping_sub(1),
             dt: 0.0,
             time,
             walls: self.walls.clone(),
             force_quantum: quantum,
-            gather: false,
+            gather: blocking,
+            blocking,
             collect: store || at_end,
             stop: at_end,
         };
@@ -445,8 +472,8 @@ impl Job {
         while let Some(acts_at) = epoch.exchanges.get(1).map(|acting| acting.at).filter(|at| *at <= cycle + 1)
         {
             epoch.exchanges.pop_front();
-            let lag = u64::from(self.model.setup.control.sort_lag);
-            epoch.references = [(acts_at, acts_at - lag), epoch.references[0]];
+            let gathered = epoch.exchanges.front().map_or(acts_at, |acting| acting.gathered);
+            epoch.references = [(acts_at, gathered), epoch.references[0]];
             self.sorts += 1;
         }
     }
@@ -463,6 +490,9 @@ impl Job {
         let now = *self.epoch.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
         if fresh {
             self.follow_spread(cycle.saturating_sub(1), &vote);
+            if let (Some(eroded), Some(before)) = (&mut self.epoch.eroded, cycle.checked_sub(1)) {
+                eroded.note(before, &vote.eroded)?;
+            }
         }
         if self.epoch.halves.contains_key(&cycle) {
             let rest = self.rest_at(cycle, vote.clone())?;
@@ -491,8 +521,9 @@ impl Job {
             ToWorker::Totals { cycle, orders: orders.clone(), totals }
         });
         self.retire(cycle);
-        if self.epoch.sorts_under_way.contains(&cycle)
-            && let Some(bench) = &self.epoch.bench
+        let sort = self.epoch.sorts_under_way.iter().find(|sort| sort.gathered == cycle);
+        if let Some(blocking) = sort.map(|sort| sort.blocking)
+            && let Some(bench) = self.bench_for(cycle, blocking)
         {
             for (worker, gathered) in arrivals.gathered.iter().enumerate() {
                 let expected = bench.sorter.n_gathered(worker);
@@ -503,7 +534,8 @@ impl Job {
                     ));
                 }
             }
-            actions.push(Action::Sort(Arc::clone(bench), bench.sorter.positions(&arrivals.gathered)));
+            let x = bench.sorter.positions(&arrivals.gathered);
+            actions.push(Action::Sort(bench, x));
         }
         actions.push(Action::Progress(Progress { cycle, time: now.time, dt: now.dt, element, limit }));
         Ok(())
@@ -515,15 +547,18 @@ impl Job {
         if sorted.epoch < self.epoch.number {
             return Ok(());
         }
-        let gathered_at = self.epoch.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
-        let acts_at = gathered_at + u64::from(self.model.setup.control.sort_lag);
+        let sort = self.epoch.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
+        if sort.replaced {
+            return Ok(());
+        }
+        let SortUnderWay { gathered: gathered_at, acts_at, .. } = sort;
         self.census = sorted.census;
         let exchange = Arc::new(sorted.exchange);
         self.send_all(actions, |worker| {
             let plan = Box::new(exchange.plans[worker].clone());
-            ToWorker::Plan { acts_at, plan, hash: exchange.hash }
+            ToWorker::Plan { gathered_at, acts_at, plan, hash: exchange.hash }
         });
-        self.epoch.exchanges.push_back(Acting { at: acts_at, exchange });
+        self.epoch.exchanges.push_back(Acting { at: acts_at, gathered: gathered_at, exchange });
         // A late sort: the cycles before its own are complete, and workers wait for the plan. It is in force from here, as
         // it would be had it come in time, so that the cycles of further sorts do not depend on how long this one took.
         if acts_at <= self.epoch.completed {

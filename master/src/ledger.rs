@@ -1,7 +1,10 @@
 //! The ledger of a run: energies and momentum from votes, the worst ratios, rows of history.
 
 use deck::model::Model;
-use mechanics::vote::{PartVote, Vote};
+use mechanics::{
+    element::hex8,
+    vote::{PartVote, Vote},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::results::history::{GaugeRow, HistoryRow, PartEnergy};
@@ -17,6 +20,14 @@ pub struct Ledger {
     pub friction: f64,
     /// Work of supports and walls so far.
     pub external: f64,
+    /// Internal energy of eroded elements, and kinetic energy of nodes that were dropped.
+    pub eroded: f64,
+    /// Momentum of those nodes.
+    pub eroded_momentum: [f64; 3],
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass.
+    pub eroded_mass: f64,
     /// Total energy less external work after the first cycle; none before it.
     pub initial_total: Option<f64>,
     /// Greatest kinetic energy so far.
@@ -64,6 +75,10 @@ impl Ledger {
             viscosity: 0.0,
             friction: 0.0,
             external: 0.0,
+            eroded: 0.0,
+            eroded_momentum: [0.0; 3],
+            eroded_elements: 0,
+            eroded_mass: 0.0,
             initial_total: None,
             greatest_kinetic: 0.0,
             greatest_external: 0.0,
@@ -87,7 +102,11 @@ impl Ledger {
         self.external += vote.external;
         let kinetic = sum(&|p| p.kinetic);
         let internal = sum(&|p| p.internal);
-        let total = kinetic + internal + self.hourglass + vote.contact + self.friction;
+        self.eroded += vote.gone.internal + vote.gone.kinetic;
+        for (sum, lost) in self.eroded_momentum.iter_mut().zip(vote.gone.momentum) {
+            *sum += lost;
+        }
+        let total = kinetic + internal + self.hourglass + vote.contact + self.friction + self.eroded;
         let initial = *self.initial_total.get_or_insert(total - self.external);
         self.greatest_kinetic = self.greatest_kinetic.max(kinetic);
         self.greatest_external = self.greatest_external.max(self.external.abs());
@@ -109,6 +128,9 @@ impl Ledger {
             hourglass: self.hourglass,
             contact: vote.contact,
             friction: self.friction,
+            eroded: self.eroded,
+            eroded_elements: self.eroded_elements,
+            eroded_mass: self.eroded_mass,
             external: self.external,
             total,
             error,
@@ -122,6 +144,25 @@ impl Ledger {
             element_gauges: vote.element_gauges.iter().map(|(_, state)| *state).collect(),
             contacts: vote.contacts.clone(),
         };
+    }
+
+    /// Books the number and mass of the elements that eroded in the cycle booked last. Their mass is that of the deck: it stays at
+    /// the nodes until those are dropped.
+    pub fn book_eroded(&mut self, vote: &Vote, model: &Model) {
+        if vote.eroded.is_empty() {
+            return;
+        }
+        let offsets = model.mesh.element_offsets();
+        for &element in &vote.eroded {
+            let part = offsets.partition_point(|&first| first <= element as usize) - 1;
+            let Some(of_part) = model.mesh.parts.get(part) else { continue };
+            let corners = of_part.corners(element as usize - offsets[part]);
+            let volume = hex8::volume(&corners.map(|n| model.mesh.positions[n as usize]));
+            self.eroded_mass += model.setup.materials[of_part.material as usize].density * volume;
+        }
+        self.eroded_elements += vote.eroded.len() as u64;
+        self.last.eroded_elements = self.eroded_elements;
+        self.last.eroded_mass = self.eroded_mass;
     }
 
     fn book_parts(&mut self, votes: &[PartVote]) {
@@ -162,7 +203,9 @@ impl Ledger {
         if self.part_momentum == 0.0 {
             return 0.0;
         }
-        let change: f64 = (0..3).map(|a| (self.last.momentum[a] - self.initial_momentum[a]).powi(2)).sum();
+        let change: f64 = (0..3)
+            .map(|a| (self.last.momentum[a] + self.eroded_momentum[a] - self.initial_momentum[a]).powi(2))
+            .sum();
         change.sqrt() / self.part_momentum
     }
 }

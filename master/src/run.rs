@@ -24,9 +24,7 @@ use protocol::{
 use tracing::{info, warn};
 
 use crate::{
-    balance::Costs,
     command::RunArgs,
-    decompose,
     embedded::{self, Sink, Traffic},
     event::{self, Action, ForceSorts, Hand, Keep, Limit, Outcome, Progress},
     job::Job,
@@ -329,7 +327,7 @@ fn resuming_command(folder: &Path) -> String {
 }
 
 /// A word as a shell takes it.
-fn quoted(word: &str) -> String {
+pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();
@@ -358,7 +356,7 @@ impl Census {
         Self {
             elements: surface.n_elements() as u64,
             faces: surface.faces.len() as u64,
-            nodes: surface.nodes.len() as u64,
+            nodes: surface.active.iter().filter(|active| **active).count() as u64,
         }
     }
 }
@@ -448,6 +446,9 @@ pub fn summarise(
         bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
         master_bytes_per_cycle: per((traffic.bytes - traffic.peer_bytes) as f64, run_cycles),
         worker_times: worker_times(&outcome.workers, &outcome.reports),
+        eroded_elements: ledger.eroded_elements,
+        eroded_mass: ledger.eroded_mass,
+        eroded_energy: ledger.eroded,
         energies: Energies {
             kinetic: ledger.last.kinetic,
             internal: ledger.last.internal,
@@ -613,7 +614,7 @@ impl Output {
             };
             writer.with(on).map_err(|e| e.to_string())?;
         }
-        self.dealt(job.speeds());
+        self.owners = job.owners();
         let Some(states) = states else { return self.state(Box::new(job.start_state().clone())) };
         if let Some(folder) = &self.folder {
             folder.keep_states(states.len()).map_err(|e| e.to_string())?;
@@ -627,14 +628,6 @@ impl Output {
         let Some(writer) = &self.writer else { return Ok(()) };
         let times: Vec<f64> = self.states.iter().map(|(_, time)| *time).collect();
         writer.with(|series| series.roll_back(&times)).map_err(|e| e.to_string())
-    }
-
-    /// Work was dealt out by these speeds: states will say who computes what, where the deck wants that.
-    pub fn dealt(&mut self, speeds: &[f64]) {
-        if !self.model.output.workers || self.writer.is_none() {
-            return;
-        }
-        self.owners = Some(decompose::owners(&self.model.mesh, speeds, Costs::default().node).into());
     }
 
     /// States that were handed over are on disk after this.
@@ -763,14 +756,14 @@ impl Sink for Output {
                 Ok(())
             }
             Action::Rewind { rows, cycle } => self.rewind(rows, cycle),
-            Action::Dealt(deals) => {
-                let speeds: Vec<f64> = deals.iter().map(|deal| deal.speed).collect();
-                self.dealt(&speeds);
+            Action::Owners(owners) => {
+                self.owners = Some(owners);
                 Ok(())
             }
             Action::Send(..)
             | Action::Sort(..)
             | Action::Timer(_)
+            | Action::Dealt(_)
             | Action::Dismiss(..)
             | Action::Over(_) => Ok(()),
         }

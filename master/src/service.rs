@@ -245,8 +245,8 @@ impl Sink for Reporter<'_> {
         let progress = match action {
             Action::Progress(progress) => progress,
             Action::Dealt(deals) => {
-                self.dealt(deals.clone());
-                return self.output.take(Action::Dealt(deals));
+                self.dealt(deals);
+                return Ok(());
             }
             Action::Rewind { cycle, .. } => {
                 warn!(job = self.number, "a worker is lost: back to cycle {cycle}");

@@ -110,6 +110,7 @@ fn plates(cells: u32) -> Model {
             walls: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
+            erosion: Default::default(),
         },
         output: Output {
             history_cycles: 1,
@@ -151,6 +152,8 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         constraint: vec![0; model.mesh.n_nodes()],
         initial_volume: vec![1.0; n],
         elements,
+        eroded: Vec::new(),
+        strain: Vec::new(),
     }
 }
 
@@ -206,6 +209,7 @@ fn summary(model: &Model) -> Summary {
         rebalances: Vec::new(),
         losses: Vec::new(),
         digest: "00ff".repeat(16),
+        ..Summary::default()
     }
 }
 
@@ -220,6 +224,9 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
         hourglass: -0.0,
         contact: 1e-7,
         friction: 1e16,
+        eroded: 0.0,
+        eroded_elements: 0,
+        eroded_mass: 0.0,
         external: 2.0,
         total: x.sqrt(),
         error: -1.0 / 7.0,

@@ -166,8 +166,7 @@ fn contact_surface_carries_the_force_of_the_history_as_pressure_where_bodies_tou
     let (job, _) =
         Job::new(Arc::clone(&solved.model), &[hand], Options::default(), None).expect("it has run");
     let probe = job.probe().expect("there is contact");
-    let map = probe.map(&solved.state);
-    let surface = &probe.surface;
+    let (surface, map) = probe.map(&solved.model, &solved.state);
     let on_projectile = |n: usize| surface.node_part[n] == 1;
     for axis in 0..3 {
         let sum: f64 =

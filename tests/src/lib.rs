@@ -1,7 +1,7 @@
 //! What the tests of the whole system share.
 //!
 //! [`solve`] takes a deck through master and workers in this process; [`cluster`] runs real processes on loopback,
-//! [`proxy`] stands between them; [`book`] holds the cases, [`case`] compares a figure with a published or derived one
+//! [`proxy`] stands between them, [`sshd`] beside them, [`browser`] and [`terminal`] look at them; [`book`] holds the cases, [`case`] compares a figure with a published or derived one
 //! of `reference.toml` and says how it went; [`checker`]
 //! looks for nodes inside foreign bodies, without asking the contact code.
 
@@ -15,3 +15,5 @@ pub mod faults;
 pub mod left;
 pub mod proxy;
 pub mod solve;
+pub mod sshd;
+pub mod terminal;

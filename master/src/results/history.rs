@@ -38,9 +38,15 @@ pub struct HistoryRow {
     pub contact: f64,
     /// Energy taken by friction.
     pub friction: f64,
+    /// Energy that left with eroded elements and dropped nodes.
+    pub eroded: f64,
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass.
+    pub eroded_mass: f64,
     /// Work done on the bodies from outside, by prescribed velocities and walls.
     pub external: f64,
-    /// Sum of kinetic, internal, hourglass, contact and friction energy.
+    /// Sum of kinetic, internal, hourglass, contact, friction and eroded energy.
     pub total: f64,
     /// Energy error, relative, as in the summary.
     pub error: f64,
@@ -111,6 +117,8 @@ pub struct History {
     densities: Vec<f64>,
     /// Pairs of parts that are watched.
     n_contacts: u32,
+    /// Whether anything can erode: then rows say what has.
+    erodes: bool,
     row: String,
 }
 
@@ -148,6 +156,7 @@ impl History {
             gauges: model.output.gauges.iter().map(|g| model.mesh.positions[g.node as usize]).collect(),
             densities: model.output.element_gauges.iter().map(|g| density(model, g.element)).collect(),
             n_contacts: model.output.contact_forces.len() as u32,
+            erodes: model.setup.erosion.is_on(),
             row: String::new(),
         };
         history.cut()?;
@@ -194,6 +203,7 @@ impl History {
             .into_iter()
             .chain([row.external, row.total, row.error])
             .chain(row.momentum)
+            .chain([row.eroded, row.eroded_mass].into_iter().filter(|_| self.erodes))
             .chain(row.parts.iter().flat_map(PartEnergy::numbers))
             .chain(row.gauges.iter().zip(&self.gauges).flat_map(|(gauge, start)| {
                 let moved: [f64; 3] = std::array::from_fn(|axis| gauge.x[axis] - start[axis]);
@@ -214,6 +224,9 @@ impl History {
                 contacts.next_if(|(index, _)| *index == pair).map(|(_, vote)| *vote).unwrap_or_default();
             let [x, y, z] = vote.force;
             let _ = write!(self.row, ",{x:?},{y:?},{z:?},{}", vote.hits);
+        }
+        if self.erodes {
+            let _ = write!(self.row, ",{}", row.eroded_elements);
         }
         self.row.push('\n');
         if let Err(source) = self.file.write_all(self.row.as_bytes()) {
@@ -288,6 +301,10 @@ fn header(model: &Model) -> String {
     columns.extend(energies.iter().map(|name| format!("{name} [{energy}]")));
     columns.push("error".to_owned());
     columns.extend(["x", "y", "z"].iter().map(|axis| format!("momentum_{axis} [{mass}*{length}/{time}]")));
+    if model.setup.erosion.is_on() {
+        columns.push(format!("eroded [{energy}]"));
+        columns.push(format!("eroded mass [{mass}]"));
+    }
     for part in &model.mesh.parts {
         columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
     }
@@ -309,6 +326,9 @@ fn header(model: &Model) -> String {
         let [a, b] = pair.map(|part| &model.mesh.parts[part as usize].name);
         columns.extend(["fx", "fy", "fz"].iter().map(|axis| format!("{a} from {b}:{axis} [{force}]")));
         columns.push(format!("{a} from {b}:contacts"));
+    }
+    if model.setup.erosion.is_on() {
+        columns.push("eroded elements".to_owned());
     }
     let mut header = columns.iter().map(|column| cell(column)).collect::<Vec<_>>().join(",");
     header.push('\n');

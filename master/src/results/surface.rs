@@ -13,6 +13,8 @@ use mechanics::{
     state::GlobalState,
 };
 
+use crate::job::surface_of;
+
 use super::{
     CONTACT_PVD, Error, Folder, contact_name,
     vtu::{Array, write_index, write_piece},
@@ -22,7 +24,7 @@ use super::{
 /// What contact needs that stays the same through a run.
 #[derive(Clone)]
 pub struct Probe {
-    /// Outer faces and their nodes.
+    /// Outer faces and their nodes while nothing has eroded.
     pub surface: Arc<Surface>,
     /// Settings of the run.
     pub settings: Settings,
@@ -33,11 +35,13 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// Contact in a state.
-    pub fn map(&self, state: &GlobalState) -> Map {
-        let x: Vec<[f64; 3]> = self.surface.nodes.iter().map(|&node| state.x[node as usize]).collect();
+    /// Contact in a state, on the surface that is in force in its cycle.
+    pub fn map(&self, model: &Model, state: &GlobalState) -> (Arc<Surface>, Map) {
+        let surface = surface_of(model, state).unwrap_or_else(|| Arc::clone(&self.surface));
+        let x: Vec<[f64; 3]> = surface.nodes.iter().map(|&node| state.x[node as usize]).collect();
         let mass = |node: u32| state.mass[node as usize];
-        Map::new(&self.surface, &x, &self.settings, &self.exclusions, &mass, self.quantum)
+        let map = Map::new(&surface, &x, &self.settings, &self.exclusions, &mass, self.quantum);
+        (surface, map)
     }
 
     /// Writes the surface of state `index`, whole or not at all.
@@ -55,7 +59,7 @@ impl Probe {
         model: &Model,
         state: &GlobalState,
     ) -> Result<(), Error> {
-        let (surface, map) = (&*self.surface, self.map(state));
+        let (surface, map) = self.map(model, state);
         let (n_nodes, n_faces) = (surface.nodes.len(), surface.faces.len());
         let global = |n: usize| surface.nodes[n] as usize;
         let offsets = model.mesh.element_offsets();

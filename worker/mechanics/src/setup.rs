@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     burn::Detonation,
     contact,
+    erosion::Erosion,
     load::{Drive, Loads},
     material::Material,
     wall::RigidWall,
@@ -27,6 +28,8 @@ pub struct Setup {
     pub detonations: Vec<Detonation>,
     /// Curves, forces, gravity, loads on faces, relaxation.
     pub loads: Loads,
+    /// Which parts erode and when.
+    pub erosion: Erosion,
 }
 
 /// What acts on a node alone: prescribed velocities, walls, forces. A node's constraint is the same on every holder.

@@ -59,6 +59,32 @@ pub struct Vote {
     pub contacts: Vec<(u32, PairVote)>,
     /// The first element that went wrong, if any: global index and its volume.
     pub fault: Option<(u32, f64)>,
+    /// Global indices of the elements that eroded in this cycle, ascending.
+    pub eroded: Vec<u32>,
+    /// What left the run with them, and with nodes that were dropped.
+    pub gone: Gone,
+}
+
+/// What left the run in a cycle through erosion: exact sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Gone {
+    /// Internal energy of eroded elements.
+    pub internal: f64,
+    /// Kinetic energy of freed nodes that were dropped.
+    pub kinetic: f64,
+    /// Their momentum.
+    pub momentum: [f64; 3],
+}
+
+impl Gone {
+    /// Adds what left with others.
+    pub fn merge(&mut self, other: &Self) {
+        self.internal += other.internal;
+        self.kinetic += other.kinetic;
+        for a in 0..3 {
+            self.momentum[a] += other.momentum[a];
+        }
+    }
 }
 
 /// What of a run is watched beside its energies, because a deck asks for it.
@@ -130,6 +156,8 @@ impl Vote {
             element_gauges: Vec::new(),
             contacts: Vec::new(),
             fault: None,
+            eroded: Vec::new(),
+            gone: Gone::default(),
         }
     }
 
@@ -169,6 +197,16 @@ impl Vote {
         self.element_gauges.sort_by_key(|g| g.0);
         self.add_contacts(&other.contacts);
         self.note_fault(other.fault);
+        self.add_eroded(&other.eroded);
+        self.gone.merge(&other.gone);
+    }
+
+    /// Joins elements that eroded elsewhere.
+    pub fn add_eroded(&mut self, eroded: &[u32]) {
+        if !eroded.is_empty() {
+            self.eroded.extend_from_slice(eroded);
+            self.eroded.sort_unstable();
+        }
     }
 
     /// Joins what the elements of one block of part `part` said.
