@@ -167,7 +167,13 @@ impl Gate {
                     route: Arc::clone(&route),
                 };
                 let _ = self.events.send(Event::Joined(seat)).await;
-                listen(&mut receiver, incarnation, &route).await
+                tokio::select! {
+                    error = listen(&mut receiver, incarnation, &route) => error,
+                    why = route.condemned() => {
+                        let _ = self.events.send(Event::Condemned { incarnation, why: why.clone() }).await;
+                        Error::Message(why)
+                    }
+                }
             }
         };
         if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {

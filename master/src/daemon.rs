@@ -58,6 +58,13 @@ pub enum Event {
     },
     /// It was welcomed and can be given jobs.
     Joined(Seat),
+    /// Its numbers are wrong: it is not to be taken in again.
+    Condemned {
+        /// The connection.
+        incarnation: u32,
+        /// What was found.
+        why: String,
+    },
     /// Its connection has ended.
     Left {
         /// The connection.
@@ -188,6 +195,8 @@ fn first_job(spool: &Path) -> Result<u32, String> {
 /// The owner of hosts and queue.
 struct Owner {
     spool: PathBuf,
+    /// What every worker's arithmetic must come to.
+    proof: String,
     events: mpsc::Sender<Event>,
     hosts: Hosts,
     /// By connection: those that were welcomed and have not left.
@@ -218,6 +227,7 @@ impl Owner {
     fn new(spool: PathBuf, first: u32, events: mpsc::Sender<Event>) -> Self {
         Self {
             spool,
+            proof: mechanics::proof::of_this_machine(),
             events,
             hosts: Hosts::default(),
             seats: BTreeMap::new(),
@@ -277,6 +287,7 @@ impl Owner {
                 self.offer(&seat);
                 self.seats.insert(seat.incarnation, seat);
             }
+            Event::Condemned { incarnation, why } => self.hosts.condemn(incarnation, &why),
             Event::Left { incarnation, why } => {
                 self.seats.remove(&incarnation);
                 self.hosts.lose(incarnation, &why);
@@ -324,6 +335,7 @@ impl Owner {
     }
 
     fn admit(&mut self, hello: &Hello, address: &str, incarnation: u32) -> Result<u32, String> {
+        hello.proves(&self.proof)?;
         let (number, ghost) = self.hosts.admit(hello, address, incarnation)?;
         if let Some(ghost) = ghost.and_then(|ghost| self.seats.remove(&ghost)) {
             ghost.sender().abort(protocol::Error::Message("its process called again".into()));

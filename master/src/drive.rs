@@ -23,6 +23,7 @@ use protocol::{
     wire,
 };
 use tokio::sync::mpsc;
+use tracing::warn;
 use worker::compute::lowest_priority;
 
 use crate::{
@@ -101,6 +102,8 @@ struct Port {
     to: Option<(usize, mpsc::Sender<Input>)>,
     /// Why the connection has ended.
     gone: Option<String>,
+    /// Tells the connection's task that the worker's numbers cannot be trusted, and why.
+    condemned: tokio::sync::watch::Sender<Option<String>>,
 }
 
 impl Route {
@@ -119,6 +122,18 @@ impl Route {
                 Ok(())
             }
         }
+    }
+
+    /// Ends the connection: what the worker computes is wrong.
+    fn condemn(&self, why: String) {
+        self.port().condemned.send_replace(Some(why));
+    }
+
+    /// Waits until the worker is found to compute wrong numbers; gives the reason.
+    pub async fn condemned(&self) -> String {
+        let mut news = self.port().condemned.subscribe();
+        let why = news.wait_for(Option::is_some).await.ok().and_then(|why| why.clone());
+        why.unwrap_or_default()
     }
 
     fn close(&self) {
@@ -317,6 +332,10 @@ impl Driver {
                         let why = format!("{} at {}: {error}", seat.hand.name, seat.address);
                         self.lost.push_back((worker, why));
                     }
+                }
+                Action::Drop(worker, why) => {
+                    warn!("dropped: {why}");
+                    self.seats[worker].route.condemn(why);
                 }
                 Action::Sort(bench, x) => self.sort(bench, x),
                 Action::Timer(seconds) => {

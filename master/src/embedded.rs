@@ -59,6 +59,8 @@ pub enum Fate {
     Lose(usize),
     /// A worker comes.
     Join(Hand),
+    /// From here on a worker's elements are wrong by one unit in the last place.
+    Spoil(usize),
 }
 
 /// Something on its way between sessions, or a task's end.
@@ -77,6 +79,7 @@ struct Place {
     /// Away while a task runs.
     machine: Option<Box<Machine>>,
     lost: bool,
+    spoilt: bool,
     stopwatch: Stopwatch,
     /// Of this epoch: bytes sent to each neighbour.
     peers: (u32, BTreeMap<u32, u64>),
@@ -89,6 +92,7 @@ impl Place {
             machine: Some(Box::default()),
             stopwatch: Stopwatch::new(),
             lost: false,
+            spoilt: false,
             peers: (0, BTreeMap::new()),
         }
     }
@@ -196,6 +200,7 @@ impl Host {
                     self.places[worker].lost = true;
                     self.apply(Event::Lost(worker, "it was to be lost".to_owned()), sink)?;
                 }
+                Some(Fate::Spoil(worker)) => self.places[worker].spoilt = true,
                 Some(Fate::Join(hand)) => {
                     self.places.push(Place::new());
                     self.apply(Event::Joined(hand), sink)?;
@@ -235,6 +240,9 @@ impl Host {
                     let place = &mut self.places[worker];
                     for lap in machine.take_laps() {
                         place.stopwatch.book(place.session.cycle(), lap);
+                    }
+                    if place.spoilt && matches!(outcome, session::Outcome::Computed) {
+                        machine.plant_fault();
                     }
                     place.machine = Some(machine);
                     self.step(worker, session::Event::Done(outcome))?;
@@ -375,6 +383,7 @@ impl Host {
                     self.traffic.bytes += packed.wire_bytes();
                     self.queue.push_back(Arrival::ToWorker(worker, packed));
                 }
+                Action::Drop(worker, _) => self.places[worker].lost = true,
                 Action::Sort(bench, x) => self.sort(bench, x),
                 Action::Timer(seconds) => {
                     self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))

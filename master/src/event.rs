@@ -45,6 +45,9 @@ pub struct Options {
     pub waits: bool,
     /// Write states while the run goes (the last one is always gathered).
     pub states: bool,
+    /// Samples of what elements come to are computed again here, at the first cycle of each epoch and where states are
+    /// kept; a worker whose sample differs is dropped.
+    pub replay: bool,
     /// Forces extra sorts, for tests of bits.
     pub force_sorts: ForceSorts,
 }
@@ -138,6 +141,8 @@ pub enum Event {
 pub enum Action {
     /// Send to a worker.
     Send(usize, ToWorker),
+    /// A worker's numbers cannot be trusted: end its connection with this reason. The job has gone on without it.
+    Drop(usize, String),
     /// Sort; exactly one [`Event::Sorted`] answers it. Positions by surface node.
     Sort(Arc<Bench>, Vec<[f64; 3]>),
     /// Send [`Event::Timer`] in so many seconds.

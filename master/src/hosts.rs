@@ -2,7 +2,7 @@
 //!
 //! A plain table: it knows no socket and no clock. A host's link and the way to its job stand beside it in the daemon.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use protocol::{handshake::Hello, request::HostRow};
 
@@ -48,6 +48,8 @@ pub struct Host {
 pub struct Hosts {
     by_number: BTreeMap<u32, Host>,
     next: u32,
+    /// Name and nonce of those whose numbers were wrong, and what was found, oldest first.
+    condemned: VecDeque<(String, u64, String)>,
 }
 
 impl Hosts {
@@ -62,6 +64,11 @@ impl Hosts {
         address: &str,
         incarnation: u32,
     ) -> Result<(u32, Option<u32>), String> {
+        let condemned =
+            self.condemned.iter().find(|(name, nonce, _)| *name == hello.name || *nonce == hello.nonce);
+        if let Some((_, _, why)) = condemned {
+            return Err(format!("{why}; the master takes it again after a restart of its own"));
+        }
         let known = self.by_number.values_mut().find(|host| host.name == hello.name);
         let mut ended = None;
         let number = match known {
@@ -110,6 +117,16 @@ impl Hosts {
         if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
             host.state = State::Lost(why.to_owned());
         }
+    }
+
+    /// The host on a connection computes wrong numbers: it is not taken in again.
+    pub fn condemn(&mut self, incarnation: u32, why: &str) {
+        let Some(host) = self.on(incarnation) else { return };
+        let entry = (host.name.clone(), host.nonce, why.to_owned());
+        if self.condemned.len() >= LOST_LIMIT {
+            self.condemned.pop_front();
+        }
+        self.condemned.push_back(entry);
     }
 
     /// Those without a job, by number.
@@ -192,6 +209,19 @@ mod tests {
         assert_eq!(hosts.on(4).map(|h| &h.state), Some(&State::Idle));
         hosts.lose(4, "gone");
         assert_eq!(hosts.admit(&hello("a", 9), "z", 5), Ok((0, None)), "the place is free again");
+    }
+
+    #[test]
+    fn a_condemned_process_is_refused_by_name_and_by_nonce() {
+        let mut hosts = Hosts::default();
+        hosts.admit(&hello("a", 1), "x", 1).expect("new");
+        hosts.condemn(1, "worker a: block 2 came to other numbers");
+        hosts.lose(1, "condemned");
+        for returned in [hello("a", 7), hello("b", 1)] {
+            let refused = hosts.admit(&returned, "x", 2).expect_err("condemned");
+            assert!(refused.contains("worker a: block 2 came to other numbers"), "{refused}");
+        }
+        assert!(hosts.admit(&hello("b", 7), "x", 3).is_ok());
     }
 
     #[test]

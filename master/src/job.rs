@@ -7,6 +7,7 @@ mod epoch;
 mod images;
 mod measure;
 mod pace;
+mod replay;
 mod start;
 #[cfg(test)]
 mod tests;
@@ -78,6 +79,11 @@ pub struct Job {
     epoch: Epoch,
     /// Where the next epoch begins if a worker is lost.
     base: Arc<Base>,
+    /// Where it begins if a worker's numbers were wrong: the newest base from which samples of the whole crew agreed.
+    /// None before the first, and where nothing is computed again: then `base` serves.
+    proven: Option<Arc<Base>>,
+    /// The cycle in which a worker was dropped for numbers that are not finite.
+    not_finite_at: Option<u64>,
     /// The time for a new base has come.
     keep_due: bool,
     first_cycle: u64,
@@ -266,6 +272,7 @@ impl Job {
                 self.work[member] = work;
                 self.image(worker, cycle, pieces, last, actions)
             }
+            ToMaster::Sample { cycle, hash } => self.sampled(worker, cycle, hash, actions),
             ToMaster::Failed { cycle, reason } => Err(format!("worker {worker}, cycle {cycle}: {reason}")),
         }
     }
@@ -323,6 +330,7 @@ impl Job {
             gather: false,
             collect: store || at_end,
             stop: at_end,
+            sample: self.options.replay && !at_end,
         };
         if before.collect {
             self.epoch.image_times.insert(first, (time, false));
@@ -348,6 +356,9 @@ impl Job {
     ) -> Result<(), String> {
         if !self.epoch.running {
             return Err(format!("worker {worker} sends cycle {cycle} before the start"));
+        }
+        if self.options.replay && self.refuses_numbers(worker, cycle, vote.as_deref(), partials, actions)? {
+            return Ok(());
         }
         let exchange = self.exchange_at(cycle)?;
         let expected = exchange.n_partials(worker);
@@ -429,7 +440,7 @@ impl Job {
                 spread_rate: self.epoch.spread_rate,
             };
             self.epoch.halves.entry(cycle).or_default().rest = Some(rest);
-            self.complete_base(cycle, actions);
+            self.complete_base(cycle, actions)?;
         }
         let control = self.model.setup.control;
         let (dt, limit, element) = self.limit(&vote, control.growth * now.dt);

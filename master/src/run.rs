@@ -92,6 +92,7 @@ pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> 
         keep: asked.keep_every.map_or(Keep::Never, Keep::Seconds),
         balance: asked.balance,
         waits: false,
+        replay: false,
         states: !asked.no_output,
         force_sorts: match (asked.sort_every, asked.sort_seed) {
             (Some(n), _) => ForceSorts::Every(n),
@@ -504,9 +505,12 @@ impl Sink for Output {
                 Ok(())
             }
             Action::Rewind { rows, cycle } => self.rewind(rows, cycle),
-            Action::Send(..) | Action::Sort(..) | Action::Timer(_) | Action::Dealt(_) | Action::Over(_) => {
-                Ok(())
-            }
+            Action::Send(..)
+            | Action::Drop(..)
+            | Action::Sort(..)
+            | Action::Timer(_)
+            | Action::Dealt(_)
+            | Action::Over(_) => Ok(()),
         }
     }
 }

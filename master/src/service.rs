@@ -94,7 +94,7 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     share_with_sorts(&model, &mut hands, &beside);
     let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
     let options = options_for(&order.options, hands.len(), all_take_peers);
-    let options = Options { waits: true, ..options };
+    let options = Options { waits: true, replay: true, ..options };
     let (job, first) = Job::new(Arc::clone(&model), &hands, options, None)?;
     let line = order.line.lock().unwrap_or_else(PoisonError::into_inner).take();
     let line = line.unwrap_or_else(|| drive::channel(order.seats.len()));

@@ -12,7 +12,8 @@ use std::fmt;
 /// The version of the messages in this module and in the control messages, stated first in [`Hello`].
 ///
 /// 1: the first. 2: links between workers (`peer_port` and `member` in [`Hello`]), introductions and reports.
-pub const VERSION: u16 = 2;
+/// 3: proof of arithmetic in [`Hello`], samples of cycles.
+pub const VERSION: u16 = 3;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;
@@ -20,6 +21,8 @@ pub const NAME_LIMIT: usize = 64;
 pub const LANES_LIMIT: usize = 32;
 /// Most characters of a token.
 pub const TOKEN_LIMIT: usize = 128;
+/// Most characters of a proof of arithmetic.
+pub const PROOF_LIMIT: usize = 64;
 /// Most threads that a host may claim.
 pub const THREADS_LIMIT: u32 = 4096;
 /// The largest speed: a host a million times the reference is a slip of the keyboard.
@@ -98,6 +101,8 @@ pub struct Hello {
     pub peer_port: u16,
     /// Of a peer: its place in the job; none for other roles.
     pub member: Option<Membership>,
+    /// Of a worker: what the fixed problem of `mechanics::proof` comes to on its processor; none for other roles.
+    pub proof: Option<String>,
 }
 
 impl Hello {
@@ -122,12 +127,29 @@ impl Hello {
             token: None,
             peer_port: 0,
             member: None,
+            proof: None,
         }
     }
 
     /// Whether its token is `secret`; takes a time that does not tell where they differ.
     pub fn holds(&self, secret: &str) -> bool {
         self.token.as_ref().is_some_and(|theirs| same(secret, theirs))
+    }
+
+    /// Whether its processor computes the bits of this side's, whose proof is `ours`; a worker's must.
+    ///
+    /// # Errors
+    /// The reason to refuse it, with both proofs.
+    pub fn proves(&self, ours: &str) -> std::result::Result<(), String> {
+        match self.proof.as_deref() {
+            Some(theirs) if theirs == ours => Ok(()),
+            theirs => Err(format!(
+                "worker {}: its arithmetic gives {}, this fleet's gives {ours}; install the same release on both, and if \
+                 it is the same, keep this processor out",
+                self.name,
+                theirs.unwrap_or("no proof")
+            )),
+        }
     }
 
     /// The reason to refuse the greeting whoever sent it, naming what was found and what is expected.
@@ -150,6 +172,9 @@ impl Hello {
             && token.len() > TOKEN_LIMIT
         {
             return Err(format!("token of {} bytes, must have at most {TOKEN_LIMIT}", token.len()));
+        }
+        if let Some(proof) = &self.proof {
+            check_name("proof", proof, PROOF_LIMIT)?;
         }
         Ok(())
     }

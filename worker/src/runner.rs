@@ -288,6 +288,7 @@ mod tests {
             gather: false,
             collect: false,
             stop: false,
+            sample: false,
         };
         ToWorker::Totals { cycle, orders, totals: Vec::new() }
     }

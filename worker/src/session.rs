@@ -3,7 +3,7 @@
 //! It knows no socket, clock or thread. Computation is an action whose outcome comes back as an event; at most one
 //! is under way. An assignment of a later epoch replaces the one in hand at any time: the outcome of the task under way
 //! is then thrown away, and the new domain is built when it has come. The steps of a cycle, in order: images if ordered; at a plan boundary transfer, all elements, install;
-//! else contact and border; send; interior; totals; integrate.
+//! else contact and border; send; interior; a sample if ordered; totals; integrate.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -104,6 +104,11 @@ pub enum Task {
     },
     /// State of all sub-domains.
     Image,
+    /// What elements came to in this cycle, in one block.
+    Sample {
+        /// The cycle.
+        cycle: u64,
+    },
 }
 
 /// What came of a task.
@@ -136,6 +141,8 @@ pub enum Outcome {
         /// Compute time so far.
         work: Work,
     },
+    /// Of `Sample`.
+    Sampled([u8; 16]),
     /// The task failed: a sentence for the user.
     Failed(String),
 }
@@ -163,6 +170,8 @@ enum Phase {
     Interior,
     /// Waiting for totals or orders.
     AwaitTotals,
+    /// Hashing a sample, with all elements done.
+    Sampling,
     /// Integrating.
     Integrating,
     /// Failed or finished; only `Release` or `Assign` is heard.
@@ -206,6 +215,8 @@ pub struct Session {
     vote: Option<Box<Vote>>,
     resumed: bool,
     imaged: bool,
+    /// This cycle's sample is still to be sent.
+    sample_due: bool,
     /// The interior was computed with the border: at a plan boundary.
     whole: bool,
 }
@@ -245,6 +256,7 @@ impl Session {
             vote: None,
             resumed: false,
             imaged: false,
+            sample_due: false,
             whole: false,
         }
     }
@@ -500,6 +512,12 @@ impl Session {
                 self.phase = Phase::AwaitTotals;
                 self.try_integrate(actions)
             }
+            (Phase::Sampling, Outcome::Sampled(hash)) => {
+                actions.push(Action::Send(ToMaster::Sample { cycle: self.cycle, hash }));
+                self.sample_due = false;
+                self.phase = Phase::AwaitTotals;
+                self.try_integrate(actions)
+            }
             (Phase::Integrating, Outcome::Integrated(vote)) => {
                 self.vote = Some(vote);
                 self.dt_previous = self.dt;
@@ -526,7 +544,8 @@ impl Session {
     }
 
     fn begin_cycle(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let Orders { stop, collect, gather, .. } = *self.flags()?;
+        let Orders { stop, collect, gather, sample, .. } = *self.flags()?;
+        self.sample_due = sample;
         while let Some(entry) = self.orders.first_entry()
             && entry.key().wrapping_add(1) < self.cycle
         {
@@ -591,6 +610,11 @@ impl Session {
 
     /// A worker that shares no node needs only the orders of the cycle before.
     fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+        if self.sample_due {
+            self.phase = Phase::Sampling;
+            actions.push(Action::Compute(Task::Sample { cycle: self.cycle }));
+            return Ok(());
+        }
         let Some(orders) = self.orders.get(&self.cycle) else { return Ok(()) };
         let (dt, walls) = (orders.dt, orders.walls.clone());
         let totals = match self.route {

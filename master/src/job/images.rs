@@ -76,7 +76,7 @@ impl Job {
                 }
                 if let Some(halves) = self.epoch.halves.get_mut(&cycle) {
                     halves.state = Some(state);
-                    self.complete_base(cycle, actions);
+                    return self.complete_base(cycle, actions);
                 }
                 Ok(())
             }
@@ -101,14 +101,26 @@ impl Job {
         Ok(())
     }
 
-    /// The newest base, once both halves of it are here; and to the disk where that was asked for.
-    pub(super) fn complete_base(&mut self, cycle: u64, actions: &mut Vec<Action>) {
-        let Some(Halves { state: Some(_), rest: Some(_) }) = self.epoch.halves.get(&cycle) else { return };
-        let Some(Halves { state: Some(state), rest: Some(rest) }) = self.epoch.halves.remove(&cycle) else {
-            return;
+    /// The newest base, once both halves of it are here, and samples from it that agree where those are asked for; and
+    /// to the disk where that was asked for.
+    pub(super) fn complete_base(&mut self, cycle: u64, actions: &mut Vec<Action>) -> Result<(), String> {
+        let Some(Halves { state: Some(_), rest: Some(_) }) = self.epoch.halves.get(&cycle) else {
+            return Ok(());
         };
-        self.base = Arc::new(Base { state: Arc::new(state), rest });
+        // The last sample comes after the last frame of its cycle, so what follows such a frame is not cut short.
+        if self.options.replay && !self.has_samples(cycle) {
+            return Ok(());
+        }
+        let Some(Halves { state: Some(state), rest: Some(rest) }) = self.epoch.halves.remove(&cycle) else {
+            return Ok(());
+        };
+        let base = Arc::new(Base { state: Arc::new(state), rest });
+        if self.options.replay && !self.prove(&base, actions)? {
+            return Ok(());
+        }
+        self.base = base;
         self.store(cycle, actions);
+        Ok(())
     }
 
     /// Stores the base if it is the one that was asked for.

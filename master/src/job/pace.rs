@@ -58,7 +58,8 @@ impl Job {
             self.epoch.last_gather = after;
         }
         let (walls, force_quantum) = (self.walls.clone(), self.epoch.quantum);
-        Orders { next, dt, time, walls, force_quantum, gather, collect, stop }
+        let sample = keep && self.options.replay;
+        Orders { next, dt, time, walls, force_quantum, gather, collect, stop, sample }
     }
 
     /// Plan boundaries are the cycles at which plans begin to act, and at latest every so many.

@@ -403,6 +403,7 @@ impl Clock<'_> {
                 | Action::Progress(_)
                 | Action::Dealt(_)
                 | Action::Rewind { .. }
+                | Action::Drop(..)
                 | Action::Timer(_) => {}
             }
         }

@@ -43,7 +43,7 @@ fn assign(cycle: u64) -> Box<Assign> {
 fn orders(next: u64) -> Orders {
     let force_quantum = Quantum::for_reference(1.0, 42);
     let (dt, time, walls) = (1e-3, 1e-3 * next as f64, Vec::new());
-    Orders { next, dt, time, walls, force_quantum, gather: false, collect: false, stop: false }
+    Orders { next, dt, time, walls, force_quantum, gather: false, collect: false, stop: false, sample: false }
 }
 
 fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
@@ -90,6 +90,28 @@ fn totals_may_come_before_the_interior_is_done() {
     let actions = done(&mut session, vote());
     assert!(matches!(actions[..], [Action::Compute(Task::Border { .. })]));
     assert_eq!(session.cycle(), 1);
+}
+
+#[test]
+fn a_sample_is_taken_once_between_the_elements_and_integration() {
+    let mut session = in_first_cycle(Orders { sample: true, ..orders(0) });
+    done(&mut session, Outcome::Computed);
+    hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+    done(&mut session, vote());
+    done(&mut session, forces());
+    hear(&mut session, ToWorker::Totals { cycle: 1, orders: orders(2), totals: vec![0.0; 3] });
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Sample { cycle: 1 })]));
+    let actions = done(&mut session, Outcome::Sampled([7; 16]));
+    assert!(matches!(
+        actions[..],
+        [Action::Send(ToMaster::Sample { cycle: 1, hash: [7, ..] }), Action::Compute(Task::Integrate { .. })]
+    ));
+    done(&mut session, vote());
+    done(&mut session, forces());
+    hear(&mut session, ToWorker::Totals { cycle: 2, orders: orders(3), totals: vec![0.0; 3] });
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Integrate { .. })]), "{actions:?}");
 }
 
 #[test]
