@@ -20,6 +20,7 @@ use protocol::{
     request::{Ended, HostRow, JobOptions, State, Status},
     shape::{Shape, Wire},
     tls,
+    token::Token,
 };
 use tokio::{
     net::TcpListener,
@@ -32,6 +33,7 @@ use crate::{
     connection::Gate,
     drive::{self, Input, Seat},
     hosts::Hosts,
+    lab::Lab,
     queue::{self, Queue, is_over},
     service::{self, Order},
 };
@@ -40,6 +42,8 @@ use crate::{
 pub const WAITING_EVENTS: usize = 1024;
 /// Most connections at a time, those in their greeting included.
 pub const CONNECTIONS: usize = 4096;
+/// How long the token that a master prints at its start is good.
+const FIRST_TOKEN_HOURS: u64 = 24;
 /// The longest that an ending master waits for the job under way.
 const END_LIMIT: Duration = Duration::from_secs(10);
 
@@ -104,8 +108,10 @@ pub enum Event {
 /// # Errors
 /// If it cannot listen there, or the certificates cannot be used.
 pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
-    let tls = args.certs.as_ref().map(|folder| tls::server_config(&tls::Paths::in_folder(folder)));
-    let tls = tls.transpose().map_err(|e| e.to_string())?;
+    let lab = args.lab.as_ref().map(|folder| Lab::open(folder)).transpose().map_err(|e| e.to_string())?;
+    let tls = args.certs.as_ref().map(|folder| tls::Paths::in_folder(folder));
+    let config = if lab.is_some() { tls::open_server_config } else { tls::server_config };
+    let tls = tls.map(|paths| config(&paths)).transpose().map_err(|e| e.to_string())?;
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
@@ -120,10 +126,13 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     let result = runtime.block_on(async {
         let listener = TcpListener::bind(args.listen).await.map_err(|e| format!("{}: {e}", args.listen))?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
-        announce(address, tls.is_some());
+        announce(address, tls.is_some(), lab.as_ref())?;
+        let lab = lab.map(|lab| lab.follow().map(|revoked| (lab, revoked))).transpose();
+        let lab = lab.map_err(|e| e.to_string())?;
         let (events, heard) = mpsc::channel(WAITING_EVENTS);
         let gate =
-            Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls).behind(port));
+            Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls).behind(port).of(lab);
+        let gate = Arc::new(gate);
         tokio::spawn(listen(listener, Arc::clone(&gate)));
         let stop = crate::run::stop_on_interrupt("ending; the job under way writes its results");
         Owner::new(args.spool.clone(), first, events).run(heard, &stop, &gate).await;
@@ -163,12 +172,27 @@ pub async fn listen(listener: TcpListener, gate: Arc<Gate>) {
 }
 
 /// Says where it listens and how workers join.
-fn announce(address: SocketAddr, certificates: bool) {
+fn announce(address: SocketAddr, certificates: bool, lab: Option<&Lab>) -> Result<(), String> {
     let host = if address.ip().is_unspecified() { host_name() } else { address.ip().to_string() };
     let host = if host.contains(':') { format!("[{host}]") } else { host };
+    let host = format!("{host}:{}", address.port());
     let certs = if certificates { " --certs FOLDER" } else { "" };
     println!("listening on {address}");
-    println!("workers join with: bolide worker --master {host}:{}{certs}", address.port());
+    println!("workers join with: bolide worker --master {host}{certs}");
+    if let Some(lab) = lab {
+        let token = lab.issue(tls::Role::Worker, FIRST_TOKEN_HOURS).map_err(|e| e.to_string())?;
+        println!("a new PC joins with: {}", line_to_paste(&host, &token, tls::Role::Worker));
+        println!("more such lines: bolide certs token LAB --master {host}");
+    }
+    Ok(())
+}
+
+/// What is pasted on a bare PC.
+pub fn line_to_paste(master: &str, token: &Token, role: tls::Role) -> String {
+    match role {
+        tls::Role::Worker => format!("bolide worker --master {master} --certs bolide-certs --join {token}"),
+        _ => format!("bolide certs join {master} {token} bolide-certs"),
+    }
 }
 
 /// The name of this machine.

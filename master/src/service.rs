@@ -98,6 +98,9 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     let (job, first) = Job::new(Arc::clone(&model), &hands, options, None)?;
     let line = order.line.lock().unwrap_or_else(PoisonError::into_inner).take();
     let line = line.unwrap_or_else(|| drive::channel(order.seats.len()));
+    if let Some(path) = order.folder.as_ref().filter(|path| path.is_symlink()) {
+        return Err(format!("{} is a link; results stay in the spool folder, remove it", path.display()));
+    }
     let folder = order.folder.as_ref().map(|path| Folder::create(path, false)).transpose();
     let mut output = Output::new(Arc::clone(&model), folder.map_err(|e| e.to_string())?, true)?;
     output.state(job.start_state())?;

@@ -42,6 +42,8 @@ pub enum Role {
     Client,
     /// A worker that dials another worker for the direct route.
     Peer,
+    /// A host without a certificate, with a token to exchange for one.
+    Newcomer,
 }
 
 impl Role {
@@ -50,7 +52,7 @@ impl Role {
     /// A master's certificate serves for everything: `bolide run` and `simulate` start their own workers.
     pub const fn is_certified_by(self, certificate: tls::Role) -> bool {
         match certificate {
-            tls::Role::Master => true,
+            tls::Role::Master => !matches!(self, Self::Newcomer),
             tls::Role::Worker => matches!(self, Self::Worker | Self::Peer),
             tls::Role::Client => matches!(self, Self::Client),
         }
@@ -63,6 +65,7 @@ impl fmt::Display for Role {
             Self::Worker => "worker",
             Self::Client => "client",
             Self::Peer => "peer",
+            Self::Newcomer => "newcomer",
         })
     }
 }
@@ -320,6 +323,8 @@ pub struct Policy {
     pub certificate: Option<tls::Role>,
     /// The token that the greeting must hold, if any.
     pub token: Option<String>,
+    /// Why nobody is taken on this connection, whatever the greeting says: its certificate was revoked.
+    pub refusal: Option<String>,
 }
 
 /// What the listening side makes of a greeting.
@@ -399,6 +404,9 @@ impl Server {
         let hello: Hello =
             codec::decode(&frame.payload, HELLO_LIMIT as usize).map_err(|error| format!("hello: {error}"))?;
         hello.check()?;
+        if let Some(reason) = &self.policy.refusal {
+            return Err(reason.clone());
+        }
         let role = hello.role;
         if !self.policy.roles.contains(&role) {
             let taken: Vec<String> = self.policy.roles.iter().map(Role::to_string).collect();

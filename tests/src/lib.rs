@@ -2,8 +2,8 @@
 //!
 //! [`solve`] takes a deck through master and workers in this process; [`cluster`] runs real processes on loopback,
 //! [`proxy`] stands between them; [`book`] holds the cases, [`case`] compares a figure with a published or derived one
-//! of `reference.toml` and says how it went; [`checker`]
-//! looks for nodes inside foreign bodies, without asking the contact code.
+//! of `reference.toml` and says how it went; [`seeds`] plays the pure sessions
+//! in a world that goes wrong; [`checker`] looks for nodes inside foreign bodies, without asking the contact code.
 
 pub mod bits;
 pub mod book;
@@ -11,4 +11,5 @@ pub mod case;
 pub mod checker;
 pub mod cluster;
 pub mod proxy;
+pub mod seeds;
 pub mod solve;

@@ -145,6 +145,7 @@ impl Job {
             rebalances: Vec::new(),
             losses: Vec::new(),
             over: false,
+            unfenced: false,
             model,
             options,
         };
