@@ -172,6 +172,8 @@ enum Phase {
     AwaitTotals,
     /// Hashing a sample, with all elements done.
     Sampling,
+    /// After the last image: computing the elements of the cycle that will not be, for a sample of them.
+    Proving,
     /// Integrating.
     Integrating,
     /// Failed or finished; only `Release` or `Assign` is heard.
@@ -464,6 +466,13 @@ impl Session {
                     last,
                     work,
                 }));
+                if stop && self.sample_due {
+                    self.phase = Phase::Proving;
+                    let (quantum, time) = self.quantum_and_time()?;
+                    let (dt_previous, gather) = (self.dt_previous, false);
+                    actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather }));
+                    return Ok(());
+                }
                 if stop {
                     self.phase = Phase::Over;
                     return Ok(());
@@ -517,6 +526,19 @@ impl Session {
                 self.sample_due = false;
                 self.phase = Phase::AwaitTotals;
                 self.try_integrate(actions)
+            }
+            (Phase::Proving, Outcome::Forces { .. }) => {
+                actions.push(Action::Compute(Task::Interior { dt_previous: self.dt_previous }));
+                Ok(())
+            }
+            (Phase::Proving, Outcome::Computed) => {
+                actions.push(Action::Compute(Task::Sample { cycle: self.cycle }));
+                Ok(())
+            }
+            (Phase::Proving, Outcome::Sampled(hash)) => {
+                actions.push(Action::Send(ToMaster::Sample { cycle: self.cycle, hash }));
+                self.phase = Phase::Over;
+                Ok(())
             }
             (Phase::Integrating, Outcome::Integrated(vote)) => {
                 self.vote = Some(vote);

@@ -133,6 +133,10 @@ pub(super) struct Epoch {
     pub(super) spread_rate: f64,
     /// All stop at the start of this cycle.
     pub(super) stop_at: Option<u64>,
+    /// Samples come with that stop.
+    pub(super) stop_sampled: bool,
+    /// All have stopped, and their images are here: state, last vote, whether the state is for the user.
+    pub(super) stopped: Option<(GlobalState, Vote, bool)>,
     /// They stop for the next epoch, not for the end.
     pub(super) pauses: bool,
     pub(super) meter: Meter,
@@ -215,6 +219,8 @@ impl Job {
             spread_rate: self.epoch.spread_rate,
         };
         self.base = Arc::new(Base { state: Arc::new(state), rest });
+        // Its samples came with the stop.
+        self.proven = self.epoch.stop_sampled.then(|| Arc::clone(&self.base));
         self.store(cycle, actions);
         self.adopt_proposal(cycle);
         self.next_epoch(actions)

@@ -56,20 +56,11 @@ impl Job {
         })?;
         state.time = time;
         match collected.vote {
-            Some(vote) if self.epoch.pauses => {
-                self.book_last(cycle, &vote, actions);
-                if self.failure.is_some() {
-                    return self.end_with(state, actions);
-                }
-                if due {
-                    actions.push(Action::State(Box::new(state.clone())));
-                }
-                self.paused(state, vote, actions)
+            Some(vote) if self.epoch.stop_sampled => {
+                self.epoch.stopped = Some((state, vote, due));
+                self.prove_stop(cycle, actions)
             }
-            Some(vote) => {
-                self.book_last(cycle, &vote, actions);
-                self.end_with(state, actions)
-            }
+            Some(vote) => self.stopped(state, vote, due, actions),
             None => {
                 if due {
                     actions.push(Action::State(Box::new(state.clone())));
@@ -81,6 +72,24 @@ impl Job {
                 Ok(())
             }
         }
+    }
+
+    /// All have stopped: the epoch is over, or the run.
+    pub(super) fn stopped(
+        &mut self,
+        state: GlobalState,
+        vote: Vote,
+        due: bool,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), String> {
+        self.book_last(state.cycle, &vote, actions);
+        if !self.epoch.pauses || self.failure.is_some() {
+            return self.end_with(state, actions);
+        }
+        if due {
+            actions.push(Action::State(Box::new(state.clone())));
+        }
+        self.paused(state, vote, actions)
     }
 
     /// Books the vote of the cycle before a stop.

@@ -58,7 +58,8 @@ impl Job {
             self.epoch.last_gather = after;
         }
         let (walls, force_quantum) = (self.walls.clone(), self.epoch.quantum);
-        let sample = keep && self.options.replay;
+        let sample = (keep || stop) && self.options.replay;
+        self.epoch.stop_sampled |= stop && sample;
         Orders { next, dt, time, walls, force_quantum, gather, collect, stop, sample }
     }
 

@@ -286,6 +286,8 @@ impl Epoch {
             last_spread: 0.0,
             spread_rate: rest.spread_rate,
             stop_at: None,
+            stop_sampled: false,
+            stopped: None,
             pauses: false,
             meter: Meter::new(0),
         }
