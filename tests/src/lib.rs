@@ -2,7 +2,7 @@
 //!
 //! [`solve`] takes a deck through master and workers in this process; [`cluster`] runs real processes on loopback,
 //! [`proxy`] stands between them; [`book`] holds the cases, [`case`] compares a figure with a published or derived one
-//! of `reference.toml` and says how it went; [`seeds`] plays the pure sessions
+//! of `reference.toml` and says how it went; [`fuzz`] damages what comes from outside, [`seeds`] plays the pure sessions
 //! in a world that goes wrong; [`checker`] looks for nodes inside foreign bodies, without asking the contact code.
 
 pub mod bits;
@@ -10,6 +10,7 @@ pub mod book;
 pub mod case;
 pub mod checker;
 pub mod cluster;
+pub mod fuzz;
 pub mod proxy;
 pub mod seeds;
 pub mod solve;

@@ -368,8 +368,9 @@ impl World {
                 }
             }
             Fault::Spoil { host } => {
-                // One that errs is found beside another that does not.
-                if let Some(host) = pick(host).filter(|_| alive.len() > 1) {
+                // One errs at a time: where all do, the master suspects itself and ends the job.
+                let one_errs = alive.iter().any(|&host| self.hosts[host].spoilt);
+                if let Some(host) = pick(host).filter(|_| alive.len() > 1 && !one_errs) {
                     self.hosts[host].spoilt = true;
                 }
             }
