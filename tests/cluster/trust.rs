@@ -158,8 +158,8 @@ fn a_revoked_worker_is_cut_off_in_mid_run_and_the_others_finish_with_the_same_di
 
 /// Sends a greeting as it stands, gives the refusal.
 fn greet(address: &str, hello: &Hello) -> String {
-    let frame = Frame::new(Header::new(Kind::Hello), codec::encode(hello).expect("plain")).seal();
-    let frame = frame.expect("short");
+    let mut frame = Frame::new(Header::new(Kind::Hello), codec::encode(hello).expect("plain"));
+    frame.seal().expect("short");
     let mut stream = TcpStream::connect(address).expect("the master listens");
     stream.write_all(&encode_header(&frame.header)).expect("it reads");
     stream.write_all(&frame.payload).expect("it reads");

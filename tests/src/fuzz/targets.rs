@@ -157,9 +157,9 @@ const DECK: &str = r#"
     title = "two small blocks"
     units = "cm-g-us"
     [control]
-    end_cycle = 8
+    end_cycle = 14
     end_time = 1e3
-    plan_interval = 3
+    plan_interval = 5
     [[part]]
     name = "target"
     material = "AL_2024_T351"
