@@ -23,6 +23,7 @@ pub(crate) use part::{Explicit, PartDraft};
 use std::collections::BTreeMap;
 
 use mechanics::{
+    contact::Settings,
     material::Material,
     setup::{Control, Setup},
 };
@@ -30,7 +31,7 @@ use toml::de::DeTable;
 
 use crate::{
     assembly, check,
-    fault::{Fault, Faults, nearest},
+    fault::{Fault, Faults, nearest, short},
     library,
     model::Model,
     table::{Range, Table, Value},
@@ -104,6 +105,9 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
     let assembly = assembly::assemble(&parts, &joins, &materials.list, faults);
     let conditions = boundary::read(&deck, &names, &parts, &assembly);
     let contact = contact::read(&deck, &names, &assembly, &materials.list, &conditions);
+    let settings = contact.as_ref().map(|contact| &contact.settings);
+    let control = control
+        .map(|control| Control { sort_lag: sort_lag(&deck, control.sort_lag, settings, faults), ..control });
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
@@ -139,6 +143,33 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
     })
 }
 
+/// Sort lag of a deck that gives none, in cycles; less where the plan interval is
+/// shorter or the slack does not hold what nodes travel in so many. A long lag
+/// spreads a sort over many cycles of the master's host.
+const SORT_LAG: u32 = 8;
+
+/// The sort lag for this contact.
+fn sort_lag(deck: &Table<'_>, given: u32, contact: Option<&Settings>, faults: &Faults<'_>) -> u32 {
+    let control = deck.get("control").and_then(|v| v.table("[control]".to_string()));
+    let Some((contact, control)) = contact.zip(control) else { return given };
+    let longest = contact.longest_lag();
+    if !control.has("sort_lag") {
+        return given.min(longest.max(1));
+    }
+    if given > longest.max(1) {
+        faults.add(
+            control.at,
+            format!("sort_lag = {given} and a slack of {} gaps", short(contact.slack / contact.gap)),
+            format!(
+                "at most {} cycles: nodes may travel a fifth of the gap in each, towards each other",
+                longest.max(1)
+            ),
+            "lower sort_lag or raise slack_gaps",
+        );
+    }
+    given
+}
+
 /// Reads `[control]`.
 fn read_control(deck: &Table<'_>, faults: &Faults<'_>) -> Option<Control> {
     let Some(control) = deck.get("control") else {
@@ -168,8 +199,12 @@ fn read_control(deck: &Table<'_>, faults: &Faults<'_>) -> Option<Control> {
         linear_viscosity: control.number_or("linear_viscosity", 0.2, coefficient),
         quadratic_viscosity: control.number_or("quadratic_viscosity", 1.0, coefficient),
         hourglass: control.number_or("hourglass", 0.1, coefficient),
-        sort_lag: control.integer_or("sort_lag", 4, 1, 1000) as u32,
+        sort_lag: control.integer_or("sort_lag", u64::from(SORT_LAG), 1, 1000) as u32,
         plan_interval: control.integer_or("plan_interval", 50, 2, 100_000) as u32,
+    };
+    let read = match control.has("sort_lag") {
+        true => read,
+        false => Control { sort_lag: read.sort_lag.min(read.plan_interval - 1), ..read },
     };
     if read.plan_interval <= read.sort_lag {
         faults.add(

@@ -36,7 +36,7 @@ fn good(name: &str) -> Model {
 fn defaults_are_those_of_the_reference() {
     let control = read(&cube("a", [0.0; 3], "")).setup.control;
     assert_eq!(control.end_cycle, u64::MAX);
-    assert_eq!((control.sort_lag, control.plan_interval), (4, 50));
+    assert_eq!((control.sort_lag, control.plan_interval), (8, 50));
     let numbers = [
         control.safety_factor,
         control.growth,

@@ -11,7 +11,11 @@ use protocol::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    balance::Dealing, job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot,
+    balance::{Costs, Dealing},
+    job::Bench,
+    ledger::Ledger,
+    results::history::HistoryRow,
+    snapshot::Snapshot,
     sort::Sorted,
 };
 
@@ -35,6 +39,8 @@ pub struct Options {
     pub route: Route,
     /// How work units are dealt.
     pub dealing: Dealing,
+    /// What work costs on the workers, relative to an element.
+    pub costs: Costs,
     /// Store a snapshot at the start of this cycle.
     pub snapshot_at: Option<u64>,
     /// How often the state is kept in memory, to go back to when a worker is lost.

@@ -30,7 +30,8 @@ use protocol::{
 
 use crate::{
     event::{Action, Event, Limit, Loss, Options, Outcome, Progress, Rebalance},
-    exchange::{Exchange, Holdings},
+    exchange::Exchange,
+    holdings::Holdings,
     ledger::Ledger,
     results::history::HistoryRow,
     sort::{Sorted, Sorter},

@@ -18,6 +18,7 @@ pub mod drive;
 pub mod embedded;
 pub mod event;
 pub mod exchange;
+pub mod holdings;
 pub mod hosts;
 pub mod job;
 pub mod lab;

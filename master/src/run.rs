@@ -88,6 +88,7 @@ pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> 
         lanes: asked.lanes.clone(),
         route: asked.route.choose(workers, all_take_peers),
         dealing: crate::balance::Dealing::Owners,
+        costs: Default::default(),
         snapshot_at: asked.snapshot_at,
         keep: asked.keep_every.map_or(Keep::Never, Keep::Seconds),
         balance: asked.balance,

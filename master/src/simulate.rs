@@ -30,6 +30,7 @@ pub mod timeline;
 pub mod virtual_clock;
 
 use crate::{
+    balance::Costs,
     command::{Clock, SimulateArgs},
     event::{Balance, Rebalance},
     run::read_deck,
@@ -87,8 +88,8 @@ fn print_rows<T: Serialize>(rows: &[T]) -> Result<ExitCode, String> {
 }
 
 fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
-    let rows =
-        mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, cluster.pair)?;
+    let costs = Costs { node: cluster.node, pair: cluster.pair };
+    let rows = mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, costs)?;
     if args.json {
         return print_rows(&rows);
     }
@@ -102,7 +103,8 @@ fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitC
         .map(|lanes| lanes.name().parse::<Width>().and_then(Width::require))
         .transpose()
         .map_err(|e| e.to_string())?;
-    let (all, medians) = measure::run(&model(deck, args.cycles)?, lanes, args.repetitions)?;
+    let (all, medians) =
+        measure::run(&model(deck, args.cycles)?, cluster.speeds.len(), lanes, args.repetitions)?;
     if args.json {
         println!("{}", serde_json::to_string(&medians).map_err(|e| e.to_string())?);
     } else {

@@ -204,7 +204,9 @@ fn every_cluster_file_and_route_gives_the_digest_of_a_plain_run() {
 
 #[test]
 fn a_sort_that_is_late_makes_workers_wait_and_changes_no_later_sort() {
-    let model = model("plates-free-slip.toml", 40);
+    let mut model = Arc::unwrap_or_clone(model("plates-free-slip.toml", 60));
+    model.setup.control.sort_lag = 4;
+    let model = Arc::new(model);
     let mut three = machines(3);
     let (quick, tape) = virtual_clock::run(&model, &three, Scheme::control(), None).expect("the deck runs");
     // Six cycles of one host, where the lag is four.
@@ -312,9 +314,11 @@ fn a_host_that_drops_to_half_speed_and_comes_back_is_followed_within_two_boundar
         assert_eq!(followed.digest, given.digest, "{deck}");
         assert_eq!(followed.digest, steady.digest, "{deck}");
         let at: Vec<u64> = followed.rebalances.iter().map(|r| r.cycle).collect();
-        // With contact boundaries are the sorts as well.
-        assert_eq!(at.len(), 2, "{deck}: {at:?}");
-        assert!((46..=85).contains(&at[0]) && (106..=145).contains(&at[1]), "{deck}: {at:?}");
+        // With contact boundaries are the sorts as well; what one saw in part the next sees whole.
+        let after_each =
+            [46..=85_u64, 106..=145].map(|window| at.iter().filter(|c| window.contains(c)).count());
+        assert!(after_each.iter().all(|n| (1..=2).contains(n)), "{deck}: {at:?}");
+        assert_eq!(after_each.iter().sum::<usize>(), at.len(), "{deck}: {at:?}");
         let alone = run(
             &model,
             &Machines { speeds: vec![1.0], believed: vec![1.0], ..eight(Vec::new()) },

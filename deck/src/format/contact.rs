@@ -20,9 +20,9 @@ pub(crate) struct ContactDraft {
 
 /// Default gap over the smallest face dimension.
 const GAP_FRACTION: f64 = 0.1;
-/// Default slack over the gap. A node travels at most 20 % of the gap in a cycle, so lists last a dozen
-/// cycles at the least.
-const SLACK_GAPS: f64 = 2.5;
+/// Default slack over the gap. Two nodes travel at most 40 % of the gap against each other in a cycle, so lists last nine
+/// cycles at the least, and a sort may take eight.
+const SLACK_GAPS: f64 = 3.5;
 /// Default friction velocity over the largest difference of initial velocities.
 const FRICTION_VELOCITY: f64 = 0.01;
 /// Default friction velocity over the largest bulk sound speed where nothing moves at the start.

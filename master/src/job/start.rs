@@ -29,9 +29,10 @@ use super::{
 };
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
-    decompose::{self, decompose},
+    decompose::{self, decompose, work},
     event::{Action, Deal, Hand, Keep, Options},
-    exchange::{Exchange, Holdings},
+    exchange::Exchange,
+    holdings::Holdings,
     ledger::Ledger,
     snapshot::Snapshot,
     sort::Sorter,
@@ -175,9 +176,11 @@ impl Job {
         let (model, state) = (&self.model, &base.state);
         let hands: Vec<&Hand> = crew.iter().map(|&member| &self.members[member].hand).collect();
         let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
-        let layout = decompose(&model.mesh, &speeds);
+        let costs = self.options.costs;
+        let layout = decompose(&model.mesh, &speeds, costs.node);
         let threads: Vec<u32> = hands.iter().map(|hand| hand.threads).collect();
-        let cut = Cut::new(model, state, &layout, &threads, self.touching.as_ref());
+        let held = work(&layout, n, costs.node);
+        let cut = Cut::new(model, state, (&layout, held), &threads, self.touching.as_ref());
         let mut elements = vec![0.0; n];
         for s in &layout {
             elements[s.worker] += s.region.n_elements() as f64;
@@ -194,6 +197,7 @@ impl Job {
                     speeds.clone(),
                     self.options.route,
                     self.options.dealing,
+                    costs.pair,
                     &cut.gather,
                 );
                 let x = sorter.positions_of(state);
@@ -319,7 +323,7 @@ impl Cut {
     fn new(
         model: &Model,
         state: &GlobalState,
-        layout: &[decompose::Subdomain],
+        (layout, work): (&[decompose::Subdomain], Vec<f64>),
         threads: &[u32],
         touching: Option<&Touching>,
     ) -> Self {
@@ -337,7 +341,7 @@ impl Cut {
             nodes_of.push(nodes);
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
         }
-        let holdings = Holdings::new(model.mesh.n_nodes(), n, layout, &nodes_of);
+        let holdings = Holdings::new(model.mesh.n_nodes(), work, layout, &nodes_of);
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
         for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {

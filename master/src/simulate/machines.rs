@@ -7,7 +7,10 @@ use super::{
     network::Network,
     timeline::{Kind, Phases},
 };
-use crate::{balance::Dealing, event::Balance};
+use crate::{
+    balance::{self, Dealing},
+    event::Balance,
+};
 
 /// What work costs on a host of speed 1 (s).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,6 +28,12 @@ pub struct Costs {
 }
 
 impl Costs {
+    /// What the master deals out work by: relative to an element.
+    pub fn relative(&self) -> balance::Costs {
+        let of = |seconds: f64| if self.element > 0.0 { seconds / self.element } else { 0.0 };
+        balance::Costs { node: of(self.node), pair: of(self.pair) }
+    }
+
     /// Contact, elements and integration of a task (s).
     pub fn of(&self, task: Kind, load: &Load) -> Phases {
         let elements = |n: u64| self.element * n as f64;

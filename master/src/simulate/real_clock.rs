@@ -213,7 +213,8 @@ pub fn run(
         .map(|(i, &speed)| Hand { name: format!("host-{}", i + 1), speed, threads: 1 })
         .collect();
     let scheme = Scheme::bolide(route);
-    let options = Options { route, dealing: scheme.dealing, ..Options::default() };
+    let options =
+        Options { route, dealing: scheme.dealing, costs: machines.costs.relative(), ..Options::default() };
     let (job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
     let (send, receive) = mpsc::channel();
     let arrived =

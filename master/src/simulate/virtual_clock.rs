@@ -88,6 +88,7 @@ pub fn run(
     let options = Options {
         route: scheme.route,
         dealing: scheme.dealing,
+        costs: machines.costs.relative(),
         balance: scheme.balance,
         lanes: scheme.lanes.map(|width| width.to_string()),
         ..Options::default()

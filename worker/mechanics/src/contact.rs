@@ -33,7 +33,7 @@ pub mod zone;
 pub use cycle::{Contact, initial_pairs};
 pub use force::ContactVote;
 pub use reach::Extent;
-pub use search::Exclusions;
+pub use search::{Exclusions, cull};
 pub use sort::sort;
 pub use surface::{Face, Surface};
 pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
@@ -72,6 +72,12 @@ impl Settings {
     #[inline(always)]
     pub fn permits(&self, a: u32, b: u32) -> bool {
         self.interacts[a as usize * self.n_parts() + b as usize]
+    }
+
+    /// Cycles between trigger and sort after which nodes cannot have left the slack at the speeds that votes allow; 0 if one
+    /// is too many.
+    pub fn longest_lag(&self) -> u32 {
+        (self.slack / reach::lag_travel(self, 1) * (1.0 + 1e-9)) as u32
     }
 
     /// Reach of the sort (length): the zone of warning plus the slack.
