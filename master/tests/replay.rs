@@ -17,6 +17,7 @@ const PLATES: &str = r#"
     end_cycle = 90
     end_time = 1e3
     plan_interval = 7
+    sort_lag = 4
     [[part]]
     name = "target"
     material = "AL_2024_T351"

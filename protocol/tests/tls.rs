@@ -370,3 +370,34 @@ async fn a_newcomer_knows_the_master_by_its_token_alone_and_is_let_in_where_newc
     let _ = tls::connect(near, "127.0.0.1", &newcomer, Role::Master).await;
     assert!(far.await.expect("no panic").is_err());
 }
+
+#[tokio::test]
+async fn a_certificate_that_expires_or_is_revoked_ends_the_link_that_it_made_with_the_reason() {
+    let lab = Authority::new("lab");
+    let (_m, master) = lab.host("bolide:master", usual);
+    let soon = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970");
+    let soon = date_time_ymd(1970, 1, 1) + Duration::from_secs(soon.as_secs() + 3);
+    let (_s, short) = lab.host("bolide:worker", |params| params.not_after = soon);
+    let (_w, worker) = lab.host("bolide:worker", usual);
+    let server = tls::server_config(&master).expect("usable");
+    for (paths, words) in [(&short, "worker \"pc-1\" has expired"), (&worker, "worker \"pc-1\" was revoked")]
+    {
+        let client = tls::client_config(paths).expect("usable");
+        let (near, far) = meet(&client, "127.0.0.1", &server).await;
+        let ((near, _), (far, identity)) = (near.expect("dialled"), far.expect("accepted"));
+        let (_kept, mut heard) = split(near, Settings::default());
+        let (sender, mut receiver) = split(far, Settings::default());
+        let (news, revoked) = tokio::sync::watch::channel(Arc::default());
+        assert_eq!(identity.fault(Some(&revoked), std::time::SystemTime::now()), None, "good so far");
+        let fingerprint = identity.fingerprint.clone();
+        tls::watch(&sender, identity, Some(revoked));
+        if words.contains("revoked") {
+            news.send_replace(Arc::new([fingerprint].into()));
+        }
+        let told = tokio::time::timeout(Duration::from_secs(30), heard.receive()).await.expect("in time");
+        let told = protocol::handshake::reason(&told.expect("a last word")).expect("a reason");
+        assert!(told.contains(words), "{told}");
+        let ended = receiver.receive().await.expect_err("ended").to_string();
+        assert!(ended.contains(words) || ended == "connection closed", "{ended}");
+    }
+}

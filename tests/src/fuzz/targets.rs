@@ -160,6 +160,7 @@ const DECK: &str = r#"
     end_cycle = 14
     end_time = 1e3
     plan_interval = 5
+    sort_lag = 4
     [[part]]
     name = "target"
     material = "AL_2024_T351"

@@ -97,6 +97,7 @@ const DECK: &str = r#"
     end_cycle = 60
     end_time = 1e3
     plan_interval = 7
+    sort_lag = 4
     [[part]]
     name = "target"
     material = "AL_2024_T351"

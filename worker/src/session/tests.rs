@@ -115,6 +115,29 @@ fn a_sample_is_taken_once_between_the_elements_and_integration() {
 }
 
 #[test]
+fn after_the_last_image_a_sample_is_computed_of_the_cycle_that_will_not_be() {
+    let mut session = in_first_cycle(Orders { stop: true, sample: true, ..orders(0) });
+    done(&mut session, Outcome::Computed);
+    hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+    let actions = done(&mut session, vote());
+    assert!(matches!(actions[..], [Action::Compute(Task::Image)]));
+    let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
+    assert!(matches!(
+        actions[..],
+        [
+            Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. }),
+            Action::Compute(Task::Border { gather: false, .. })
+        ]
+    ));
+    let actions = done(&mut session, forces());
+    assert!(matches!(actions[..], [Action::Compute(Task::Interior { .. })]));
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Sample { cycle: 1 })]));
+    let actions = done(&mut session, Outcome::Sampled([9; 16]));
+    assert!(matches!(actions[..], [Action::Send(ToMaster::Sample { cycle: 1, .. })]));
+}
+
+#[test]
 fn a_plan_is_installed_when_it_and_the_guests_are_there() {
     let mut session = in_first_cycle(Orders { gather: true, ..orders(0) });
     done(&mut session, Outcome::Computed);
