@@ -6,6 +6,7 @@ mod zones;
 use mechanics::mesh::Topology;
 
 pub(crate) use surface::{Face, outer_faces, smallest_face_dimension};
+pub(crate) use zones::clearance;
 
 use crate::{
     assembly::Assembly,

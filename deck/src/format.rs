@@ -33,6 +33,7 @@ use crate::{
     assembly, check,
     fault::{Fault, Faults, nearest, short},
     library,
+    mesh_file::MeshFile,
     model::Model,
     table::{Range, Table, Value},
     units::{SETS, Units},
@@ -53,8 +54,11 @@ pub const MAX_PARTS: usize = 10_000;
 /// Most entries of any other array of tables.
 pub const MAX_ENTRIES: usize = 10_000;
 
+/// Mesh files by the name that the deck has for them.
+pub(crate) type Meshes = BTreeMap<String, MeshFile>;
+
 /// Reads a deck; the whole check.
-pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
+pub(crate) fn read(text: &str, file_name: &str, meshes: &Meshes) -> Result<Model, Vec<Fault>> {
     if text.len() > MAX_TEXT {
         let faults = Faults::new(file_name, "");
         faults.add(
@@ -75,7 +79,7 @@ pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     if faults.count() > 0 {
         return Err(faults.into_list());
     }
-    let model = read_document(document.get_ref(), &faults);
+    let model = read_document(document.get_ref(), meshes, &faults);
     match model {
         Some(model) if faults.count() == 0 => Ok(model),
         _ => {
@@ -85,7 +89,7 @@ pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     }
 }
 
-fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
+fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -> Option<Model> {
     let deck = Table::new(document, 0, "the deck".to_string(), faults);
     let title = deck.require("title", "a title in quotes");
     let text = title.and_then(|v| v.text()).unwrap_or_default();
@@ -95,14 +99,16 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
         title.fault(&format!("at most {MAX_TITLE} characters on one line"), "shorten it");
     }
     let names = SETS.map(|set| set.name);
-    let units = deck.require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t").and_then(|v| v.one_of(&names));
+    let units = deck
+        .require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t, in-s-lbf")
+        .and_then(|v| v.one_of(&names));
     let units = SETS[units.unwrap_or(0)];
     let control = read_control(&deck, faults);
     let mut materials = Materials::read(&deck, units);
-    let parts = part::read_parts(&deck, &mut materials);
+    let parts = part::read_parts(&deck, &mut materials, meshes);
     let names = Names::of(&parts);
     let joins = assembly::read_joins(&deck, &names);
-    let assembly = assembly::assemble(&parts, &joins, &materials.list, faults);
+    let assembly = assembly::assemble(&parts, &joins, &materials.list, meshes, faults);
     let conditions = boundary::read(&deck, &names, &parts, &assembly);
     let contact = contact::read(&deck, &names, &assembly, &materials.list, &conditions);
     let settings = contact.as_ref().map(|contact| &contact.settings);
@@ -266,6 +272,12 @@ impl Materials {
             let name = value.text()?;
             if let Some(own) = self.own.iter().find(|m| m.name == name) {
                 own.clone()
+            } else if !self.units.library && library::find(name).is_some() {
+                value.fault(
+                    "a [[material]] of the deck",
+                    "write the constants in inches, seconds and pounds of force",
+                );
+                return None;
             } else if let Some(found) = library::find(name) {
                 self.units.from_si(found)
             } else if self.broken.iter().any(|b| b == name) {

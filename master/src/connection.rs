@@ -15,8 +15,9 @@ use std::{
 use protocol::{
     Error, Result,
     dial::leave,
+    frame::Frame,
     handshake::{Hello, Policy, Role, Server, Welcome},
-    link::{self, Receiver, Sender, Settings},
+    link::{self, MISSED_HEARTBEATS, Receiver, Sender, Settings},
     message::ToMaster,
     order::{BULK_ON_THE_WAY, Inbox, Outbox},
     shape::{Shape, Shaped},
@@ -27,7 +28,9 @@ use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::TcpStream,
     sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot},
+    time::Instant,
 };
+use tracing::{info, warn};
 
 use crate::{
     daemon::Event,
@@ -42,8 +45,8 @@ use crate::{
 pub const GREETINGS: usize = 256;
 /// The longest that a connection waits for a place among them.
 const PLACE_LIMIT: Duration = Duration::from_secs(30);
-/// Interval of heartbeats on every connection (ms).
-const HEARTBEAT_MS: u32 = 1000;
+/// A worker is suspect after this part of the silence after which it is dead.
+const SUSPECT: f64 = 0.3;
 
 /// What every connection needs of the daemon.
 pub struct Gate {
@@ -61,6 +64,8 @@ pub struct Gate {
     greetings: Arc<Semaphore>,
     /// This host's emulated port, which all connections pass.
     port: Option<Shape>,
+    /// Without a byte for so long, a peer is dead.
+    dead_after: Duration,
     /// The last incarnation that was given.
     incarnations: AtomicU32,
     ending: AtomicBool,
@@ -76,7 +81,8 @@ impl Gate {
     ) -> Self {
         let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
         let greetings = Arc::new(Semaphore::new(GREETINGS));
-        Self { events, roles, token, tls, lab: None, greetings, port: None, incarnations, ending }
+        let (lab, port, dead_after) = (None, None, Settings::default().silence);
+        Self { events, roles, token, tls, lab, greetings, port, dead_after, incarnations, ending }
     }
 
     /// Newcomers may exchange tokens of this lab, and certificates on its list are not accepted.
@@ -91,6 +97,23 @@ impl Gate {
     pub fn behind(mut self, port: Option<Shape>) -> Self {
         self.port = port;
         self
+    }
+
+    /// A peer is dead after so long without a byte.
+    #[must_use]
+    pub fn patient_for(mut self, dead_after: Duration) -> Self {
+        self.dead_after = dead_after;
+        self
+    }
+
+    /// The interval that peers are told (ms).
+    fn heartbeat_ms(&self) -> u32 {
+        u32::try_from(self.settings().heartbeat.as_millis()).unwrap_or(u32::MAX).max(1)
+    }
+
+    fn settings(&self) -> Settings {
+        let heartbeat = Settings::default().heartbeat.min(self.dead_after / MISSED_HEARTBEATS);
+        Settings { heartbeat, silence: self.dead_after, ..Settings::default() }
     }
 
     /// This side ends all connections from now on, so that their ends are no faults.
@@ -118,12 +141,12 @@ impl Gate {
         match self.tls.clone() {
             None => {
                 let policy = Policy { roles: self.roles.clone(), ..Policy::default() };
-                let (sender, receiver) = link::split(stream, Settings::default());
+                let (sender, receiver) = link::split(stream, self.settings());
                 self.greet(sender, receiver, address, policy, Some(place)).await
             }
             Some(config) => {
                 let (stream, identity) = tls::accept_any(stream, &config).await?;
-                let (sender, receiver) = link::split(stream, Settings::default());
+                let (sender, receiver) = link::split(stream, self.settings());
                 let policy = self.policy_for(identity.as_ref());
                 if let Some(identity) = identity {
                     tls::watch(&sender, identity, self.lab.as_ref().map(|(_, revoked)| revoked.clone()));
@@ -160,7 +183,7 @@ impl Gate {
     where
         S: AsyncRead + AsyncWrite + Send + 'static,
     {
-        let (sender, receiver) = link::split(stream, Settings::default());
+        let (sender, receiver) = link::split(stream, self.settings());
         let policy = Policy { roles: self.roles.clone(), certificate, ..Policy::default() };
         self.greet(sender, receiver, address, policy, None).await
     }
@@ -182,7 +205,7 @@ impl Gate {
             drop(place);
             return self.worker(server, &hello, sender, receiver, address, incarnation).await;
         }
-        let welcome = Welcome { incarnation, host: 0, heartbeat_ms: HEARTBEAT_MS };
+        let welcome = Welcome { incarnation, host: 0, heartbeat_ms: self.heartbeat_ms() };
         link::admit(server, &sender, &mut receiver, welcome)?;
         if newcomer {
             let (lab, _) = self.lab.as_ref().ok_or_else(|| Error::Message("no lab to join here".into()))?;
@@ -214,18 +237,20 @@ impl Gate {
         let (answer, answered) = oneshot::channel();
         let knock =
             Event::Knock { hello: Box::new(hello.clone()), address: address.clone(), incarnation, answer };
-        // The owner lives as long as the daemon; a daemon that ends refuses.
+        // The owner lives as long as the daemon.
         let _ = self.events.send(knock).await;
-        let host = match answered.await.unwrap_or_else(|_| Err("the master is ending".to_owned())) {
-            Ok(host) => host,
-            Err(reason) => {
+        let host = match answered.await {
+            // A daemon that ends hangs up: the worker finds the next one by dialling again.
+            Err(_) => return Err(Error::Message("the master is ending".to_owned())),
+            Ok(Ok(host)) => host,
+            Ok(Err(reason)) => {
                 sender.send(server.refuse(&reason)?)?;
                 let _ = tokio::time::timeout(link::GREETING_LIMIT, sender.finish()).await;
                 return Err(Error::Message(reason));
             }
         };
         let route = Arc::new(Route::default());
-        let welcome = Welcome { incarnation, host, heartbeat_ms: HEARTBEAT_MS };
+        let welcome = Welcome { incarnation, host, heartbeat_ms: self.heartbeat_ms() };
         let error = match link::admit(server, &sender, &mut receiver, welcome) {
             Err(error) => error,
             Ok(()) => {
@@ -238,26 +263,77 @@ impl Gate {
                     route: Arc::clone(&route),
                 };
                 let _ = self.events.send(Event::Joined(seat)).await;
-                tokio::select! {
-                    error = listen(&mut receiver, incarnation, &route) => error,
-                    why = route.condemned() => {
-                        let _ = self.events.send(Event::Condemned { incarnation, why: why.clone() }).await;
-                        Error::Message(why)
-                    }
-                }
+                self.listen(&mut receiver, hello, incarnation, &route).await
             }
         };
+        let dropped = route.dismissal();
+        let words = dropped.clone().unwrap_or_else(|| error.to_string());
         if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
-            leave(&sender, &error.to_string()).await;
+            leave(&sender, &words).await;
         }
         drop(receiver);
-        let why = format!("{} at {address}: {error}", hello.name);
+        let why = format!("{} at {address}: {words}", hello.name);
         if let Some((index, send)) = route.lose(&why) {
             // The job may be over by now.
             let _ = send.send(Input::Lost(index, why)).await;
         }
-        let _ = self.events.send(Event::Left { incarnation, why: error.to_string() }).await;
+        let dropped = dropped.is_some();
+        let _ = self.events.send(Event::Left { incarnation, why: words, dropped }).await;
         Err(error)
+    }
+
+    /// Hands a worker's messages to its job, and says when it has been silent; ends with the link, or when the job will
+    /// have no more to do with the worker.
+    async fn listen(&self, receiver: &mut Receiver, hello: &Hello, incarnation: u32, route: &Route) -> Error {
+        let mut inbox = Inbox::new(incarnation, BULK_ON_THE_WAY);
+        let mut look = tokio::time::interval(self.dead_after.mul_f64(SUSPECT) / 4);
+        let mut silent_since = None;
+        loop {
+            let frame = tokio::select! {
+                biased;
+                frame = receiver.receive() => Some(frame),
+                () = route.dismissed() => return Error::Message("its job dropped it".to_owned()),
+                _ = look.tick() => None,
+            };
+            let handed = match frame {
+                Some(Ok(frame)) => hand_on(frame, receiver, &mut inbox, route).await,
+                Some(Err(error)) => Err(error),
+                None => {
+                    self.look_at(&hello.name, incarnation, receiver.last_seen(), &mut silent_since).await;
+                    Ok(())
+                }
+            };
+            if let Err(error) = handed {
+                return error;
+            }
+        }
+    }
+
+    /// Says when a worker has become suspect, and when it is heard again.
+    async fn look_at(
+        &self,
+        name: &str,
+        incarnation: u32,
+        last_seen: Instant,
+        silent_since: &mut Option<Instant>,
+    ) {
+        let note = match *silent_since {
+            None if last_seen.elapsed() >= self.dead_after.mul_f64(SUSPECT) => {
+                *silent_since = Some(last_seen);
+                let (quiet, dead) = (last_seen.elapsed().as_secs_f64(), self.dead_after.as_secs_f64());
+                let note = format!("suspect: silent for {quiet:.1} s, dead after {dead} s");
+                warn!("worker {name} is {note}");
+                Some(note)
+            }
+            Some(since) if last_seen > since => {
+                *silent_since = None;
+                info!("worker {name} is heard again after {:.1} s", (last_seen - since).as_secs_f64());
+                None
+            }
+            _ => return,
+        };
+        // The owner lives as long as the daemon.
+        let _ = self.events.send(Event::Suspect { incarnation, note }).await;
     }
 }
 
@@ -267,18 +343,8 @@ fn peer_address(address: &str, port: u16) -> Option<SocketAddr> {
     Some(SocketAddr::new(caller.ip(), port))
 }
 
-/// Hands a worker's messages to its job; ends with the link.
-async fn listen(receiver: &mut Receiver, incarnation: u32, route: &Route) -> Error {
-    let mut inbox = Inbox::new(incarnation, BULK_ON_THE_WAY);
-    loop {
-        if let Err(error) = hand_on(receiver, &mut inbox, route).await {
-            return error;
-        }
-    }
-}
-
-async fn hand_on(receiver: &mut Receiver, inbox: &mut Inbox, route: &Route) -> Result<()> {
-    inbox.accept(receiver.receive().await?)?;
+async fn hand_on(frame: Frame, receiver: &mut Receiver, inbox: &mut Inbox, route: &Route) -> Result<()> {
+    inbox.accept(frame)?;
     while let Some(letter) = inbox.take() {
         let header = letter.header;
         let Some((index, send)) = route.find(&header)? else { continue };

@@ -41,6 +41,8 @@ pub struct Host {
     pub incarnation: u32,
     /// What it is doing.
     pub state: State,
+    /// Silent for so long that it may be dead: in words.
+    pub suspect: Option<String>,
 }
 
 /// Every host that is or was connected.
@@ -48,8 +50,8 @@ pub struct Host {
 pub struct Hosts {
     by_number: BTreeMap<u32, Host>,
     next: u32,
-    /// Name and nonce of those whose numbers were wrong, and what was found, oldest first.
-    condemned: VecDeque<(String, u64, String)>,
+    /// Name and nonce of those that a job dropped, and why, oldest first.
+    barred: VecDeque<(String, u64, String)>,
 }
 
 impl Hosts {
@@ -57,17 +59,19 @@ impl Hosts {
     /// process had before and is to be ended, if any.
     ///
     /// # Errors
-    /// The reason to refuse it: another process of that name is connected.
+    /// The reason to refuse it: another process of that name is connected, or a job dropped it.
     pub fn admit(
         &mut self,
         hello: &Hello,
         address: &str,
         incarnation: u32,
     ) -> Result<(u32, Option<u32>), String> {
-        let condemned =
-            self.condemned.iter().find(|(name, nonce, _)| *name == hello.name || *nonce == hello.nonce);
-        if let Some((_, _, why)) = condemned {
-            return Err(format!("{why}; the master takes it again after a restart of its own"));
+        if let Some((name, _, why)) =
+            self.barred.iter().find(|(n, nonce, _)| *n == hello.name || *nonce == hello.nonce)
+        {
+            return Err(format!(
+                "worker {name} was {why}; look after its machine, then start it under another --name, or restart the master"
+            ));
         }
         let known = self.by_number.values_mut().find(|host| host.name == hello.name);
         let mut ended = None;
@@ -102,6 +106,7 @@ impl Hosts {
                 nonce: hello.nonce,
                 incarnation,
                 state: State::Idle,
+                suspect: None,
             },
         );
         Ok((number, ended))
@@ -116,17 +121,26 @@ impl Hosts {
     pub fn lose(&mut self, incarnation: u32, why: &str) {
         if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
             host.state = State::Lost(why.to_owned());
+            host.suspect = None;
         }
     }
 
-    /// The host on a connection computes wrong numbers: it is not taken in again.
-    pub fn condemn(&mut self, incarnation: u32, why: &str) {
+    /// The connection has ended because a job dropped its worker: neither its name nor its process is taken in again.
+    pub fn drop_out(&mut self, incarnation: u32, why: &str) {
         let Some(host) = self.on(incarnation) else { return };
         let entry = (host.name.clone(), host.nonce, why.to_owned());
-        if self.condemned.len() >= LOST_LIMIT {
-            self.condemned.pop_front();
+        if self.barred.len() >= LOST_LIMIT {
+            self.barred.pop_front();
         }
-        self.condemned.push_back(entry);
+        self.barred.push_back(entry);
+        self.lose(incarnation, why);
+    }
+
+    /// A host is silent, in words, or is heard again.
+    pub fn suspect(&mut self, incarnation: u32, note: Option<String>) {
+        if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
+            host.suspect = note;
+        }
     }
 
     /// Those without a job, by number.
@@ -159,6 +173,11 @@ impl Hosts {
                 State::Idle => ("idle", String::new()),
                 State::Busy(job) => ("busy", format!("job {job}")),
                 State::Lost(why) => ("lost", why.clone()),
+            };
+            let note = match &host.suspect {
+                Some(suspect) if note.is_empty() => suspect.clone(),
+                Some(suspect) => format!("{note}, {suspect}"),
+                None => note,
             };
             HostRow {
                 host: host.number,
@@ -212,16 +231,18 @@ mod tests {
     }
 
     #[test]
-    fn a_condemned_process_is_refused_by_name_and_by_nonce() {
+    fn who_was_dropped_is_refused_by_name_and_by_nonce_with_the_reason() {
         let mut hosts = Hosts::default();
         hosts.admit(&hello("a", 1), "x", 1).expect("new");
-        hosts.condemn(1, "worker a: block 2 came to other numbers");
-        hosts.lose(1, "condemned");
-        for returned in [hello("a", 7), hello("b", 1)] {
-            let refused = hosts.admit(&returned, "x", 2).expect_err("condemned");
-            assert!(refused.contains("worker a: block 2 came to other numbers"), "{refused}");
+        hosts.suspect(1, Some("suspect: silent".to_owned()));
+        assert_eq!(hosts.rows()[0].note, "suspect: silent");
+        hosts.drop_out(1, "dropped: block 2 came to other numbers");
+        assert_eq!(hosts.rows()[0].note, "dropped: block 2 came to other numbers");
+        for returned in [hello("a", 1), hello("a", 7), hello("b", 1)] {
+            let refused = hosts.admit(&returned, "x", 2).expect_err("dropped");
+            assert!(refused.contains("worker a was dropped: block 2 came to other numbers"), "{refused}");
         }
-        assert!(hosts.admit(&hello("b", 7), "x", 3).is_ok());
+        assert_eq!(hosts.admit(&hello("b", 7), "x", 3), Ok((1, None)));
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod measure;
 mod pace;
 mod replay;
 mod start;
+mod stop;
 #[cfg(test)]
 mod tests;
 mod verdict;
@@ -36,9 +37,10 @@ use crate::{
     results::history::HistoryRow,
     sort::{Sorted, Sorter},
 };
-use epoch::{Acting, Base, Epoch, Member, Rest, Step};
+use epoch::{Acting, Base, Epoch, Member, Step};
 use measure::{Patience, Proposal};
 use start::Touching;
+use stop::not_a_number;
 
 /// What sorts work on: fixed for an epoch.
 pub struct Bench {
@@ -55,6 +57,7 @@ pub struct Bench {
 impl Bench {
     /// Does the sort that [`Action::Sort`] asks for.
     pub fn sort(&self, x: &[[f64; 3]]) -> Sorted {
+        worker::failpoint::die("die-in-sort");
         self.sorter.run(self.epoch, x, &self.holdings, &self.state)
     }
 }
@@ -78,18 +81,20 @@ pub struct Job {
     /// In the order they came: the indices of events and actions.
     members: Vec<Member>,
     epoch: Epoch,
-    /// Where the next epoch begins if a worker is lost.
+    /// Where the next epoch begins if a worker is lost or wrong: where samples are computed again, all that led here
+    /// agreed.
     base: Arc<Base>,
-    /// Where it begins if a worker's numbers were wrong: the newest base from which samples of the whole crew agreed.
-    /// None before the first, and where nothing is computed again: then `base` serves.
-    proven: Option<Arc<Base>>,
-    /// The cycle in which a worker was dropped for numbers that are not finite.
-    not_finite_at: Option<u64>,
     /// The time for a new base has come.
     keep_due: bool,
+    /// No state is kept to go back to.
+    lean: bool,
     first_cycle: u64,
     lanes: String,
     stop_asked: bool,
+    /// This process has to leave.
+    leaves: bool,
+    /// Workers that failed by themselves: member, cycle and why.
+    blamed: Vec<(usize, u64, String)>,
     failure: Option<String>,
     /// Speeds that the next epoch is to begin with.
     proposal: Option<Proposal>,
@@ -97,7 +102,7 @@ pub struct Job {
     ledger: Ledger,
     /// Poses of the walls of finite mass in the newest cycle that was ordered.
     walls: Vec<Pose>,
-    rows: Vec<HistoryRow>,
+    rows: Vec<Arc<HistoryRow>>,
     sorts: u64,
     census: Census,
     /// By member.
@@ -126,7 +131,7 @@ impl Job {
     }
 
     /// Rows of history that a snapshot brought along.
-    pub fn rows_before(&self) -> &[HistoryRow] {
+    pub fn rows_before(&self) -> &[Arc<HistoryRow>] {
         &self.rows
     }
 
@@ -173,6 +178,13 @@ impl Job {
                 self.stop_asked = true;
                 if self.epoch.crew.is_empty() { self.finish_at_base(&mut actions) } else { Ok(()) }
             }
+            Event::Suspend => {
+                self.leaves = true;
+                if self.epoch.crew.is_empty() {
+                    self.suspend_at_base(&mut actions);
+                }
+                Ok(())
+            }
             Event::Lost(member, why) => self.lost(member, why, &mut actions),
             Event::Joined(hand) => self.joined(hand, &mut actions),
             Event::Timer => {
@@ -194,12 +206,14 @@ impl Job {
 
     fn finish(&mut self, state: Option<GlobalState>, actions: &mut Vec<Action>) {
         self.over = true;
+        let failed = self.failure.is_some();
         self.send_all(actions, |_| ToWorker::Release);
         let digest = state.as_ref().map(digest::digest).unwrap_or_default();
         let cycles_run = state.as_ref().map_or(self.epoch.completed, |s| s.cycle) - self.first_cycle;
         actions.push(Action::Over(Box::new(Outcome {
             failure: self.failure.take(),
             stopped: self.stop_asked,
+            suspended: self.leaves && state.is_none() && !failed,
             state,
             digest,
             ledger: self.ledger.clone(),
@@ -284,7 +298,12 @@ impl Job {
                 self.image(worker, cycle, pieces, last, actions)
             }
             ToMaster::Sample { cycle, hash } => self.sampled(worker, cycle, hash, actions),
-            ToMaster::Failed { cycle, reason } => Err(format!("worker {worker}, cycle {cycle}: {reason}")),
+            ToMaster::Failed { cycle, reason } => self.blame(worker, cycle, reason, actions),
+            ToMaster::Leaving => {
+                let member = self.epoch.crew[worker];
+                self.members[member].leaves = true;
+                Ok(())
+            }
         }
     }
 
@@ -368,9 +387,6 @@ impl Job {
         if !self.epoch.running {
             return Err(format!("worker {worker} sends cycle {cycle} before the start"));
         }
-        if self.options.replay && self.refuses_numbers(worker, cycle, vote.as_deref(), partials, actions)? {
-            return Ok(());
-        }
         let exchange = self.exchange_at(cycle)?;
         let expected = exchange.n_partials(worker);
         if partials.len() != expected {
@@ -378,6 +394,9 @@ impl Job {
                 "worker {worker}, cycle {cycle}: {} numbers of partial forces, the plan has {expected}",
                 partials.len()
             ));
+        }
+        if let Some(what) = not_a_number(vote.as_deref(), partials) {
+            return self.blame(worker, cycle, what, actions);
         }
         let n = self.epoch.n();
         let arrivals = self.epoch.arrivals.entry(cycle).or_insert_with(|| Arrivals {
@@ -439,17 +458,7 @@ impl Job {
             self.follow_spread(cycle.saturating_sub(1), &vote);
         }
         if self.epoch.halves.contains_key(&cycle) {
-            let before = cycle.checked_sub(1).and_then(|c| self.epoch.steps.get(&c));
-            let rest = Rest {
-                dt_previous: before.map_or(0.0, |step| step.dt),
-                dt: Some(now.dt),
-                quanta: [now.quantum, self.epoch.quantum],
-                vote: Some(vote.clone()),
-                walls: self.walls.clone(),
-                ledger: self.ledger.clone(),
-                n_rows: self.rows.len(),
-                spread_rate: self.epoch.spread_rate,
-            };
+            let rest = self.rest_at(cycle, vote.clone())?;
             self.epoch.halves.entry(cycle).or_default().rest = Some(rest);
             self.complete_base(cycle, actions)?;
         }

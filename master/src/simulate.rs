@@ -32,12 +32,12 @@ pub mod virtual_clock;
 use crate::{
     balance::Costs,
     command::{Clock, SimulateArgs},
-    event::{Balance, Rebalance},
+    event::{Balance, Loss, Rebalance},
     run::read_deck,
 };
 
 use cluster::{Cluster, ElementCost};
-use machines::{Machines, Scheme};
+use machines::{Machines, Scheme, What};
 use real_clock::Strain;
 use timeline::{Phases, Timeline};
 
@@ -123,6 +123,9 @@ fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitC
 }
 
 fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
+    if cluster.changes.iter().any(|change| !matches!(change.what, What::Speed(_))) {
+        return Err(format!("{}: hosts that come and go are for runs of one deck", args.cluster.display()));
+    }
     let tables = cluster
         .tables
         .as_ref()
@@ -169,6 +172,8 @@ struct Summary<'a> {
     phases: Vec<Phases>,
     /// When work was dealt out by other speeds.
     rebalances: &'a [Rebalance],
+    /// Hosts that were lost.
+    losses: &'a [Loss],
     digest: &'a str,
     /// Under the real clock.
     strain: Option<Strain>,
@@ -212,6 +217,9 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
     if args.clock == Clock::Real && scheme.balance != Balance::Given {
         return Err("--balance measured is followed under --clock virtual only".to_owned());
     }
+    if args.clock == Clock::Real && machines.come_and_go() {
+        return Err("hosts that die, stop and join are followed under --clock virtual only".to_owned());
+    }
     let bound = calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>();
     let (timeline, strain) = match args.clock {
         Clock::Virtual => (virtual_clock::run(&model, &machines, scheme, None)?.0, None),
@@ -243,6 +251,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         bytes_per_cycle: timeline.bytes_per_cycle(),
         phases: (0..cluster.speeds.len()).map(|worker| timeline.mean_phases(worker)).collect(),
         rebalances: &timeline.rebalances,
+        losses: &timeline.losses,
         digest: &timeline.digest,
         strain,
         refused: strain.is_some_and(|strain| strain.refused()),
@@ -300,6 +309,9 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         println!(
             "cycle {cycle}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}"
         );
+    }
+    for Loss { worker, cycle, back_to, why } in summary.losses {
+        println!("cycle {cycle}: {worker} is lost, {why}; back to cycle {back_to}");
     }
     println!("digest {}", summary.digest);
     Ok(verdict(strain.as_ref()))

@@ -109,6 +109,8 @@ fn plates(cells: u32) -> Model {
             loads: Default::default(),
         },
         output: Output {
+            snapshot_seconds: None,
+            snapshot_cycles: None,
             period: None,
             history_cycles: 1,
             fields: Vec::new(),

@@ -234,7 +234,7 @@ pub enum ToMaster {
         /// `mechanics::cycle::Domain::sample` of the block that [`sampled_block`] names; zeros of a worker without any.
         hash: [u8; 16],
     },
-    /// Before the last `Image`: how the worker's time went, from its runtime.
+    /// Before the last `Image`, and about once a second: how the worker's time went, from its runtime.
     Report(Box<Report>),
     /// The worker cannot go on.
     Failed {
@@ -243,6 +243,8 @@ pub enum ToMaster {
         /// Why: a sentence for the user.
         reason: String,
     },
+    /// The worker wants to go: it computes on until it is released, at the next plan boundary.
+    Leaving,
 }
 
 impl ToMaster {

@@ -7,10 +7,13 @@
 
 pub mod bits;
 pub mod book;
+pub mod browser;
 pub mod case;
 pub mod checker;
 pub mod cluster;
+pub mod faults;
 pub mod fuzz;
+pub mod left;
 pub mod proxy;
 pub mod seeds;
 pub mod solve;

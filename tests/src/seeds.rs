@@ -221,7 +221,7 @@ impl World {
         if self.plot.unfenced {
             job.plant_unfenced();
         }
-        self.disk.rows = job.rows_before().to_vec();
+        self.disk.rows = job.rows_before().iter().map(|row| HistoryRow::clone(row)).collect();
         self.disk.states.retain(|state| state.cycle <= cycle);
         self.life += 1;
         self.job = Some(job);
@@ -432,14 +432,16 @@ impl World {
                     let at = self.now + (seconds * 1e6) as u64;
                     self.put(at, What::Timer(self.life));
                 }
-                Action::Drop(member, _) => {
+                Action::Dismiss(member, _) => {
                     if let Some(host) = self.hosts.iter_mut().find(|host| host.member == Some(member)) {
                         (host.alive, host.member) = (false, None);
                     }
                 }
                 Action::Row(row) => self.disk.rows.push(*row),
                 Action::State(state) => self.disk.states.push(*state),
-                Action::Snapshot(snapshot) => self.disk.snapshot = Some(*snapshot),
+                Action::Snapshot(snapshot) | Action::Base { snapshot, .. } => {
+                    self.disk.snapshot = Some(*snapshot);
+                }
                 Action::Rewind { rows, cycle } => {
                     self.disk.rows.truncate(rows);
                     self.disk.states.retain(|state| state.cycle <= cycle);

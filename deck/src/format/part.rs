@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mechanics::mesh::Topology;
 
-use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, shape};
+use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, Meshes, shape};
 use crate::{
     blocks::Block,
     geometry::{norm, scaled},
@@ -36,10 +36,12 @@ pub(crate) struct Explicit {
     pub(crate) node_places: Vec<usize>,
     /// Offset of each element in the text.
     pub(crate) element_places: Vec<usize>,
+    /// The file it comes from, whose parts share nodes.
+    pub(crate) file: Option<String>,
 }
 
 /// Reads every part. A part with a fault keeps its place in the list, so that others may refer to it.
-pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials) -> Vec<PartDraft> {
+pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials, meshes: &Meshes) -> Vec<PartDraft> {
     let tables = deck.tables("part", MAX_PARTS);
     if tables.is_empty() && !deck.has("part") {
         deck.faults.add(0, "a deck without [[part]]", "at least one part", "add a [[part]]");
@@ -68,12 +70,19 @@ pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials) -> Vec<Par
             .require("material", "a material by name or as an inline table")
             .and_then(|v| materials.resolve(v, &name, fracture));
         let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
-        let (mut block, explicit) = read_mesh(&table, &name, &mut budget);
-        if let Some(block) = &mut block {
+        let (mut block, explicit) = read_mesh(&table, &name, meshes, &mut budget);
+        let movable = explicit.as_ref().is_none_or(|own| own.file.is_none());
+        if let Some(block) = &mut block
+            && movable
+        {
             transform(&table, block);
         } else {
             // The keys are known even where there is nothing to move.
-            let _ = (table.get("rotate"), table.get("translate"));
+            for key in [table.get("rotate"), table.get("translate")].into_iter().flatten() {
+                if !movable {
+                    key.fault("a mesh file where it is", "move the nodes in the file");
+                }
+            }
         }
         table.finish();
         parts.push(PartDraft { name, at, material, velocity, block, explicit });
@@ -111,7 +120,12 @@ impl Budget {
 }
 
 /// The mesh of a part: exactly one of the blocks, or `mesh`.
-fn read_mesh(table: &Table<'_>, name: &str, budget: &mut Budget) -> (Option<Block>, Option<Explicit>) {
+fn read_mesh(
+    table: &Table<'_>,
+    name: &str,
+    meshes: &Meshes,
+    budget: &mut Budget,
+) -> (Option<Block>, Option<Explicit>) {
     const KINDS: [&str; 5] = ["box", "cylinder", "sphere", "tube", "mesh"];
     let present: Vec<(&'static str, Value<'_>)> =
         KINDS.iter().filter_map(|kind| table.get(kind).map(|v| (*kind, v))).collect();
@@ -128,7 +142,12 @@ fn read_mesh(table: &Table<'_>, name: &str, budget: &mut Budget) -> (Option<Bloc
     };
     let Some(inner) = value.table(format!("{kind} of \"{name}\"")) else { return (None, None) };
     if kind == "mesh" {
-        return match read_explicit(inner, budget) {
+        let read = if inner.has("file") {
+            read_file(inner, name, meshes, budget)
+        } else {
+            read_explicit(inner, budget)
+        };
+        return match read {
             Some((block, explicit)) => (Some(block), Some(explicit)),
             None => (None, None),
         };
@@ -156,6 +175,7 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
         element_ids: Vec::new(),
         node_places: Vec::new(),
         element_places: Vec::new(),
+        file: None,
     };
     let mut positions = Vec::new();
     let mut index: BTreeMap<u32, u32> = BTreeMap::new();
@@ -241,6 +261,73 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
     table.finish();
     let block = Block { positions, topology: Topology::Explicit { hexahedra }, faces: Vec::new() };
     clean.then_some((block, explicit))
+}
+
+/// `file = "name"` and `body = "name"`: a body of a mesh file, by default the one called like the part.
+fn read_file(
+    table: Table<'_>,
+    part: &str,
+    meshes: &Meshes,
+    budget: &mut Budget,
+) -> Option<(Block, Explicit)> {
+    let file = table.require("file", "the name of a mesh file")?;
+    let name = file.text();
+    let body = table.get("body");
+    let body_name = body.map_or(Some(part), |v| v.text());
+    let (at, title) = (table.at, table.title.clone());
+    let (name, body_name) = (name?, body_name?);
+    let Some(mesh) = meshes.get(name) else {
+        file.fault("a mesh file that can be read", "put it beside the deck, or correct the name");
+        table.finish();
+        return None;
+    };
+    let Some(found) = mesh.body(body_name).filter(|body| !body.solids.is_empty()) else {
+        let names: Vec<&str> = mesh.bodies.iter().map(|body| body.name.as_str()).take(20).collect();
+        body.unwrap_or(file).fault(
+            &format!("a body with elements of that file ({})", names.join(", ")),
+            "choose one with body = \"name\"",
+        );
+        table.finish();
+        return None;
+    };
+    let mut index: BTreeMap<u32, u32> = BTreeMap::new();
+    for id in found.solids.iter().flat_map(|(_, corners)| corners) {
+        index.entry(*id).or_insert(0);
+    }
+    let distinct = |corners: &[u32; 8]| (0..8).filter(|i| !corners[..*i].contains(&corners[*i])).count();
+    let odd = found.solids.iter().find(|(_, corners)| !matches!(distinct(corners), 4 | 5 | 6 | 8));
+    if let Some((id, corners)) = odd {
+        table.faults.add(
+            at,
+            format!("element {id} with {} different corners", distinct(corners)),
+            "eight, or six, five or four of a wedge, a pyramid or a tetrahedron",
+            "correct the element",
+        );
+        table.finish();
+        return None;
+    }
+    budget.take(Some((index.len() as u64, found.solids.len() as u64)), at, &title, &table)?;
+    let mut positions = Vec::with_capacity(index.len());
+    let mut node_ids = Vec::with_capacity(index.len());
+    // Nodes in the order of the file.
+    for (id, x) in &mesh.nodes {
+        if let Some(local) = index.get_mut(id) {
+            *local = positions.len() as u32;
+            positions.push(*x);
+            node_ids.push(*id);
+        }
+    }
+    let hexahedra = found.solids.iter().map(|(_, corners)| corners.map(|id| index[&id])).collect();
+    let element_ids: Vec<u32> = found.solids.iter().map(|(id, _)| *id).collect();
+    table.finish();
+    let explicit = Explicit {
+        node_places: vec![at; node_ids.len()],
+        element_places: vec![at; element_ids.len()],
+        node_ids,
+        element_ids,
+        file: Some(name.to_string()),
+    };
+    Some((Block { positions, topology: Topology::Explicit { hexahedra }, faces: Vec::new() }, explicit))
 }
 
 /// `rotate`, then `translate`.

@@ -46,8 +46,9 @@ impl Job {
             return Ok(());
         }
         let Some(collected) = self.epoch.collecting.remove(&cycle) else { return Ok(()) };
-        let mut state = GlobalState::clone(&self.base.state);
-        for piece in &collected.pieces {
+        let before = &self.base.state;
+        let mut state = if before.is_static() { before.to_fill() } else { GlobalState::clone(before) };
+        for piece in collected.pieces {
             piece::put_back(piece, &mut state)?;
         }
         state.cycle = cycle;
@@ -60,7 +61,7 @@ impl Job {
                 self.epoch.stopped = Some((state, vote, due));
                 self.prove_stop(cycle, actions)
             }
-            Some(vote) => self.stopped(state, vote, due, actions),
+            Some(vote) => self.all_stopped(state, vote, due, actions),
             None => {
                 if due {
                     actions.push(Action::State(Box::new(state.clone())));
@@ -75,7 +76,7 @@ impl Job {
     }
 
     /// All have stopped: the epoch is over, or the run.
-    pub(super) fn stopped(
+    pub(super) fn all_stopped(
         &mut self,
         state: GlobalState,
         vote: Vote,
@@ -83,7 +84,10 @@ impl Job {
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
         self.book_last(state.cycle, &vote, actions);
-        if !self.epoch.pauses || self.failure.is_some() {
+        if !self.epoch.pauses {
+            return self.stopped(state, vote, actions);
+        }
+        if self.failure.is_some() {
             return self.end_with(state, actions);
         }
         if due {
@@ -105,13 +109,15 @@ impl Job {
         if state.cycle > self.first_cycle && last != Some(state.cycle - 1) {
             self.row(actions);
         }
-        actions.push(Action::State(Box::new(state.clone())));
+        if self.options.states {
+            actions.push(Action::State(Box::new(state.clone())));
+        }
         self.finish(Some(state), actions);
         Ok(())
     }
 
     /// The newest base, once both halves of it are here, and samples from it that agree where those are asked for; and
-    /// to the disk where that was asked for.
+    /// to the disk where that is asked for.
     pub(super) fn complete_base(&mut self, cycle: u64, actions: &mut Vec<Action>) -> Result<(), String> {
         let Some(Halves { state: Some(_), rest: Some(_) }) = self.epoch.halves.get(&cycle) else {
             return Ok(());
@@ -132,23 +138,34 @@ impl Job {
         Ok(())
     }
 
-    /// Stores the base if it is the one that was asked for.
+    /// Gives the base to the sink, where that is asked for.
     pub(super) fn store(&self, cycle: u64, actions: &mut Vec<Action>) {
-        let Base { state, rest } = &*self.base;
-        let (Some(vote), Some(dt)) = (rest.vote.clone(), rest.dt) else { return };
-        if self.options.snapshot_at == Some(cycle) {
-            let snapshot = Snapshot {
-                state: GlobalState::clone(state),
-                dt_previous: rest.dt_previous,
-                dt,
-                force_quanta: rest.quanta,
-                spread_rate: rest.spread_rate,
-                vote,
-                walls: rest.walls.clone(),
-                ledger: rest.ledger.clone(),
-                rows: self.rows[..rest.n_rows].to_vec(),
-            };
-            actions.push(Action::Snapshot(Box::new(snapshot)));
+        if self.options.snapshot_at == Some(cycle)
+            && let Some(snapshot) = self.base_as_snapshot()
+        {
+            actions.push(Action::Snapshot(snapshot));
         }
+        if self.options.store
+            && let Some(snapshot) = self.base_as_snapshot()
+        {
+            actions.push(Action::Base { snapshot, last: false });
+        }
+    }
+
+    /// The base as it is stored; none at the start of a run, which the deck gives as well.
+    pub(super) fn base_as_snapshot(&self) -> Option<Box<Snapshot>> {
+        let Base { state, rest } = &*self.base;
+        Some(Box::new(Snapshot {
+            state: Arc::clone(state),
+            dt_previous: rest.dt_previous,
+            dt: rest.dt?,
+            force_quanta: rest.quanta,
+            spread_rate: rest.spread_rate,
+            vote: rest.vote.clone()?,
+            walls: rest.walls.clone(),
+            ledger: rest.ledger.clone(),
+            rows: self.rows[..rest.n_rows].to_vec(),
+            states: Vec::new(),
+        }))
     }
 }

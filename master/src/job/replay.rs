@@ -18,7 +18,7 @@ use mechanics::{
     lanes::Width,
     piece,
     state::GlobalState,
-    vote::{Quanta, Vote},
+    vote::Quanta,
 };
 use protocol::{message::sampled_block, token::hex};
 use worker::compute::ThreadClock;
@@ -63,15 +63,13 @@ impl Job {
         self.epoch.samples.get(&cycle).is_some_and(|samples| samples.iter().all(Option::is_some))
     }
 
-    /// Computes the samples of the base's cycle again. Where all agree the base is proven; else workers are dropped, and
-    /// the run has gone back.
+    /// Computes the samples of the base's cycle again. Gives whether all agree; else workers are dropped, and the run has
+    /// gone back.
     pub(super) fn prove(&mut self, base: &Arc<Base>, actions: &mut Vec<Action>) -> Result<bool, String> {
         let Base { state, rest } = &**base;
         let wrong = self.differing(state, rest.dt_previous, rest.quanta[0], state.time)?;
         let agree = wrong.is_empty();
-        if agree {
-            self.proven = Some(Arc::clone(base));
-        } else {
+        if !agree {
             self.expel(wrong, actions)?;
         }
         Ok(agree)
@@ -91,7 +89,11 @@ impl Job {
             None => (self.base.rest.dt_previous, now.time),
         };
         let wrong = self.differing(&state, dt_previous, now.quantum, time)?;
-        if wrong.is_empty() { self.stopped(state, vote, due, actions) } else { self.expel(wrong, actions) }
+        if wrong.is_empty() {
+            self.all_stopped(state, vote, due, actions)
+        } else {
+            self.expel(wrong, actions)
+        }
     }
 
     /// The workers (by position) whose samples of the state's cycle are others than here, and how.
@@ -144,7 +146,7 @@ impl Job {
         let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: Vec::new() };
         let quanta = Quanta { force: quantum, ..self.quanta };
         let (setup, n_parts) = (self.model.setup.clone(), self.model.mesh.parts.len());
-        let mut domain = Domain::new(setup, n_parts, quanta, &[subdomain], &[], Width::best());
+        let mut domain = Domain::new(setup, n_parts, quanta, vec![subdomain], &[], Width::best());
         let clock = ThreadClock::default();
         domain.begin(quantum, time);
         domain.contact(dt_previous, &clock);
@@ -152,48 +154,21 @@ impl Job {
         domain.sample(0)
     }
 
-    /// Drops a worker whose frame holds numbers that are not finite, and says so. If the cycle comes to the same on
-    /// others it is not the worker, and the frame is taken: its vote then ends the run with the reason.
-    pub(super) fn refuses_numbers(
-        &mut self,
-        worker: usize,
-        cycle: u64,
-        vote: Option<&Vote>,
-        partials: &[f64],
-        actions: &mut Vec<Action>,
-    ) -> Result<bool, String> {
-        let sums =
-            vote.map_or(0.0, |vote| vote.force_bound + vote.external + vote.momentum.iter().sum::<f64>());
-        let kinetic: f64 = vote.map_or(0.0, |vote| vote.parts.iter().map(|p| p.kinetic + p.internal).sum());
-        let nan = vote.is_some_and(|vote| vote.courant.is_nan());
-        let finite = (sums + kinetic).is_finite() && !nan && partials.iter().all(|p| p.is_finite());
-        if finite || self.not_finite_at == Some(cycle) || self.epoch.n() < 2 {
-            return Ok(false);
-        }
-        self.not_finite_at = Some(cycle);
-        let why =
-            format!("its frame of cycle {cycle} holds numbers that are not finite; keep its processor out");
-        self.expel(vec![(worker, why)], actions)?;
-        Ok(true)
-    }
-
     /// Workers (by position) whose numbers cannot be trusted leave the job, which goes back to what is proven.
     fn expel(&mut self, wrong: Vec<(usize, String)>, actions: &mut Vec<Action>) -> Result<(), String> {
-        let back = self.proven.clone().unwrap_or_else(|| self.base.clone());
-        let (cycle, back_to) = (self.epoch.completed, back.state.cycle);
+        let (cycle, back_to) = (self.epoch.completed, self.base.state.cycle);
         for (position, why) in wrong {
             let index = self.epoch.crew[position];
             let member = &mut self.members[index];
             member.alive = false;
             let worker = member.hand.name.clone();
-            actions.push(Action::Drop(index, format!("worker {worker}: {why}")));
+            actions.push(Action::Dismiss(index, why.clone()));
             self.losses.push(Loss { worker, cycle, back_to, why });
         }
         if !self.options.waits && !self.members.iter().any(|member| member.alive) {
             let last = self.losses.last().map(|loss| format!("worker {}: {}", loss.worker, loss.why));
             return Err(format!("{}; no other is left", last.unwrap_or_default()));
         }
-        self.base = back;
         self.go_back(actions);
         self.next_epoch(actions)
     }

@@ -30,7 +30,7 @@ use super::{
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
     decompose::{self, decompose, work},
-    event::{Action, Deal, Hand, Keep, Options},
+    event::{Action, Deal, Hand, Options},
     exchange::Exchange,
     holdings::Holdings,
     ledger::Ledger,
@@ -98,7 +98,7 @@ impl Job {
                     n_rows: snapshot.rows.len(),
                     spread_rate: snapshot.spread_rate,
                 };
-                (Base { state: Arc::new(snapshot.state), rest }, snapshot.rows)
+                (Base { state: snapshot.state, rest }, snapshot.rows)
             }
         };
         let mut model = model;
@@ -123,17 +123,21 @@ impl Job {
         let mut job = Self {
             quanta,
             touching: touching.transpose()?,
-            members: hands.iter().map(|hand| Member { hand: hand.clone(), alive: true }).collect(),
+            members: hands
+                .iter()
+                .map(|hand| Member { hand: hand.clone(), alive: true, leaves: false })
+                .collect(),
             epoch: Epoch::without_workers(0, &base, &model),
             ledger: base.rest.ledger.clone(),
             walls: base.rest.walls.clone(),
             base: Arc::new(base),
-            proven: None,
-            not_finite_at: None,
             keep_due: false,
+            lean: false,
             first_cycle,
             lanes: String::new(),
             stop_asked: false,
+            leaves: false,
+            blamed: Vec::new(),
             failure: None,
             proposal: None,
             patience: Patience::default(),
@@ -153,10 +157,25 @@ impl Job {
         let mut actions = Vec::new();
         job.epoch = job.deal(0, (0..hands.len()).collect(), &mut actions)?;
         job.sorts = u64::from(job.census.units > 0);
-        if let Keep::Seconds(seconds) = keep {
+        if let Some(seconds) = keep.seconds() {
             actions.push(Action::Timer(seconds));
         }
         Ok((job, actions))
+    }
+
+    /// From now on no state is kept to go back to: for a crew of which nobody can be lost, as it shares this process.
+    pub fn keep_no_state(&mut self) {
+        self.lean = true;
+        self.forget_base();
+    }
+
+    /// Drops what only going back would need of the base that has been dealt out.
+    pub(super) fn forget_base(&mut self) {
+        let state = Arc::new(self.base.state.statics());
+        if let Some(bench) = self.epoch.bench.as_mut().and_then(Arc::get_mut) {
+            bench.state = Arc::clone(&state);
+        }
+        self.base = Arc::new(Base { state, rest: self.base.rest.clone() });
     }
 
     /// Deals the base out to a crew, as epoch `number`.
@@ -167,6 +186,9 @@ impl Job {
         actions: &mut Vec<Action>,
     ) -> Result<Epoch, String> {
         let base = Arc::clone(&self.base);
+        if base.state.is_static() {
+            return Err(format!("no state of cycle {} is kept to go back to", base.state.cycle));
+        }
         let mut epoch = Epoch::without_workers(number, &base, &self.model);
         let n = crew.len();
         if n == 0 {

@@ -61,20 +61,49 @@ pub struct Machines {
     pub costs: Costs,
     /// The network.
     pub network: Network,
-    /// Changes of speed, by cycle.
+    /// What happens to hosts, by cycle.
     pub changes: Vec<Change>,
 }
 
-/// A host's speed changes when its worker starts a cycle.
+impl Machines {
+    /// Whether hosts come and go.
+    pub fn come_and_go(&self) -> bool {
+        self.changes.iter().any(|change| !matches!(change.what, What::Speed(_)))
+    }
+
+    /// Whether a host is there only from a later cycle on.
+    pub fn comes_later(&self, host: usize) -> bool {
+        self.changes.iter().any(|change| change.host == host && change.what == What::Join)
+    }
+}
+
+/// Something happens to a host when its worker starts a cycle; if it is not there, when the first host's worker does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Host, from 0.
     pub host: usize,
     /// The cycle.
     pub cycle: u64,
-    /// Relative speed from then on.
-    pub speed: f64,
+    /// What happens.
+    pub what: What,
 }
+
+/// What happens to a host.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum What {
+    /// It has another relative speed from then on.
+    Speed(f64),
+    /// Its worker dies and its connections close: the master hears of it after the latency of the network.
+    Die,
+    /// It stands still for so long (s), as a stopped process does. Silent for longer than [`SILENCE`] it is given up; when it
+    /// goes on, it dials again and joins anew.
+    Stop(f64),
+    /// It joins.
+    Join,
+}
+
+/// After so long without a byte the master gives a host up (s).
+pub const SILENCE: f64 = 10.0;
 
 /// How the program itself goes about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

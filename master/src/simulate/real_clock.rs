@@ -31,7 +31,7 @@ use worker::{
 };
 
 use super::{
-    machines::{Machines, Scheme},
+    machines::{Machines, Scheme, What},
     processor::{Processor, Rank},
     timeline::{Flight, Kind, Span, Timeline, counts_at, phases_at},
 };
@@ -451,7 +451,10 @@ impl Clock<'_> {
         let cycle = self.places[worker].session.cycle();
         self.timeline.end_cycle(worker, cycle, self.now);
         for change in self.machines.changes.iter().filter(|c| c.host == worker && c.cycle == cycle + 1) {
-            self.processors[worker].set_speed(self.now, change.speed);
+            // Hosts that come and go are refused before the run.
+            if let What::Speed(speed) = change.what {
+                self.processors[worker].set_speed(self.now, speed);
+            }
         }
     }
 
@@ -581,10 +584,11 @@ impl Clock<'_> {
                 Action::Row(_)
                 | Action::State(_)
                 | Action::Snapshot(_)
+                | Action::Base { .. }
+                | Action::Dismiss(..)
                 | Action::Progress(_)
                 | Action::Dealt(_)
                 | Action::Rewind { .. }
-                | Action::Drop(..)
                 | Action::Timer(_) => {}
             }
         }

@@ -80,6 +80,12 @@ impl Settings {
         (self.slack / reach::lag_travel(self, 1) * (1.0 + 1e-9)) as u32
     }
 
+    /// How near a pair is that a cycle looks at (length): the zone of warning and the spread of a worker's list between
+    /// sorts, but no more than the reach.
+    pub fn near(&self) -> f64 {
+        WARNING.mul_add(self.gap, self.slack.min(watch::SPREAD * self.gap))
+    }
+
     /// Reach of the sort (length): the zone of warning plus the slack.
     ///
     /// The paper's proximity test is the size of the detection zone plus the slack. Pairs between one gap and

@@ -148,7 +148,7 @@ fn largest_face(x: &[[f64; 3]; 8]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Gives each node of a part that feels a wall a constraint that says so.
+/// Gives each node of a part that feels a wall a constraint that says so, beside the walls that a deck gave it.
 ///
 /// # Errors
 /// If there are more than [`MAX_WALLS`] walls or more kinds of constraint than an index can tell apart.
@@ -170,7 +170,8 @@ pub fn bind_walls(mesh: &Mesh, setup: &mut Setup, constraint: &mut [u16]) -> Res
         let next = setup.constraints.len();
         let index = *index_of.entry((held, walls)).or_insert(next);
         if index == next {
-            setup.constraints.push(Constraint { walls, ..setup.constraints[held as usize] });
+            let held = setup.constraints[held as usize];
+            setup.constraints.push(Constraint { walls: walls | held.walls, ..held });
         }
         constraint[n] =
             u16::try_from(index).map_err(|_| "more than 65,535 kinds of constraint".to_owned())?;

@@ -265,7 +265,7 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
     let (force, energy) = (Quantum::for_reference(3e7, 42), Quantum::for_reference(1e6, 42));
     let quanta = Quanta { force, energy, momentum: energy };
     let subdomain = Subdomain { id: 0, pieces: vec![piece], unowned: Vec::new(), surface: Vec::new() };
-    let mut domain = Domain::new(setup, 1, quanta, &[subdomain], &[], width);
+    let mut domain = Domain::new(setup, 1, quanta, vec![subdomain], &[], width);
     for cycle in 0..3 {
         domain.begin(force, DT * f64::from(cycle));
         domain.elements(Sets::All, DT, &Unmeasured);

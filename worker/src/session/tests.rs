@@ -120,7 +120,7 @@ fn after_the_last_image_a_sample_is_computed_of_the_cycle_that_will_not_be() {
     done(&mut session, Outcome::Computed);
     hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
     let actions = done(&mut session, vote());
-    assert!(matches!(actions[..], [Action::Compute(Task::Image)]));
+    assert!(matches!(actions[..], [Action::Compute(Task::Image { last: false })]));
     let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
     assert!(matches!(
         actions[..],
@@ -235,7 +235,7 @@ fn stop_sends_the_image_with_the_last_vote() {
     done(&mut session, Outcome::Computed);
     hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
     let actions = done(&mut session, vote());
-    assert!(matches!(actions[..], [Action::Compute(Task::Image)]));
+    assert!(matches!(actions[..], [Action::Compute(Task::Image { last: true })]));
     let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
     assert!(matches!(actions[..], [Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. })]));
 }

@@ -80,6 +80,11 @@ impl Bounds {
         }
     }
 
+    /// The box that is smaller on all sides.
+    fn shrunk(&self, by: f64) -> Self {
+        Self { min: self.min.map(|c| c + by), max: self.max.map(|c| c - by) }
+    }
+
     /// Whether a point lies inside or on the border.
     #[inline(always)]
     pub fn holds(&self, p: [f64; 3]) -> bool {
@@ -93,8 +98,8 @@ impl Bounds {
 }
 
 /// Leaves in each unit the nodes and faces that have a pair which can meet before the next sort (checks 1 to 4, with one
-/// slack, for `x` are the sorted positions, by surface node), and gives the number of such pairs by unit: what a cycle
-/// looks at, and what a unit weighs. A cube of the sort reaches as far on all sides, a face's box only across the face;
+/// slack, for `x` are the sorted positions, by surface node), and gives by unit the number of those that are near
+/// ([`Settings::near`]): what a cycle looks at, and what a unit weighs. The others cost a look once in several cycles. A cube of the sort reaches as far on all sides, a face's box only across the face;
 /// on a plain surface far from others nothing is left.
 pub fn cull(
     units: &mut [WorkUnit],
@@ -104,6 +109,7 @@ pub fn cull(
     exclusions: &Exclusions,
 ) -> Vec<u64> {
     let reach = settings.reach();
+    let beyond = reach - settings.near();
     let mut excluded: Vec<(u32, u32)> = exclusions.on(surface).collect();
     excluded.sort_unstable();
     const NONE: u32 = u32::MAX;
@@ -126,16 +132,18 @@ pub fn cull(
                 boxes.push(Bounds::of(&face.nodes.map(|n| x[n as usize]), reach));
             }
             let bounds = boxes[*place as usize];
-            let before = pairs;
+            let near = bounds.shrunk(beyond);
+            let mut any = false;
             for (i, _) in at.iter().enumerate().filter(|(_, p)| bounds.holds(**p)) {
                 let n = nodes[i];
                 let meets = settings.permits(surface.node_part[n as usize], face.part)
                     && !face.own.contains(&n)
                     && (excluded.is_empty() || excluded.binary_search(&(n, f)).is_err());
                 met[i] |= meets;
-                pairs += u64::from(meets);
+                any |= meets;
+                pairs += u64::from(meets && near.holds(at[i]));
             }
-            pairs > before
+            any
         });
         let mut met = met.iter();
         nodes.retain(|_| met.next().is_some_and(|met| *met));
