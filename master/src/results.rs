@@ -129,10 +129,6 @@ impl Folder {
             if !force {
                 return Err(Error::NotEmpty { path: path.to_owned() });
             }
-            // Those of an earlier run; the store clears them.
-            if entry.path().is_dir() {
-                continue;
-            }
             if entry.file_name().to_str().is_some_and(is_written_by_a_run) {
                 fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
             }

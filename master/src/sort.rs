@@ -46,6 +46,7 @@ pub struct Sorted {
 
 impl Sorter {
     /// `gather` lists, by worker, the global surface nodes whose positions it sends, in its order.
+    #[expect(clippy::too_many_arguments, reason = "what a sort needs, once by epoch")]
     pub fn new(
         surface: Arc<Surface>,
         settings: contact::Settings,

@@ -2,7 +2,8 @@
 
 use std::{fs, path::Path};
 
-/// Digest, energies, and the bytes of each file but the summary, which holds times of day.
+/// Digest, energies, and the bytes of each file but those that hold times of day and wall times: the summary and the
+/// report that draws it.
 pub struct Left {
     /// Of the final state.
     pub digest: String,
@@ -21,7 +22,7 @@ impl Left {
         let mut files: Vec<(String, Vec<u8>)> = fs::read_dir(folder)
             .expect("a results folder")
             .map(|entry| entry.expect("readable").path())
-            .filter(|path| path.is_file() && !path.ends_with("summary.json"))
+            .filter(|path| path.is_file() && !path.ends_with("summary.json") && !path.ends_with("report.html"))
             .map(|path| {
                 let name = path.file_name().expect("a file").to_string_lossy().into_owned();
                 (name, fs::read(&path).expect("readable"))

@@ -25,9 +25,9 @@ const GAP_FRACTION: f64 = 0.1;
 const FIT_LEAST: f64 = 0.01;
 /// A gap that fits over the distance of the bodies.
 const FIT_SHARE: f64 = 0.95;
-/// Default slack over the gap. Two nodes travel at most 40 % of the gap against each other in a cycle, so lists last nine
-/// cycles at the least, and a sort may take eight.
-const SLACK_GAPS: f64 = 3.5;
+/// Default slack over the gap. Two nodes travel at most 40 % of the gap against each other in a cycle, so lists last ten
+/// cycles at the least: two for votes and orders, eight for a sort.
+const SLACK_GAPS: f64 = 4.0;
 /// Default slack over the gap where that is more than half a face: longer lists would cost more than sorts.
 const LEAST_SLACK_GAPS: f64 = 2.5;
 /// Default friction velocity over the largest difference of initial velocities.

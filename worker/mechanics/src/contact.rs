@@ -74,10 +74,10 @@ impl Settings {
         self.interacts[a as usize * self.n_parts() + b as usize]
     }
 
-    /// Cycles between trigger and sort after which nodes cannot have left the slack at the speeds that votes allow; 0 if one
-    /// is too many.
+    /// Cycles between trigger and sort after which nodes cannot have left the slack at the speeds that votes allow, where
+    /// orders answer a vote two cycles later; 0 if one is too many.
     pub fn longest_lag(&self) -> u32 {
-        (self.slack / reach::lag_travel(self, 1) * (1.0 + 1e-9)) as u32
+        ((self.slack / reach::lag_travel(self, 1) * (1.0 + 1e-9)) as u32).saturating_sub(2)
     }
 
     /// How near a pair is that a cycle looks at (length): the zone of warning and the spread of a worker's list between
