@@ -15,6 +15,15 @@ pub use targets::{Target, all};
 
 use crate::seeds::Draws;
 
+/// The target of this name.
+///
+/// # Panics
+/// If there is none.
+pub fn named(name: &str) -> Box<dyn Target> {
+    let target = all().into_iter().find(|target| target.name() == name);
+    target.unwrap_or_else(|| panic!("no target {name:?}"))
+}
+
 /// What became of many inputs.
 #[derive(Clone, Debug, Default)]
 pub struct Count {

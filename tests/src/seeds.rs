@@ -2,7 +2,8 @@
 //!
 //! Real sessions, real computation, packed messages; time, links, crashes and the disk are of this file. Frames of cycles
 //! overtake long control messages, links delay each message by what they like, hosts are slow, crash and come back, pairs
-//! of workers lose their links, masters restart from the last snapshot, processors err by one unit in the last place.
+//! of workers lose their links, masters restart from the last snapshot or leave and are followed by another, processors err
+//! by one unit in the last place.
 //! Whatever happens, the run must come to its end with the rows, energies and digest of the undisturbed one. A seed that
 //! does not is a bug, and the seed is all it takes to see it again.
 
@@ -37,20 +38,39 @@ pub use plot::{Fault, Plot, Stage};
 use crate::{bits::Fingerprint, solve::Solved};
 
 /// A small generator.
-pub struct Draws(u64);
+pub struct Draws {
+    state: u64,
+    /// Drawn by somebody else, last first: used up before the generator is.
+    given: Vec<u8>,
+}
 
 impl Draws {
     /// Of a seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
+        Self { state: seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1, given: Vec::new() }
+    }
+
+    /// Of bytes that a fuzzer has drawn: every choice is one of them, as long as there are any.
+    pub fn of_bytes(bytes: &[u8]) -> Self {
+        let seed = bytes.iter().fold(0, |sum: u64, &byte| sum.rotate_left(5) ^ u64::from(byte));
+        Self { given: bytes.iter().rev().copied().collect(), ..Self::new(seed) }
     }
 
     /// A number below `below`, which is not zero.
     pub fn below(&mut self, below: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) % below
+        if !self.given.is_empty() {
+            let wide = match below {
+                0..=0x100 => 1,
+                0x101..=0x1_0000 => 2,
+                _ => 8,
+            };
+            let bytes = (0..wide).filter_map(|_| self.given.pop());
+            return bytes.fold(0, |number: u64, byte| number << 8 | u64::from(byte)) % below;
+        }
+        self.state ^= self.state << 13;
+        self.state ^= self.state >> 7;
+        self.state ^= self.state << 17;
+        (self.state >> 11) % below
     }
 
     /// A delay (us): mostly short, one in thirty a hundred times as long.
@@ -375,16 +395,20 @@ impl World {
                 }
             }
             Fault::Join => self.put(self.now, What::Comes),
-            Fault::Master => {
-                self.job = None;
-                for host in &mut self.hosts {
-                    (host.alive, host.member) = (false, None);
-                }
-                let back = self.now + 10 * self.draws.delay();
-                self.put(back, What::MasterReturns);
-            }
+            Fault::Master => self.without_master(),
+            Fault::Leave => self.apply(Event::Suspend)?,
         }
         Ok(())
+    }
+
+    /// The master is gone; its workers give it up, and others call the next one.
+    fn without_master(&mut self) {
+        self.job = None;
+        for host in &mut self.hosts {
+            (host.alive, host.member) = (false, None);
+        }
+        let back = self.now + 10 * self.draws.delay();
+        self.put(back, What::MasterReturns);
     }
 
     /// A worker finds its link to another ended: what may be lost goes again, relayed.
@@ -446,6 +470,7 @@ impl World {
                     self.disk.rows.truncate(rows);
                     self.disk.states.retain(|state| state.cycle <= cycle);
                 }
+                Action::Over(outcome) if outcome.suspended => self.without_master(),
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 Action::Dealt(_) | Action::Progress(_) => {}
             }

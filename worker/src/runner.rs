@@ -248,6 +248,7 @@ fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
     }
     let mut outcome = machine.run(task);
     match &mut outcome {
+        Outcome::Computed if failpoint::from_cycle("ulp", cycle) => machine.plant_fault(),
         Outcome::Integrated(vote) if failpoint::in_cycle("nan-vote", cycle) => {
             vote.parts.iter_mut().for_each(|part| part.internal = f64::NAN);
         }

@@ -85,7 +85,7 @@ impl Job {
     ) -> Result<(), String> {
         self.book_last(state.cycle, &vote, actions);
         if !self.epoch.pauses {
-            return self.stopped(state, vote, actions);
+            return self.stopped(state, vote, due, actions);
         }
         if self.failure.is_some() {
             return self.end_with(state, actions);

@@ -11,11 +11,13 @@ use crate::event::Action;
 const SAME_FAULT: u64 = 2;
 
 impl Job {
-    /// All have stopped at the start of a cycle, the last one of this session.
+    /// All have stopped at the start of a cycle, the last one of this session; `due` says that the user is to have the
+    /// state in any case.
     pub(super) fn stopped(
         &mut self,
         state: GlobalState,
         vote: Vote,
+        due: bool,
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
         let control = self.model.setup.control;
@@ -31,6 +33,10 @@ impl Job {
         let rest = self.rest_at(state.cycle, vote)?;
         self.base = Arc::new(Base { state: Arc::new(state), rest });
         if self.leaves {
+            if due {
+                // The next session begins behind it.
+                actions.push(Action::State(Box::new(GlobalState::clone(&self.base.state))));
+            }
             self.suspend_at_base(actions);
             return Ok(());
         }

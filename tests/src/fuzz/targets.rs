@@ -50,6 +50,8 @@ pub fn all() -> Vec<Box<dyn Target>> {
         Box::new(Requests),
         Box::new(Tokens),
         Box::new(Decks),
+        Box::new(KeywordDecks),
+        Box::new(MeshFiles::new()),
         Box::new(Snapshots::new()),
         Box::new(WorkerSession(Arc::clone(&said))),
         Box::new(JobSession(said)),
@@ -317,6 +319,122 @@ impl Target for Decks {
     }
 }
 
+/// A keyword deck of two solids, with parameters, a curve, sets and an offset block of data.
+const KEYWORDS: &str = "*KEYWORD
+*TITLE
+one on another
+*PARAMETER
+R  speed      -50.0
+*CONTROL_TERMINATION
+      0.01
+*PART
+upper
+         1         1         1
+lower
+         2         1         1
+*SECTION_SOLID
+         1         1
+*MAT_PLASTIC_KINEMATIC
+         1 7.850E-06     210.0       0.3       0.6       1.5       1.0
+*CONTACT_AUTOMATIC_SINGLE_SURFACE
+         0
+*NODE
+       1             0.0             0.0             0.0
+       2             1.0             0.0             0.0
+       3             1.0             1.0             0.0
+       4             0.0             1.0             0.0
+       5             0.0             0.0             1.0
+       6             1.0             0.0             1.0
+       7             1.0             1.0             1.0
+       8             0.0             1.0             1.0
+      11             0.2             0.2             1.3
+      12             0.9             0.2             1.3
+      13             0.9             0.9             1.3
+      14             0.2             0.9             1.3
+      15             0.2             0.2             2.0
+      16             0.9             0.2             2.0
+      17             0.9             0.9             2.0
+      18             0.2             0.9             2.0
+*ELEMENT_SOLID
+       1       2       1       2       3       4       5       6       7       8
+       2       1      11      12      13      14      15      16      17      18
+*SET_PART_LIST
+         1
+         1
+*INITIAL_VELOCITY_GENERATION
+         1         1       0.0       0.0       0.0    &speed
+*END
+";
+
+struct KeywordDecks;
+
+impl Target for KeywordDecks {
+    fn name(&self) -> &'static str {
+        "keyword deck"
+    }
+
+    fn attack(&mut self, draws: &mut Draws) -> bool {
+        let mut bytes = KEYWORDS.as_bytes().to_vec();
+        if draws.below(4) == 0 {
+            // Lines out of place: cards without their keyword, keywords without their cards.
+            let lines: Vec<&str> = KEYWORDS.lines().collect();
+            let (from, to) = (one(&lines, draws), draws.below(lines.len() as u64) as usize);
+            let mut mixed: Vec<&str> = lines.clone();
+            mixed.insert(to, from);
+            if draws.below(2) == 0 {
+                mixed.remove(draws.below(mixed.len() as u64) as usize);
+            }
+            bytes = mixed.join("\n").into_bytes();
+        }
+        damage(&mut bytes, draws);
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let read = deck::read_whole(&text, "deck.k");
+        // Both ways to the model refuse the same decks.
+        assert_eq!(deck::convert(&text, "deck.k", "deck.mesh").is_ok(), read.is_ok(), "{text}");
+        read.is_ok()
+    }
+}
+
+/// Mesh files, and bundles of a deck with its mesh.
+struct MeshFiles {
+    mesh: String,
+    bundle: String,
+}
+
+impl MeshFiles {
+    fn new() -> Self {
+        let converted = deck::convert(KEYWORDS, "deck.k", "deck.mesh");
+        let deck::Converted { deck, mesh, .. } =
+            converted.unwrap_or_else(|faults| panic!("the corpus: {faults:?}"));
+        let (long, wide) = (deck.len(), mesh.len());
+        let bundle =
+            format!("#bolide-bundle 1\nfile {long} deck.toml\n{deck}\nfile {wide} deck.mesh\n{mesh}\n");
+        assert!(
+            deck::read(&bundle, "bundle").is_ok(),
+            "the corpus: {:?}",
+            deck::read(&bundle, "bundle").err()
+        );
+        Self { mesh, bundle }
+    }
+}
+
+impl Target for MeshFiles {
+    fn name(&self) -> &'static str {
+        "mesh and bundle"
+    }
+
+    fn attack(&mut self, draws: &mut Draws) -> bool {
+        let bundled = draws.below(2) == 0;
+        let mut bytes = if bundled { self.bundle.clone() } else { self.mesh.clone() }.into_bytes();
+        damage(&mut bytes, draws);
+        let text = String::from_utf8_lossy(&bytes);
+        match bundled {
+            true => deck::read(&text, "bundle").is_ok(),
+            false => deck::mesh_file::parse(&text, "mesh").is_ok(),
+        }
+    }
+}
+
 /// Snapshots whose checksum is right and whose body is not.
 struct Snapshots {
     model: Arc<deck::Model>,
@@ -325,8 +443,10 @@ struct Snapshots {
 }
 
 impl Snapshots {
-    /// Bytes before the body: magic and checksum.
-    const HEAD: usize = 40;
+    /// Bytes before the first chunk's sum: magic, length, cycle.
+    const HEAD: usize = 24;
+    /// Bytes of a sum.
+    const SUM: usize = 32;
 
     fn new() -> Self {
         let options = Options { snapshot_at: Some(4), ..Options::default() };
@@ -351,10 +471,23 @@ impl Target for Snapshots {
         if draws.below(4) == 0 {
             damage(&mut bytes, draws);
         } else {
-            let mut body = bytes.split_off(Self::HEAD);
+            let mut body = bytes.split_off(Self::HEAD + Self::SUM);
+            body.truncate(body.len() - Self::SUM);
             damage(&mut body, draws);
-            bytes[8..].copy_from_slice(blake3::hash(&body).as_bytes());
-            bytes.extend(body);
+            bytes[8..16].copy_from_slice(&(body.len() as u64).to_le_bytes());
+            if draws.below(8) == 0 {
+                bytes[16 + draws.below(8) as usize] ^= 1 << draws.below(8);
+            }
+            bytes.truncate(Self::HEAD);
+            let mut sums = blake3::Hasher::new();
+            sums.update(&bytes);
+            for chunk in body.chunks(snapshot::file::CHUNK) {
+                let sum = blake3::hash(chunk);
+                sums.update(sum.as_bytes());
+                bytes.extend_from_slice(sum.as_bytes());
+                bytes.extend_from_slice(chunk);
+            }
+            bytes.extend_from_slice(sums.finalize().as_bytes());
         }
         let path = self.folder.path().join("damaged");
         if std::fs::write(&path, bytes).is_err() {

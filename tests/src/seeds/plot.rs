@@ -49,6 +49,8 @@ pub enum Fault {
     Join,
     /// The master is gone, and starts anew from the disk.
     Master,
+    /// The master is told to leave: it stores the run, and another one goes on with it.
+    Leave,
 }
 
 /// What goes wrong, by the number of the happening before which it does.
@@ -179,13 +181,15 @@ impl Stage {
                     11 => Fault::Slow { host, factor: 2 + draws.below(30) },
                     12 => Fault::Spoil { host },
                     13 | 14 => Fault::Join,
-                    _ => Fault::Master,
+                    _ if host < 32 => Fault::Master,
+                    _ => Fault::Leave,
                 };
                 (at, fault)
             })
             .collect();
         faults.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
-        (Plot { snapshot_at, faults, ..Plot::quiet(workers) }, Options { route, keep, ..options() })
+        let store = draws.below(2) == 0;
+        (Plot { snapshot_at, faults, ..Plot::quiet(workers) }, Options { route, keep, store, ..options() })
     }
 
     /// Plays a seed; gives what it took, or how it went wrong, with the seed and its plot.
