@@ -12,7 +12,8 @@ use std::fmt;
 /// The version of the messages in this module and in the control messages, stated first in [`Hello`].
 ///
 /// 1: the first. 2: links between workers (`peer_port` and `member` in [`Hello`]), introductions and reports.
-pub const VERSION: u16 = 2;
+/// 3: the work of loads by part in votes.
+pub const VERSION: u16 = 3;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

@@ -72,8 +72,10 @@ pub enum Task {
         guest_state: Vec<f64>,
         /// The step before.
         dt_previous: f64,
-        /// Gather positions first.
+        /// Gather positions then.
         gather: bool,
+        /// This gathering replaces those whose plans have not acted.
+        blocking: bool,
     },
     /// Contact, border elements, partial forces.
     Border {
@@ -85,6 +87,8 @@ pub enum Task {
         time: f64,
         /// Gather positions first.
         gather: bool,
+        /// This gathering replaces those whose plans have not acted.
+        blocking: bool,
     },
     /// Interior elements.
     Interior {
@@ -195,8 +199,8 @@ pub struct Session {
     /// Orders by the cycle whose step they give.
     orders: BTreeMap<u64, Orders>,
     totals: VecDeque<(u64, Vec<f64>)>,
-    /// Cycles at which plans act, from gatherings, and the plans that have come.
-    boundaries: VecDeque<u64>,
+    /// Cycles of gatherings and at which their plans act, and the plans that have come: cycle at which one acts, hash, plan.
+    boundaries: VecDeque<(u64, u64)>,
     plans: VecDeque<(u64, u64, Box<Plan>)>,
     guests: Option<(u64, Vec<f64>)>,
     n_exchange: usize,
@@ -274,9 +278,9 @@ impl Session {
 
     /// Hash of the plan that acts at a cycle, this one or a later one; none while that plan has not come.
     pub fn plan_at(&self, cycle: u64) -> Option<u64> {
-        match self.boundaries.iter().rev().find(|acts_at| **acts_at <= cycle) {
+        match self.boundaries.iter().rev().find(|(_, acts_at)| *acts_at <= cycle) {
             None => Some(self.plan_hash),
-            Some(boundary) => {
+            Some((_, boundary)) => {
                 self.plans.iter().find(|(acts_at, ..)| acts_at == boundary).map(|(_, hash, _)| *hash)
             }
         }
@@ -385,7 +389,13 @@ impl Session {
                     phase => Err(format!("start while {phase:?}, expected Ready")),
                 }
             }
-            ToWorker::Plan { acts_at, plan, hash } => {
+            // Its gathering was replaced while it was on its way.
+            ToWorker::Plan { gathered_at, acts_at, .. }
+                if !self.boundaries.contains(&(gathered_at, acts_at)) =>
+            {
+                Ok(())
+            }
+            ToWorker::Plan { acts_at, plan, hash, .. } => {
                 if self.plans.len() as u64 > self.sort_lag + 1 {
                     return Err(format!("plan for cycle {acts_at} while {} others wait", self.plans.len()));
                 }
@@ -536,7 +546,7 @@ impl Session {
     }
 
     fn begin_cycle(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let Orders { stop, collect, gather, .. } = *self.flags()?;
+        let Orders { stop, collect, gather, blocking, .. } = *self.flags()?;
         while let Some(entry) = self.orders.first_entry()
             && entry.key().wrapping_add(1) < self.cycle
         {
@@ -548,9 +558,15 @@ impl Session {
             return Ok(());
         }
         if gather {
-            self.boundaries.push_back(self.cycle + self.sort_lag);
+            let mut acts_at = self.cycle + self.sort_lag;
+            if blocking {
+                acts_at = self.cycle + 1;
+                self.boundaries.retain(|(_, at)| *at <= self.cycle);
+                self.plans.retain(|(at, ..)| *at <= self.cycle);
+            }
+            self.boundaries.push_back((self.cycle, acts_at));
         }
-        if self.boundaries.front() == Some(&self.cycle) {
+        if self.boundaries.front().is_some_and(|(_, at)| *at == self.cycle) {
             self.phase = Phase::AwaitGuests;
             self.whole = false;
             return self.try_boundary(actions);
@@ -558,7 +574,7 @@ impl Session {
         self.phase = Phase::Border;
         let (quantum, time) = self.quantum_and_time()?;
         let dt_previous = self.dt_previous;
-        actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather }));
+        actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather, blocking }));
         Ok(())
     }
 
@@ -582,7 +598,7 @@ impl Session {
             },
             _ => return Ok(()),
         };
-        let gather = self.flags()?.gather;
+        let Orders { gather, blocking, .. } = *self.flags()?;
         if let Some((_, hash, plan)) = self.plans.pop_front() {
             self.boundaries.pop_front();
             self.n_exchange = plan.exchange.len();
@@ -594,6 +610,7 @@ impl Session {
                 guest_state,
                 dt_previous: self.dt_previous,
                 gather,
+                blocking,
             }));
         }
         Ok(())

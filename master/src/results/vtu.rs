@@ -98,6 +98,12 @@ impl<'a> Array<'a> {
         Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
     }
 
+    /// The tuples of some elements alone.
+    fn only(self, kept: &'a [usize]) -> Self {
+        let put = self.put;
+        Self { tuples: kept.len(), put: Box::new(move |i, out| put(kept[i], out)), ..self }
+    }
+
     /// Size of the numbers, without the header that precedes them.
     fn n_bytes(&self) -> u64 {
         self.tuples as u64 * self.components as u64 * self.width as u64
@@ -180,7 +186,7 @@ pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
 /// `temperature` (K), `damage`, `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
 /// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric), `time_to_light`.
 /// `worker` gives, by global element index, the worker that computes the element, and becomes the element
-/// field of that name. Units are the deck's.
+/// field of that name. Eroded elements are left out. Units are the deck's.
 ///
 /// # Errors
 /// [`Error::Io`] if the disk refuses.
@@ -221,16 +227,21 @@ fn stream(
         arrays.retain(|array| array.name == "worker" || fields.contains(array.name));
         arrays
     });
+    // Eroded elements are left out, their nodes are not.
+    let kept: Vec<usize> = (0..n_elements).filter(|&e| !state.is_eroded(e)).collect();
+    let n_cells = kept.len();
+    let cell: Vec<Array> =
+        if n_cells < n_elements { cell.into_iter().map(|array| array.only(&kept)).collect() } else { cell };
     let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
     let cells = [
-        Array::i64("connectivity", n_elements, |e| elements.corners(e)),
-        Array::i64("offsets", n_elements, |e| [8 * (e as i64 + 1)]),
+        Array::i64("connectivity", n_cells, |cell| elements.corners(kept[cell])),
+        Array::i64("offsets", n_cells, |cell| [8 * (cell as i64 + 1)]),
         Array {
             name: "types",
             kind: "UInt8",
             width: 1,
             components: 1,
-            tuples: n_elements,
+            tuples: n_cells,
             grouped: true,
             put: Box::new(|_, out| out.push(VTK_HEXAHEDRON)),
         },
@@ -255,7 +266,7 @@ fn stream(
         state.cycle
     )?;
     writeln!(out, "    </FieldData>")?;
-    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_elements}">"#)?;
+    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_cells}">"#)?;
     let mut offset = 0;
     for (section, arrays) in sections {
         writeln!(out, "      <{section}>")?;

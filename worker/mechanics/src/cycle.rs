@@ -20,12 +20,13 @@ use crate::{
     block::{Block, Piece},
     contact::{Batch, Contact},
     element::{ElementVote, Step},
+    erosion::{Eroding, PieceErosion},
     home::Home,
     lanes::{SET, Width},
     load::face::{self, FaceVote, LoadedFace},
     nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
-    vote::{Quanta, Vote},
+    vote::{Gone, Quanta, Vote},
     wall::{self, Pose, WallVote},
 };
 
@@ -63,6 +64,9 @@ pub struct Plan {
     pub send: Vec<u32>,
     /// On route direct: the workers that hold nodes of `exchange` too.
     pub neighbours: Vec<Neighbour>,
+    /// Nodes held here that have no element left and leave the run with this plan; in the first plan of an epoch, all that
+    /// have left before.
+    pub dropped: Vec<u32>,
 }
 
 /// Another worker that holds nodes of the exchange.
@@ -134,6 +138,8 @@ struct Room {
     face_vote: FaceVote,
     /// What booked nodes gave each wall.
     walls: Vec<WallVote>,
+    /// Where the part erodes.
+    eroding: Option<Eroding>,
 }
 
 impl Room {
@@ -143,6 +149,30 @@ impl Room {
         std::array::from_fn(|a| {
             touched().flat_map(|(set, _)| &self.block.x[a][set * SET..(set + 1) * SET]).copied().collect()
         })
+    }
+
+    /// Takes a copy of a node out of the sums and off the surface; true if it was the one that is booked. Reference positions
+    /// of its set go with its last node on the surface.
+    fn drop_node(&mut self, local: u32) -> bool {
+        let (set, bit) = (local as usize / SET, 1 << (local as usize % SET));
+        let booked = self.sets[set].booked & bit != 0;
+        self.sets[set].booked &= !bit;
+        let before = self.sets[set].surface;
+        self.sets[set].surface &= !bit;
+        if before != 0 && self.sets[set].surface == 0 {
+            let at = SET * self.sets[..set].iter().filter(|set| set.surface != 0).count();
+            for positions in std::iter::once(&mut self.reference).chain(&mut self.gathered) {
+                for along in positions {
+                    along.drain(at..at + SET);
+                }
+            }
+        }
+        booked
+    }
+
+    /// Which elements have eroded and how far the others are, where they can.
+    fn erosion(&self) -> Option<PieceErosion> {
+        self.eroding.as_ref().map(|eroding| eroding.state(&self.block))
     }
 
     fn is_booked(&self, local: u32) -> bool {
@@ -195,8 +225,14 @@ pub struct Domain {
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
     vote: Vote,
+    /// `n`.
+    cycle: u64,
     /// `t_n`.
     time: f64,
+    /// Whether the first plan is installed.
+    installed: bool,
+    /// What left with dropped nodes in this cycle.
+    gone: Gone,
     /// Where the walls are and how they move in this step.
     poses: Vec<Pose>,
     /// Takes what guests give walls, which their owners book.
@@ -204,12 +240,12 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Builds the blocks of the sub-domains. `gauges` are global node indices by gauge.
+    /// Builds the blocks of the sub-domains at the start of a cycle. `gauges` are global node indices by gauge.
     pub fn new(
         setup: Setup,
         n_parts: usize,
         quanta: Quanta,
-        subdomains: Vec<Subdomain>,
+        (subdomains, cycle): (Vec<Subdomain>, u64),
         gauges: &[u32],
         width: Width,
     ) -> Self {
@@ -219,10 +255,14 @@ impl Domain {
         let mut gather = Vec::new();
         for Subdomain { pieces, unowned, surface, .. } in subdomains {
             let first = rooms.len();
-            for piece in pieces {
-                let block = Block::take(piece);
+            for mut piece in pieces {
+                let erosion = piece.erosion.take();
+                let mut block = Block::take(piece);
                 let all = 0..block.n_sets();
                 let material = &setup.materials[block.material as usize];
+                let eroding = setup.erosion.of_part(block.part as usize).map(|criteria| {
+                    Eroding::new(criteria, erosion.as_ref(), &mut block, material, setup.control.safety_factor)
+                });
                 let faces = face::faces_of(&block, &setup.loads, material);
                 rooms.push(Room {
                     sets: NodeSet::all(&block.constraint),
@@ -236,6 +276,7 @@ impl Domain {
                     faces,
                     face_vote: NO_FACES,
                     walls: vec![WallVote::default(); setup.walls.len()],
+                    eroding,
                 });
             }
             let own = first as u32..rooms.len() as u32;
@@ -273,7 +314,10 @@ impl Domain {
             .collect();
         Self {
             vote: Vote::empty(n_parts),
+            cycle,
             time: 0.0,
+            installed: false,
+            gone: Gone::default(),
             poses: Vec::with_capacity(setup.walls.len()),
             unbooked: vec![WallVote::default(); setup.walls.len()],
             setup,
@@ -301,10 +345,9 @@ impl Domain {
     pub fn load(&self) -> Load {
         let mut load = Load::default();
         for room in &self.rooms {
-            let n = room.block.elements.len() as u64;
-            let interior: u64 = room.interior.iter().map(|sets| room.block.n_elements_of(sets)).sum();
-            load.border += n - interior;
-            load.interior += interior;
+            let count = |sets: &[Range<u32>]| sets.iter().map(|s| room.block.n_elements_of(s)).sum::<u64>();
+            load.border += count(&room.border);
+            load.interior += count(&room.interior);
             load.nodes += room.block.nodes.len() as u64;
         }
         load.nodes += self.guests.node.len() as u64;
@@ -419,11 +462,49 @@ impl Domain {
                 let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
                 split(&room.block.sets_touching(&touched))
             };
+            if room.eroding.is_some() {
+                let alive = room.block.alive();
+                room.border = living(&room.border, alive);
+                room.interior = living(&room.interior, alive);
+            }
             if let Some(gathered) = room.gathered.pop_front() {
                 room.reference = gathered;
             }
         }
+        self.drop_nodes(&plan.dropped);
+        self.installed = true;
         Ok(())
+    }
+
+    /// Takes freed nodes out of the run: they stand still from now on, and nothing feels them. Those that the first plan names
+    /// were booked before.
+    fn drop_nodes(&mut self, nodes: &[u32]) {
+        for &node in nodes {
+            for &(room, local) in self.home.get(node) {
+                let room = &mut self.rooms[room as usize];
+                let booked = room.drop_node(local);
+                if !self.installed {
+                    continue;
+                }
+                let (v, mass) = (&mut room.block.v, room.block.mass[local as usize]);
+                let velocity: [f64; 3] = std::array::from_fn(|a| std::mem::take(&mut v[a][local as usize]));
+                if booked {
+                    let [x, y, z] = velocity;
+                    let square = x.mul_add(x, y.mul_add(y, z * z));
+                    self.gone.kinetic += self.quanta.energy.round(0.5 * mass * square);
+                    for (sum, v) in self.gone.momentum.iter_mut().zip(velocity) {
+                        *sum += self.quanta.momentum.round(mass * v);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Forgets gatherings whose plans will not come: that of this cycle replaces them.
+    pub fn forget_gathered(&mut self) {
+        for room in &mut self.rooms {
+            room.gathered.clear();
+        }
     }
 
     /// Books the copies of a held node that is not exchanged.
@@ -529,10 +610,18 @@ impl Domain {
             force_quantum: self.quanta.force,
             energy_quantum: self.quanta.energy,
         };
-        let (materials, width) = (&self.setup.materials, self.width);
+        let (materials, width, cycle) = (&self.setup.materials, self.width, self.cycle);
         let work = |room: &mut Room| {
             let mark = meter.start();
             let material = &materials[room.block.material as usize];
+            if let Some(eroding) = room.eroding.as_mut().filter(|_| dt > 0.0) {
+                if sets != Sets::Interior {
+                    eroding.watch(&mut room.block, &room.border, &step, cycle, width);
+                }
+                if sets != Sets::Border {
+                    eroding.watch(&mut room.block, &room.interior, &step, cycle, width);
+                }
+            }
             if sets != Sets::Interior {
                 room.vote = ElementVote::default();
                 room.block.compute(material, &room.border, &step, width, &mut room.vote);
@@ -648,6 +737,11 @@ impl Domain {
                 let half_steps = 0.5 * (dt_previous + dt);
                 room.booked.external += face::work(&room.faces, block, half_steps, advance.quanta.energy);
             }
+            // Loads leave with the faces of eroded elements.
+            if room.eroding.as_mut().is_some_and(Eroding::take_change) && !room.faces.is_empty() {
+                let material = &setup.materials[block.material as usize];
+                room.faces = face::faces_of(block, &setup.loads, material);
+            }
             meter.stop(mark, false);
         });
         let guests = &mut self.guests;
@@ -662,6 +756,7 @@ impl Domain {
             walls: &mut self.unbooked,
         };
         advance.run(&mut nodes, width);
+        self.cycle += 1;
         Ok(self.finish_vote())
     }
 
@@ -676,13 +771,20 @@ impl Domain {
             room.walls.fill(WallVote::default());
             vote.parts[part].kinetic += room.booked.kinetic;
             vote.external += room.booked.external;
+            vote.parts[part].external += room.booked.external;
             for a in 0..3 {
                 vote.momentum[a] += room.booked.momentum[a];
             }
             vote.extents[part].merge(&room.booked.extent);
             vote.contact_speed_squared = vote.contact_speed_squared.max(room.booked.speed_squared);
             vote.contact_speed_ahead = vote.contact_speed_ahead.max(room.booked.speed_ahead);
+            if let Some(eroding) = &mut room.eroding {
+                let casualties = eroding.take_casualties();
+                vote.add_eroded(&casualties.elements);
+                vote.gone.internal += casualties.internal;
+            }
         }
+        vote.gone.merge(&std::mem::take(&mut self.gone));
         for &(gauge, room, local) in &self.gauges {
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
             let values =
@@ -694,12 +796,13 @@ impl Domain {
 
     /// The state of all blocks, to be put back into a global state.
     pub fn pieces(&self) -> Vec<Piece> {
-        self.rooms.iter().map(|room| room.block.piece()).collect()
+        self.rooms.iter().map(|room| Piece { erosion: room.erosion(), ..room.block.piece() }).collect()
     }
 
     /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
     pub fn into_pieces(self) -> Vec<Piece> {
-        self.rooms.into_iter().map(|room| room.block.into_piece()).collect()
+        let image = |room: Room| Piece { erosion: room.erosion(), ..room.block.into_piece() };
+        self.rooms.into_iter().map(image).collect()
     }
 }
 
@@ -733,6 +836,18 @@ fn pack(
             v[a][i] = from_v[a][local];
         }
     }
+}
+
+/// The sets among these in which an element is alive, as ranges.
+fn living(ranges: &[Range<u32>], alive: &[u8]) -> Vec<Range<u32>> {
+    let mut living: Vec<Range<u32>> = Vec::new();
+    for set in ranges.iter().cloned().flatten().filter(|&set| alive[set as usize] != 0) {
+        match living.last_mut() {
+            Some(last) if last.end == set => last.end += 1,
+            _ => living.push(set..set + 1),
+        }
+    }
+    living
 }
 
 /// Sets that touch marked nodes and the others, as ranges.

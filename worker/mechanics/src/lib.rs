@@ -25,6 +25,7 @@ pub mod cycle;
 pub mod digest;
 pub mod element;
 mod eos;
+pub mod erosion;
 pub mod exact;
 mod failure;
 mod home;

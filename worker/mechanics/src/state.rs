@@ -91,6 +91,22 @@ pub struct GlobalState {
     pub initial_volume: Vec<f64>,
     /// One array per entry of [`FIELDS`], each by global element index.
     pub elements: [Vec<f64>; N_FIELDS],
+    /// Cycle in which each element eroded, or [`crate::erosion::ALIVE`]; empty where nothing can.
+    pub eroded: Vec<u64>,
+    /// Incremental geometric strain by element; empty where none erodes by it.
+    pub strain: Vec<f64>,
+}
+
+impl GlobalState {
+    /// Whether an element has eroded.
+    pub fn is_eroded(&self, element: usize) -> bool {
+        self.eroded.get(element).is_some_and(|&cycle| cycle != crate::erosion::ALIVE)
+    }
+
+    /// Number of elements that have eroded.
+    pub fn n_eroded(&self) -> usize {
+        (0..self.eroded.len()).filter(|&e| self.is_eroded(e)).count()
+    }
 }
 
 impl GlobalState {
