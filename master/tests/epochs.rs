@@ -138,7 +138,7 @@ fn a_worker_that_joins_is_used_from_the_next_boundary_and_changes_no_bit() {
     let (one, written, arrivals) = undisturbed();
     for seed in 0..12 {
         let mut draw = random(seed);
-        // One worker is sent a third as many messages as three: later instants would never come.
+        // One worker alone has a third of the arrivals.
         let (at, lost_at) = (draw(arrivals / 4), draw(arrivals / 4));
         let route = [Route::Master, Route::Direct][draw(2) as usize];
         let mut fate = |number: u64| match number {
