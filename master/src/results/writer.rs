@@ -70,10 +70,9 @@ impl Writer {
             failed: AtomicBool::new(false),
         });
         let of_thread = Arc::clone(&shared);
-        let thread = std::thread::Builder::new().name("states".to_owned()).spawn(move || {
-            worker::compute::lowest_priority();
-            serve(&of_thread, &model);
-        });
+        // At the priority of the others: a run that waits for it must not wait for strangers on this machine too.
+        let thread = std::thread::Builder::new().name("states".to_owned());
+        let thread = thread.spawn(move || serve(&of_thread, &model));
         let thread = thread.map_err(|e| format!("a thread for states: {e}"))?;
         Ok(Self { shared, thread: Some(thread) })
     }
