@@ -12,6 +12,7 @@ pub mod hex8;
 pub(crate) mod hourglass;
 pub(crate) mod modes;
 pub(crate) mod rotation;
+pub mod shell4;
 pub(crate) mod vector;
 pub(crate) mod viscosity;
 
