@@ -23,11 +23,10 @@ pub(super) struct Geometry<L> {
     pub py: [L; 4],
     /// Hourglass pattern orthogonal to linear fields, magnitude 1/4 on a parallelogram.
     pub gamma: [L; 4],
-    /// Its moments: of the height z, and of x x, x y and y y.
+    /// Its moment of the height z.
     pub gz: L,
-    pub gxx: L,
-    pub gxy: L,
-    pub gyy: L,
+    /// Moments of x x, x y and y y of the pattern, of `bx` and of `by`: what they see of a curved deflection.
+    pub curved: [[L; 3]; 3],
     /// Least normal component of a corner's edge product (area); not positive for an element turned over.
     pub least: L,
 }
@@ -89,20 +88,18 @@ impl<L: Lane> Geometry<L> {
         let sx = quarter * ((x[0] - x[1]) + (x[2] - x[3]));
         let sy = quarter * ((y[0] - y[1]) + (y[2] - y[3]));
         let mut gamma = [zero; 4];
-        let (mut gz, mut gxx, mut gxy, mut gyy) = (zero, zero, zero, zero);
+        let mut gz = zero;
         let mut sign = quarter;
         let mut i = 0;
         while i < 4 {
             gamma[i] = sy.neg_mul_add(by[i], sx.neg_mul_add(bx[i], sign));
             gz = gamma[i].mul_add(z[i], gz);
-            gxx = (gamma[i] * x[i]).mul_add(x[i], gxx);
-            gxy = (gamma[i] * x[i]).mul_add(y[i], gxy);
-            gyy = (gamma[i] * y[i]).mul_add(y[i], gyy);
             sign = -sign;
             i += 1;
         }
         let area = half * twice_area;
-        Self { e: [e1, e2, e3], area, bx, by, cx, cy, px, py, gamma, gz, gxx, gxy, gyy, least }
+        let curved = [moments(&gamma, &x, &y), moments(&bx, &x, &y), moments(&by, &x, &y)];
+        Self { e: [e1, e2, e3], area, bx, by, cx, cy, px, py, gamma, gz, curved, least }
     }
 
     /// `sum bx_I bx_I`, `sum by_I by_I` and the largest eigenvalue of the sum of dyads.
@@ -120,6 +117,22 @@ impl<L: Lane> Geometry<L> {
 fn opposite<L: Lane>(a: &[L; 4], factor: L) -> [L; 4] {
     let (one, two) = ((a[1] - a[3]) * factor, (a[2] - a[0]) * factor);
     [one, two, -one, -two]
+}
+
+/// `sum a x x`, `sum a x y`, `sum a y y`.
+#[inline(always)]
+fn moments<L: Lane>(a: &[L; 4], x: &[L; 4], y: &[L; 4]) -> [L; 3] {
+    let zero = L::splat(0.0);
+    let (mut xx, mut xy, mut yy) = (zero, zero, zero);
+    let mut i = 0;
+    while i < 4 {
+        let (ax, ay) = (a[i] * x[i], a[i] * y[i]);
+        xx = ax.mul_add(x[i], xx);
+        xy = ax.mul_add(y[i], xy);
+        yy = ay.mul_add(y[i], yy);
+        i += 1;
+    }
+    [xx, xy, yy]
 }
 
 /// Sum of products over the corners.

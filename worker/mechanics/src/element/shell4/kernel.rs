@@ -143,13 +143,17 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
     let (bend_xx, bend_yy) = (-dot(&g.bx, &wy), dot(&g.by, &wx));
     let (turn_x, turn_y) = (dot(&g.bx, &wx), dot(&g.by, &wy));
     let twist = half * (turn_x - turn_y);
-    let bent = (half * g.gxx).mul_add(bend_xx, (half * g.gyy).mul_add(bend_yy, g.gxy * twist));
+    // What the curvatures alone make of the deflection is neither shear nor hourglass.
+    let curvatures = [half * bend_xx, twist, half * bend_yy];
+    let bent =
+        [sum(&g.curved[0], &curvatures), sum(&g.curved[1], &curvatures), sum(&g.curved[2], &curvatures)];
+    let (shear_x, shear_y) = (shear_x - bent[1], shear_y - bent[2]);
     let rates = [
         g.gz.mul_add(tilt_x, dot(&g.gamma, &vx)),
         g.gz.mul_add(tilt_y, dot(&g.gamma, &vy)),
         dot(&g.gamma, &wx),
         dot(&g.gamma, &wy),
-        dot(&g.gamma, &vz) - bent,
+        dot(&g.gamma, &vz) - bent[0],
         turn_x + turn_y,
     ];
 
@@ -265,6 +269,14 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
     let computed = L::both(alive, finite);
     let faults = L::bits(alive) & (L::bits(flat) | !L::bits(finite));
     let [hx, hy, hwx, hwy, hq, ht] = [state[0], state[1], state[2], state[3], state[4], state[5]];
+    // Deflection forces on the curvatures xx, xy and yy.
+    let mut bent = [zero; 3];
+    let mut i = 0;
+    while i < 3 {
+        let sheared = q_x.mul_add(g.curved[1][i], q_y * g.curved[2][i]);
+        bent[i] = volume.mul_add(sheared, hq * g.curved[0][i]);
+        i += 1;
+    }
     let force_magic = L::splat(c.force_magic);
     let moment_magic = L::splat(c.moment_magic);
     let mut forces = [Vector { x: zero, y: zero, z: zero }; 4];
@@ -281,10 +293,10 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         let fz = volume.mul_add(fz, hq.mul_add(gamma, tilted));
         let tx = volume * m_xx.mul_add(bx, m_xy.mul_add(by, quarter * q_x));
         let ty = volume * m_yy.mul_add(by, m_xy.mul_add(bx, quarter * q_y));
-        let about_x = half * g.gxy.mul_add(bx, g.gyy * by);
-        let about_y = half * g.gxy.mul_add(by, g.gxx * bx);
-        let mx = hwx.mul_add(gamma, ht.mul_add(bx, hq.neg_mul_add(about_x, -ty)));
-        let my = hwy.mul_add(gamma, ht.mul_add(by, hq.mul_add(about_y, tx)));
+        let about_x = half * bent[1].mul_add(bx, bent[2] * by);
+        let about_y = half * bent[1].mul_add(by, bent[0] * bx);
+        let mx = hwx.mul_add(gamma, ht.mul_add(bx, -(ty + about_x)));
+        let my = hwy.mul_add(gamma, ht.mul_add(by, tx + about_y));
         let mz = g.px[i].mul_add(ty, -(g.py[i] * tx));
         // What the element resists with acts on the nodes the other way.
         let (fx, fy, fz) = (-fx, -fy, -fz);
@@ -367,4 +379,10 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         }
         lane += 1;
     }
+}
+
+/// Sum of products of three.
+#[inline(always)]
+fn sum<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
