@@ -4,15 +4,18 @@
 //! 1. syntax (faults here end the reading: nothing after them can be trusted);
 //! 2. title, units, control, materials, parts with their blocks;
 //! 3. one mesh with one numbering, joins, volumes, masses, velocities;
-//! 4. boundaries, walls, contact, output, which refer to parts and nodes;
+//! 4. boundaries, walls, loads, contact, output, which refer to parts and nodes;
 //! 5. what spans entries ([`crate::check`]).
 
 mod boundary;
 mod burn;
 mod contact;
+mod curve;
+mod load;
 mod output;
 mod part;
 mod shape;
+mod wall;
 
 pub(crate) use contact::ContactDraft;
 pub(crate) use part::{Explicit, PartDraft};
@@ -112,7 +115,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
         let prescribed = conditions.constraints[*index as usize].velocity;
         for (axis, value) in prescribed.iter().enumerate() {
             if let Some(value) = value {
-                velocity[node][axis] = *value;
+                velocity[node][axis] = value.at(&conditions.loads.curves, 0.0);
             }
         }
     }
@@ -130,6 +133,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
             constraints: conditions.constraints,
             walls: conditions.walls,
             detonations,
+            loads: conditions.loads,
         },
         output,
     })

@@ -1,6 +1,6 @@
 //! The example decks are what users copy: each must be read, and hold what its comments say.
 
-use mechanics::mesh::Topology;
+use mechanics::{load::Drive, mesh::Topology};
 
 fn example(name: &str) -> deck::Model {
     let path = format!("{}/examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
@@ -54,7 +54,8 @@ fn taylor_bar_is_the_972_element_quarter_on_its_symmetry_planes() {
     let model = example("taylor-copper");
     assert_eq!(model.mesh.n_elements(), 972);
     let fixed = |axis: usize| {
-        let on = |c: &u16| model.setup.constraints[usize::from(*c)].velocity[axis] == Some(0.0);
+        let on =
+            |c: &u16| model.setup.constraints[usize::from(*c)].velocity[axis] == Some(Drive::constant(0.0));
         model.constraint.iter().filter(|c| on(c)).count()
     };
     // Seven nodes across each cut plane, 37 layers; the axis is on both.

@@ -3,8 +3,11 @@
 use deck::Model;
 use mechanics::{
     burn::Detonation,
+    load::{Drive, Gravity, NodalForce, Relaxation, SurfaceKind},
     material::{CowperSymonds, Eos, Failure, Strength},
-    mesh::Topology,
+    mesh::{FACES, Topology},
+    setup::Constraint,
+    wall::{Motion, Shape},
 };
 
 const HEAD: &str = "title = \"t\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n";
@@ -112,7 +115,9 @@ fn boundaries_merge_by_node_and_set_the_initial_velocity() {
     let model = good("boundaries");
     let at = |p: [f64; 3]| {
         let node = model.mesh.positions.iter().position(|x| *x == p).expect("a node of the mesh");
-        (model.setup.constraints[usize::from(model.constraint[node])].velocity, model.velocity[node])
+        let velocity = model.setup.constraints[usize::from(model.constraint[node])].velocity;
+        assert!(velocity.iter().flatten().all(|drive| drive.curve.is_none()));
+        (velocity.map(|drive| drive.map(|drive| drive.factor)), model.velocity[node])
     };
     assert_eq!(at([2.0, 2.0, 2.0]).0, [None; 3]);
     assert_eq!(at([2.0, 2.0, 0.0]).0, [Some(0.0); 3]);
@@ -120,8 +125,53 @@ fn boundaries_merge_by_node_and_set_the_initial_velocity() {
     assert_eq!(at([2.0, 0.0, 2.0]).0, [None, Some(0.0), None]);
     assert_eq!(at([4.0, 4.0, 4.0]), ([Some(2.5), None, Some(0.0)], [2.5, 0.0, 0.0]));
     let wall = &model.setup.walls[0];
-    assert_eq!(wall.normal, [0.0, 0.0, 1.0]);
+    assert_eq!(wall.shape, Shape::Plane { point: [0.0, 0.0, -1.0], normal: [0.0, 0.0, 1.0] });
+    assert_eq!(wall.motion, Motion::Fixed);
     assert_eq!(model.setup.constraints[0].velocity, [None; 3]);
+}
+
+#[test]
+fn loads_curves_and_walls_are_as_the_deck_says() {
+    let model = good("loads");
+    let loads = &model.setup.loads;
+    let ramp = |factor| Drive { factor, curve: Some(1) };
+    assert_eq!(loads.curves[0].points, [[0.0, 0.0]]);
+    assert_eq!(loads.curves[1].points, [[0.0, 3.0], [1e-3, 1.0]]);
+    assert_eq!(loads.forces, [NodalForce { force: [1.0, 2.0, 3.0], drive: ramp(1.0) }]);
+    assert_eq!(loads.gravity, Some(Gravity { acceleration: [0.0, 0.0, -9.81], drive: Drive::constant(1.0) }));
+    assert_eq!(loads.relaxation, Some(Relaxation { factor: 0.99, until: 5e-4 }));
+    // Faces of a grid of 4 x 4 x 4: sides are those of the mechanics, so that 1 is k-max and 3 is i-max.
+    let side = |corners: [usize; 4]| FACES.iter().position(|face| *face == corners).expect("a face") as u8;
+    assert_eq!((side([4, 5, 6, 7]), side([1, 2, 6, 5])), (1, 3));
+    let [pressure, transmit] = &loads.surfaces[..] else { panic!("{:?}", loads.surfaces) };
+    assert_eq!(pressure.kind, SurfaceKind::Pressure(ramp(-2.0)));
+    assert_eq!(pressure.faces, (48..64).map(|e| (e, 1)).collect::<Vec<_>>());
+    assert_eq!(transmit.kind, SurfaceKind::Transmit);
+    assert_eq!(transmit.faces, (0..16).map(|e| (4 * e + 3, 3)).collect::<Vec<_>>());
+    // Nodes 1 and 125 have the force, the first a velocity that starts at twice the first value of the curve.
+    let of = |node: usize| model.setup.constraints[usize::from(model.constraint[node])];
+    assert_eq!(of(0), Constraint { velocity: [Some(ramp(2.0)), None, None], walls: 0, forces: 1 });
+    assert_eq!(of(124), Constraint { forces: 1, ..Constraint::default() });
+    assert_eq!((model.velocity[0], model.velocity[124]), ([6.0, 0.0, 0.0], [0.0; 3]));
+    let walls: Vec<_> =
+        model.setup.walls.iter().map(|wall| (wall.shape, wall.motion, wall.friction)).collect();
+    let axis = [0.0, 1.0, 0.0];
+    let zero = Drive::constant(0.0);
+    assert_eq!(
+        walls,
+        [
+            (
+                Shape::Cylinder { point: [2.0, 0.0, 6.0], axis, radius: 1.5 },
+                Motion::Driven([zero, zero, ramp(-1.0)]),
+                0.0
+            ),
+            (
+                Shape::Sphere { centre: [2.0, 2.0, -3.0], radius: 2.0 },
+                Motion::Free { mass: 5.0, velocity: [0.0, 0.0, 10.0] },
+                0.1
+            ),
+        ]
+    );
 }
 
 #[test]

@@ -1,9 +1,17 @@
 //! Balance: work units to workers by speed and ownership, at each sort (paper section 4).
 //!
-//! A unit weighs its interaction count. It stays with the worker that owns most of its nodes' elements unless that
+//! A unit weighs the pairs that a cycle will look at ([`pairs`]). Contact is shared out so that workers end their
+//! sub-domains and units at one time. A unit stays with the worker that owns most of its nodes' elements unless that
 //! worker has more than its share; then its lightest-bound units go to the workers with the most room. Deterministic.
 
-use mechanics::contact::WorkUnit;
+use mechanics::contact::{Settings, Surface, WorkUnit};
+
+/// A node-face pair in a cycle, in element-cycles of this code (`bolide simulate --measure-costs`).
+pub const PAIR: f64 = 1.2;
+
+/// Interactions that cost as much as one element-cycle: of the plates of 64,000 elements 4.6 make a pair, and a pair costs
+/// 1.2 elements (`bolide simulate --decomposition --json`, `--measure-costs`).
+pub const INTERACTIONS_PER_ELEMENT: f64 = 3.8;
 
 /// How units are dealt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,6 +21,28 @@ pub enum Dealing {
     Owners,
     /// By weight alone, the heaviest first: what a cluster pays for leaving ownership out, in `simulate`.
     Weights,
+}
+
+/// A surface node in a sort, in element-cycles of this code on one thread (`bolide simulate --measure-costs`).
+pub const SORT_ELEMENTS: f64 = 3.1;
+
+/// Least share of its speed that a worker keeps beside sorts.
+const LEAST_BESIDE_SORTS: f64 = 0.1;
+
+/// Speeds to deal out work by where some workers share the master's host, on which sorts run at the lowest priority: a
+/// sort must be done within its lag, less half a cycle for the way of positions and plans, or all workers wait for it.
+/// So the workers on that host leave idle in each cycle what that takes. `elements` is the work of a cycle and `sort`
+/// that of a sort, in the same unit. Where all workers share the host, or none does, speeds stay.
+pub fn beside_sorts(speeds: &[f64], beside: &[bool], elements: f64, sort: f64, lag: u32) -> Vec<f64> {
+    let n = beside.iter().filter(|b| **b).count();
+    if n == 0 || n == speeds.len() || elements <= 0.0 {
+        return speeds.to_vec();
+    }
+    let idle = sort / (f64::from(lag.max(1)) - 0.5) / elements * speeds.iter().sum::<f64>() / n as f64;
+    let left = |(&speed, &beside): (&f64, &bool)| {
+        if beside { (speed - idle).max(LEAST_BESIDE_SORTS * speed) } else { speed }
+    };
+    speeds.iter().zip(beside).map(left).collect()
 }
 
 /// Worker of each unit by weight alone: each, the heaviest first, to the worker that would end it first.
@@ -30,20 +60,58 @@ pub fn assign_by_weight(units: &[WorkUnit], speeds: &[f64]) -> Vec<usize> {
     chosen
 }
 
-/// How far above its share a worker may be before units move; moving one costs shared nodes in every cycle.
-const TOLERANCE: f64 = 0.10;
+/// How far above its share a worker may be before units move, relative to its whole cycle; moving one costs shared
+/// nodes in every cycle.
+const TOLERANCE: f64 = 0.004;
 
-/// Worker of each unit. `owner` gives the worker that owns a surface node's elements.
-pub fn assign(units: &[WorkUnit], speeds: &[f64], owner: &dyn Fn(u32) -> usize) -> Vec<usize> {
-    let n = speeds.len();
-    if n == 1 {
-        return vec![0; units.len()];
+/// When all workers have ended if pairs fill up those that end their sub-domains first (element-cycles at speed 1).
+/// Contact so levels what index planes left uneven.
+fn level(speeds: &[f64], work: &[f64], contact: f64) -> f64 {
+    let mut order: Vec<usize> = (0..speeds.len()).collect();
+    let finish = |w: usize| work[w] / speeds[w];
+    order.sort_by(|&a, &b| finish(a).total_cmp(&finish(b)).then(a.cmp(&b)));
+    let (mut speed, mut load, mut level) = (0.0, contact, 0.0);
+    for &w in &order {
+        if speed > 0.0 && finish(w) >= level {
+            break;
+        }
+        speed += speeds[w];
+        load += work[w];
+        level = load / speed;
     }
-    let mut load = vec![0_u64; n];
-    let mut chosen = Vec::with_capacity(units.len());
-    let mut bound = Vec::with_capacity(units.len());
+    level
+}
+
+/// Pairs of each unit of which the node lies in the face's box grown by the reach: what a cycle looks at, and what a
+/// unit weighs.
+pub fn pairs(units: &[WorkUnit], surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> Vec<u64> {
+    let reach = settings.reach();
+    let of_unit = |unit: &WorkUnit| {
+        let of_face = |&face: &u32| {
+            let face = &surface.faces[face as usize];
+            let corners = face.nodes.map(|n| x[n as usize]);
+            let bounds: [[f64; 2]; 3] = std::array::from_fn(|a| {
+                let along = corners.map(|c| c[a]);
+                let low = along.into_iter().fold(f64::INFINITY, f64::min);
+                let high = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                [low - reach, high + reach]
+            });
+            let near = |node: u32| {
+                let p = x[node as usize];
+                (0..3).all(|a| p[a] >= bounds[a][0] && p[a] <= bounds[a][1])
+                    && settings.permits(surface.node_part[node as usize], face.part)
+            };
+            unit.nodes.iter().filter(|&&node| near(node)).count() as u64
+        };
+        unit.faces.iter().map(of_face).sum()
+    };
+    units.iter().map(of_unit).collect()
+}
+
+/// Worker of each unit that owns most of its nodes, and how many.
+fn owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usize) -> Vec<(usize, usize)> {
     let mut count = vec![0_usize; n];
-    for unit in units {
+    let owner_of = |unit: &WorkUnit| {
         let mut best = usize::MAX;
         for &node in &unit.nodes {
             let w = owner(node);
@@ -53,30 +121,53 @@ pub fn assign(units: &[WorkUnit], speeds: &[f64], owner: &dyn Fn(u32) -> usize) 
                 best = w;
             }
         }
-        let worker = if best == usize::MAX { 0 } else { best };
-        bound.push(if best == usize::MAX { 0 } else { count[best] });
+        let found = if best == usize::MAX { (0, 0) } else { (best, count[best]) };
         for &node in &unit.nodes {
             count[owner(node)] = 0;
         }
-        load[worker] += unit.interactions;
-        chosen.push(worker);
+        found
+    };
+    units.iter().map(owner_of).collect()
+}
+
+/// Worker of each unit by ownership alone: what slabs without a balance of contact come to, in `simulate`.
+pub fn assign_to_owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usize) -> Vec<usize> {
+    owners(units, n, owner).into_iter().map(|(worker, _)| worker).collect()
+}
+
+/// Worker of each unit. `weights` are the units' [`pairs`], `work` what the workers' sub-domains cost in
+/// element-cycles; `owner` gives the worker that owns a surface node's elements.
+pub fn assign(
+    units: &[WorkUnit],
+    weights: &[u64],
+    speeds: &[f64],
+    work: &[f64],
+    owner: &dyn Fn(u32) -> usize,
+) -> Vec<usize> {
+    let n = speeds.len();
+    if n == 1 {
+        return vec![0; units.len()];
     }
-    let all: u64 = load.iter().sum();
-    let speed: f64 = speeds.iter().sum();
-    let share = |w: usize| all as f64 * speeds[w] / speed;
+    let (mut chosen, bound): (Vec<usize>, Vec<usize>) = owners(units, n, owner).into_iter().unzip();
+    let mut load = vec![0_u64; n];
+    for (weight, &worker) in weights.iter().zip(&chosen) {
+        load[worker] += weight;
+    }
+    let limit = level(speeds, work, PAIR * load.iter().sum::<u64>() as f64) * (1.0 + TOLERANCE);
+    let finish = |w: usize, load: u64| PAIR.mul_add(load as f64, work[w]) / speeds[w];
     let mut giving: Vec<usize> =
-        (0..units.len()).filter(|&u| load[chosen[u]] as f64 > share(chosen[u]) * (1.0 + TOLERANCE)).collect();
+        (0..units.len()).filter(|&u| weights[u] > 0 && finish(chosen[u], load[chosen[u]]) > limit).collect();
     // Loosely bound units first, the heavier of equals first: fewer moves.
-    giving.sort_by_key(|&u| (bound[u], std::cmp::Reverse(units[u].interactions), u));
+    giving.sort_by_key(|&u| (bound[u], std::cmp::Reverse(weights[u]), u));
     for u in giving {
-        let from = chosen[u];
-        let weight = units[u].interactions;
-        if load[from] as f64 <= share(from) * (1.0 + TOLERANCE) {
+        let (from, weight) = (chosen[u], weights[u]);
+        let before = finish(from, load[from]);
+        if before <= limit {
             continue;
         }
-        let room = |w: usize| share(w) - load[w] as f64;
-        let to = (0..n).fold(0, |best, w| if room(w) > room(best) { w } else { best });
-        if room(to) >= weight as f64 * 0.5 {
+        let after = |w: usize| finish(w, load[w] + weight);
+        let to = (0..n).fold(0, |best, w| if after(w) < after(best) { w } else { best });
+        if to != from && after(to) < before {
             load[from] -= weight;
             load[to] += weight;
             chosen[u] = to;
@@ -97,7 +188,7 @@ mod tests {
     fn units_stay_with_the_owner_of_their_nodes_when_loads_fit() {
         let units: Vec<_> = (0..8).map(|i| unit(i, vec![i as u32], 10)).collect();
         let owner = |n: u32| (n % 2) as usize;
-        assert_eq!(assign(&units, &[1.0, 1.0], &owner), [0, 1, 0, 1, 0, 1, 0, 1]);
+        assert_eq!(assign(&units, &[10; 8], &[1.0, 1.0], &[1e4; 2], &owner), [0, 1, 0, 1, 0, 1, 0, 1]);
     }
 
     #[test]
@@ -111,11 +202,37 @@ mod tests {
     fn an_overloaded_worker_gives_units_until_shares_follow_speeds() {
         let units: Vec<_> = (0..400).map(|i| unit(i, vec![i as u32], 10)).collect();
         let speeds = [1.0, 2.0, 1.0];
-        let chosen = assign(&units, &speeds, &|_| 0);
+        let chosen = assign(&units, &[10; 400], &speeds, &[500.0, 1000.0, 500.0], &|_| 0);
         for (w, s) in speeds.iter().enumerate() {
             let load = chosen.iter().filter(|&&c| c == w).count() as f64;
             let share = 100.0 * s;
             assert!((load - share).abs() <= share * 0.11 + 1.0, "worker {w}: {load} against {share}");
         }
+    }
+
+    #[test]
+    fn contact_levels_what_index_planes_left_uneven() {
+        assert!((level(&[1.0, 1.0, 2.0], &[100.0, 110.0, 220.0], 40.0) - 117.5).abs() < 1e-9);
+        let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 1)).collect();
+        let chosen = assign(&units, &[1; 100], &[1.0, 1.0], &[1000.0, 1060.0], &|_| 1);
+        let first = chosen.iter().filter(|&&w| w == 0).count();
+        // 120 elements' worth of pairs: 90 to the first, 30 to the other.
+        assert!((70..=76).contains(&first), "{first}");
+    }
+
+    #[test]
+    fn a_worker_that_ends_its_elements_last_gets_no_contact() {
+        assert_eq!(level(&[1.0, 1.0], &[100.0, 110.0], 8.0), 108.0);
+        let units: Vec<_> = (0..6).map(|i| unit(i, vec![i as u32], 1)).collect();
+        assert_eq!(assign(&units, &[1; 6], &[1.0, 1.0], &[100.0, 110.0], &|_| 1), [0; 6]);
+    }
+
+    #[test]
+    fn a_worker_beside_the_master_leaves_idle_what_a_sort_takes_within_its_lag() {
+        // A sort of 350 elements' time in 3.5 cycles of 1,000 elements by speeds of 4: 0.4 of a speed.
+        let left = beside_sorts(&[1.0; 4], &[true, false, false, false], 1000.0, 350.0, 4);
+        assert!((left[0] - 0.6).abs() < 1e-12 && left[1..] == [1.0; 3], "{left:?}");
+        assert_eq!(beside_sorts(&[1.0; 2], &[true; 2], 1000.0, 350.0, 4), [1.0; 2], "all share it");
+        assert_eq!(beside_sorts(&[2.0, 1.0], &[true, false], 1.0, 350.0, 4), [0.2, 1.0], "never less");
     }
 }

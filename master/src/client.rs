@@ -112,7 +112,8 @@ fn line_of(status: &Status) -> String {
     let Status { job, state, waits_for, progress, .. } = status;
     match (state, waits_for) {
         (State::Queued, Some(what)) => format!("job {job} queued, waits for {what}"),
-        (State::Running, _) => format!("job {job} running  {progress}"),
+        (State::Running, Some(what)) => format!("job {job} running, waits for {what}"),
+        (State::Running, None) => format!("job {job} running  {progress}"),
         _ => format!("job {job} {}", state.name()),
     }
 }

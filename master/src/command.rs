@@ -5,6 +5,7 @@ use std::{net::SocketAddr, path::PathBuf};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::{
     request::{JobOptions, RouteChoice},
+    shape::Rate,
     tls,
 };
 
@@ -114,6 +115,24 @@ impl From<Route> for RouteChoice {
     }
 }
 
+/// What speeds work is dealt out by; the bits do not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Balance {
+    /// Those that workers were started with
+    Given,
+    /// Those, corrected by what the workers take
+    Measured,
+}
+
+impl From<Balance> for protocol::request::Balance {
+    fn from(balance: Balance) -> Self {
+        match balance {
+            Balance::Given => Self::Given,
+            Balance::Measured => Self::Measured,
+        }
+    }
+}
+
 /// Lane width of the kernels; the bits do not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Lanes {
@@ -158,6 +177,12 @@ pub struct JobArgs {
     /// Store the run at the start of this cycle, as snapshot.bolide in the results folder
     #[arg(long, value_name = "CYCLE")]
     pub snapshot_at: Option<u64>,
+    /// Speeds that work is dealt out by
+    #[arg(long, value_enum, default_value = "given")]
+    pub balance: Balance,
+    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for the start alone
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    pub keep_every: f64,
     /// Extra sorts every so many cycles, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_every: Option<u64>,
@@ -179,6 +204,8 @@ impl JobArgs {
             sort_every: self.sort_every,
             sort_seed: self.sort_seed,
             min_workers: 1,
+            balance: self.balance.into(),
+            keep_every: (self.keep_every > 0.0).then_some(self.keep_every),
             trace: false,
         }
     }
@@ -225,7 +252,10 @@ pub struct RunArgs {
 #[derive(Args, Clone, Debug)]
 pub struct SimulateArgs {
     /// The deck (TOML)
-    #[arg(required_unless_present = "table", conflicts_with = "table")]
+    #[arg(
+        required_unless_present_any = ["table", "decomposition"],
+        conflicts_with_all = ["table", "decomposition"]
+    )]
     pub deck: Option<PathBuf>,
     /// The cluster file (TOML)
     #[arg(long)]
@@ -233,15 +263,39 @@ pub struct SimulateArgs {
     /// Print the cluster file's tables instead of one run
     #[arg(long)]
     pub table: bool,
-    /// What tells the time: costs and messages, replayed
+    /// Measure what work costs on this machine by the deck, beside the cluster file's constants
+    #[arg(long, conflicts_with_all = ["table", "decomposition"])]
+    pub measure_costs: bool,
+    /// Lane width to measure with: the machines of the paper had none; the widest by default
+    #[arg(long, value_enum, requires = "measure_costs")]
+    pub lanes: Option<Lanes>,
+    /// How often to measure; medians count
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repetitions: u32,
+    /// Print how near hosts of random speeds come to their bound, contact included, instead of one run
+    #[arg(long, conflicts_with = "table")]
+    pub decomposition: bool,
+    /// How many sets of random speeds
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// What tells the time: a replay of costs and messages, or threads, links and a real clock
     #[arg(long, value_enum, default_value = "virtual")]
     pub clock: Clock,
+    /// Real seconds by emulated second, for --clock real [default: such that tasks rarely overrun]
+    #[arg(long, value_name = "X")]
+    pub dilation: Option<f64>,
+    /// Use only so many hosts, the first of the file
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "table")]
+    pub hosts: Option<u32>,
     /// Stop after this many cycles, or at the deck's end, whichever comes first
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u64).range(4..))]
     pub cycles: u64,
     /// Route of the shared-node forces
     #[arg(long, value_enum, default_value = "direct")]
     pub route: Route,
+    /// Speeds that work is dealt out by, in a run of one deck
+    #[arg(long, value_enum, default_value = "given", conflicts_with = "table")]
+    pub balance: Balance,
     /// Folder for pictures and the trace; without it none are drawn
     #[arg(long)]
     pub out: Option<PathBuf>,
@@ -255,6 +309,8 @@ pub struct SimulateArgs {
 pub enum Clock {
     /// Costs and messages, replayed: the same figures on every machine
     Virtual,
+    /// Workers on threads, frames over shaped loopback links, both stretched to the emulated speed
+    Real,
 }
 
 /// Flags of `master`.
@@ -269,6 +325,9 @@ pub struct MasterArgs {
     /// Folder for the results of jobs
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
+    /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
+    #[arg(long, value_name = "RATE")]
+    pub link: Option<Rate>,
 }
 
 /// Flags of `worker`.
@@ -295,6 +354,9 @@ pub struct WorkerArgs {
     /// End when the master ends the connection, instead of dialling again
     #[arg(long)]
     pub once: bool,
+    /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
+    #[arg(long, value_name = "RATE")]
+    pub link: Option<Rate>,
     /// Port for other workers, on the interface that leads to the master [default: any]
     #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
     pub peer_port: u16,

@@ -18,6 +18,7 @@ use protocol::{
     link::{self, Receiver, Sender, Settings},
     message::ToMaster,
     order::{BULK_ON_THE_WAY, Inbox, Outbox},
+    shape::{Shape, Shaped},
     tls::{self, ServerConfig},
     wire,
 };
@@ -47,6 +48,8 @@ pub struct Gate {
     token: Option<String>,
     /// Certificates; none on loopback.
     tls: Option<Arc<ServerConfig>>,
+    /// This host's emulated port, which all connections pass.
+    port: Option<Shape>,
     /// The last incarnation that was given.
     incarnations: AtomicU32,
     ending: AtomicBool,
@@ -60,7 +63,15 @@ impl Gate {
         token: Option<String>,
         tls: Option<Arc<ServerConfig>>,
     ) -> Self {
-        Self { events, roles, token, tls, incarnations: AtomicU32::new(0), ending: AtomicBool::new(false) }
+        let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
+        Self { events, roles, token, tls, port: None, incarnations, ending }
+    }
+
+    /// All connections pass this emulated port.
+    #[must_use]
+    pub fn behind(mut self, port: Option<Shape>) -> Self {
+        self.port = port;
+        self
     }
 
     /// This side ends all connections from now on, so that their ends are no faults.
@@ -78,7 +89,7 @@ impl Gate {
     /// # Errors
     /// Why it ended, unless a client left.
     pub async fn take(self: Arc<Self>, stream: TcpStream, address: String) -> Result<()> {
-        let stream = link::Socket::new(stream)?;
+        let stream = Shaped::new(link::Socket::new(stream)?, self.port.as_ref());
         match self.tls.clone() {
             None => self.serve(stream, address, None).await,
             Some(config) => {

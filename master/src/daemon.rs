@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
     process::ExitCode,
     sync::{
-        Arc,
+        Arc, Mutex,
         atomic::{AtomicBool, Ordering},
     },
     time::Duration,
@@ -18,6 +18,7 @@ use std::{
 use protocol::{
     handshake::{Hello, Role},
     request::{Ended, HostRow, JobOptions, State, Status},
+    shape::{Shape, Wire},
     tls,
 };
 use tokio::{
@@ -29,7 +30,7 @@ use tracing::{info, warn};
 use crate::{
     command::MasterArgs,
     connection::Gate,
-    drive::Seat,
+    drive::{self, Input, Seat},
     hosts::Hosts,
     queue::{self, Queue, is_over},
     service::{self, Order},
@@ -101,6 +102,7 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
+    let port = args.link.map(|rate| Shape::port(Wire::ethernet(rate)));
     let first = first_job(&args.spool)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -113,7 +115,8 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         let address = listener.local_addr().map_err(|e| e.to_string())?;
         announce(address, tls.is_some());
         let (events, heard) = mpsc::channel(WAITING_EVENTS);
-        let gate = Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls));
+        let gate =
+            Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls).behind(port));
         tokio::spawn(listen(listener, Arc::clone(&gate)));
         let stop = crate::run::stop_on_interrupt("ending; the job under way writes its results");
         Owner::new(args.spool.clone(), first, events).run(heard, &stop, &gate).await;
@@ -191,8 +194,24 @@ struct Owner {
     seats: BTreeMap<u32, Seat>,
     queue: Queue,
     status: BTreeMap<u32, watch::Sender<Status>>,
-    /// The job under way, and what ends it.
-    running: Option<(u32, Arc<AtomicBool>)>,
+    running: Option<Running>,
+}
+
+/// The job under way.
+struct Running {
+    job: u32,
+    /// Ends it.
+    stop: Arc<AtomicBool>,
+    /// The way to its thread.
+    line: mpsc::Sender<Input>,
+}
+
+impl Running {
+    fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+        // A full line keeps its thread awake anyway.
+        let _ = self.line.try_send(Input::Wake);
+    }
 }
 
 impl Owner {
@@ -224,8 +243,8 @@ impl Owner {
 
     /// Lets the job under way write its results, and says good-bye.
     async fn end(&mut self, heard: &mut mpsc::Receiver<Event>, gate: &Gate) {
-        if let Some((_, stop)) = &self.running {
-            stop.store(true, Ordering::Relaxed);
+        if let Some(running) = &self.running {
+            running.stop();
         }
         let _ = tokio::time::timeout(END_LIMIT, async {
             while self.running.is_some()
@@ -255,6 +274,7 @@ impl Owner {
             Event::Joined(seat) => {
                 let Seat { hand, address, .. } = &seat;
                 info!(address, speed = hand.speed, threads = hand.threads, "worker {} joined", hand.name);
+                self.offer(&seat);
                 self.seats.insert(seat.incarnation, seat);
             }
             Event::Left { incarnation, why } => {
@@ -290,6 +310,16 @@ impl Owner {
                     warn!(job, "{why}");
                 }
             }
+        }
+    }
+
+    /// A worker that comes while a job runs is the job's.
+    fn offer(&mut self, seat: &Seat) {
+        if let Some(Running { job, line, .. }) = &self.running {
+            self.hosts.occupy(&[seat.incarnation], *job);
+            let (line, seat) = (line.clone(), seat.clone());
+            // A job that is over by then gives all its hosts back.
+            tokio::spawn(async move { line.send(Input::Joined(seat)).await.is_ok() });
         }
     }
 
@@ -331,10 +361,10 @@ impl Owner {
     }
 
     fn cancel(&mut self, job: u32) -> Result<String, String> {
-        if let Some((running, stop)) = &self.running
-            && *running == job
+        if let Some(running) = &self.running
+            && running.job == job
         {
-            stop.store(true, Ordering::Relaxed);
+            running.stop();
             return Ok(format!("job {job} ends after its present cycle"));
         }
         self.change(job, queue::Event::Cancel, Some(Ended::default()))?;
@@ -369,7 +399,7 @@ impl Owner {
     fn start_next(&mut self) {
         let Some(entry) = self.queue.first() else { return };
         let job = entry.id;
-        if let Some((running, _)) = self.running {
+        if let Some(Running { job: running, .. }) = self.running {
             self.wait_for(job, format!("job {running}"));
             return;
         }
@@ -382,6 +412,8 @@ impl Owner {
         }
         let Some(status) = self.status.get(&job).cloned() else { return };
         let stop = Arc::new(AtomicBool::new(false));
+        let line = drive::channel(idle.len());
+        let running = Running { job, stop: Arc::clone(&stop), line: line.0.clone() };
         let order = Order {
             number: job,
             name: entry.name.clone(),
@@ -389,11 +421,12 @@ impl Owner {
             options: entry.options.clone(),
             folder: entry.folder.clone(),
             seats: idle.iter().filter_map(|i| self.seats.get(i)).cloned().collect(),
-            stop: Arc::clone(&stop),
+            line: Mutex::new(Some(line)),
+            stop,
             status,
         };
         self.hosts.occupy(&idle, job);
-        self.running = Some((job, stop));
+        self.running = Some(running);
         info!(job, workers = idle.len(), "job starts");
         if let Err(why) = self.change(job, queue::Event::Start, None) {
             warn!(job, "{why}");

@@ -11,6 +11,7 @@ use std::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
+    time::{Duration, Instant},
 };
 
 use protocol::{
@@ -22,6 +23,7 @@ use protocol::{
     wire,
 };
 use tokio::sync::mpsc;
+use worker::compute::lowest_priority;
 
 use crate::{
     embedded::{Sink, Traffic, timed_sort},
@@ -42,6 +44,15 @@ pub enum Input {
     Lost(usize, String),
     /// A sort is done, with its thread-CPU time (ns); or the sort had a bug.
     Sorted(Result<(Box<Sorted>, u64), String>),
+    /// A worker has come while the job runs.
+    Joined(Seat),
+    /// Look at what is to be stopped.
+    Wake,
+}
+
+/// The way to the thread of a job that begins with `n_workers`.
+pub fn channel(n_workers: usize) -> (mpsc::Sender<Input>, mpsc::Receiver<Input>) {
+    mpsc::channel(WAITING_PER_WORKER * n_workers + 1)
 }
 
 /// A connected worker, as those see it who send to it.
@@ -120,10 +131,10 @@ impl Route {
     /// For a frame of a job that the worker was not given.
     pub fn find(&self, header: &Header) -> protocol::Result<Option<(usize, mpsc::Sender<Input>)>> {
         let port = self.port();
-        if header.job > port.job || header.job == 0 || header.epoch != 0 {
+        if header.job > port.job || header.job == 0 {
             return Err(Error::Message(format!(
-                "{} frame of job {} epoch {}, the worker was given job {} epoch 0",
-                header.kind, header.job, header.epoch, port.job
+                "{} frame of job {}, the worker was given job {}",
+                header.kind, header.job, port.job
             )));
         }
         Ok(if header.job == port.job { port.to.clone() } else { None })
@@ -137,7 +148,8 @@ impl Route {
     }
 }
 
-/// Runs job `number` on these workers to its end; `first` are the actions that came with the job.
+/// Runs job `number` on these workers, and those that join, to its end; `first` are the actions that came with the job,
+/// and `line` is its [`channel`].
 ///
 /// # Errors
 /// What the sink refused; the workers are released all the same.
@@ -146,57 +158,79 @@ pub fn drive(
     first: Vec<Action>,
     number: u32,
     seats: &[Seat],
+    line: (mpsc::Sender<Input>, mpsc::Receiver<Input>),
     sink: &mut dyn Sink,
     stop: &AtomicBool,
 ) -> Result<(Outcome, Traffic), String> {
-    let (send, input) = mpsc::channel(WAITING_PER_WORKER * seats.len() + 1);
-    let bytes_before: u64 = seats.iter().map(Seat::bytes).sum();
+    let (send, input) = line;
     let mut driver = Driver {
+        place: Place { job: number, epoch: job.epoch(), plan: 0 },
         job,
-        place: Place { job: number, epoch: 0, plan: 0 },
-        seats,
+        seats: Vec::new(),
+        bytes_before: 0,
         send,
         input,
         lost: VecDeque::new(),
+        timer: None,
         sort_ns: 0,
         outcome: None,
     };
-    for (index, seat) in seats.iter().enumerate() {
-        if let Err(why) = seat.route.open(number, index, driver.send.clone()) {
-            driver.lost.push_back((index, why));
-        }
-    }
-    if driver.job.route() == protocol::message::Route::Direct {
-        driver.lost.extend(peers::introduce(seats, driver.place));
-    }
-    let result = driver.run(first, sink, stop);
     for seat in seats {
+        driver.seat(seat.clone());
+    }
+    driver.introduce();
+    let result = driver.run(first, sink, stop);
+    for seat in &driver.seats {
         seat.route.close();
         if result.is_err() {
             // A worker that cannot be reached is found lost by its connection's task.
             let _ = seat.send(driver.place, &ToWorker::Release);
         }
     }
-    let bytes = seats.iter().map(Seat::bytes).sum::<u64>() - bytes_before;
+    let bytes = driver.seats.iter().map(Seat::bytes).sum::<u64>() - driver.bytes_before;
     result.map(|outcome| {
         let peer_bytes = outcome.reports.iter().map(|report| report.peer_bytes).sum();
         (outcome, Traffic { bytes: bytes + peer_bytes, peer_bytes, sort_ns: driver.sort_ns })
     })
 }
 
-struct Driver<'a> {
+struct Driver {
     job: Job,
     place: Place,
-    seats: &'a [Seat],
+    /// In the order they came.
+    seats: Vec<Seat>,
+    /// On the links of the seats, before they were the job's.
+    bytes_before: u64,
     send: mpsc::Sender<Input>,
     input: mpsc::Receiver<Input>,
     /// Workers found lost while sending.
     lost: VecDeque<(usize, String)>,
+    /// When the job is told that its time has passed.
+    timer: Option<Instant>,
     sort_ns: u64,
     outcome: Option<Outcome>,
 }
 
-impl Driver<'_> {
+impl Driver {
+    /// Takes a worker in.
+    fn seat(&mut self, seat: Seat) {
+        let index = self.seats.len();
+        self.bytes_before += seat.bytes();
+        if let Err(why) = seat.route.open(self.place.job, index, self.send.clone()) {
+            self.lost.push_back((index, why));
+        }
+        self.seats.push(seat);
+    }
+
+    /// Tells the epoch's workers where they find each other, before they are dealt their work.
+    fn introduce(&mut self) {
+        if self.job.route() == protocol::message::Route::Direct {
+            let crew: Vec<(usize, &Seat)> =
+                self.job.crew().iter().map(|&index| (index, &self.seats[index])).collect();
+            self.lost.extend(peers::introduce(&crew, self.place));
+        }
+    }
+
     fn run(&mut self, first: Vec<Action>, sink: &mut dyn Sink, stop: &AtomicBool) -> Result<Outcome, String> {
         self.act(first, sink)?;
         let mut stopping = false;
@@ -204,6 +238,10 @@ impl Driver<'_> {
             if !stopping && stop.load(Ordering::Relaxed) {
                 stopping = true;
                 self.apply(Event::Stop, sink)?;
+            }
+            if self.timer.is_some_and(|due| Instant::now() >= due) {
+                self.timer = None;
+                self.apply(Event::Timer, sink)?;
             }
             if let Some(outcome) = self.outcome.take() {
                 return Ok(outcome);
@@ -214,7 +252,7 @@ impl Driver<'_> {
             };
             match input {
                 Input::Message(worker, header, message) => match self.check(&header, &message) {
-                    Ok(()) => self.apply(Event::Message(worker, message), sink)?,
+                    Ok(()) => self.apply(Event::Message(worker, header.epoch, message), sink)?,
                     Err(why) => {
                         let seat = &self.seats[worker];
                         let why = format!("{} at {}: {why}", seat.hand.name, seat.address);
@@ -228,13 +266,25 @@ impl Driver<'_> {
                     self.sort_ns += ns;
                     self.apply(Event::Sorted(sorted), sink)?;
                 }
+                Input::Joined(seat) => {
+                    let hand = seat.hand.clone();
+                    self.seat(seat);
+                    self.apply(Event::Joined(hand), sink)?;
+                }
+                Input::Wake => {}
             }
         }
     }
 
     /// A cycle's frame follows the plan in force at its cycle, which the totals that answer it follow as well.
     fn check(&mut self, header: &Header, message: &ToMaster) -> Result<(), String> {
-        if let ToMaster::Cycle { cycle, .. } = message {
+        let epoch = self.job.epoch();
+        if header.epoch > epoch {
+            return Err(format!("frame of epoch {}, this is epoch {epoch}", header.epoch));
+        }
+        if let ToMaster::Cycle { cycle, .. } = message
+            && header.epoch == epoch
+        {
             let plan = self.job.plan_hash(*cycle);
             if header.cycle != *cycle || plan != Some(header.plan) {
                 return Err(format!(
@@ -255,6 +305,10 @@ impl Driver<'_> {
     }
 
     fn act(&mut self, actions: Vec<Action>, sink: &mut dyn Sink) -> Result<(), String> {
+        if self.place.epoch != self.job.epoch() {
+            self.place.epoch = self.job.epoch();
+            self.introduce();
+        }
         for action in actions {
             match action {
                 Action::Send(worker, message) => {
@@ -265,6 +319,9 @@ impl Driver<'_> {
                     }
                 }
                 Action::Sort(bench, x) => self.sort(bench, x),
+                Action::Timer(seconds) => {
+                    self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
+                }
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => sink.take(other)?,
             }
@@ -273,12 +330,18 @@ impl Driver<'_> {
     }
 
     fn sort(&self, bench: Arc<Bench>, x: Vec<[f64; 3]>) {
-        let send = self.send.clone();
-        rayon::spawn(move || {
+        let (send, failed) = (self.send.clone(), self.send.clone());
+        // On a thread of the lowest priority: a worker on this host computes first, the sort takes what is idle.
+        let work = move || {
+            lowest_priority();
             let sorted = catch_unwind(AssertUnwindSafe(|| timed_sort(&bench, &x)));
             let sorted = sorted.map_err(|_| "a bug in the sort; the log has its words".to_owned());
             // The receiver is gone only when the job is over.
             let _ = send.blocking_send(Input::Sorted(sorted));
-        });
+        };
+        if let Err(error) = std::thread::Builder::new().name("sort".to_owned()).spawn(work) {
+            // As above.
+            let _ = failed.try_send(Input::Sorted(Err(format!("a thread to sort on: {error}"))));
+        }
     }
 }

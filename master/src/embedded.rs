@@ -11,12 +11,12 @@ use std::{
         atomic::{AtomicBool, Ordering},
         mpsc,
     },
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use mechanics::cycle::Meter;
 use protocol::{
-    message::ToMaster,
+    message::{ToMaster, ToPeer},
     phase::{Phase, Report},
     wire::{self, Packed},
 };
@@ -27,7 +27,7 @@ use worker::{
 };
 
 use crate::{
-    event::{Action, Event, Outcome},
+    event::{Action, Event, Hand, Outcome},
     job::{Bench, Job},
     sort::Sorted,
 };
@@ -52,12 +52,22 @@ pub struct Traffic {
     pub sort_ns: u64,
 }
 
+/// What befalls the workers of a run, for tests.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fate {
+    /// A worker is gone, with all that it knew.
+    Lose(usize),
+    /// A worker comes.
+    Join(Hand),
+}
+
 /// Something on its way between sessions, or a task's end.
 enum Arrival {
-    ToMaster(usize, Packed),
+    /// From, in which epoch.
+    ToMaster(usize, u32, Packed),
     ToWorker(usize, Packed),
-    /// From, to.
-    ToPeer(u32, usize, Packed),
+    /// From, by its place in the epoch's crew; to; in which epoch.
+    ToPeer(u32, usize, u32, Packed),
     Done(usize, Box<Machine>, session::Outcome),
     Sorted(Box<Sorted>, u64),
 }
@@ -66,9 +76,10 @@ struct Place {
     session: Session,
     /// Away while a task runs.
     machine: Option<Box<Machine>>,
+    lost: bool,
     stopwatch: Stopwatch,
-    /// Bytes sent to each neighbour.
-    peers: BTreeMap<u32, u64>,
+    /// Of this epoch: bytes sent to each neighbour.
+    peers: (u32, BTreeMap<u32, u64>),
 }
 
 impl Place {
@@ -77,14 +88,17 @@ impl Place {
             session: Session::new(),
             machine: Some(Box::default()),
             stopwatch: Stopwatch::new(),
-            peers: BTreeMap::new(),
+            lost: false,
+            peers: (0, BTreeMap::new()),
         }
     }
 
     fn report(&self) -> Report {
+        let (epoch, peers) = &self.peers;
+        let now = *epoch == self.session.epoch();
         Report {
-            peer_bytes: self.peers.values().sum(),
-            linked: self.peers.keys().copied().collect(),
+            peer_bytes: peers.values().sum(),
+            linked: if now { peers.keys().copied().collect() } else { Vec::new() },
             ..self.stopwatch.report()
         }
     }
@@ -101,6 +115,22 @@ pub fn run(
     threads: usize,
     sink: &mut (dyn Sink + Send),
     stop: &AtomicBool,
+) -> Result<(Outcome, Traffic), String> {
+    run_through(job, first, n_workers, threads, sink, stop, &mut |_| None)
+}
+
+/// [`run`] with workers that come and go: `fate` is asked before each arrival, by its number from 0.
+///
+/// # Errors
+/// As for [`run`].
+pub fn run_through(
+    job: Job,
+    first: Vec<Action>,
+    n_workers: usize,
+    threads: usize,
+    sink: &mut (dyn Sink + Send),
+    stop: &AtomicBool,
+    fate: &mut (dyn FnMut(u64) -> Option<Fate> + Send),
 ) -> Result<(Outcome, Traffic), String> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -119,10 +149,15 @@ pub fn run(
         send,
         receive,
         away: 0,
+        timer: None,
         traffic: Traffic::default(),
         outcome: None,
     };
-    if n_workers > 1 { host.drive(first, sink, stop) } else { pool.install(|| host.drive(first, sink, stop)) }
+    if n_workers > 1 {
+        host.drive(first, sink, stop, fate)
+    } else {
+        pool.install(|| host.drive(first, sink, stop, fate))
+    }
 }
 
 struct Host {
@@ -135,6 +170,8 @@ struct Host {
     receive: mpsc::Receiver<Arrival>,
     /// Tasks and sorts under way on the pool.
     away: usize,
+    /// When the job is told that its time has passed.
+    timer: Option<Instant>,
     traffic: Traffic,
     outcome: Option<Outcome>,
 }
@@ -145,14 +182,29 @@ impl Host {
         first: Vec<Action>,
         sink: &mut (dyn Sink + Send),
         stop: &AtomicBool,
+        fate: &mut dyn FnMut(u64) -> Option<Fate>,
     ) -> Result<(Outcome, Traffic), String> {
         self.act(first, sink)?;
         let mut stopping = false;
-        loop {
+        for number in 0.. {
+            if self.timer.is_some_and(|due| Instant::now() >= due) {
+                self.timer = None;
+                self.apply(Event::Timer, sink)?;
+            }
+            match fate(number) {
+                Some(Fate::Lose(worker)) if !self.places[worker].lost => {
+                    self.places[worker].lost = true;
+                    self.apply(Event::Lost(worker, "it was to be lost".to_owned()), sink)?;
+                }
+                Some(Fate::Join(hand)) => {
+                    self.places.push(Place::new());
+                    self.apply(Event::Joined(hand), sink)?;
+                }
+                _ => {}
+            }
             if !stopping && stop.load(Ordering::Relaxed) {
                 stopping = true;
-                let actions = self.job.apply(Event::Stop);
-                self.act(actions, sink)?;
+                self.apply(Event::Stop, sink)?;
             }
             if let Some(outcome) = self.outcome.take() {
                 return Ok((outcome, self.traffic));
@@ -162,21 +214,22 @@ impl Host {
                 None => self.wait()?,
             };
             match arrival {
-                Arrival::ToMaster(worker, packed) => {
+                Arrival::ToMaster(worker, epoch, packed) => {
                     let message =
                         wire::unpack_to_master(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
-                    let actions = self.job.apply(Event::Message(worker, message));
-                    self.act(actions, sink)?;
+                    self.apply(Event::Message(worker, epoch, message), sink)?;
                 }
                 Arrival::ToWorker(worker, packed) => {
                     let message =
                         wire::unpack_to_worker(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
                     self.step(worker, session::Event::Message(message))?;
                 }
-                Arrival::ToPeer(from, worker, packed) => {
+                Arrival::ToPeer(from, worker, epoch, packed) => {
                     let message =
                         wire::unpack_to_peer(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
-                    self.step(worker, session::Event::Peer(from, message))?;
+                    if self.places[worker].session.epoch() == epoch {
+                        self.step(worker, session::Event::Peer(from, message))?;
+                    }
                 }
                 Arrival::Done(worker, mut machine, outcome) => {
                     let place = &mut self.places[worker];
@@ -188,11 +241,16 @@ impl Host {
                 }
                 Arrival::Sorted(sorted, ns) => {
                     self.traffic.sort_ns += ns;
-                    let actions = self.job.apply(Event::Sorted(sorted));
-                    self.act(actions, sink)?;
+                    self.apply(Event::Sorted(sorted), sink)?;
                 }
             }
         }
+        Err("2^64 arrivals in one run".to_owned())
+    }
+
+    fn apply(&mut self, event: Event, sink: &mut (dyn Sink + Send)) -> Result<(), String> {
+        let actions = self.job.apply(event);
+        self.act(actions, sink)
     }
 
     /// The next end of a task or sort; nothing else can happen when the queue is empty.
@@ -216,24 +274,25 @@ impl Host {
     }
 
     fn step(&mut self, worker: usize, event: session::Event) -> Result<(), String> {
-        for action in self.places[worker].session.apply(event) {
+        let place = &mut self.places[worker];
+        if place.lost {
+            return Ok(());
+        }
+        let actions = place.session.apply(event);
+        let epoch = place.session.epoch();
+        for action in actions {
             match action {
                 session::Action::Send(message) => self.timed(worker, |host| {
                     if let ToMaster::Image { last: Some(_), .. } = message {
                         let report = Box::new(host.places[worker].report());
-                        host.send(worker, &ToMaster::Report(report))?;
+                        host.send(worker, epoch, &ToMaster::Report(report))?;
                     }
-                    host.send(worker, &message)
+                    let worked = host.places[worker].machine.as_ref().map(|m| m.work()).unwrap_or_default();
+                    host.send(worker, epoch, &message.stamped(worked))
                 })?,
-                session::Action::SendPeer(to, message) => self.timed(worker, |host| {
-                    let packed = wire::pack_to_peer(&message);
-                    let bytes = packed.wire_bytes();
-                    host.traffic.bytes += bytes;
-                    host.traffic.peer_bytes += bytes;
-                    *host.places[worker].peers.entry(to).or_default() += bytes;
-                    host.queue.push_back(Arrival::ToPeer(worker as u32, to as usize, packed));
-                    Ok(())
-                })?,
+                session::Action::SendPeer(to, message) => {
+                    self.timed(worker, |host| host.send_peer(worker, epoch, to, &message))?;
+                }
                 session::Action::Compute(task) => self.compute(worker, task)?,
                 session::Action::Forget => {
                     if let Some(machine) = &mut self.places[worker].machine {
@@ -245,10 +304,33 @@ impl Host {
         Ok(())
     }
 
-    fn send(&mut self, worker: usize, message: &ToMaster) -> Result<(), String> {
+    fn send_peer(&mut self, worker: usize, epoch: u32, to: u32, message: &ToPeer) -> Result<(), String> {
+        // Of an epoch that is over, there is nobody to hear it.
+        if epoch != self.job.epoch() {
+            return Ok(());
+        }
+        let crew = self.job.crew();
+        let from = crew.iter().position(|&member| member == worker);
+        let (Some(from), Some(&member)) = (from, crew.get(to as usize)) else {
+            return Err(format!("worker {worker} writes to {to}, there are {}", crew.len()));
+        };
+        let packed = wire::pack_to_peer(message);
+        let bytes = packed.wire_bytes();
+        self.traffic.bytes += bytes;
+        self.traffic.peer_bytes += bytes;
+        let (of, sent) = &mut self.places[worker].peers;
+        if std::mem::replace(of, epoch) != epoch {
+            sent.clear();
+        }
+        *sent.entry(to).or_default() += bytes;
+        self.queue.push_back(Arrival::ToPeer(from as u32, member, epoch, packed));
+        Ok(())
+    }
+
+    fn send(&mut self, worker: usize, epoch: u32, message: &ToMaster) -> Result<(), String> {
         let packed = wire::pack_to_master(message).map_err(|e| e.to_string())?;
         self.traffic.bytes += packed.wire_bytes();
-        self.queue.push_back(Arrival::ToMaster(worker, packed));
+        self.queue.push_back(Arrival::ToMaster(worker, epoch, packed));
         Ok(())
     }
 
@@ -294,6 +376,9 @@ impl Host {
                     self.queue.push_back(Arrival::ToWorker(worker, packed));
                 }
                 Action::Sort(bench, x) => self.sort(bench, x),
+                Action::Timer(seconds) => {
+                    self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
+                }
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => sink.take(other)?,
             }

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use mechanics::{contact::Census, state::GlobalState};
+pub use protocol::request::Balance;
 use protocol::{
     message::{Route, ToMaster, ToWorker, Work},
     phase::Report,
 };
+use serde::{Deserialize, Serialize};
 
 use crate::{
     balance::Dealing, job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot,
@@ -33,12 +35,60 @@ pub struct Options {
     pub route: Route,
     /// How work units are dealt.
     pub dealing: Dealing,
-    /// Take a snapshot at the start of this cycle.
+    /// Store a snapshot at the start of this cycle.
     pub snapshot_at: Option<u64>,
+    /// How often the state is kept in memory, to go back to when a worker is lost.
+    pub keep: Keep,
+    /// What speeds work is dealt out by.
+    pub balance: Balance,
+    /// With no worker left, wait for one instead of ending.
+    pub waits: bool,
     /// Write states while the run goes (the last one is always gathered).
     pub states: bool,
     /// Forces extra sorts, for tests of bits.
     pub force_sorts: ForceSorts,
+}
+
+/// How often the state is kept in memory, always at a plan boundary.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Keep {
+    /// Only where an epoch begins.
+    #[default]
+    Never,
+    /// After so many seconds, which [`Action::Timer`] asks for.
+    Seconds(f64),
+    /// After so many cycles.
+    Cycles(u64),
+}
+
+/// Work was dealt out anew because speeds turned out to be others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rebalance {
+    /// At the start of this cycle.
+    pub cycle: u64,
+    /// Names of the workers, in the order of the following.
+    pub workers: Vec<String>,
+    /// Speeds that work was dealt out by before.
+    pub speeds_before: Vec<f64>,
+    /// And after.
+    pub speeds_after: Vec<f64>,
+    /// Time of the slowest worker over that of a perfect cut, as measured before.
+    pub imbalance_before: f64,
+    /// The same as it is foreseen with the new cut.
+    pub imbalance_after: f64,
+}
+
+/// A worker was lost and the run went back.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Loss {
+    /// Name of the worker.
+    pub worker: String,
+    /// The first cycle that was not complete.
+    pub cycle: u64,
+    /// The cycle that the run went back to.
+    pub back_to: u64,
+    /// Why.
+    pub why: String,
 }
 
 /// Extra sorts, which may not change a bit.
@@ -67,16 +117,21 @@ impl ForceSorts {
     }
 }
 
-/// What happens to a job.
+/// What happens to a job. Workers have the index at which they came: first those of [`Job::new`](crate::job::Job::new),
+/// then one after another as they join.
 pub enum Event {
-    /// A message from a worker.
-    Message(usize, ToMaster),
+    /// A message from a worker, of the epoch that the worker was in when it was sent.
+    Message(usize, u32, ToMaster),
     /// A sort is done.
     Sorted(Box<Sorted>),
     /// The user wants the run to end with the results so far.
     Stop,
     /// A worker is gone for good.
     Lost(usize, String),
+    /// A worker has come; it has the next index.
+    Joined(Hand),
+    /// The time that [`Action::Timer`] asked for has passed.
+    Timer,
 }
 
 /// What a job wants done.
@@ -85,16 +140,38 @@ pub enum Action {
     Send(usize, ToWorker),
     /// Sort; exactly one [`Event::Sorted`] answers it. Positions by surface node.
     Sort(Arc<Bench>, Vec<[f64; 3]>),
+    /// Send [`Event::Timer`] in so many seconds.
+    Timer(f64),
     /// Append a row of history.
     Row(Box<HistoryRow>),
     /// Write a state for the user.
     State(Box<GlobalState>),
+    /// The run goes back: drop all rows but the first so many, and states of later cycles.
+    Rewind {
+        /// Rows to keep, those of a run before that this one resumed included.
+        rows: usize,
+        /// The cycle that the run goes back to.
+        cycle: u64,
+    },
+    /// Work was dealt out anew: who has how many elements.
+    Dealt(Vec<Deal>),
     /// Store a snapshot.
     Snapshot(Box<Snapshot>),
     /// Tell the user how far it is.
     Progress(Progress),
     /// The job is over.
     Over(Box<Outcome>),
+}
+
+/// What a worker was dealt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deal {
+    /// Its name.
+    pub name: String,
+    /// The speed that it was dealt work by.
+    pub speed: f64,
+    /// Its elements.
+    pub elements: u64,
 }
 
 /// How far a run is.
@@ -157,4 +234,10 @@ pub struct Outcome {
     pub route: &'static str,
     /// Cycles of this session of the run: not those before a snapshot that it resumed from.
     pub cycles_run: u64,
+    /// Names of the workers at the end.
+    pub workers: Vec<String>,
+    /// When work was dealt out by other speeds.
+    pub rebalances: Vec<Rebalance>,
+    /// Workers that were lost at work.
+    pub losses: Vec<Loss>,
 }

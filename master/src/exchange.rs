@@ -13,7 +13,7 @@ use mechanics::{
 
 use protocol::message::Route;
 
-use crate::decompose::Subdomain;
+use crate::decompose::{self, Subdomain};
 
 /// Which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
 pub struct Holdings {
@@ -22,6 +22,8 @@ pub struct Holdings {
     pub owner_subdomain: Vec<u32>,
     /// Worker of that sub-domain.
     pub owner_worker: Vec<u32>,
+    /// What each worker's sub-domains cost in a cycle ([`decompose::work`]).
+    pub work: Vec<f64>,
     /// Other workers that hold a node, ascending; most nodes have none and no entry.
     others: HashMap<u32, Vec<u32>>,
 }
@@ -47,7 +49,13 @@ impl Holdings {
                 }
             }
         }
-        Self { n_workers, owner_subdomain, owner_worker, others }
+        Self {
+            n_workers,
+            owner_subdomain,
+            owner_worker,
+            work: decompose::work(subdomains, n_workers),
+            others,
+        }
     }
 
     /// Whether a sub-domain of the worker has the node.

@@ -3,24 +3,24 @@
 //! It decides time steps, sorts, images and the end from the votes of whole cycles, adds partial forces, and keeps the
 //! ledger. It knows no socket, clock, disk or thread: those are events and actions.
 
+mod epoch;
 mod images;
+mod measure;
 mod pace;
 mod start;
 #[cfg(test)]
 mod tests;
 mod verdict;
 
-use std::{
-    collections::{BTreeMap, VecDeque},
-    sync::Arc,
-};
+use std::sync::Arc;
 
 use deck::model::Model;
 use mechanics::{
-    contact::Surface,
+    contact::{Census, Surface},
     digest,
     state::GlobalState,
     vote::{Quanta, Vote},
+    wall::{self, Pose},
 };
 use protocol::{
     message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work},
@@ -28,28 +28,32 @@ use protocol::{
 };
 
 use crate::{
-    event::{Action, Event, Limit, Options, Outcome, Progress},
+    event::{Action, Event, Limit, Loss, Options, Outcome, Progress, Rebalance},
     exchange::{Exchange, Holdings},
     ledger::Ledger,
     results::history::HistoryRow,
     sort::{Sorted, Sorter},
 };
-use images::{Collecting, SnapshotRest};
+use epoch::{Acting, Base, Epoch, Member, Rest, Step};
+use measure::{Patience, Proposal};
+use start::Touching;
 
-/// What sorts work on: fixed between two decompositions.
+/// What sorts work on: fixed for an epoch.
 pub struct Bench {
+    /// Number of the epoch.
+    pub epoch: u32,
     /// Surface, settings, speeds.
     pub sorter: Sorter,
     /// Who holds which nodes.
     pub holdings: Holdings,
-    /// Masses and constraints (positions are those of the start).
+    /// Masses and constraints (positions are those of the epoch's start).
     pub state: Arc<GlobalState>,
 }
 
 impl Bench {
     /// Does the sort that [`Action::Sort`] asks for.
     pub fn sort(&self, x: &[[f64; 3]]) -> Sorted {
-        self.sorter.run(x, &self.holdings, &self.state)
+        self.sorter.run(self.epoch, x, &self.holdings, &self.state)
     }
 }
 
@@ -65,56 +69,44 @@ struct Arrivals {
 pub struct Job {
     model: Arc<Model>,
     options: Options,
-    n_workers: usize,
+    /// Those of the start; the quantum of forces may grow with the epoch.
     quanta: Quanta,
-    bench: Option<Arc<Bench>>,
-    state: GlobalState,
-    ready: Vec<bool>,
-    running: bool,
-    lanes: String,
+    /// None without contact.
+    touching: Option<Touching>,
+    /// In the order they came: the indices of events and actions.
+    members: Vec<Member>,
+    epoch: Epoch,
+    /// Where the next epoch begins if a worker is lost.
+    base: Arc<Base>,
+    /// The time for a new base has come.
+    keep_due: bool,
     first_cycle: u64,
-    /// `dt` by cycle, and the time at its start; a few cycles around the present.
-    steps: BTreeMap<u64, (f64, f64)>,
-    /// The vote of the cycle before `first_cycle`.
-    vote_before: Option<Vote>,
-    arrivals: BTreeMap<u64, Arrivals>,
-    /// Exchanges by the cycle they act from; the first is in force at the oldest cycle that is not complete.
-    exchanges: VecDeque<(u64, Arc<Exchange>)>,
-    /// The last complete cycle plus one.
-    completed: u64,
-    /// Cycles whose positions a sort works on, oldest first.
-    sorts_under_way: VecDeque<u64>,
-    transfers: BTreeMap<u64, Vec<Option<Vec<f64>>>>,
-    collecting: BTreeMap<u64, Collecting>,
-    /// Time of each image that was ordered and is not complete: frames of later cycles may overtake it.
-    image_times: BTreeMap<u64, f64>,
-    /// The images of a snapshot, and the rest of it: frames of cycles may overtake images, so either may come first.
-    snapshot_state: Option<GlobalState>,
-    snapshot_rest: Option<SnapshotRest>,
-    next_state_time: Option<f64>,
-    /// The cycle whose positions the newest sort works on, asked for or in force.
-    last_gather: u64,
-    /// The exchange in force and the one before it: where it began to act, and the cycle whose positions it sorted.
-    references: [(u64, u64); 2],
-    last_spread: f64,
-    spread_rate: f64,
+    lanes: String,
     stop_asked: bool,
-    stop_at: Option<u64>,
     failure: Option<String>,
+    /// Speeds that the next epoch is to begin with.
+    proposal: Option<Proposal>,
+    patience: Patience,
     ledger: Ledger,
+    /// Poses of the walls of finite mass in the newest cycle that was ordered.
+    walls: Vec<Pose>,
     rows: Vec<HistoryRow>,
     sorts: u64,
-    census: mechanics::contact::Census,
+    census: Census,
+    /// By member.
     work: Vec<Work>,
+    /// By member, of its last stop.
     reports: Vec<Report>,
     imbalance: f64,
+    rebalances: Vec<Rebalance>,
+    losses: Vec<Loss>,
     over: bool,
 }
 
 impl Job {
     /// The state the run starts from.
     pub fn start_state(&self) -> &GlobalState {
-        &self.state
+        &self.base.state
     }
 
     /// Rows of history that a snapshot brought along.
@@ -124,7 +116,7 @@ impl Job {
 
     /// Surface of the problem; none without contact.
     pub fn surface(&self) -> Option<&Surface> {
-        self.bench.as_ref().map(|bench| bench.sorter.surface())
+        self.epoch.bench.as_ref().map(|bench| bench.sorter.surface())
     }
 
     /// How partial forces travel.
@@ -135,6 +127,16 @@ impl Job {
     /// Whether it has ended.
     pub fn is_over(&self) -> bool {
         self.over
+    }
+
+    /// How often it was dealt out anew.
+    pub fn epoch(&self) -> u32 {
+        self.epoch.number
+    }
+
+    /// Workers of the present epoch, in the order by which peers and plans name them.
+    pub fn crew(&self) -> &[usize] {
+        &self.epoch.crew
     }
 
     /// Hash of the plan that frames of a cycle follow; none for a cycle without one.
@@ -149,13 +151,18 @@ impl Job {
             return actions;
         }
         let result = match event {
-            Event::Message(worker, message) => self.hear(worker, message, &mut actions),
+            Event::Message(member, epoch, message) => self.receive(member, epoch, message, &mut actions),
             Event::Sorted(sorted) => self.sorted(*sorted, &mut actions),
             Event::Stop => {
                 self.stop_asked = true;
+                if self.epoch.crew.is_empty() { self.finish_at_base(&mut actions) } else { Ok(()) }
+            }
+            Event::Lost(member, why) => self.lost(member, why, &mut actions),
+            Event::Joined(hand) => self.joined(hand, &mut actions),
+            Event::Timer => {
+                self.keep_due = true;
                 Ok(())
             }
-            Event::Lost(worker, why) => Err(format!("worker {worker} is lost: {why}")),
         };
         if let Err(reason) = result {
             self.give_up(reason, &mut actions);
@@ -171,11 +178,9 @@ impl Job {
 
     fn finish(&mut self, state: Option<GlobalState>, actions: &mut Vec<Action>) {
         self.over = true;
-        for worker in 0..self.n_workers {
-            actions.push(Action::Send(worker, ToWorker::Release));
-        }
+        self.send_all(actions, |_| ToWorker::Release);
         let digest = state.as_ref().map(digest::digest).unwrap_or_default();
-        let cycles_run = state.as_ref().map_or(self.completed, |s| s.cycle) - self.first_cycle;
+        let cycles_run = state.as_ref().map_or(self.epoch.completed, |s| s.cycle) - self.first_cycle;
         actions.push(Action::Over(Box::new(Outcome {
             failure: self.failure.take(),
             stopped: self.stop_asked,
@@ -185,7 +190,12 @@ impl Job {
             sorts: self.sorts,
             census: self.census,
             work: self.work.clone(),
-            reports: std::mem::take(&mut self.reports),
+            reports: self
+                .epoch
+                .crew
+                .iter()
+                .map(|&m| self.reports.get(m).cloned().unwrap_or_default())
+                .collect(),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
             route: match self.options.route {
@@ -193,28 +203,55 @@ impl Job {
                 Route::Direct => "direct",
             },
             cycles_run,
+            workers: self.epoch.crew.iter().map(|&m| self.members[m].hand.name.clone()).collect(),
+            rebalances: std::mem::take(&mut self.rebalances),
+            losses: std::mem::take(&mut self.losses),
         })));
     }
 
+    /// Frames of an older epoch say nothing any more; those of a later one nobody can have sent.
+    fn receive(
+        &mut self,
+        member: usize,
+        epoch: u32,
+        message: ToMaster,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), String> {
+        if epoch < self.epoch.number {
+            return Ok(());
+        }
+        match self.epoch.crew.iter().position(|&m| m == member) {
+            Some(worker) if epoch == self.epoch.number => self.hear(worker, message, actions),
+            _ => Err(format!(
+                "worker {member} sends a message of epoch {epoch}, which it was not dealt; this is epoch {}",
+                self.epoch.number
+            )),
+        }
+    }
+
+    /// From here on a worker is its position in the epoch's crew.
     fn hear(&mut self, worker: usize, message: ToMaster, actions: &mut Vec<Action>) -> Result<(), String> {
         match message {
             ToMaster::Ready { vote, lanes } => self.ready(worker, vote, lanes, actions),
-            ToMaster::Cycle { cycle, vote, partials, gathered } => {
+            ToMaster::Cycle { cycle, vote, partials, gathered, busy } => {
+                self.epoch.meter.note(worker, busy);
                 self.arrived(worker, cycle, vote, &partials, gathered, actions)
             }
             ToMaster::Relay { to, message } => {
-                if to as usize >= self.n_workers {
+                let Some(&member) = self.epoch.crew.get(to as usize) else {
                     return Err(format!(
                         "worker {worker} writes to worker {to}, there are {}",
-                        self.n_workers
+                        self.epoch.n()
                     ));
-                }
-                actions.push(Action::Send(to as usize, ToWorker::Relayed { from: worker as u32, message }));
+                };
+                actions.push(Action::Send(member, ToWorker::Relayed { from: worker as u32, message }));
                 Ok(())
             }
             ToMaster::Report(report) => {
-                report.check(self.n_workers).map_err(|error| format!("worker {worker}: {error}"))?;
-                self.reports[worker] = *report;
+                report.check(self.epoch.n()).map_err(|error| format!("worker {worker}: {error}"))?;
+                let member = self.epoch.crew[worker];
+                self.reports.resize(self.members.len(), Report::default());
+                self.reports[member] = *report;
                 Ok(())
             }
             ToMaster::Transfer { cycle, state } => self.transfer(worker, cycle, state, actions),
@@ -224,7 +261,9 @@ impl Job {
                         "worker {worker} sends images of version {version}, this master reads {IMAGE_VERSION}"
                     ));
                 }
-                self.work[worker] = work;
+                let member = self.epoch.crew[worker];
+                self.work.resize(self.members.len(), Work::default());
+                self.work[member] = work;
                 self.image(worker, cycle, pieces, last, actions)
             }
             ToMaster::Failed { cycle, reason } => Err(format!("worker {worker}, cycle {cycle}: {reason}")),
@@ -238,59 +277,63 @@ impl Job {
         lanes: String,
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
-        if self.running || std::mem::replace(&mut self.ready[worker], true) {
+        let epoch = &mut self.epoch;
+        if epoch.running || std::mem::replace(&mut epoch.ready[worker], true) {
             return Err(format!("worker {worker} is ready twice"));
         }
         if !self.lanes.split('+').any(|l| l == lanes) {
             self.lanes = if self.lanes.is_empty() { lanes } else { format!("{}+{lanes}", self.lanes) };
         }
         if let Some(vote) = vote {
-            match &mut self.vote_before {
+            match &mut epoch.vote_before {
                 Some(merged) => merged.merge(&vote),
-                None => self.vote_before = Some(*vote),
+                None => epoch.vote_before = Some(*vote),
             }
         }
-        if self.ready.iter().all(|r| *r) {
-            self.running = true;
+        if epoch.ready.iter().all(|r| *r) {
+            epoch.running = true;
             self.start(actions)?;
         }
         Ok(())
     }
 
-    /// Orders for the first cycle and the one after.
+    /// Orders for the first cycle of an epoch and the one after.
     fn start(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let first = self.first_cycle;
+        let first = self.epoch.first_cycle;
         let control = self.model.setup.control;
-        let vote = self.vote_before.as_ref().ok_or("no worker voted")?;
-        if !self.steps.contains_key(&first) {
+        let vote = self.epoch.vote_before.as_ref().ok_or("no worker voted")?;
+        if !self.epoch.steps.contains_key(&first) {
             if let Some((element, volume)) = vote.fault {
                 return Err(self.element_fault(element, volume, 0));
             }
+            let time = self.base.state.time;
             let (dt, _, _) = self.limit(vote, f64::INFINITY);
-            let dt = dt.min(control.end_time - self.state.time).max(0.0);
-            self.steps.insert(first, (dt, self.state.time));
+            let dt = dt.min(control.end_time - time).max(0.0);
+            self.epoch.steps.insert(first, Step { dt, time, quantum: self.epoch.quantum });
         }
-        let (dt, time) = self.steps[&first];
+        let Step { dt, time, quantum } = self.epoch.steps[&first];
         let at_end = time >= control.end_time || first >= control.end_cycle;
-        let snapshot_now = self.options.snapshot_at == Some(first);
+        let store = self.options.snapshot_at == Some(first) && self.epoch.number == 0;
         let before = Orders {
             next: first.wrapping_sub(1),
             dt: 0.0,
-            force_quantum: self.quanta.force,
+            time,
+            walls: self.walls.clone(),
+            force_quantum: quantum,
             gather: false,
-            collect: snapshot_now || at_end,
+            collect: store || at_end,
             stop: at_end,
         };
         if before.collect {
-            self.image_times.insert(first, time);
+            self.epoch.image_times.insert(first, (time, false));
         }
         if at_end {
-            self.stop_at = Some(first);
+            self.epoch.stop_at = Some(first);
+        } else if store {
+            self.epoch.halves.entry(first).or_default();
         }
-        let orders = self.orders_for(first, dt, time + dt, None);
-        for worker in 0..self.n_workers {
-            actions.push(Action::Send(worker, ToWorker::Start { orders: [before, orders] }));
-        }
+        let orders = self.orders_for(first, dt, [time, time + dt], None, actions);
+        self.send_all(actions, |_| ToWorker::Start { orders: [before.clone(), orders.clone()] });
         Ok(())
     }
 
@@ -303,7 +346,7 @@ impl Job {
         gathered: Vec<f64>,
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
-        if !self.running {
+        if !self.epoch.running {
             return Err(format!("worker {worker} sends cycle {cycle} before the start"));
         }
         let exchange = self.exchange_at(cycle)?;
@@ -314,8 +357,8 @@ impl Job {
                 partials.len()
             ));
         }
-        let n = self.n_workers;
-        let arrivals = self.arrivals.entry(cycle).or_insert_with(|| Arrivals {
+        let n = self.epoch.n();
+        let arrivals = self.epoch.arrivals.entry(cycle).or_insert_with(|| Arrivals {
             arrived: vec![false; n],
             vote: None,
             totals: exchange.totals(),
@@ -333,7 +376,7 @@ impl Job {
             }
         }
         if arrivals.arrived.iter().all(|a| *a)
-            && let Some(arrivals) = self.arrivals.remove(&cycle)
+            && let Some(arrivals) = self.epoch.arrivals.remove(&cycle)
         {
             self.complete(cycle, arrivals, actions)?;
         }
@@ -343,69 +386,74 @@ impl Job {
     /// The exchange in force at a cycle. A worker that shares nothing may be a cycle ahead of the others, so two can be
     /// in use at once.
     fn exchange_at(&self, cycle: u64) -> Result<Arc<Exchange>, String> {
-        let found = self.exchanges.iter().rev().find(|(acts_at, _)| *acts_at <= cycle);
-        found.map(|(_, exchange)| Arc::clone(exchange)).ok_or_else(|| format!("no plan for cycle {cycle}"))
+        let found = self.epoch.exchanges.iter().rev().find(|acting| acting.at <= cycle);
+        found.map(|acting| Arc::clone(&acting.exchange)).ok_or_else(|| format!("no plan for cycle {cycle}"))
     }
 
     /// No frame of `cycle` or before will come any more.
     fn retire(&mut self, cycle: u64) {
-        self.completed = cycle + 1;
-        while let Some(&(acts_at, _)) = self.exchanges.get(1).filter(|(acts_at, _)| *acts_at <= cycle + 1) {
-            self.exchanges.pop_front();
+        let epoch = &mut self.epoch;
+        epoch.completed = cycle + 1;
+        while let Some(acts_at) = epoch.exchanges.get(1).map(|acting| acting.at).filter(|at| *at <= cycle + 1)
+        {
+            epoch.exchanges.pop_front();
             let lag = u64::from(self.model.setup.control.sort_lag);
-            self.references = [(acts_at, acts_at - lag), self.references[0]];
+            epoch.references = [(acts_at, acts_at - lag), epoch.references[0]];
             self.sorts += 1;
         }
     }
 
     /// Every worker's frame of `cycle` is here: totals and orders go out, the vote of the cycle before is booked.
     fn complete(&mut self, cycle: u64, arrivals: Arrivals, actions: &mut Vec<Action>) -> Result<(), String> {
-        let vote = match arrivals.vote {
+        let (vote, fresh) = match arrivals.vote {
             Some(vote) => {
                 self.book(cycle - 1, &vote, actions);
-                vote
+                (vote, true)
             }
-            None => self.vote_before.clone().ok_or("a cycle without a vote")?,
+            None => (self.epoch.vote_before.clone().ok_or("a cycle without a vote")?, cycle == 0),
         };
-        let (dt_now, time_now) =
-            *self.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
-        if self.options.snapshot_at == Some(cycle) {
-            let dt_previous = cycle.checked_sub(1).and_then(|c| self.steps.get(&c)).map_or(0.0, |s| s.0);
-            self.snapshot_rest = Some(SnapshotRest {
-                dt_previous,
-                dt: dt_now,
-                force_quantum: self.quanta.force,
-                vote: vote.clone(),
+        let now = *self.epoch.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
+        if fresh {
+            self.follow_spread(cycle.saturating_sub(1), &vote);
+        }
+        if self.epoch.halves.contains_key(&cycle) {
+            let before = cycle.checked_sub(1).and_then(|c| self.epoch.steps.get(&c));
+            let rest = Rest {
+                dt_previous: before.map_or(0.0, |step| step.dt),
+                dt: Some(now.dt),
+                quanta: [now.quantum, self.epoch.quantum],
+                vote: Some(vote.clone()),
+                walls: self.walls.clone(),
                 ledger: self.ledger.clone(),
-                rows: self.rows.clone(),
-            });
-            self.snapshot(actions);
+                n_rows: self.rows.len(),
+                spread_rate: self.epoch.spread_rate,
+            };
+            self.epoch.halves.entry(cycle).or_default().rest = Some(rest);
+            self.complete_base(cycle, actions);
         }
-        self.follow_spread(cycle.saturating_sub(1), &vote);
-        let growth = self.model.setup.control.growth;
-        let (dt, limit, element) = self.limit(&vote, growth * dt_now);
-        let time_next = time_now + dt_now;
-        let remaining = (self.model.setup.control.end_time - time_next).max(0.0);
+        let control = self.model.setup.control;
+        let (dt, limit, element) = self.limit(&vote, control.growth * now.dt);
+        let time_next = now.time + now.dt;
+        let remaining = (control.end_time - time_next).max(0.0);
         let (dt, limit) = if remaining < dt * 1.000_000_1 { (remaining, Limit::End) } else { (dt, limit) };
-        let time_after = if limit == Limit::End { self.model.setup.control.end_time } else { time_next + dt };
-        self.steps.insert(cycle + 1, (dt, time_next));
-        while self.steps.len() > 4 {
-            self.steps.pop_first();
+        let time_after = if limit == Limit::End { control.end_time } else { time_next + dt };
+        self.epoch.steps.insert(cycle + 1, Step { dt, time: time_next, quantum: self.epoch.quantum });
+        while self.epoch.steps.len() > 4 {
+            self.epoch.steps.pop_first();
         }
-        let coarser = self.rescaled(&vote)?;
-        let mut orders = self.orders_for(cycle + 1, dt, time_after, Some(&vote));
-        if let Some(quantum) = coarser {
-            self.quanta.force = quantum;
-            orders.force_quantum = quantum;
+        if let Some(coarser) = self.rescaled(&vote)? {
+            self.epoch.quantum = coarser;
         }
+        wall::advance(&self.model.setup.walls, &vote.walls, now.dt, &mut self.walls)?;
+        let orders = self.orders_for(cycle + 1, dt, [time_next, time_after], Some(&vote), actions);
         let exchange = self.exchange_at(cycle)?;
-        for worker in 0..self.n_workers {
+        self.send_all(actions, |worker| {
             let totals = exchange.of_worker(worker, &arrivals.totals);
-            actions.push(Action::Send(worker, ToWorker::Totals { cycle, orders, totals }));
-        }
+            ToWorker::Totals { cycle, orders: orders.clone(), totals }
+        });
         self.retire(cycle);
-        if self.sorts_under_way.contains(&cycle)
-            && let Some(bench) = &self.bench
+        if self.epoch.sorts_under_way.contains(&cycle)
+            && let Some(bench) = &self.epoch.bench
         {
             for (worker, gathered) in arrivals.gathered.iter().enumerate() {
                 let expected = bench.sorter.n_gathered(worker);
@@ -418,24 +466,29 @@ impl Job {
             }
             actions.push(Action::Sort(Arc::clone(bench), bench.sorter.positions(&arrivals.gathered)));
         }
-        actions.push(Action::Progress(Progress { cycle, time: time_now, dt: dt_now, element, limit }));
+        actions.push(Action::Progress(Progress { cycle, time: now.time, dt: now.dt, element, limit }));
         Ok(())
     }
 
-    /// A sort is done: its plan goes to the workers and acts a lag after the gathering.
+    /// A sort is done: its plan goes to the workers and acts a lag after the gathering. One of an older epoch is of no
+    /// use any more.
     fn sorted(&mut self, sorted: Sorted, actions: &mut Vec<Action>) -> Result<(), String> {
-        let gathered_at = self.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
+        if sorted.epoch < self.epoch.number {
+            return Ok(());
+        }
+        let gathered_at = self.epoch.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
         let acts_at = gathered_at + u64::from(self.model.setup.control.sort_lag);
         self.census = sorted.census;
-        for (worker, plan) in sorted.exchange.plans.iter().enumerate() {
-            let plan = Box::new(plan.clone());
-            actions.push(Action::Send(worker, ToWorker::Plan { acts_at, plan, hash: sorted.exchange.hash }));
-        }
-        self.exchanges.push_back((acts_at, Arc::new(sorted.exchange)));
+        let exchange = Arc::new(sorted.exchange);
+        self.send_all(actions, |worker| {
+            let plan = Box::new(exchange.plans[worker].clone());
+            ToWorker::Plan { acts_at, plan, hash: exchange.hash }
+        });
+        self.epoch.exchanges.push_back(Acting { at: acts_at, exchange });
         // A late sort: the cycles before its own are complete, and workers wait for the plan. It is in force from here, as
         // it would be had it come in time, so that the cycles of further sorts do not depend on how long this one took.
-        if acts_at <= self.completed {
-            self.retire(self.completed - 1);
+        if acts_at <= self.epoch.completed {
+            self.retire(self.epoch.completed - 1);
         }
         Ok(())
     }
@@ -447,11 +500,9 @@ impl Job {
         state: Vec<f64>,
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
-        let exchange = self
-            .exchanges
-            .iter()
-            .find(|(acts_at, _)| *acts_at == cycle)
-            .map(|(_, exchange)| Arc::clone(exchange))
+        let acting = self.epoch.exchanges.iter().find(|acting| acting.at == cycle);
+        let exchange = acting
+            .map(|acting| Arc::clone(&acting.exchange))
             .ok_or_else(|| format!("worker {worker} transfers nodes at cycle {cycle}, where no plan acts"))?;
         let expected = exchange.n_transfer(worker);
         if state.len() != expected {
@@ -460,16 +511,16 @@ impl Job {
                 state.len()
             ));
         }
-        let n = self.n_workers;
-        let sent = self.transfers.entry(cycle).or_insert_with(|| vec![None; n]);
+        let n = self.epoch.n();
+        let sent = self.epoch.transfers.entry(cycle).or_insert_with(|| vec![None; n]);
         sent[worker] = Some(state);
         let complete = (0..n).all(|w| sent[w].is_some() || exchange.n_transfer(w) == 0);
-        if complete && let Some(sent) = self.transfers.remove(&cycle) {
+        if complete && let Some(sent) = self.epoch.transfers.remove(&cycle) {
             let sent: Vec<Vec<f64>> = sent.into_iter().map(Option::unwrap_or_default).collect();
-            for w in 0..n {
+            for (w, &member) in self.epoch.crew.iter().enumerate() {
                 let state = exchange.guest_state(w, &sent);
                 if !state.is_empty() {
-                    actions.push(Action::Send(w, ToWorker::Transfer { cycle, state }));
+                    actions.push(Action::Send(member, ToWorker::Transfer { cycle, state }));
                 }
             }
         }

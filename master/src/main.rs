@@ -11,6 +11,7 @@ use master::{
     command::{Bench, Certs, Cli, Command, WorkerArgs},
     daemon, processes, run, simulate,
 };
+use protocol::shape::{Shape, Wire};
 use worker::daemon::Listen;
 
 fn main() -> ExitCode {
@@ -60,6 +61,7 @@ fn work(args: WorkerArgs) -> Result<ExitCode, String> {
         patience: Duration::from_secs(args.patience),
         once: args.once,
         token: std::env::var(processes::TOKEN).ok(),
+        port: args.link.map(|rate| Shape::port(Wire::ethernet(rate))),
         peers: if args.no_peers {
             Listen::Nowhere
         } else {

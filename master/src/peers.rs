@@ -7,24 +7,24 @@ use protocol::{
 
 use crate::drive::Seat;
 
-/// Introduces the workers of a job and epoch to each other, with a fresh secret that only they know. To be called before
+/// Introduces the workers of an epoch of a job, in the order of its crew and with their numbers, to each other, with a fresh secret that only they know. To be called before
 /// their assignments are sent: short messages overtake long ones only if they were queued first. Gives the workers that
 /// could not be told, and why.
-pub fn introduce(seats: &[Seat], place: Place) -> Vec<(usize, String)> {
+pub fn introduce(seats: &[(usize, &Seat)], place: Place) -> Vec<(usize, String)> {
     let secret = format!("{:016x}{:016x}", worker::random(), worker::random());
     let members: Vec<Member> = seats
         .iter()
-        .map(|seat| Member {
+        .map(|(_, seat)| Member {
             name: seat.hand.name.clone(),
             address: seat.peer,
             incarnation: seat.incarnation,
         })
         .collect();
-    let tell = |(index, seat): (usize, &Seat)| {
+    let tell = |(position, (index, seat)): (usize, &(usize, &Seat))| {
         let introduction =
-            Introduction { me: index as u32, secret: secret.clone(), members: members.clone() };
+            Introduction { me: position as u32, secret: secret.clone(), members: members.clone() };
         let told = seat.send(place, &ToWorker::Peers(Box::new(introduction)));
-        told.err().map(|error| (index, format!("{} at {}: {error}", seat.hand.name, seat.address)))
+        told.err().map(|error| (*index, format!("{} at {}: {error}", seat.hand.name, seat.address)))
     };
     seats.iter().enumerate().filter_map(tell).collect()
 }

@@ -16,7 +16,7 @@ use tokio::{net::TcpListener, runtime::Runtime, sync::mpsc};
 use crate::{
     connection::Gate,
     daemon::{Event, WAITING_EVENTS, listen},
-    drive::{Seat, drive},
+    drive::{self, Seat, drive},
     embedded::{Sink, Traffic},
     event::{Action, Hand, Outcome},
     job::Job,
@@ -94,7 +94,7 @@ impl Processes {
         sink: &mut dyn Sink,
         stop: &AtomicBool,
     ) -> Result<(Outcome, Traffic), String> {
-        drive(job, first, 1, &self.seats, sink, stop)
+        drive(job, first, 1, &self.seats, drive::channel(self.seats.len()), sink, stop)
     }
 }
 

@@ -22,7 +22,7 @@ use protocol::{
 use crate::{
     command::RunArgs,
     embedded::{self, Sink, Traffic},
-    event::{Action, ForceSorts, Hand, Limit, Options, Outcome, Progress},
+    event::{Action, ForceSorts, Hand, Keep, Limit, Options, Outcome, Progress},
     job::Job,
     processes::Processes,
     results::{
@@ -89,6 +89,9 @@ pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> 
         route: asked.route.choose(workers, all_take_peers),
         dealing: crate::balance::Dealing::Owners,
         snapshot_at: asked.snapshot_at,
+        keep: asked.keep_every.map_or(Keep::Never, Keep::Seconds),
+        balance: asked.balance,
+        waits: false,
         states: !asked.no_output,
         force_sorts: match (asked.sort_every, asked.sort_seed) {
             (Some(n), _) => ForceSorts::Every(n),
@@ -138,7 +141,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let folder = if asked.no_output { None } else { Some(folder_for(args)) };
     let folder =
         folder.map(|path| Folder::create(&path, args.force)).transpose().map_err(|e| e.to_string())?;
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options_for(&asked, n, true), resume)?;
+    let mut options = options_for(&asked, n, true);
+    if !args.processes {
+        // Nobody is lost who shares this process.
+        options.keep = Keep::Never;
+    }
+    let (job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
     let census = Census::of(&job, &model);
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     for row in job.rows_before() {
@@ -158,12 +166,11 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let wall = started.elapsed().as_secs_f64();
     drop(children);
     output.finish();
-    let names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
     if let Some(path) = &args.trace {
-        trace::write(path, &names, &outcome.reports).map_err(|e| e.to_string())?;
+        trace::write(path, &outcome.workers, &outcome.reports).map_err(|e| e.to_string())?;
     }
     let total_threads = (n * threads) as u32;
-    conclude(&model, &census, &outcome, traffic, &names, total_threads, wall, &output, args.json)
+    conclude(&model, &census, &outcome, traffic, total_threads, wall, &output, args.json)
 }
 
 /// Counts of the surface, taken before the run.
@@ -198,13 +205,12 @@ pub fn conclude(
     census: &Census,
     outcome: &Outcome,
     traffic: Traffic,
-    workers: &[&str],
     threads: u32,
     wall_s: f64,
     output: &Output,
     json: bool,
 ) -> Result<ExitCode, String> {
-    let summary = summarise(model, census, outcome, traffic, workers, threads, wall_s);
+    let summary = summarise(model, census, outcome, traffic, threads, wall_s);
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
     }
@@ -229,7 +235,6 @@ pub fn summarise(
     census: &Census,
     outcome: &Outcome,
     traffic: Traffic,
-    workers: &[&str],
     threads: u32,
     wall_s: f64,
 ) -> Summary {
@@ -248,7 +253,7 @@ pub fn summarise(
         surface_elements: census.elements,
         surface_faces: census.faces,
         surface_nodes: census.nodes,
-        workers: workers.len() as u32,
+        workers: outcome.workers.len() as u32,
         threads,
         route: outcome.route.to_owned(),
         linked_pairs: pairs(&outcome.reports).0,
@@ -273,7 +278,7 @@ pub fn summarise(
         imbalance: outcome.imbalance,
         bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
         master_bytes_per_cycle: per((traffic.bytes - traffic.peer_bytes) as f64, run_cycles),
-        worker_times: worker_times(workers, &outcome.reports),
+        worker_times: worker_times(&outcome.workers, &outcome.reports),
         energies: Energies {
             kinetic: ledger.last.kinetic,
             internal: ledger.last.internal,
@@ -287,6 +292,8 @@ pub fn summarise(
         worst_courant: ledger.worst_courant,
         worst_gap_travel: ledger.worst_gap_travel,
         worst_penetration: ledger.worst_penetration,
+        rebalances: outcome.rebalances.clone(),
+        losses: outcome.losses.clone(),
         digest: outcome.digest.clone(),
     }
 }
@@ -303,8 +310,8 @@ fn pairs(reports: &[Report]) -> (u64, u64) {
 }
 
 /// How the time of each worker went.
-fn worker_times(names: &[&str], reports: &[Report]) -> Vec<WorkerTimes> {
-    let of = |(name, report): (&&str, &Report)| WorkerTimes {
+fn worker_times(names: &[String], reports: &[Report]) -> Vec<WorkerTimes> {
+    let of = |(name, report): (&String, &Report)| WorkerTimes {
         name: (*name).to_owned(),
         border_s: report.seconds(Phase::Border),
         contact_s: report.seconds(Phase::Contact),
@@ -362,7 +369,10 @@ pub struct Output {
     bar: Option<ProgressBar>,
     started: Instant,
     last_line: Instant,
-    last_state_time: Option<f64>,
+    /// Length of the history before its first row and after each (bytes).
+    row_ends: Vec<u64>,
+    /// Cycle and time of each state written.
+    states: Vec<(u64, f64)>,
 }
 
 impl Output {
@@ -381,15 +391,17 @@ impl Output {
             }
             bar
         });
+        let row_ends = history.iter().map(History::length).collect();
         Ok(Self {
             model,
             folder,
             history,
+            row_ends,
+            states: Vec::new(),
             series,
             bar,
             started: Instant::now(),
             last_line: Instant::now(),
-            last_state_time: None,
         })
     }
 
@@ -398,7 +410,22 @@ impl Output {
     /// # Errors
     /// What the disk refused.
     pub fn row(&mut self, row: &HistoryRow) -> Result<(), String> {
-        self.history.as_mut().map_or(Ok(()), |history| history.append(row)).map_err(|e| e.to_string())
+        let Some(history) = &mut self.history else { return Ok(()) };
+        history.append(row).map_err(|e| e.to_string())?;
+        self.row_ends.push(history.length());
+        Ok(())
+    }
+
+    /// Drops all rows but the first so many, and states of later cycles than this.
+    fn rewind(&mut self, rows: usize, cycle: u64) -> Result<(), String> {
+        let fault = |e: crate::results::Error| e.to_string();
+        self.row_ends.truncate(rows + 1);
+        if let (Some(history), Some(&end)) = (&mut self.history, self.row_ends.last()) {
+            history.roll_back(end).map_err(fault)?;
+        }
+        self.states.retain(|(written, _)| *written <= cycle);
+        let times: Vec<f64> = self.states.iter().map(|(_, time)| *time).collect();
+        self.series.as_mut().map_or(Ok(()), |series| series.roll_back(&times)).map_err(fault)
     }
 
     /// Writes a state, unless one of that time was the last.
@@ -406,15 +433,16 @@ impl Output {
     /// # Errors
     /// What the disk refused.
     pub fn state(&mut self, state: &mechanics::state::GlobalState) -> Result<(), String> {
-        if self.last_state_time == Some(state.time) {
+        if self.states.last().is_some_and(|(_, time)| *time == state.time) {
             return Ok(());
         }
-        self.last_state_time = Some(state.time);
         let model = &self.model;
         self.series
             .as_mut()
             .map_or(Ok(()), |series| series.write(model, state, None))
-            .map_err(|e| e.to_string())
+            .map_err(|e| e.to_string())?;
+        self.states.push((state.cycle, state.time));
+        Ok(())
     }
 
     fn progress(&mut self, progress: Progress) {
@@ -475,7 +503,10 @@ impl Sink for Output {
                 self.progress(progress);
                 Ok(())
             }
-            Action::Send(..) | Action::Sort(..) | Action::Over(_) => Ok(()),
+            Action::Rewind { rows, cycle } => self.rewind(rows, cycle),
+            Action::Send(..) | Action::Sort(..) | Action::Timer(_) | Action::Dealt(_) | Action::Over(_) => {
+                Ok(())
+            }
         }
     }
 }

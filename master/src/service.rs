@@ -1,23 +1,24 @@
 //! SERVICE: one job of the queue, from its deck's text to its summary. Runs on a thread of its own.
 
 use std::{
+    net::{SocketAddr, UdpSocket},
     panic::{AssertUnwindSafe, catch_unwind},
     path::PathBuf,
-    sync::{Arc, atomic::AtomicBool},
+    sync::{Arc, Mutex, PoisonError, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
 use deck::model::Model;
-use protocol::{
-    message::ToWorker,
-    request::{Ended, JobOptions, Share, Status},
-};
-use tokio::sync::watch;
+use mechanics::contact::Surface;
+use protocol::request::{Ended, JobOptions, Share, Status};
+use tokio::sync::{mpsc, watch};
+use tracing::{info, warn};
 
 use crate::{
-    drive::{Seat, drive},
+    balance,
+    drive::{self, Input, Seat, drive},
     embedded::Sink,
-    event::Action,
+    event::{Action, Deal, Hand, Options},
     job::Job,
     queue::Event,
     results::{Folder, TRACE, trace},
@@ -41,6 +42,8 @@ pub struct Order {
     pub folder: Option<PathBuf>,
     /// Its workers.
     pub seats: Vec<Seat>,
+    /// The way to its thread; taken when it is driven.
+    pub line: Mutex<Option<(mpsc::Sender<Input>, mpsc::Receiver<Input>)>>,
     /// Set to end it with the results so far.
     pub stop: Arc<AtomicBool>,
     /// What watchers see.
@@ -59,32 +62,58 @@ pub fn serve(order: &Order) -> (Event, Ended) {
     result.unwrap_or_else(|reason| (Event::Fail, Ended { failure: Some(reason), ..Ended::default() }))
 }
 
+/// Whether an address is one of this machine: then it can be bound to.
+fn is_here(address: &str) -> bool {
+    let ip = address.parse::<SocketAddr>().map(|address| address.ip());
+    ip.is_ok_and(|ip| ip.is_loopback() || UdpSocket::bind((ip, 0)).is_ok())
+}
+
+/// Workers on this machine are dealt less, for sorts run beside them ([`balance::beside_sorts`]).
+fn share_with_sorts(model: &Model, hands: &mut [Hand], beside: &[bool]) {
+    if model.setup.contact.is_none() || !beside.contains(&true) {
+        return;
+    }
+    let surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
+    let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
+    let sort = balance::SORT_ELEMENTS * surface.nodes.len() as f64;
+    let elements = model.mesh.n_elements() as f64;
+    let lag = model.setup.control.sort_lag;
+    let left = balance::beside_sorts(&speeds, beside, elements, sort, lag);
+    for (hand, speed) in hands.iter_mut().zip(left) {
+        hand.speed = speed;
+    }
+}
+
 fn run(order: &Order) -> Result<(Event, Ended), String> {
     let mut model = deck::read(&order.text, &order.name)
         .map_err(|faults| faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
     limit(&mut model, &order.options)?;
     let model = Arc::new(model);
-    let hands: Vec<_> = order.seats.iter().map(|seat| seat.hand.clone()).collect();
+    let mut hands: Vec<_> = order.seats.iter().map(|seat| seat.hand.clone()).collect();
+    let beside: Vec<bool> = order.seats.iter().map(|seat| is_here(&seat.address)).collect();
+    share_with_sorts(&model, &mut hands, &beside);
     let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
     let options = options_for(&order.options, hands.len(), all_take_peers);
+    let options = Options { waits: true, ..options };
     let (job, first) = Job::new(Arc::clone(&model), &hands, options, None)?;
-    let shares = shares(&order.seats, &first);
-    order.status.send_modify(|status| status.shares = shares);
+    let line = order.line.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let line = line.unwrap_or_else(|| drive::channel(order.seats.len()));
     let folder = order.folder.as_ref().map(|path| Folder::create(path, false)).transpose();
     let mut output = Output::new(Arc::clone(&model), folder.map_err(|e| e.to_string())?, true)?;
     output.state(job.start_state())?;
     let census = Census::of(&job, &model);
     let started = Instant::now();
-    let mut reporter = Reporter { output, model: &model, status: &order.status, started, last: None };
-    let (outcome, traffic) = drive(job, first, order.number, &order.seats, &mut reporter, &order.stop)?;
+    let mut reporter =
+        Reporter { number: order.number, output, model: &model, status: &order.status, started, last: None };
+    let (outcome, traffic) = drive(job, first, order.number, &order.seats, line, &mut reporter, &order.stop)?;
     let wall = started.elapsed().as_secs_f64();
     let threads = hands.iter().map(|hand| hand.threads).sum();
-    let names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
-    let summary = summarise(&model, &census, &outcome, traffic, &names, threads, wall);
+    let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         if order.options.trace {
-            trace::write(&folder.file(TRACE), &names, &outcome.reports).map_err(|e| e.to_string())?;
+            trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
+                .map_err(|e| e.to_string())?;
         }
     }
     order.status.send_modify(|status| {
@@ -105,23 +134,10 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     Ok((event, ended))
 }
 
-/// Elements of each worker, from its assignment.
-fn shares(seats: &[Seat], first: &[Action]) -> Vec<Share> {
-    let mut shares: Vec<Share> = seats
-        .iter()
-        .map(|seat| Share { host: seat.hand.name.clone(), speed: seat.hand.speed, elements: 0 })
-        .collect();
-    for action in first {
-        if let Action::Send(worker, ToWorker::Assign(assign)) = action {
-            let pieces = assign.subdomains.iter().flat_map(|subdomain| &subdomain.pieces);
-            shares[*worker].elements += pieces.map(|piece| piece.elements.len() as u64).sum::<u64>();
-        }
-    }
-    shares
-}
-
 /// Results to the disk, progress to watchers.
 struct Reporter<'a> {
+    /// The job's.
+    number: u32,
     output: Output,
     model: &'a Model,
     status: &'a watch::Sender<Status>,
@@ -129,9 +145,35 @@ struct Reporter<'a> {
     last: Option<Instant>,
 }
 
+impl Reporter<'_> {
+    /// Work was dealt out anew; with nobody to deal it to, the job waits.
+    fn dealt(&self, deals: Vec<Deal>) {
+        let workers = deals.len();
+        info!(job = self.number, workers, "work is dealt out");
+        let waits_for = deals.is_empty().then(|| "a worker: all are lost".to_owned());
+        let share = |Deal { name, speed, elements }| Share { host: name, speed, elements };
+        let shares = deals.into_iter().map(share).collect();
+        self.status.send_modify(|status| {
+            status.shares = shares;
+            status.waits_for = waits_for;
+        });
+    }
+}
+
 impl Sink for Reporter<'_> {
     fn take(&mut self, action: Action) -> Result<(), String> {
-        let Action::Progress(progress) = action else { return self.output.take(action) };
+        let progress = match action {
+            Action::Progress(progress) => progress,
+            Action::Dealt(deals) => {
+                self.dealt(deals);
+                return Ok(());
+            }
+            Action::Rewind { cycle, .. } => {
+                warn!(job = self.number, "a worker is lost: back to cycle {cycle}");
+                return self.output.take(action);
+            }
+            other => return self.output.take(other),
+        };
         let now = Instant::now();
         if self.last.is_some_and(|last| now.duration_since(last) < REPORT_EVERY) {
             return Ok(());

@@ -1,30 +1,44 @@
 //! `bolide simulate`: what an emulated cluster would take for a deck, on one machine.
 //!
-//! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`processor`]) and
-//! wires ([`network`]); [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
+//! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`machines`],
+//! [`processor`]) and wires ([`network`]), [`real_clock`] does so on threads, links and real time; [`timeline`] says what
+//! came of it. [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
 //! seconds of a cluster file into costs of work. [`table`] prints the tables of the paper ([`mod@paper`]) beside
 //! modelled ones, [`figure`] draws them. All figures are modelled, and say so.
 
 use std::{path::Path, process::ExitCode, sync::Arc};
 
 use deck::model::Model;
+use mechanics::lanes::Width;
 use protocol::{message::Route, request::RouteChoice};
 use serde::Serialize;
 
 pub mod calibrate;
 pub mod cluster;
 pub mod figure;
+pub mod machines;
+pub mod measure;
+pub mod mixed;
 pub mod network;
 pub mod paper;
 pub mod processor;
+pub mod real_clock;
+pub mod sweep;
 pub mod table;
 pub mod tape;
+pub mod timeline;
 pub mod virtual_clock;
 
-use crate::{command::SimulateArgs, run::read_deck};
+use crate::{
+    command::{Clock, SimulateArgs},
+    event::{Balance, Rebalance},
+    run::read_deck,
+};
 
 use cluster::{Cluster, ElementCost};
-use virtual_clock::{Machines, Phases, Scheme, Timeline};
+use machines::{Machines, Scheme};
+use real_clock::Strain;
+use timeline::{Phases, Timeline};
 
 /// Does what `bolide simulate` is asked for.
 ///
@@ -32,9 +46,29 @@ use virtual_clock::{Machines, Phases, Scheme, Timeline};
 /// Faults of the files, and whatever keeps a run from its end.
 pub fn run(args: &SimulateArgs) -> Result<ExitCode, String> {
     let cluster = cluster::read_file(&args.cluster)?;
+    if args.clock == Clock::Real && args.table {
+        return Err("the tables are run under the virtual clock; leave out --clock real".to_owned());
+    }
+    if args.clock == Clock::Virtual && args.dilation.is_some() {
+        return Err("--dilation is for --clock real; the virtual clock has none".to_owned());
+    }
     match &args.deck {
-        Some(deck) => one(args, &cluster, deck),
+        None if args.decomposition => decomposition(args, &cluster),
+        Some(deck) if args.measure_costs => measured(args, &cluster, deck),
+        Some(deck) => one(args, &first_hosts(args, cluster)?, deck),
         None => tables(args, &cluster),
+    }
+}
+
+/// The cluster with as many hosts as are asked for.
+fn first_hosts(args: &SimulateArgs, cluster: Cluster) -> Result<Cluster, String> {
+    match args.hosts.map(|n| n as usize) {
+        None => Ok(cluster),
+        Some(n) if n <= cluster.speeds.len() => Ok(cluster.first(n)),
+        Some(n) => {
+            let (file, there) = (args.cluster.display(), cluster.speeds.len());
+            Err(format!("{file}: {there} hosts, --hosts asks for {n}"))
+        }
     }
 }
 
@@ -44,12 +78,62 @@ fn model(path: &Path, cycles: u64) -> Result<Arc<Model>, String> {
     Ok(Arc::new(model))
 }
 
+/// A JSON object by line.
+fn print_rows<T: Serialize>(rows: &[T]) -> Result<ExitCode, String> {
+    for row in rows {
+        println!("{}", serde_json::to_string(row).map_err(|e| e.to_string())?);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
+    let rows =
+        mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, cluster.pair)?;
+    if args.json {
+        return print_rows(&rows);
+    }
+    print!("{}", mixed::print(&rows, cluster.pair));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
+    let lanes = args
+        .lanes
+        .map(|lanes| lanes.name().parse::<Width>().and_then(Width::require))
+        .transpose()
+        .map_err(|e| e.to_string())?;
+    let (all, medians) = measure::run(&model(deck, args.cycles)?, lanes, args.repetitions)?;
+    if args.json {
+        println!("{}", serde_json::to_string(&medians).map_err(|e| e.to_string())?);
+    } else {
+        print!("{}", measure::print(&all, &medians));
+        println!(
+            "the cluster file: node = {}, pair = {}, search = {}, sort = {}, message_seconds = {:e}, byte_seconds = {:e}",
+            cluster.node,
+            cluster.pair,
+            cluster.search,
+            cluster.sort,
+            cluster.network.message,
+            cluster.network.byte
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
     let tables = cluster
         .tables
         .as_ref()
         .ok_or_else(|| format!("{}: no [tables]; add decks and hosts", args.cluster.display()))?;
     let models = [model(&tables.decks[0], args.cycles)?, model(&tables.decks[1], args.cycles)?];
+    if !tables.rates.is_empty() {
+        let rows = sweep::run(cluster, tables, &models, &mut |cell| eprintln!("{cell}"))?;
+        if args.json {
+            return print_rows(&rows);
+        }
+        print!("{}", sweep::print(cluster, &rows));
+        return Ok(ExitCode::SUCCESS);
+    }
     let report = table::run(cluster, tables, &models, &mut |cell| eprintln!("{cell}"))?;
     if let Some(folder) = &args.out {
         pictures(folder, &cluster.title, &report.last)?;
@@ -58,12 +142,9 @@ fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
         std::fs::write(&path, picture).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     if args.json {
-        for row in &report.rows {
-            println!("{}", serde_json::to_string(row).map_err(|e| e.to_string())?);
-        }
-    } else {
-        print!("{}", table::print(cluster, &report));
+        return print_rows(&report.rows);
     }
+    print!("{}", table::print(cluster, &report));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -84,7 +165,13 @@ struct Summary<'a> {
     bytes_per_cycle: f64,
     /// Mean phases of a cycle by worker (s).
     phases: Vec<Phases>,
+    /// When work was dealt out by other speeds.
+    rebalances: &'a [Rebalance],
     digest: &'a str,
+    /// Under the real clock.
+    strain: Option<Strain>,
+    /// Whether too many tasks overran for the figures to be of use.
+    refused: bool,
 }
 
 fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
@@ -103,7 +190,8 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         }
     };
     let costs = calibrate::costs(cluster, &benchmarks, 1.0);
-    let work = calibrate::work(&model, cluster)?;
+    let (work, cpu_ns) = real_clock::cpu_time(|| calibrate::work(&model, cluster));
+    let work = work?;
     let machines = Machines {
         believed: calibrate::believed(
             &cluster.speeds,
@@ -118,12 +206,28 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         changes: cluster.changes.clone(),
     };
     let route = RouteChoice::from(args.route).choose(cluster.speeds.len(), true);
-    let scheme = Scheme::bolide(route);
-    let (timeline, _) = virtual_clock::run(&model, &machines, scheme, None)?;
+    let scheme = Scheme { balance: args.balance.into(), ..Scheme::bolide(route) };
+    if args.clock == Clock::Real && scheme.balance != Balance::Given {
+        return Err("--balance measured is followed under --clock virtual only".to_owned());
+    }
+    let bound = calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>();
+    let (timeline, strain) = match args.clock {
+        Clock::Virtual => (virtual_clock::run(&model, &machines, scheme, None)?.0, None),
+        Clock::Real => {
+            let cpu = cpu_ns as f64 * 1e-9 / model.setup.control.end_cycle as f64;
+            let chosen =
+                || real_clock::choose_dilation(&machines, bound, cpu, calibrate::seconds(&costs, &work));
+            let (timeline, strain) = real(&model, &machines, route, args.dilation, chosen)?;
+            (timeline, Some(strain))
+        }
+    };
     let window = timeline.window();
     let summary = Summary {
         cluster: &cluster.title,
-        clock: "virtual",
+        clock: match args.clock {
+            Clock::Virtual => "virtual",
+            Clock::Real => "real",
+        },
         route: match route {
             Route::Master => "master",
             Route::Direct => "direct",
@@ -133,19 +237,35 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         cycles: timeline.counts.len(),
         window: (window.start, window.end),
         sec_per_cycle: timeline.seconds_per_cycle(),
-        bound: calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>(),
+        bound,
         bytes_per_cycle: timeline.bytes_per_cycle(),
         phases: (0..cluster.speeds.len()).map(|worker| timeline.mean_phases(worker)).collect(),
+        rebalances: &timeline.rebalances,
         digest: &timeline.digest,
+        strain,
+        refused: strain.is_some_and(|strain| strain.refused()),
     };
     if let Some(folder) = &args.out {
         pictures(folder, &cluster.title, &timeline)?;
     }
     if args.json {
         println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
-        return Ok(ExitCode::SUCCESS);
+        return Ok(verdict(strain.as_ref()));
     }
-    println!("{}: modelled under a virtual clock, route {}", summary.cluster, summary.route);
+    println!("{}: modelled under a {} clock, route {}", summary.cluster, summary.clock, summary.route);
+    if let Some(s) = &strain {
+        println!(
+            "dilation {}: {:.1} s for {} cycles, computing stretched {:.1}-fold; {} of {} tasks overran ({:.2} %), by {:.4} s in all",
+            s.dilation,
+            s.wall_seconds,
+            summary.cycles,
+            s.stretch,
+            s.overruns,
+            s.tasks,
+            100.0 * s.share(),
+            s.late_seconds
+        );
+    }
     println!(
         "{} elements, {} hosts, cycles {} to {}: {:.6} s/cycle, {:.4} of the bound {:.6}; {:.0} bytes/cycle",
         summary.elements,
@@ -174,8 +294,52 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
             p.wait
         );
     }
+    for Rebalance { cycle, imbalance_before, imbalance_after, .. } in summary.rebalances {
+        println!(
+            "cycle {cycle}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}"
+        );
+    }
     println!("digest {}", summary.digest);
-    Ok(ExitCode::SUCCESS)
+    Ok(verdict(strain.as_ref()))
+}
+
+/// How often a dilation of our own choice is doubled after too many overruns.
+const DOUBLINGS: usize = 3;
+
+/// A run under the real clock; where no dilation is asked for, at one where few tasks overrun.
+fn real(
+    model: &Arc<Model>,
+    machines: &Machines,
+    route: Route,
+    asked: Option<f64>,
+    chosen: impl Fn() -> f64,
+) -> Result<(Timeline, Strain), String> {
+    let mut dilation = asked.unwrap_or_else(chosen);
+    for _ in 0..DOUBLINGS {
+        let (timeline, strain) = real_clock::run(model, machines, route, dilation)?;
+        if asked.is_some() || !strain.refused() {
+            return Ok((timeline, strain));
+        }
+        eprintln!("dilation {dilation}: {:.2} % of the tasks overran; doubled", 100.0 * strain.share());
+        dilation *= 2.0;
+    }
+    real_clock::run(model, machines, route, dilation)
+}
+
+/// Success, unless figures under the real clock are of no use; says so.
+fn verdict(strain: Option<&Strain>) -> ExitCode {
+    match strain {
+        Some(strain) if strain.refused() => {
+            eprintln!(
+                "refused: {:.2} % of the tasks overran, at most {} %; the figures are of no use. Raise --dilation above {}",
+                100.0 * strain.share(),
+                100.0 * real_clock::OVERRUN_LIMIT,
+                strain.dilation
+            );
+            ExitCode::FAILURE
+        }
+        _ => ExitCode::SUCCESS,
+    }
 }
 
 /// Draws what a run shows.

@@ -2,7 +2,7 @@
 
 use std::{fs, io::Write, path::Path};
 
-use mechanics::{exact::Quantum, state::GlobalState, vote::Vote};
+use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
 use serde::{Deserialize, Serialize};
 
 use crate::{ledger::Ledger, results::history::HistoryRow};
@@ -16,10 +16,14 @@ pub struct Snapshot {
     pub dt_previous: f64,
     /// `dt` of the cycle to come (time).
     pub dt: f64,
-    /// Quantum of forces.
-    pub force_quantum: Quantum,
+    /// Quantum of forces in the cycle to come, and from the one after it on.
+    pub force_quanta: [Quantum; 2],
+    /// Rate at which bodies moved against each other (length per cycle), for the sorts to come.
+    pub spread_rate: f64,
     /// The whole vote of the cycle before, still to take effect.
     pub vote: Vote,
+    /// Poses of the walls of finite mass in the cycle to come.
+    pub walls: Vec<Pose>,
     /// Energies and worst ratios so far.
     pub ledger: Ledger,
     /// Rows of history so far.
@@ -27,7 +31,7 @@ pub struct Snapshot {
 }
 
 /// First bytes of a snapshot file.
-const MAGIC: &[u8; 8] = b"BLDSNAP2";
+const MAGIC: &[u8; 8] = b"BLDSNAP3";
 
 /// Writes a snapshot: temporary file, checksum, fsync, rename.
 ///

@@ -2,6 +2,8 @@
 //!
 //! The sort itself is mechanics'; here its units are dealt to workers and become batches and an exchange.
 
+use std::sync::Arc;
+
 use mechanics::{
     contact::{self, Batch, Census, Exclusions, Surface},
     state::GlobalState,
@@ -16,9 +18,9 @@ use crate::{
 
 /// All that a sort needs and that stays the same between two decompositions.
 pub struct Sorter {
-    surface: Surface,
+    surface: Arc<Surface>,
     settings: contact::Settings,
-    exclusions: Exclusions,
+    exclusions: Arc<Exclusions>,
     speeds: Vec<f64>,
     route: Route,
     dealing: Dealing,
@@ -29,6 +31,8 @@ pub struct Sorter {
 /// What came of a sort.
 #[derive(Clone)]
 pub struct Sorted {
+    /// The epoch that it was done for.
+    pub epoch: u32,
     /// The next plan of every worker.
     pub exchange: Exchange,
     /// The census of the work units.
@@ -40,9 +44,9 @@ pub struct Sorted {
 impl Sorter {
     /// `gather` lists, by worker, the global surface nodes whose positions it sends, in its order.
     pub fn new(
-        surface: Surface,
+        surface: Arc<Surface>,
         settings: contact::Settings,
-        exclusions: Exclusions,
+        exclusions: Arc<Exclusions>,
         speeds: Vec<f64>,
         route: Route,
         dealing: Dealing,
@@ -82,12 +86,15 @@ impl Sorter {
     }
 
     /// Sorts, balances, plans. `x` by surface node; of `state` only masses and constraints are read.
-    pub fn run(&self, x: &[[f64; 3]], holdings: &Holdings, state: &GlobalState) -> Sorted {
+    pub fn run(&self, epoch: u32, x: &[[f64; 3]], holdings: &Holdings, state: &GlobalState) -> Sorted {
         let units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
         let census = Census::of(&units);
         let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
         let worker_of = match self.dealing {
-            Dealing::Owners => balance::assign(&units, &self.speeds, &owner),
+            Dealing::Owners => {
+                let weights = balance::pairs(&units, &self.surface, x, &self.settings);
+                balance::assign(&units, &weights, &self.speeds, &holdings.work, &owner)
+            }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
         };
         let n = self.speeds.len();
@@ -104,6 +111,7 @@ impl Sorter {
                 (!units.is_empty()).then(|| Batch::gather(&self.surface, units, &mass, &self.exclusions))
             })
             .collect();
-        Sorted { exchange: Exchange::new(holdings, batches, state, self.route), census, interactions }
+        let exchange = Exchange::new(holdings, batches, state, self.route);
+        Sorted { epoch, exchange, census, interactions }
     }
 }

@@ -9,7 +9,7 @@ use deck::model::Model;
 use master::{
     connection::Gate,
     daemon::Event,
-    drive::{Seat, drive},
+    drive::{Seat, channel, drive},
     embedded::{self, Sink},
     event::{Action, Hand, Options, Outcome},
     job::Job,
@@ -97,7 +97,7 @@ where
                 // What it accepts has the buffers of what it listens on.
                 let listener = tight_socket("127.0.0.1:0").listen(16).expect("listens");
                 hello.peer_port = listener.local_addr().expect("bound").port();
-                Some(Arc::new(Peers::start(listener, None).expect("no certificates")))
+                Some(Arc::new(Peers::start(listener, None, None).expect("no certificates")))
             }
         };
         tokio::spawn(Arc::clone(&gate).serve(near, format!("127.0.0.1:{}", i + 1), None));
@@ -125,7 +125,7 @@ where
         let options = Options { route, ..options() };
         let (job, first) = Job::new(model, &hands, options, None).expect("it starts");
         let mut sink = Keep::default();
-        let ran = drive(job, first, 1, &seats, &mut sink, &AtomicBool::new(false));
+        let ran = drive(job, first, 1, &seats, channel(seats.len()), &mut sink, &AtomicBool::new(false));
         ran.map(|(outcome, traffic)| (outcome, traffic, sink.0))
     });
     let ran = tokio::time::timeout(DEADLINE, running).await.expect("nobody waits for the other");

@@ -106,6 +106,7 @@ fn plates(cells: u32) -> Model {
             constraints: vec![Constraint::default()],
             walls: Vec::new(),
             detonations: Vec::new(),
+            loads: Default::default(),
         },
         output: Output {
             period: None,
@@ -195,6 +196,8 @@ fn summary(model: &Model) -> Summary {
         worst_courant: 0.6912,
         worst_gap_travel: 0.1631,
         worst_penetration: 0.4312,
+        rebalances: Vec::new(),
+        losses: Vec::new(),
         digest: "00ff".repeat(16),
     }
 }
@@ -457,7 +460,7 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
     assert_eq!(
         keys(&json),
         "bytes_per_cycle contact_share cycles digest elements end_time energies grind_ns imbalance lanes \
-         linked_pairs master_bytes_per_cycle momentum_error nodes relayed_pairs route sorts surface_elements surface_faces surface_nodes threads title wall_s \
+         linked_pairs losses master_bytes_per_cycle momentum_error nodes rebalances relayed_pairs route sorts surface_elements surface_faces surface_nodes threads title wall_s \
          work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
     );
     assert_eq!(keys(&json["energies"]), "contact error external hourglass internal kinetic viscosity");

@@ -8,16 +8,18 @@ use std::{
 use deck::model::Model;
 use master::{
     embedded::{self, Sink},
-    event::{Action, Hand, Options},
+    event::{Action, Balance, Hand, Options},
     job::Job,
     run::read_deck,
     simulate::{
         calibrate,
         cluster::{self, Cluster},
+        machines::{Change, Costs, Machines, Scheme},
         network::{Network, Wires},
         paper::{self, Verdict},
         table,
-        virtual_clock::{self, Change, Costs, Machines, Scheme, Timeline},
+        timeline::Timeline,
+        virtual_clock,
     },
 };
 use protocol::message::Route;
@@ -180,6 +182,27 @@ fn every_number_of_hosts_and_every_scheme_gives_the_digest_of_a_plain_run() {
 }
 
 #[test]
+fn every_cluster_file_and_route_gives_the_digest_of_a_plain_run() {
+    let model = model("plates-free-slip.toml", 10);
+    let digest = embedded_digest(&model);
+    let files = ["dec-alpha-4", "pentium-16", "myrinet-80", "mixed-lab", "modern-16", "modern-1000"];
+    for file in files {
+        // More hosts than that cost the test time and show nothing new.
+        let part = cluster(&format!("{file}.toml")).first(20);
+        let hosts = Machines {
+            costs: Costs { element: 1e-6, node: 1e-7, pair: 1e-6, search: 1e-6, sort: 2e-6 },
+            believed: part.speeds.clone(),
+            speeds: part.speeds.clone(),
+            network: part.network.clone(),
+            changes: part.changes.clone(),
+        };
+        for route in [Route::Direct, Route::Master] {
+            assert_eq!(run(&model, &hosts, Scheme::bolide(route)).digest, digest, "{file}, {route:?}");
+        }
+    }
+}
+
+#[test]
 fn a_sort_that_is_late_makes_workers_wait_and_changes_no_later_sort() {
     let model = model("plates-free-slip.toml", 40);
     let mut three = machines(3);
@@ -234,7 +257,8 @@ fn sixteen_pcs_are_ahead_of_table_2() {
             .find(|r| (r.benchmark, r.hosts, r.route, r.k, r.network_factor) == (2, 16, "direct", k, 1.0));
         found.expect("the table has it").efficiency
     };
-    assert!(cell(1) >= 0.98, "k = 1: {}", cell(1));
+    // With measured constants (deploy/clusters/README.md).
+    assert!(cell(1) >= 0.965, "k = 1: {}", cell(1));
     assert!(cell(10) >= 0.94, "k = 10: {}", cell(10));
 }
 
@@ -250,4 +274,73 @@ fn a_mixed_lab_computes_near_its_bound_contact_included() {
     let bound = calibrate::seconds(&costs, &work) / lab.speeds.iter().sum::<f64>();
     println!("mixed lab, contact included: {:.4} of the bound", seconds / bound);
     assert!(seconds / bound <= 1.04, "{seconds} s per cycle, bound {bound}");
+}
+
+/// Eight hosts that compute and hardly talk, one of which changes its speed on the way.
+fn eight(changes: Vec<Change>) -> Machines {
+    let mut eight = machines(8);
+    eight.costs = Costs { element: 1e-3, node: 3e-5, pair: 1e-4, search: 8e-4, sort: 0.0 };
+    eight.network.latency = 1e-4;
+    eight.network.rate = 1e9;
+    eight.changes = changes;
+    eight
+}
+
+/// The mean time of a cycle between two cycles, over the shortest that speeds allow.
+fn over_the_bound(timeline: &Timeline, cycles: std::ops::Range<u64>, speed: f64, alone: f64) -> f64 {
+    let n = (cycles.end - cycles.start) as f64;
+    (timeline.reached(cycles.end) - timeline.reached(cycles.start)) / n / (alone / speed)
+}
+
+#[test]
+fn a_host_that_drops_to_half_speed_and_comes_back_is_followed_within_two_boundaries() {
+    for (deck, route) in [
+        ("plates-joined.toml", Route::Direct),
+        ("plates-joined.toml", Route::Master),
+        ("plates-free-slip.toml", Route::Direct),
+    ] {
+        let mut model = Arc::unwrap_or_clone(model(deck, 180));
+        model.setup.control.plan_interval = 20;
+        let model = Arc::new(model);
+        let changes =
+            vec![Change { host: 3, cycle: 45, speed: 0.5 }, Change { host: 3, cycle: 105, speed: 1.0 }];
+        let measured = Scheme { balance: Balance::Measured, ..Scheme::bolide(route) };
+        let steady = run(&model, &eight(Vec::new()), measured);
+        assert_eq!(steady.rebalances, [], "{deck}: nothing changes, nothing is dealt anew");
+        let given = run(&model, &eight(changes.clone()), Scheme::bolide(route));
+        let followed = run(&model, &eight(changes), measured);
+        assert_eq!(followed.digest, given.digest, "{deck}");
+        assert_eq!(followed.digest, steady.digest, "{deck}");
+        let at: Vec<u64> = followed.rebalances.iter().map(|r| r.cycle).collect();
+        // With contact boundaries are the sorts as well.
+        assert_eq!(at.len(), 2, "{deck}: {at:?}");
+        assert!((46..=85).contains(&at[0]) && (106..=145).contains(&at[1]), "{deck}: {at:?}");
+        let alone = run(
+            &model,
+            &Machines { speeds: vec![1.0], believed: vec![1.0], ..eight(Vec::new()) },
+            Scheme::bolide(route),
+        );
+        let window = |from: u64, to: u64, speed: f64, timeline: &Timeline| {
+            let alone = (alone.reached(to) - alone.reached(from)) / (to - from) as f64;
+            over_the_bound(timeline, from..to, speed, alone)
+        };
+        // At 85 two boundaries of 20 cycles have passed since the drop, at 145 since the return.
+        let figures = [
+            window(20, 40, 8.0, &followed),
+            window(46, at[0].min(60), 7.5, &followed),
+            window(85, 104, 7.5, &followed),
+            window(85, 104, 7.5, &given),
+            window(145, 178, 8.0, &followed),
+        ];
+        println!("{deck}, {route:?}: rebalanced at {at:?}; time over the bound {figures:.3?}");
+        for r in &followed.rebalances {
+            println!(
+                "  {:?} -> {:?}: {:.3} -> {:.3}",
+                r.speeds_before, r.speeds_after, r.imbalance_before, r.imbalance_after
+            );
+        }
+        assert!(figures[2] <= 1.0 / 0.95, "{deck}: {figures:?}");
+        assert!(figures[4] <= 1.0 / 0.95, "{deck}: {figures:?}");
+        assert!(figures[3] > 1.5, "{deck}: without it the slow host holds all up: {figures:?}");
+    }
 }

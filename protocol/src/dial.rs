@@ -14,6 +14,7 @@ use crate::{
     Error, Result,
     handshake::{self, Hello, Welcome},
     link::{self, Receiver, Sender, Settings},
+    shape::{Shape, Shaped},
     tls,
 };
 
@@ -50,9 +51,17 @@ pub struct Reached {
     /// What the other side's certificate may be for.
     roles: &'static [tls::Role],
     settings: Settings,
+    port: Option<Shape>,
 }
 
 impl Reached {
+    /// The same through this host's emulated port.
+    #[must_use]
+    pub fn through(mut self, port: Option<&Shape>) -> Self {
+        self.port = port.cloned();
+        self
+    }
+
     /// The address of this side: of the interface that the other side is reached by.
     ///
     /// # Errors
@@ -67,10 +76,11 @@ impl Reached {
     /// # Errors
     /// [`Error::Certificate`], or what [`link::greet`] gives.
     pub async fn greet(self, hello: &Hello) -> Result<Call> {
+        let stream = Shaped::new(self.stream, self.port.as_ref());
         let (sender, receiver) = match &self.certificates {
-            None => link::split(self.stream, self.settings),
+            None => link::split(stream, self.settings),
             Some(config) => {
-                let (stream, _) = tls::connect_any(self.stream, &self.host, config, self.roles).await?;
+                let (stream, _) = tls::connect_any(stream, &self.host, config, self.roles).await?;
                 link::split(stream, self.settings)
             }
         };
@@ -103,7 +113,7 @@ pub async fn reach_peer(
     let stream = connect(&[address], &address.to_string()).await?;
     let roles = &[tls::Role::Worker, tls::Role::Master];
     let host = address.ip().to_string();
-    Ok(Reached { stream, host, certificates: certificates.cloned(), roles, settings })
+    Ok(Reached { stream, host, certificates: certificates.cloned(), roles, settings, port: None })
 }
 
 /// Connects to `master` as [`dial`] does, without a greeting.
@@ -123,6 +133,7 @@ pub async fn reach(master: &str, certificates: Option<&Arc<ClientConfig>>) -> Re
         certificates: certificates.cloned(),
         roles: &[tls::Role::Master],
         settings: Settings::default(),
+        port: None,
     })
 }
 

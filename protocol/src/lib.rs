@@ -4,7 +4,8 @@
 //! are checked before anything is allocated; [`codec`] turns values and arrays into payloads and cuts
 //! large messages into chunks; [`link`] carries frames both ways over any byte stream without one
 //! direction waiting for the other; [`order`] keeps control messages in order over it; [`handshake`] says who is at the other end; [`tls`] proves it. [`message`] and
-//! [`wire`] are what master and workers say in a run, [`phase`] how workers report on their time, [`request`] what clients ask, [`dial`] how to call.
+//! [`wire`] are what master and workers say in a run, [`phase`] how workers report on their time, [`request`] what clients
+//! ask, [`dial`] how to call; [`shape`] makes a stream as slow as an emulated wire.
 //!
 //! Nothing here knows what a cycle computes: a link moves frames and ends with one [`Error`] value when
 //! the peer breaks a rule. No input from a peer reaches a panic.
@@ -18,6 +19,7 @@ pub mod message;
 pub mod order;
 pub mod phase;
 pub mod request;
+pub mod shape;
 pub mod tls;
 pub mod wire;
 

@@ -39,6 +39,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpStream;
+use tokio::runtime::Handle;
 use tokio::sync::{Notify, watch};
 use tokio::time::Instant;
 use writer::Writer;
@@ -163,6 +164,8 @@ struct Shared {
     /// Whether the writing task has stopped.
     written: watch::Sender<bool>,
     spare: Mutex<Vec<Vec<u8>>>,
+    /// For senders that write on a thread of their own: a shaped stream waits with the runtime's timer.
+    runtime: Handle,
 }
 
 impl Shared {
@@ -185,6 +188,7 @@ impl Shared {
             end: watch::Sender::new(None),
             written: watch::Sender::new(false),
             spare: Mutex::default(),
+            runtime: Handle::current(),
         }
     }
 

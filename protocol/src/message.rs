@@ -5,6 +5,9 @@
 //! `Report` and `Image` with `last`, then `Release`. On route direct `Peers` comes before `Assign`, and partial forces go
 //! from worker to worker as [`ToPeer`].
 //!
+//! A job that is dealt out anew - a worker was lost, one joined, speeds turned out to be others - sends a further
+//! `Assign` of the next epoch, at any time; what the worker still does for the epoch before comes to nothing.
+//!
 //! Orders act with a lag that is the same on every route: the orders that answer cycle `n` give the time step of
 //! cycle `n + 1` and what happens at the start of cycle `n + 2`.
 
@@ -14,6 +17,7 @@ use mechanics::{
     exact::Quantum,
     setup::Setup,
     vote::{Quanta, Vote},
+    wall::Pose,
 };
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
@@ -23,7 +27,7 @@ use crate::phase::Report;
 /// From the master to a worker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ToWorker {
-    /// First of a job: all that the worker holds. Answered by `Ready`.
+    /// First of a job, and of each epoch of it: all that the worker holds. Answered by `Ready`.
     Assign(Box<Assign>),
     /// When every worker is ready: the orders for the first cycle and the one after.
     Start {
@@ -112,6 +116,8 @@ pub enum Route {
 /// All that a worker holds of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Assign {
+    /// How often the job has been dealt out anew before. An assignment of a later epoch replaces the one in hand.
+    pub epoch: u32,
     /// Materials, contact, boundaries, control.
     pub setup: Setup,
     /// Number of parts of the problem.
@@ -139,12 +145,16 @@ pub struct Assign {
 }
 
 /// What the next cycles do; the same on every worker.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Orders {
     /// The cycle whose time step `dt` is.
     pub next: u64,
     /// `dt` of cycle `next` (time).
     pub dt: f64,
+    /// When cycle `next` begins (time).
+    pub time: f64,
+    /// Poses of the walls of finite mass in cycle `next`, in the order of the walls.
+    pub walls: Vec<Pose>,
     /// Quantum of forces from cycle `next + 1` on.
     pub force_quantum: Quantum,
     /// At the start of cycle `next + 1`, the positions of surface nodes travel; the plan sorted from them acts a sort
@@ -176,6 +186,9 @@ pub enum ToMaster {
         partials: Vec<f64>,
         /// Positions of owned surface nodes where this cycle gathers; else empty.
         gathered: Vec<f64>,
+        /// How long this worker has worked on its tasks so far, by the clock of its host (ns): what `--balance
+        /// measured` goes by. Whoever drives the session fills it in.
+        busy: Work,
     },
     /// For another worker that this one has no link to (route direct). Passed on as it is.
     Relay {
@@ -215,11 +228,22 @@ pub enum ToMaster {
     },
 }
 
+impl ToMaster {
+    /// The same with `busy` filled in, where it is the frame of a cycle.
+    #[must_use]
+    pub fn stamped(mut self, worked: Work) -> Self {
+        if let Self::Cycle { busy, .. } = &mut self {
+            *busy = worked;
+        }
+        self
+    }
+}
+
 /// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
 /// 2: with damage and the time until an explosive is lit behind them.
 pub const IMAGE_VERSION: u32 = 2;
 
-/// Thread-CPU time of a worker's compute threads (ns).
+/// Time that a worker has computed for (ns): of its threads in an image, of its host in the frame of a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Work {
     /// All phases.

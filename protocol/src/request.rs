@@ -104,8 +104,22 @@ pub struct JobOptions {
     pub sort_seed: Option<u64>,
     /// Start when so many workers are there.
     pub min_workers: u32,
+    /// What speeds work is dealt out by.
+    pub balance: Balance,
+    /// Seconds from one state kept in memory to the next; none if it is never kept, so that a loss begins the run anew.
+    pub keep_every: Option<f64>,
     /// Write `trace.json`: what every worker did in its last cycles.
     pub trace: bool,
+}
+
+/// What speeds work is dealt out by. No bit of a result depends on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Balance {
+    /// Those that users gave.
+    #[default]
+    Given,
+    /// Those, corrected by what is measured.
+    Measured,
 }
 
 /// How a user wants partial forces to travel.

@@ -10,7 +10,7 @@ use crate::{
     Error, Result,
     codec::{self, MESSAGE_LIMIT},
     frame::{CHUNK, CHUNK_PREFIX, CONTROL_LIMIT, HEADER_LEN, Kind},
-    message::{Orders, ToMaster, ToPeer, ToWorker},
+    message::{Orders, ToMaster, ToPeer, ToWorker, Work},
 };
 
 /// A message ready to be framed.
@@ -47,6 +47,7 @@ struct CycleHead {
     vote: Option<Box<Vote>>,
     partials: u64,
     gathered: u64,
+    busy: Work,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -62,7 +63,7 @@ struct TotalsHead {
 pub fn pack_to_worker(message: &ToWorker) -> Result<Packed> {
     match message {
         ToWorker::Totals { cycle, orders, totals } => {
-            let head = codec::encode(&TotalsHead { cycle: *cycle, orders: *orders })?;
+            let head = codec::encode(&TotalsHead { cycle: *cycle, orders: orders.clone() })?;
             Ok(Packed { kind: Kind::Totals, cycle: *cycle, bytes: with_arrays(&head, &[totals]) })
         }
         other => Ok(Packed { kind: Kind::Control, cycle: 0, bytes: codec::encode(other)? }),
@@ -96,12 +97,13 @@ pub fn unpack_to_worker(kind: Kind, bytes: &[u8]) -> Result<ToWorker> {
 /// If it is longer than a message may be.
 pub fn pack_to_master(message: &ToMaster) -> Result<Packed> {
     match message {
-        ToMaster::Cycle { cycle, vote, partials, gathered } => {
+        ToMaster::Cycle { cycle, vote, partials, gathered, busy } => {
             let head = codec::encode(&CycleHead {
                 cycle: *cycle,
                 vote: vote.clone(),
                 partials: partials.len() as u64,
                 gathered: gathered.len() as u64,
+                busy: *busy,
             })?;
             Ok(Packed { kind: Kind::Cycle, cycle: *cycle, bytes: with_arrays(&head, &[partials, gathered]) })
         }
@@ -133,7 +135,7 @@ pub fn unpack_to_master(kind: Kind, bytes: &[u8]) -> Result<ToMaster> {
                 )));
             }
             let gathered = partials.split_off(head.partials as usize);
-            Ok(ToMaster::Cycle { cycle: head.cycle, vote: head.vote, partials, gathered })
+            Ok(ToMaster::Cycle { cycle: head.cycle, vote: head.vote, partials, gathered, busy: head.busy })
         }
         Kind::Control => match codec::decode(bytes, MESSAGE_LIMIT)? {
             ToMaster::Cycle { .. } => {

@@ -7,29 +7,6 @@ use tests::cluster::{Cluster, Process, repository, said, until};
 use crate::{BOLIDE, digest_of, long, reference, small};
 
 #[test]
-fn a_killed_worker_fails_its_job_by_name_and_the_next_job_runs() {
-    let mut cluster = Cluster::start(BOLIDE, false);
-    for name in ["a", "victim", "c"] {
-        cluster.worker(name, "1");
-    }
-    let arguments = ["submit", &long(), "--no-output", "--wait", "--min-workers", "3"];
-    let mut waiting = Process::start("submit", &mut cluster.command("client", &arguments));
-    cluster.wait_until_running(1);
-    cluster.kill_worker("victim");
-    assert_eq!(waiting.wait().code(), Some(1));
-    let words = waiting.wait_for("is lost: victim at 127.0.0.1:");
-    assert!(words.starts_with("bolide: job 1: worker 1 is lost"), "{words}");
-    assert_eq!(cluster.job(1)["state"], "failed");
-    let table = cluster.client(&["hosts"]).out;
-    let row = table.lines().find(|line| line.contains("victim")).expect("it is remembered");
-    assert!(row.contains(" lost "), "{row}");
-
-    let next = ["submit", &small(), "--cycles", "40", "--no-output", "--wait", "--min-workers", "2"];
-    assert_eq!(digest_of(&cluster.json(&next)), reference());
-    assert!(cluster.master.is_alive());
-}
-
-#[test]
 fn a_cancelled_job_keeps_what_it_had_and_frees_its_workers() {
     let mut cluster = Cluster::start(BOLIDE, false);
     cluster.worker("a", "1");

@@ -2,6 +2,7 @@
 
 mod faults;
 mod links;
+mod losses;
 mod peers;
 mod runs;
 

@@ -8,6 +8,7 @@
 mod contact;
 mod element;
 mod gas;
+mod load;
 mod solid;
 mod structure;
 mod wave;
@@ -42,6 +43,16 @@ macro_rules! each_case_of_the_book {
             structure: the_impulsive_panel_is_dented_as_deep_as_measured long;
             structure: the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds quick;
             structure: a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness quick;
+            load: a_pressure_by_curve_drives_a_wave_of_its_shape quick;
+            load: a_velocity_by_curve_arrives_as_it_was_prescribed quick;
+            load: a_transmitting_face_lets_a_pulse_out quick;
+            load: shear_waves_leave_through_a_transmitting_face_too quick;
+            load: a_force_by_curve_gives_its_impulse_and_gravity_its_fall quick;
+            load: a_hanging_bar_relaxes_to_its_length_under_its_weight quick;
+            load: a_wall_of_finite_mass_is_slowed_by_the_bar_it_strikes quick;
+            load: a_driven_wall_pushes_as_a_bar_that_strikes_it_is_pushed quick;
+            load: a_wall_gives_the_impulse_that_bodies_lack_and_rubs_after_coulomb quick;
+            load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
             contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
             contact: struck_plates_conserve_keep_apart_and_move_together quick;
             contact: strengthless_plates_reach_the_impedance_match_on_the_axis quick;

@@ -4,7 +4,7 @@ use std::sync::{Arc, atomic::AtomicBool};
 
 use deck::Model;
 use master::{
-    embedded::{self, Sink},
+    embedded::{self, Fate, Sink},
     event::{Action, Hand, Options, Outcome},
     job::Job,
     results::history::{GaugeRow, HistoryRow},
@@ -172,6 +172,10 @@ impl Sink for Keep {
             Action::Row(row) => self.rows.push(*row),
             Action::State(state) => self.states.push(*state),
             Action::Snapshot(snapshot) => self.snapshot = Some(*snapshot),
+            Action::Rewind { rows, cycle } => {
+                self.rows.truncate(rows);
+                self.states.retain(|state| state.cycle <= cycle);
+            }
             _ => {}
         }
         Ok(())
@@ -183,6 +187,18 @@ impl Sink for Keep {
 /// # Errors
 /// Whatever kept it from its end.
 pub fn solve(model: Model, crew: Crew) -> Result<Solved, String> {
+    solve_through(model, crew, &mut |_| None)
+}
+
+/// [`solve`] with workers that come and go; see [`embedded::run_through`].
+///
+/// # Errors
+/// Whatever kept it from its end.
+pub fn solve_through(
+    model: Model,
+    crew: Crew,
+    fate: &mut (dyn FnMut(u64) -> Option<Fate> + Send),
+) -> Result<Solved, String> {
     let model = Arc::new(model);
     let hands: Vec<Hand> = crew
         .speeds
@@ -193,7 +209,8 @@ pub fn solve(model: Model, crew: Crew) -> Result<Solved, String> {
     let (job, first) = Job::new(Arc::clone(&model), &hands, crew.options, crew.resume)?;
     let mut keep = Keep { rows: job.rows_before().to_vec(), ..Keep::default() };
     let stop = AtomicBool::new(false);
-    let (mut outcome, _) = embedded::run(job, first, hands.len(), crew.threads as usize, &mut keep, &stop)?;
+    let (n, threads) = (hands.len(), crew.threads as usize);
+    let (mut outcome, _) = embedded::run_through(job, first, n, threads, &mut keep, &stop, fate)?;
     if let Some(failure) = outcome.failure.take() {
         return Err(failure);
     }

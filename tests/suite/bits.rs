@@ -10,6 +10,7 @@ use tests::{
 
 use deck::Model;
 use master::event::{ForceSorts, Options};
+use protocol::message::Route;
 
 fn fingerprint(model: &Model, crew: Crew) -> Fingerprint {
     Fingerprint::of(&solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}")))
@@ -23,7 +24,7 @@ fn asked(workers: usize, options: Options) -> Crew {
 /// Every crew whose bits are compared with those of one worker of one thread.
 fn crews() -> Vec<(String, Crew)> {
     let mut crews = Vec::new();
-    for workers in [2, 3, 7] {
+    for workers in [2, 3, 5, 7] {
         crews.push((format!("{workers} workers"), Crew::of(workers)));
     }
     for workers in [1, 2] {
@@ -151,6 +152,110 @@ fn joined_parts_on_a_wall_have_the_same_bits() {
         point = [0, 0, 16]
         "#,
     ));
+}
+
+#[test]
+fn every_load_and_wall_has_the_same_bits_on_both_routes() {
+    let model = model(
+        r#"
+        title = "loads"
+        units = "cm-g-us"
+        [control]
+        end_cycle = 300
+        safety_factor = 0.4
+        end_time = 1e3
+        [[curve]]
+        name = "pulse"
+        points = [[0, 0], [5, 1], [30, 0.5]]
+        [[part]]
+        name = "target"
+        material = "AL_2024_T351"
+        box = { origin = [0, 0, 0], size = [9, 8, 4], cells = [9, 8, 4] }
+        [[part]]
+        name = "projectile"
+        material = "STEEL_1006"
+        velocity = [0.02, 0.01, -0.05]
+        box = { origin = [1.3, 0.7, 4.3], size = [5, 6, 3], cells = [5, 6, 3] }
+        [contact]
+        gap_length = 0.15
+        [[load]]
+        type = "pressure"
+        parts = ["projectile"]
+        face = "k-max"
+        pressure = { curve = "pulse", factor = 2e-3 }
+        [[load]]
+        type = "force"
+        parts = ["target"]
+        face = "i-min"
+        force = [1e-4, 0, 2e-4]
+        curve = "pulse"
+        [gravity]
+        acceleration = [0, 0, -1e-5]
+        curve = "pulse"
+        [relaxation]
+        factor = 0.999
+        until = 40
+        [[boundary]]
+        type = "transmit"
+        parts = ["target"]
+        face = "k-min"
+        [[boundary]]
+        type = "velocity"
+        parts = ["target"]
+        face = "j-max"
+        velocity = { y = { curve = "pulse", factor = -1e-3 } }
+        [[wall]]
+        point = [0, 0, -0.02]
+        normal = [0, 0, 1]
+        friction = 0.2
+        mass = 4000
+        velocity = { z = 2e-3 }
+        [[wall]]
+        shape = "sphere"
+        point = [4, 4, 9.32]
+        radius = 2
+        mass = 3000
+        velocity = { z = -0.06 }
+        parts = ["projectile"]
+        [[wall]]
+        shape = "cylinder"
+        point = [-1.05, 0, 2]
+        axis = [0, 1, 0]
+        radius = 1
+        velocity = { x = { curve = "pulse", factor = 0.01 } }
+        [output]
+        history_cycles = 1
+        "#,
+    );
+    same_bits(&model);
+    let one = Fingerprint::of(&solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}")));
+    for workers in [2, 5] {
+        let options = Options { route: Route::Direct, ..Options::default() };
+        one.assert_equal(
+            &fingerprint(&model, asked(workers, options)),
+            &format!("{workers} workers, direct"),
+        );
+    }
+    // Nothing of it is idle: without any one of them the bits are others.
+    let without = |change: &dyn Fn(&mut Model)| {
+        let mut other = model.clone();
+        change(&mut other);
+        fingerprint(&other, Crew::default()).digest
+    };
+    for wall in 0..3 {
+        let idle = without(&|m| m.setup.walls[wall].parts.fill(false));
+        assert_ne!(idle, one.digest, "wall {wall}");
+    }
+    for surface in 0..2 {
+        assert_ne!(
+            without(&|m| m.setup.loads.surfaces[surface].faces.clear()),
+            one.digest,
+            "surface {surface}"
+        );
+    }
+    assert_ne!(without(&|m| m.setup.loads.gravity = None), one.digest);
+    assert_ne!(without(&|m| m.setup.loads.relaxation = None), one.digest);
+    assert_ne!(without(&|m| m.setup.loads.forces[0].force = [0.0; 3]), one.digest);
 }
 
 #[test]

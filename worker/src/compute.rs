@@ -50,6 +50,15 @@ impl ThreadClock {
     }
 }
 
+/// Gives the calling thread the lowest priority of the machine's ordinary ones, for good: it runs on what others leave
+/// idle. A machine that refuses leaves it as it was.
+pub fn lowest_priority() {
+    let _ = rustix::process::setpriority_process(Some(rustix::thread::gettid()), LOWEST);
+}
+
+/// The highest nice value of Linux.
+const LOWEST: i32 = 19;
+
 fn thread_cpu_ns() -> u64 {
     let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
@@ -92,6 +101,11 @@ impl Machine {
         self.domain.as_ref().map(Domain::load).unwrap_or_default()
     }
 
+    /// Thread-CPU time of its tasks so far, over all epochs of a job.
+    pub fn work(&self) -> Work {
+        self.clock.work()
+    }
+
     /// What the tasks since the last call took, by wall clock, in their order.
     pub fn take_laps(&mut self) -> impl Iterator<Item = Lap> + use<> {
         std::mem::take(&mut self.laps.0).into_iter()
@@ -113,8 +127,8 @@ impl Machine {
             Task::Transfer { nodes } => {
                 Outcome::Transferred(laps.time(Phase::Other, || domain.transfer(&nodes))?)
             }
-            Task::Elements { dt_previous, quantum } => {
-                domain.set_force_quantum(quantum);
+            Task::Elements { dt_previous, quantum, time } => {
+                domain.begin(quantum, time);
                 laps.time(Phase::Interior, || domain.elements(Sets::All, dt_previous, clock));
                 Outcome::Computed
             }
@@ -126,10 +140,10 @@ impl Machine {
                 domain.contact(dt_previous, clock);
                 Ok::<_, String>(Outcome::Forces { partials: domain.partials(clock), gathered })
             })?,
-            Task::Border { dt_previous, quantum, gather } => {
+            Task::Border { dt_previous, quantum, time, gather } => {
                 let gathered = laps.time(Phase::Contact, || {
                     let gathered = if gather { domain.gather() } else { Vec::new() };
-                    domain.set_force_quantum(quantum);
+                    domain.begin(quantum, time);
                     domain.contact(dt_previous, clock);
                     gathered
                 });
@@ -142,9 +156,9 @@ impl Machine {
                 laps.time(Phase::Interior, || domain.elements(Sets::Interior, dt_previous, clock));
                 Outcome::Computed
             }
-            Task::Integrate { totals, dt_previous, dt } => {
-                let vote =
-                    laps.time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, clock))?;
+            Task::Integrate { totals, dt_previous, dt, walls } => {
+                let vote = laps
+                    .time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, &walls, clock))?;
                 Outcome::Integrated(Box::new(vote))
             }
             Task::Image => {
@@ -164,6 +178,8 @@ impl Machine {
             }
             None => Width::best(),
         };
+        // The domain of the epoch before goes first: there need not be room for two.
+        let further_epoch = self.domain.take().is_some();
         let mut domain = Domain::new(
             assign.setup,
             assign.n_parts as usize,
@@ -175,7 +191,9 @@ impl Machine {
         drop(assign.subdomains);
         domain.install(&assign.plan, &assign.guest_state)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
-        self.clock = ThreadClock::default();
+        if !further_epoch {
+            self.clock = ThreadClock::default();
+        }
         self.domain = Some(domain);
         Ok(Outcome::Loaded { vote, lanes: width.to_string() })
     }

@@ -18,6 +18,7 @@ use protocol::{
     handshake::{Hello, Role},
     link::Receiver,
     order::{BULK_ON_THE_WAY, Inbox, Outbox},
+    shape::Shape,
     tls::ClientConfig,
     wire,
 };
@@ -56,6 +57,8 @@ pub struct Options {
     pub once: bool,
     /// The secret that the master asks for.
     pub token: Option<String>,
+    /// This host's emulated port; none for what the network gives.
+    pub port: Option<Shape>,
     /// Whether and where it takes other workers.
     pub peers: Listen,
 }
@@ -194,7 +197,7 @@ async fn join(
     listening: &mut Option<IpAddr>,
     service: &mut Service,
 ) -> Result<Call> {
-    let reached = dial::reach(&options.master, certificates).await?;
+    let reached = dial::reach(&options.master, certificates).await?.through(options.port.as_ref());
     let ip = reached.local_ip()?;
     if let Listen::Port { port, announce } = options.peers
         && *listening != Some(ip)
@@ -202,7 +205,8 @@ async fn join(
         service.peers = None;
         let listener = Peers::bind(ip, port).await?;
         let bound = listener.local_addr().map_err(|e| Error::io("the port for other workers", &e))?;
-        service.peers = Some(Arc::new(Peers::start(listener, options.certs.as_deref())?));
+        service.peers =
+            Some(Arc::new(Peers::start(listener, options.certs.as_deref(), options.port.clone())?));
         *listening = Some(ip);
         hello.peer_port = announce.unwrap_or(bound.port());
         info!(announced = hello.peer_port, "listening for other workers on {bound}");

@@ -27,6 +27,7 @@ use protocol::{
     handshake,
     link::{Receiver, Sender, Settings},
     message::{Introduction, ToPeer},
+    shape::Shape,
     tls::{self, ClientConfig, ServerConfig},
     wire,
 };
@@ -60,17 +61,20 @@ pub struct Peers {
 /// What the tasks of all connections need.
 struct Shared {
     certificates: Option<(Arc<ServerConfig>, Arc<ClientConfig>)>,
+    /// This host's emulated port.
+    port: Option<Shape>,
     /// Who may call now.
     circle: watch::Sender<Option<Arc<Circle>>>,
     runtime: Handle,
 }
 
 impl Peers {
-    /// Takes peers on `listener`, with the certificates in a folder if there are any. Called within a runtime.
+    /// Takes peers on `listener`, with the certificates in a folder if there are any, through this host's emulated
+    /// port if it has one. Called within a runtime.
     ///
     /// # Errors
     /// [`Error::Certificate`].
-    pub fn start(listener: TcpListener, certs: Option<&Path>) -> Result<Self> {
+    pub fn start(listener: TcpListener, certs: Option<&Path>, port: Option<Shape>) -> Result<Self> {
         let certificates = match certs {
             None => None,
             Some(folder) => {
@@ -78,8 +82,12 @@ impl Peers {
                 Some((tls::server_config(&paths)?, tls::peer_config(&paths)?))
             }
         };
-        let shared =
-            Arc::new(Shared { certificates, circle: watch::Sender::new(None), runtime: Handle::current() });
+        let shared = Arc::new(Shared {
+            certificates,
+            port,
+            circle: watch::Sender::new(None),
+            runtime: Handle::current(),
+        });
         let accepting = tokio::spawn(gate::listen(listener, Arc::clone(&shared)));
         Ok(Self { shared, accepting })
     }

@@ -6,13 +6,13 @@
 use std::{
     collections::VecDeque,
     panic::{AssertUnwindSafe, catch_unwind},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use protocol::{
     Error, Result,
     frame::Header,
-    message::{ToMaster, ToPeer, ToWorker},
+    message::{ToMaster, ToPeer, ToWorker, Work},
     order::{Outbox, Place},
     phase::Phase,
     wire,
@@ -45,6 +45,8 @@ pub struct Runner {
     watch: Watch,
     stopwatch: Stopwatch,
     links: Links,
+    /// Wall-clock time of tasks so far.
+    busy: Duration,
     /// The answer to an assignment, while links are being made.
     ready: Option<ToMaster>,
 }
@@ -59,6 +61,7 @@ impl Runner {
             watch: Watch::default(),
             stopwatch: Stopwatch::new(),
             links,
+            busy: Duration::ZERO,
             ready: None,
         }
     }
@@ -91,6 +94,7 @@ impl Runner {
             self.links.introduce(key, *introduction);
             return Ok(());
         }
+        let job_before = self.watch.place.job;
         self.watch.heard(header, &message)?;
         match message {
             ToWorker::Assign(assign) => {
@@ -98,7 +102,9 @@ impl Runner {
                     self.links.leave("another job begins");
                 }
                 self.ready = None;
-                self.stopwatch = Stopwatch::new();
+                if header.job != job_before {
+                    self.stopwatch = Stopwatch::new();
+                }
                 let neighbours: Vec<u32> = assign.plan.neighbours.iter().map(|n| n.worker).collect();
                 self.links.want(neighbours);
                 self.apply(Event::Message(ToWorker::Assign(assign)))
@@ -162,12 +168,14 @@ impl Runner {
                             runner.links.report(&mut report);
                             runner.send(&ToMaster::Report(Box::new(report)))?;
                         }
-                        runner.send(&message)
+                        let worked = share(runner.busy, runner.machine.work());
+                        runner.send(&message.stamped(worked))
                     })?,
                     Action::SendPeer(to, message) => self.timed(|runner| runner.send_peer(to, message))?,
                     Action::Compute(task) => {
-                        let machine = &mut self.machine;
+                        let (machine, started) = (&mut self.machine, Instant::now());
                         let outcome = catch_unwind(AssertUnwindSafe(|| machine.run(task)));
+                        self.busy += started.elapsed();
                         for lap in self.machine.take_laps() {
                             self.stopwatch.book(self.session.cycle(), lap);
                         }
@@ -190,6 +198,14 @@ impl Runner {
         self.stopwatch.book(cycle, Lap { phase: Phase::Send, from, to: Instant::now() });
         result
     }
+}
+
+/// What tasks took on this host, with the share of contact as the threads' own clocks have it. The wall clock tells that
+/// others want the host's cores too; the clocks of threads do not.
+fn share(busy: Duration, threads: Work) -> Work {
+    let busy = busy.as_nanos() as u64;
+    let contact = busy as f64 * threads.contact_ns as f64 / threads.compute_ns.max(1) as f64;
+    Work { compute_ns: busy, contact_ns: contact as u64 }
 }
 
 /// What a panic said.
@@ -266,6 +282,8 @@ mod tests {
         let orders = protocol::message::Orders {
             next: cycle + 1,
             dt: 1.0,
+            time: 0.0,
+            walls: Vec::new(),
             force_quantum: quantum,
             gather: false,
             collect: false,
@@ -277,7 +295,13 @@ mod tests {
     #[test]
     fn frames_of_another_job_cycle_or_plan_are_named() {
         let place = Place { job: 3, epoch: 0, plan: 8 };
-        let sent = ToMaster::Cycle { cycle: 5, vote: None, partials: Vec::new(), gathered: Vec::new() };
+        let sent = ToMaster::Cycle {
+            cycle: 5,
+            vote: None,
+            partials: Vec::new(),
+            gathered: Vec::new(),
+            busy: Work::default(),
+        };
         let fresh = || {
             let mut watch = Watch { place, plans: VecDeque::new() };
             assert_eq!(watch.said(&sent, 8), place);

@@ -1,7 +1,8 @@
 //! The worker's session: a pure state machine, `apply(event) -> actions`.
 //!
 //! It knows no socket, clock or thread. Computation is an action whose outcome comes back as an event; at most one
-//! is under way. The steps of a cycle, in order: images if ordered; at a plan boundary transfer, all elements, install;
+//! is under way. An assignment of a later epoch replaces the one in hand at any time: the outcome of the task under way
+//! is then thrown away, and the new domain is built when it has come. The steps of a cycle, in order: images if ordered; at a plan boundary transfer, all elements, install;
 //! else contact and border; send; interior; totals; integrate.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -11,6 +12,7 @@ use mechanics::{
     cycle::{Neighbour, Plan},
     exact::Quantum,
     vote::Vote,
+    wall::Pose,
 };
 use protocol::message::{Assign, IMAGE_VERSION, Orders, Route, ToMaster, ToPeer, ToWorker, Work};
 
@@ -59,6 +61,8 @@ pub enum Task {
         dt_previous: f64,
         /// Quantum of forces from now on.
         quantum: Quantum,
+        /// When the cycle begins.
+        time: f64,
     },
     /// Install a plan; contact; partial forces.
     Install {
@@ -77,6 +81,8 @@ pub enum Task {
         dt_previous: f64,
         /// Quantum of forces from now on.
         quantum: Quantum,
+        /// When the cycle begins.
+        time: f64,
         /// Gather positions first.
         gather: bool,
     },
@@ -93,6 +99,8 @@ pub enum Task {
         dt_previous: f64,
         /// The step to take.
         dt: f64,
+        /// Poses of the walls of finite mass in this cycle.
+        walls: Vec<Pose>,
     },
     /// State of all sub-domains.
     Image,
@@ -168,6 +176,13 @@ const MAX_BUFFERED: usize = 2;
 #[derive(Debug)]
 pub struct Session {
     phase: Phase,
+    epoch: u32,
+    /// A task is under way.
+    busy: bool,
+    /// Its outcome is of an epoch or a job that is over.
+    outdated: bool,
+    /// An assignment that waits for that task's end.
+    next: Option<Box<Assign>>,
     cycle: u64,
     first_cycle: u64,
     sort_lag: u64,
@@ -206,6 +221,10 @@ impl Session {
     pub fn new() -> Self {
         Self {
             phase: Phase::Idle,
+            epoch: 0,
+            busy: false,
+            outdated: false,
+            next: None,
             cycle: 0,
             first_cycle: 0,
             sort_lag: 0,
@@ -235,6 +254,11 @@ impl Session {
         self.cycle
     }
 
+    /// The epoch of the assignment in hand; every frame carries it.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
     /// Hash of the plan in force; every frame of a cycle carries it.
     pub fn plan_hash(&self) -> u64 {
         self.plan_hash
@@ -253,10 +277,39 @@ impl Session {
     /// Takes an event, says what to do.
     pub fn apply(&mut self, event: Event) -> Vec<Action> {
         let mut actions = Vec::new();
+        if matches!(event, Event::Done(_)) {
+            self.busy = false;
+            if std::mem::take(&mut self.outdated) {
+                self.after_outdated(&mut actions);
+                return actions;
+            }
+        }
         if let Err(reason) = self.step(event, &mut actions) {
             self.fail(reason, &mut actions);
         }
+        self.busy |= actions.iter().any(|action| matches!(action, Action::Compute(_)));
         actions
+    }
+
+    /// The task of an epoch or a job that is over has come to its end.
+    fn after_outdated(&mut self, actions: &mut Vec<Action>) {
+        match self.next.take() {
+            Some(assign) => self.load(assign, actions),
+            None => actions.push(Action::Forget),
+        }
+    }
+
+    /// Drops all of the job in hand; a task under way goes on, for nothing.
+    fn clear(&mut self) {
+        let (busy, outdated) = (self.busy, self.busy || self.outdated);
+        *self = Self { busy, outdated, ..Self::new() };
+    }
+
+    /// Begins an epoch.
+    fn load(&mut self, assign: Box<Assign>, actions: &mut Vec<Action>) {
+        let prepare = !self.resumed;
+        self.busy = true;
+        actions.push(Action::Compute(Task::Load { assign, prepare }));
     }
 
     fn fail(&mut self, reason: String, actions: &mut Vec<Action>) {
@@ -277,30 +330,40 @@ impl Session {
     fn hear(&mut self, message: ToWorker, actions: &mut Vec<Action>) -> Result<(), String> {
         match message {
             ToWorker::Release => {
-                *self = Self::new();
-                actions.push(Action::Forget);
+                self.clear();
+                if !self.busy {
+                    actions.push(Action::Forget);
+                }
                 Ok(())
             }
-            ToWorker::Assign(assign) => match self.phase {
-                Phase::Idle | Phase::Over => {
-                    *self = Self::new();
-                    self.phase = Phase::Loading;
-                    self.cycle = assign.cycle;
-                    self.first_cycle = assign.cycle;
-                    self.dt_previous = assign.dt_previous;
-                    self.sort_lag = u64::from(assign.setup.control.sort_lag);
-                    self.quantum = Some(assign.quanta.force);
-                    self.n_exchange = assign.plan.exchange.len();
-                    self.route = assign.route;
-                    self.neighbours.clone_from(&assign.plan.neighbours);
-                    self.plan_hash = assign.plan_hash;
-                    self.resumed = assign.cycle > 0;
-                    let prepare = !self.resumed;
-                    actions.push(Action::Compute(Task::Load { assign, prepare }));
-                    Ok(())
+            ToWorker::Assign(assign) => {
+                let free = matches!(self.phase, Phase::Idle | Phase::Over);
+                if !free && assign.epoch <= self.epoch {
+                    return Err(format!(
+                        "an assignment of epoch {} while {:?} in epoch {}: a job is in hand",
+                        assign.epoch, self.phase, self.epoch
+                    ));
                 }
-                phase => Err(format!("an assignment while {phase:?}: a job is in hand")),
-            },
+                self.clear();
+                self.phase = Phase::Loading;
+                self.epoch = assign.epoch;
+                self.cycle = assign.cycle;
+                self.first_cycle = assign.cycle;
+                self.dt_previous = assign.dt_previous;
+                self.sort_lag = u64::from(assign.setup.control.sort_lag);
+                self.quantum = Some(assign.quanta.force);
+                self.n_exchange = assign.plan.exchange.len();
+                self.route = assign.route;
+                self.neighbours.clone_from(&assign.plan.neighbours);
+                self.plan_hash = assign.plan_hash;
+                self.resumed = assign.cycle > 0;
+                if self.busy {
+                    self.next = Some(assign);
+                } else {
+                    self.load(assign, actions);
+                }
+                Ok(())
+            }
             _ if self.phase == Phase::Over || self.phase == Phase::Idle => Ok(()),
             ToWorker::Relayed { from, message } => self.hear_peer(from, message, actions),
             // Links are the runtime's affair.
@@ -401,8 +464,9 @@ impl Session {
                     actions.push(Action::Send(ToMaster::Transfer { cycle: self.cycle, state }));
                 }
                 self.phase = Phase::Elements;
-                let quantum = self.force_quantum()?;
-                actions.push(Action::Compute(Task::Elements { dt_previous: self.dt_previous, quantum }));
+                let (quantum, time) = self.quantum_and_time()?;
+                let dt_previous = self.dt_previous;
+                actions.push(Action::Compute(Task::Elements { dt_previous, quantum, time }));
                 Ok(())
             }
             (Phase::Elements, Outcome::Computed) => {
@@ -412,9 +476,9 @@ impl Session {
             }
             (Phase::Border, Outcome::Forces { partials, gathered }) => {
                 let vote = self.vote.take();
-                let cycle = self.cycle;
+                let (cycle, busy) = (self.cycle, Work::default());
                 if self.route == Route::Master {
-                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered }));
+                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered, busy }));
                 } else {
                     for neighbour in &self.neighbours {
                         let partials = of_nodes(&partials, &neighbour.shared)?;
@@ -422,7 +486,7 @@ impl Session {
                     }
                     self.partials = partials;
                     let partials = Vec::new();
-                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered }));
+                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered, busy }));
                 }
                 if std::mem::take(&mut self.whole) {
                     self.phase = Phase::AwaitTotals;
@@ -448,33 +512,32 @@ impl Session {
     }
 
     /// The orders whose flags act at the start of this cycle.
-    fn flags(&self) -> Result<Orders, String> {
+    fn flags(&self) -> Result<&Orders, String> {
         let before = self.cycle.wrapping_sub(1);
-        self.orders
-            .get(&before)
-            .copied()
-            .ok_or_else(|| format!("no orders for the start of cycle {}", self.cycle))
+        self.orders.get(&before).ok_or_else(|| format!("no orders for the start of cycle {}", self.cycle))
     }
 
-    fn force_quantum(&mut self) -> Result<Quantum, String> {
-        let quantum = self.flags()?.force_quantum;
+    /// The quantum of forces in this cycle, and when it begins.
+    fn quantum_and_time(&mut self) -> Result<(Quantum, f64), String> {
+        let before = self.flags()?;
+        let (quantum, time) = (before.force_quantum, before.time + before.dt);
         self.quantum = Some(quantum);
-        Ok(quantum)
+        Ok((quantum, time))
     }
 
     fn begin_cycle(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let flags = self.flags()?;
+        let Orders { stop, collect, gather, .. } = *self.flags()?;
         while let Some(entry) = self.orders.first_entry()
             && entry.key().wrapping_add(1) < self.cycle
         {
             entry.remove();
         }
-        if (flags.stop || flags.collect) && !self.imaged {
+        if (stop || collect) && !self.imaged {
             self.phase = Phase::Imaging;
             actions.push(Action::Compute(Task::Image));
             return Ok(());
         }
-        if flags.gather {
+        if gather {
             self.boundaries.push_back(self.cycle + self.sort_lag);
         }
         if self.boundaries.front() == Some(&self.cycle) {
@@ -483,12 +546,9 @@ impl Session {
             return self.try_boundary(actions);
         }
         self.phase = Phase::Border;
-        let quantum = self.force_quantum()?;
-        actions.push(Action::Compute(Task::Border {
-            dt_previous: self.dt_previous,
-            quantum,
-            gather: flags.gather,
-        }));
+        let (quantum, time) = self.quantum_and_time()?;
+        let dt_previous = self.dt_previous;
+        actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather }));
         Ok(())
     }
 
@@ -531,16 +591,18 @@ impl Session {
 
     /// A worker that shares no node needs only the orders of the cycle before.
     fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let Some(orders) = self.orders.get(&self.cycle).copied() else { return Ok(()) };
+        let Some(orders) = self.orders.get(&self.cycle) else { return Ok(()) };
+        let (dt, walls) = (orders.dt, orders.walls.clone());
         let totals = match self.route {
             _ if self.n_exchange == 0 => Some(Vec::new()),
             Route::Master => self.totals_of_master()?,
             Route::Direct => self.totals_of_peers()?,
         };
         let Some(totals) = totals else { return Ok(()) };
-        self.dt = orders.dt;
+        self.dt = dt;
         self.phase = Phase::Integrating;
-        actions.push(Action::Compute(Task::Integrate { totals, dt_previous: self.dt_previous, dt: self.dt }));
+        let dt_previous = self.dt_previous;
+        actions.push(Action::Compute(Task::Integrate { totals, dt_previous, dt, walls }));
         Ok(())
     }
 

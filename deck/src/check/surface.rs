@@ -11,6 +11,9 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Face {
     pub(crate) part: u32,
+    /// Global element, and which of its faces in the order of [`mechanics::mesh::FACES`], which is not that of ours.
+    pub(crate) element: u32,
+    pub(crate) side: u8,
     /// Global nodes, outward by the right hand.
     pub(crate) nodes: [u32; 4],
     /// Whether another part has the same face: joined bodies touch there and contact does not see it.
@@ -21,6 +24,8 @@ pub(crate) struct Face {
 pub(crate) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
     let mut keyed: Vec<([u32; 4], u64, Face)> = Vec::new();
     let mut order = 0;
+    let offsets = assembly.mesh.element_offsets();
+    let side = FACES.map(side_of);
     for (p, part) in assembly.mesh.parts.iter().enumerate() {
         let first = keyed.len();
         for e in 0..part.n_elements() {
@@ -32,9 +37,14 @@ pub(crate) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
                     continue;
                 }
                 let nodes = face.map(|c| corners[c]);
+                let element = (offsets[p] + e) as u32;
                 let mut key = nodes;
                 key.sort_unstable();
-                keyed.push((key, order, Face { part: p as u32, nodes, inside: false }));
+                keyed.push((
+                    key,
+                    order,
+                    Face { part: p as u32, element, side: side[f], nodes, inside: false },
+                ));
                 order += 1;
             }
         }
@@ -54,6 +64,17 @@ pub(crate) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
     }
     keyed.sort_unstable_by_key(|(_, order, _)| *order);
     keyed.into_iter().map(|(_, _, face)| face).collect()
+}
+
+/// The index into [`mechanics::mesh::FACES`] of the face with these corners.
+fn side_of(mut corners: [usize; 4]) -> u8 {
+    corners.sort_unstable();
+    let same = |face: &[usize; 4]| {
+        let mut other = *face;
+        other.sort_unstable();
+        other == corners
+    };
+    mechanics::mesh::FACES.iter().position(same).expect("a hexahedron has six faces") as u8
 }
 
 /// Whether face `f` of element `e` of a grid lies on the grid's side.

@@ -1,39 +1,52 @@
-//! `[[boundary]]` and `[[wall]]`: prescribed velocities by node, rigid planes by part.
+//! `[[boundary]]`: prescribed velocities by node, faces that transmit.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use mechanics::setup::{Constraint, RigidWall};
+use mechanics::{
+    load::{Drive, Loads, SurfaceKind, SurfaceLoad},
+    setup::Constraint,
+    wall::RigidWall,
+};
 
-use super::{MAX_ENTRIES, Names, PartDraft};
+use super::{MAX_ENTRIES, Names, PartDraft, curve::Curves, load, wall};
 use crate::{
     assembly::Assembly,
-    fault::short,
+    check::outer_faces,
     geometry::{dot, norm, scaled, sub},
     table::{Range, Table, Value},
 };
 
 /// Distance at which a node counts as on a plane or inside a box, over the smallest edge of its part.
-const ON_PLANE: f64 = 1e-3;
+pub(super) const ON_PLANE: f64 = 1e-3;
 
-const TYPES: [&str; 3] = ["fixed", "velocity", "symmetry"];
+const TYPES: [&str; 4] = ["fixed", "velocity", "symmetry", "transmit"];
 
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Constraints and walls of the deck.
+/// Constraints, walls and loads of the deck.
 pub(crate) struct Conditions {
     pub(crate) constraints: Vec<Constraint>,
     pub(crate) constraint: Vec<u16>,
     pub(crate) walls: Vec<RigidWall>,
+    pub(crate) loads: Loads,
 }
 
 /// One `[[boundary]]`: what it prescribes and where it stands.
 struct Boundary {
     at: usize,
-    velocity: [Option<f64>; 3],
+    velocity: Prescribed,
 }
 
-/// Reads boundaries and walls.
+/// A drive as a key: bits of the factor, and the curve.
+type DriveBits = Option<(u64, Option<u32>)>;
+
+/// Velocities by axis.
+type Prescribed = [Option<Drive>; 3];
+
+/// Reads boundaries, walls and loads.
 pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembly: &Assembly) -> Conditions {
+    let curves = Curves::read(deck);
+    let mut loads = load::read(deck, names, parts, assembly, &curves);
     let mut boundaries: Vec<Boundary> = Vec::new();
     // By node and axis: the boundary that prescribes it.
     let mut prescribed: BTreeMap<u32, [Option<usize>; 3]> = BTreeMap::new();
@@ -41,10 +54,18 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembl
     let mut conflicts: BTreeMap<(usize, usize, usize), (u32, usize)> = BTreeMap::new();
     for table in deck.tables("boundary", MAX_ENTRIES) {
         let at = table.at;
-        let kind = table.require("type", "one of fixed, velocity, symmetry").and_then(|v| v.one_of(&TYPES));
+        let kind = table
+            .require("type", "one of fixed, velocity, symmetry, transmit")
+            .and_then(|v| v.one_of(&TYPES));
         // Which keys belong depends on the type, so without one none is called unknown.
         let Some(kind) = kind else { continue };
-        let read = read_boundary(&table, TYPES[kind], names, parts, assembly);
+        if TYPES[kind] == "transmit" {
+            let faces = read_faces(&table, names, parts, assembly);
+            table.finish();
+            loads.list.surfaces.push(SurfaceLoad { kind: SurfaceKind::Transmit, faces });
+            continue;
+        }
+        let read = read_boundary(&table, TYPES[kind], names, parts, assembly, &curves);
         table.finish();
         let Some((velocity, nodes)) = read else { continue };
         let this = boundaries.len();
@@ -65,7 +86,7 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembl
         }
     }
     for ((first, second, axis), (node, count)) in conflicts {
-        let value = |b: usize| boundaries[b].velocity[axis].unwrap_or_default();
+        let value = |b: usize| boundaries[b].velocity[axis].map(|v| curves.words(v)).unwrap_or_default();
         let (line, _) = deck.faults.place(boundaries[first].at);
         deck.faults.add(
             boundaries[second].at,
@@ -80,13 +101,15 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembl
             "take the nodes out of one of the two",
         );
     }
-    let (constraints, constraint) = number(deck, &boundaries, &prescribed, assembly.mesh.n_nodes());
+    let (constraints, constraint) =
+        number(deck, &boundaries, &prescribed, &loads.forces, assembly.mesh.n_nodes());
     let walls = deck
         .tables("wall", MAX_ENTRIES)
         .into_iter()
-        .filter_map(|table| read_wall(table, names, assembly))
+        .filter_map(|table| wall::read(table, names, assembly, &curves))
         .collect();
-    Conditions { constraints, constraint, walls }
+    let loads = Loads { curves: curves.list, ..loads.list };
+    Conditions { constraints, constraint, walls, loads }
 }
 
 /// Numbers the different constraints; entry 0 is free.
@@ -94,33 +117,37 @@ fn number(
     deck: &Table<'_>,
     boundaries: &[Boundary],
     prescribed: &BTreeMap<u32, [Option<usize>; 3]>,
+    forces: &BTreeMap<u32, u32>,
     n_nodes: usize,
 ) -> (Vec<Constraint>, Vec<u16>) {
     let mut list = vec![Constraint::default()];
-    let mut known: BTreeMap<[Option<u64>; 3], u16> = BTreeMap::new();
+    let mut known: BTreeMap<([DriveBits; 3], u32), u16> = BTreeMap::new();
     let mut of_node = vec![0u16; n_nodes];
-    for (node, held) in prescribed {
+    let nodes: BTreeSet<u32> = prescribed.keys().chain(forces.keys()).copied().collect();
+    for node in nodes {
+        let held = prescribed.get(&node).copied().unwrap_or_default();
+        let forces = forces.get(&node).copied().unwrap_or_default();
         let velocity = [0, 1, 2].map(|axis| held[axis].and_then(|b| boundaries[b].velocity[axis]));
-        let key = velocity.map(|v| v.map(f64::to_bits));
+        let key = (velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve))), forces);
         let next = list.len();
         let index = match known.get(&key) {
             Some(index) => *index,
             None => {
                 let Ok(index) = u16::try_from(next) else {
                     deck.faults.add(
-                        boundaries[0].at,
+                        boundaries.first().map_or(0, |boundary| boundary.at),
                         format!("more than {} different constraints", u16::MAX),
                         "fewer",
-                        "prescribe the same velocities to more nodes",
+                        "give more nodes the same velocities and forces",
                     );
                     return (list, of_node);
                 };
-                list.push(Constraint { velocity, walls: 0 });
+                list.push(Constraint { velocity, walls: 0, forces });
                 known.insert(key, index);
                 index
             }
         };
-        of_node[*node as usize] = index;
+        of_node[node as usize] = index;
     }
     (list, of_node)
 }
@@ -132,7 +159,8 @@ fn read_boundary(
     names: &Names,
     parts: &[PartDraft],
     assembly: &Assembly,
-) -> Option<([Option<f64>; 3], Vec<u32>)> {
+    curves: &Curves,
+) -> Option<(Prescribed, Vec<u32>)> {
     let selected = names.of_table(table);
     // A part that could not be read has no nodes to select; that is no second fault.
     let broken = selected.is_empty() || selected.iter().any(|&p| parts[p].block.is_none());
@@ -142,12 +170,12 @@ fn read_boundary(
             let place = table.number_or("at", 0.0, Range::Any);
             let axis = axis?;
             let mut velocity = [None; 3];
-            velocity[axis] = Some(0.0);
+            velocity[axis] = Some(Drive::constant(0.0));
             let nodes = choose(assembly, &selected, |x, near| (x[axis] - place).abs() <= near);
             (velocity, nodes)
         }
         kind => {
-            let velocity = if kind == "fixed" { read_axes(table) } else { read_velocity(table) };
+            let velocity = if kind == "fixed" { read_axes(table) } else { read_velocity(table, curves) };
             let nodes = read_nodes(table, &selected, assembly);
             (velocity?, nodes?)
         }
@@ -164,13 +192,13 @@ fn read_boundary(
 }
 
 /// `axes = "xy"`: zero velocity on those; all three where it is absent.
-fn read_axes(table: &Table<'_>) -> Option<[Option<f64>; 3]> {
-    let Some(value) = table.get("axes") else { return Some([Some(0.0); 3]) };
+fn read_axes(table: &Table<'_>) -> Option<Prescribed> {
+    let Some(value) = table.get("axes") else { return Some([Some(Drive::constant(0.0)); 3]) };
     let text = value.text()?;
     let mut velocity = [None; 3];
     for c in text.chars() {
         match AXES.iter().position(|axis| axis.starts_with(c)) {
-            Some(axis) => velocity[axis] = Some(0.0),
+            Some(axis) => velocity[axis] = Some(Drive::constant(0.0)),
             None => {
                 value.fault("some of the letters x, y, z", "write for instance \"xz\"");
                 return None;
@@ -184,15 +212,15 @@ fn read_axes(table: &Table<'_>) -> Option<[Option<f64>; 3]> {
     Some(velocity)
 }
 
-/// `velocity = { x = 1.0, z = 0.0 }`: the axes not named stay free.
-fn read_velocity(table: &Table<'_>) -> Option<[Option<f64>; 3]> {
+/// `velocity = { x = 1.0, z = { curve = "name" } }`: the axes not named stay free.
+pub(super) fn read_velocity(table: &Table<'_>, curves: &Curves) -> Option<Prescribed> {
     let value = table.require("velocity", "a table of components such as { x = 1.0 }")?;
     let components = value.table(format!("velocity of {}", table.title))?;
     let mut velocity = [None; 3];
     let mut faulty = false;
     for (axis, name) in AXES.into_iter().enumerate() {
         if let Some(component) = components.get(name) {
-            velocity[axis] = component.number(Range::Any);
+            velocity[axis] = curves.drive(component);
             faulty |= velocity[axis].is_none();
         }
     }
@@ -205,7 +233,7 @@ fn read_velocity(table: &Table<'_>) -> Option<[Option<f64>; 3]> {
 }
 
 /// The nodes of a boundary: all of its parts, or those of one face, box, plane or list.
-fn read_nodes(table: &Table<'_>, selected: &[usize], assembly: &Assembly) -> Option<Vec<u32>> {
+pub(super) fn read_nodes(table: &Table<'_>, selected: &[usize], assembly: &Assembly) -> Option<Vec<u32>> {
     const WAYS: [&str; 4] = ["face", "box", "plane", "nodes"];
     let given: Vec<(&str, Value<'_>)> = WAYS.iter().filter_map(|w| table.get(w).map(|v| (*w, v))).collect();
     match given[..] {
@@ -222,7 +250,7 @@ fn read_nodes(table: &Table<'_>, selected: &[usize], assembly: &Assembly) -> Opt
         }
         [("plane", value)] => {
             let plane = value.table(format!("plane of {}", table.title))?;
-            let (point, normal) = (plane.vector("point"), read_normal(&plane));
+            let (point, normal) = (plane.vector("point"), read_direction(&plane, "normal"));
             plane.finish();
             let (point, normal) = (point?, normal?);
             Some(choose(assembly, selected, |x, near| dot(sub(x, point), normal).abs() <= near))
@@ -293,47 +321,45 @@ fn choose(assembly: &Assembly, selected: &[usize], fits: impl Fn([f64; 3], f64) 
     nodes
 }
 
-/// A normal of any length, made one of unit length.
-fn read_normal(table: &Table<'_>) -> Option<[f64; 3]> {
-    let value = table.require("normal", "[x, y, z]")?;
+/// A direction of any length, made one of unit length.
+pub(super) fn read_direction(table: &Table<'_>, key: &'static str) -> Option<[f64; 3]> {
+    let value = table.require(key, "[x, y, z]")?;
     let normal = value.vector()?;
     let long = norm(normal);
     if long > 0.0 && long.is_finite() {
         return Some(scaled(normal, 1.0 / long));
     }
-    value.fault("a normal of some length", "give a direction such as [0, 0, 1]");
+    value.fault(
+        &format!("{} {key} of some length", if key == "axis" { "an" } else { "a" }),
+        "give a direction such as [0, 0, 1]",
+    );
     None
 }
 
-/// One `[[wall]]`; a part that starts behind it is a fault.
-fn read_wall(table: Table<'_>, names: &Names, assembly: &Assembly) -> Option<RigidWall> {
-    let point = table.vector("point");
-    let normal = read_normal(&table);
-    let friction = table.number_or("friction", 0.0, Range::NotNegative);
-    let selected = names.of_table(&table);
-    let (at, title, faults) = (table.at, table.title.clone(), table.faults);
-    table.finish();
-    let (point, normal) = (point?, normal?);
-    let mut parts = vec![false; names.len()];
-    for &p in &selected {
-        parts[p] = true;
-        let part = &assembly.mesh.parts[p];
-        let height = |node: u32| dot(sub(assembly.mesh.positions[node as usize], point), normal);
-        let deepest = part.nodes.iter().copied().min_by(|a, b| height(*a).total_cmp(&height(*b)));
-        let Some(deepest) = deepest else { continue };
-        if height(deepest) < -ON_PLANE * assembly.smallest_edge[p] {
-            faults.add(
-                at,
-                format!(
-                    "{title} with node {} of part \"{}\" {} behind it",
-                    assembly.mesh.node_ids[deepest as usize],
-                    part.name,
-                    short(-height(deepest))
-                ),
-                "every node on the side of the normal",
-                "turn the normal, move the wall or the part, or leave the part out of parts",
-            );
-        }
+/// The outer faces of the parts of a table whose nodes it selects; none is a fault.
+pub(super) fn read_faces(
+    table: &Table<'_>,
+    names: &Names,
+    parts: &[PartDraft],
+    assembly: &Assembly,
+) -> Vec<(u32, u8)> {
+    let selected = names.of_table(table);
+    let broken = selected.is_empty() || selected.iter().any(|&p| parts[p].block.is_none());
+    let Some(nodes) = read_nodes(table, &selected, assembly) else { return Vec::new() };
+    let outer = outer_faces(assembly);
+    let chosen = outer.iter().filter(|face| {
+        !face.inside
+            && selected.contains(&(face.part as usize))
+            && face.nodes.iter().all(|n| nodes.binary_search(n).is_ok())
+    });
+    let faces: Vec<(u32, u8)> = chosen.map(|face| (face.element, face.side)).collect();
+    if faces.is_empty() && !broken {
+        table.faults.add(
+            table.at,
+            format!("{} that holds no face", table.title),
+            "at least one outer face with all its nodes",
+            "check parts, face, box, plane or nodes against the mesh",
+        );
     }
-    Some(RigidWall { point, normal, friction, parts })
+    faces
 }

@@ -1,6 +1,6 @@
 //! `[contact]`: gap, slack, which parts meet, friction.
 
-use mechanics::{contact::Settings, material::Material};
+use mechanics::{contact::Settings, load::Drive, material::Material, setup::Constraint, wall::Motion};
 
 use super::{MAX_CONTACT_PARTS, MAX_ENTRIES, Names, boundary::Conditions};
 use crate::{
@@ -170,9 +170,16 @@ fn read_gap(table: &Table<'_>, smallest: Option<f64>) -> Option<f64> {
 /// rest where there is a wall or one part only); where nothing moves, 1e-5 of the largest sound speed.
 fn default_friction_velocity(assembly: &Assembly, materials: &[Material], conditions: &Conditions) -> f64 {
     let mut velocities = assembly.part_velocity.clone();
-    velocities
-        .extend(conditions.constraints.iter().skip(1).map(|c| c.velocity.map(Option::unwrap_or_default)));
-    if !conditions.walls.is_empty() || velocities.len() == 1 {
+    // At its greatest, where it follows a curve.
+    let speed = |v: Drive| v.greatest(&conditions.loads.curves).copysign(v.factor);
+    let of_constraint = |c: &Constraint| c.velocity.map(|v| v.map_or(0.0, speed));
+    velocities.extend(conditions.constraints.iter().skip(1).map(of_constraint));
+    velocities.extend(conditions.walls.iter().map(|wall| match wall.motion {
+        Motion::Fixed => [0.0; 3],
+        Motion::Driven(velocity) => velocity.map(speed),
+        Motion::Free { velocity, .. } => velocity,
+    }));
+    if velocities.len() == 1 {
         velocities.push([0.0; 3]);
     }
     // The largest difference is found per axis: its ends are the extremes.

@@ -1,18 +1,14 @@
 //! Images of all sub-domains become a state, a snapshot or the end of the run.
 
-use mechanics::{block::Piece, exact::Quantum, piece, vote::Vote};
+use std::sync::Arc;
 
-use super::Job;
-use crate::{event::Action, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot};
-/// What a snapshot holds beside the state, as it was when its cycle was complete.
-pub(super) struct SnapshotRest {
-    pub(super) dt_previous: f64,
-    pub(super) dt: f64,
-    pub(super) force_quantum: Quantum,
-    pub(super) vote: Vote,
-    pub(super) ledger: Ledger,
-    pub(super) rows: Vec<HistoryRow>,
-}
+use mechanics::{block::Piece, piece, state::GlobalState, vote::Vote};
+
+use super::{
+    Job,
+    epoch::{Base, Halves},
+};
+use crate::{event::Action, snapshot::Snapshot};
 
 /// An image on its way.
 pub(super) struct Collecting {
@@ -30,8 +26,8 @@ impl Job {
         last: Option<Box<Vote>>,
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
-        let n = self.n_workers;
-        let collecting = self.collecting.entry(cycle).or_insert_with(|| Collecting {
+        let n = self.epoch.n();
+        let collecting = self.epoch.collecting.entry(cycle).or_insert_with(|| Collecting {
             pieces: Vec::new(),
             arrived: vec![false; n],
             vote: None,
@@ -49,43 +45,88 @@ impl Job {
         if !collecting.arrived.iter().all(|a| *a) {
             return Ok(());
         }
-        let Some(collected) = self.collecting.remove(&cycle) else { return Ok(()) };
-        let mut state = self.state.clone();
+        let Some(collected) = self.epoch.collecting.remove(&cycle) else { return Ok(()) };
+        let mut state = GlobalState::clone(&self.base.state);
         for piece in &collected.pieces {
             piece::put_back(piece, &mut state)?;
         }
         state.cycle = cycle;
-        state.time = self.image_times.remove(&cycle).ok_or_else(|| {
+        let (time, due) = self.epoch.image_times.remove(&cycle).ok_or_else(|| {
             format!("worker {worker} sends an image of cycle {cycle}, which nobody asked for")
         })?;
-        if let Some(vote) = collected.vote {
-            if cycle > self.first_cycle {
-                self.book(cycle - 1, &vote, actions);
-                if !(cycle - 1).is_multiple_of(u64::from(self.model.output.history_cycles.max(1))) {
-                    self.row(actions);
+        state.time = time;
+        match collected.vote {
+            Some(vote) if self.epoch.pauses => {
+                self.book_last(cycle, &vote, actions);
+                if self.failure.is_some() {
+                    return self.end_with(state, actions);
                 }
+                if due {
+                    actions.push(Action::State(Box::new(state.clone())));
+                }
+                self.paused(state, vote, actions)
             }
-            actions.push(Action::State(Box::new(state.clone())));
-            self.finish(Some(state), actions);
-            return Ok(());
+            Some(vote) => {
+                self.book_last(cycle, &vote, actions);
+                self.end_with(state, actions)
+            }
+            None => {
+                if due {
+                    actions.push(Action::State(Box::new(state.clone())));
+                }
+                if let Some(halves) = self.epoch.halves.get_mut(&cycle) {
+                    halves.state = Some(state);
+                    self.complete_base(cycle, actions);
+                }
+                Ok(())
+            }
         }
-        if self.options.snapshot_at == Some(cycle) {
-            self.snapshot_state = Some(state.clone());
-            self.snapshot(actions);
+    }
+
+    /// Books the vote of the cycle before a stop.
+    fn book_last(&mut self, cycle: u64, vote: &Vote, actions: &mut Vec<Action>) {
+        if cycle > self.epoch.first_cycle {
+            self.book(cycle - 1, vote, actions);
         }
-        if self.options.states {
-            actions.push(Action::State(Box::new(state)));
+    }
+
+    /// The run ends with this state; its last cycle has a row in any case.
+    pub(super) fn end_with(&mut self, state: GlobalState, actions: &mut Vec<Action>) -> Result<(), String> {
+        let last = self.rows.last().map(|row| row.cycle);
+        if state.cycle > self.first_cycle && last != Some(state.cycle - 1) {
+            self.row(actions);
         }
+        actions.push(Action::State(Box::new(state.clone())));
+        self.finish(Some(state), actions);
         Ok(())
     }
 
-    /// Stores the snapshot once both halves of it are here.
-    pub(super) fn snapshot(&mut self, actions: &mut Vec<Action>) {
-        if let (Some(_), Some(_)) = (&self.snapshot_state, &self.snapshot_rest)
-            && let (Some(state), Some(rest)) = (self.snapshot_state.take(), self.snapshot_rest.take())
-        {
-            let SnapshotRest { dt_previous, dt, force_quantum, vote, ledger, rows } = rest;
-            let snapshot = Snapshot { state, dt_previous, dt, force_quantum, vote, ledger, rows };
+    /// The newest base, once both halves of it are here; and to the disk where that was asked for.
+    pub(super) fn complete_base(&mut self, cycle: u64, actions: &mut Vec<Action>) {
+        let Some(Halves { state: Some(_), rest: Some(_) }) = self.epoch.halves.get(&cycle) else { return };
+        let Some(Halves { state: Some(state), rest: Some(rest) }) = self.epoch.halves.remove(&cycle) else {
+            return;
+        };
+        self.base = Arc::new(Base { state: Arc::new(state), rest });
+        self.store(cycle, actions);
+    }
+
+    /// Stores the base if it is the one that was asked for.
+    pub(super) fn store(&self, cycle: u64, actions: &mut Vec<Action>) {
+        let Base { state, rest } = &*self.base;
+        let (Some(vote), Some(dt)) = (rest.vote.clone(), rest.dt) else { return };
+        if self.options.snapshot_at == Some(cycle) {
+            let snapshot = Snapshot {
+                state: GlobalState::clone(state),
+                dt_previous: rest.dt_previous,
+                dt,
+                force_quanta: rest.quanta,
+                spread_rate: rest.spread_rate,
+                vote,
+                walls: rest.walls.clone(),
+                ledger: rest.ledger.clone(),
+                rows: self.rows[..rest.n_rows].to_vec(),
+            };
             actions.push(Action::Snapshot(Box::new(snapshot)));
         }
     }

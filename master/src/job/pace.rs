@@ -1,10 +1,10 @@
 //! The pace of a run: time steps, sorts, images and the end, from the votes of whole cycles.
 
-use mechanics::{contact::reach, exact::Quantum, vote::Vote};
+use mechanics::{contact::reach, exact::Quantum, vote::Vote, wall::Motion};
 use protocol::message::Orders;
 
-use super::Job;
-use crate::event::Limit;
+use super::{Job, start::output_after};
+use crate::event::{Action, Keep, Limit};
 /// Part of the slack kept free for a rate of spread that rises between the trigger of a sort and the cycle it acts at:
 /// surfaces that shake change it threefold in a few cycles.
 const SPREAD_MARGIN: f64 = 0.25;
@@ -12,45 +12,96 @@ const SPREAD_MARGIN: f64 = 0.25;
 const TRAVEL_VOTE: f64 = 0.16;
 
 impl Job {
-    /// The orders that give `dt` of cycle `next`, which ends at `time_after`, and what happens then. `vote` is of the
+    /// The orders that give `dt` of cycle `next`, from `time` to `time_after`, and what happens then. Walls of finite mass
+    /// are where they are in that cycle. `vote` is of the
     /// cycle two before the sort that it may trigger could gather.
-    pub(super) fn orders_for(&mut self, next: u64, dt: f64, time_after: f64, vote: Option<&Vote>) -> Orders {
+    pub(super) fn orders_for(
+        &mut self,
+        next: u64,
+        dt: f64,
+        [time, time_after]: [f64; 2],
+        vote: Option<&Vote>,
+        actions: &mut Vec<Action>,
+    ) -> Orders {
         let control = self.model.setup.control;
         let after = next + 1;
-        if self.stop_at.is_none()
-            && (self.stop_asked
+        if self.epoch.stop_at.is_none() {
+            let ends = self.stop_asked
                 || self.failure.is_some()
                 || time_after >= control.end_time
-                || after >= control.end_cycle)
-        {
-            self.stop_at = Some(after);
+                || after >= control.end_cycle;
+            let pauses = !ends && self.is_boundary(after) && self.wants_next_epoch(after);
+            if ends || pauses {
+                self.epoch.stop_at = Some(after);
+                self.epoch.pauses = pauses;
+            }
         }
-        let stop = self.stop_at == Some(after);
-        let mut collect = stop || self.options.snapshot_at == Some(after);
-        if self.options.states
-            && let (Some(due), Some(period)) = (self.next_state_time, self.model.output.period)
-            && time_after >= due
-        {
-            collect = true;
-            self.next_state_time = Some(((time_after / period).floor() + 1.0) * period);
+        let stop = self.epoch.stop_at == Some(after);
+        let due = match (self.epoch.next_state_time, self.model.output.period) {
+            (Some(due), Some(period)) if self.options.states && time_after >= due => {
+                self.epoch.next_state_time = Some(output_after(time_after, period));
+                true
+            }
+            _ => false,
+        };
+        let keep = self.epoch.stop_at.is_none() && self.base_due(after, actions);
+        if keep {
+            self.epoch.halves.entry(after).or_default();
         }
+        let collect = stop || due || keep;
         if collect {
-            self.image_times.insert(after, time_after);
+            self.epoch.image_times.insert(after, (time_after, due));
         }
         let gather = !stop && self.sort_due(after, vote);
         if gather {
-            self.sorts_under_way.push_back(after);
-            self.last_gather = after;
+            self.epoch.sorts_under_way.push_back(after);
+            self.epoch.last_gather = after;
         }
-        Orders { next, dt, force_quantum: self.quanta.force, gather, collect, stop }
+        let (walls, force_quantum) = (self.walls.clone(), self.epoch.quantum);
+        Orders { next, dt, time, walls, force_quantum, gather, collect, stop }
+    }
+
+    /// Plan boundaries are the cycles at which plans begin to act, and at latest every so many.
+    fn is_boundary(&self, cycle: u64) -> bool {
+        let control = self.model.setup.control;
+        let lag = u64::from(control.sort_lag);
+        let epoch = &self.epoch;
+        cycle.is_multiple_of(u64::from(control.plan_interval.max(1)))
+            || epoch.sorts_under_way.iter().any(|gathered| gathered + lag == cycle)
+            || epoch.exchanges.iter().any(|acting| acting.at == cycle)
+    }
+
+    /// Whether the epoch is to end at a boundary.
+    fn wants_next_epoch(&mut self, boundary: u64) -> bool {
+        boundary > self.epoch.first_cycle && (self.has_newcomers() || self.wants_other_speeds(boundary))
+    }
+
+    /// Whether the state at the start of a cycle is to be kept, to go back to.
+    fn base_due(&mut self, cycle: u64, actions: &mut Vec<Action>) -> bool {
+        let due = match self.options.keep {
+            Keep::Never => false,
+            Keep::Seconds(seconds) => {
+                let due = self.keep_due && self.is_boundary(cycle);
+                if due {
+                    self.keep_due = false;
+                    actions.push(Action::Timer(seconds));
+                }
+                due
+            }
+            Keep::Cycles(n) => cycle >= self.epoch.last_base + n && self.is_boundary(cycle),
+        };
+        if due {
+            self.epoch.last_base = cycle;
+        }
+        due || self.options.snapshot_at == Some(cycle)
     }
 
     /// Whether positions travel at the start of cycle `cycle`, so that a sort acts a lag later.
     pub(super) fn sort_due(&mut self, cycle: u64, vote: Option<&Vote>) -> bool {
-        let (Some(_), Some(settings)) = (&self.bench, &self.model.setup.contact) else { return false };
+        let (Some(_), Some(settings)) = (&self.epoch.bench, &self.model.setup.contact) else { return false };
         let lag = u64::from(self.model.setup.control.sort_lag);
-        let waiting = self.exchanges.iter().filter(|(acts_at, _)| *acts_at > self.completed).count();
-        let in_flight = self.sorts_under_way.len() + waiting;
+        let waiting = self.epoch.exchanges.iter().filter(|acting| acting.at > self.epoch.completed).count();
+        let in_flight = self.epoch.sorts_under_way.len() + waiting;
         if in_flight as u64 > 2 * lag + 2 {
             return false;
         }
@@ -59,15 +110,15 @@ impl Job {
         }
         let Some(vote) = vote else { return false };
         // Positions were those of two cycles before `cycle`; the sort acts `lag` cycles after it.
-        let added = (lag + 3) as f64 * self.spread_rate;
-        let measured = self.references[0].0 < self.completed && in_flight == 0;
+        let added = (lag + 3) as f64 * self.epoch.spread_rate;
+        let measured = self.epoch.references[0].0 < self.epoch.completed && in_flight == 0;
         let (spread, margin) = if measured {
             let (spread, _) = reach::worst_spread(&vote.extents, settings);
             (spread, (0.5 * added).max(SPREAD_MARGIN * settings.slack))
         } else {
             // Until votes are against the newest sorted positions, the rate says how far bodies are from those: bodies
             // that close in at the travel limit from both sides need the next sort before this one acts.
-            (self.spread_rate * cycle.saturating_sub(self.last_gather) as f64, 0.0)
+            (self.epoch.spread_rate * cycle.saturating_sub(self.epoch.last_gather) as f64, 0.0)
         };
         spread + added + margin > settings.slack
     }
@@ -84,17 +135,30 @@ impl Job {
         offer(control.safety_factor * vote.courant, Limit::Courant, Some(vote.courant_element));
         offer(vote.volume_limit, Limit::Volume, None);
         offer(vote.contact_limit, Limit::Contact, None);
-        if let Some(contact) = &self.model.setup.contact
-            && vote.contact_speed_ahead > 0.0
-        {
-            offer(TRAVEL_VOTE * contact.gap / vote.contact_speed_ahead, Limit::Travel, None);
+        if let Some(contact) = &self.model.setup.contact {
+            // A wall may bring a node to its own speed within a cycle.
+            let speed = vote.contact_speed_ahead.max(self.wall_speed());
+            if speed > 0.0 {
+                offer(TRAVEL_VOTE * contact.gap / speed, Limit::Travel, None);
+            }
         }
         best
     }
 
+    /// The greatest speed of a wall: that prescribed at any time, or that of now.
+    fn wall_speed(&self) -> f64 {
+        let setup = &self.model.setup;
+        let driven = setup.walls.iter().filter_map(|wall| match wall.motion {
+            Motion::Driven(velocity) => Some(velocity.map(|v| v.greatest(&setup.loads.curves))),
+            _ => None,
+        });
+        let free = self.walls.iter().map(|[_, velocity]| *velocity);
+        driven.chain(free).map(|v| v.iter().map(|c| c * c).sum::<f64>().sqrt()).fold(0.0, f64::max)
+    }
+
     /// Forces nearing the bound of exact sums ask for a coarser quantum.
     pub(super) fn rescaled(&self, vote: &Vote) -> Result<Option<Quantum>, String> {
-        let quantum = self.quanta.force;
+        let quantum = self.epoch.quantum;
         if vote.force_bound > quantum.term_bound() || !vote.force_bound.is_finite() {
             return Err(format!(
                 "a force of up to {:e}, exact sums hold {:e}; the run has blown up or needs a smaller time step",
@@ -113,11 +177,11 @@ impl Job {
         if !spread.is_finite() {
             return;
         }
-        let [newest, before] = self.references;
+        let [newest, before] = self.epoch.references;
         let (acts_at, gathered_at) = if newest.0 <= cycle { newest } else { before };
         let age = (cycle + 1).saturating_sub(gathered_at).max(1);
-        let step = if acts_at < cycle { spread - self.last_spread } else { 0.0 };
-        self.spread_rate = step.max(spread / age as f64);
-        self.last_spread = spread;
+        let step = if acts_at < cycle { spread - self.epoch.last_spread } else { 0.0 };
+        self.epoch.spread_rate = step.max(spread / age as f64);
+        self.epoch.last_spread = spread;
     }
 }

@@ -1,4 +1,4 @@
-//! From a problem and its workers to the first assignments.
+//! From a problem and its workers to their assignments: at the start of a run, and of each epoch of it.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -8,27 +8,41 @@ use std::{
 use deck::model::Model;
 use mechanics::{
     block::Piece,
-    contact::{Exclusions, Surface, initial_pairs},
+    contact::{Census, Exclusions, Surface, initial_pairs},
     cycle::Subdomain,
     initial,
     mesh::Mesh,
     piece,
+    state::GlobalState,
     vote::Quanta,
+    wall,
 };
 use protocol::{
     message::{Assign, ToWorker, Work},
     phase::Report,
 };
 
-use super::{Bench, Job};
+use super::{
+    Bench, Job,
+    epoch::{Acting, Base, Epoch, Member, Rest, Step},
+    measure::{Meter, Patience},
+};
 use crate::{
-    decompose::decompose,
-    event::{Action, Hand, Options},
+    balance::INTERACTIONS_PER_ELEMENT,
+    decompose::{self, decompose},
+    event::{Action, Deal, Hand, Keep, Options},
     exchange::{Exchange, Holdings},
     ledger::Ledger,
     snapshot::Snapshot,
     sort::Sorter,
 };
+
+/// What of the contact stays the same in all epochs.
+pub(super) struct Touching {
+    surface: Arc<Surface>,
+    exclusions: Arc<Exclusions>,
+}
+
 impl Job {
     /// Takes a problem to these workers: from its deck, or from a snapshot of it.
     ///
@@ -47,27 +61,43 @@ impl Job {
         let mut constraint = model.constraint.clone();
         initial::bind_walls(&model.mesh, &mut setup, &mut constraint)?;
         let start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
-        let fresh_quanta = initial::quanta(&model.mesh, &setup, &start);
-        let (state, quanta, ledger, rows, steps, vote_before) = match resume {
+        let quanta = initial::quanta(&model.mesh, &setup, &start);
+        let (base, rows) = match resume {
             None => {
                 let ledger = Ledger::new(&model, &start.mass);
-                (start, fresh_quanta, ledger, Vec::new(), BTreeMap::new(), None)
+                let rest = Rest {
+                    dt_previous: 0.0,
+                    dt: None,
+                    quanta: [quanta.force; 2],
+                    vote: None,
+                    walls: wall::first_poses(&setup.walls),
+                    ledger,
+                    n_rows: 0,
+                    spread_rate: 0.0,
+                };
+                (Base { state: Arc::new(start), rest }, Vec::new())
             }
             Some(snapshot) => {
                 if snapshot.state.x.len() != start.x.len()
                     || snapshot.state.initial_volume != start.initial_volume
+                    || snapshot.walls.len() != wall::first_poses(&setup.walls).len()
                 {
-                    return Err("the snapshot is of another problem: its mesh is not this deck's".to_owned());
+                    return Err(
+                        "the snapshot is of another problem: its mesh or its walls are not this deck's"
+                            .to_owned(),
+                    );
                 }
-                let cycle = snapshot.state.cycle;
-                let time = snapshot.state.time;
-                let mut steps = BTreeMap::new();
-                if cycle > 0 {
-                    steps.insert(cycle - 1, (snapshot.dt_previous, time - snapshot.dt_previous));
-                }
-                steps.insert(cycle, (snapshot.dt, time));
-                let quanta = Quanta { force: snapshot.force_quantum, ..fresh_quanta };
-                (snapshot.state, quanta, snapshot.ledger, snapshot.rows, steps, Some(snapshot.vote))
+                let rest = Rest {
+                    dt_previous: snapshot.dt_previous,
+                    dt: Some(snapshot.dt),
+                    quanta: snapshot.force_quanta,
+                    vote: Some(snapshot.vote),
+                    walls: snapshot.walls,
+                    ledger: snapshot.ledger,
+                    n_rows: snapshot.rows.len(),
+                    spread_rate: snapshot.spread_rate,
+                };
+                (Base { state: Arc::new(snapshot.state), rest }, snapshot.rows)
             }
         };
         let mut model = model;
@@ -76,18 +106,222 @@ impl Job {
             with_walls.setup = setup;
             model = Arc::new(with_walls);
         }
-        let n = hands.len();
-        let speeds: Vec<f64> = hands.iter().map(|h| h.speed).collect();
+        let touching = model.setup.contact.as_ref().map(|settings| {
+            let speed = initial::closing_speeds(&model.mesh, settings, &model.velocity);
+            let mut surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
+            surface.stiffen(&model.mesh, &model.setup.materials, settings, &speed);
+            let at_start: Vec<[f64; 3]> =
+                surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
+            let inside = initial_pairs(&surface, &at_start, settings);
+            refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
+            let exclusions = Arc::new(Exclusions::new(&surface, &inside));
+            Ok::<_, String>(Touching { surface: Arc::new(surface), exclusions })
+        });
+        let first_cycle = base.state.cycle;
+        let keep = options.keep;
+        let mut job = Self {
+            quanta,
+            touching: touching.transpose()?,
+            members: hands.iter().map(|hand| Member { hand: hand.clone(), alive: true }).collect(),
+            epoch: Epoch::without_workers(0, &base, &model),
+            ledger: base.rest.ledger.clone(),
+            walls: base.rest.walls.clone(),
+            base: Arc::new(base),
+            keep_due: false,
+            first_cycle,
+            lanes: String::new(),
+            stop_asked: false,
+            failure: None,
+            proposal: None,
+            patience: Patience::default(),
+            rows,
+            sorts: 0,
+            census: Census::default(),
+            work: vec![Work::default(); hands.len()],
+            reports: vec![Report::default(); hands.len()],
+            imbalance: 1.0,
+            rebalances: Vec::new(),
+            losses: Vec::new(),
+            over: false,
+            model,
+            options,
+        };
+        let mut actions = Vec::new();
+        job.epoch = job.deal(0, (0..hands.len()).collect(), &mut actions)?;
+        job.sorts = u64::from(job.census.units > 0);
+        if let Keep::Seconds(seconds) = keep {
+            actions.push(Action::Timer(seconds));
+        }
+        Ok((job, actions))
+    }
+
+    /// Deals the base out to a crew, as epoch `number`.
+    pub(super) fn deal(
+        &mut self,
+        number: u32,
+        crew: Vec<usize>,
+        actions: &mut Vec<Action>,
+    ) -> Result<Epoch, String> {
+        let base = Arc::clone(&self.base);
+        let mut epoch = Epoch::without_workers(number, &base, &self.model);
+        let n = crew.len();
+        if n == 0 {
+            actions.push(Action::Dealt(Vec::new()));
+            return Ok(epoch);
+        }
+        let (model, state) = (&self.model, &base.state);
+        let hands: Vec<&Hand> = crew.iter().map(|&member| &self.members[member].hand).collect();
+        let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
         let layout = decompose(&model.mesh, &speeds);
+        let threads: Vec<u32> = hands.iter().map(|hand| hand.threads).collect();
+        let cut = Cut::new(model, state, &layout, &threads, self.touching.as_ref());
+        let mut elements = vec![0.0; n];
+        for s in &layout {
+            elements[s.worker] += s.region.n_elements() as f64;
+        }
+        let (exchange, interactions) = match (&self.touching, &model.setup.contact) {
+            (Some(touching), Some(settings)) => {
+                let sorter = Sorter::new(
+                    Arc::clone(&touching.surface),
+                    settings.clone(),
+                    Arc::clone(&touching.exclusions),
+                    speeds.clone(),
+                    self.options.route,
+                    self.options.dealing,
+                    &cut.gather,
+                );
+                let x = sorter.positions_of(state);
+                let bench = Bench { epoch: number, sorter, holdings: cut.holdings, state: Arc::clone(state) };
+                let sorted = bench.sort(&x);
+                epoch.bench = Some(Arc::new(bench));
+                self.census = sorted.census;
+                (sorted.exchange, sorted.interactions)
+            }
+            _ => (Exchange::new(&cut.holdings, vec![None; n], state, self.options.route), vec![0; n]),
+        };
+        self.imbalance = imbalance(&elements, &interactions, &speeds);
+        let exchange = Arc::new(exchange);
+        let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
+        for (position, subdomains) in cut.by_worker.into_iter().enumerate() {
+            let assign = Assign {
+                epoch: number,
+                setup: model.setup.clone(),
+                n_parts: model.mesh.parts.len() as u32,
+                quanta: Quanta { force: base.rest.quanta[0], ..self.quanta },
+                subdomains,
+                gauges: gauges.clone(),
+                lanes: self.options.lanes.clone(),
+                cycle: state.cycle,
+                dt_previous: base.rest.dt_previous,
+                route: self.options.route,
+                plan: exchange.plans[position].clone(),
+                plan_hash: exchange.hash,
+                guest_state: exchange.guest_state_from(position, state),
+            };
+            actions.push(Action::Send(crew[position], ToWorker::Assign(Box::new(assign))));
+        }
+        actions.push(Action::Dealt(
+            hands
+                .iter()
+                .zip(&elements)
+                .map(|(hand, &e)| Deal { name: hand.name.clone(), speed: hand.speed, elements: e as u64 })
+                .collect(),
+        ));
+        epoch.exchanges = VecDeque::from([Acting { at: state.cycle, exchange }]);
+        epoch.ready = vec![false; n];
+        epoch.meter = Meter::new(n);
+        epoch.crew = crew;
+        epoch.speeds = speeds;
+        epoch.elements = elements;
+        Ok(epoch)
+    }
+}
+
+impl Epoch {
+    /// An epoch of a base before its crew is there.
+    fn without_workers(number: u32, base: &Base, model: &Model) -> Self {
+        let Base { state, rest } = base;
+        let (first, time) = (state.cycle, state.time);
+        let mut steps = BTreeMap::new();
+        if let Some(dt) = rest.dt {
+            let [now, _] = rest.quanta;
+            if let Some(before) = first.checked_sub(1) {
+                let dt = rest.dt_previous;
+                steps.insert(before, Step { dt, time: time - dt, quantum: now });
+            }
+            steps.insert(first, Step { dt, time, quantum: now });
+        }
+        Self {
+            number,
+            crew: Vec::new(),
+            speeds: Vec::new(),
+            elements: Vec::new(),
+            bench: None,
+            ready: Vec::new(),
+            running: false,
+            first_cycle: first,
+            quantum: rest.quanta[1],
+            steps,
+            vote_before: rest.vote.clone(),
+            arrivals: BTreeMap::new(),
+            exchanges: VecDeque::new(),
+            completed: first,
+            sorts_under_way: VecDeque::new(),
+            transfers: BTreeMap::new(),
+            collecting: BTreeMap::new(),
+            image_times: BTreeMap::new(),
+            halves: BTreeMap::new(),
+            last_base: first,
+            next_state_time: model.output.period.map(|period| output_after(time, period)),
+            last_gather: first,
+            references: [(first, first); 2],
+            last_spread: 0.0,
+            spread_rate: rest.spread_rate,
+            stop_at: None,
+            pauses: false,
+            meter: Meter::new(0),
+        }
+    }
+}
+
+/// The first multiple of `period` after `time`, to the bit: at whatever time it is asked between two of them, it is the
+/// same one.
+pub(super) fn output_after(time: f64, period: f64) -> f64 {
+    let mut count = (time / period).floor();
+    while count * period > time {
+        count -= 1.0;
+    }
+    while count * period <= time {
+        count += 1.0;
+    }
+    count * period
+}
+
+/// The sub-domains of a layout, and who holds what.
+struct Cut {
+    by_worker: Vec<Vec<Subdomain>>,
+    holdings: Holdings,
+    /// By worker: surface nodes that it owns, in the order of its gathering.
+    gather: Vec<Vec<u32>>,
+}
+
+impl Cut {
+    fn new(
+        model: &Model,
+        state: &GlobalState,
+        layout: &[decompose::Subdomain],
+        threads: &[u32],
+        touching: Option<&Touching>,
+    ) -> Self {
+        let n = threads.len();
         let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
         let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
         for (id, subdomain) in layout.iter().enumerate() {
-            let threads = hands[subdomain.worker].threads.max(1) as usize;
             let pieces: Vec<Piece> = subdomain
                 .region
-                .split(threads)
+                .split(threads[subdomain.worker].max(1) as usize)
                 .iter()
-                .map(|region| piece::cut(&model.mesh, &state, subdomain.part, region))
+                .map(|region| piece::cut(&model.mesh, state, subdomain.part, region))
                 .collect();
             let mut nodes: Vec<u32> = pieces.iter().flat_map(|p| p.nodes.iter().copied()).collect();
             nodes.sort_unstable();
@@ -95,137 +329,25 @@ impl Job {
             nodes_of.push(nodes);
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
         }
-        let holdings = Holdings::new(model.mesh.n_nodes(), n, &layout, &nodes_of);
-        let surface = model.setup.contact.as_ref().map(|settings| {
-            let speed = initial::closing_speeds(&model.mesh, settings, &model.velocity);
-            let mut surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
-            surface.stiffen(&model.mesh, &model.setup.materials, settings, &speed);
-            surface
-        });
+        let holdings = Holdings::new(model.mesh.n_nodes(), n, layout, &nodes_of);
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
-        for (subdomain, (place, nodes)) in subdomains.iter_mut().zip(layout.iter().zip(&nodes_of)) {
+        let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
+        for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {
             let id = subdomain.id;
             subdomain.unowned =
                 nodes.iter().copied().filter(|&node| holdings.owner_subdomain[node as usize] != id).collect();
-            if let Some(surface) = &surface {
+            if let Some(Touching { surface, .. }) = touching {
                 subdomain.surface =
                     nodes.iter().copied().filter(|&node| surface.node_index(node).is_some()).collect();
                 gather[place.worker].extend(
                     subdomain.surface.iter().filter(|&&node| holdings.owner_subdomain[node as usize] == id),
                 );
             }
-        }
-        let shared_state = Arc::new(state.clone());
-        let mut elements = vec![0.0; n];
-        for s in &layout {
-            elements[s.worker] += s.region.n_elements() as f64;
-        }
-        let (bench, exchange, census, interactions) = match (surface, &model.setup.contact) {
-            (Some(surface), Some(settings)) => {
-                let at_start: Vec<[f64; 3]> =
-                    surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
-                let inside = initial_pairs(&surface, &at_start, settings);
-                refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
-                let exclusions = Exclusions::new(&surface, &inside);
-                let sorter = Sorter::new(
-                    surface,
-                    settings.clone(),
-                    exclusions,
-                    speeds.clone(),
-                    options.route,
-                    options.dealing,
-                    &gather,
-                );
-                let x = sorter.positions_of(&state);
-                let bench = Bench { sorter, holdings, state: shared_state };
-                let sorted = bench.sort(&x);
-                (Some(Arc::new(bench)), sorted.exchange, sorted.census, sorted.interactions)
-            }
-            _ => {
-                let exchange = Exchange::new(&holdings, vec![None; n], &state, options.route);
-                (None, exchange, mechanics::contact::Census::default(), vec![0; n])
-            }
-        };
-        let imbalance = imbalance(&elements, &interactions, &speeds);
-        let exchange = Arc::new(exchange);
-        let first_cycle = state.cycle;
-        let dt_previous = first_cycle.checked_sub(1).and_then(|c| steps.get(&c)).map_or(0.0, |s| s.0);
-        let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
-        for (subdomain, place) in subdomains.into_iter().zip(&layout) {
             by_worker[place.worker].push(subdomain);
         }
-        let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
-        let actions = by_worker
-            .into_iter()
-            .enumerate()
-            .map(|(w, subdomains)| {
-                let assign = Assign {
-                    setup: model.setup.clone(),
-                    n_parts: model.mesh.parts.len() as u32,
-                    quanta,
-                    subdomains,
-                    gauges: gauges.clone(),
-                    lanes: options.lanes.clone(),
-                    cycle: first_cycle,
-                    dt_previous,
-                    route: options.route,
-                    plan: exchange.plans[w].clone(),
-                    plan_hash: exchange.hash,
-                    guest_state: exchange.guest_state_from(w, &state),
-                };
-                Action::Send(w, ToWorker::Assign(Box::new(assign)))
-            })
-            .collect();
-        let next_state_time = model.output.period.map(|period| {
-            let passed = (state.time / period).floor() + 1.0;
-            passed * period
-        });
-        let job = Self {
-            n_workers: n,
-            quanta,
-            bench,
-            ready: vec![false; n],
-            running: false,
-            lanes: String::new(),
-            first_cycle,
-            steps,
-            vote_before,
-            arrivals: BTreeMap::new(),
-            exchanges: VecDeque::from([(first_cycle, exchange)]),
-            completed: first_cycle,
-            sorts_under_way: VecDeque::new(),
-            transfers: BTreeMap::new(),
-            collecting: BTreeMap::new(),
-            image_times: BTreeMap::new(),
-            snapshot_state: None,
-            snapshot_rest: None,
-            next_state_time,
-            last_gather: first_cycle,
-            references: [(first_cycle, first_cycle); 2],
-            last_spread: 0.0,
-            spread_rate: 0.0,
-            stop_asked: false,
-            stop_at: None,
-            failure: None,
-            ledger,
-            rows,
-            sorts: u64::from(census.units > 0),
-            census,
-            work: vec![Work::default(); n],
-            reports: vec![Report::default(); n],
-            imbalance,
-            over: false,
-            state,
-            model,
-            options,
-        };
-        Ok((job, actions))
+        Self { by_worker, holdings, gather }
     }
 }
-
-/// Most an element's interactions weigh against an element when imbalance is reported: an element-cycle costs about as
-/// much as this many interactions.
-const INTERACTIONS_PER_ELEMENT: f64 = 60.0;
 
 /// Largest over mean of cost over speed, workers without a speed aside.
 fn imbalance(elements: &[f64], interactions: &[u64], speeds: &[f64]) -> f64 {

@@ -1,12 +1,12 @@
 //! A job without workers, sockets or clocks.
 
-use std::sync::Arc;
+use std::{collections::VecDeque, sync::Arc};
 
 use mechanics::vote::Vote;
 use protocol::message::{IMAGE_VERSION, ToMaster, ToWorker, Work};
 
 use super::Job;
-use crate::event::{Action, Event, Hand, Options};
+use crate::event::{Action, Balance, Event, Hand, Options};
 
 const DECK: &str = r#"
     title = "two cubes"
@@ -40,9 +40,9 @@ fn started(n: usize) -> (Job, Vec<usize>) {
     let (mut job, actions) = job(n);
     let exchange: Vec<usize> = actions
         .iter()
-        .map(|action| match action {
-            Action::Send(_, ToWorker::Assign(assign)) => assign.plan.exchange.len(),
-            _ => panic!("a job begins with assignments"),
+        .filter_map(|action| match action {
+            Action::Send(_, ToWorker::Assign(assign)) => Some(assign.plan.exchange.len()),
+            _ => None,
         })
         .collect();
     for worker in 0..n {
@@ -50,6 +50,7 @@ fn started(n: usize) -> (Job, Vec<usize>) {
         vote.courant = 1e-4;
         let actions = job.apply(Event::Message(
             worker,
+            0,
             ToMaster::Ready { vote: Some(Box::new(vote)), lanes: "scalar".into() },
         ));
         let starts = actions.iter().filter(|a| matches!(a, Action::Send(_, ToWorker::Start { .. }))).count();
@@ -60,7 +61,13 @@ fn started(n: usize) -> (Job, Vec<usize>) {
 
 fn cycle(cycle: u64, n_exchange: usize) -> ToMaster {
     let vote = (cycle > 0).then(|| Box::new(Vote { courant: 1e-4, ..Vote::empty(2) }));
-    ToMaster::Cycle { cycle, vote, partials: vec![1.0; 3 * n_exchange], gathered: Vec::new() }
+    ToMaster::Cycle {
+        cycle,
+        vote,
+        partials: vec![1.0; 3 * n_exchange],
+        gathered: Vec::new(),
+        busy: Work::default(),
+    }
 }
 
 fn failure(actions: &[Action]) -> &str {
@@ -77,8 +84,8 @@ fn failure(actions: &[Action]) -> &str {
 fn totals_are_the_sums_of_both_workers_and_come_when_both_have_sent() {
     let (mut job, exchange) = started(2);
     assert!(exchange[0] > 0 && exchange[0] == exchange[1]);
-    assert!(job.apply(Event::Message(0, cycle(0, exchange[0]))).is_empty());
-    let actions = job.apply(Event::Message(1, cycle(0, exchange[1])));
+    assert!(job.apply(Event::Message(0, 0, cycle(0, exchange[0]))).is_empty());
+    let actions = job.apply(Event::Message(1, 0, cycle(0, exchange[1])));
     let totals: Vec<&Vec<f64>> = actions
         .iter()
         .filter_map(|a| match a {
@@ -93,7 +100,7 @@ fn totals_are_the_sums_of_both_workers_and_come_when_both_have_sent() {
 #[test]
 fn a_frame_of_the_wrong_length_ends_the_job_with_both_lengths() {
     let (mut job, exchange) = started(2);
-    let actions = job.apply(Event::Message(1, cycle(0, exchange[1] + 1)));
+    let actions = job.apply(Event::Message(1, 0, cycle(0, exchange[1] + 1)));
     let reason = failure(&actions);
     assert!(
         reason.contains(&format!("{}", 3 * exchange[1]))
@@ -106,33 +113,104 @@ fn a_frame_of_the_wrong_length_ends_the_job_with_both_lengths() {
 #[test]
 fn the_same_cycle_twice_from_one_worker_ends_the_job() {
     let (mut job, exchange) = started(2);
-    job.apply(Event::Message(0, cycle(0, exchange[0])));
-    let actions = job.apply(Event::Message(0, cycle(0, exchange[0])));
+    job.apply(Event::Message(0, 0, cycle(0, exchange[0])));
+    let actions = job.apply(Event::Message(0, 0, cycle(0, exchange[0])));
     assert!(failure(&actions).contains("twice"));
 }
 
+fn assigned(actions: &[Action]) -> Vec<(usize, u32, u64)> {
+    let of = |action: &Action| match action {
+        Action::Send(to, ToWorker::Assign(assign)) => Some((*to, assign.epoch, assign.cycle)),
+        _ => None,
+    };
+    actions.iter().filter_map(of).collect()
+}
+
 #[test]
-fn a_lost_worker_is_named_and_the_others_are_released() {
-    let (mut job, _) = started(3);
-    let actions = job.apply(Event::Lost(2, "closed by peer".into()));
-    assert!(failure(&actions).contains("worker 2"));
-    assert_eq!(actions.iter().filter(|a| matches!(a, Action::Send(_, ToWorker::Release))).count(), 3);
+fn the_work_of_a_lost_worker_is_dealt_to_the_others_in_a_new_epoch() {
+    let (mut job, exchange) = started(3);
+    job.apply(Event::Message(0, 0, cycle(0, exchange[0])));
+    let actions = job.apply(Event::Lost(1, "closed by peer".into()));
+    assert_eq!(assigned(&actions), [(0, 1, 0), (2, 1, 0)]);
+    assert!(actions.iter().any(|a| matches!(a, Action::Rewind { rows: 0, cycle: 0 })));
+    assert_eq!((job.epoch(), job.crew()), (1, &[0, 2][..]));
+    assert!(job.apply(Event::Lost(1, "a second time".into())).is_empty());
+    assert!(job.apply(Event::Message(2, 0, cycle(0, exchange[2]))).is_empty(), "of the epoch before");
+    assert!(job.apply(Event::Message(1, 0, cycle(0, exchange[1]))).is_empty(), "of the lost one");
+    let actions = job.apply(Event::Message(1, 1, cycle(0, exchange[1])));
+    assert!(failure(&actions).contains("worker 1 sends a message of epoch 1, which it was not dealt"));
+}
+
+#[test]
+fn a_frame_of_an_epoch_to_come_ends_the_job() {
+    let (mut job, exchange) = started(2);
+    let actions = job.apply(Event::Message(0, 4, cycle(0, exchange[0])));
+    assert!(failure(&actions).contains("epoch 4, which it was not dealt; this is epoch 0"));
+}
+
+#[test]
+fn the_last_worker_lost_ends_a_job_that_does_not_wait() {
+    let (mut job, _) = started(2);
+    job.apply(Event::Lost(0, "cable".into()));
+    let actions = job.apply(Event::Lost(1, "closed by peer".into()));
+    assert_eq!(failure(&actions), "worker worker-1 is lost: closed by peer; no other is left");
+}
+
+fn waiting(n: usize) -> Job {
+    let model = Arc::new(deck::read(DECK, "two cubes").expect("a good deck"));
+    let options = Options { waits: true, ..Options::default() };
+    let (mut job, _) = Job::new(model, &hands(n), options, None).expect("a good problem");
+    for worker in 0..n {
+        job.apply(Event::Lost(worker, "power cut".into()));
+    }
+    job
+}
+
+#[test]
+fn a_job_without_workers_deals_itself_out_to_the_first_that_comes() {
+    let mut job = waiting(2);
+    assert!(!job.is_over() && job.crew().is_empty());
+    let actions = job.apply(Event::Joined(Hand { name: "new".into(), speed: 1.0, threads: 1 }));
+    assert_eq!(assigned(&actions), [(2, 3, 0)]);
+}
+
+#[test]
+fn a_job_without_workers_that_is_stopped_ends_with_the_state_it_went_back_to() {
+    let actions = waiting(1).apply(Event::Stop);
+    let ends = |a: &Action| matches!(a, Action::Over(o) if o.stopped && o.failure.is_none() && o.state.as_ref().is_some_and(|s| s.cycle == 0));
+    assert!(actions.iter().any(ends));
+}
+
+#[test]
+fn a_sort_of_an_epoch_that_is_over_is_of_no_use() {
+    let (mut job, _) = job(2);
+    let bench = job.epoch.bench.clone().expect("the cubes may meet");
+    let x = bench.sorter.positions_of(job.start_state());
+    let sorted = Box::new(bench.sort(&x));
+    job.apply(Event::Lost(0, "cable".into()));
+    assert!(job.apply(Event::Sorted(sorted)).is_empty() && !job.is_over());
 }
 
 #[test]
 fn a_contact_deeper_than_nine_tenths_of_the_gap_stops_the_run_with_its_node() {
     let (mut job, exchange) = started(1);
-    job.apply(Event::Message(0, cycle(0, exchange[0])));
+    job.apply(Event::Message(0, 0, cycle(0, exchange[0])));
     let vote = Vote { courant: 1e-4, worst_depth: 0.95, worst_pair: (3, 1), ..Vote::empty(2) };
     let partials = Vec::new();
-    let frame = ToMaster::Cycle { cycle: 1, vote: Some(Box::new(vote)), partials, gathered: Vec::new() };
-    let actions = job.apply(Event::Message(0, frame));
+    let frame = ToMaster::Cycle {
+        cycle: 1,
+        vote: Some(Box::new(vote)),
+        partials,
+        gathered: Vec::new(),
+        busy: Work::default(),
+    };
+    let actions = job.apply(Event::Message(0, 0, frame));
     let stops = |a: &Action| matches!(a, Action::Send(_, ToWorker::Totals { orders, .. }) if orders.stop && orders.collect);
     assert!(actions.iter().any(stops), "the state up to there is still gathered");
     let last = Some(Box::new(Vote { courant: 1e-4, ..Vote::empty(2) }));
     let image =
         ToMaster::Image { cycle: 3, version: IMAGE_VERSION, pieces: Vec::new(), last, work: Work::default() };
-    let actions = job.apply(Event::Message(0, image));
+    let actions = job.apply(Event::Message(0, 0, image));
     let reason = failure(&actions);
     assert!(
         reason.contains("node 4") && reason.contains("0.95") && reason.contains("contact.stiffness"),
@@ -150,7 +228,7 @@ fn images_of_another_version_are_refused_with_both_versions() {
         last: None,
         work: Work::default(),
     };
-    let actions = job.apply(Event::Message(0, image));
+    let actions = job.apply(Event::Message(0, 0, image));
     let reason = failure(&actions).to_owned();
     assert!(reason.contains(&IMAGE_VERSION.to_string()) && reason.contains(&(IMAGE_VERSION + 1).to_string()));
 }
@@ -160,4 +238,85 @@ fn a_node_inside_a_foreign_gap_is_refused_with_its_number() {
     let text = DECK.replace("1.1]", "1.02]");
     let faults = deck::read(&text, "two cubes").map(|_| ()).expect_err("zones overlap");
     assert!(faults[0].to_string().contains("low"), "{}", faults[0]);
+}
+
+/// Four workers without contact whose elements take what `nanoseconds` says of worker and cycle; gives the cycles at which
+/// work was dealt out anew.
+fn dealt_anew(cycles: u64, mut nanoseconds: impl FnMut(usize, u64) -> f64) -> Vec<u64> {
+    let text = format!(
+        "title = \"bar\"\nunits = \"SI\"\n[control]\nend_cycle = {cycles}\nplan_interval = 20\n[[part]]\nname = \"bar\"\nmaterial = \"LEAD\"\nbox = {{ origin = [0, 0, 0], size = [4, 1, 1], cells = [40, 10, 10] }}\n"
+    );
+    let model = Arc::new(deck::read(&text, "bar").expect("a good deck"));
+    let options = Options { balance: Balance::Measured, ..Options::default() };
+    let (mut job, first) = Job::new(model, &hands(4), options, None).expect("a good problem");
+    let vote = || Some(Box::new(Vote { courant: 1e-9, ..Vote::empty(1) }));
+    let mut busy = [0.0; 4];
+    let mut actions: VecDeque<Action> = first.into();
+    let (mut elements, mut exchange) = ([0.0; 4], [0; 4]);
+    while let Some(action) = actions.pop_front() {
+        let (worker, message) = match action {
+            Action::Send(worker, ToWorker::Assign(assign)) => {
+                let pieces = assign.subdomains.iter().flat_map(|s| &s.pieces);
+                elements[worker] = pieces.map(|piece| piece.elements.len()).sum::<usize>() as f64;
+                exchange[worker] = assign.plan.exchange.len();
+                let vote = if assign.cycle == 0 { vote() } else { None };
+                (worker, ToMaster::Ready { vote, lanes: "scalar".into() })
+            }
+            Action::Send(worker, ToWorker::Start { orders: [before, _] }) => {
+                (worker, frame(before.next.wrapping_add(1), true, exchange[worker], busy[worker]))
+            }
+            Action::Send(worker, ToWorker::Totals { cycle, orders, .. }) => {
+                busy[worker] += elements[worker] * nanoseconds(worker, cycle);
+                // Orders of the cycle before say whether this is the last one.
+                if orders.next != cycle + 1 {
+                    panic!("orders for {} after cycle {cycle}", orders.next);
+                }
+                let stops = job.epoch.stop_at == Some(cycle + 1);
+                if stops {
+                    let (pieces, work) = (Vec::new(), Work::default());
+                    let last = vote();
+                    (worker, ToMaster::Image { cycle: cycle + 1, version: IMAGE_VERSION, pieces, last, work })
+                } else {
+                    (worker, frame(cycle + 1, false, exchange[worker], busy[worker]))
+                }
+            }
+            Action::Over(outcome) => {
+                assert_eq!(outcome.failure, None);
+                return outcome.rebalances.iter().map(|r| r.cycle).collect();
+            }
+            _ => continue,
+        };
+        actions.extend(job.apply(Event::Message(worker, job.epoch(), message)));
+    }
+    panic!("the job never ends");
+}
+
+fn frame(cycle: u64, first: bool, n_exchange: usize, busy: f64) -> ToMaster {
+    let vote = (!first).then(|| Box::new(Vote { courant: 1e-9, ..Vote::empty(1) }));
+    let busy = Work { compute_ns: busy as u64, contact_ns: 0 };
+    ToMaster::Cycle { cycle, vote, partials: vec![0.0; 3 * n_exchange], gathered: Vec::new(), busy }
+}
+
+/// Uniform between 1 - `by` and 1 + `by`.
+fn noise(state: &mut u64, by: f64) -> f64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    1.0 + by * ((*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0)
+}
+
+#[test]
+fn noise_of_five_per_cent_does_not_make_elements_wander() {
+    let mut state = 7;
+    let dealt = dealt_anew(2000, |_, _| 100.0 * noise(&mut state, 0.05));
+    assert!(dealt.len() <= 1, "dealt out anew at {dealt:?}");
+}
+
+#[test]
+fn a_worker_that_turns_slow_under_noise_is_relieved_once_within_two_boundaries() {
+    let mut state = 3;
+    let slow = |worker, cycle| if worker == 2 && cycle >= 110 { 200.0 } else { 100.0 };
+    let dealt = dealt_anew(400, |worker, cycle| slow(worker, cycle) * noise(&mut state, 0.05));
+    assert!(dealt.first().is_some_and(|first| (118..=140).contains(first)), "{dealt:?}");
+    assert!(dealt.len() <= 2, "{dealt:?}");
 }

@@ -2,7 +2,7 @@
 
 use mechanics::{contact::reach, vote::Vote};
 
-use super::Job;
+use super::{Job, epoch::Step};
 use crate::event::Action;
 /// Deepest contact (gaps) before the run is stopped.
 const DEEPEST: f64 = 0.9;
@@ -10,7 +10,7 @@ const DEEPEST: f64 = 0.9;
 impl Job {
     /// Books the whole vote of a cycle, and stops the run where the physics went wrong.
     pub(super) fn book(&mut self, cycle: u64, vote: &Vote, actions: &mut Vec<Action>) {
-        let Some(&(dt, time)) = self.steps.get(&cycle) else { return };
+        let Some(&Step { dt, time, .. }) = self.epoch.steps.get(&cycle) else { return };
         let gap = self.model.setup.contact.as_ref().map(|c| c.gap);
         self.ledger.book(vote, cycle, time, dt, gap);
         if cycle.is_multiple_of(u64::from(self.model.output.history_cycles.max(1))) {
@@ -80,7 +80,7 @@ impl Job {
     }
 
     pub(super) fn element_fault(&self, element: u32, volume: f64, cycle: u64) -> String {
-        let was = self.state.initial_volume.get(element as usize).copied().unwrap_or(f64::NAN);
+        let was = self.base.state.initial_volume.get(element as usize).copied().unwrap_or(f64::NAN);
         format!(
             "element {}: volume {volume:e} at cycle {cycle}, at first {was:e}; refine the mesh, soften the load or add an erosion strain",
             self.element_name(element)

@@ -10,6 +10,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{Error, Folder, SUMMARY, Units, write_whole};
+use crate::event::{Loss, Rebalance};
 
 /// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no
 /// others.
@@ -71,6 +72,10 @@ pub struct Summary {
     pub worst_gap_travel: f64,
     /// Deepest penetration (gaps).
     pub worst_penetration: f64,
+    /// When work was dealt out by other speeds, with `--balance measured`.
+    pub rebalances: Vec<Rebalance>,
+    /// Workers that were lost, and how far the run went back for them.
+    pub losses: Vec<Loss>,
     /// Hash of the final state (hexadecimal).
     pub digest: String,
 }
@@ -195,6 +200,22 @@ impl Summary {
             grouped(self.relayed_pairs),
             grouped(self.relayed_pairs + self.linked_pairs)
         )?;
+        for Rebalance { cycle, imbalance_before, imbalance_after, .. } in &self.rebalances {
+            writeln!(
+                out,
+                "  balance    cycle {}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}",
+                grouped(*cycle)
+            )?;
+        }
+        for Loss { worker, cycle, back_to, .. } in &self.losses {
+            writeln!(
+                out,
+                "  lost       {} in cycle {}, went on from cycle {}",
+                worker.replace(char::is_control, " "),
+                grouped(*cycle),
+                grouped(*back_to)
+            )?;
+        }
         let WorkUnits {
             count,
             nodes_min,

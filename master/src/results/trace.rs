@@ -14,14 +14,14 @@ use super::{Error, write_whole};
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn write(path: &Path, names: &[&str], reports: &[Report]) -> Result<(), Error> {
+pub fn write(path: &Path, names: &[String], reports: &[Report]) -> Result<(), Error> {
     write_whole(path, |out| {
         serde_json::to_writer(&mut *out, &events(names, reports))?;
         std::io::Write::write_all(out, b"\n")
     })
 }
 
-fn events(names: &[&str], reports: &[Report]) -> serde_json::Value {
+fn events(names: &[String], reports: &[Report]) -> serde_json::Value {
     let spans = || reports.iter().flat_map(|report| &report.spans);
     let start = spans().map(|span| span.start_ns).min().unwrap_or(0);
     let microseconds = |ns: u64| ns as f64 * 1e-3;
@@ -51,7 +51,7 @@ mod tests {
         let span = |phase, start_ns| Span { phase, cycle: 7, start_ns, length_ns: 1500 };
         let report = |spans| Report { spans, ..Report::default() };
         let reports = [report(vec![span(Phase::Wait, 9_000)]), report(vec![span(Phase::Contact, 4_000)])];
-        let value = events(&["a", "b"], &reports);
+        let value = events(&["a".to_owned(), "b".to_owned()], &reports);
         let events = value["traceEvents"].as_array().expect("a list");
         assert_eq!(events.len(), 4);
         assert_eq!((&events[1]["name"], &events[1]["ts"]), (&json!("wait"), &json!(5.0)));

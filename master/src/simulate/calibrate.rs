@@ -8,8 +8,10 @@ use protocol::message::Route;
 
 use super::{
     cluster::{Cluster, ElementCost},
-    virtual_clock::{self, Costs, Machines, Scheme},
+    machines::{Costs, Machines, Scheme},
+    virtual_clock,
 };
+use crate::balance;
 
 /// Work of one cycle of a problem on one host: elements, nodes, pairs, pairs of new plans, surface nodes sorted.
 pub type Work = [f64; 5];
@@ -61,17 +63,11 @@ pub fn seconds(costs: &Costs, work: &Work) -> f64 {
         + costs.sort * sorted
 }
 
-/// The speeds by which the master deals out work: its own host has less left beside sorts. A sort of `sorted` surface
-/// nodes has `lag` cycles to be done, half a cycle less for the way of positions and plans; the host must leave that much
-/// idle in each, for all wait if it is late.
+/// The speeds by which the master deals out work: its own host has less left beside sorts of `sorted` surface nodes
+/// ([`balance::beside_sorts`], the same that the daemon does).
 pub fn believed(speeds: &[f64], costs: &Costs, work: &Work, sorted: f64, lag: u32) -> Vec<f64> {
-    let mut believed = speeds.to_vec();
-    let cycle = seconds(costs, work) / speeds.iter().sum::<f64>();
-    if speeds.len() > 1 && cycle > 0.0 {
-        let share = costs.sort * sorted / (f64::from(lag) - 0.5) / cycle;
-        believed[0] = (speeds[0] - share).max(0.1 * speeds[0]);
-    }
-    believed
+    let beside: Vec<bool> = (0..speeds.len()).map(|host| host == 0).collect();
+    balance::beside_sorts(speeds, &beside, seconds(costs, work), costs.sort * sorted, lag)
 }
 
 /// Surface nodes that a sort of the problem works on.

@@ -12,8 +12,8 @@ use deck::{
 use toml::de::DeTable;
 
 use super::{
+    machines::Change,
     network::{Network, Wires},
-    virtual_clock::Change,
 };
 
 /// Longest cluster file (bytes).
@@ -66,6 +66,8 @@ pub struct Tables {
     pub hosts: Vec<usize>,
     /// Number of the paper's table that stands beside; 0 for none.
     pub paper: u64,
+    /// Rates of wires (bits per second) to run in place of the network's own: where the cluster saturates.
+    pub rates: Vec<f64>,
 }
 
 impl Cluster {
@@ -241,8 +243,14 @@ fn read_tables(file: &Table<'_>, n_hosts: usize) -> Option<Option<Tables>> {
         Some(numbers)
     });
     let paper = table.integer_or("paper", 0, 0, 2);
+    let rates = match table.get("rates_bits_per_second") {
+        None => Some(Vec::new()),
+        Some(value) => {
+            value.items().and_then(|list| list.iter().map(|v| v.number(Range::Positive)).collect())
+        }
+    };
     table.finish();
-    Some(Some(Tables { decks: decks?, hosts: hosts?, paper }))
+    Some(Some(Tables { decks: decks?, hosts: hosts?, paper, rates: rates? }))
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! Pictures: the speed-up as the paper's figure 4 draws it, the space-time diagram of the hosts, and the same as a trace
 //! that Perfetto and chrome://tracing open.
 
-use std::fmt::Write as _;
+use std::{collections::HashMap, fmt::Write as _};
 
 use super::{
     table::Row,
-    virtual_clock::{Kind, Span, Timeline},
+    timeline::{Kind, Span, Timeline},
 };
 
 /// Cycles that the space-time diagram shows.
@@ -81,6 +81,15 @@ pub fn speed_up(title: &str, rows: &[Row]) -> String {
         line(format!("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{n}</text>", x(0.0) - 6.0, y(n) + 4.0));
     }
     line(format!("<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">hosts</text>", width / 2.0, height - 14.0));
+    line(format!(
+        "<text transform=\"translate(20 {}) rotate(-90)\" text-anchor=\"middle\">speed-up</text>",
+        height / 2.0
+    ));
+    line(format!(
+        "<text x=\"{}\" y=\"{}\" fill=\"gray\" text-anchor=\"end\">dashed: perfect speed-up; circles: the paper's</text>",
+        x(most),
+        y(0.0) - 10.0
+    ));
     let mut series: Vec<(usize, u32)> = rows.iter().map(|r| (r.benchmark, r.k)).collect();
     series.sort_unstable();
     series.dedup();
@@ -107,13 +116,21 @@ pub fn speed_up(title: &str, rows: &[Row]) -> String {
             }
         }
         line(format!(
-            "<text x=\"{}\" y=\"{}\" fill=\"{colour}\">benchmark {benchmark}, k = {k} (circles: the paper's)</text>",
+            "<text x=\"{}\" y=\"{}\" fill=\"{colour}\">benchmark {benchmark}, k = {k}</text>",
             margin + 16.0,
             56.0 + 18.0 * i as f64
         ));
     }
     svg.push_str("</svg>\n");
     svg
+}
+
+/// Steps of the scale of time.
+const TICKS: u32 = 8;
+
+/// A time in four digits.
+fn seconds(time: f64) -> String {
+    if time >= 0.1 || time == 0.0 { format!("{time:.2}") } else { format!("{time:.2e}") }
 }
 
 /// Spans of the cycles that are drawn, and their times.
@@ -136,9 +153,9 @@ pub fn space_time(title: &str, timeline: &Timeline) -> String {
     // The master's own row comes first.
     let y = |host: usize, master: bool| if master { top } else { top + row * (host as f64 + 1.0) };
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n<text x=\"{left}\" y=\"20\">{}: {} cycles from {from:.4} s to {to:.4} s, modelled</text>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n<text x=\"{left}\" y=\"20\">{}: {} cycles, modelled; white is waiting, lines are messages</text>\n",
         escaped(title),
-        SHOWN
+        SHOWN.min(timeline.counts.len() as u64 - timeline.window().start)
     );
     let kinds =
         [Kind::Border, Kind::Interior, Kind::Integrate, Kind::Install, Kind::Sort, Kind::Send, Kind::Receive];
@@ -156,6 +173,21 @@ pub fn space_time(title: &str, timeline: &Timeline) -> String {
         let _ = writeln!(svg, "<text x=\"6\" y=\"{}\">host {}</text>", y(host, false) + 15.0, host + 1);
     }
     let _ = writeln!(svg, "<text x=\"6\" y=\"{}\">master</text>", top + 15.0);
+    // A scale of time below the last host.
+    let below = top + row * (n as f64 + 1.0);
+    let _ = writeln!(svg, "<path d=\"M{left} {below} H{}\" stroke=\"black\"/>", x(to));
+    for tick in 0..=TICKS {
+        let at = x(from + (to - from) * f64::from(tick) / f64::from(TICKS));
+        let time = (to - from) * f64::from(tick) / f64::from(TICKS);
+        let unit = if tick == TICKS { " s" } else { "" };
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{at:.1} {below} v5\" stroke=\"black\"/><text x=\"{at:.1}\" y=\"{}\" text-anchor=\"{}\">{}{unit}</text>",
+            below + 19.0,
+            if tick == TICKS { "end" } else { "middle" },
+            seconds(time)
+        );
+    }
     // Messages last, so that they stand on what they interrupt.
     let messages = |s: &Span| matches!(s.kind, Kind::Send | Kind::Receive);
     for above in [false, true] {
@@ -174,7 +206,7 @@ pub fn space_time(title: &str, timeline: &Timeline) -> String {
     for flight in timeline.flights.iter().filter(|f| f.time.0 >= from && f.time.1 <= to) {
         let _ = writeln!(
             svg,
-            "<path d=\"M{:.2} {} L{:.2} {}\" stroke=\"black\" stroke-width=\"0.3\" opacity=\"0.5\"/>",
+            "<path d=\"M{:.2} {} L{:.2} {}\" stroke=\"#333333\" stroke-width=\"0.3\" opacity=\"0.25\"/>",
             x(flight.time.0),
             y(flight.hosts.0, false) + 9.0,
             x(flight.time.1),
@@ -205,15 +237,15 @@ pub fn trace(timeline: &Timeline) -> String {
             "ts": span.time.0 * 1e6, "dur": (span.time.1 - span.time.0) * 1e6, "args": { "cycle": span.cycle }
         }));
     }
-    for (id, flight) in timeline.flights.iter().enumerate() {
-        for (phase, host, time) in
-            [("s", flight.hosts.0, flight.time.0), ("f", flight.hosts.1, flight.time.1)]
-        {
-            events.push(serde_json::json!({
-                "ph": phase, "bp": "e", "name": "message", "cat": "message", "id": id, "pid": host + 1, "tid": 1,
-                "ts": time * 1e6, "args": { "bytes": flight.bytes }
-            }));
-        }
+    // An arrow binds to the slices that enclose its ends, so it starts and ends in the middle of theirs.
+    let bytes: HashMap<u64, u64> = timeline.flights.iter().map(|f| (f.message, f.bytes)).collect();
+    for span in &timeline.spans {
+        let Some((id, bytes)) = span.message.and_then(|id| Some((id, bytes.get(&id)?))) else { continue };
+        let phase = if span.kind == Kind::Send { "s" } else { "f" };
+        events.push(serde_json::json!({
+            "ph": phase, "bp": "e", "name": "message", "cat": "message", "id": id, "pid": span.host + 1,
+            "tid": lane(span), "ts": 0.5 * (span.time.0 + span.time.1) * 1e6, "args": { "bytes": bytes }
+        }));
     }
     serde_json::json!({ "displayTimeUnit": "ms", "traceEvents": events }).to_string()
 }

@@ -32,6 +32,11 @@ impl<W> Processor<W> {
         Self { speed, queues: [const { VecDeque::new() }; 3], updated: 0.0, version: 0 }
     }
 
+    /// Relative speed now.
+    pub fn speed(&self) -> f64 {
+        self.speed
+    }
+
     /// Changes with every change of work or speed; what was foreseen before is void then.
     pub fn version(&self) -> u64 {
         self.version

@@ -12,8 +12,10 @@ use serde::Serialize;
 use super::{
     calibrate::{self, Work},
     cluster::{Cluster, ElementCost, Tables},
+    machines::{Machines, Scheme},
     paper::{self, Verdict},
-    virtual_clock::{self, Machines, Scheme, Timeline},
+    timeline::Timeline,
+    virtual_clock,
 };
 
 /// One cell.

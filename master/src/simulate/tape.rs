@@ -4,13 +4,17 @@
 
 use std::collections::VecDeque;
 
-use mechanics::{cycle::Load, vote::Vote};
+use mechanics::{
+    cycle::{Load, Meter},
+    vote::Vote,
+};
 use protocol::message::Work;
 use worker::{
-    compute::Machine,
+    compute::{Machine, ThreadClock},
     session::{Outcome, Task},
 };
 
+use super::timeline::Kind;
 use crate::sort::Sorted;
 
 /// What a run gave, by worker in the order of its tasks.
@@ -20,6 +24,8 @@ pub struct Tape {
     pub workers: Vec<Vec<Taped>>,
     /// Outcomes of the sorts.
     pub sorts: Vec<Sorted>,
+    /// Thread-CPU time of each sort by surface node (ns).
+    pub sort_ns: Vec<f64>,
     /// Digest of the run's final state.
     pub digest: String,
 }
@@ -27,8 +33,28 @@ pub struct Tape {
 /// One outcome: what it was, and what the worker held then.
 #[derive(Clone)]
 pub struct Taped {
+    kind: Kind,
     load: Load,
+    /// Thread-CPU time of the calling thread (ns).
+    used_ns: u64,
     kept: Kept,
+}
+
+impl Taped {
+    /// What the task was.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// What the worker held then.
+    pub fn load(&self) -> Load {
+        self.load
+    }
+
+    /// Thread-CPU time of the thread that drove the task (ns): all of it where tasks run on one thread.
+    pub fn used_ns(&self) -> u64 {
+        self.used_ns
+    }
 }
 
 #[derive(Clone)]
@@ -85,15 +111,20 @@ impl Player {
         match self {
             Self::Live { machine, load, kept } => {
                 let builds = matches!(task, Task::Load { .. } | Task::Install { .. });
+                let kind = Kind::of(&task);
+                let clock = ThreadClock::default();
+                let mark = clock.start();
                 let outcome = machine.run(task);
+                clock.stop(mark, false);
                 if builds {
                     *load = machine.load();
                 }
-                kept.push(Taped { load: *load, kept: keep(&outcome)? });
+                let used_ns = clock.work().compute_ns;
+                kept.push(Taped { kind, load: *load, used_ns, kept: keep(&outcome)? });
                 Ok((outcome, *load))
             }
             Self::Tape(left) => {
-                let Taped { load, kept } =
+                let Taped { load, kept, .. } =
                     left.pop_front().ok_or("the tape of a run is shorter than the run")?;
                 if !kept.answers(&task) {
                     return Err("the tape is of a run with other sorts: report this as a bug".to_owned());

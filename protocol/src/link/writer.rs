@@ -129,6 +129,7 @@ pub(super) fn write_at_once(shared: &Shared) -> bool {
     if writer.blocked {
         return false;
     }
+    let _inside = shared.runtime.enter();
     match writer.poll(shared, false, &mut Context::from_waker(Waker::noop())) {
         Poll::Ready(Ok(())) => !shared.unwritten.load(Relaxed),
         Poll::Ready(Err(error)) => {

@@ -1,6 +1,8 @@
 //! The whole matrix of bits, through the `bolide` binary and its worker processes: prints a table of digests.
 //!
-//! `cargo run --release -p tests --bin bits -- [--bolide PATH] [--cycles N] [--deck PATH]... [--most-workers N]`
+//! `cargo run --release -p tests --bin bits -- [--bolide PATH] [--cycles N] [--deck PATH]... [--most-workers N] [--clusters FOLDER]`
+//!
+//! With `--clusters deploy/clusters`, every cluster file there is emulated on both routes as well.
 //!
 //! Without `--bolide`, the binary beside this one; build it first with `cargo build --release -p master`. Without
 //! `--deck`, both benchmarks of 27,000 elements. Every run of a deck must have the digest, the history and the energies
@@ -19,13 +21,20 @@ struct Asked {
     decks: Vec<PathBuf>,
     cycles: u64,
     most_workers: usize,
+    /// Folder of cluster files to emulate too.
+    clusters: Option<PathBuf>,
 }
 
 fn asked() -> Result<Asked, String> {
     let here = std::env::current_exe().map_err(|e| format!("where this program is: {e}"))?;
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deck/examples");
-    let mut asked =
-        Asked { bolide: here.with_file_name("bolide"), decks: Vec::new(), cycles: 300, most_workers: 7 };
+    let mut asked = Asked {
+        bolide: here.with_file_name("bolide"),
+        decks: Vec::new(),
+        cycles: 300,
+        most_workers: 7,
+        clusters: None,
+    };
     let mut arguments = std::env::args().skip(1);
     while let Some(flag) = arguments.next() {
         let value = arguments.next().ok_or_else(|| format!("{flag}: a value is needed"))?;
@@ -34,8 +43,11 @@ fn asked() -> Result<Asked, String> {
             "--bolide" => asked.bolide = value.into(),
             "--deck" => asked.decks.push(value.into()),
             "--cycles" => asked.cycles = number()?.max(2),
+            "--clusters" => asked.clusters = Some(value.into()),
             "--most-workers" => asked.most_workers = number()? as usize,
-            _ => return Err(format!("{flag}: read --bolide, --deck, --cycles or --most-workers")),
+            _ => {
+                return Err(format!("{flag}: read --bolide, --deck, --cycles, --most-workers or --clusters"));
+            }
         }
     }
     if asked.decks.is_empty() {
@@ -160,7 +172,6 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs everything, prints the table and counts the runs that differ.
 /// A copy of a deck whose contact has twice the default slack; none without contact.
 fn with_doubled_slack(deck: &Path, folder: &Path) -> Result<Option<PathBuf>, String> {
     let text = std::fs::read_to_string(deck).map_err(|e| format!("{}: {e}", deck.display()))?;
@@ -173,6 +184,53 @@ fn with_doubled_slack(deck: &Path, folder: &Path) -> Result<Option<PathBuf>, Str
     Ok(Some(copy))
 }
 
+/// The digest of a deck on an emulated cluster.
+fn emulated(asked: &Asked, deck: &Path, cluster: &Path, route: &str) -> Result<String, String> {
+    let output = Command::new(&asked.bolide)
+        .arg("simulate")
+        .arg(deck)
+        .arg("--cluster")
+        .arg(cluster)
+        .args(["--route", route, "--json", "--cycles", &asked.cycles.max(4).to_string()])
+        .output()
+        .map_err(|e| format!("{}: {e}", asked.bolide.display()))?;
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).trim().to_owned());
+    }
+    let summary: Value = serde_json::from_slice(&output.stdout).map_err(|e| format!("its summary: {e}"))?;
+    Ok(summary["digest"].as_str().ok_or("a summary without a digest")?.to_owned())
+}
+
+/// Every cluster file of `--clusters` on both routes; counts those that have not the digest `first`.
+fn on_clusters(asked: &Asked, deck: &Path, first: &str) -> Result<usize, String> {
+    let Some(folder) = &asked.clusters else { return Ok(0) };
+    let entries = std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .collect();
+    files.sort();
+    let mut different = 0;
+    for file in &files {
+        for route in ["master", "direct"] {
+            let name = format!("{}, {route}", file.file_stem().unwrap_or_default().display());
+            match emulated(asked, deck, file, route) {
+                Ok(digest) => {
+                    let verdict = if digest == first { "same" } else { "DIFFERENT" };
+                    different += usize::from(digest != first);
+                    println!("{name:<36} {digest}             {verdict}");
+                }
+                Err(reason) => {
+                    different += 1;
+                    println!("{name:<36} FAILED: {reason}");
+                }
+            }
+        }
+    }
+    Ok(different)
+}
+
+/// Runs everything, prints the table and counts the runs that differ.
 fn matrix() -> Result<usize, String> {
     let asked = asked()?;
     let help = Command::new(&asked.bolide).args(["run", "--help"]).output().map_err(|e| {
@@ -212,6 +270,9 @@ fn matrix() -> Result<usize, String> {
             if taken.exists() {
                 std::fs::rename(&taken, &kept).map_err(|e| format!("{}: {e}", kept.display()))?;
             }
+        }
+        if let Some(first) = &first {
+            different += on_clusters(&asked, deck, &first.digest)?;
         }
     }
     std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;

@@ -1,6 +1,6 @@
 //! Thin structures of solid elements under impulses, and the tones of a cantilever.
 
-use mechanics::setup::Constraint;
+use mechanics::{load::Drive, setup::Constraint};
 
 use crate::{
     case::Sheet,
@@ -51,15 +51,16 @@ pub(super) fn the_impulsive_panel_is_dented_as_deep_as_measured(sheet: &mut Shee
         9.42 * INCH
     );
     let mut model = model(&deck);
+    let zero = Some(Drive::constant(0.0));
     let clamped = model
         .setup
         .constraints
         .iter()
-        .position(|c| c.velocity == [Some(0.0); 3])
+        .position(|c| c.velocity == [zero; 3])
         .expect("the straight edge is clamped") as u16;
     // Hinged: held across the panel, free to slide along it.
     let hinged = model.setup.constraints.len() as u16;
-    model.setup.constraints.push(Constraint { velocity: [Some(0.0), Some(0.0), None], walls: 0 });
+    model.setup.constraints.push(Constraint { velocity: [zero, zero, None], ..Constraint::default() });
     for n in 0..model.mesh.n_nodes() {
         let [x, y, z] = model.mesh.positions[n];
         let (r, angle) = (x.hypot(y), x.atan2(y).to_degrees());

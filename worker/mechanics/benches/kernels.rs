@@ -180,6 +180,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         constraints: vec![Constraint::default()],
         walls: Vec::new(),
         detonations: Vec::new(),
+        loads: Default::default(),
     };
     let falls = |n: u32| [0.0, 0.0, if n / plane > below { -500.0 } else { 0.0 }];
     let velocity: Vec<[f64; 3]> = mesh.node_ids.iter().map(|&n| falls(n)).collect();
@@ -231,7 +232,8 @@ fn whole_cycle(plates: (Domain, usize), n_cycles: usize) -> [f64; 2] {
             domain.elements(Sets::Border, dt_previous, &Silent);
             let partials = domain.partials(&Silent);
             domain.elements(Sets::Interior, dt_previous, &Silent);
-            vote = domain.integrate(&partials, dt_previous, dt, &Silent).expect("totals of the exchange");
+            vote =
+                domain.integrate(&partials, dt_previous, dt, &[], &Silent).expect("totals of the exchange");
             let spent = now() - start;
             assert!(vote.fault.is_none(), "fault {:?}", vote.fault);
             dt_previous = dt;

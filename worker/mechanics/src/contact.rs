@@ -6,7 +6,7 @@
 //! is a rule on displacements ([`reach`]). A worker gets a *batch* of units and each cycle
 //! ([`cycle`]):
 //! 1. takes the node-face pairs that can meet before the next sort ([`search`], once per batch);
-//! 2. drops those whose boxes are apart ([`search`]);
+//! 2. drops those whose boxes are apart ([`search`]), most of them for several cycles at once;
 //! 3. finds the closest point of each face to its node: the contact detection zone ([`zone`]);
 //! 4. reduces the hits of a node to distinct closest features with a side ([`joint`]);
 //! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
@@ -26,6 +26,7 @@ pub mod reach;
 pub mod search;
 pub mod sort;
 pub mod surface;
+mod watch;
 pub mod work_unit;
 pub mod zone;
 

@@ -5,7 +5,7 @@
 //! copies, here or on other workers, is said by a [`Plan`]; their total forces are exact sums, so the
 //! steps below give the same bits however blocks, workers and threads are cut.
 //!
-//! Between two plans a cycle is, in this order: [`Domain::contact`], [`Domain::elements`] (border),
+//! Between two plans a cycle is, in this order: [`Domain::begin`], [`Domain::contact`] (with the loads on faces), [`Domain::elements`] (border),
 //! [`Domain::partials`], [`Domain::elements`] (interior), [`Domain::integrate`].
 
 use std::{
@@ -22,9 +22,11 @@ use crate::{
     element::{ElementVote, Step},
     home::Home,
     lanes::{SET, Width},
+    load::face::{self, FaceVote, LoadedFace},
     nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
     vote::{Quanta, Vote},
+    wall::{self, Pose, WallVote},
 };
 
 /// Measures the work of compute threads; the physics knows no clock of its own.
@@ -108,6 +110,9 @@ pub struct Load {
     pub pairs: u64,
 }
 
+/// What a block without loads on faces says.
+const NO_FACES: FaceVote = FaceVote { force_bound: 0.0, limit: f64::INFINITY };
+
 /// No index.
 const NONE: u32 = u32::MAX;
 
@@ -124,6 +129,11 @@ struct Room {
     gathered: VecDeque<[Vec<f64>; 3]>,
     vote: ElementVote,
     booked: Booked,
+    /// Faces with loads, and what they said of the cycle.
+    faces: Vec<LoadedFace>,
+    face_vote: FaceVote,
+    /// What booked nodes gave each wall.
+    walls: Vec<WallVote>,
 }
 
 impl Room {
@@ -185,6 +195,12 @@ pub struct Domain {
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
     vote: Vote,
+    /// `t_n`.
+    time: f64,
+    /// Where the walls are and how they move in this step.
+    poses: Vec<Pose>,
+    /// Takes what guests give walls, which their owners book.
+    unbooked: Vec<WallVote>,
 }
 
 impl Domain {
@@ -206,6 +222,8 @@ impl Domain {
             for piece in &subdomain.pieces {
                 let block = Block::new(piece);
                 let all = 0..block.n_sets();
+                let material = &setup.materials[block.material as usize];
+                let faces = face::faces_of(&block, &setup.loads, material);
                 rooms.push(Room {
                     sets: NodeSet::all(&block.constraint),
                     block,
@@ -215,6 +233,9 @@ impl Domain {
                     gathered: VecDeque::new(),
                     vote: ElementVote::default(),
                     booked: Booked::default(),
+                    faces,
+                    face_vote: NO_FACES,
+                    walls: vec![WallVote::default(); setup.walls.len()],
                 });
             }
             let own = first as u32..rooms.len() as u32;
@@ -252,6 +273,9 @@ impl Domain {
             .collect();
         Self {
             vote: Vote::empty(n_parts),
+            time: 0.0,
+            poses: Vec::with_capacity(setup.walls.len()),
+            unbooked: vec![WallVote::default(); setup.walls.len()],
             setup,
             n_parts,
             quanta,
@@ -292,6 +316,7 @@ impl Domain {
     pub fn prepare(&mut self, meter: &dyn Meter) -> Vote {
         self.vote = Vote::empty(self.n_parts);
         self.elements(Sets::All, 0.0, meter);
+        self.load_faces(meter);
         for room in &mut self.rooms {
             room.block.clear_forces();
             let v = &room.block.v;
@@ -457,12 +482,13 @@ impl Domain {
         out
     }
 
-    /// A coarser quantum of forces, from an order.
-    pub fn set_force_quantum(&mut self, quantum: crate::exact::Quantum) {
+    /// A cycle begins at `time` with this quantum of forces, which an order may have made coarser.
+    pub fn begin(&mut self, quantum: crate::exact::Quantum, time: f64) {
         self.quanta.force = quantum;
+        self.time = time;
     }
 
-    /// Contact forces of the work units at `x_n`; `dt` is `dt_{n-1}`.
+    /// Contact forces of the work units at `x_n` and loads on faces; `dt` is `dt_{n-1}`.
     pub fn contact(&mut self, dt: f64, meter: &dyn Meter) {
         let mark = meter.start();
         if let Some(room) = &mut self.contact {
@@ -475,6 +501,21 @@ impl Domain {
             self.vote.add_contact(&vote);
         }
         meter.stop(mark, true);
+        self.load_faces(meter);
+    }
+
+    /// Adds the loads on faces to the forces of the blocks.
+    fn load_faces(&mut self, meter: &dyn Meter) {
+        if self.setup.loads.surfaces.is_empty() {
+            return;
+        }
+        let Setup { loads, control, .. } = &self.setup;
+        let (time, quantum) = (self.time, self.quanta.force);
+        each(&mut self.rooms, |room| {
+            let mark = meter.start();
+            room.face_vote = face::apply(&mut room.faces, &mut room.block, loads, control, time, quantum);
+            meter.stop(mark, false);
+        });
     }
 
     /// Forces of element sets at `x_n`, added to forces that integration has cleared; `dt` is `dt_{n-1}`.
@@ -548,6 +589,7 @@ impl Domain {
     }
 
     /// Puts the total forces in place, integrates all nodes from `x_n` to `x_{n+1}` and gives the vote of the cycle.
+    /// `free_walls` are the poses of the walls of finite mass.
     ///
     /// # Errors
     /// If `totals` has not three numbers for each node of the exchange.
@@ -556,6 +598,7 @@ impl Domain {
         totals: &[f64],
         dt_previous: f64,
         dt: f64,
+        free_walls: &[Pose],
         meter: &dyn Meter,
     ) -> Result<Vote, String> {
         if totals.len() != 3 * self.exchange.len() {
@@ -574,11 +617,16 @@ impl Domain {
             self.set(i, false, total);
         }
         meter.stop(mark, false);
+        let setup = &self.setup;
+        wall::poses(&setup.walls, &setup.loads.curves, self.time, dt, free_walls, &mut self.poses);
         let advance = Advance {
             dt_previous,
             dt,
-            constraints: &self.setup.constraints,
-            walls: &self.setup.walls,
+            time: self.time,
+            constraints: &setup.constraints,
+            walls: &setup.walls,
+            poses: &self.poses,
+            loads: &setup.loads,
             quanta: self.quanta,
         };
         let width = self.width;
@@ -593,8 +641,13 @@ impl Domain {
                 constraint: &block.constraint,
                 sets: &room.sets,
                 reference: &room.reference,
+                walls: &mut room.walls,
             };
             room.booked = advance.run(&mut nodes, width);
+            if !room.faces.is_empty() {
+                let half_steps = 0.5 * (dt_previous + dt);
+                room.booked.external += face::work(&room.faces, block, half_steps, advance.quanta.energy);
+            }
             meter.stop(mark, false);
         });
         let guests = &mut self.guests;
@@ -606,6 +659,7 @@ impl Domain {
             constraint: &guests.constraint,
             sets: &guests.sets,
             reference: &Default::default(),
+            walls: &mut self.unbooked,
         };
         advance.run(&mut nodes, width);
         Ok(self.finish_vote())
@@ -613,9 +667,13 @@ impl Domain {
 
     fn finish_vote(&mut self) -> Vote {
         let mut vote = std::mem::replace(&mut self.vote, Vote::empty(self.n_parts));
-        for room in &self.rooms {
+        for room in &mut self.rooms {
             let part = room.block.part as usize;
             vote.add_elements(part, &room.vote);
+            vote.contact_limit = vote.contact_limit.min(room.face_vote.limit);
+            vote.force_bound = vote.force_bound.max(room.face_vote.force_bound);
+            vote.add_walls(&room.walls);
+            room.walls.fill(WallVote::default());
             vote.parts[part].kinetic += room.booked.kinetic;
             vote.external += room.booked.external;
             for a in 0..3 {

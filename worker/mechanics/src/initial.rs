@@ -6,10 +6,12 @@ use crate::{
     contact::Extent,
     element::hex8,
     exact::Quantum,
+    load::SurfaceKind,
     mesh::Mesh,
     setup::{Constraint, MAX_WALLS, Setup},
     state::{GlobalState, N_FIELDS, field},
     vote::Quanta,
+    wall::{Motion, RigidWall},
 };
 
 /// The state at time zero.
@@ -80,19 +82,35 @@ pub fn state(
 
 /// The quanta of a run's sums, from the deck's data alone.
 ///
-/// Force: `F_ref = A max(K + 4G/3, rho v^2)` with A the largest initial face, 42 bits; the bulk modulus K of a gas is
+/// Force: `F_ref = A max(K + 4G/3, rho v^2, p)` with A the largest initial face and p the greatest pressure load, 42 bits; the bulk modulus K of a gas is
 /// more than its pressure at the start, that of an explosive (`rho D^2`) more than the pressure of detonation. Energy:
 /// the initial kinetic energy plus, over the whole volume, a thousandth of the bulk modulus or the internal energy at
-/// the start, 46 bits. Momentum: all mass at the greatest initial or prescribed speed, a thousandth of the fastest
+/// the start, 46 bits. Momentum: all mass at the greatest initial or prescribed speed, of walls too, a thousandth of the fastest
 /// sound, or the speed to which its internal energy at the start could bring a material, 50 bits.
 pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     let speed2 = state.v.iter().map(|v| v.iter().map(|c| c * c).sum::<f64>()).fold(0.0, f64::max);
+    let curves = &setup.loads.curves;
     let prescribed2 = setup
         .constraints
         .iter()
-        .map(|c| c.velocity.iter().map(|v| v.map_or(0.0, |v| v * v)).sum::<f64>())
+        .map(|c| c.velocity.iter().map(|v| v.map_or(0.0, |v| v.greatest(curves).powi(2))).sum::<f64>())
         .fold(0.0, f64::max);
-    let top_speed2 = speed2.max(prescribed2);
+    let of_wall = |wall: &RigidWall| match wall.motion {
+        Motion::Fixed => 0.0,
+        Motion::Driven(velocity) => velocity.iter().map(|v| v.greatest(curves).powi(2)).sum(),
+        Motion::Free { velocity, .. } => velocity.iter().map(|v| v * v).sum::<f64>(),
+    };
+    let walls2 = setup.walls.iter().map(of_wall).fold(0.0, f64::max);
+    let top_speed2 = speed2.max(prescribed2).max(walls2);
+    let pressure = setup
+        .loads
+        .surfaces
+        .iter()
+        .map(|surface| match surface.kind {
+            SurfaceKind::Pressure(drive) => drive.greatest(curves),
+            SurfaceKind::Transmit => 0.0,
+        })
+        .fold(0.0, f64::max);
     let (mut force, mut stored, mut sound, mut driven2) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
     let mut index = 0;
     for part in &mesh.parts {
@@ -100,7 +118,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         let modulus = material.bulk() + 4.0 / 3.0 * material.shear();
         sound = sound.max((modulus / material.density).sqrt());
         driven2 = driven2.max(2.0 * material.initial_energy() / material.density);
-        let strength = modulus.max(material.density * top_speed2);
+        let strength = modulus.max(material.density * top_speed2).max(pressure);
         for e in 0..part.n_elements() {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
             force = force.max(largest_face(&x) * strength);
@@ -152,8 +170,7 @@ pub fn bind_walls(mesh: &Mesh, setup: &mut Setup, constraint: &mut [u16]) -> Res
         let next = setup.constraints.len();
         let index = *index_of.entry((held, walls)).or_insert(next);
         if index == next {
-            let velocity = setup.constraints[held as usize].velocity;
-            setup.constraints.push(Constraint { velocity, walls });
+            setup.constraints.push(Constraint { walls, ..setup.constraints[held as usize] });
         }
         constraint[n] =
             u16::try_from(index).map_err(|_| "more than 65,535 kinds of constraint".to_owned())?;

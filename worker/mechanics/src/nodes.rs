@@ -1,4 +1,5 @@
-//! Integration of nodes: central differences, prescribed velocities, rigid walls; what is booked and voted.
+//! Integration of nodes: central differences, forces on nodes, gravity, relaxation, prescribed velocities, rigid walls;
+//! what is booked and voted.
 //!
 //! Every holder of a node runs this with the same mass, constraint, walls and total force, and so gets the
 //! same bits. Only the owner's copy is booked. Nodes go in sets of eight on lanes; those that something holds are
@@ -10,8 +11,10 @@ use crate::{
     contact::Extent,
     element::vector::Vector,
     lanes::{Lane, SET, Width, scalar::Scalar},
-    setup::{Constraint, RigidWall},
+    load::Loads,
+    setup::Constraint,
     vote::Quanta,
+    wall::{Motion, Pose, RigidWall, WallVote, touched_quantum},
 };
 
 /// Cycles for which a surface node's speed is foreseen by its acceleration: a vote takes effect two cycles later, and
@@ -54,6 +57,8 @@ pub struct Nodes<'a> {
     pub sets: &'a [NodeSet],
     /// Positions that displacements of surface nodes are counted from: eight for each set with such a node.
     pub reference: &'a [Vec<f64>; 3],
+    /// What booked nodes gave each wall in this step, by wall: terms are added to it.
+    pub walls: &'a mut [WallVote],
 }
 
 /// One step of time for nodes.
@@ -62,10 +67,16 @@ pub struct Advance<'a> {
     pub dt_previous: f64,
     /// `dt_n` (time).
     pub dt: f64,
-    /// Prescribed velocities; entry 0 is free.
+    /// `t_n` (time).
+    pub time: f64,
+    /// What acts on single nodes; entry 0 is nothing.
     pub constraints: &'a [Constraint],
     /// All walls; a node's constraint says which it feels.
     pub walls: &'a [RigidWall],
+    /// Where the walls are and how they move in this step.
+    pub poses: &'a [Pose],
+    /// Curves, forces on nodes, gravity, relaxation.
+    pub loads: &'a Loads,
     /// Quanta of the sums.
     pub quanta: Quanta,
 }
@@ -76,7 +87,7 @@ pub struct Advance<'a> {
 pub struct Booked {
     /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`.
     pub kinetic: f64,
-    /// Work done on the nodes by prescribed velocities and walls.
+    /// Work done on the nodes by prescribed velocities, walls, forces, gravity and relaxation.
     pub external: f64,
     /// `sum m v_{n+1/2}`.
     pub momentum: [f64; 3],
@@ -96,6 +107,7 @@ struct Tally<L> {
     high: Vector<L>,
     speed_squared: L,
     speed_ahead: L,
+    body_work: L,
     external: f64,
 }
 
@@ -110,6 +122,7 @@ impl<L: Lane> Tally<L> {
             high: splat(f64::NEG_INFINITY),
             speed_squared: zero,
             speed_ahead: zero,
+            body_work: zero,
             external: 0.0,
         }
     }
@@ -120,8 +133,10 @@ impl<L: Lane> Tally<L> {
         let (kinetic, momentum) = (self.kinetic.to_array(), arrays(&self.momentum));
         let (low, high) = (arrays(&self.low), arrays(&self.high));
         let (squared, ahead) = (self.speed_squared.to_array(), self.speed_ahead.to_array());
+        let body_work = self.body_work.to_array();
         for lane in 0..L::N {
             booked.kinetic += kinetic[lane];
+            booked.external += body_work[lane];
             for a in 0..3 {
                 booked.momentum[a] += momentum[a][lane];
                 booked.extent.min[a] = booked.extent.min[a].min(low[a][lane]);
@@ -134,11 +149,32 @@ impl<L: Lane> Tally<L> {
     }
 }
 
+/// What changes the velocity of every node: `gain - loss v`.
+#[derive(Clone, Copy)]
+struct Body {
+    gain: [f64; 3],
+    loss: f64,
+}
+
 impl Advance<'_> {
+    /// Gravity and relaxation in this step, if there are any.
+    fn body(&self) -> Option<Body> {
+        let relaxation = self.loads.relaxation.filter(|r| self.time < r.until);
+        if self.loads.gravity.is_none() && relaxation.is_none() {
+            return None;
+        }
+        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        let gain = self.loads.gravity.map_or([0.0; 3], |gravity| {
+            let scale = half_steps * gravity.drive.at(&self.loads.curves, self.time);
+            gravity.acceleration.map(|g| g * scale)
+        });
+        Some(Body { gain, loss: relaxation.map_or(0.0, |r| 1.0 - r.factor) })
+    }
+
     /// Integrates all sets of nodes, books the owned nodes, votes on the surface, and clears the forces.
     ///
-    /// `v_{n+1/2} = v_{n-1/2} + f/m (dt_{n-1} + dt_n)/2`, `x_{n+1} = x_n + v_{n+1/2} dt_n`. The result does not depend
-    /// on `width`.
+    /// `v_{n+1/2} = v_{n-1/2} + f/m (dt_{n-1} + dt_n)/2`, `x_{n+1} = x_n + v_{n+1/2} dt_n`, with gravity and relaxation
+    /// added to the first where there are any. The result does not depend on `width`.
     ///
     /// # Panics
     /// If an array is shorter than the sets or the machine lacks the width, see [`Width::require`].
@@ -169,6 +205,7 @@ impl Advance<'_> {
     #[inline(always)]
     unsafe fn all_sets<L: Lane>(&self, nodes: &mut Nodes<'_>) -> Booked {
         let mut tally = Tally::<L>::new();
+        let body = self.body();
         let mut referred = 0;
         for index in 0..nodes.sets.len() {
             let set = nodes.sets[index];
@@ -180,7 +217,7 @@ impl Advance<'_> {
                     surface: low_bits::<L>(set.surface >> lane),
                 };
                 // SAFETY: the lanes are inside the set; the rest is the caller's promise.
-                unsafe { self.lanes(nodes, moved, index * SET + lane, referred + lane, &mut tally) };
+                unsafe { self.lanes(nodes, moved, body, index * SET + lane, referred + lane, &mut tally) };
                 lane += L::N;
             }
             if set.surface != 0 {
@@ -199,6 +236,7 @@ impl Advance<'_> {
         &self,
         nodes: &mut Nodes<'_>,
         set: NodeSet,
+        body: Option<Body>,
         at: usize,
         referred: usize,
         tally: &mut Tally<L>,
@@ -210,6 +248,14 @@ impl Advance<'_> {
             unsafe { (load(nodes.x, at), load(nodes.v, at), load(nodes.f, at), L::load(nodes.mass, at)) };
         let scale = L::splat(0.5 * (self.dt_previous + self.dt)) / mass;
         let mut new: Vector<L> = force.mul_add(scale, &old);
+        let mut change = splat::<L>(0.0);
+        if let Some(Body { gain, loss }) = body {
+            let loss = L::splat(loss);
+            change.x = loss.neg_mul_add(old.x, L::splat(gain[0]));
+            change.y = loss.neg_mul_add(old.y, L::splat(gain[1]));
+            change.z = loss.neg_mul_add(old.z, L::splat(gain[2]));
+            new = Vector { x: new.x + change.x, y: new.y + change.y, z: new.z + change.z };
+        }
         if set.held != 0 {
             let mut held = arrays(&new);
             tally.external += self.hold(nodes, set, at, &mut held);
@@ -228,6 +274,11 @@ impl Advance<'_> {
 
         let booked = L::mask(u32::from(set.booked));
         let energy = L::splat(self.quanta.energy.magic());
+        if body.is_some() {
+            let mean = Vector { x: old.x + new.x, y: old.y + new.y, z: old.z + new.z };
+            let work = L::splat(0.5) * mass * change.dot(&mean);
+            tally.body_work = tally.body_work + L::select(booked, (work + energy) - energy, zero);
+        }
         let kinetic = L::splat(0.5) * mass * old.dot(&new);
         tally.kinetic = tally.kinetic + L::select(booked, (kinetic + energy) - energy, zero);
         let momentum = L::splat(self.quanta.momentum.magic());
@@ -254,28 +305,50 @@ impl Advance<'_> {
     }
 
     /// Corrects the free velocities of held nodes from `at` on; gives the work of what holds the booked ones.
-    fn hold(&self, nodes: &Nodes<'_>, set: NodeSet, at: usize, velocity: &mut [[f64; SET]; 3]) -> f64 {
+    fn hold(&self, nodes: &mut Nodes<'_>, set: NodeSet, at: usize, velocity: &mut [[f64; SET]; 3]) -> f64 {
         let mut external = 0.0;
+        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        let curves = &self.loads.curves;
         for lane in (0..SET).filter(|lane| set.held >> lane & 1 == 1) {
             let i = at + lane;
             let old = [nodes.v[0][i], nodes.v[1][i], nodes.v[2][i]];
             let free = [velocity[0][lane], velocity[1][lane], velocity[2][lane]];
             let mut new = free;
+            let mass = nodes.mass[i];
+            let booked = set.booked >> lane & 1 == 1;
             let held = &self.constraints[nodes.constraint[i] as usize];
+            let mut forces = held.forces;
+            while forces != 0 {
+                let load = &self.loads.forces[forces.trailing_zeros() as usize];
+                let scale = half_steps * load.drive.at(curves, self.time) / mass;
+                for a in 0..3 {
+                    new[a] += load.force[a] * scale;
+                }
+                forces &= forces - 1;
+            }
             for (component, prescribed) in new.iter_mut().zip(held.velocity) {
                 if let Some(velocity) = prescribed {
-                    *component = velocity;
+                    *component = velocity.at(curves, 0.5f64.mul_add(self.dt, self.time));
                 }
             }
             let mut walls = held.walls;
             while walls != 0 {
+                let w = walls.trailing_zeros() as usize;
                 let x = [nodes.x[0][i], nodes.x[1][i], nodes.x[2][i]];
-                stop_at_wall(&self.walls[walls.trailing_zeros() as usize], x, &mut new, self.dt);
+                let before = new;
+                if self.walls[w].stop(&self.poses[w], x, &mut new, self.dt) && booked {
+                    let quantum = self.quanta.momentum;
+                    for a in 0..3 {
+                        nodes.walls[w].impulse[a] += quantum.round(mass * (before[a] - new[a]));
+                    }
+                    if let Motion::Free { mass: own, .. } = self.walls[w].motion {
+                        nodes.walls[w].touched += touched_quantum(own).round(mass);
+                    }
+                }
                 walls &= walls - 1;
             }
-            if set.booked >> lane & 1 == 1 && new != free {
-                // Impulse of the support times the mean velocity is its work.
-                let mass = nodes.mass[i];
+            if booked && new != free {
+                // Impulse of what holds and pushes times the mean velocity is its work.
                 let work = (0..3).map(|a| mass * (new[a] - free[a]) * 0.5 * (old[a] + new[a])).sum::<f64>();
                 external += self.quanta.energy.round(work);
             }
@@ -363,37 +436,16 @@ unsafe fn on_avx512(advance: &Advance<'_>, nodes: &mut Nodes<'_>) -> Booked {
     unsafe { advance.all_sets::<Avx512>(nodes) }
 }
 
-/// Keeps a node that would end behind the wall on it; friction takes `mu` times the normal impulse.
-fn stop_at_wall(wall: &RigidWall, x: [f64; 3], v: &mut [f64; 3], dt: f64) {
-    let n = wall.normal;
-    let height = (0..3).map(|a| (x[a] - wall.point[a]) * n[a]).sum::<f64>();
-    let approach = (0..3).map(|a| v[a] * n[a]).sum::<f64>();
-    if height + approach * dt >= 0.0 || dt == 0.0 {
-        return;
-    }
-    let change = -height / dt - approach;
-    for a in 0..3 {
-        v[a] += change * n[a];
-    }
-    if wall.friction > 0.0 {
-        let normal_speed = -height / dt;
-        let tangential: [f64; 3] = std::array::from_fn(|a| v[a] - normal_speed * n[a]);
-        let speed =
-            (tangential[0] * tangential[0] + tangential[1] * tangential[1] + tangential[2] * tangential[2])
-                .sqrt();
-        if speed > 0.0 {
-            let factor = (wall.friction * change / speed).min(1.0);
-            for a in 0..3 {
-                v[a] -= factor * tangential[a];
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exact::Quantum;
+    use crate::{
+        exact::Quantum,
+        load::{Curve, Drive, Gravity, NodalForce, Relaxation},
+        wall::Shape,
+    };
+
+    const FLOOR: Shape = Shape::Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
 
     fn advance_one(
         v: [f64; 3],
@@ -401,17 +453,32 @@ mod tests {
         constraint: Constraint,
         walls: &[RigidWall],
     ) -> ([f64; 3], [f64; 3], Booked) {
+        let (x, v, booked, _) = loaded_one(v, f, constraint, walls, &Loads::default());
+        (x, v, booked)
+    }
+
+    fn loaded_one(
+        v: [f64; 3],
+        f: [f64; 3],
+        constraint: Constraint,
+        walls: &[RigidWall],
+        loads: &Loads,
+    ) -> ([f64; 3], [f64; 3], Booked, Vec<WallVote>) {
         let padded = |c: f64| [c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0].to_vec();
         let mut x = [0.0, 0.0, 0.001].map(padded);
         let mut vel = v.map(padded);
         let mut force = f.map(padded);
+        let mut votes = vec![WallVote::default(); walls.len()];
         let q = Quantum::for_reference(1e3, 46);
         let constraints = [Constraint::default(), constraint];
         let advance = Advance {
             dt_previous: 1e-3,
             dt: 1e-3,
+            time: 0.5,
             constraints: &constraints,
             walls,
+            poses: &vec![Pose::default(); walls.len()],
+            loads,
             quanta: Quanta { force: q, energy: q, momentum: q },
         };
         let mut nodes = Nodes {
@@ -422,10 +489,11 @@ mod tests {
             constraint: &[1],
             sets: &[NodeSet { held: 1, booked: 1, surface: 0 }],
             reference: &Default::default(),
+            walls: &mut votes,
         };
         let booked = advance.run(&mut nodes, Width::best());
         assert!(force.iter().flatten().all(|&f| f == 0.0), "forces are cleared");
-        (x.map(|c| c[0]), vel.map(|c| c[0]), booked)
+        (x.map(|c| c[0]), vel.map(|c| c[0]), booked, votes)
     }
 
     #[test]
@@ -437,7 +505,7 @@ mod tests {
 
     #[test]
     fn prescribed_velocity_books_the_work_of_its_support() {
-        let hold = Constraint { velocity: [Some(1.0), None, None], walls: 0 };
+        let hold = Constraint { velocity: [Some(Drive::constant(1.0)), None, None], ..Constraint::default() };
         let (_, v, booked) = advance_one([1.0, 0.0, 0.0], [4.0, 0.0, 0.0], hold, &[]);
         assert_eq!(v[0], 1.0);
         assert!((booked.external + 4.0e-3).abs() < 1e-9, "{}", booked.external);
@@ -445,15 +513,55 @@ mod tests {
 
     #[test]
     fn wall_stops_the_node_on_its_plane_and_friction_follows_coulomb() {
-        let touches = Constraint { velocity: [None; 3], walls: 1 };
-        let mut wall =
-            RigidWall { point: [0.0; 3], normal: [0.0, 0.0, 1.0], friction: 0.0, parts: vec![true] };
+        let touches = Constraint { walls: 1, ..Constraint::default() };
+        let mut wall = RigidWall { shape: FLOOR, motion: Motion::Fixed, friction: 0.0, parts: vec![true] };
         let (x, v, _) = advance_one([10.0, 0.0, -10.0], [0.0; 3], touches, std::slice::from_ref(&wall));
         assert!(x[2].abs() < 1e-15 && v[0] == 10.0);
         wall.friction = 0.3;
         let (_, v, _) = advance_one([10.0, 0.0, -10.0], [0.0; 3], touches, std::slice::from_ref(&wall));
         // normal velocity goes from -10 to -1 (it still closes one millimetre): tangential loses 0.3 * 9
         assert!((v[0] - 7.3).abs() < 1e-12, "{}", v[0]);
+    }
+
+    #[test]
+    fn what_a_node_loses_the_wall_gets_and_a_light_wall_counts_the_mass_on_it() {
+        let touches = Constraint { walls: 1, ..Constraint::default() };
+        let motion = Motion::Free { mass: 100.0, velocity: [0.0; 3] };
+        let wall = RigidWall { shape: FLOOR, motion, friction: 0.3, parts: vec![true] };
+        let before = [10.0, 0.0, -10.0];
+        let (_, v, _, votes) = loaded_one(before, [0.0; 3], touches, &[wall], &Loads::default());
+        for a in 0..3 {
+            assert!((votes[0].impulse[a] - 2.0 * (before[a] - v[a])).abs() < 1e-9, "{:?}", votes[0]);
+        }
+        assert_eq!(votes[0].touched, 2.0);
+    }
+
+    #[test]
+    fn gravity_relaxation_and_nodal_force_change_the_velocity_and_book_their_work() {
+        let curves = vec![Curve { points: vec![[0.0, 0.0], [1.0, 2.0]] }];
+        let drive = Drive { factor: 3.0, curve: Some(0) };
+        let force = NodalForce { force: [8.0, 0.0, 0.0], drive: Drive { factor: 1.0, curve: Some(0) } };
+        let loads = Loads {
+            curves,
+            forces: vec![force],
+            gravity: Some(Gravity { acceleration: [0.0, 0.0, -10.0], drive }),
+            surfaces: Vec::new(),
+            relaxation: Some(Relaxation { factor: 0.9, until: 0.6 }),
+        };
+        let pushed = Constraint { forces: 1, ..Constraint::default() };
+        let run = |loads| loaded_one([1.0, 2.0, 0.0], [0.0; 3], pushed, &[], loads);
+        // At 0.5 the curve is 1; a step of 1e-3, mass 2: 8/2 e-3 along x, -30e-3 along z.
+        let (_, v, booked, _) = run(&loads);
+        let expected: [f64; 3] = [0.9 + 4e-3, 1.8, -30e-3];
+        assert!((0..3).all(|a| (v[a] - expected[a]).abs() < 1e-15), "{v:?}");
+        let energy = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>();
+        assert!(
+            (booked.external - (energy(v) - energy([1.0, 2.0, 0.0]))).abs() < 1e-9,
+            "{}",
+            booked.external
+        );
+        let late = Loads { relaxation: Some(Relaxation { factor: 0.9, until: 0.5 }), ..loads.clone() };
+        assert!((run(&late).1[1] - 2.0).abs() < 1e-15, "relaxation is over");
     }
 
     #[test]
@@ -482,19 +590,33 @@ mod tests {
         let quantum = Quantum::for_reference(1e6, 46);
         let constraints = [
             Constraint::default(),
-            Constraint { velocity: [Some(1.0), None, Some(0.0)], walls: 0 },
-            Constraint { velocity: [None; 3], walls: 1 },
+            Constraint {
+                velocity: [Some(Drive::constant(1.0)), None, Some(Drive::constant(0.0))],
+                ..Constraint::default()
+            },
+            Constraint { walls: 1, forces: 1, ..Constraint::default() },
         ];
-        let wall = RigidWall { point: [0.0; 3], normal: [0.0, 0.0, 1.0], friction: 0.2, parts: vec![true] };
+        let motion = Motion::Free { mass: 50.0, velocity: [0.0; 3] };
+        let wall = RigidWall { shape: FLOOR, motion, friction: 0.2, parts: vec![true] };
+        let loads = Loads {
+            forces: vec![NodalForce { force: [1e3, 0.0, 5e2], drive: Drive::constant(1.0) }],
+            gravity: Some(Gravity { acceleration: [0.0, 3.0, -10.0], drive: Drive::constant(1.0) }),
+            relaxation: Some(Relaxation { factor: 0.95, until: 1.0 }),
+            ..Loads::default()
+        };
         let advance = Advance {
             dt_previous: 1e-4,
             dt: 1.1e-4,
+            time: 0.0,
             constraints: &constraints,
             walls: &[wall],
+            poses: &[Pose::default()],
+            loads: &loads,
             quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
         };
         let run = |width: Width| {
             let (mut x, mut v, mut f) = (x.clone(), v.clone(), f.clone());
+            let mut votes = [WallVote::default()];
             let mut nodes = Nodes {
                 x: &mut x,
                 v: &mut v,
@@ -503,11 +625,13 @@ mod tests {
                 constraint: &constraint,
                 sets: &sets,
                 reference: &reference,
+                walls: &mut votes,
             };
             let booked = advance.run(&mut nodes, width);
             assert!(booked.external != 0.0 && booked.speed_ahead > booked.speed_squared.sqrt());
             let bits: Vec<u64> = x.iter().chain(&v).flatten().map(|c| c.to_bits()).collect();
-            (booked, bits)
+            assert!(votes[0].touched > 0.0);
+            (booked, votes, bits)
         };
         let reference = run(Width::Scalar);
         for width in Width::ALL.into_iter().filter(|width| width.available()) {

@@ -2,7 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{burn::Detonation, contact, material::Material};
+use crate::{
+    burn::Detonation,
+    contact,
+    load::{Drive, Loads},
+    material::Material,
+    wall::RigidWall,
+};
 
 /// The rules of a run. Equal on every worker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,38 +21,29 @@ pub struct Setup {
     pub contact: Option<contact::Settings>,
     /// Node constraints, indexed by [`crate::state::GlobalState::constraint`]; entry 0 is "free".
     pub constraints: Vec<Constraint>,
-    /// Planar rigid walls.
+    /// Rigid walls.
     pub walls: Vec<RigidWall>,
     /// Where explosives are lit.
     pub detonations: Vec<Detonation>,
+    /// Curves, forces, gravity, loads on faces, relaxation.
+    pub loads: Loads,
 }
 
-/// What holds a node: prescribed velocities and walls. A node's constraint is the same on every holder.
+/// What acts on a node alone: prescribed velocities, walls, forces. A node's constraint is the same on every holder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Constraint {
-    /// Prescribed velocity by axis x, y, z (length per time); `None` is free, `Some(0.0)` is fixed, and one
+    /// Prescribed velocity by axis x, y, z (length per time); `None` is free, a constant 0 is fixed, and one
     /// fixed axis is a symmetry plane.
-    pub velocity: [Option<f64>; 3],
+    pub velocity: [Option<Drive>; 3],
     /// Walls that the node feels, one bit per entry of [`Setup::walls`]. Decks leave it 0: the start of a run
     /// derives it from the parts that each wall names ([`crate::initial::bind_walls`]).
     pub walls: u32,
+    /// Forces on the node, one bit per entry of [`Loads::forces`].
+    pub forces: u32,
 }
 
 /// Most walls in a run: one bit each in [`Constraint::walls`].
 pub const MAX_WALLS: usize = 32;
-
-/// A fixed plane that no node of the named parts crosses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RigidWall {
-    /// A point of the plane.
-    pub point: [f64; 3],
-    /// Unit normal, pointing to the side where material may be.
-    pub normal: [f64; 3],
-    /// Coulomb coefficient; 0 slides freely.
-    pub friction: f64,
-    /// Parts that feel the wall, by part index; true for each that does.
-    pub parts: Vec<bool>,
-}
 
 /// Time step, damping and ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     contact::{ContactVote, Extent},
     element::ElementVote,
+    wall::WallVote,
 };
 
 /// The vote of one cycle.
@@ -19,7 +20,7 @@ pub struct Vote {
     pub courant_element: u32,
     /// Least `0.1 / |rate of volume|` (time).
     pub volume_limit: f64,
-    /// Least limit from the stiffness of contacts (time).
+    /// Least limit from the stiffness of contacts and from transmitting faces (time).
     pub contact_limit: f64,
     /// Greatest squared speed of a contact node after integration.
     pub contact_speed_squared: f64,
@@ -39,12 +40,14 @@ pub struct Vote {
     pub contact: f64,
     /// Energy lost to friction in this cycle.
     pub friction: f64,
-    /// Work of prescribed velocities and walls in this cycle.
+    /// Work of prescribed velocities, walls and loads in this cycle.
     pub external: f64,
     /// Momentum of all nodes, `m v_{n+1/2}`.
     pub momentum: [f64; 3],
     /// Energies by part.
     pub parts: Vec<PartVote>,
+    /// What nodes gave each wall; empty if none was touched.
+    pub walls: Vec<WallVote>,
     /// Displacement extents of surface nodes since the sorted positions, by part.
     pub extents: Vec<Extent>,
     /// Position and velocity of gauge nodes: gauge index, then x, y, z, vx, vy, vz.
@@ -86,6 +89,7 @@ impl Vote {
             external: 0.0,
             momentum: [0.0; 3],
             parts: vec![PartVote::default(); n_parts],
+            walls: Vec::new(),
             extents: vec![Extent::NONE; n_parts],
             gauges: Vec::new(),
             fault: None,
@@ -120,6 +124,7 @@ impl Vote {
         for (mine, theirs) in self.extents.iter_mut().zip(&other.extents) {
             mine.merge(theirs);
         }
+        self.add_walls(&other.walls);
         self.gauges.extend_from_slice(&other.gauges);
         self.gauges.sort_by_key(|g| g.0);
         self.note_fault(other.fault);
@@ -147,6 +152,19 @@ impl Vote {
         self.hits += vote.hits;
         self.contact += vote.energy;
         self.friction += vote.friction;
+    }
+
+    /// Joins what other nodes gave the walls.
+    pub fn add_walls(&mut self, walls: &[WallVote]) {
+        if walls.iter().all(|wall| *wall == WallVote::default()) {
+            return;
+        }
+        if self.walls.len() < walls.len() {
+            self.walls.resize(walls.len(), WallVote::default());
+        }
+        for (mine, theirs) in self.walls.iter_mut().zip(walls) {
+            mine.merge(theirs);
+        }
     }
 
     fn deepest(&mut self, depth: f64, pair: (u32, u32)) {

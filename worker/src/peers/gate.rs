@@ -6,6 +6,7 @@ use protocol::{
     Error, Result, dial,
     handshake::{Hello, Membership, Policy, Role, Welcome},
     link::{self, Receiver, Sender},
+    shape::Shaped,
     tls,
 };
 use tokio::{
@@ -46,7 +47,7 @@ pub(super) async fn listen(listener: TcpListener, shared: Arc<Shared>) {
 
 /// Serves a connection to its end. What happens once it stands is told to the compute thread.
 async fn take(shared: &Shared, stream: TcpStream) -> Result<()> {
-    let stream = link::Socket::new(stream)?;
+    let stream = Shaped::new(link::Socket::new(stream)?, shared.port.as_ref());
     match &shared.certificates {
         None => {
             let (sender, receiver) = link::split(stream, settings());
@@ -148,7 +149,8 @@ async fn reach(shared: &Shared, circle: &Circle, other: u32) -> Result<dial::Cal
     hello.token = Some(who.secret.clone());
     hello.member = Some(Membership { job: circle.key.job, epoch: circle.key.epoch, index: who.me });
     let certificates = shared.certificates.as_ref().map(|(_, config)| config);
-    let call = dial::reach_peer(address, certificates, settings()).await?.greet(&hello).await?;
+    let reached = dial::reach_peer(address, certificates, settings()).await?;
+    let call = reached.through(shared.port.as_ref()).greet(&hello).await?;
     let found = call.welcome.host;
     if found != other {
         return Err(Error::Message(format!("worker {found} answers there")));

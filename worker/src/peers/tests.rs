@@ -28,7 +28,7 @@ struct Side {
 
 async fn side(listener: TcpListener) -> Side {
     let address = listener.local_addr().expect("bound");
-    let peers = Peers::start(listener, None).expect("no certificates");
+    let peers = Peers::start(listener, None, None).expect("no certificates");
     let (send, news) = mpsc::channel(16);
     Side {
         links: Links::new(Some(&peers), send.downgrade()),

@@ -6,6 +6,7 @@ use mechanics::{cycle::Guest, setup::Control, setup::Setup, vote::Quanta};
 fn assign(cycle: u64) -> Box<Assign> {
     let quantum = Quantum::for_reference(1.0, 42);
     Box::new(Assign {
+        epoch: 0,
         setup: Setup {
             materials: Vec::new(),
             control: Control {
@@ -23,6 +24,7 @@ fn assign(cycle: u64) -> Box<Assign> {
             constraints: Vec::new(),
             walls: Vec::new(),
             detonations: Vec::new(),
+            loads: Default::default(),
         },
         n_parts: 1,
         quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
@@ -40,7 +42,8 @@ fn assign(cycle: u64) -> Box<Assign> {
 
 fn orders(next: u64) -> Orders {
     let force_quantum = Quantum::for_reference(1.0, 42);
-    Orders { next, dt: 1e-3, force_quantum, gather: false, collect: false, stop: false }
+    let (dt, time, walls) = (1e-3, 1e-3 * next as f64, Vec::new());
+    Orders { next, dt, time, walls, force_quantum, gather: false, collect: false, stop: false }
 }
 
 fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
@@ -137,19 +140,46 @@ fn more_totals_than_two_cycles_end_the_session() {
 }
 
 #[test]
-fn a_second_assignment_names_the_phase() {
+fn a_second_assignment_of_the_same_epoch_names_the_phase() {
     let mut session = in_first_cycle(orders(0));
     let actions = hear(&mut session, ToWorker::Assign(assign(0)));
     assert!(
-        matches!(&actions[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("Interior"))
+        matches!(&actions[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("Interior") && reason.contains("epoch 0"))
     );
 }
 
 #[test]
-fn release_forgets_the_job_in_any_phase() {
+fn an_assignment_of_a_later_epoch_waits_for_the_task_under_way_and_its_outcome_is_thrown_away() {
     let mut session = in_first_cycle(orders(0));
+    for epoch in [1, 2] {
+        let assign = Box::new(Assign { epoch, ..*assign(40) });
+        assert!(hear(&mut session, ToWorker::Assign(assign)).is_empty(), "the interior is under way");
+    }
+    assert_eq!((session.epoch(), session.cycle()), (2, 40));
+    let load = done(&mut session, Outcome::Computed);
+    assert!(
+        matches!(&load[..], [Action::Compute(Task::Load { assign, prepare: false })] if assign.epoch == 2),
+        "only the newest is loaded: {load:?}"
+    );
+    let ready = done(&mut session, Outcome::Loaded { vote: None, lanes: "scalar".into() });
+    assert!(matches!(ready[..], [Action::Send(ToMaster::Ready { .. })]));
+}
+
+#[test]
+fn an_assignment_of_a_later_epoch_is_loaded_at_once_by_a_worker_that_waits() {
+    let mut session = in_first_cycle(orders(0));
+    done(&mut session, Outcome::Computed);
+    let assign = Box::new(Assign { epoch: 7, ..*assign(0) });
+    let load = hear(&mut session, ToWorker::Assign(assign));
+    assert!(matches!(load[..], [Action::Compute(Task::Load { prepare: true, .. })]), "{load:?}");
+}
+
+#[test]
+fn release_forgets_the_job_when_the_task_under_way_is_done() {
+    let mut session = in_first_cycle(orders(0));
+    assert!(hear(&mut session, ToWorker::Release).is_empty(), "the interior is under way");
+    assert!(matches!(done(&mut session, Outcome::Computed)[..], [Action::Forget]));
     assert!(matches!(hear(&mut session, ToWorker::Release)[..], [Action::Forget]));
-    assert!(done(&mut session, Outcome::Computed).is_empty(), "an outcome of the job before is ignored");
     let load = hear(&mut session, ToWorker::Assign(assign(5)));
     assert!(matches!(load[..], [Action::Compute(Task::Load { prepare: false, .. })]));
 }

@@ -4,12 +4,12 @@
 //! what it is grown by, and two zeros: one comparison of eight numbers is the whole test, and it is
 //! [`Bounds::holds`](super::search::Bounds::holds) because changing a sign is exact.
 
-use super::search::Candidates;
+use super::{search::Candidates, watch::Listed};
 use crate::lanes::{Lane, SET, Width, scalar::Scalar};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
 
-/// Points of nodes and boxes of faces in one cycle.
+/// Points of nodes and boxes of faces in one cycle, those that are watched.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Boxes {
     points: Vec<f64>,
@@ -17,44 +17,55 @@ pub(super) struct Boxes {
 }
 
 impl Boxes {
-    /// Measures the boxes of faces, given as batch nodes, grown by `grow`. `x` by batch node.
+    /// Measures the points of `watched` nodes and the boxes of `watched` faces, given as batch nodes, grown by `grow`.
+    /// `x` by batch node. Boxes of other faces stay what they were; their corners must be among the nodes.
     ///
     /// # Panics
-    /// If a node is out of range or the machine lacks the width.
-    pub(super) fn measure(&mut self, width: Width, x: &[Vec<f64>; 3], faces: &[[u32; 4]], grow: f64) {
+    /// If a node or face is out of range or the machine lacks the width.
+    pub(super) fn measure(
+        &mut self,
+        width: Width,
+        x: &[Vec<f64>; 3],
+        faces: &[[u32; 4]],
+        watched: &Listed,
+        grow: f64,
+    ) {
         assert!(width.available(), "lane width {width} on a machine that lacks it");
         let n = x[0].len();
+        let [x, y, z] = [&x[0][..n], &x[1][..n], &x[2][..n]];
         self.points.resize(SET * n, 0.0);
-        let axes = x[0].iter().zip(&x[1][..n]).zip(&x[2][..n]);
-        for (point, ((&x, &y), &z)) in self.points.chunks_exact_mut(SET).zip(axes) {
-            point.copy_from_slice(&[x, y, z, -x, -y, -z, 0.0, 0.0]);
+        for i in watched.nodes.iter().map(|&node| node as usize) {
+            let point = &mut self.points[SET * i..][..SET];
+            point.copy_from_slice(&[x[i], y[i], z[i], -x[i], -y[i], -z[i], 0.0, 0.0]);
         }
         self.faces.resize(SET * faces.len(), 0.0);
         let grown = [grow, grow, grow, grow, grow, grow, 0.0, 0.0];
-        let highest = faces.iter().flatten().fold(0, |highest, &i| if i > highest { i } else { highest });
-        assert!(faces.is_empty() || (highest as usize) < n, "node {highest} of {n}");
         match width {
-            // SAFETY: there are as many boxes as faces, and all nodes are in range; the width is available.
-            Width::Scalar => unsafe { self.boxes::<Scalar>(faces, &grown) },
+            // SAFETY: the width is available.
+            Width::Scalar => unsafe { self.boxes::<Scalar>(faces, &watched.faces, &grown) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
-            Width::Avx2 => unsafe { self.boxes_on_avx2(faces, &grown) },
+            Width::Avx2 => unsafe { self.boxes_on_avx2(faces, &watched.faces, &grown) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
-            Width::Avx512 => unsafe { self.boxes_on_avx512(faces, &grown) },
+            Width::Avx512 => unsafe { self.boxes_on_avx512(faces, &watched.faces, &grown) },
             #[cfg(not(target_arch = "x86_64"))]
             Width::Avx2 | Width::Avx512 => unreachable!("not available"),
         }
     }
 
     /// # Safety
-    /// A box for each face, and all nodes in range.
+    /// On a machine that has the lanes.
     #[inline(always)]
-    unsafe fn boxes<L: Lane>(&mut self, faces: &[[u32; 4]], grown: &[f64; SET]) {
-        for (f, nodes) in faces.iter().enumerate() {
+    unsafe fn boxes<L: Lane>(&mut self, faces: &[[u32; 4]], watched: &[u32], grown: &[f64; SET]) {
+        let (n_points, n_boxes) = (self.points.len() / SET, self.faces.len() / SET);
+        for &f in watched {
+            let (f, nodes) = (f as usize, &faces[f as usize]);
+            let highest = nodes[0].max(nodes[1]).max(nodes[2].max(nodes[3])) as usize;
+            assert!(f < n_boxes && highest < n_points, "face {f} of {n_boxes}, node {highest} of {n_points}");
             let mut at = 0;
             while at < SET {
-                // SAFETY: the caller's.
+                // SAFETY: the caller's; a set lies behind each point and box that has just been checked.
                 unsafe {
                     let a = L::load(&self.points, SET * nodes[0] as usize + at);
                     let b = L::load(&self.points, SET * nodes[1] as usize + at);
@@ -70,16 +81,16 @@ impl Boxes {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
-    unsafe fn boxes_on_avx2(&mut self, faces: &[[u32; 4]], grown: &[f64; SET]) {
+    unsafe fn boxes_on_avx2(&mut self, faces: &[[u32; 4]], watched: &[u32], grown: &[f64; SET]) {
         // SAFETY: the caller's.
-        unsafe { self.boxes::<Avx2>(faces, grown) }
+        unsafe { self.boxes::<Avx2>(faces, watched, grown) }
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-    unsafe fn boxes_on_avx512(&mut self, faces: &[[u32; 4]], grown: &[f64; SET]) {
+    unsafe fn boxes_on_avx512(&mut self, faces: &[[u32; 4]], watched: &[u32], grown: &[f64; SET]) {
         // SAFETY: the caller's.
-        unsafe { self.boxes::<Avx512>(faces, grown) }
+        unsafe { self.boxes::<Avx512>(faces, watched, grown) }
     }
 
     /// The candidates of nodes `first..end` of the list whose boxes hold them: faces in `held`, and the end of
@@ -197,9 +208,10 @@ mod tests {
         assert!(wanted.concat().len() > 500);
         let starts: Vec<u32> = (0..=100).map(|i| 40 * i).collect();
         let candidates = Candidates { nodes: nodes.clone(), starts, faces: all.repeat(100) };
+        let listed = Listed { nodes: (0..200).collect(), faces: all };
         for width in Width::ALL.into_iter().filter(|width| width.available()) {
             let (mut boxes, mut held, mut ends) = (Boxes::default(), vec![], vec![]);
-            boxes.measure(width, &x, &faces, 0.25);
+            boxes.measure(width, &x, &faces, &listed, 0.25);
             boxes.hold(width, &candidates, (0, 100), &mut held, &mut ends);
             assert_eq!(held, wanted.concat(), "{width}");
             assert_eq!(ends.last(), Some(&(held.len() as u32)));

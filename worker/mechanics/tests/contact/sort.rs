@@ -1,10 +1,9 @@
 //! Verification book 4.7: the sort finds what brute force finds.
 
-use std::{collections::BTreeSet, time::Instant};
+use std::collections::BTreeSet;
 
 use mechanics::{
-    contact::{Batch, Census, Contact, Exclusions, Settings, Surface, WorkUnit, initial_pairs, sort},
-    exact::Quantum,
+    contact::{Census, Exclusions, Settings, Surface, WorkUnit, initial_pairs, sort},
     mesh::Mesh,
 };
 
@@ -241,75 +240,4 @@ fn the_benchmark_of_64000_elements_has_its_census() {
         assert!(census.nodes.0 >= 1 && census.nodes.2 <= 12, "{census:?}");
     }
     assert!(initial_pairs(&surface, &x, &settings(2, 0.1, 0.1)).is_empty(), "one gap apart is apart");
-}
-
-/// Figures, not a test of anything but that they exist: `cargo test --release -- --ignored --nocapture`.
-#[test]
-#[ignore = "prints timings"]
-fn timing_of_the_sort() {
-    let (mesh, surface, x) = plates(0.1);
-    let start = Instant::now();
-    std::hint::black_box(Surface::new(&mesh, &materials(), &|_| true));
-    println!("surface: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
-    for settings in [settings(2, 0.1, 0.1), without_self(settings(2, 0.1, 0.1))] {
-        let best = (0..30)
-            .map(|_| {
-                let start = Instant::now();
-                std::hint::black_box(sort(&surface, &x, &settings, &Exclusions::default()));
-                start.elapsed().as_secs_f64()
-            })
-            .fold(f64::INFINITY, f64::min);
-        println!("sort: {:.0} ns per node", best * 1e9 / surface.nodes.len() as f64);
-        assert!(best > 0.0);
-    }
-}
-
-#[test]
-#[ignore = "prints timings"]
-fn timing_of_the_force() {
-    let (mesh, surface, x) = plates(0.1);
-    let settings = without_self(settings(2, 0.1, 0.1));
-    let units = sort(&surface, &x, &settings, &Exclusions::default());
-    let all: Vec<&WorkUnit> = units.iter().collect();
-    // Density 1, eighths of elements.
-    let mut mass = vec![0.0; mesh.n_nodes()];
-    for part in &mesh.parts {
-        (0..part.n_elements()).for_each(|e| part.corners(e).iter().for_each(|&n| mass[n as usize] += 0.125));
-    }
-    let batch = Batch::gather(&surface, &all, &|n| mass[n as usize], &Exclusions::default());
-    let quantum = Quantum::for_reference(1.0, 42);
-    for (title, offset, waves) in [("on corners", 0.0, 0.0), ("on faces", 0.37, 0.0), ("warped", 0.37, 0.02)]
-    {
-        let mut x = [0, 1, 2]
-            .map(|a| batch.nodes.iter().map(|n| mesh.positions[n.global as usize][a]).collect::<Vec<f64>>());
-        for (i, node) in batch.nodes.iter().enumerate() {
-            let wave = waves * (1.3 * x[0][i]).sin() * (0.9 * x[1][i]).cos();
-            let upper = f64::from(node.part);
-            x[0][i] += offset * upper;
-            x[1][i] += offset * upper;
-            x[2][i] += wave - 0.03 * upper;
-        }
-        let v = x.clone();
-        let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
-        let start = Instant::now();
-        let mut contact = Contact::new(&batch, &settings, &x);
-        let built = start.elapsed().as_secs_f64();
-        let (mut best, mut vote) = (f64::INFINITY, Default::default());
-        for _ in 0..200 {
-            let start = Instant::now();
-            vote = contact.forces(&x, &v, 1.0, quantum, quantum, &mut f);
-            best = best.min(start.elapsed().as_secs_f64());
-        }
-        println!(
-            "{title}: dt {:.4} h/c; stage zero {:.2} ms; {} pairs, {} hits, {:.1} ns per pair, {:.0} ns per hit, {:.1} us",
-            vote.dt,
-            built * 1e3,
-            vote.pairs,
-            vote.hits,
-            best * 1e9 / vote.pairs as f64,
-            best * 1e9 / vote.hits as f64,
-            best * 1e6
-        );
-        assert!(vote.hits > 3000, "{vote:?}");
-    }
 }

@@ -131,45 +131,50 @@ fn gas_that_runs_onto_a_wall_stops_at_four_times_its_density() {
     assert!((front / 0.2 - 1.0).abs() < 0.03, "{front}");
 }
 
-/// TNT lit at its first layer, which then moves at `push`: 200 cells of 1 mm.
-fn charge() -> Column {
+const H: f64 = 1e-3;
+const D: f64 = 6930.0;
+const P_CJ: f64 = 20.9997e9;
+const U_CJ: f64 = 1859.2306;
+const V_CJ: f64 = 0.731_687_66;
+
+/// TNT lit at its first layer: cells of 1 mm.
+fn charge(cells: u32) -> Column {
     let tnt = tnt();
-    let h = 1e-3;
-    let mut piece = grid(&tnt, [1, 1, 200], h, 0.0, 1);
+    let mut piece = grid(&tnt, [1, 1, cells], H, 0.0, 1);
     for (e, time) in piece.fields[field::TIME_TO_LIGHT].iter_mut().enumerate() {
-        *time = (e as f64 + 0.5) * h / 6930.0;
+        *time = (e as f64 + 0.5) * H / D;
     }
     Column::new(&piece, &tnt, 8e4)
 }
 
+/// A miss: the peak should come to p_CJ as the run grows in cells, and it falls, to 0.919 after 360 cells.
 #[test]
-fn a_detonation_runs_at_its_speed_and_behind_it_stands_the_chapman_jouguet_pressure() {
-    const P_CJ: f64 = 20.9997e9;
-    const U_CJ: f64 = 1859.2;
-    // From a wall: the products slow down behind the front, at which the pressure peaks.
-    let mut column = charge();
+fn a_detonation_from_a_wall_runs_at_its_speed_with_a_peak_that_is_seven_per_cent_low() {
+    let mut column = charge(200);
     let mut lit = 0;
     let mut peak = 0.0_f64;
-    while column.time < 180e-3 / 6930.0 {
+    while column.time < 180.0 * H / D {
         column.cycle(0.0, None);
         // An element bears pressure from the step in which the front passes its centre.
         while lit < 200 && column.pressure(lit) > 0.0 {
-            let due = (lit as f64 + 0.5) * 1e-3 / 6930.0;
+            let due = (lit as f64 + 0.5) * H / D;
             assert!(due < column.time && column.time < due + 1e-7, "{lit}: {due} {}", column.time);
             lit += 1;
         }
         assert!((lit..200).all(|e| column.pressure(e) == 0.0), "ahead of the front at {}", column.time);
-        if column.time > 150e-3 / 6930.0 {
+        if column.time > 150.0 * H / D {
             peak = (0..200).map(|e| column.pressure(e)).fold(peak, f64::max);
         }
     }
-    println!("TNT, from a wall: {lit} of 200 lit, peak {:.4} of P_CJ", peak / P_CJ);
+    println!("TNT from a wall: {lit} of 200 lit, peak {:.4} p_CJ", peak / P_CJ);
     assert!((179..=181).contains(&lit), "{lit} lit");
     assert!((peak / P_CJ - 1.0).abs() < 0.07, "{peak}");
+}
 
-    // Pushed from behind at the speed of the products the state behind the front is uniform.
-    let mut column = charge();
-    while column.time < 180e-3 / 6930.0 {
+#[test]
+fn behind_a_detonation_that_is_pushed_stands_the_chapman_jouguet_state() {
+    let mut column = charge(200);
+    while column.time < 180.0 * H / D {
         column.cycle(U_CJ, None);
     }
     let front = (0..200).find(|&e| column.pressure(e) == 0.0).expect("the front is inside");
@@ -179,5 +184,5 @@ fn a_detonation_runs_at_its_speed_and_behind_it_stands_the_chapman_jouguet_press
     println!("TNT, pushed: front {front}, pressure {:.4} of P_CJ, volume {volume:.5}", pressure / P_CJ);
     assert!((178..=184).contains(&front), "{front}");
     assert!((pressure / P_CJ - 1.0).abs() < 0.02, "{pressure}");
-    assert!((volume / 0.73169 - 1.0).abs() < 0.01, "{volume}");
+    assert!((volume / V_CJ - 1.0).abs() < 0.01, "{volume}");
 }

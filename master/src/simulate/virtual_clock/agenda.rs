@@ -1,0 +1,101 @@
+//! What is due when under a virtual clock: ends of work, and messages on their way.
+
+use std::cmp::Ordering;
+
+use protocol::wire::Packed;
+use worker::session::Outcome;
+
+use super::super::timeline::Kind;
+use crate::sort::Sorted;
+
+/// One end of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The master.
+    Master,
+    /// A worker, from 0.
+    Worker(usize),
+}
+
+impl End {
+    /// Its host, from 0.
+    pub fn host(self) -> usize {
+        match self {
+            Self::Master => 0,
+            Self::Worker(worker) => worker,
+        }
+    }
+}
+
+/// A message on its way.
+pub struct Parcel {
+    /// Its number in the run.
+    pub number: u64,
+    /// Sender.
+    pub from: End,
+    /// Receiver.
+    pub to: End,
+    /// The message.
+    pub packed: Packed,
+    /// Its bytes with the frames' headers.
+    pub bytes: u64,
+    /// The epoch of the worker at one of its ends.
+    pub epoch: u32,
+    /// The cycle of the worker at one of its ends.
+    pub cycle: u64,
+    /// When it was handed to the sender's processor (s).
+    pub sent: f64,
+}
+
+/// What a processor works on.
+pub enum Work {
+    /// A worker's task, and what will come of it.
+    Task(usize, Kind, Outcome),
+    /// The master's sort, and what will come of it.
+    Sort(Box<Sorted>),
+    /// A message that leaves.
+    Send(Parcel),
+    /// A message that comes in.
+    Receive(Parcel),
+}
+
+/// Work with the time it began.
+pub struct Begun(pub f64, pub Work);
+
+/// What is due.
+pub enum What {
+    /// A processor may have ended something, if nothing changed since this version.
+    Processor(usize, u64),
+    /// The first bits of a message reach the receiver's port.
+    Enters(Parcel),
+    /// All of a message is there.
+    Arrives(Parcel),
+}
+
+/// Something due: the earliest first, and of those due at once the first that was foreseen.
+pub struct Due {
+    /// When (s).
+    pub time: f64,
+    /// By when it was foreseen.
+    pub order: u64,
+    /// What.
+    pub what: What,
+}
+
+impl PartialEq for Due {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Due {}
+impl PartialOrd for Due {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Due {
+    /// The earliest is the greatest, as the heap gives the greatest first.
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.time.total_cmp(&self.time).then(other.order.cmp(&self.order))
+    }
+}

@@ -1,0 +1,205 @@
+//! What acts on bodies from outside beside walls: curves of time, nodal forces, gravity, loads on faces, relaxation.
+//!
+//! Velocities are prescribed at the middle of a step, forces act at its start, as central differences have them. Forces
+//! on nodes, gravity and relaxation are put in where nodes are integrated (`nodes.rs`), alike on every holder of a node;
+//! loads on faces are nodal forces of the block that has the element (`load/face.rs`), rounded like its corner forces.
+
+pub(crate) mod face;
+
+use serde::{Deserialize, Serialize};
+
+/// A tabulated function of time: straight lines between its points, constant before the first and after the last.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Curve {
+    /// Time and value, at least one; times ascend.
+    pub points: Vec<[f64; 2]>,
+}
+
+impl Curve {
+    /// The value at a time.
+    pub fn at(&self, time: f64) -> f64 {
+        let after = self.points.partition_point(|p| p[0] <= time);
+        match (after.checked_sub(1).map(|i| self.points[i]), self.points.get(after)) {
+            (None, None) => 0.0,
+            (Some(point), None) => point[1],
+            (None, Some(point)) => point[1],
+            (Some([t0, y0]), Some([t1, y1])) => (time - t0).mul_add((y1 - y0) / (t1 - t0), y0),
+        }
+    }
+
+    /// The integral from zero to a time, exact for the straight lines.
+    pub fn integral(&self, time: f64) -> f64 {
+        self.since_first(time) - self.since_first(0.0)
+    }
+
+    /// The integral from the first point to a time.
+    fn since_first(&self, time: f64) -> f64 {
+        let Some(first) = self.points.first() else { return 0.0 };
+        if time <= first[0] {
+            return (time - first[0]) * first[1];
+        }
+        let mut sum = 0.0;
+        let mut from = *first;
+        for &point in &self.points[1..] {
+            if point[0] >= time {
+                break;
+            }
+            sum = ((point[0] - from[0]) * 0.5).mul_add(from[1] + point[1], sum);
+            from = point;
+        }
+        ((time - from[0]) * 0.5).mul_add(from[1] + self.at(time), sum)
+    }
+
+    /// The greatest magnitude.
+    pub fn greatest(&self) -> f64 {
+        self.points.iter().map(|p| p[1].abs()).fold(0.0, f64::max)
+    }
+}
+
+/// A number that may follow a curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drive {
+    /// The number, or what the curve is multiplied by.
+    pub factor: f64,
+    /// Index into [`Loads::curves`]; none for a constant.
+    pub curve: Option<u32>,
+}
+
+impl Drive {
+    /// A constant.
+    pub const fn constant(factor: f64) -> Self {
+        Self { factor, curve: None }
+    }
+
+    /// The value at a time.
+    ///
+    /// # Panics
+    /// If there is no such curve.
+    pub fn at(&self, curves: &[Curve], time: f64) -> f64 {
+        self.curve.map_or(self.factor, |c| self.factor * curves[c as usize].at(time))
+    }
+
+    /// The integral from zero to a time.
+    ///
+    /// # Panics
+    /// If there is no such curve.
+    pub fn integral(&self, curves: &[Curve], time: f64) -> f64 {
+        self.factor * self.curve.map_or(time, |c| curves[c as usize].integral(time))
+    }
+
+    /// The greatest magnitude.
+    ///
+    /// # Panics
+    /// If there is no such curve.
+    pub fn greatest(&self, curves: &[Curve]) -> f64 {
+        self.factor.abs() * self.curve.map_or(1.0, |c| curves[c as usize].greatest())
+    }
+}
+
+/// All of them; none by default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Loads {
+    /// Curves that the others name.
+    pub curves: Vec<Curve>,
+    /// Forces on single nodes; a node's constraint says which it feels.
+    pub forces: Vec<NodalForce>,
+    /// Gravity, on every node.
+    pub gravity: Option<Gravity>,
+    /// Loads on faces.
+    pub surfaces: Vec<SurfaceLoad>,
+    /// Dynamic relaxation.
+    pub relaxation: Option<Relaxation>,
+}
+
+/// Most nodal forces in a run: one bit each in [`crate::setup::Constraint::forces`].
+pub const MAX_FORCES: usize = 32;
+
+/// A force on each of some nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NodalForce {
+    /// Force on one node (force).
+    pub force: [f64; 3],
+    /// What it is multiplied by.
+    pub drive: Drive,
+}
+
+/// An acceleration of everything.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gravity {
+    /// Acceleration (length per time squared).
+    pub acceleration: [f64; 3],
+    /// What it is multiplied by.
+    pub drive: Drive,
+}
+
+/// A load on faces of elements.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceLoad {
+    /// What acts.
+    pub kind: SurfaceKind,
+    /// Global element index and index into [`crate::mesh::FACES`].
+    pub faces: Vec<(u32, u8)>,
+}
+
+/// What acts on a face.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum SurfaceKind {
+    /// A pressure against the face as it is turned now (stress, positive pushes).
+    Pressure(Drive),
+    /// Dampers that take up plane waves which leave through the face (Lysmer and Kuhlemeyer 1969): traction
+    /// `-rho (c_l v_n n + c_s v_t)` with the wave speeds of the material at rest.
+    Transmit,
+}
+
+/// Velocities are multiplied by a factor each cycle, so that a structure comes to rest under its loads.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Relaxation {
+    /// The factor, from 0 to 1.
+    pub factor: f64,
+    /// Acts before this time (time).
+    pub until: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_is_straight_between_its_points_and_constant_outside() {
+        let curve = Curve { points: vec![[1.0, 2.0], [3.0, 6.0], [4.0, -1.0]] };
+        assert_eq!(
+            [0.0, 1.0, 2.0, 3.0, 3.5, 4.0, 9.0].map(|t| curve.at(t)),
+            [2.0, 2.0, 4.0, 6.0, 2.5, -1.0, -1.0]
+        );
+        assert_eq!(curve.greatest(), 6.0);
+    }
+
+    #[test]
+    fn the_integral_of_a_curve_is_that_of_its_lines() {
+        let curve = Curve { points: vec![[1.0, 2.0], [3.0, 6.0], [4.0, -1.0]] };
+        let exact = [
+            (0.0, 0.0),
+            (0.5, 1.0),
+            (1.0, 2.0),
+            (2.0, 5.0),
+            (3.0, 10.0),
+            (4.0, 12.5),
+            (6.0, 10.5),
+            (-1.0, -2.0),
+        ];
+        for (time, expected) in exact {
+            assert!((curve.integral(time) - expected).abs() < 1e-14, "{time}: {}", curve.integral(time));
+        }
+        let curves = [curve];
+        let drive = Drive { factor: -2.0, curve: Some(0) };
+        assert_eq!(
+            (drive.at(&curves, 2.0), drive.integral(&curves, 3.0), drive.greatest(&curves)),
+            (-8.0, -20.0, 12.0)
+        );
+        let constant = Drive::constant(3.0);
+        assert_eq!(
+            (constant.at(&[], 9.0), constant.integral(&[], 2.0), constant.greatest(&[])),
+            (3.0, 6.0, 3.0)
+        );
+    }
+}

@@ -1,0 +1,212 @@
+//! Loads on the faces of a block's elements, as nodal forces.
+//!
+//! A face is the bilinear surface through its corners; what acts on it goes to the corners by their shape functions. A
+//! uniform pressure on all faces of an element is then exactly its pressure times the volume gradient.
+
+use nalgebra::Vector3;
+
+use super::{Loads, SurfaceKind};
+use crate::{block::Block, element::hex8, exact::Quantum, material::Material, mesh::FACES, setup::Control};
+
+/// A loaded face and what acted on it in this cycle.
+#[derive(Clone, Debug)]
+pub(crate) struct LoadedFace {
+    /// Index into [`Loads::surfaces`].
+    load: u32,
+    /// Index into [`FACES`].
+    side: u8,
+    /// Local nodes of the element's corners.
+    corners: [u32; 8],
+    /// Faces of the element that transmit.
+    together: f64,
+    /// `rho c_l` and `rho c_s` (stress over velocity), and `c_l`.
+    impedance: [f64; 3],
+    /// Forces on the corners of the face.
+    force: [[f64; 3]; 4],
+    /// Their power with the velocities before the step.
+    power: f64,
+}
+
+/// What the faces of a block say of a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FaceVote {
+    /// Bound on every force term.
+    pub force_bound: f64,
+    /// Least limit on the step from dampers (time).
+    pub limit: f64,
+}
+
+/// The loaded faces of a block.
+pub(crate) fn faces_of(block: &Block, loads: &Loads, material: &Material) -> Vec<LoadedFace> {
+    let mut local: Vec<(u32, usize)> = block.elements.iter().copied().zip(0..).collect();
+    local.sort_unstable();
+    let find = |element: u32| local.binary_search_by_key(&element, |l| l.0).ok().map(|i| local[i].1);
+    let stiffness = material.bulk() + 4.0 / 3.0 * material.shear();
+    let longitudinal = (stiffness / material.density).sqrt();
+    let shear = (material.shear() / material.density).sqrt();
+    let impedance = [material.density * longitudinal, material.density * shear, longitudinal];
+    let mut found: Vec<(usize, LoadedFace)> = Vec::new();
+    for (load, surface) in (0..).zip(&loads.surfaces) {
+        for &(element, side) in &surface.faces {
+            if let Some(e) = find(element) {
+                let corners = block.corners(e);
+                let (force, power) = ([[0.0; 3]; 4], 0.0);
+                found.push((e, LoadedFace { load, side, corners, together: 0.0, impedance, force, power }));
+            }
+        }
+    }
+    let transmits = |face: &LoadedFace| loads.surfaces[face.load as usize].kind == SurfaceKind::Transmit;
+    let mut damped: Vec<usize> = found.iter().filter(|(_, face)| transmits(face)).map(|(e, _)| *e).collect();
+    damped.sort_unstable();
+    for (e, face) in &mut found {
+        face.together = (damped.partition_point(|d| d <= e) - damped.partition_point(|d| d < e)) as f64;
+    }
+    found.into_iter().map(|(_, face)| face).collect()
+}
+
+/// Area vectors of the corners of a bilinear face, outward: `integral of N_I n dA`.
+fn corner_areas(x: [Vector3<f64>; 4]) -> [Vector3<f64>; 4] {
+    let (a, b, c, d) = (x[1] - x[0], x[2] - x[1], x[2] - x[3], x[3] - x[0]);
+    let products = [a.cross(&d), a.cross(&b), c.cross(&b), c.cross(&d)];
+    std::array::from_fn(|i| {
+        let [near, next, far, last] = [0, 1, 2, 3].map(|k| products[(i + k) % 4]);
+        near / 9.0 + (next + last) / 18.0 + far / 36.0
+    })
+}
+
+impl LoadedFace {
+    /// Local nodes of the face.
+    fn nodes(&self) -> [usize; 4] {
+        FACES[usize::from(self.side)].map(|corner| self.corners[corner] as usize)
+    }
+}
+
+/// Adds the loads at `time` to the forces of the block, and keeps them for [`work`].
+pub(crate) fn apply(
+    faces: &mut [LoadedFace],
+    block: &mut Block,
+    loads: &Loads,
+    control: &Control,
+    time: f64,
+    quantum: Quantum,
+) -> FaceVote {
+    let mut vote = FaceVote { force_bound: 0.0, limit: f64::INFINITY };
+    for face in faces {
+        let nodes = face.nodes();
+        let at = |values: &[Vec<f64>; 3], n: usize| Vector3::new(values[0][n], values[1][n], values[2][n]);
+        let areas = corner_areas(nodes.map(|n| at(&block.x, n)));
+        let velocities = nodes.map(|n| at(&block.v, n));
+        let kind = loads.surfaces[face.load as usize].kind;
+        face.power = 0.0;
+        for (corner, &n) in nodes.iter().enumerate() {
+            let (area, v) = (areas[corner], velocities[corner]);
+            let force = match kind {
+                SurfaceKind::Pressure(drive) => area * -drive.at(&loads.curves, time),
+                SurfaceKind::Transmit => {
+                    let size = area.norm();
+                    let normal = if size > 0.0 { area / size } else { area };
+                    let across = normal * normal.dot(&v);
+                    let [longitudinal, shear, _] = face.impedance;
+                    (across * longitudinal + (v - across) * shear) * -size
+                }
+            };
+            let force = [force.x, force.y, force.z].map(|c| quantum.round(c));
+            for a in 0..3 {
+                block.f[a][n] += force[a];
+                vote.force_bound = vote.force_bound.max(force[a].abs());
+            }
+            face.force[corner] = force;
+            face.power += force[0] * v.x + force[1] * v.y + force[2] * v.z;
+        }
+        if kind == SurfaceKind::Transmit {
+            let x = face.corners.map(|n| at(&block.x, n as usize));
+            vote.limit = vote.limit.min(damper_limit(&x, face.together, face.impedance[2], control));
+        }
+    }
+    vote
+}
+
+/// The step up to which dampers on `together` faces of an element are stable beside its stiffness, its viscosity and its
+/// hourglass control. All damping acts with the velocities of half a step before, so the corners of the element need
+/// `1 - dt C/(2m) - dt^2 K/(4m) > 0` in every mode; the largest of each term are added here:
+/// `1 - r dt (n + 8 h + 2 l) - (r dt)^2` with `r` the wave speed over the least height, `h` and `l` the coefficients of
+/// hourglass control and linear viscosity.
+fn damper_limit(x: &[Vector3<f64>; 8], together: f64, speed: f64, control: &Control) -> f64 {
+    let volume = hex8::volume(&x.map(|p| [p.x, p.y, p.z]));
+    let area = |face: &[usize; 4]| {
+        let p = face.map(|corner| x[corner]);
+        0.5 * (p[2] - p[0]).cross(&(p[3] - p[1])).norm()
+    };
+    let rate = speed * FACES.iter().map(area).fold(0.0, f64::max) / volume;
+    let damped = rate * (together + 8.0 * control.hourglass + 2.0 * control.linear_viscosity);
+    2.0 / (damped + damped.mul_add(damped, 4.0 * rate * rate).sqrt())
+}
+
+/// Work of the loads in the step around the time at which they acted: their power with the mean of the velocities
+/// before and after, times `half_steps`, the mean of the two steps. A sum of terms rounded to `quantum`.
+pub(crate) fn work(faces: &[LoadedFace], block: &Block, half_steps: f64, quantum: Quantum) -> f64 {
+    let one = |face: &LoadedFace| {
+        let after: f64 = face
+            .nodes()
+            .iter()
+            .zip(&face.force)
+            .map(|(&n, f)| f[0] * block.v[0][n] + f[1] * block.v[1][n] + f[2] * block.v[2][n])
+            .sum();
+        quantum.round(0.5 * half_steps * (face.power + after))
+    };
+    faces.iter().map(one).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pressure_on_all_faces_is_pressure_times_the_volume_gradient() {
+        let x = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.2, 1.1, 0.1],
+            [0.0, 1.0, 0.2],
+            [0.1, 0.0, 1.0],
+            [1.0, 0.2, 1.3],
+            [1.1, 1.0, 1.0],
+            [-0.1, 1.1, 0.9],
+        ];
+        let mut sum = [[0.0; 3]; 8];
+        for face in FACES {
+            let areas = corner_areas(face.map(|c| Vector3::from(x[c])));
+            for (corner, area) in face.into_iter().zip(areas) {
+                (0..3).for_each(|a| sum[corner][a] += area[a]);
+            }
+        }
+        for (found, expected) in sum.iter().zip(hex8::volume_gradient(&x)) {
+            for a in 0..3 {
+                assert!((found[a] - expected[a]).abs() < 1e-15, "{found:?} {expected:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_damped_cube_steps_by_the_golden_section_of_its_crossing_time_less_what_else_damps_it() {
+        let corner = |c: usize| {
+            Vector3::new(f64::from([0, 1, 1, 0][c % 4]), f64::from([0, 0, 1, 1][c % 4]), (c / 4) as f64)
+        };
+        let x: [Vector3<f64>; 8] = std::array::from_fn(|c| corner(c) * 2.0);
+        let mut control = Control {
+            end_time: 1.0,
+            end_cycle: 1,
+            safety_factor: 1.0,
+            growth: 1.05,
+            linear_viscosity: 0.0,
+            quadratic_viscosity: 0.0,
+            hourglass: 0.0,
+            sort_lag: 1,
+            plan_interval: 2,
+        };
+        let limit = |faces, control: &Control| damper_limit(&x, faces, 4.0, control) / 0.5;
+        assert!((limit(1.0, &control) - 0.618_033_988_749_895).abs() < 1e-14);
+        (control.hourglass, control.linear_viscosity) = (0.1, 0.2);
+        assert!((limit(1.0, &control) - 0.387).abs() < 1e-3 && limit(3.0, &control) < 0.23);
+    }
+}
