@@ -10,7 +10,7 @@ use mechanics::{
 use crate::{
     fault::{Faults, short},
     format::{MAX_ENTRIES, Names, PartDraft},
-    geometry::{EDGES, dot, norm, sub, volume},
+    geometry::{EDGES, dot, norm, sub},
     table::{Range, Table},
 };
 
@@ -108,7 +108,7 @@ pub(crate) fn assemble(
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
             let corners = part.corners(e).map(|node| mesh.positions[node as usize]);
-            assembly.volumes.push(volume(&corners));
+            assembly.volumes.push(part.volume(&corners));
         }
     }
     assembly.mesh = mesh;
@@ -178,7 +178,7 @@ fn edges(positions: &[[f64; 3]], part: &Part) -> (f64, f64) {
     let (mut low, mut high) = (f64::INFINITY, 0.0f64);
     for e in 0..part.n_elements() {
         let corners = part.corners(e);
-        for [a, b] in EDGES {
+        for [a, b] in EDGES.into_iter().filter(|[a, b]| corners[*a] != corners[*b]) {
             let long = norm(sub(positions[corners[a] as usize], positions[corners[b] as usize]));
             low = low.min(long);
             high = high.max(long);

@@ -107,7 +107,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
-    check::spans(&parts, &assembly, contact.as_ref(), faults);
+    check::spans(&parts, &assembly, contact.as_ref(), &materials.list, faults);
     let contact = contact.map(|c| c.settings);
 
     let mut velocity = assembly.velocity;

@@ -112,8 +112,9 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize]) -> Vec<Subdomain> {
                     cut_planes(vec![all], shortest, order, speeds, &mut pieces);
                 }
             }
-            Topology::Explicit { hexahedra } => {
-                let centres: Vec<[f64; 3]> = (0..hexahedra.len())
+            Topology::Explicit { .. } | Topology::Shells { .. } => {
+                let n_elements = mesh_part.n_elements();
+                let centres: Vec<[f64; 3]> = (0..n_elements)
                     .map(|e| {
                         let corners = mesh_part.corners(e);
                         std::array::from_fn(|a| {
@@ -121,7 +122,7 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize]) -> Vec<Subdomain> {
                         })
                     })
                     .collect();
-                let all = (0..hexahedra.len() as u32).collect();
+                let all = (0..n_elements as u32).collect();
                 bisect(all, &centres, order, speeds, &mut pieces);
             }
         }

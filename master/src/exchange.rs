@@ -73,6 +73,8 @@ pub struct Exchange {
     /// Says which exchange this is; frames carry it.
     pub hash: u64,
     route: Route,
+    /// Numbers by node of the exchange: three of the force, and with shells three of the moment.
+    stride: usize,
     /// Number of nodes in the exchange.
     n_slots: usize,
     /// By worker: the slot of each node of its exchange list.
@@ -91,7 +93,9 @@ impl Exchange {
             list.push(holdings.owner_worker[node as usize]);
             list.extend(others);
         }
-        let mut plans: Vec<Plan> = (0..n).map(|_| Plan::default()).collect();
+        let moments = !state.shells.spin.is_empty();
+        let stride = if moments { 6 } else { 3 };
+        let mut plans: Vec<Plan> = (0..n).map(|_| Plan { moments, ..Plan::default() }).collect();
         for (worker, batch) in batches.iter().enumerate() {
             let Some(batch) = batch else { continue };
             let mut guests: Vec<u32> = batch
@@ -153,13 +157,13 @@ impl Exchange {
             plan.batch = batch;
         }
         let hash = hash(&plans);
-        Self { plans, hash, route, n_slots: holders.len(), slots, sources }
+        Self { plans, hash, route, stride, n_slots: holders.len(), slots, sources }
     }
 
     /// Numbers in the partial forces that a worker sends to the master: none on route direct.
     pub fn n_partials(&self, worker: usize) -> usize {
         match self.route {
-            Route::Master => 3 * self.slots[worker].len(),
+            Route::Master => self.stride * self.slots[worker].len(),
             Route::Direct => 0,
         }
     }
@@ -172,15 +176,15 @@ impl Exchange {
     /// Zero totals; none on route direct.
     pub fn totals(&self) -> Vec<f64> {
         match self.route {
-            Route::Master => vec![0.0; 3 * self.n_slots],
+            Route::Master => vec![0.0; self.stride * self.n_slots],
             Route::Direct => Vec::new(),
         }
     }
 
     /// Adds the partial forces of one worker; exact, so the order of workers does not matter.
     pub fn add(&self, worker: usize, partials: &[f64], totals: &mut [f64]) {
-        for (&slot, partial) in self.slots[worker].iter().zip(partials.chunks_exact(3)) {
-            for (total, term) in totals[3 * slot as usize..].iter_mut().zip(partial) {
+        for (&slot, partial) in self.slots[worker].iter().zip(partials.chunks_exact(self.stride)) {
+            for (total, term) in totals[self.stride * slot as usize..].iter_mut().zip(partial) {
                 *total += term;
             }
         }
@@ -193,7 +197,8 @@ impl Exchange {
             return out;
         }
         for &slot in &self.slots[worker] {
-            out.extend_from_slice(&totals[3 * slot as usize..3 * slot as usize + 3]);
+            let first = self.stride * slot as usize;
+            out.extend_from_slice(&totals[first..first + self.stride]);
         }
         out
     }

@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::mesh::Topology;
+use mechanics::{
+    element::shell4::Rule,
+    mesh::{Section, Topology},
+};
 
 use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, shape};
 use crate::{
@@ -112,7 +115,9 @@ impl Budget {
 
 /// The mesh of a part: exactly one of the blocks, or `mesh`.
 fn read_mesh(table: &Table<'_>, name: &str, budget: &mut Budget) -> (Option<Block>, Option<Explicit>) {
-    const KINDS: [&str; 5] = ["box", "cylinder", "sphere", "tube", "mesh"];
+    const KINDS: [&str; 7] = ["box", "cylinder", "sphere", "tube", "plate", "prism", "mesh"];
+    let shell = table.get("shell");
+    let section = shell.and_then(|value| read_section(value, name));
     let present: Vec<(&'static str, Value<'_>)> =
         KINDS.iter().filter_map(|kind| table.get(kind).map(|v| (*kind, v))).collect();
     let [(kind, value)] = present[..] else {
@@ -127,13 +132,27 @@ fn read_mesh(table: &Table<'_>, name: &str, budget: &mut Budget) -> (Option<Bloc
         return (None, None);
     };
     let Some(inner) = value.table(format!("{kind} of \"{name}\"")) else { return (None, None) };
+    let of_shells = ["plate", "prism"].contains(&kind);
+    match shell {
+        None if of_shells => {
+            let read = format!("a {kind} without a shell in {}", table.title);
+            table.faults.add(table.at, read, "its thickness", "add shell = { thickness = ... }");
+        }
+        Some(shell) if !of_shells && kind != "mesh" => {
+            shell.fault("no shell: solids fill this block", "remove it, or take plate, prism or mesh");
+        }
+        _ => {}
+    }
     if kind == "mesh" {
-        return match read_explicit(inner, budget) {
+        if shell.is_some() && section.is_none() {
+            return (None, None);
+        }
+        return match read_explicit(inner, budget, section) {
             Some((block, explicit)) => (Some(block), Some(explicit)),
             None => (None, None),
         };
     }
-    let shape = shape::read(kind, &inner);
+    let shape = shape::read(kind, &inner, section);
     let (at, title) = (inner.at, inner.title.clone());
     inner.finish();
     let block = shape.and_then(|shape| {
@@ -143,8 +162,24 @@ fn read_mesh(table: &Table<'_>, name: &str, budget: &mut Budget) -> (Option<Bloc
     (block, None)
 }
 
-/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`.
-fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explicit)> {
+/// `shell = { thickness, points, rule }`.
+fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
+    let table = value.table(format!("shell of \"{name}\""))?;
+    let thickness = table.number("thickness", Range::Positive);
+    let rule = table.get("rule").map_or(Some(0), |v| v.one_of(&["gauss", "lobatto"]));
+    let (least, default) = if rule == Some(1) { (3, 5) } else { (1, 3) };
+    let points = table.integer_or("points", default, least, 5) as u32;
+    table.finish();
+    let rule = if rule? == 1 { Rule::Lobatto(points) } else { Rule::Gauss(points) };
+    Some(Section { thickness: thickness?, rule })
+}
+
+/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`, of shells `[id, n1 ... n4]`.
+fn read_explicit(
+    table: Table<'_>,
+    budget: &mut Budget,
+    section: Option<Section>,
+) -> Option<(Block, Explicit)> {
     let nodes = table.require("nodes", "a list of [id, x, y, z]").and_then(|v| v.items());
     let elements = table.require("elements", "a list of [id, n1, ..., n8]").and_then(|v| v.items());
     let (nodes, elements) = (nodes?, elements?);
@@ -178,7 +213,12 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
     let mut seen: BTreeMap<u32, usize> = BTreeMap::new();
     let mut used = vec![false; positions.len()];
     for element in &elements {
-        let Some(numbers) = element.integers::<9>("[id, n1, ..., n8]", 1, MAX_ID) else { continue };
+        let numbers = if section.is_some() {
+            element.integers::<5>("[id, n1, n2, n3, n4]", 1, MAX_ID).map(|n| n.to_vec())
+        } else {
+            element.integers::<9>("[id, n1, ..., n8]", 1, MAX_ID).map(|n| n.to_vec())
+        };
+        let Some(numbers) = numbers else { continue };
         let id = numbers[0] as u32;
         if let Some(first) = seen.insert(id, element.at) {
             let (line, _) = table.faults.place(first);
@@ -204,11 +244,12 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
                 }
             }
         }
-        let mut sorted = corners;
+        let mut sorted = corners[..numbers.len() - 1].to_vec();
         sorted.sort_unstable();
         if complete && sorted.windows(2).any(|w| w[0] == w[1]) {
             complete = false;
-            element.fault("eight different nodes", "list each corner once; wedges are not read");
+            let expected = if section.is_some() { "four different nodes" } else { "eight different nodes" };
+            element.fault(expected, "list each corner once; wedges and triangles are not read");
         }
         if complete {
             hexahedra.push(corners);
@@ -239,7 +280,14 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
     }
     let clean = table.faults.count() == before;
     table.finish();
-    let block = Block { positions, topology: Topology::Explicit { hexahedra }, faces: Vec::new() };
+    let topology = match section {
+        None => Topology::Explicit { hexahedra },
+        Some(section) => {
+            let quads = hexahedra.iter().map(|&[a, b, c, d, ..]: &[u32; 8]| [a, b, c, d]).collect();
+            Topology::Shells { quads, section }
+        }
+    };
+    let block = Block { positions, topology, faces: Vec::new() };
     clean.then_some((block, explicit))
 }
 

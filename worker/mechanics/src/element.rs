@@ -32,6 +32,8 @@ pub struct Step {
     pub force_quantum: Quantum,
     /// Energies are rounded to it (energy).
     pub energy_quantum: Quantum,
+    /// Quantum of moments over that of forces, a power of two (length).
+    pub arm: f64,
 }
 
 /// What the elements answer: sums that are exact, minima and maxima, so that the order of elements cannot show.

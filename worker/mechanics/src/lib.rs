@@ -36,6 +36,7 @@ pub mod mesh;
 pub mod nodes;
 pub mod piece;
 pub mod setup;
+pub(crate) mod spin;
 pub mod state;
 mod strength;
 pub mod vote;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     block::Piece,
     mesh::{Mesh, Topology},
-    state::{GlobalState, N_FIELDS},
+    state::{GlobalState, N_FIELDS, ShellState},
 };
 
 /// Which elements of a part.
@@ -109,12 +109,39 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
                 .collect();
             (Topology::Explicit { hexahedra: corners }, nodes, list.clone())
         }
+        (Topology::Shells { quads, section }, Region::List(list)) => {
+            let mut local_of = std::collections::BTreeMap::new();
+            let mut nodes = Vec::new();
+            let corners = list
+                .iter()
+                .map(|&e| {
+                    quads[e as usize].map(|n| {
+                        *local_of.entry(n).or_insert_with(|| {
+                            nodes.push(n);
+                            (nodes.len() - 1) as u32
+                        })
+                    })
+                })
+                .collect();
+            (Topology::Shells { quads: corners, section: *section }, nodes, list.clone())
+        }
         (topology, region) => {
             panic!("region {region:?} does not fit part `{}` ({topology:?})", mesh_part.name)
         }
     };
     let nodes: Vec<u32> = local_nodes.iter().map(|&n| mesh_part.nodes[n as usize]).collect();
     let elements: Vec<u32> = local_elements.iter().map(|&e| e + offset as u32).collect();
+    let shells = match mesh_part.section() {
+        None => ShellState::default(),
+        Some(section) => ShellState {
+            spin: nodes.iter().map(|&n| state.shells.spin[n as usize]).collect(),
+            inertia: nodes.iter().map(|&n| state.shells.inertia[n as usize]).collect(),
+            fields: state.shells.fields[..section.n_fields()]
+                .iter()
+                .map(|field| elements.iter().map(|&e| field[e as usize]).collect())
+                .collect(),
+        },
+    };
     Piece {
         part: part as u32,
         material: mesh_part.material,
@@ -129,6 +156,7 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         }),
         nodes,
         elements,
+        shells,
     }
 }
 
@@ -140,7 +168,10 @@ pub fn put_back(piece: &Piece, state: &mut GlobalState) -> Result<(), String> {
     let (n_nodes, n_elements) = (state.x.len(), state.initial_volume.len());
     let lengths_fit = piece.x.len() == piece.nodes.len()
         && piece.v.len() == piece.nodes.len()
-        && (0..N_FIELDS).all(|k| piece.fields[k].len() == piece.elements.len());
+        && (0..N_FIELDS).all(|k| piece.fields[k].len() == piece.elements.len())
+        && (piece.shells.spin.is_empty() || piece.shells.spin.len() == piece.nodes.len())
+        && piece.shells.fields.iter().all(|field| field.len() == piece.elements.len())
+        && piece.shells.fields.len() <= state.shells.fields.len();
     if !lengths_fit {
         return Err(format!(
             "image of part {}: array lengths do not fit its {} nodes and {} elements",
@@ -161,6 +192,14 @@ pub fn put_back(piece: &Piece, state: &mut GlobalState) -> Result<(), String> {
     for (i, &n) in piece.nodes.iter().enumerate() {
         state.x[n as usize] = piece.x[i];
         state.v[n as usize] = piece.v[i];
+    }
+    for (&n, &spin) in piece.nodes.iter().zip(&piece.shells.spin) {
+        state.shells.spin[n as usize] = spin;
+    }
+    for (field, values) in state.shells.fields.iter_mut().zip(&piece.shells.fields) {
+        for (&e, &value) in piece.elements.iter().zip(values) {
+            field[e as usize] = value;
+        }
     }
     for (k, values) in piece.fields.iter().enumerate() {
         for (&e, &value) in piece.elements.iter().zip(values) {

@@ -74,4 +74,19 @@ pub struct GlobalState {
     pub initial_volume: Vec<f64>,
     /// One array per entry of [`FIELDS`], each by global element index.
     pub elements: [Vec<f64>; N_FIELDS],
+    /// What shells have beside that; empty arrays in a run without shells.
+    pub shells: ShellState,
+}
+
+/// What shells have beside the state of solids.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ShellState {
+    /// Rotation rate `w_{n-1/2}` by node (1/time); zero at nodes without shells.
+    pub spin: Vec<[f64; 3]>,
+    /// Rotational inertia about any axis by node (mass times length squared); zero at nodes without shells.
+    pub inertia: Vec<f64>,
+    /// By element: six hourglass forces, thickness, internal energy, energy of hourglass control; then for each point
+    /// through the thickness, from below, stress xx, yy, xy, yz, zx in the frame of the element, plastic strain,
+    /// temperature.
+    pub fields: Vec<Vec<f64>>,
 }

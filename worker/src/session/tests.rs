@@ -27,7 +27,7 @@ fn assign(cycle: u64) -> Box<Assign> {
             loads: Default::default(),
         },
         n_parts: 1,
-        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
+        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
         subdomains: Vec::new(),
         gauges: Vec::new(),
         lanes: None,

@@ -4,13 +4,16 @@
 //! are therefore inside. A face of a degenerate element counts with its distinct nodes and vanishes with fewer
 //! than three. The surface holds static data only; positions come from the caller, by surface node.
 
-use crate::{element::hex8, material::Material, mesh::Mesh};
+use crate::{material::Material, mesh::Mesh};
 
 pub use crate::mesh::FACES as SIDES;
 
 /// Depth (gaps) within which the penalty stops a node at the closing speed of its part; the rest of 0.9 is for the bodies
 /// behind it.
 const STOPPING_DEPTH: f64 = 0.75;
+
+/// The side of a shell that stands for it, an index into [`SIDES`].
+const UPPER: usize = 1;
 
 /// The outer faces of a mesh and their nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,6 +53,11 @@ pub struct Face {
 }
 
 impl Face {
+    /// Whether it is a shell, which pushes nodes away on both its sides.
+    pub fn is_shell(corners: &[u32; 8]) -> bool {
+        corners[..4] == corners[4..]
+    }
+
     /// A number that stays with this face when the surface is redefined.
     pub fn key(&self) -> u64 {
         u64::from(self.element) * 6 + u64::from(self.side)
@@ -84,11 +92,16 @@ impl Surface {
             let bulk = materials[mesh.parts[part].material as usize].bulk();
             let nodes = SIDES[side as usize].map(|c| corners[c]);
             let area = area(nodes.map(|n| mesh.positions[n as usize]));
-            let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
+            let volume = mesh.parts[part].volume(&corners.map(|n| mesh.positions[n as usize]));
             for n in nodes {
                 index[n as usize] = 0;
             }
-            let stiffness = if volume > 0.0 { bulk * area * area / volume } else { 0.0 };
+            let stiffness = match mesh.parts[part].section() {
+                // As the shell itself resists in its plane: across its thickness it would rule the time step.
+                Some(section) => bulk * section.thickness,
+                None if volume > 0.0 => bulk * area * area / volume,
+                None => 0.0,
+            };
             let part = part as u32;
             faces.push(Face { nodes, element, side, part, stiffness, corners, own: [u32::MAX; 8] });
         }
@@ -106,7 +119,7 @@ impl Surface {
             for e in 0..part.n_elements() {
                 let corners = part.corners(e);
                 if alive(element) && corners.iter().any(|&n| index[n as usize] != u32::MAX) {
-                    let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
+                    let volume = part.volume(&corners.map(|n| mesh.positions[n as usize]));
                     for n in corners.map(|n| index[n as usize]).into_iter().filter(|&n| n != u32::MAX) {
                         around[n as usize] += 0.125 * volume;
                     }
@@ -115,7 +128,8 @@ impl Surface {
             }
         }
         for face in &mut faces {
-            let face_volume = hex8::volume(&face.corners.map(|n| mesh.positions[n as usize]));
+            let x = face.corners.map(|n| mesh.positions[n as usize]);
+            let face_volume = mesh.parts[face.part as usize].volume(&x);
             face.nodes = face.nodes.map(|n| index[n as usize]);
             for (i, n) in face.corners.into_iter().enumerate() {
                 if !face.corners[..i].contains(&n) {
@@ -155,7 +169,8 @@ impl Surface {
         for face in &mut self.faces {
             let part = face.part as usize;
             let density = materials[mesh.parts[part].material as usize].density;
-            let mass = density * hex8::volume(&face.corners.map(|n| mesh.positions[n as usize]));
+            let x = face.corners.map(|n| mesh.positions[n as usize]);
+            let mass = density * mesh.parts[part].volume(&x);
             let least = 0.5 * mass * speed[part] * speed[part] / (depth * depth * settings.stiffness);
             face.stiffness = face.stiffness.max(least);
             for n in face.nodes {
@@ -243,7 +258,10 @@ fn for_each_side(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, visit: &mut dyn FnMut
         for e in 0..part.n_elements() {
             if alive(element) {
                 let corners = part.corners(e);
-                for (side, local) in SIDES.iter().enumerate() {
+                // A shell is one face, whose zone acts on both its sides: the upper.
+                let of_shell = part.section().is_some();
+                for (side, local) in SIDES.iter().enumerate().filter(|(side, _)| !of_shell || *side == UPPER)
+                {
                     let mut key = local.map(|c| corners[c]);
                     key.sort_unstable();
                     for i in 1..4 {

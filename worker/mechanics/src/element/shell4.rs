@@ -11,16 +11,20 @@
 //! deflection and the twist of rotations in the plane with that of transverse shear scaled by `h^2 / A`. All are blind
 //! to rigid motion and to constant strain, curvature and twist.
 //!
-//! The elements stand in [`block::Shells`], which a cycle does not drive yet: parts, exchange and decks know solids.
+//! The elements stand in [`block::Core`], which a block of a cycle holds beside its nodes; [`block::Shells`] is a core with
+//! nodes of its own.
 
 pub mod block;
 mod geometry;
 mod kernel;
 
-pub use block::{SectionError, ShellStep, Shells};
+use serde::{Deserialize, Serialize};
+
+pub use block::{Core, SectionError, ShellStep, Shells};
+pub use kernel::{ELEMENT, LAYER, THICKNESS};
 
 /// Points through the thickness: heights by half the thickness and weights that add up to 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Rule {
     /// Gauss's points, 1 to 5; they integrate elastic bending exactly from 2 on.
     Gauss(u32),

@@ -1,5 +1,7 @@
 //! One cycle of a lane set of shells, from gather to scatter.
 
+use std::ops::Range;
+
 use super::geometry::{Geometry, dot};
 use crate::{
     element::{ElementVote, Fault, vector::Vector},
@@ -8,13 +10,14 @@ use crate::{
 };
 
 /// State of a layer: stress xx, yy, xy, yz, zx, plastic strain, temperature.
-pub(super) const LAYER: usize = 7;
+pub const LAYER: usize = 7;
 /// State of an element beside its layers: hourglass forces of membrane x and y, bending about x and y, deflection and
 /// twist; thickness; internal energy; hourglass energy.
-pub(super) const ELEMENT: usize = 9;
-pub(super) const THICKNESS: usize = 6;
-pub(super) const INTERNAL: usize = 7;
-pub(super) const HOURGLASS: usize = 8;
+pub const ELEMENT: usize = 9;
+/// Index of the thickness in the state of an element.
+pub const THICKNESS: usize = 6;
+pub(crate) const INTERNAL: usize = 7;
+pub(crate) const HOURGLASS: usize = 8;
 
 /// Shear correction of a homogeneous plate.
 const SHEAR: f64 = 5.0 / 6.0;
@@ -45,20 +48,29 @@ pub(super) struct Constants<'a> {
     pub dt: f64,
     pub force_magic: f64,
     pub moment_magic: f64,
+    /// Force quantum over moment quantum (1/length).
+    pub inverse_arm: f64,
     pub energy_magic: f64,
 }
 
-/// All sets of the block.
+/// The sets of these ranges.
 ///
 /// # Safety
-/// Every array by slot holds a whole number of sets, and every corner is inside the node arrays.
+/// Every array by slot holds all sets of the ranges, and every corner is inside the node arrays.
 #[inline(always)]
-pub(super) unsafe fn compute<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, vote: &mut ElementVote) {
-    let mut slot = 0;
-    while slot < view.elements.len() {
-        // SAFETY: handed on from the caller.
-        unsafe { slots::<L>(view, c, slot, vote) };
-        slot += L::N;
+pub(super) unsafe fn compute<L: Lane>(
+    view: &mut View<'_>,
+    c: &Constants<'_>,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
+    for range in sets {
+        let mut slot = range.start as usize * SET;
+        while slot < range.end as usize * SET {
+            // SAFETY: handed on from the caller.
+            unsafe { slots::<L>(view, c, slot, vote) };
+            slot += L::N;
+        }
     }
 }
 
@@ -319,7 +331,9 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
             let f = L::select(computed, f[axis], zero);
             bound = bound.max_magnitude(f);
             rounded[axis] = (f + force_magic) - force_magic;
-            turned[axis] = (L::select(computed, m[axis], zero) + moment_magic) - moment_magic;
+            let m = L::select(computed, m[axis], zero);
+            bound = bound.max_magnitude(m * L::splat(c.inverse_arm));
+            turned[axis] = (m + moment_magic) - moment_magic;
             axis += 1;
         }
         forces[i] = Vector { x: rounded[0], y: rounded[1], z: rounded[2] };
