@@ -146,6 +146,7 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         constraint: vec![0; model.mesh.n_nodes()],
         initial_volume: vec![1.0; n],
         elements,
+        shells: mechanics::state::ShellState::default(),
     }
 }
 

@@ -76,6 +76,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         constraint: vec![0; n_nodes],
         initial_volume,
         fields,
+        shells: mechanics::state::ShellState::default(),
     }
 }
 
