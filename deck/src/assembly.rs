@@ -1,6 +1,6 @@
 //! Putting the parts together: one numbering, joins, volumes, masses, velocities.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use mechanics::{
     material::Material,
@@ -9,8 +9,9 @@ use mechanics::{
 
 use crate::{
     fault::{Faults, short},
-    format::{MAX_ENTRIES, Names, PartDraft},
+    format::{Explicit, MAX_ENTRIES, Meshes, Names, PartDraft},
     geometry::{EDGES, dot, norm, sub},
+    mesh_file::MeshFile,
     table::{Range, Table},
 };
 
@@ -27,6 +28,8 @@ pub(crate) struct Assembly {
     pub(crate) mesh: Mesh,
     /// Initial velocity by global node.
     pub(crate) velocity: Vec<[f64; 3]>,
+    /// Initial rotation rate by global node (1/time); empty where no mesh file gives one.
+    pub(crate) spin: Vec<[f64; 3]>,
     /// Kinetic energy lost in joins.
     pub(crate) join_energy: f64,
     /// Named faces of each part: their global nodes.
@@ -45,6 +48,12 @@ pub(crate) struct Assembly {
     pub(crate) node_of_id: BTreeMap<u32, u32>,
     /// The initial velocity each part was given.
     pub(crate) part_velocity: Vec<[f64; 3]>,
+    /// Two corners of the box around the velocities that mesh files give, where they give any.
+    pub(crate) file_velocities: Vec<[f64; 3]>,
+    /// Named sets of nodes from mesh files: global nodes, ascending.
+    pub(crate) sets: BTreeMap<String, Vec<u32>>,
+    /// Named sets of faces from mesh files: global nodes. Faces of nodes that no part has are left out.
+    pub(crate) segments: BTreeMap<String, Vec<[u32; 4]>>,
 }
 
 /// Reads every `[[join]]`.
@@ -77,6 +86,7 @@ pub(crate) fn assemble(
     drafts: &[PartDraft],
     joins: &[Join],
     materials: &[Material],
+    meshes: &Meshes,
     faults: &Faults<'_>,
 ) -> Assembly {
     let mut mesh = number(drafts, faults);
@@ -91,6 +101,7 @@ pub(crate) fn assemble(
     let mut assembly = Assembly {
         mesh: Mesh::default(),
         velocity: Vec::new(),
+        spin: Vec::new(),
         join_energy: 0.0,
         faces: Vec::new(),
         smallest_edge,
@@ -100,7 +111,11 @@ pub(crate) fn assemble(
         joined: Vec::new(),
         node_of_id,
         part_velocity: drafts.iter().map(|d| d.velocity).collect(),
+        file_velocities: Vec::new(),
+        sets: BTreeMap::new(),
+        segments: BTreeMap::new(),
     };
+    share(&mesh, drafts, &mut assembly.joined);
     if !joins.is_empty() {
         merge(&mut mesh, joins, &mut assembly, faults);
     }
@@ -113,7 +128,75 @@ pub(crate) fn assemble(
     }
     assembly.mesh = mesh;
     velocities(&mut assembly, materials);
+    let used = drafts.iter().filter_map(|d| d.explicit.as_ref()?.file.as_ref());
+    for mesh in used.collect::<BTreeSet<_>>().into_iter().filter_map(|file| meshes.get(file)) {
+        take_over(mesh, &mut assembly);
+    }
     assembly
+}
+
+/// Pairs of parts of one file that name the same node, into `joined`.
+fn share(mesh: &Mesh, drafts: &[PartDraft], joined: &mut Vec<(usize, usize)>) {
+    if !drafts.iter().any(|d| d.explicit.as_ref().is_some_and(|e| e.file.is_some())) {
+        return;
+    }
+    let mut holders: Vec<Option<usize>> = vec![None; mesh.n_nodes()];
+    let mut several: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (p, part) in mesh.parts.iter().enumerate() {
+        for node in &part.nodes {
+            match holders[*node as usize] {
+                None => holders[*node as usize] = Some(p),
+                Some(first) => several.entry(*node).or_insert_with(|| vec![first]).push(p),
+            }
+        }
+    }
+    for list in several.values() {
+        for (i, a) in list.iter().enumerate() {
+            joined.extend(list[i + 1..].iter().map(|b| (*a, *b)));
+        }
+        if joined.len() > 1 << 16 {
+            joined.sort_unstable();
+            joined.dedup();
+        }
+    }
+    joined.sort_unstable();
+    joined.dedup();
+}
+
+/// Sets and velocities of a mesh file; numbers that no part uses are left out.
+fn take_over(mesh: &MeshFile, assembly: &mut Assembly) {
+    let node_of_id = &assembly.node_of_id;
+    for (name, ids) in &mesh.sets {
+        let set = assembly.sets.entry(name.clone()).or_default();
+        set.extend(ids.iter().filter_map(|id| node_of_id.get(id)));
+        set.sort_unstable();
+        set.dedup();
+    }
+    for (name, faces) in &mesh.segments {
+        let known = |face: &[u32; 4]| {
+            let nodes = face.map(|id| node_of_id.get(&id).copied());
+            nodes.iter().all(Option::is_some).then(|| nodes.map(Option::unwrap_or_default))
+        };
+        assembly.segments.entry(name.clone()).or_default().extend(faces.iter().filter_map(known));
+    }
+    for (id, spin) in &mesh.spins {
+        if let Some(node) = node_of_id.get(id) {
+            assembly.spin.resize(assembly.velocity.len(), [0.0; 3]);
+            assembly.spin[*node as usize] = *spin;
+        }
+    }
+    for (id, velocity) in &mesh.velocities {
+        if let Some(node) = node_of_id.get(id) {
+            assembly.velocity[*node as usize] = *velocity;
+            if assembly.file_velocities.is_empty() {
+                assembly.file_velocities = vec![*velocity; 2];
+            }
+            for (axis, v) in velocity.iter().enumerate() {
+                assembly.file_velocities[0][axis] = assembly.file_velocities[0][axis].min(*v);
+                assembly.file_velocities[1][axis] = assembly.file_velocities[1][axis].max(*v);
+            }
+        }
+    }
 }
 
 /// Numbers nodes and elements part by part, without joins.
@@ -123,14 +206,23 @@ fn number(drafts: &[PartDraft], faults: &Faults<'_>) -> Mesh {
     let mut next_node = explicit().flat_map(|(_, e)| e.node_ids.iter().copied()).max().unwrap_or(0) + 1;
     let mut next_element = explicit().flat_map(|(_, e)| e.element_ids.iter().copied()).max().unwrap_or(0) + 1;
     // Numbers of different parts may not meet; inside a part this was looked at when it was read.
-    let mut node_owner: BTreeMap<u32, usize> = BTreeMap::new();
-    let mut element_owner: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut node_owner: Owners<'_> = BTreeMap::new();
+    // Solids and shells are numbered apart.
+    let mut element_owner: [Owners<'_>; 2] = Default::default();
+    // The node of each number of each file: its parts share them.
+    let mut of_file: BTreeMap<(&str, u32), u32> = BTreeMap::new();
     for draft in drafts {
         let (positions, topology) = match &draft.block {
             Some(block) => (block.positions.as_slice(), block.topology.clone()),
             None => (&[][..], Topology::Explicit { hexahedra: Vec::new() }),
         };
         let first = mesh.positions.len() as u32;
+        let file = draft.explicit.as_ref().and_then(|own| own.file.as_deref().map(|file| (file, own)));
+        if let Some((file, own)) = file {
+            number_shared(&mut mesh, positions, topology, draft, file, own, &mut of_file);
+            owned(own, draft, &mut element_owner, &mut node_owner, faults);
+            continue;
+        }
         mesh.positions.extend_from_slice(positions);
         let mut part = Part {
             name: draft.name.clone(),
@@ -141,22 +233,7 @@ fn number(drafts: &[PartDraft], faults: &Faults<'_>) -> Mesh {
         };
         match &draft.explicit {
             Some(own) => {
-                for (ids, places, owner, what) in [
-                    (&own.node_ids, &own.node_places, &mut node_owner, "node"),
-                    (&own.element_ids, &own.element_places, &mut element_owner, "element"),
-                ] {
-                    for (id, place) in ids.iter().zip(places) {
-                        if let Some(other) = owner.insert(*id, *place) {
-                            let (line, _) = faults.place(other);
-                            faults.add(
-                                *place,
-                                format!("{what} {id} of part \"{}\"", draft.name),
-                                format!("a number other than {id}, which line {line} has"),
-                                "renumber one; nodes shared by parts are listed in both and joined",
-                            );
-                        }
-                    }
-                }
+                owned(own, draft, &mut element_owner, &mut node_owner, faults);
                 mesh.node_ids.extend(&own.node_ids);
                 part.element_ids = own.element_ids.clone();
             }
@@ -171,6 +248,70 @@ fn number(drafts: &[PartDraft], faults: &Faults<'_>) -> Mesh {
         mesh.parts.push(part);
     }
     mesh
+}
+
+/// Adds a part of a mesh file: nodes that an earlier part of the file has are that part's.
+fn number_shared<'a>(
+    mesh: &mut Mesh,
+    positions: &[[f64; 3]],
+    topology: Topology,
+    draft: &PartDraft,
+    file: &'a str,
+    own: &Explicit,
+    of_file: &mut BTreeMap<(&'a str, u32), u32>,
+) {
+    let mut nodes = Vec::with_capacity(positions.len());
+    for (x, id) in positions.iter().zip(&own.node_ids) {
+        let next = mesh.positions.len() as u32;
+        let node = *of_file.entry((file, *id)).or_insert(next);
+        if node == next {
+            mesh.positions.push(*x);
+            mesh.node_ids.push(*id);
+        }
+        nodes.push(node);
+    }
+    mesh.parts.push(Part {
+        name: draft.name.clone(),
+        material: draft.material.unwrap_or(0),
+        topology,
+        nodes,
+        element_ids: own.element_ids.clone(),
+    });
+}
+
+/// Where each number was taken: the place in the text, and the file.
+type Owners<'a> = BTreeMap<u32, (usize, Option<&'a str>)>;
+
+/// Reports numbers that an earlier part has; parts of one file share nodes.
+fn owned<'a>(
+    own: &'a Explicit,
+    draft: &PartDraft,
+    elements: &mut [Owners<'a>; 2],
+    nodes: &mut Owners<'a>,
+    faults: &Faults<'_>,
+) {
+    let of_shells =
+        draft.block.as_ref().is_some_and(|block| matches!(block.topology, Topology::Shells { .. }));
+    let elements = &mut elements[usize::from(of_shells)];
+    for (ids, places, owner, what) in [
+        (&own.node_ids, &own.node_places, nodes, "node"),
+        (&own.element_ids, &own.element_places, elements, "element"),
+    ] {
+        for (id, place) in ids.iter().zip(places) {
+            let file = own.file.as_deref();
+            let Some((other, of)) = owner.insert(*id, (*place, file)) else { continue };
+            if what == "node" && file.is_some() && of == file {
+                continue;
+            }
+            let (line, _) = faults.place(other);
+            faults.add(
+                *place,
+                format!("{what} {id} of part \"{}\"", draft.name),
+                format!("a number other than {id}, which line {line} has"),
+                "renumber one; nodes shared by parts are listed in both and joined",
+            );
+        }
+    }
 }
 
 /// Smallest and largest edge of a part.

@@ -9,6 +9,7 @@ use mechanics::{
 };
 
 pub(crate) use surface::{Face, outer_faces, smallest_face_dimension};
+pub(crate) use zones::clearance;
 
 use crate::{
     assembly::Assembly,
@@ -44,7 +45,7 @@ pub(crate) fn spans(
     }
 }
 
-/// Reports shells of a material that layers do not know, and shells that a join ties to solids.
+/// Reports shells of a material that layers do not know.
 fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], faults: &Faults<'_>) {
     for (part, draft) in assembly.mesh.parts.iter().zip(parts) {
         let material = draft.material.and_then(|index| materials.get(index as usize));
@@ -64,18 +65,6 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], fa
                     "remove the failure of the material, or model the part with solids",
                 );
             }
-        }
-    }
-    for &(a, b) in &assembly.joined {
-        let [first, second] = [a, b].map(|p| &assembly.mesh.parts[p]);
-        if first.section().is_some() != second.section().is_some() {
-            let (line, _) = faults.place(parts[a].at);
-            faults.add(
-                parts[b].at,
-                format!("part \"{}\" joined to part \"{}\" (line {line})", second.name, first.name),
-                "shells joined to shells, solids to solids",
-                "take one of them out of the join and let them meet in contact",
-            );
         }
     }
 }

@@ -23,6 +23,7 @@ pub(crate) use part::{Explicit, PartDraft};
 use std::collections::BTreeMap;
 
 use mechanics::{
+    contact::Settings,
     material::Material,
     setup::{Control, Setup},
 };
@@ -30,8 +31,9 @@ use toml::de::DeTable;
 
 use crate::{
     assembly, check,
-    fault::{Fault, Faults, nearest},
+    fault::{Fault, Faults, nearest, short},
     library,
+    mesh_file::MeshFile,
     model::Model,
     table::{Range, Table, Value},
     units::{SETS, Units},
@@ -52,8 +54,11 @@ pub const MAX_PARTS: usize = 10_000;
 /// Most entries of any other array of tables.
 pub const MAX_ENTRIES: usize = 10_000;
 
+/// Mesh files by the name that the deck has for them.
+pub(crate) type Meshes = BTreeMap<String, MeshFile>;
+
 /// Reads a deck; the whole check.
-pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
+pub(crate) fn read(text: &str, file_name: &str, meshes: &Meshes) -> Result<Model, Vec<Fault>> {
     if text.len() > MAX_TEXT {
         let faults = Faults::new(file_name, "");
         faults.add(
@@ -74,7 +79,7 @@ pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     if faults.count() > 0 {
         return Err(faults.into_list());
     }
-    let model = read_document(document.get_ref(), &faults);
+    let model = read_document(document.get_ref(), meshes, &faults);
     match model {
         Some(model) if faults.count() == 0 => Ok(model),
         _ => {
@@ -84,7 +89,7 @@ pub(crate) fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     }
 }
 
-fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
+fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -> Option<Model> {
     let deck = Table::new(document, 0, "the deck".to_string(), faults);
     let title = deck.require("title", "a title in quotes");
     let text = title.and_then(|v| v.text()).unwrap_or_default();
@@ -94,16 +99,21 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
         title.fault(&format!("at most {MAX_TITLE} characters on one line"), "shorten it");
     }
     let names = SETS.map(|set| set.name);
-    let units = deck.require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t").and_then(|v| v.one_of(&names));
+    let units = deck
+        .require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t, in-s-lbf")
+        .and_then(|v| v.one_of(&names));
     let units = SETS[units.unwrap_or(0)];
     let control = read_control(&deck, faults);
     let mut materials = Materials::read(&deck, units);
-    let parts = part::read_parts(&deck, &mut materials);
+    let parts = part::read_parts(&deck, &mut materials, meshes);
     let names = Names::of(&parts);
     let joins = assembly::read_joins(&deck, &names);
-    let assembly = assembly::assemble(&parts, &joins, &materials.list, faults);
+    let assembly = assembly::assemble(&parts, &joins, &materials.list, meshes, faults);
     let conditions = boundary::read(&deck, &names, &parts, &assembly);
     let contact = contact::read(&deck, &names, &assembly, &materials.list, &conditions);
+    let settings = contact.as_ref().map(|contact| &contact.settings);
+    let control = control
+        .map(|control| Control { sort_lag: sort_lag(&deck, control.sort_lag, settings, faults), ..control });
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
@@ -124,6 +134,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
         units: units.name.to_string(),
         mesh: assembly.mesh,
         velocity,
+        spin: assembly.spin,
         constraint: conditions.constraint,
         join_energy: assembly.join_energy,
         setup: Setup {
@@ -137,6 +148,33 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Model> {
         },
         output,
     })
+}
+
+/// Sort lag of a deck that gives none, in cycles; less where the plan interval is
+/// shorter or the slack does not hold what nodes travel in so many. A long lag
+/// spreads a sort over many cycles of the master's host.
+const SORT_LAG: u32 = 8;
+
+/// The sort lag for this contact.
+fn sort_lag(deck: &Table<'_>, given: u32, contact: Option<&Settings>, faults: &Faults<'_>) -> u32 {
+    let control = deck.get("control").and_then(|v| v.table("[control]".to_string()));
+    let Some((contact, control)) = contact.zip(control) else { return given };
+    let longest = contact.longest_lag();
+    if !control.has("sort_lag") {
+        return given.min(longest.max(1));
+    }
+    if given > longest.max(1) {
+        faults.add(
+            control.at,
+            format!("sort_lag = {given} and a slack of {} gaps", short(contact.slack / contact.gap)),
+            format!(
+                "at most {} cycles: nodes may travel a fifth of the gap in each, towards each other",
+                longest.max(1)
+            ),
+            "lower sort_lag or raise slack_gaps",
+        );
+    }
+    given
 }
 
 /// Reads `[control]`.
@@ -168,8 +206,12 @@ fn read_control(deck: &Table<'_>, faults: &Faults<'_>) -> Option<Control> {
         linear_viscosity: control.number_or("linear_viscosity", 0.2, coefficient),
         quadratic_viscosity: control.number_or("quadratic_viscosity", 1.0, coefficient),
         hourglass: control.number_or("hourglass", 0.1, coefficient),
-        sort_lag: control.integer_or("sort_lag", 4, 1, 1000) as u32,
+        sort_lag: control.integer_or("sort_lag", u64::from(SORT_LAG), 1, 1000) as u32,
         plan_interval: control.integer_or("plan_interval", 50, 2, 100_000) as u32,
+    };
+    let read = match control.has("sort_lag") {
+        true => read,
+        false => Control { sort_lag: read.sort_lag.min(read.plan_interval - 1), ..read },
     };
     if read.plan_interval <= read.sort_lag {
         faults.add(
@@ -231,6 +273,12 @@ impl Materials {
             let name = value.text()?;
             if let Some(own) = self.own.iter().find(|m| m.name == name) {
                 own.clone()
+            } else if !self.units.library && library::find(name).is_some() {
+                value.fault(
+                    "a [[material]] of the deck",
+                    "write the constants in inches, seconds and pounds of force",
+                );
+                return None;
             } else if let Some(found) = library::find(name) {
                 self.units.from_si(found)
             } else if self.broken.iter().any(|b| b == name) {

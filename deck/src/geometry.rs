@@ -36,7 +36,6 @@ pub(crate) fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-#[cfg(test)]
 pub(crate) use mechanics::element::hex8::volume;
 
 /// Which end of each axis a corner has.

@@ -1,6 +1,7 @@
 //! Text in, checked [`Model`] out.
 //!
-//! [`read`] takes the text of a TOML deck (`README.md` is the reference of the format) and gives either a
+//! [`read`] takes the text of a TOML deck (`README.md` is the reference of the format) or of an LS-DYNA keyword deck,
+//! alone or with the files that it refers to ([`bundle`]), and gives either a
 //! [`Model`] that can run, or every [`Fault`] of the deck with line, column, what was read, what was
 //! expected and what to do. It opens no file, allocates nothing before its size is known to be inside the
 //! named limits, and does not panic on any text.
@@ -10,27 +11,92 @@
 
 mod assembly;
 mod blocks;
+pub mod bundle;
 mod check;
 pub mod fault;
 mod format;
 mod geometry;
+mod keyword;
 pub mod library;
+pub mod mesh_file;
 pub mod model;
 pub mod table;
 pub mod units;
 
+use bundle::{Bundle, Kind};
+
 pub use fault::{Fault, MAX_FAULTS};
 pub use format::{MAX_CONTACT_PARTS, MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT, MAX_TITLE};
+pub use keyword::{UNIT_NAMES, Warning};
 pub use model::Model;
 pub use table::{MAX_NAME, MAX_NUMBER};
 
-/// Reads and checks a deck. `file_name` stands in the faults; no file is opened.
+/// A deck that can run, and what its user should know.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// The checked problem.
+    pub model: Model,
+    /// What is done otherwise than the deck says; TOML decks have none.
+    pub warnings: Vec<Warning>,
+}
+
+/// Reads and checks a deck, or a bundle of files that [`bundle::gather`] made. `file_name` stands in the faults of a
+/// deck of one file; no file is opened.
 ///
 /// # Errors
 ///
 /// Every fault of the deck, ordered by place, at most [`MAX_FAULTS`]. Faults of syntax hide all others.
 pub fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
-    format::read(text, file_name)
+    read_whole(text, file_name).map(|reading| reading.model)
+}
+
+/// As [`read`], with the warnings.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
+    let bundle = Bundle::of(text, file_name)?;
+    let (name, deck) = bundle.files[0];
+    if Kind::of(deck) == Kind::Keyword {
+        let read = keyword::read(&bundle, None)?;
+        return Ok(Reading { model: read.model, warnings: read.warnings });
+    }
+    let mut meshes = format::Meshes::new();
+    for (path, text) in &bundle.files[1..] {
+        // The deck names its meshes as it sees them.
+        let folder = name.rsplit_once('/').map_or(String::new(), |(folder, _)| format!("{folder}/"));
+        let seen = path.strip_prefix(&folder).unwrap_or(path);
+        meshes.insert(seen.to_string(), mesh_file::parse(text, path)?);
+    }
+    let model = format::read(deck, name, &meshes)?;
+    Ok(Reading { model, warnings: Vec::new() })
+}
+
+/// A keyword deck as a TOML deck and a mesh file.
+#[derive(Clone, Debug)]
+pub struct Converted {
+    /// Text of the deck.
+    pub deck: String,
+    /// Text of the mesh file.
+    pub mesh: String,
+    /// What is done otherwise than the keyword deck says.
+    pub warnings: Vec<Warning>,
+}
+
+/// Puts a keyword deck into a TOML deck, which calls its mesh file `mesh_name`. Both give the same model.
+///
+/// # Errors
+/// Every fault of the deck; a deck that is no keyword deck is one.
+pub fn convert(text: &str, file_name: &str, mesh_name: &str) -> Result<Converted, Vec<Fault>> {
+    let bundle = Bundle::of(text, file_name)?;
+    let (name, deck) = bundle.files[0];
+    if Kind::of(deck) != Kind::Keyword {
+        let faults = fault::Faults::new(name, deck);
+        faults.add(0, faults.quote(0, 60), "an LS-DYNA keyword deck", "run a TOML deck as it is");
+        return Err(faults.into_list());
+    }
+    let read = keyword::read(&bundle, Some(mesh_name))?;
+    Ok(Converted { deck: read.deck, mesh: read.mesh.text(), warnings: read.warnings })
 }
 
 /// Names of the library's materials.

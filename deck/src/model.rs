@@ -40,6 +40,8 @@ pub struct Model {
     pub mesh: Mesh,
     /// Initial velocity by global node index (mass-weighted at merged nodes).
     pub velocity: Vec<[f64; 3]>,
+    /// Initial rotation rate by global node index (1/time), of nodes of shells; empty where all are zero.
+    pub spin: Vec<[f64; 3]>,
     /// Index into `setup.constraints` by global node index; 0 is free.
     pub constraint: Vec<u16>,
     /// Kinetic energy lost where joined nodes of different velocity merged.
@@ -57,6 +59,10 @@ pub struct Output {
     pub period: Option<f64>,
     /// Cycles between rows of history.csv; at least 1.
     pub history_cycles: u32,
+    /// Seconds of real time between snapshots on disk, of a run that stores any; none: what the command says.
+    pub snapshot_seconds: Option<f64>,
+    /// The same in cycles.
+    pub snapshot_cycles: Option<u64>,
     /// Element and node fields to write, by name; empty means the default set.
     pub fields: Vec<String>,
     /// Gauges: histories at nodes.

@@ -1,11 +1,11 @@
 //! The named consistent sets of units, and conversion of library values from SI.
 //!
-//! Each unit is a power of ten of its SI unit, so that a conversion is one correctly rounded
+//! Each unit of a set that the library is converted to is a power of ten of its SI unit, so that a conversion is one correctly rounded
 //! multiplication or division by an exact power of ten.
 
 use mechanics::material::{CowperSymonds, Eos, Failure, Material, Strength};
 
-/// A consistent set: one deck unit is ten to this power of the SI unit.
+/// A consistent set: one deck unit is ten to this power of the SI unit, where the library is converted to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Units {
     /// The name a deck writes.
@@ -15,14 +15,45 @@ pub struct Units {
     time: i32,
     /// Names of the units of length, mass, time, velocity and stress, for readers of results.
     pub symbols: [&'static str; 5],
+    /// Whether a deck in these units may name materials of the library.
+    pub library: bool,
 }
 
 /// Every set a deck may name.
-pub const SETS: [Units; 4] = [
-    Units { name: "SI", length: 0, mass: 0, time: 0, symbols: ["m", "kg", "s", "m/s", "Pa"] },
-    Units { name: "cm-g-us", length: -2, mass: -3, time: -6, symbols: ["cm", "g", "us", "cm/us", "Mbar"] },
-    Units { name: "mm-ms-kg", length: -3, mass: 0, time: -3, symbols: ["mm", "kg", "ms", "m/s", "GPa"] },
-    Units { name: "mm-s-t", length: -3, mass: 3, time: 0, symbols: ["mm", "t", "s", "mm/s", "MPa"] },
+pub const SETS: [Units; 5] = [
+    Units { name: "SI", length: 0, mass: 0, time: 0, symbols: ["m", "kg", "s", "m/s", "Pa"], library: true },
+    Units {
+        name: "cm-g-us",
+        length: -2,
+        mass: -3,
+        time: -6,
+        symbols: ["cm", "g", "us", "cm/us", "Mbar"],
+        library: true,
+    },
+    Units {
+        name: "mm-ms-kg",
+        length: -3,
+        mass: 0,
+        time: -3,
+        symbols: ["mm", "kg", "ms", "m/s", "GPa"],
+        library: true,
+    },
+    Units {
+        name: "mm-s-t",
+        length: -3,
+        mass: 3,
+        time: 0,
+        symbols: ["mm", "t", "s", "mm/s", "MPa"],
+        library: true,
+    },
+    Units {
+        name: "in-s-lbf",
+        length: 0,
+        mass: 0,
+        time: 0,
+        symbols: ["in", "lbf*s2/in", "s", "in/s", "psi"],
+        library: false,
+    },
 ];
 
 impl Units {

@@ -36,7 +36,7 @@ fn good(name: &str) -> Model {
 fn defaults_are_those_of_the_reference() {
     let control = read(&cube("a", [0.0; 3], "")).setup.control;
     assert_eq!(control.end_cycle, u64::MAX);
-    assert_eq!((control.sort_lag, control.plan_interval), (4, 50));
+    assert_eq!((control.sort_lag, control.plan_interval), (8, 50));
     let numbers = [
         control.safety_factor,
         control.growth,
@@ -111,6 +111,23 @@ fn contact_matrices_are_symmetric_and_follow_the_pairs() {
 }
 
 #[test]
+fn the_slack_is_half_a_face_within_two_and_a_half_and_four_gaps() {
+    // Faces of half a metre.
+    let slack = |keys: &str| {
+        let model = read(&(cube("a", [0.0; 3], "") + &cube("b", [2.0, 0.0, 0.0], "") + "[contact]\n" + keys));
+        model.setup.contact.expect("the deck has contact").slack
+    };
+    for (keys, wanted) in [
+        ("", 0.2),
+        ("gap_fraction = 0.15\n", 0.25),
+        ("gap_fraction = 0.4\n", 0.5),
+        ("gap_fraction = 0.4\nslack_gaps = 2\n", 0.4),
+    ] {
+        assert!((slack(keys) - wanted).abs() < 1e-12, "{keys}: {}", slack(keys));
+    }
+}
+
+#[test]
 fn boundaries_merge_by_node_and_set_the_initial_velocity() {
     let model = good("boundaries");
     let at = |p: [f64; 3]| {
@@ -150,7 +167,10 @@ fn loads_curves_and_walls_are_as_the_deck_says() {
     assert_eq!(transmit.faces, (0..16).map(|e| (4 * e + 3, 3)).collect::<Vec<_>>());
     // Nodes 1 and 125 have the force, the first a velocity that starts at twice the first value of the curve.
     let of = |node: usize| model.setup.constraints[usize::from(model.constraint[node])];
-    assert_eq!(of(0), Constraint { velocity: [Some(ramp(2.0)), None, None], walls: 0, forces: 1 });
+    assert_eq!(
+        of(0),
+        Constraint { velocity: [Some(ramp(2.0)), None, None], walls: 0, forces: 1, clamped: 0 }
+    );
     assert_eq!(of(124), Constraint { forces: 1, ..Constraint::default() });
     assert_eq!((model.velocity[0], model.velocity[124]), ([6.0, 0.0, 0.0], [0.0; 3]));
     let walls: Vec<_> =

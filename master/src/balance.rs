@@ -1,13 +1,26 @@
 //! Balance: work units to workers by speed and ownership, at each sort (paper section 4).
 //!
-//! A unit weighs the pairs that a cycle will look at ([`pairs`]). Contact is shared out so that workers end their
+//! A unit weighs the pairs that a cycle will look at ([`mechanics::contact::cull`]). Contact is shared out so that workers end their
 //! sub-domains and units at one time. A unit stays with the worker that owns most of its nodes' elements unless that
 //! worker has more than its share; then its lightest-bound units go to the workers with the most room. Deterministic.
 
-use mechanics::contact::{Settings, Surface, WorkUnit};
+use mechanics::contact::WorkUnit;
 
-/// A node-face pair in a cycle, in element-cycles of this code (`bolide simulate --measure-costs`).
-pub const PAIR: f64 = 1.2;
+/// What work costs in a cycle, in element-cycles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Costs {
+    /// Integrating a node.
+    pub node: f64,
+    /// A node-face pair.
+    pub pair: f64,
+}
+
+impl Default for Costs {
+    /// Of this code with the widest lanes (`bolide simulate --measure-costs`).
+    fn default() -> Self {
+        Self { node: 0.09, pair: 1.2 }
+    }
+}
 
 /// Interactions that cost as much as one element-cycle: of the plates of 64,000 elements 4.6 make a pair, and a pair costs
 /// 1.2 elements (`bolide simulate --decomposition --json`, `--measure-costs`).
@@ -23,8 +36,8 @@ pub enum Dealing {
     Weights,
 }
 
-/// A surface node in a sort, in element-cycles of this code on one thread (`bolide simulate --measure-costs`).
-pub const SORT_ELEMENTS: f64 = 3.1;
+/// A surface node in a sort for sixteen workers, in element-cycles of this code (`bolide simulate --measure-costs`).
+pub const SORT_ELEMENTS: f64 = 3.9;
 
 /// Least share of its speed that a worker keeps beside sorts.
 const LEAST_BESIDE_SORTS: f64 = 0.1;
@@ -62,7 +75,7 @@ pub fn assign_by_weight(units: &[WorkUnit], speeds: &[f64]) -> Vec<usize> {
 
 /// How far above its share a worker may be before units move, relative to its whole cycle; moving one costs shared
 /// nodes in every cycle.
-const TOLERANCE: f64 = 0.004;
+const TOLERANCE: f64 = 0.001;
 
 /// When all workers have ended if pairs fill up those that end their sub-domains first (element-cycles at speed 1).
 /// Contact so levels what index planes left uneven.
@@ -80,32 +93,6 @@ fn level(speeds: &[f64], work: &[f64], contact: f64) -> f64 {
         level = load / speed;
     }
     level
-}
-
-/// Pairs of each unit of which the node lies in the face's box grown by the reach: what a cycle looks at, and what a
-/// unit weighs.
-pub fn pairs(units: &[WorkUnit], surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> Vec<u64> {
-    let reach = settings.reach();
-    let of_unit = |unit: &WorkUnit| {
-        let of_face = |&face: &u32| {
-            let face = &surface.faces[face as usize];
-            let corners = face.nodes.map(|n| x[n as usize]);
-            let bounds: [[f64; 2]; 3] = std::array::from_fn(|a| {
-                let along = corners.map(|c| c[a]);
-                let low = along.into_iter().fold(f64::INFINITY, f64::min);
-                let high = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
-                [low - reach, high + reach]
-            });
-            let near = |node: u32| {
-                let p = x[node as usize];
-                (0..3).all(|a| p[a] >= bounds[a][0] && p[a] <= bounds[a][1])
-                    && settings.permits(surface.node_part[node as usize], face.part)
-            };
-            unit.nodes.iter().filter(|&&node| near(node)).count() as u64
-        };
-        unit.faces.iter().map(of_face).sum()
-    };
-    units.iter().map(of_unit).collect()
 }
 
 /// Worker of each unit that owns most of its nodes, and how many.
@@ -135,11 +122,11 @@ pub fn assign_to_owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usi
     owners(units, n, owner).into_iter().map(|(worker, _)| worker).collect()
 }
 
-/// Worker of each unit. `weights` are the units' [`pairs`], `work` what the workers' sub-domains cost in
-/// element-cycles; `owner` gives the worker that owns a surface node's elements.
+/// Worker of each unit. `weights` are the units' pairs, of which one costs `pair`; `work` is what the workers' sub-domains
+/// cost, both in element-cycles; `owner` gives the worker that owns a surface node's elements.
 pub fn assign(
     units: &[WorkUnit],
-    weights: &[u64],
+    (weights, pair): (&[u64], f64),
     speeds: &[f64],
     work: &[f64],
     owner: &dyn Fn(u32) -> usize,
@@ -153,8 +140,8 @@ pub fn assign(
     for (weight, &worker) in weights.iter().zip(&chosen) {
         load[worker] += weight;
     }
-    let limit = level(speeds, work, PAIR * load.iter().sum::<u64>() as f64) * (1.0 + TOLERANCE);
-    let finish = |w: usize, load: u64| PAIR.mul_add(load as f64, work[w]) / speeds[w];
+    let limit = level(speeds, work, pair * load.iter().sum::<u64>() as f64) * (1.0 + TOLERANCE);
+    let finish = |w: usize, load: u64| pair.mul_add(load as f64, work[w]) / speeds[w];
     let mut giving: Vec<usize> =
         (0..units.len()).filter(|&u| weights[u] > 0 && finish(chosen[u], load[chosen[u]]) > limit).collect();
     // Loosely bound units first, the heavier of equals first: fewer moves.
@@ -188,7 +175,7 @@ mod tests {
     fn units_stay_with_the_owner_of_their_nodes_when_loads_fit() {
         let units: Vec<_> = (0..8).map(|i| unit(i, vec![i as u32], 10)).collect();
         let owner = |n: u32| (n % 2) as usize;
-        assert_eq!(assign(&units, &[10; 8], &[1.0, 1.0], &[1e4; 2], &owner), [0, 1, 0, 1, 0, 1, 0, 1]);
+        assert_eq!(assign(&units, (&[10; 8], 1.2), &[1.0, 1.0], &[1e4; 2], &owner), [0, 1, 0, 1, 0, 1, 0, 1]);
     }
 
     #[test]
@@ -202,7 +189,7 @@ mod tests {
     fn an_overloaded_worker_gives_units_until_shares_follow_speeds() {
         let units: Vec<_> = (0..400).map(|i| unit(i, vec![i as u32], 10)).collect();
         let speeds = [1.0, 2.0, 1.0];
-        let chosen = assign(&units, &[10; 400], &speeds, &[500.0, 1000.0, 500.0], &|_| 0);
+        let chosen = assign(&units, (&[10; 400], 1.2), &speeds, &[500.0, 1000.0, 500.0], &|_| 0);
         for (w, s) in speeds.iter().enumerate() {
             let load = chosen.iter().filter(|&&c| c == w).count() as f64;
             let share = 100.0 * s;
@@ -214,7 +201,7 @@ mod tests {
     fn contact_levels_what_index_planes_left_uneven() {
         assert!((level(&[1.0, 1.0, 2.0], &[100.0, 110.0, 220.0], 40.0) - 117.5).abs() < 1e-9);
         let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 1)).collect();
-        let chosen = assign(&units, &[1; 100], &[1.0, 1.0], &[1000.0, 1060.0], &|_| 1);
+        let chosen = assign(&units, (&[1; 100], 1.2), &[1.0, 1.0], &[1000.0, 1060.0], &|_| 1);
         let first = chosen.iter().filter(|&&w| w == 0).count();
         // 120 elements' worth of pairs: 90 to the first, 30 to the other.
         assert!((70..=76).contains(&first), "{first}");
@@ -224,7 +211,7 @@ mod tests {
     fn a_worker_that_ends_its_elements_last_gets_no_contact() {
         assert_eq!(level(&[1.0, 1.0], &[100.0, 110.0], 8.0), 108.0);
         let units: Vec<_> = (0..6).map(|i| unit(i, vec![i as u32], 1)).collect();
-        assert_eq!(assign(&units, &[1; 6], &[1.0, 1.0], &[100.0, 110.0], &|_| 1), [0; 6]);
+        assert_eq!(assign(&units, (&[1; 6], 1.2), &[1.0, 1.0], &[100.0, 110.0], &|_| 1), [0; 6]);
     }
 
     #[test]

@@ -1,10 +1,11 @@
-//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel` and `results`, the other end of the [`desk`](crate::desk).
+//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel`, `resume` and `results`, the other end of the [`desk`](crate::desk).
 
 use std::{
     fs::File,
     io::Write,
     path::{Path, PathBuf},
     process::ExitCode,
+    time::{Duration, Instant},
 };
 
 use protocol::{
@@ -22,8 +23,14 @@ use crate::{
     command::{ClientArgs, SubmitArgs},
     daemon::host_name,
     results::Folder,
-    run::list_of_faults,
+    run::{gather_deck, list_of_faults, warn},
 };
+
+pub mod top;
+/// How long a master that has gone is dialled again while one of its jobs is followed.
+const RETURN_LIMIT: Duration = Duration::from_secs(60);
+/// How often.
+const DIAL_EVERY: Duration = Duration::from_millis(500);
 
 /// A connection to a master.
 struct Client {
@@ -31,6 +38,10 @@ struct Client {
     outbox: Outbox,
     inbox: Inbox,
     receiver: Receiver,
+    /// The connection has ended.
+    gone: bool,
+    /// The job that is followed.
+    following: Option<u32>,
 }
 
 impl Client {
@@ -49,6 +60,8 @@ impl Client {
             outbox: Outbox::new(sender, welcome.incarnation),
             inbox: Inbox::new(0, BULK_ON_THE_WAY),
             receiver,
+            gone: false,
+            following: None,
         })
     }
 
@@ -71,7 +84,10 @@ impl Client {
                 inbox.accept(receiver.receive().await?)?;
             }
         });
-        let letter = letter.map_err(|e: protocol::Error| format!("the master: {e}"))?;
+        let letter = letter.map_err(|e: protocol::Error| {
+            self.gone = true;
+            format!("the master: {e}")
+        })?;
         match codec::decode(&letter.bytes, MESSAGE_LIMIT).map_err(|e| e.to_string())? {
             Reply::No(why) => Err(why),
             reply => Ok(reply),
@@ -84,6 +100,7 @@ impl Client {
         let mut last = String::new();
         loop {
             let Reply::Status(status) = reply else { return Err(surprise()) };
+            self.following = Some(status.job);
             let line = line_of(&status);
             if !quiet && line != last {
                 eprintln!("{line}");
@@ -124,18 +141,27 @@ fn line_of(status: &Status) -> String {
 /// Faults of the deck, or whatever went wrong on the way.
 pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     let name = args.deck.display().to_string();
-    let text = std::fs::read_to_string(&args.deck).map_err(|e| format!("{name}: {e}"))?;
+    let text = gather_deck(&args.deck, &args.reading.options())?;
     if text.len() > DECK_LIMIT {
         return Err(format!("{name}: {} bytes, at most {DECK_LIMIT} can be sent", text.len()));
     }
-    let options = JobOptions { min_workers: args.min_workers, trace: args.trace, ..args.job.asked() };
+    // The master answers with faults; what a run does otherwise than the deck says is told here.
+    if let Ok(reading) = deck::read_whole(&text, &name) {
+        warn(&reading.warnings);
+    }
+    let options = JobOptions {
+        min_workers: args.min_workers,
+        priority: args.priority,
+        trace: args.trace,
+        ..args.job.asked()
+    };
     let mut client = Client::new(&args.at)?;
     match client.ask(&Request::Submit { name, text, options })? {
         Reply::Submitted { job } if args.wait => {
             if !args.at.json {
                 eprintln!("job {job} submitted");
             }
-            finish(&mut client, Some(job), args.at.json)
+            finish(client, &args.at, Some(job))
         }
         Reply::Submitted { job } => {
             if args.at.json {
@@ -155,11 +181,24 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
 /// # Errors
 /// The job's failure, or whatever went wrong on the way.
 pub fn watch(job: Option<u32>, at: &ClientArgs) -> Result<ExitCode, String> {
-    finish(&mut Client::new(at)?, job, at.json)
+    finish(Client::new(at)?, at, job)
 }
 
-fn finish(client: &mut Client, job: Option<u32>, json: bool) -> Result<ExitCode, String> {
-    let status = client.follow(job, json)?;
+/// Follows a job to its end, over a restart of its master as well.
+fn finish(mut client: Client, at: &ClientArgs, mut job: Option<u32>) -> Result<ExitCode, String> {
+    let json = at.json;
+    let status = loop {
+        match client.follow(job, json) {
+            Ok(status) => break status,
+            Err(why) if client.gone && client.following.is_some() => {
+                job = client.following;
+                eprintln!("{why}; dialling again for {} s", RETURN_LIMIT.as_secs());
+                client = dial_again(at, &why)?;
+                client.following = job;
+            }
+            Err(why) => return Err(why),
+        }
+    };
     let ended = status.ended.unwrap_or_default();
     if let Some(text) = if json { ended.summary } else { ended.table } {
         println!("{text}");
@@ -168,6 +207,19 @@ fn finish(client: &mut Client, job: Option<u32>, json: bool) -> Result<ExitCode,
         (Some(why), _) => Err(format!("job {}: {why}", status.job)),
         (None, State::Cancelled) => Ok(ExitCode::from(130)),
         (None, _) => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// A connection to the master that is started again.
+fn dial_again(at: &ClientArgs, why: &str) -> Result<Client, String> {
+    let since = Instant::now();
+    loop {
+        std::thread::sleep(DIAL_EVERY);
+        match Client::new(at) {
+            Ok(client) => return Ok(client),
+            Err(_) if since.elapsed() < RETURN_LIMIT => {}
+            Err(last) => return Err(format!("{why}; then {last}")),
+        }
     }
 }
 
@@ -226,6 +278,20 @@ pub fn hosts(at: &ClientArgs) -> Result<ExitCode, String> {
 /// If there is no such job or it is over, or whatever went wrong on the way.
 pub fn cancel(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
     let Reply::Done(what) = Client::new(at)?.ask(&Request::Cancel { job })? else { return Err(surprise()) };
+    if at.json {
+        println!("{}", serde_json::json!({ "done": what }));
+    } else {
+        println!("{what}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `bolide resume`.
+///
+/// # Errors
+/// If there is no such job or it has not failed, or whatever went wrong on the way.
+pub fn resume(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
+    let Reply::Done(what) = Client::new(at)?.ask(&Request::Resume { job })? else { return Err(surprise()) };
     println!("{what}");
     Ok(ExitCode::SUCCESS)
 }

@@ -9,9 +9,13 @@ use protocol::{
     tls,
 };
 
+/// What the process ends with, as `--help` says it.
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 a fault, which is printed (deck, disk, physics, peer); 2 wrong flags; 130 \
+stopped by Ctrl-C, or the followed job was cancelled. The log goes to standard error, BOLIDE_LOG=debug for more.";
+
 /// Explicit Lagrangian impact simulation on whatever PCs a lab has.
 #[derive(Debug, Parser)]
-#[command(name = "bolide", version, about, max_term_width = 100)]
+#[command(name = "bolide", version, about, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -59,6 +63,14 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
+    /// Put a job that failed back into the queue, to go on where it was stored
+    Resume {
+        /// The job
+        job: u32,
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
     /// Fetch the results of a job
     Results {
         /// The job
@@ -73,11 +85,15 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Measure what this machine's parts cost
+    /// Measure what this machine takes for elements, contact, sorts and messages, and its --speed
+    #[command(args_conflicts_with_subcommands = true)]
     Bench {
-        /// What to measure
+        /// What to measure instead
         #[command(subcommand)]
-        what: Bench,
+        what: Option<Bench>,
+        /// Grind times
+        #[command(flatten)]
+        grind: GrindArgs,
     },
     /// Make certificates: a CA, and one folder for each host
     Certs {
@@ -89,9 +105,61 @@ pub enum Command {
     Check {
         /// The deck
         deck: PathBuf,
+        /// What a keyword deck does not say
+        #[command(flatten)]
+        reading: ReadingArgs,
+    },
+    /// Write an LS-DYNA keyword deck as a TOML deck, with its mesh in a file beside it
+    Convert {
+        /// The keyword deck
+        deck: PathBuf,
+        /// The TOML deck to write; the mesh goes beside it, ending in .mesh
+        to: PathBuf,
+        /// Replace files that are there
+        #[arg(long)]
+        force: bool,
+        /// What a keyword deck does not say
+        #[command(flatten)]
+        reading: ReadingArgs,
     },
     /// List the material library
     Materials,
+    /// Show hosts and jobs of a master, looked at once a second
+    Top {
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
+    /// Print what a shell needs to complete commands and flags
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page, or write one for each command
+    Man {
+        /// Folder for all of them
+        #[arg(long, value_name = "FOLDER")]
+        out: Option<PathBuf>,
+    },
+}
+
+/// What an LS-DYNA keyword deck does not say itself.
+#[derive(Args, Clone, Debug)]
+pub struct ReadingArgs {
+    /// Keyword decks: their units, one of mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), in-s-lbf,
+    /// SI (m-s-kg) [default: told by the densities]
+    #[arg(long)]
+    pub units: Option<String>,
+    /// Keyword decks: the case to run, of those that *CASE defines
+    #[arg(long)]
+    pub case: Option<u32>,
+}
+
+impl ReadingArgs {
+    /// As the reader takes them.
+    pub fn options(&self) -> deck::bundle::Options {
+        deck::bundle::Options { units: self.units.clone(), case: self.case }
+    }
 }
 
 /// How partial forces travel.
@@ -180,15 +248,30 @@ pub struct JobArgs {
     /// Speeds that work is dealt out by
     #[arg(long, value_enum, default_value = "given")]
     pub balance: Balance,
-    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for the start alone
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for no oftener than on disk
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub keep_every: f64,
+    /// Store the run on disk every so many seconds, to be gone on with by --resume; 0 for never [default: the deck's; else a
+    /// master's jobs every 10, `run` only when it is interrupted]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub snapshot_every: Option<f64>,
+    /// The same every so many cycles
+    #[arg(long, value_name = "CYCLES", value_parser = clap::value_parser!(u64).range(1..))]
+    pub snapshot_cycles: Option<u64>,
     /// Extra sorts every so many cycles, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_every: Option<u64>,
     /// Extra sorts at pseudo-random cycles of this seed, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_seed: Option<u64>,
+}
+
+/// A number of seconds that a timer can wait for.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(seconds),
+        _ => Err("expected seconds from 0 to 1e9".to_owned()),
+    }
 }
 
 impl JobArgs {
@@ -206,6 +289,9 @@ impl JobArgs {
             min_workers: 1,
             balance: self.balance.into(),
             keep_every: (self.keep_every > 0.0).then_some(self.keep_every),
+            snapshot_every: self.snapshot_every,
+            snapshot_cycles: self.snapshot_cycles,
+            priority: 0,
             trace: false,
         }
     }
@@ -214,8 +300,11 @@ impl JobArgs {
 /// Flags of `run`.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
-    /// The deck (TOML)
+    /// The deck (TOML, or LS-DYNA keywords)
     pub deck: PathBuf,
+    /// What a keyword deck does not say
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Number of workers
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub workers: u32,
@@ -228,10 +317,13 @@ pub struct RunArgs {
     /// A process for each worker, over loopback TCP
     #[arg(long)]
     pub processes: bool,
-    /// Go on from this snapshot
-    #[arg(long, value_name = "FILE")]
+    /// Run on these processors only, as in 0,2-3
+    #[arg(long, value_name = "LIST")]
+    pub pin: Option<Processors>,
+    /// Go on from a snapshot: this file, or the newest whole one of this results folder, which is then written on
+    #[arg(long, value_name = "FILE|FOLDER")]
     pub resume: Option<PathBuf>,
-    /// Results folder [default: results/<deck name>]
+    /// Results folder [default: the one resumed from, else results/<deck name>]
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Replace the results in an existing folder
@@ -322,12 +414,25 @@ pub struct MasterArgs {
     /// Folder with this host's certificates, as `bolide certs host` makes it
     #[arg(long, value_name = "FOLDER")]
     pub certs: Option<PathBuf>,
-    /// Folder for the results of jobs
+    /// Folder for jobs, their results and snapshots; a restarted master goes on with what it finds there
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
+    /// Serve a page and a JSON API there, 127.0.0.1:7118 for example; other than loopback only with --certs, by HTTPS
+    #[arg(long, value_name = "ADDRESS")]
+    pub http: Option<SocketAddr>,
+    /// Seconds without a byte after which a worker counts as lost; it is suspect after three tenths of that
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = deadline)]
+    pub dead_after: f64,
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
     #[arg(long, value_name = "RATE")]
     pub link: Option<Rate>,
+}
+
+fn deadline(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (1.0..=3600.0).contains(&seconds) => Ok(seconds),
+        _ => Err("expected seconds from 1 to 3600".to_owned()),
+    }
 }
 
 /// Flags of `worker`.
@@ -336,9 +441,12 @@ pub struct WorkerArgs {
     /// The master: HOST, HOST:PORT or [ADDRESS]:PORT
     #[arg(long)]
     pub master: String,
-    /// Speed relative to the other workers
-    #[arg(long, default_value_t = 1.0)]
-    pub speed: f64,
+    /// Speed relative to the other workers; auto measures it: 1 is a thread that takes 100 ns for an element-cycle
+    #[arg(long, default_value = "1", value_name = "NUMBER|auto")]
+    pub speed: Speed,
+    /// Run on these processors only, as in 0,2-3
+    #[arg(long, value_name = "LIST")]
+    pub pin: Option<Processors>,
     /// Compute threads [default: all cores]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
@@ -385,11 +493,17 @@ pub struct ClientArgs {
 /// Flags of `submit`.
 #[derive(Args, Clone, Debug)]
 pub struct SubmitArgs {
-    /// The deck (TOML)
+    /// The deck (TOML, or LS-DYNA keywords); files that it refers to are sent along
     pub deck: PathBuf,
+    /// What a keyword deck does not say
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Start when so many workers are there
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub min_workers: u32,
+    /// Jobs of a higher priority start first; of the same, the first come
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    pub priority: i32,
     /// Follow the job until it ends, then print its summary
     #[arg(long)]
     pub wait: bool,
@@ -402,6 +516,83 @@ pub struct SubmitArgs {
     /// The master
     #[command(flatten)]
     pub at: ClientArgs,
+}
+
+/// Flags of `bench` alone.
+#[derive(Args, Clone, Debug)]
+pub struct GrindArgs {
+    /// Rounds, of which the median and the least are printed
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub rounds: u32,
+    /// Elements along each side of the cube of two plates
+    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(6..=120))]
+    pub side: u32,
+    /// Lane width; the widest by default
+    #[arg(long, value_enum)]
+    pub lanes: Option<Lanes>,
+    /// Run on these processors only, as in 0,2-3
+    #[arg(long, value_name = "LIST")]
+    pub pin: Option<Processors>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Processors of this machine, as in `0,2-3`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Processors(Vec<usize>);
+
+impl Processors {
+    /// The highest number that is read.
+    const LAST: usize = 1023;
+
+    /// Confines this process to them: the calling thread, and all that it starts from now on.
+    ///
+    /// # Errors
+    /// If this machine has none of them.
+    pub fn apply(&self) -> Result<(), String> {
+        worker::compute::pin(&self.0)
+    }
+}
+
+impl std::str::FromStr for Processors {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let fault = || format!("processors {text:?}: a list of numbers up to {} as in 0,2-3", Self::LAST);
+        let number =
+            |digits: &str| digits.trim().parse::<usize>().ok().filter(|n| *n <= Self::LAST).ok_or_else(fault);
+        let mut processors = Vec::new();
+        for range in text.split(',') {
+            let (first, last) = range.split_once('-').unwrap_or((range, range));
+            let (first, last) = (number(first)?, number(last)?);
+            if first > last {
+                return Err(fault());
+            }
+            processors.extend(first..=last);
+        }
+        Ok(Self(processors))
+    }
+}
+
+/// A worker's speed relative to the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Speed {
+    /// Measured when the worker starts.
+    Auto,
+    /// As it was said.
+    Given(f64),
+}
+
+impl std::str::FromStr for Speed {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        text.parse().map(Self::Given).map_err(|_| format!("speed {text:?}: a number, or auto to measure it"))
+    }
 }
 
 /// What `bench` measures.
@@ -484,5 +675,25 @@ impl CertRole {
             Self::Worker => tls::Role::Worker,
             Self::Client => tls::Role::Client,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_of_processors_and_speeds_are_read_and_faults_say_what_was_read() {
+        assert_eq!("0,2-3".parse(), Ok(Processors(vec![0, 2, 3])));
+        for text in ["", "a", "3-2", "1024", "0,,1", "-1"] {
+            let fault = text.parse::<Processors>().expect_err(text);
+            assert!(fault.starts_with(&format!("processors {text:?}: ")), "{fault}");
+        }
+        assert_eq!("auto".parse(), Ok(Speed::Auto));
+        assert_eq!("0.5".parse(), Ok(Speed::Given(0.5)));
+        assert_eq!(
+            "fast".parse::<Speed>(),
+            Err("speed \"fast\": a number, or auto to measure it".to_owned())
+        );
     }
 }

@@ -9,13 +9,15 @@ use std::{
         Arc, Mutex,
         atomic::{AtomicBool, AtomicU32, Ordering},
     },
+    time::Duration,
 };
 
 use protocol::{
     Error, Result,
     dial::leave,
+    frame::Frame,
     handshake::{Hello, Policy, Role, Server, Welcome},
-    link::{self, Receiver, Sender, Settings},
+    link::{self, MISSED_HEARTBEATS, Receiver, Sender, Settings},
     message::ToMaster,
     order::{BULK_ON_THE_WAY, Inbox, Outbox},
     shape::{Shape, Shaped},
@@ -26,7 +28,9 @@ use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::TcpStream,
     sync::{mpsc, oneshot},
+    time::Instant,
 };
+use tracing::{info, warn};
 
 use crate::{
     daemon::Event,
@@ -35,8 +39,8 @@ use crate::{
     event::Hand,
 };
 
-/// Interval of heartbeats on every connection (ms).
-const HEARTBEAT_MS: u32 = 1000;
+/// A worker is suspect after this part of the silence after which it is dead.
+const SUSPECT: f64 = 0.3;
 
 /// What every connection needs of the daemon.
 pub struct Gate {
@@ -50,6 +54,8 @@ pub struct Gate {
     tls: Option<Arc<ServerConfig>>,
     /// This host's emulated port, which all connections pass.
     port: Option<Shape>,
+    /// Without a byte for so long, a peer is dead.
+    dead_after: Duration,
     /// The last incarnation that was given.
     incarnations: AtomicU32,
     ending: AtomicBool,
@@ -64,7 +70,8 @@ impl Gate {
         tls: Option<Arc<ServerConfig>>,
     ) -> Self {
         let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
-        Self { events, roles, token, tls, port: None, incarnations, ending }
+        let dead_after = Settings::default().silence;
+        Self { events, roles, token, tls, port: None, dead_after, incarnations, ending }
     }
 
     /// All connections pass this emulated port.
@@ -72,6 +79,23 @@ impl Gate {
     pub fn behind(mut self, port: Option<Shape>) -> Self {
         self.port = port;
         self
+    }
+
+    /// A peer is dead after so long without a byte.
+    #[must_use]
+    pub fn patient_for(mut self, dead_after: Duration) -> Self {
+        self.dead_after = dead_after;
+        self
+    }
+
+    /// The interval that peers are told (ms).
+    fn heartbeat_ms(&self) -> u32 {
+        u32::try_from(self.settings().heartbeat.as_millis()).unwrap_or(u32::MAX).max(1)
+    }
+
+    fn settings(&self) -> Settings {
+        let heartbeat = Settings::default().heartbeat.min(self.dead_after / MISSED_HEARTBEATS);
+        Settings { heartbeat, silence: self.dead_after, ..Settings::default() }
     }
 
     /// This side ends all connections from now on, so that their ends are no faults.
@@ -112,14 +136,14 @@ impl Gate {
     where
         S: AsyncRead + AsyncWrite + Send + 'static,
     {
-        let (sender, mut receiver) = link::split(stream, Settings::default());
+        let (sender, mut receiver) = link::split(stream, self.settings());
         let policy = Policy { roles: self.roles.clone(), certificate, token: self.token.clone() };
         let (server, hello) = link::hear(&sender, &mut receiver, policy).await?;
         let incarnation = self.incarnations.fetch_add(1, Ordering::Relaxed) + 1;
         if hello.role == Role::Worker {
             return self.worker(server, &hello, sender, receiver, address, incarnation).await;
         }
-        let welcome = Welcome { incarnation, host: 0, heartbeat_ms: HEARTBEAT_MS };
+        let welcome = Welcome { incarnation, host: 0, heartbeat_ms: self.heartbeat_ms() };
         link::admit(server, &sender, &mut receiver, welcome)?;
         match desk::serve(&self.events, &sender, &mut receiver, incarnation).await {
             // A client may go as it likes.
@@ -143,18 +167,20 @@ impl Gate {
         let (answer, answered) = oneshot::channel();
         let knock =
             Event::Knock { hello: Box::new(hello.clone()), address: address.clone(), incarnation, answer };
-        // The owner lives as long as the daemon; a daemon that ends refuses.
+        // The owner lives as long as the daemon.
         let _ = self.events.send(knock).await;
-        let host = match answered.await.unwrap_or_else(|_| Err("the master is ending".to_owned())) {
-            Ok(host) => host,
-            Err(reason) => {
+        let host = match answered.await {
+            // A daemon that ends hangs up: the worker finds the next one by dialling again.
+            Err(_) => return Err(Error::Message("the master is ending".to_owned())),
+            Ok(Ok(host)) => host,
+            Ok(Err(reason)) => {
                 sender.send(server.refuse(&reason)?)?;
                 let _ = tokio::time::timeout(link::GREETING_LIMIT, sender.finish()).await;
                 return Err(Error::Message(reason));
             }
         };
         let route = Arc::new(Route::default());
-        let welcome = Welcome { incarnation, host, heartbeat_ms: HEARTBEAT_MS };
+        let welcome = Welcome { incarnation, host, heartbeat_ms: self.heartbeat_ms() };
         let error = match link::admit(server, &sender, &mut receiver, welcome) {
             Err(error) => error,
             Ok(()) => {
@@ -167,20 +193,77 @@ impl Gate {
                     route: Arc::clone(&route),
                 };
                 let _ = self.events.send(Event::Joined(seat)).await;
-                listen(&mut receiver, incarnation, &route).await
+                self.listen(&mut receiver, hello, incarnation, &route).await
             }
         };
+        let dropped = route.dismissal();
+        let words = dropped.clone().unwrap_or_else(|| error.to_string());
         if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
-            leave(&sender, &error.to_string()).await;
+            leave(&sender, &words).await;
         }
         drop(receiver);
-        let why = format!("{} at {address}: {error}", hello.name);
+        let why = format!("{} at {address}: {words}", hello.name);
         if let Some((index, send)) = route.lose(&why) {
             // The job may be over by now.
             let _ = send.send(Input::Lost(index, why)).await;
         }
-        let _ = self.events.send(Event::Left { incarnation, why: error.to_string() }).await;
+        let dropped = dropped.is_some();
+        let _ = self.events.send(Event::Left { incarnation, why: words, dropped }).await;
         Err(error)
+    }
+
+    /// Hands a worker's messages to its job, and says when it has been silent; ends with the link, or when the job will
+    /// have no more to do with the worker.
+    async fn listen(&self, receiver: &mut Receiver, hello: &Hello, incarnation: u32, route: &Route) -> Error {
+        let mut inbox = Inbox::new(incarnation, BULK_ON_THE_WAY);
+        let mut look = tokio::time::interval(self.dead_after.mul_f64(SUSPECT) / 4);
+        let mut silent_since = None;
+        loop {
+            let frame = tokio::select! {
+                biased;
+                frame = receiver.receive() => Some(frame),
+                () = route.dismissed() => return Error::Message("its job dropped it".to_owned()),
+                _ = look.tick() => None,
+            };
+            let handed = match frame {
+                Some(Ok(frame)) => hand_on(frame, receiver, &mut inbox, route).await,
+                Some(Err(error)) => Err(error),
+                None => {
+                    self.look_at(&hello.name, incarnation, receiver.last_seen(), &mut silent_since).await;
+                    Ok(())
+                }
+            };
+            if let Err(error) = handed {
+                return error;
+            }
+        }
+    }
+
+    /// Says when a worker has become suspect, and when it is heard again.
+    async fn look_at(
+        &self,
+        name: &str,
+        incarnation: u32,
+        last_seen: Instant,
+        silent_since: &mut Option<Instant>,
+    ) {
+        let note = match *silent_since {
+            None if last_seen.elapsed() >= self.dead_after.mul_f64(SUSPECT) => {
+                *silent_since = Some(last_seen);
+                let (quiet, dead) = (last_seen.elapsed().as_secs_f64(), self.dead_after.as_secs_f64());
+                let note = format!("suspect: silent for {quiet:.1} s, dead after {dead} s");
+                warn!("worker {name} is {note}");
+                Some(note)
+            }
+            Some(since) if last_seen > since => {
+                *silent_since = None;
+                info!("worker {name} is heard again after {:.1} s", (last_seen - since).as_secs_f64());
+                None
+            }
+            _ => return,
+        };
+        // The owner lives as long as the daemon.
+        let _ = self.events.send(Event::Suspect { incarnation, note }).await;
     }
 }
 
@@ -190,18 +273,8 @@ fn peer_address(address: &str, port: u16) -> Option<SocketAddr> {
     Some(SocketAddr::new(caller.ip(), port))
 }
 
-/// Hands a worker's messages to its job; ends with the link.
-async fn listen(receiver: &mut Receiver, incarnation: u32, route: &Route) -> Error {
-    let mut inbox = Inbox::new(incarnation, BULK_ON_THE_WAY);
-    loop {
-        if let Err(error) = hand_on(receiver, &mut inbox, route).await {
-            return error;
-        }
-    }
-}
-
-async fn hand_on(receiver: &mut Receiver, inbox: &mut Inbox, route: &Route) -> Result<()> {
-    inbox.accept(receiver.receive().await?)?;
+async fn hand_on(frame: Frame, receiver: &mut Receiver, inbox: &mut Inbox, route: &Route) -> Result<()> {
+    inbox.accept(frame)?;
     while let Some(letter) = inbox.take() {
         let header = letter.header;
         let Some((index, send)) = route.find(&header)? else { continue };

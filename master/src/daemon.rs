@@ -6,13 +6,13 @@
 use std::{
     collections::BTreeMap,
     net::SocketAddr,
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitCode,
     sync::{
         Arc, Mutex,
         atomic::{AtomicBool, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use protocol::{
@@ -32,16 +32,21 @@ use crate::{
     connection::Gate,
     drive::{self, Input, Seat},
     hosts::Hosts,
-    queue::{self, Queue, is_over},
+    http::{self, board::Board},
+    queue::{self, Entry, Queue, is_over},
     service::{self, Order},
+    spool::{Left, Record, Spool},
 };
 
 /// Events that may wait for the owner.
 pub const WAITING_EVENTS: usize = 1024;
 /// Most connections at a time, those in their greeting included.
 pub const CONNECTIONS: usize = 4096;
-/// The longest that an ending master waits for the job under way.
-const END_LIMIT: Duration = Duration::from_secs(10);
+/// The longest that an ending master waits until the job under way is stored.
+const END_LIMIT: Duration = Duration::from_secs(60);
+/// How long an interrupted job waits for all of its workers before it goes on with those that are back; later ones are taken
+/// in at plan boundaries.
+const RETURN_LIMIT: Duration = Duration::from_secs(2);
 
 /// What the owner of hosts and queue hears.
 pub enum Event {
@@ -64,6 +69,15 @@ pub enum Event {
         incarnation: u32,
         /// Why.
         why: String,
+        /// Its job dropped the worker: it may not come back.
+        dropped: bool,
+    },
+    /// A worker has been silent for long, or is heard again.
+    Suspect {
+        /// Its connection.
+        incarnation: u32,
+        /// In words, while it is silent.
+        note: Option<String>,
     },
     /// A client brings a deck without faults; answered with the job's number.
     Submit {
@@ -86,6 +100,8 @@ pub enum Event {
     Watch(Option<u32>, oneshot::Sender<Result<watch::Receiver<Status>, String>>),
     /// A client takes a job back.
     Cancel(u32, oneshot::Sender<Result<String, String>>),
+    /// A client wants a job that failed to go on.
+    Resume(u32, oneshot::Sender<Result<String, String>>),
     /// A client asks where a job's results are.
     Folder(u32, oneshot::Sender<Result<PathBuf, String>>),
     /// A job's thread is done.
@@ -103,23 +119,28 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
     let port = args.link.map(|rate| Shape::port(Wire::ethernet(rate)));
-    let first = first_job(&args.spool)?;
+    let (spool, left) = Spool::open(&args.spool)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .thread_name("link")
         .build()
         .map_err(|e| format!("threads of links: {e}"))?;
+    let dead_after = Duration::from_secs_f64(args.dead_after);
     let result = runtime.block_on(async {
         let listener = TcpListener::bind(args.listen).await.map_err(|e| format!("{}: {e}", args.listen))?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
-        announce(address, tls.is_some());
+        let join = announce(address, tls.is_some());
         let (events, heard) = mpsc::channel(WAITING_EVENTS);
-        let gate =
-            Arc::new(Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls).behind(port));
+        let gate = Arc::new(
+            Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls)
+                .behind(port)
+                .patient_for(dead_after),
+        );
         tokio::spawn(listen(listener, Arc::clone(&gate)));
-        let stop = crate::run::stop_on_interrupt("ending; the job under way writes its results");
-        Owner::new(args.spool.clone(), first, events).run(heard, &stop, &gate).await;
+        let board = open_page(args, join, &events).await?;
+        let stop = crate::run::stop_on_interrupt("ending; the job under way is stored for the next master");
+        Owner::new(args.spool.clone(), spool, left, events, board).run(heard, &stop, &gate).await;
         Ok(ExitCode::SUCCESS)
     });
     runtime.shutdown_background();
@@ -155,13 +176,39 @@ pub async fn listen(listener: TcpListener, gate: Arc<Gate>) {
     }
 }
 
-/// Says where it listens and how workers join.
-fn announce(address: SocketAddr, certificates: bool) {
+/// Opens the page where one is asked for, and prints its address with its token.
+async fn open_page(
+    args: &MasterArgs,
+    join: String,
+    events: &mpsc::Sender<Event>,
+) -> Result<Option<Arc<Board>>, String> {
+    let Some(address) = args.http else { return Ok(None) };
+    let place = http::Place::open(address, args.certs.as_deref()).await?;
+    let (address, secure) = (place.address()?, place.is_secure());
+    let loopback = address.ip().is_loopback();
+    let guard = http::guard::Guard::new(&args.spool, address.port(), loopback, secure, host_name())?;
+    let scheme = if secure { "https" } else { "http" };
+    println!("page: {scheme}://{}/?token={}", reachable(address), guard.token());
+    let board = Arc::new(Board::default());
+    let office = http::Office { events: events.clone(), board: Arc::clone(&board), join, guard };
+    tokio::spawn(http::serve(place, office));
+    Ok(Some(board))
+}
+
+/// Says where it listens and how workers join; gives the line for workers.
+fn announce(address: SocketAddr, certificates: bool) -> String {
+    let certs = if certificates { " --certs FOLDER" } else { "" };
+    let join = format!("bolide worker --master {}{certs}", reachable(address));
+    println!("listening on {address}");
+    println!("workers join with: {join}");
+    join
+}
+
+/// Host and port as others write them.
+fn reachable(address: SocketAddr) -> String {
     let host = if address.ip().is_unspecified() { host_name() } else { address.ip().to_string() };
     let host = if host.contains(':') { format!("[{host}]") } else { host };
-    let certs = if certificates { " --certs FOLDER" } else { "" };
-    println!("listening on {address}");
-    println!("workers join with: bolide worker --master {host}:{}{certs}", address.port());
+    format!("{host}:{}", address.port())
 }
 
 /// The name of this machine.
@@ -172,22 +219,11 @@ pub fn host_name() -> String {
     if name.is_empty() { "localhost".to_owned() } else { name }
 }
 
-/// The first number that no job of an earlier master in this spool folder has.
-fn first_job(spool: &Path) -> Result<u32, String> {
-    let fault = |e: std::io::Error| format!("spool folder {}: {e}", spool.display());
-    std::fs::create_dir_all(spool).map_err(fault)?;
-    let mut first = 1;
-    for entry in std::fs::read_dir(spool).map_err(fault)? {
-        let name = entry.map_err(fault)?.file_name();
-        let number = name.to_str().and_then(|n| n.strip_prefix("job-")).and_then(|n| n.parse::<u32>().ok());
-        first = first.max(number.map_or(0, |n| n.saturating_add(1)));
-    }
-    Ok(first)
-}
-
 /// The owner of hosts and queue.
 struct Owner {
-    spool: PathBuf,
+    folder: PathBuf,
+    spool: Spool,
+    started: Instant,
     events: mpsc::Sender<Event>,
     hosts: Hosts,
     /// By connection: those that were welcomed and have not left.
@@ -195,6 +231,8 @@ struct Owner {
     queue: Queue,
     status: BTreeMap<u32, watch::Sender<Status>>,
     running: Option<Running>,
+    /// What the page shows; none without a page.
+    board: Option<Arc<Board>>,
 }
 
 /// The job under way.
@@ -215,16 +253,72 @@ impl Running {
 }
 
 impl Owner {
-    fn new(spool: PathBuf, first: u32, events: mpsc::Sender<Event>) -> Self {
-        Self {
+    /// With what an earlier master left.
+    fn new(
+        folder: PathBuf,
+        spool: Spool,
+        left: Left,
+        events: mpsc::Sender<Event>,
+        board: Option<Arc<Board>>,
+    ) -> Self {
+        let mut owner = Self {
+            folder,
             spool,
+            started: Instant::now(),
             events,
             hosts: Hosts::default(),
             seats: BTreeMap::new(),
-            queue: Queue::new(first),
+            queue: Queue::new(left.first),
             status: BTreeMap::new(),
             running: None,
+            board,
+        };
+        for why in &left.warnings {
+            warn!("{why}");
         }
+        for (record, text) in left.jobs {
+            owner.restore(record, text);
+        }
+        owner
+    }
+
+    /// A job of an earlier master; one that was under way goes on.
+    fn restore(&mut self, record: Record, text: String) {
+        let Record { job, name, title, state, options, crew, cycle, time, ended } = record;
+        let interrupted = state == State::Running;
+        let state = if interrupted { State::Queued } else { state };
+        if !is_over(state) {
+            info!(job, title, interrupted, "job of an earlier master");
+        }
+        self.status.insert(
+            job,
+            watch::Sender::new(Status { state, cycle, time, ended, ..Status::queued(job, title) }),
+        );
+        let folder = (!options.no_output).then(|| self.spool.results(job));
+        let before = interrupted.then_some(crew);
+        self.queue.restore(Entry { id: job, name, text: Arc::new(text), options, state, folder, before });
+    }
+
+    /// Puts on disk how a job stands, before anybody is told. One that was begun is called running until it is over.
+    fn record(&self, job: u32, ended: Option<Ended>) -> Result<(), String> {
+        let (Some(entry), Some(status)) = (self.queue.get(job), self.status.get(&job)) else { return Ok(()) };
+        let begun = entry.before.is_some() && !is_over(entry.state);
+        let record = {
+            let status = status.borrow();
+            Record {
+                job,
+                name: entry.name.clone(),
+                title: status.title.clone(),
+                state: if begun { State::Running } else { entry.state },
+                options: entry.options.clone(),
+                crew: entry.before.clone().unwrap_or_default(),
+                cycle: status.cycle,
+                time: status.time,
+                ended,
+            }
+        };
+        // A few kilobytes; the job's own thread does not wait for it.
+        tokio::task::block_in_place(|| self.spool.change(&record))
     }
 
     async fn run(mut self, mut heard: mpsc::Receiver<Event>, stop: &AtomicBool, gate: &Gate) {
@@ -235,16 +329,19 @@ impl Owner {
                     self.hear(event);
                     self.start_next();
                 },
-                _ = look.tick() => {}
+                // An interrupted job waits for its workers for a while.
+                _ = look.tick() => self.start_next(),
             }
         }
         self.end(&mut heard, gate).await;
     }
 
-    /// Lets the job under way write its results, and says good-bye.
+    /// Lets the job under way be stored, and says good-bye.
     async fn end(&mut self, heard: &mut mpsc::Receiver<Event>, gate: &Gate) {
         if let Some(running) = &self.running {
-            running.stop();
+            let line = running.line.clone();
+            // Beside what is heard below: the line may be full.
+            tokio::spawn(async move { line.send(Input::Suspend).await.is_ok() });
         }
         let _ = tokio::time::timeout(END_LIMIT, async {
             while self.running.is_some()
@@ -277,10 +374,14 @@ impl Owner {
                 self.offer(&seat);
                 self.seats.insert(seat.incarnation, seat);
             }
-            Event::Left { incarnation, why } => {
+            Event::Left { incarnation, why, dropped } => {
                 self.seats.remove(&incarnation);
-                self.hosts.lose(incarnation, &why);
+                match dropped {
+                    true => self.hosts.drop_out(incarnation, &why),
+                    false => self.hosts.lose(incarnation, &why),
+                }
             }
+            Event::Suspect { incarnation, note } => self.hosts.suspect(incarnation, note),
             Event::Submit { name, title, text, options, answer } => {
                 let _ = answer.send(self.submit(name, title, text, options));
             }
@@ -296,6 +397,9 @@ impl Owner {
             Event::Cancel(job, answer) => {
                 let _ = answer.send(self.cancel(job));
             }
+            Event::Resume(job, answer) => {
+                let _ = answer.send(self.resume(job));
+            }
             Event::Folder(job, answer) => {
                 let _ = answer.send(self.folder(job));
             }
@@ -303,6 +407,7 @@ impl Owner {
                 self.running = None;
                 self.hosts.release(job);
                 match &ended.failure {
+                    _ if matches!(event, queue::Event::Suspend) => {}
                     Some(why) => warn!(job, "job failed: {why}"),
                     None => info!(job, digest = ended.digest, "job over"),
                 }
@@ -338,20 +443,26 @@ impl Owner {
         text: String,
         options: JobOptions,
     ) -> Result<u32, String> {
-        let job = self.queue.add(name, text, options, &self.spool)?;
-        info!(job, title, "job queued");
-        let status = Status {
+        let job = self.queue.add(name.clone(), text, options.clone(), &self.folder)?;
+        let record = Record {
             job,
-            title,
+            name,
+            title: title.clone(),
             state: State::Queued,
-            waits_for: None,
+            options,
+            crew: Vec::new(),
             cycle: 0,
             time: 0.0,
-            progress: String::new(),
-            shares: Vec::new(),
             ended: None,
         };
-        self.status.insert(job, watch::Sender::new(status));
+        let text = self.queue.get(job).map(|entry| Arc::clone(&entry.text)).unwrap_or_default();
+        // Who is told that the job is queued finds it in the queue of the next master as well.
+        if let Err(why) = tokio::task::block_in_place(|| self.spool.add(&record, &text)) {
+            self.queue.take_back(job);
+            return Err(format!("the job is not queued: {why}"));
+        }
+        info!(job, title, "job queued");
+        self.status.insert(job, watch::Sender::new(Status::queued(job, title)));
         Ok(job)
     }
 
@@ -371,6 +482,18 @@ impl Owner {
         Ok(format!("job {job} is cancelled"))
     }
 
+    fn resume(&mut self, job: u32) -> Result<String, String> {
+        let state = self.queue.get(job).ok_or_else(|| format!("no job {job}"))?.state;
+        queue::after(state, queue::Event::Resume)?;
+        let text = tokio::task::block_in_place(|| self.spool.text(job))?;
+        let state = self.queue.resume(job, text)?;
+        self.record(job, None)?;
+        if let Some(status) = self.status.get(&job) {
+            status.send_modify(|status| (status.state, status.ended) = (state, None));
+        }
+        Ok(format!("job {job} goes on where it was stored"))
+    }
+
     fn folder(&self, job: u32) -> Result<PathBuf, String> {
         let entry = self.queue.get(job).ok_or_else(|| format!("no job {job}"))?;
         let folder = entry.folder.clone().ok_or_else(|| format!("job {job} writes no results"))?;
@@ -382,15 +505,20 @@ impl Owner {
 
     fn change(&mut self, job: u32, event: queue::Event, ended: Option<Ended>) -> Result<(), String> {
         let (state, forgotten) = self.queue.apply(job, event)?;
+        let ended = ended.filter(|_| is_over(state));
+        if let Err(why) = self.record(job, ended.clone()) {
+            warn!(job, "its record is not on disk: {why}");
+        }
         if let Some(status) = self.status.get(&job) {
             status.send_modify(|status| {
                 status.state = state;
                 status.waits_for = None;
-                status.ended = ended.filter(|_| is_over(state));
+                status.ended = ended;
             });
         }
         for job in forgotten {
             self.status.remove(&job);
+            self.spool.forget(job);
         }
         Ok(())
     }
@@ -406,9 +534,22 @@ impl Owner {
         let idle: Vec<u32> =
             self.hosts.idle().map(|h| h.incarnation).filter(|i| self.seats.contains_key(i)).collect();
         let needed = entry.options.min_workers.max(1) as usize;
-        if idle.len() < needed {
-            self.wait_for(job, format!("{needed} workers, {} are idle", idle.len()));
-            return;
+        let back =
+            |name: &&String| idle.iter().filter_map(|i| self.seats.get(i)).any(|s| s.hand.name == **name);
+        match &entry.before {
+            // Any worker will do for what was begun with enough of them.
+            Some(crew) => {
+                let (all, back) = (crew.len(), crew.iter().filter(back).count());
+                if idle.is_empty() || back < all && self.started.elapsed() < RETURN_LIMIT {
+                    self.wait_for(job, format!("its workers: {back} of {all} are back"));
+                    return;
+                }
+            }
+            None if idle.len() < needed => {
+                self.wait_for(job, format!("{needed} workers, {} are idle", idle.len()));
+                return;
+            }
+            None => {}
         }
         let Some(status) = self.status.get(&job).cloned() else { return };
         let stop = Arc::new(AtomicBool::new(false));
@@ -420,13 +561,18 @@ impl Owner {
             text: Arc::clone(&entry.text),
             options: entry.options.clone(),
             folder: entry.folder.clone(),
+            snapshots: self.spool.snapshots(job),
+            crew_before: entry.before.as_ref().map(Vec::len),
             seats: idle.iter().filter_map(|i| self.seats.get(i)).cloned().collect(),
             line: Mutex::new(Some(line)),
             stop,
             status,
+            board: self.board.clone(),
         };
+        let crew = idle.iter().filter_map(|i| self.seats.get(i)).map(|seat| seat.hand.name.clone()).collect();
         self.hosts.occupy(&idle, job);
         self.running = Some(running);
+        self.queue.set_crew(job, crew);
         info!(job, workers = idle.len(), "job starts");
         if let Err(why) = self.change(job, queue::Event::Start, None) {
             warn!(job, "{why}");

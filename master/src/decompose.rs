@@ -27,12 +27,9 @@ const GROUPINGS: u64 = 25;
 /// How often a grouping is cut again, each time for shares corrected by what came of the last.
 const CORRECTIONS: usize = 4;
 
-/// Integrating a node, in element-cycles of this code (`bolide simulate --measure-costs`).
-pub const NODE: f64 = 0.10;
-
-/// Cuts the mesh for workers of these relative speeds. Sub-domains come part by part; those without elements are left
+/// Cuts the mesh for workers of these relative speeds, on which a node costs `node` elements. Sub-domains come part by part, shells first; those without elements are left
 /// out, so a worker may have none in a small problem.
-pub fn decompose(mesh: &Mesh, speeds: &[f64]) -> Vec<Subdomain> {
+pub fn decompose(mesh: &Mesh, speeds: &[f64], node: f64) -> Vec<Subdomain> {
     let mut best: Option<(f64, Vec<Subdomain>)> = None;
     for seed in 0..GROUPINGS {
         let order = grouping(speeds, seed);
@@ -40,7 +37,7 @@ pub fn decompose(mesh: &Mesh, speeds: &[f64]) -> Vec<Subdomain> {
         let mut shares = speeds.to_vec();
         for _ in 0..if equal { 1 } else { CORRECTIONS } {
             let subdomains = cut_all(mesh, &shares, &order);
-            let work = work(&subdomains, speeds.len());
+            let work = work(&subdomains, speeds.len(), node);
             let finish = work.iter().zip(speeds).map(|(w, s)| w / s).fold(0.0, f64::max);
             let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
             // Ragged pieces have more nodes: their workers get fewer elements in the next try.
@@ -59,15 +56,15 @@ pub fn decompose(mesh: &Mesh, speeds: &[f64]) -> Vec<Subdomain> {
     best.map(|(_, subdomains)| subdomains).unwrap_or_default()
 }
 
-/// What each worker's sub-domains cost in a cycle (element-cycles): their elements and all their nodes.
-pub fn work(subdomains: &[Subdomain], n: usize) -> Vec<f64> {
+/// What each worker's sub-domains cost in a cycle (element-cycles): their elements, and all their nodes at `node` each.
+pub fn work(subdomains: &[Subdomain], n: usize, node: f64) -> Vec<f64> {
     let mut work = vec![0.0; n];
     for s in subdomains {
         let nodes = match &s.region {
             Region::Cells { low, high } => (0..3).map(|a| f64::from(high[a] - low[a] + 1)).product(),
             Region::List(elements) => elements.len() as f64,
         };
-        work[s.worker] += NODE.mul_add(nodes, s.region.n_elements() as f64);
+        work[s.worker] += node.mul_add(nodes, s.region.n_elements() as f64);
     }
     work
 }
@@ -129,6 +126,8 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize]) -> Vec<Subdomain> {
         pieces.retain(|(region, _): &(Region, usize)| region.n_elements() > 0);
         out.extend(pieces.into_iter().map(|(region, worker)| Subdomain { part, region, worker }));
     }
+    // The lowest sub-domain that has a node books it, and only shells know of its rotation.
+    out.sort_by_key(|subdomain| mesh.parts[subdomain.part].section().is_none());
     out
 }
 
@@ -305,6 +304,8 @@ mod tests {
     use super::*;
     use mechanics::mesh::Part;
 
+    const NODE: f64 = 0.1;
+
     fn plate(cells: [u32; 3]) -> Mesh {
         let part = Part {
             name: "plate".into(),
@@ -329,7 +330,7 @@ mod tests {
         for n in [1, 2, 3, 4, 7, 16, 200] {
             let speeds: Vec<f64> = (0..n).map(|i| 1.0 + (i % 4) as f64).collect();
             let mesh = plate([30, 30, 10]);
-            let total: usize = shares(&decompose(&mesh, &speeds), n).iter().sum();
+            let total: usize = shares(&decompose(&mesh, &speeds, NODE), n).iter().sum();
             assert_eq!(total, 9000, "{n} workers");
         }
     }
@@ -337,7 +338,7 @@ mod tests {
     #[test]
     fn shares_follow_speeds_within_one_index_plane() {
         let speeds = [1.0, 2.0, 0.5];
-        let count = shares(&decompose(&plate([30, 30, 20]), &speeds), 3);
+        let count = shares(&decompose(&plate([30, 30, 20]), &speeds, NODE), 3);
         for (c, s) in count.iter().zip(speeds) {
             let ideal = 18_000.0 * s / 3.5;
             assert!((*c as f64 - ideal).abs() <= 600.0, "{count:?}: {c} against {ideal}");
@@ -346,7 +347,7 @@ mod tests {
 
     #[test]
     fn equal_speeds_share_equally_where_planes_allow() {
-        assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16]), 16), vec![1000; 16]);
+        assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16], NODE), 16), vec![1000; 16]);
     }
 
     /// Sixteen hosts with speeds of 1 to 4, by a small generator.
@@ -381,7 +382,7 @@ mod tests {
             for seed in 0..20 {
                 let speeds = mixed_lab(seed);
                 let bound = f64::from(n * n * n) / speeds.iter().sum::<f64>();
-                let ratio = slowest_finish(&decompose(&plate([n; 3]), &speeds), &speeds) / bound;
+                let ratio = slowest_finish(&decompose(&plate([n; 3]), &speeds, NODE), &speeds) / bound;
                 (worst, sum) = (worst.max(ratio), sum + ratio);
                 naive = naive.max(naive_slabs([n; 3], &speeds) / bound);
             }
@@ -402,7 +403,7 @@ mod tests {
         let mut both = plate([40, 40, thick[0]]);
         both.parts.extend(plate([40, 40, thick[1]]).parts);
         let mut owners = [vec![usize::MAX; 1600], vec![usize::MAX; 1600]];
-        for s in decompose(&both, &speeds) {
+        for s in decompose(&both, &speeds, NODE) {
             let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
             assert_eq!((low[2], high[2]), (0, thick[s.part]), "the thin axis stays whole");
             for j in low[1]..high[1] {
@@ -416,7 +417,7 @@ mod tests {
 
     #[test]
     fn cuts_leave_the_thin_axis_whole() {
-        for s in decompose(&plate([30, 30, 10]), &[1.0; 4]) {
+        for s in decompose(&plate([30, 30, 10]), &[1.0; 4], NODE) {
             let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
             assert_eq!((low[2], high[2]), (0, 10));
         }

@@ -93,6 +93,7 @@ impl Desk<'_> {
             Request::Jobs => Reply::Jobs(self.ask(Event::Jobs).await?),
             Request::Hosts => Reply::Hosts(self.ask(Event::Hosts).await?),
             Request::Cancel { job } => Reply::Done(self.ask(|answer| Event::Cancel(job, answer)).await??),
+            Request::Resume { job } => Reply::Done(self.ask(|answer| Event::Resume(job, answer)).await??),
             Request::Files { job } => {
                 let folder = self.folder(job).await?;
                 Reply::Files(blocking(move || list(&folder)).await?)

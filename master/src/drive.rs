@@ -22,7 +22,8 @@ use protocol::{
     order::{Outbox, Place},
     wire,
 };
-use tokio::sync::mpsc;
+use tokio::sync::{Notify, mpsc};
+use tracing::warn;
 use worker::compute::lowest_priority;
 
 use crate::{
@@ -48,6 +49,8 @@ pub enum Input {
     Joined(Seat),
     /// Look at what is to be stopped.
     Wake,
+    /// This process has to leave.
+    Suspend,
 }
 
 /// The way to the thread of a job that begins with `n_workers`.
@@ -92,7 +95,11 @@ impl Seat {
 
 /// The way from a worker's connection to the job that it computes.
 #[derive(Default)]
-pub struct Route(Mutex<Port>);
+pub struct Route {
+    port: Mutex<Port>,
+    /// The job will have no more to do with the worker.
+    dismissed: Notify,
+}
 
 #[derive(Default)]
 struct Port {
@@ -101,11 +108,31 @@ struct Port {
     to: Option<(usize, mpsc::Sender<Input>)>,
     /// Why the connection has ended.
     gone: Option<String>,
+    /// Why the job will have no more to do with the worker.
+    dismissal: Option<String>,
 }
 
 impl Route {
     fn port(&self) -> std::sync::MutexGuard<'_, Port> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.port.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The worker failed by itself: its connection is to end with this reason, and it may not come back.
+    fn dismiss(&self, why: String) {
+        let mut port = self.port();
+        port.to = None;
+        port.dismissal = Some(format!("dropped: {why}"));
+        self.dismissed.notify_one();
+    }
+
+    /// Waits until the worker is dismissed. Cancel safe.
+    pub async fn dismissed(&self) {
+        self.dismissed.notified().await;
+    }
+
+    /// Why the worker was dismissed, if it was.
+    pub fn dismissal(&self) -> Option<String> {
+        self.port().dismissal.clone()
     }
 
     /// From now on messages of `job` go to `send`.
@@ -252,7 +279,12 @@ impl Driver {
             };
             match input {
                 Input::Message(worker, header, message) => match self.check(&header, &message) {
-                    Ok(()) => self.apply(Event::Message(worker, header.epoch, message), sink)?,
+                    Ok(()) => {
+                        if header.epoch == self.job.epoch() {
+                            sink.heard(&self.seats[worker].hand.name, &message);
+                        }
+                        self.apply(Event::Message(worker, header.epoch, message), sink)?;
+                    }
                     Err(why) => {
                         let seat = &self.seats[worker];
                         let why = format!("{} at {}: {why}", seat.hand.name, seat.address);
@@ -272,6 +304,7 @@ impl Driver {
                     self.apply(Event::Joined(hand), sink)?;
                 }
                 Input::Wake => {}
+                Input::Suspend => self.apply(Event::Suspend, sink)?,
             }
         }
     }
@@ -321,6 +354,11 @@ impl Driver {
                 Action::Sort(bench, x) => self.sort(bench, x),
                 Action::Timer(seconds) => {
                     self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
+                }
+                Action::Dismiss(worker, why) => {
+                    let seat = &self.seats[worker];
+                    warn!("worker {} at {} is dropped: {why}", seat.hand.name, seat.address);
+                    seat.route.dismiss(why);
                 }
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => sink.take(other)?,

@@ -1,6 +1,7 @@
 //! Master and workers in one process: the same sessions over an in-memory pipe.
 //!
-//! Messages are packed and unpacked as on a wire, so that bytes are counted and nothing is shared by accident. With one
+//! Messages are packed and unpacked as on a wire, so that bytes are counted and nothing is shared by accident; but
+//! assignments and images of many elements are handed over as they are, since there need not be room for them twice. With one
 //! worker everything runs in turn on the pool's own threads; with several, each worker's tasks run on one pool, one
 //! task of a worker at a time.
 
@@ -14,9 +15,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use mechanics::cycle::Meter;
+use mechanics::{block::Piece, cycle::Meter};
 use protocol::{
-    message::{ToMaster, ToPeer},
+    message::{ToMaster, ToPeer, ToWorker},
     phase::{Phase, Report},
     wire::{self, Packed},
 };
@@ -39,6 +40,9 @@ pub trait Sink {
     /// # Errors
     /// What the disk refused; the run then ends with that as its failure.
     fn take(&mut self, action: Action) -> Result<(), String>;
+
+    /// Looks at a message of a worker before the job takes it.
+    fn heard(&mut self, _worker: &str, _message: &ToMaster) {}
 }
 
 /// What a run cost beside its outcome.
@@ -66,10 +70,21 @@ enum Arrival {
     /// From, in which epoch.
     ToMaster(usize, u32, Packed),
     ToWorker(usize, Packed),
+    /// A large assignment.
+    Assign(usize, Box<ToWorker>),
+    /// A large image; from, in which epoch.
+    Image(usize, u32, Box<ToMaster>),
     /// From, by its place in the epoch's crew; to; in which epoch.
     ToPeer(u32, usize, u32, Packed),
     Done(usize, Box<Machine>, session::Outcome),
     Sorted(Box<Sorted>, u64),
+}
+
+/// Elements from which on a message is handed over as it is.
+const WHOLE: usize = 50_000;
+
+fn n_elements(pieces: &[Piece]) -> usize {
+    pieces.iter().map(|piece| piece.elements.len()).sum()
 }
 
 struct Place {
@@ -224,6 +239,12 @@ impl Host {
                         wire::unpack_to_worker(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
                     self.step(worker, session::Event::Message(message))?;
                 }
+                Arrival::Assign(worker, message) => {
+                    self.step(worker, session::Event::Message(*message))?;
+                }
+                Arrival::Image(worker, epoch, message) => {
+                    self.apply(Event::Message(worker, epoch, *message), sink)?;
+                }
                 Arrival::ToPeer(from, worker, epoch, packed) => {
                     let message =
                         wire::unpack_to_peer(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
@@ -285,10 +306,10 @@ impl Host {
                 session::Action::Send(message) => self.timed(worker, |host| {
                     if let ToMaster::Image { last: Some(_), .. } = message {
                         let report = Box::new(host.places[worker].report());
-                        host.send(worker, epoch, &ToMaster::Report(report))?;
+                        host.send(worker, epoch, ToMaster::Report(report))?;
                     }
                     let worked = host.places[worker].machine.as_ref().map(|m| m.work()).unwrap_or_default();
-                    host.send(worker, epoch, &message.stamped(worked))
+                    host.send(worker, epoch, message.stamped(worked))
                 })?,
                 session::Action::SendPeer(to, message) => {
                     self.timed(worker, |host| host.send_peer(worker, epoch, to, &message))?;
@@ -327,8 +348,15 @@ impl Host {
         Ok(())
     }
 
-    fn send(&mut self, worker: usize, epoch: u32, message: &ToMaster) -> Result<(), String> {
-        let packed = wire::pack_to_master(message).map_err(|e| e.to_string())?;
+    fn send(&mut self, worker: usize, epoch: u32, message: ToMaster) -> Result<(), String> {
+        if let ToMaster::Image { pieces, .. } = &message
+            && n_elements(pieces) > WHOLE
+        {
+            self.traffic.bytes += wire::measure_to_master(&message).map_err(|e| e.to_string())?;
+            self.queue.push_back(Arrival::Image(worker, epoch, Box::new(message)));
+            return Ok(());
+        }
+        let packed = wire::pack_to_master(&message).map_err(|e| e.to_string())?;
         self.traffic.bytes += packed.wire_bytes();
         self.queue.push_back(Arrival::ToMaster(worker, epoch, packed));
         Ok(())
@@ -370,6 +398,13 @@ impl Host {
     fn act(&mut self, actions: Vec<Action>, sink: &mut (dyn Sink + Send)) -> Result<(), String> {
         for action in actions {
             match action {
+                Action::Send(worker, ToWorker::Assign(assign))
+                    if assign.subdomains.iter().map(|s| n_elements(&s.pieces)).sum::<usize>() > WHOLE =>
+                {
+                    let message = ToWorker::Assign(assign);
+                    self.traffic.bytes += wire::measure_to_worker(&message).map_err(|e| e.to_string())?;
+                    self.queue.push_back(Arrival::Assign(worker, Box::new(message)));
+                }
                 Action::Send(worker, message) => {
                     let packed = wire::pack_to_worker(&message).map_err(|e| e.to_string())?;
                     self.traffic.bytes += packed.wire_bytes();
@@ -379,6 +414,7 @@ impl Host {
                 Action::Timer(seconds) => {
                     self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
                 }
+                Action::Dismiss(worker, _) => self.places[worker].lost = true,
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => sink.take(other)?,
             }

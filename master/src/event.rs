@@ -11,7 +11,11 @@ use protocol::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    balance::Dealing, job::Bench, ledger::Ledger, results::history::HistoryRow, snapshot::Snapshot,
+    balance::{Costs, Dealing},
+    job::Bench,
+    ledger::Ledger,
+    results::history::HistoryRow,
+    snapshot::Snapshot,
     sort::Sorted,
 };
 
@@ -35,10 +39,14 @@ pub struct Options {
     pub route: Route,
     /// How work units are dealt.
     pub dealing: Dealing,
+    /// What work costs on the workers, relative to an element.
+    pub costs: Costs,
     /// Store a snapshot at the start of this cycle.
     pub snapshot_at: Option<u64>,
     /// How often the state is kept in memory, to go back to when a worker is lost.
     pub keep: Keep,
+    /// Give every base to the sink, for snapshots on disk.
+    pub store: bool,
     /// What speeds work is dealt out by.
     pub balance: Balance,
     /// With no worker left, wait for one instead of ending.
@@ -59,6 +67,26 @@ pub enum Keep {
     Seconds(f64),
     /// After so many cycles.
     Cycles(u64),
+    /// After so many seconds or cycles, whichever comes first.
+    Either(f64, u64),
+}
+
+impl Keep {
+    /// Its seconds.
+    pub(crate) const fn seconds(self) -> Option<f64> {
+        match self {
+            Self::Seconds(seconds) | Self::Either(seconds, _) => Some(seconds),
+            Self::Never | Self::Cycles(_) => None,
+        }
+    }
+
+    /// Its cycles.
+    pub(crate) const fn cycles(self) -> Option<u64> {
+        match self {
+            Self::Cycles(cycles) | Self::Either(_, cycles) => Some(cycles),
+            Self::Never | Self::Seconds(_) => None,
+        }
+    }
 }
 
 /// Work was dealt out anew because speeds turned out to be others.
@@ -126,6 +154,8 @@ pub enum Event {
     Sorted(Box<Sorted>),
     /// The user wants the run to end with the results so far.
     Stop,
+    /// This process has to leave: the run is stored at the next cycle, to be gone on with by another one.
+    Suspend,
     /// A worker is gone for good.
     Lost(usize, String),
     /// A worker has come; it has the next index.
@@ -155,8 +185,17 @@ pub enum Action {
     },
     /// Work was dealt out anew: who has how many elements.
     Dealt(Vec<Deal>),
-    /// Store a snapshot.
+    /// Store the snapshot that was asked for.
     Snapshot(Box<Snapshot>),
+    /// A base, which the run could be gone on with from disk; the last one of a run that is stopped comes in any case.
+    Base {
+        /// All of it but the states written.
+        snapshot: Box<Snapshot>,
+        /// The run stops here.
+        last: bool,
+    },
+    /// Have no more to do with a worker, and tell it why. It is not lost by itself, so it must not come back.
+    Dismiss(usize, String),
     /// Tell the user how far it is.
     Progress(Progress),
     /// The job is over.
@@ -212,6 +251,8 @@ pub struct Outcome {
     pub failure: Option<String>,
     /// The user stopped it.
     pub stopped: bool,
+    /// This process has to leave; the run is to be gone on with.
+    pub suspended: bool,
     /// The final state, unless a worker could not give it.
     pub state: Option<GlobalState>,
     /// Digest of the final state.

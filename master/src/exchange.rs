@@ -1,69 +1,18 @@
 //! Builds the exchange plan of each worker and adds partial forces on route master.
 //!
 //! A node that more than one worker holds (in a sub-domain, or as a guest of its work units) is in the exchange: its
-//! holders' partial forces are added here and the total goes back to each of them.
-
-use std::collections::{BTreeMap, HashMap};
+//! holders' partial forces are added here and the total goes back to each of them. What sub-domains share stays from
+//! plan to plan ([`Holdings`]); a plan adds what its guests bring.
 
 use mechanics::{
     contact::Batch,
-    cycle::{Guest, Neighbour, Plan},
+    cycle::{Guest, Plan},
     state::GlobalState,
 };
 
 use protocol::message::Route;
 
-use crate::decompose::{self, Subdomain};
-
-/// Which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
-pub struct Holdings {
-    n_workers: usize,
-    /// Sub-domain that owns each node: the lowest that has it.
-    pub owner_subdomain: Vec<u32>,
-    /// Worker of that sub-domain.
-    pub owner_worker: Vec<u32>,
-    /// What each worker's sub-domains cost in a cycle ([`decompose::work`]).
-    pub work: Vec<f64>,
-    /// Other workers that hold a node, ascending; most nodes have none and no entry.
-    others: HashMap<u32, Vec<u32>>,
-}
-
-impl Holdings {
-    /// From the nodes of each sub-domain (global indices).
-    pub fn new(n_nodes: usize, n_workers: usize, subdomains: &[Subdomain], nodes: &[Vec<u32>]) -> Self {
-        let mut owner_subdomain = vec![u32::MAX; n_nodes];
-        let mut owner_worker = vec![u32::MAX; n_nodes];
-        let mut others: HashMap<u32, Vec<u32>> = HashMap::new();
-        for (id, (subdomain, nodes)) in subdomains.iter().zip(nodes).enumerate() {
-            let worker = subdomain.worker as u32;
-            for &node in nodes {
-                let owner = &mut owner_subdomain[node as usize];
-                if *owner == u32::MAX {
-                    *owner = id as u32;
-                    owner_worker[node as usize] = worker;
-                } else if owner_worker[node as usize] != worker {
-                    let list = others.entry(node).or_default();
-                    if let Err(at) = list.binary_search(&worker) {
-                        list.insert(at, worker);
-                    }
-                }
-            }
-        }
-        Self {
-            n_workers,
-            owner_subdomain,
-            owner_worker,
-            work: decompose::work(subdomains, n_workers),
-            others,
-        }
-    }
-
-    /// Whether a sub-domain of the worker has the node.
-    pub fn holds(&self, worker: u32, node: u32) -> bool {
-        self.owner_worker[node as usize] == worker
-            || self.others.get(&node).is_some_and(|list| list.binary_search(&worker).is_ok())
-    }
-}
+use crate::holdings::{Holdings, Standing, share};
 
 /// The exchange of all workers from one plan boundary to the next.
 #[derive(Clone)]
@@ -75,9 +24,9 @@ pub struct Exchange {
     route: Route,
     /// Numbers by node of the exchange: three of the force, and with shells three of the moment.
     stride: usize,
-    /// Number of nodes in the exchange.
+    /// Number of nodes in the exchange; 0 on route direct.
     n_slots: usize,
-    /// By worker: the slot of each node of its exchange list.
+    /// By worker: the slot of each node of its exchange list; empty on route direct.
     slots: Vec<Vec<u32>>,
     /// By worker: where each guest's state comes from, (worker, position in its send list).
     sources: Vec<Vec<(u32, u32)>>,
@@ -86,59 +35,49 @@ pub struct Exchange {
 impl Exchange {
     /// Plans for these batches (one per worker, none where there is no contact).
     pub fn new(holdings: &Holdings, batches: Vec<Option<Batch>>, state: &GlobalState, route: Route) -> Self {
-        let n = holdings.n_workers;
-        let mut holders: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for (&node, others) in &holdings.others {
-            let list = holders.entry(node).or_default();
-            list.push(holdings.owner_worker[node as usize]);
-            list.extend(others);
-        }
-        let moments = !state.shells.spin.is_empty();
+        let moments = !state.shells.inertia.is_empty();
         let stride = if moments { 6 } else { 3 };
-        let mut plans: Vec<Plan> = (0..n).map(|_| Plan { moments, ..Plan::default() }).collect();
-        for (worker, batch) in batches.iter().enumerate() {
-            let Some(batch) = batch else { continue };
-            let mut guests: Vec<u32> = batch
-                .nodes
-                .iter()
-                .map(|node| node.global)
-                .filter(|&g| !holdings.holds(worker as u32, g))
-                .collect();
-            guests.sort_unstable();
-            for &node in &guests {
-                let owner = holdings.owner_worker[node as usize];
-                holders.entry(node).or_insert_with(|| vec![owner]).push(worker as u32);
-                plans[owner as usize].send.push(node);
-                plans[worker].guests.push(Guest {
+        let mut plans: Vec<Plan> =
+            (0..holdings.n_workers()).map(|_| Plan { moments, ..Plan::default() }).collect();
+        // Guests: node and worker.
+        let mut guests: Vec<(u32, u32)> = Vec::new();
+        for (worker, batch) in (0..).zip(&batches) {
+            let nodes = batch.iter().flat_map(|batch| &batch.nodes).map(|node| node.global);
+            guests.extend(nodes.filter(|&node| !holdings.holds(worker, node)).map(|node| (node, worker)));
+        }
+        guests.sort_unstable();
+        let mut added = vec![Added::default(); plans.len()];
+        let mut n_slots = holdings.n_shared() as u32;
+        for guests in guests.chunk_by(|one, other| one.0 == other.0) {
+            let node = guests[0].0;
+            let owner = holdings.owner_worker[node as usize];
+            plans[owner as usize].send.push(node);
+            let slot = holdings.slot(node).unwrap_or_else(|| {
+                added[owner as usize].nodes.push((node, n_slots));
+                n_slots += 1;
+                n_slots - 1
+            });
+            for &(_, guest) in guests {
+                plans[guest as usize].guests.push(Guest {
                     node,
                     mass: state.mass[node as usize],
                     constraint: state.constraint[node as usize],
                 });
-            }
-        }
-        for plan in &mut plans {
-            plan.send.sort_unstable();
-            plan.send.dedup();
-        }
-        let mut slots = vec![Vec::new(); n];
-        let mut shared: Vec<BTreeMap<u32, Vec<u32>>> = vec![BTreeMap::new(); n];
-        for (slot, (&node, list)) in holders.iter().enumerate() {
-            for &worker in list {
-                slots[worker as usize].push(slot as u32);
-                plans[worker as usize].exchange.push(node);
-            }
-            if route == Route::Direct {
-                for &worker in list {
-                    let at = plans[worker as usize].exchange.len() as u32 - 1;
-                    for &other in list.iter().filter(|other| **other != worker) {
-                        shared[worker as usize].entry(other).or_default().push(at);
-                    }
+                added[guest as usize].nodes.push((node, slot));
+                for holder in holdings.holders(node) {
+                    added[guest as usize].with.push((node, holder));
+                    added[holder as usize].with.push((node, guest));
                 }
+                let others = guests.iter().filter(|&&(_, other)| other != guest);
+                added[guest as usize].with.extend(others);
             }
         }
-        for (plan, shared) in plans.iter_mut().zip(shared) {
-            plan.neighbours =
-                shared.into_iter().map(|(worker, shared)| Neighbour { worker, shared }).collect();
+        let mut slots = Vec::with_capacity(plans.len());
+        for (plan, (standing, added)) in plans.iter_mut().zip(holdings.standing.iter().zip(added)) {
+            let whole = added.to(standing, route);
+            plan.exchange = whole.nodes;
+            plan.neighbours = whole.neighbours;
+            slots.push(whole.slots);
         }
         let sources = plans
             .iter()
@@ -157,7 +96,7 @@ impl Exchange {
             plan.batch = batch;
         }
         let hash = hash(&plans);
-        Self { plans, hash, route, stride, n_slots: holders.len(), slots, sources }
+        Self { plans, hash, route, stride, n_slots: n_slots as usize, slots, sources }
     }
 
     /// Numbers in the partial forces that a worker sends to the master: none on route direct.
@@ -223,14 +162,62 @@ impl Exchange {
     }
 }
 
-/// A 64-bit FNV-1a hash of the lists that the packed arrays follow.
+/// What the guests of a plan add to the exchange of a worker.
+#[derive(Clone, Default)]
+struct Added {
+    /// Nodes and their slots, ascending.
+    nodes: Vec<(u32, u32)>,
+    /// Nodes and a worker that has each too.
+    with: Vec<(u32, u32)>,
+}
+
+impl Added {
+    /// The exchange of the worker: neighbours on route direct, slots on route master.
+    fn to(self, standing: &Standing, route: Route) -> Standing {
+        let n = standing.nodes.len() + self.nodes.len();
+        let mut whole = Standing { nodes: Vec::with_capacity(n), ..Standing::default() };
+        // Where a standing node has come to.
+        let mut places = Vec::with_capacity(standing.nodes.len());
+        let mut new = self.nodes.iter().peekable();
+        for (&node, &slot) in standing.nodes.iter().zip(&standing.slots) {
+            while let Some((node, slot)) = new.next_if(|new| new.0 < node) {
+                whole.nodes.push(*node);
+                whole.slots.push(*slot);
+            }
+            places.push(whole.nodes.len() as u32);
+            whole.nodes.push(node);
+            whole.slots.push(slot);
+        }
+        for (node, slot) in new {
+            whole.nodes.push(*node);
+            whole.slots.push(*slot);
+        }
+        if route == Route::Master {
+            return whole;
+        }
+        whole.slots.clear();
+        whole.neighbours.clone_from(&standing.neighbours);
+        for at in whole.neighbours.iter_mut().flat_map(|neighbour| &mut neighbour.shared) {
+            *at = places[*at as usize];
+        }
+        for &(node, worker) in &self.with {
+            let at = whole.nodes.partition_point(|&n| n < node) as u32;
+            share(&mut whole.neighbours, worker, at);
+        }
+        if !self.with.is_empty() {
+            // Two ascending runs, which the stable sort merges.
+            whole.neighbours.iter_mut().for_each(|neighbour| neighbour.shared.sort());
+            whole.neighbours.sort_unstable_by_key(|neighbour| neighbour.worker);
+        }
+        whole
+    }
+}
+
+/// A 64-bit hash of the lists that the packed arrays follow: FNV-1a over words.
 fn hash(plans: &[Plan]) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut eat = |value: u32| {
-        for byte in value.to_le_bytes() {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-    };
+    let mut eat =
+        |value: u32| hash = (hash ^ u64::from(value)).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
     for plan in plans {
         eat(plan.exchange.len() as u32);
         plan.exchange.iter().copied().for_each(&mut eat);
@@ -240,4 +227,100 @@ fn hash(plans: &[Plan]) -> u64 {
         plan.guests.iter().for_each(|guest| eat(guest.node));
     }
     hash
+}
+
+#[cfg(test)]
+mod tests {
+    use mechanics::{contact::BatchNode, piece::Region};
+
+    use super::*;
+    use crate::decompose::Subdomain;
+
+    /// Small numbers without end.
+    fn random(seed: u64) -> impl FnMut(u32) -> u32 {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        move |n| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as u32 % n
+        }
+    }
+
+    #[test]
+    fn every_two_holders_of_a_node_list_it_at_equal_places_and_nobody_else_does() {
+        const NODES: u32 = 60;
+        for seed in 0..40 {
+            let mut random = random(seed);
+            let n = 2 + random(5) as usize;
+            let mut nodes: Vec<Vec<u32>> = vec![Vec::new(); n];
+            let mut guests = nodes.clone();
+            for node in 0..NODES {
+                nodes[random(n as u32) as usize].push(node);
+                for worker in 0..n {
+                    if random(4) == 0 && !nodes[worker].contains(&node) {
+                        nodes[worker].push(node);
+                    } else if random(5) == 0 {
+                        guests[worker].push(node);
+                    }
+                }
+            }
+            let subdomains: Vec<Subdomain> = (0..n)
+                .map(|worker| Subdomain { part: 0, region: Region::List(Vec::new()), worker })
+                .collect();
+            let holdings = Holdings::new(NODES as usize, vec![1.0; n], &subdomains, &nodes);
+            let batch = |nodes: &Vec<u32>| {
+                let node = |&global| BatchNode { global, part: 0, mass: 1.0, stiffness: 1.0, share: 1.0 };
+                Some(Batch { nodes: nodes.iter().map(node).collect(), ..Batch::default() })
+            };
+            let state = GlobalState {
+                mass: vec![1.0; NODES as usize],
+                constraint: vec![0; NODES as usize],
+                ..GlobalState::default()
+            };
+            let holds =
+                |worker: usize, node: u32| nodes[worker].contains(&node) || guests[worker].contains(&node);
+            let batches: Vec<_> = guests.iter().map(batch).collect();
+            let direct = Exchange::new(&holdings, batches.clone(), &state, Route::Direct);
+            let master = Exchange::new(&holdings, batches, &state, Route::Master);
+            for worker in 0..n {
+                let plan = &direct.plans[worker];
+                let wanted: Vec<u32> = (0..NODES)
+                    .filter(|&node| {
+                        holds(worker, node) && (0..n).any(|other| other != worker && holds(other, node))
+                    })
+                    .collect();
+                assert_eq!(plan.exchange, wanted, "seed {seed}, worker {worker}");
+                assert_eq!(master.plans[worker].exchange, wanted);
+                for other in (0..n).filter(|&other| other != worker) {
+                    let both: Vec<u32> =
+                        (0..NODES).filter(|&node| holds(worker, node) && holds(other, node)).collect();
+                    let listed = plan.neighbours.iter().find(|neighbour| neighbour.worker == other as u32);
+                    let listed: Vec<u32> = listed
+                        .iter()
+                        .flat_map(|neighbour| &neighbour.shared)
+                        .map(|&at| plan.exchange[at as usize])
+                        .collect();
+                    assert_eq!(listed, both, "seed {seed}, {worker} with {other}");
+                }
+            }
+            // Every holder adds its number; the total comes to all.
+            let mut totals = master.totals();
+            for worker in 0..n {
+                let partials: Vec<f64> = master.plans[worker]
+                    .exchange
+                    .iter()
+                    .flat_map(|&node| [f64::from(node), 1.0, worker as f64])
+                    .collect();
+                master.add(worker, &partials, &mut totals);
+            }
+            for worker in 0..n {
+                let sums = master.of_worker(worker, &totals);
+                for (&node, sum) in master.plans[worker].exchange.iter().zip(sums.chunks_exact(3)) {
+                    let holders: Vec<usize> = (0..n).filter(|&w| holds(w, node)).collect();
+                    let count = holders.len() as f64;
+                    assert_eq!(sum[..2], [count * f64::from(node), count], "seed {seed}, node {node}");
+                    assert_eq!(sum[2], holders.iter().sum::<usize>() as f64);
+                }
+            }
+        }
+    }
 }

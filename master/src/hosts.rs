@@ -41,6 +41,10 @@ pub struct Host {
     pub incarnation: u32,
     /// What it is doing.
     pub state: State,
+    /// Silent for so long that it may be dead: in words.
+    pub suspect: Option<String>,
+    /// A job dropped this process, and why: it gets no work any more.
+    pub dropped: Option<String>,
 }
 
 /// Every host that is or was connected.
@@ -66,6 +70,9 @@ impl Hosts {
         let mut ended = None;
         let number = match known {
             Some(host) => {
+                if let (Some(why), true) = (&host.dropped, host.nonce == hello.nonce) {
+                    return Err(format!("this worker was {why}; look after its machine and start it anew"));
+                }
                 if !matches!(host.state, State::Lost(_)) {
                     if host.nonce != hello.nonce {
                         return Err(format!(
@@ -95,6 +102,8 @@ impl Hosts {
                 nonce: hello.nonce,
                 incarnation,
                 state: State::Idle,
+                suspect: None,
+                dropped: None,
             },
         );
         Ok((number, ended))
@@ -109,6 +118,22 @@ impl Hosts {
     pub fn lose(&mut self, incarnation: u32, why: &str) {
         if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
             host.state = State::Lost(why.to_owned());
+            host.suspect = None;
+        }
+    }
+
+    /// The connection has ended because a job dropped its worker: that process is not taken in again.
+    pub fn drop_out(&mut self, incarnation: u32, why: &str) {
+        self.lose(incarnation, why);
+        if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
+            host.dropped = Some(why.to_owned());
+        }
+    }
+
+    /// A host is silent, in words, or is heard again.
+    pub fn suspect(&mut self, incarnation: u32, note: Option<String>) {
+        if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
+            host.suspect = note;
         }
     }
 
@@ -142,6 +167,11 @@ impl Hosts {
                 State::Idle => ("idle", String::new()),
                 State::Busy(job) => ("busy", format!("job {job}")),
                 State::Lost(why) => ("lost", why.clone()),
+            };
+            let note = match &host.suspect {
+                Some(suspect) if note.is_empty() => suspect.clone(),
+                Some(suspect) => format!("{note}, {suspect}"),
+                None => note,
             };
             HostRow {
                 host: host.number,
@@ -192,6 +222,19 @@ mod tests {
         assert_eq!(hosts.on(4).map(|h| &h.state), Some(&State::Idle));
         hosts.lose(4, "gone");
         assert_eq!(hosts.admit(&hello("a", 9), "z", 5), Ok((0, None)), "the place is free again");
+    }
+
+    #[test]
+    fn a_process_that_was_dropped_is_refused_with_the_reason_and_a_new_one_is_not() {
+        let mut hosts = Hosts::default();
+        hosts.admit(&hello("a", 1), "x", 1).expect("new");
+        hosts.suspect(1, Some("suspect: silent".to_owned()));
+        assert_eq!(hosts.rows()[0].note, "suspect: silent");
+        hosts.drop_out(1, "dropped: cycle 7: a bug");
+        assert_eq!(hosts.rows()[0].note, "dropped: cycle 7: a bug");
+        let refused = hosts.admit(&hello("a", 1), "x", 2).expect_err("the same process");
+        assert!(refused.contains("was dropped: cycle 7: a bug"), "{refused}");
+        assert_eq!(hosts.admit(&hello("a", 2), "x", 3), Ok((0, None)));
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod images;
 mod measure;
 mod pace;
 mod start;
+mod stop;
 #[cfg(test)]
 mod tests;
 mod verdict;
@@ -29,14 +30,16 @@ use protocol::{
 
 use crate::{
     event::{Action, Event, Limit, Loss, Options, Outcome, Progress, Rebalance},
-    exchange::{Exchange, Holdings},
+    exchange::Exchange,
+    holdings::Holdings,
     ledger::Ledger,
     results::history::HistoryRow,
     sort::{Sorted, Sorter},
 };
-use epoch::{Acting, Base, Epoch, Member, Rest, Step};
+use epoch::{Acting, Base, Epoch, Member, Step};
 use measure::{Patience, Proposal};
 use start::Touching;
+use stop::not_a_number;
 
 /// What sorts work on: fixed for an epoch.
 pub struct Bench {
@@ -53,6 +56,7 @@ pub struct Bench {
 impl Bench {
     /// Does the sort that [`Action::Sort`] asks for.
     pub fn sort(&self, x: &[[f64; 3]]) -> Sorted {
+        worker::failpoint::die("die-in-sort");
         self.sorter.run(self.epoch, x, &self.holdings, &self.state)
     }
 }
@@ -80,9 +84,15 @@ pub struct Job {
     base: Arc<Base>,
     /// The time for a new base has come.
     keep_due: bool,
+    /// No state is kept to go back to.
+    lean: bool,
     first_cycle: u64,
     lanes: String,
     stop_asked: bool,
+    /// This process has to leave.
+    leaves: bool,
+    /// Workers that failed by themselves: member, cycle and why.
+    blamed: Vec<(usize, u64, String)>,
     failure: Option<String>,
     /// Speeds that the next epoch is to begin with.
     proposal: Option<Proposal>,
@@ -90,7 +100,7 @@ pub struct Job {
     ledger: Ledger,
     /// Poses of the walls of finite mass in the newest cycle that was ordered.
     walls: Vec<Pose>,
-    rows: Vec<HistoryRow>,
+    rows: Vec<Arc<HistoryRow>>,
     sorts: u64,
     census: Census,
     /// By member.
@@ -110,7 +120,7 @@ impl Job {
     }
 
     /// Rows of history that a snapshot brought along.
-    pub fn rows_before(&self) -> &[HistoryRow] {
+    pub fn rows_before(&self) -> &[Arc<HistoryRow>] {
         &self.rows
     }
 
@@ -157,6 +167,13 @@ impl Job {
                 self.stop_asked = true;
                 if self.epoch.crew.is_empty() { self.finish_at_base(&mut actions) } else { Ok(()) }
             }
+            Event::Suspend => {
+                self.leaves = true;
+                if self.epoch.crew.is_empty() {
+                    self.suspend_at_base(&mut actions);
+                }
+                Ok(())
+            }
             Event::Lost(member, why) => self.lost(member, why, &mut actions),
             Event::Joined(hand) => self.joined(hand, &mut actions),
             Event::Timer => {
@@ -178,12 +195,14 @@ impl Job {
 
     fn finish(&mut self, state: Option<GlobalState>, actions: &mut Vec<Action>) {
         self.over = true;
+        let failed = self.failure.is_some();
         self.send_all(actions, |_| ToWorker::Release);
         let digest = state.as_ref().map(digest::digest).unwrap_or_default();
         let cycles_run = state.as_ref().map_or(self.epoch.completed, |s| s.cycle) - self.first_cycle;
         actions.push(Action::Over(Box::new(Outcome {
             failure: self.failure.take(),
             stopped: self.stop_asked,
+            suspended: self.leaves && state.is_none() && !failed,
             state,
             digest,
             ledger: self.ledger.clone(),
@@ -266,7 +285,12 @@ impl Job {
                 self.work[member] = work;
                 self.image(worker, cycle, pieces, last, actions)
             }
-            ToMaster::Failed { cycle, reason } => Err(format!("worker {worker}, cycle {cycle}: {reason}")),
+            ToMaster::Failed { cycle, reason } => self.blame(worker, cycle, reason, actions),
+            ToMaster::Leaving => {
+                let member = self.epoch.crew[worker];
+                self.members[member].leaves = true;
+                Ok(())
+            }
         }
     }
 
@@ -357,6 +381,9 @@ impl Job {
                 partials.len()
             ));
         }
+        if let Some(what) = vote.as_deref().and_then(not_a_number) {
+            return self.blame(worker, cycle, what, actions);
+        }
         let n = self.epoch.n();
         let arrivals = self.epoch.arrivals.entry(cycle).or_insert_with(|| Arrivals {
             arrived: vec![false; n],
@@ -417,17 +444,7 @@ impl Job {
             self.follow_spread(cycle.saturating_sub(1), &vote);
         }
         if self.epoch.halves.contains_key(&cycle) {
-            let before = cycle.checked_sub(1).and_then(|c| self.epoch.steps.get(&c));
-            let rest = Rest {
-                dt_previous: before.map_or(0.0, |step| step.dt),
-                dt: Some(now.dt),
-                quanta: [now.quantum, self.epoch.quantum],
-                vote: Some(vote.clone()),
-                walls: self.walls.clone(),
-                ledger: self.ledger.clone(),
-                n_rows: self.rows.len(),
-                spread_rate: self.epoch.spread_rate,
-            };
+            let rest = self.rest_at(cycle, vote.clone())?;
             self.epoch.halves.entry(cycle).or_default().rest = Some(rest);
             self.complete_base(cycle, actions);
         }

@@ -4,17 +4,19 @@
 
 use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
+use deck::bundle::Options;
 
 use master::{
     bench, certs, client,
-    command::{Bench, Certs, Cli, Command, WorkerArgs},
-    daemon, processes, run, simulate,
+    command::{Bench, Certs, Cli, Command, Speed, WorkerArgs},
+    convert, daemon, memory, processes, run, simulate,
 };
 use protocol::shape::{Shape, Wire};
 use worker::daemon::Listen;
 
 fn main() -> ExitCode {
+    memory::return_large_arrays();
     tracing_subscriber::fmt()
         .with_env_filter(
             tracing_subscriber::EnvFilter::try_from_env("BOLIDE_LOG").unwrap_or_else(|_| "info".into()),
@@ -33,10 +35,19 @@ fn main() -> ExitCode {
         Command::Jobs { at } => client::jobs(&at),
         Command::Hosts { at } => client::hosts(&at),
         Command::Cancel { job, at } => client::cancel(job, &at),
+        Command::Resume { job, at } => client::resume(job, &at),
         Command::Results { job, out, force, at } => client::results(job, out, force, &at),
-        Command::Bench { what: Bench::Messages(args) } => bench::messages::run(&args),
+        Command::Bench { what: Some(Bench::Messages(args)), .. } => bench::messages::run(&args),
+        Command::Bench { what: None, grind } => bench::grind::run(&grind),
         Command::Certs { what } => make_certificates(what),
-        Command::Check { deck } => check(&deck),
+        Command::Top { at } => client::top::run(&at),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "bolide", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Man { out } => manual(out.as_deref()),
+        Command::Check { deck, reading } => check(&deck, &reading.options()),
+        Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
         Command::Materials => {
             for name in deck::materials() {
                 println!("{name}");
@@ -51,11 +62,22 @@ fn main() -> ExitCode {
 }
 
 fn work(args: WorkerArgs) -> Result<ExitCode, String> {
+    if let Some(pin) = &args.pin {
+        pin.apply()?;
+    }
     let cores = std::thread::available_parallelism().map_or(1, usize::from) as u32;
+    let speed = match args.speed {
+        Speed::Given(speed) => speed,
+        Speed::Auto => {
+            let speed = bench::grind::speed(args.threads.unwrap_or(cores))?;
+            tracing::info!(speed, "measured: 1 is a thread that takes 100 ns for an element-cycle");
+            speed
+        }
+    };
     let options = worker::daemon::Options {
         master: args.master,
         name: args.name.unwrap_or_else(|| format!("{}-{}", daemon::host_name(), std::process::id())),
-        speed: args.speed,
+        speed,
         threads: args.threads.unwrap_or(cores),
         certs: args.certs,
         patience: Duration::from_secs(args.patience),
@@ -85,8 +107,23 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn check(path: &Path) -> Result<ExitCode, String> {
-    let model = run::read_deck(path)?;
+fn manual(folder: Option<&Path>) -> Result<ExitCode, String> {
+    let command = Cli::command();
+    match folder {
+        None => clap_mangen::Man::new(command)
+            .render(&mut std::io::stdout())
+            .map_err(|e| format!("standard output: {e}"))?,
+        Some(folder) => {
+            let fault = |e: std::io::Error| format!("{}: {e}", folder.display());
+            std::fs::create_dir_all(folder).map_err(fault)?;
+            clap_mangen::generate_to(command, folder).map_err(fault)?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn check(path: &Path, options: &Options) -> Result<ExitCode, String> {
+    let model = run::read_deck_with(path, options)?;
     println!(
         "{}: no fault; {} parts, {} elements, {} nodes",
         path.display(),

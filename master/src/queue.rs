@@ -1,8 +1,8 @@
-//! QUEUE: jobs, their legal states, first come first served.
+//! QUEUE: jobs, their legal states, first come first served within a priority.
 //!
-//! A plain table in memory: it knows no socket, clock or disk. The text of a deck is kept until its job is over.
+//! A plain table in memory: it knows no socket, clock or disk ([`spool`](crate::spool) does). The text of a deck is kept until its job is over.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+use std::{cmp::Reverse, collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use protocol::request::{JobOptions, State};
 
@@ -22,6 +22,10 @@ pub enum Event {
     Fail,
     /// A user took it back, or it ended early because of that.
     Cancel,
+    /// Its master has to leave: it is stored, to be gone on with by the next one.
+    Suspend,
+    /// A user wants what failed to be gone on with.
+    Resume,
 }
 
 /// The state after an event.
@@ -34,8 +38,9 @@ pub fn after(state: State, event: Event) -> Result<State, String> {
         (State::Queued | State::Running, Event::Cancel) => Ok(State::Cancelled),
         (State::Running, Event::Finish) => Ok(State::Done),
         (State::Running, Event::Fail) => Ok(State::Failed),
-        (State::Queued, Event::Finish | Event::Fail)
-        | (State::Running, Event::Start)
+        (State::Running, Event::Suspend) | (State::Failed, Event::Resume) => Ok(State::Queued),
+        (State::Queued, Event::Finish | Event::Fail | Event::Suspend | Event::Resume)
+        | (State::Running, Event::Start | Event::Resume)
         | (State::Done | State::Failed | State::Cancelled, _) => {
             Err(format!("a job that is {} cannot {event:?}", state.name()).to_lowercase())
         }
@@ -57,6 +62,8 @@ pub struct Entry {
     pub state: State,
     /// Where its results go; none with `no_output`.
     pub folder: Option<PathBuf>,
+    /// Of a job that was under way before: the workers it had. It goes on before all others.
+    pub before: Option<Vec<String>>,
 }
 
 /// All jobs, by number.
@@ -70,6 +77,38 @@ impl Queue {
     /// An empty queue that numbers from `first`.
     pub const fn new(first: u32) -> Self {
         Self { jobs: BTreeMap::new(), next: first }
+    }
+
+    /// Puts back what an earlier master left.
+    pub fn restore(&mut self, entry: Entry) {
+        self.next = self.next.max(entry.id.saturating_add(1));
+        self.jobs.insert(entry.id, entry);
+    }
+
+    /// Takes back a job that could not be put on disk.
+    pub fn take_back(&mut self, id: u32) {
+        self.jobs.remove(&id);
+    }
+
+    /// Puts a job that failed back, with its deck.
+    ///
+    /// # Errors
+    /// As for [`Queue::apply`].
+    pub fn resume(&mut self, id: u32, text: String) -> Result<State, String> {
+        let (state, _) = self.apply(id, Event::Resume)?;
+        if let Some(job) = self.jobs.get_mut(&id) {
+            job.text = Arc::new(text);
+            // Any workers will do.
+            job.before = Some(Vec::new());
+        }
+        Ok(state)
+    }
+
+    /// A job begins with these workers.
+    pub fn set_crew(&mut self, id: u32, crew: Vec<String>) {
+        if let Some(job) = self.jobs.get_mut(&id) {
+            job.before = Some(crew);
+        }
     }
 
     /// Adds a job whose results go below `spool`; gives its number.
@@ -91,13 +130,14 @@ impl Queue {
         self.next += 1;
         let folder = (!options.no_output).then(|| spool.join(format!("job-{id}")));
         let text = Arc::new(text);
-        self.jobs.insert(id, Entry { id, name, text, options, state: State::Queued, folder });
+        self.jobs.insert(id, Entry { id, name, text, options, state: State::Queued, folder, before: None });
         Ok(id)
     }
 
-    /// The job that is to start next.
+    /// The job that is to start next: one that was interrupted, else of the highest priority the first come.
     pub fn first(&self) -> Option<&Entry> {
-        self.jobs.values().find(|job| job.state == State::Queued)
+        let waiting = self.jobs.values().filter(|job| job.state == State::Queued);
+        waiting.min_by_key(|job| (job.before.is_none(), Reverse(job.options.priority), job.id))
     }
 
     /// A job.
@@ -140,10 +180,11 @@ mod tests {
     use super::*;
 
     const STATES: [State; 5] = [State::Queued, State::Running, State::Done, State::Failed, State::Cancelled];
-    const EVENTS: [Event; 4] = [Event::Start, Event::Finish, Event::Fail, Event::Cancel];
+    const EVENTS: [Event; 6] =
+        [Event::Start, Event::Finish, Event::Fail, Event::Cancel, Event::Suspend, Event::Resume];
 
     #[test]
-    fn only_five_changes_are_legal_and_none_leaves_an_end() {
+    fn only_seven_changes_are_legal_and_none_leaves_an_end_but_that_of_a_failed_job() {
         let mut legal = Vec::new();
         for state in STATES {
             for event in EVENTS {
@@ -160,6 +201,8 @@ mod tests {
             (Running, Done),
             (Running, Failed),
             (Running, Cancelled),
+            (Running, Queued),
+            (Failed, Queued),
         ];
         assert_eq!(legal, expected);
     }
@@ -179,6 +222,25 @@ mod tests {
         assert_eq!(queue.apply(5, Event::Fail), Ok((State::Failed, vec![])));
         assert_eq!(queue.get(5).map(|job| job.text.as_str()), Some(""), "the deck is not kept");
         assert_eq!(queue.apply(9, Event::Start), Err("no job 9".to_owned()));
+    }
+
+    #[test]
+    fn the_interrupted_goes_first_then_the_highest_priority_then_the_first_come() {
+        let mut queue = Queue::new(1);
+        for priority in [0, 2, 2, -1, 0] {
+            let options = JobOptions { priority, ..JobOptions::default() };
+            queue.add("d".into(), "text".into(), options, "spool".as_ref()).expect("room");
+        }
+        let interrupted =
+            Entry { id: 9, before: Some(vec!["a".into()]), ..queue.get(4).expect("added").clone() };
+        queue.restore(interrupted);
+        let mut order = Vec::new();
+        while let Some(next) = queue.first().map(|job| job.id) {
+            order.push(next);
+            queue.apply(next, Event::Start).expect("it waits");
+        }
+        assert_eq!(order, [9, 2, 3, 1, 5, 4]);
+        assert_eq!(add(&mut queue), Ok(10), "numbers go on after those of an earlier master");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! What a run leaves on disk: one folder with states, histories and a summary.
 //!
 //! A results folder holds `state-NNNNNN.vtu` (one file per written state, [`vtu`]), `results.pvd` (the index
-//! that ParaView opens, with the time of each state), `history.csv` ([`history`]) and `summary.json`
-//! ([`summary`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
+//! that ParaView opens, with the time of each state), `history.csv` ([`history`]), `summary.json`
+//! ([`summary`]) and `report.html` ([`report`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
 //! Only the history grows in place, by whole rows. So the folder of a killed run opens.
 //!
 //! Nothing here computes physics or decides when to write.
@@ -15,6 +15,7 @@ use std::{
 };
 
 pub mod history;
+pub mod report;
 pub mod summary;
 pub mod trace;
 pub mod vtu;
@@ -25,10 +26,13 @@ pub const PVD: &str = "results.pvd";
 pub const HISTORY: &str = "history.csv";
 /// Name of the summary.
 pub const SUMMARY: &str = "summary.json";
+/// Name of the report.
+pub const REPORT: &str = "report.html";
 /// Name of the trace of a job's workers.
 pub const TRACE: &str = "trace.json";
 
 pub use deck::model::FIELD_NAMES;
+pub use summary::Summary;
 
 /// Why results could not be written or read.
 #[derive(Debug)]
@@ -141,6 +145,28 @@ impl Folder {
         Ok(Self { path: path.to_owned() })
     }
 
+    /// Removes the files of all states but the first so many, of which one that is missing is an error.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn keep_states(&self, count: usize) -> Result<(), Error> {
+        for entry in fs::read_dir(&self.path).map_err(Error::io("read", &self.path))? {
+            let entry = entry.map_err(Error::io("read", &self.path))?;
+            let name = entry.file_name();
+            let index = name
+                .to_str()
+                .and_then(|n| n.strip_prefix("state-")?.strip_suffix(".vtu")?.parse::<usize>().ok());
+            if index.is_some_and(|index| index >= count) {
+                fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
+            }
+        }
+        for index in 0..count {
+            let path = self.file(&state_name(index as u32));
+            fs::metadata(&path).map_err(Error::io("read", &path))?;
+        }
+        Ok(())
+    }
+
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path
@@ -161,7 +187,7 @@ pub fn state_name(index: u32) -> String {
 fn is_written_by_a_run(name: &str) -> bool {
     let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".tmp")).unwrap_or(name);
     let state = stem.strip_prefix("state-").and_then(|n| n.strip_suffix(".vtu"));
-    [PVD, HISTORY, SUMMARY, TRACE].contains(&stem)
+    [PVD, HISTORY, SUMMARY, REPORT, TRACE].contains(&stem)
         || state.is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
@@ -223,6 +249,7 @@ impl Units {
             "cm-g-us" => ("cm", "g", "us", "Mbar*cm3"),
             "mm-ms-kg" => ("mm", "kg", "ms", "J"),
             "mm-s-t" => ("mm", "t", "s", "mJ"),
+            "in-s-lbf" => ("in", "lbf*s2/in", "s", "in*lbf"),
             _ => ("length", "mass", "time", "energy"),
         };
         Self { length, mass, time, energy }
@@ -257,6 +284,7 @@ mod tests {
             "J" => 1.0,
             "mJ" => 1e-3,
             "Mbar*cm3" => 1e11 * 1e-6,
+            "in*lbf" => 0.0254 * 4.448_221_615_260_5,
             other => panic!("no size known for {other}"),
         };
         for (name, expected) in [
@@ -264,6 +292,7 @@ mod tests {
             ("cm-g-us", joule(1e-3, 1e-2, 1e-6)),
             ("mm-ms-kg", joule(1.0, 1e-3, 1e-3)),
             ("mm-s-t", joule(1e3, 1e-3, 1.0)),
+            ("in-s-lbf", joule(4.448_221_615_260_5 / 0.0254, 0.0254, 1.0)),
         ] {
             let named = size(Units::named(name).energy);
             assert!((named / expected - 1.0).abs() < 1e-12, "{name}: {named} J named, {expected} J derived");

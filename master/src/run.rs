@@ -12,27 +12,36 @@ use std::{
     time::Instant,
 };
 
-use deck::model::Model;
+use deck::{
+    bundle::{self, Options},
+    model::Model,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::{
     phase::{Phase, Report},
     request::JobOptions,
 };
+use tracing::{info, warn};
 
 use crate::{
     command::RunArgs,
     embedded::{self, Sink, Traffic},
-    event::{Action, ForceSorts, Hand, Keep, Limit, Options, Outcome, Progress},
+    event::{self, Action, ForceSorts, Hand, Keep, Limit, Outcome, Progress},
     job::Job,
     processes::Processes,
     results::{
         Folder,
         history::{History, HistoryRow},
+        report,
         summary::{Energies, Summary, WorkUnits, WorkerTimes},
         trace,
         vtu::Series,
     },
-    snapshot,
+    snapshot::{
+        self, Snapshot,
+        keeper::{Interval, Keeper},
+        store::{self, Store},
+    },
 };
 
 /// Reads and checks a deck.
@@ -40,11 +49,48 @@ use crate::{
 /// # Errors
 /// Every fault of it, one per line.
 pub fn read_deck(path: &Path) -> Result<Model, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    deck::read(&text, &path.display().to_string()).map_err(|faults| {
+    read_deck_with(path, &Options::default())
+}
+
+/// Reads and checks a deck with what it does not say itself; warnings go to standard error.
+///
+/// # Errors
+/// Every fault of it, one per line.
+pub fn read_deck_with(path: &Path, options: &Options) -> Result<Model, String> {
+    let text = gather_deck(path, options)?;
+    let reading = deck::read_whole(&text, &path.display().to_string()).map_err(|faults| {
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
         list_of_faults(&lines)
-    })
+    })?;
+    warn(&reading.warnings);
+    Ok(reading.model)
+}
+
+/// Tells what is done otherwise than a deck says, on standard error.
+pub fn warn(warnings: &[deck::Warning]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}
+
+/// The text of a deck with the files that it refers to.
+///
+/// # Errors
+/// If the deck cannot be opened, or is too large.
+pub fn gather_deck(path: &Path, options: &Options) -> Result<String, String> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
+    // Comments of keyword decks are written in all kinds of encodings.
+    let text = match String::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) if error.as_bytes().iter().any(|b| matches!(b, b'*' | b'$')) => {
+            String::from_utf8_lossy(error.as_bytes()).into_owned()
+        }
+        Err(error) => return Err(format!("{name}: {error}")),
+    };
+    let mut open =
+        |path: &str| std::fs::read(path).ok().map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    bundle::gather(&name, text, options, &mut open)
 }
 
 /// Every fault of a deck, one per line, under their number.
@@ -57,8 +103,8 @@ pub fn list_of_faults(lines: &[String]) -> String {
 ///
 /// # Errors
 /// Faults of the deck or of the flags.
-pub fn model_for(deck: &Path, options: &JobOptions) -> Result<Model, String> {
-    let mut model = read_deck(deck)?;
+pub fn model_for(deck: &Path, reading: &Options, options: &JobOptions) -> Result<Model, String> {
+    let mut model = read_deck_with(deck, reading)?;
     limit(&mut model, options)?;
     Ok(model)
 }
@@ -83,13 +129,15 @@ pub fn limit(model: &mut Model, options: &JobOptions) -> Result<(), String> {
 
 /// The options of a job from what was asked, on so many workers; `all_take_peers` as for
 /// [`RouteChoice::choose`](protocol::request::RouteChoice::choose).
-pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> Options {
-    Options {
+pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> event::Options {
+    event::Options {
         lanes: asked.lanes.clone(),
         route: asked.route.choose(workers, all_take_peers),
         dealing: crate::balance::Dealing::Owners,
+        costs: Default::default(),
         snapshot_at: asked.snapshot_at,
-        keep: asked.keep_every.map_or(Keep::Never, Keep::Seconds),
+        keep: Keep::Never,
+        store: false,
         balance: asked.balance,
         waits: false,
         states: !asked.no_output,
@@ -98,6 +146,33 @@ pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> 
             (None, Some(seed)) => ForceSorts::Seeded(seed),
             (None, None) => ForceSorts::Never,
         },
+    }
+}
+
+/// How often a run is stored on disk: as asked, else as its deck says, else every `default` seconds.
+pub fn interval_for(asked: &JobOptions, model: &Model, default: Option<f64>) -> Interval {
+    let positive = |seconds: &f64| *seconds > 0.0;
+    let output = &model.output;
+    if asked.snapshot_every.is_some() || asked.snapshot_cycles.is_some() {
+        return Interval { seconds: asked.snapshot_every.filter(positive), cycles: asked.snapshot_cycles };
+    }
+    if output.snapshot_seconds.is_some() || output.snapshot_cycles.is_some() {
+        return Interval { seconds: output.snapshot_seconds, cycles: output.snapshot_cycles };
+    }
+    Interval { seconds: default, cycles: None }
+}
+
+/// How often the state is kept in memory, so that it can be gone back to and stored.
+pub fn keep_for(memory: Option<f64>, interval: Interval) -> Keep {
+    let seconds = match (memory, interval.seconds) {
+        (Some(memory), Some(disk)) => Some(memory.min(disk)),
+        (memory, disk) => memory.or(disk),
+    };
+    match (seconds, interval.cycles) {
+        (Some(seconds), Some(cycles)) => Keep::Either(seconds, cycles),
+        (Some(seconds), None) => Keep::Seconds(seconds),
+        (None, Some(cycles)) => Keep::Cycles(cycles),
+        (None, None) => Keep::Never,
     }
 }
 
@@ -115,9 +190,10 @@ pub fn speeds_for(n: usize, given: &[f64]) -> Result<Vec<f64>, String> {
     Ok((0..n).map(|i| given.get(i).copied().unwrap_or(1.0)).collect())
 }
 
-/// Where a run writes: `--out`, or results/<deck name>.
+/// Where a run writes: `--out`, or the folder it resumes from, or results/<deck name>.
 pub fn folder_for(args: &RunArgs) -> PathBuf {
-    args.out.clone().unwrap_or_else(|| {
+    let resumed = args.resume.clone().filter(|path| path.is_dir());
+    args.out.clone().or(resumed).unwrap_or_else(|| {
         Path::new("results").join(args.deck.file_stem().unwrap_or(std::ffi::OsStr::new("run")))
     })
 }
@@ -127,8 +203,11 @@ pub fn folder_for(args: &RunArgs) -> PathBuf {
 /// # Errors
 /// Whatever kept it from its end.
 pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
+    if let Some(pin) = &args.pin {
+        pin.apply()?;
+    }
     let asked = args.job.asked();
-    let model = Arc::new(model_for(&args.deck, &asked)?);
+    let model = Arc::new(model_for(&args.deck, &args.reading.options(), &asked)?);
     let n = args.workers as usize;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = args.threads.map_or(cores, |t| t as usize);
@@ -137,22 +216,45 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         .enumerate()
         .map(|(i, speed)| Hand { name: format!("worker-{i}"), speed, threads: threads as u32 })
         .collect();
-    let resume = args.resume.as_deref().map(snapshot::read).transpose()?;
-    let folder = if asked.no_output { None } else { Some(folder_for(args)) };
-    let folder =
-        folder.map(|path| Folder::create(&path, args.force)).transpose().map_err(|e| e.to_string())?;
-    let mut options = options_for(&asked, n, true);
-    if !args.processes {
-        // Nobody is lost who shares this process.
-        options.keep = Keep::Never;
+    let resume = args.resume.as_deref().map(resumed_from).transpose()?;
+    let path = (!asked.no_output).then(|| folder_for(args));
+    // A run that resumes from its own folder goes on writing there.
+    let in_place = path.is_some() && args.resume.is_some() && args.resume == path;
+    let folder = path.as_deref().map(|path| match in_place {
+        true => Folder::reopen(path),
+        false => Folder::create(path, args.force),
+    });
+    let folder = folder.transpose().map_err(|e| e.to_string())?;
+    let interval = interval_for(&asked, &model, None);
+    if !interval.is_never() && folder.is_none() {
+        return Err("snapshots need a results folder; leave out --no-output".to_owned());
     }
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
-    let census = Census::of(&job, &model);
+    // Nobody is lost who shares this process.
+    let memory = asked.keep_every.filter(|_| args.processes);
+    let options = event::Options {
+        keep: keep_for(memory, interval),
+        store: folder.is_some(),
+        ..options_for(&asked, n, true)
+    };
+    let states = resume.as_ref().filter(|_| in_place).map(|snapshot| snapshot.states.clone());
+    // Without contact the surface is found for its census alone, before there are states beside it.
+    let bare = model.setup.contact.is_none().then(|| Census::without_contact(&model));
+    let (mut job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
+    let census = bare.unwrap_or_else(|| Census::of(&job, &model));
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
-    for row in job.rows_before() {
-        output.row(row)?;
+    if let Some(folder) = &output.folder {
+        let snapshots = folder.file(store::FOLDER);
+        if !in_place {
+            store::remove(&snapshots)?;
+        }
+        let (store, _) = Store::open(&snapshots)?;
+        let results = Some(folder.path().to_owned());
+        output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     }
-    output.state(job.start_state())?;
+    output.go_on(&job, states)?;
+    if !args.processes && output.keeper.is_none() {
+        job.keep_no_state();
+    }
     let stop = stop_on_interrupt("stopping after this cycle");
     let children = args.processes.then(|| Processes::start(&hands)).transpose()?;
     let started = Instant::now();
@@ -166,11 +268,69 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let wall = started.elapsed().as_secs_f64();
     drop(children);
     output.finish();
+    if let (Some(keeper), true) = (&output.keeper, outcome.stopped && outcome.failure.is_none()) {
+        say_how_to_resume(keeper, &output);
+    }
     if let Some(path) = &args.trace {
         trace::write(path, &outcome.workers, &outcome.reports).map_err(|e| e.to_string())?;
     }
     let total_threads = (n * threads) as u32;
     conclude(&model, &census, &outcome, traffic, total_threads, wall, &output, args.json)
+}
+
+/// The snapshot in a file, or the newest whole one of a results folder; what is wrong with newer ones is a warning.
+fn resumed_from(path: &Path) -> Result<Snapshot, String> {
+    if !path.is_dir() {
+        return snapshot::read(path);
+    }
+    let folder = path.join(store::FOLDER);
+    let (_, found) = Store::open(&folder)?;
+    for why in &found.warnings {
+        warn!("{why}");
+    }
+    let snapshot = found.snapshot.ok_or_else(|| {
+        format!("no whole snapshot in {}; start the run anew, with --force", folder.display())
+    })?;
+    info!("going on at cycle {}", snapshot.state.cycle);
+    Ok(snapshot)
+}
+
+/// After an interrupt: the command that goes on.
+fn say_how_to_resume(keeper: &Keeper, output: &Output) {
+    let kept = keeper.flush();
+    match (kept.refused, &output.folder) {
+        (None, Some(folder)) if kept.cycle.is_some() => {
+            let cycle = kept.cycle.unwrap_or_default();
+            eprintln!("stored at cycle {cycle}; go on with: {}", resuming_command(folder.path()));
+        }
+        (Some(why), _) => eprintln!("not stored: {why}"),
+        _ => eprintln!("not stored: nothing was computed"),
+    }
+}
+
+/// The command of this process with `--resume FOLDER` in place of what says where to begin and to write.
+fn resuming_command(folder: &Path) -> String {
+    let mut words = Vec::new();
+    let mut arguments = std::env::args();
+    while let Some(word) = arguments.next() {
+        match word.as_str() {
+            "--resume" | "--out" => drop(arguments.next()),
+            "--force" => {}
+            other if other.starts_with("--resume=") || other.starts_with("--out=") => {}
+            _ => words.push(word),
+        }
+    }
+    words.extend(["--resume".to_owned(), folder.display().to_string()]);
+    words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
 }
 
 /// Counts of the surface, taken before the run.
@@ -183,14 +343,18 @@ pub struct Census {
 impl Census {
     /// Of a job; without contact the surface is counted all the same.
     pub fn of(job: &Job, model: &Model) -> Self {
-        let count = |s: &mechanics::contact::Surface| Self {
-            elements: s.n_elements() as u64,
-            faces: s.faces.len() as u64,
-            nodes: s.nodes.len() as u64,
-        };
-        match job.surface() {
-            Some(surface) => count(surface),
-            None => count(&mechanics::contact::Surface::new(&model.mesh, &model.setup.materials, &|_| true)),
+        job.surface().map_or_else(|| Self::without_contact(model), Self::count)
+    }
+
+    fn without_contact(model: &Model) -> Self {
+        Self::count(&mechanics::contact::Surface::new(&model.mesh, &model.setup.materials, &|_| true))
+    }
+
+    fn count(surface: &mechanics::contact::Surface) -> Self {
+        Self {
+            elements: surface.n_elements() as u64,
+            faces: surface.faces.len() as u64,
+            nodes: surface.nodes.len() as u64,
         }
     }
 }
@@ -213,6 +377,7 @@ pub fn conclude(
     let summary = summarise(model, census, outcome, traffic, threads, wall_s);
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
+        report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
     }
     if json {
         println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
@@ -364,6 +529,8 @@ pub struct Output {
     model: Arc<Model>,
     /// The results folder; none with `--no-output`.
     pub folder: Option<Folder>,
+    /// Where bases go; none where nothing is stored.
+    pub keeper: Option<Keeper>,
     history: Option<History>,
     series: Option<Series>,
     bar: Option<ProgressBar>,
@@ -395,6 +562,7 @@ impl Output {
         Ok(Self {
             model,
             folder,
+            keeper: None,
             history,
             row_ends,
             states: Vec::new(),
@@ -403,6 +571,24 @@ impl Output {
             started: Instant::now(),
             last_line: Instant::now(),
         })
+    }
+
+    /// Writes what belongs before the first cycle of a session: the rows so far, and the first state. `states` are those
+    /// that an earlier session wrote into this very folder before the snapshot that is gone on with; later ones go.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn go_on(&mut self, job: &Job, states: Option<Vec<(u64, f64)>>) -> Result<(), String> {
+        for row in job.rows_before() {
+            self.row(row)?;
+        }
+        let Some(states) = states else { return self.state(job.start_state()) };
+        if let Some(folder) = &self.folder {
+            folder.keep_states(states.len()).map_err(|e| e.to_string())?;
+        }
+        self.states = states;
+        let times: Vec<f64> = self.states.iter().map(|(_, time)| *time).collect();
+        self.series.as_mut().map_or(Ok(()), |series| series.roll_back(&times)).map_err(|e| e.to_string())
     }
 
     /// Appends a row of history.
@@ -496,17 +682,33 @@ impl Sink for Output {
             Action::Row(row) => self.row(&row),
             Action::State(state) => self.state(&state),
             Action::Snapshot(stored) => match &self.folder {
-                Some(folder) => snapshot::write(&folder.file("snapshot.bolide"), &stored),
+                Some(folder) => {
+                    let mut stored = stored;
+                    let cycle = stored.state.cycle;
+                    stored.states.extend(self.states.iter().filter(|(written, _)| *written <= cycle));
+                    snapshot::write(&folder.file("snapshot.bolide"), &stored).map(|_| ())
+                }
                 None => Err("a snapshot needs a results folder; leave out --no-output".to_owned()),
             },
+            Action::Base { mut snapshot, last } => {
+                let cycle = snapshot.state.cycle;
+                if let Some(keeper) = self.keeper.as_mut().filter(|keeper| last || keeper.is_due(cycle)) {
+                    snapshot.states.extend(self.states.iter().filter(|(written, _)| *written <= cycle));
+                    keeper.put(snapshot);
+                }
+                Ok(())
+            }
             Action::Progress(progress) => {
                 self.progress(progress);
                 Ok(())
             }
             Action::Rewind { rows, cycle } => self.rewind(rows, cycle),
-            Action::Send(..) | Action::Sort(..) | Action::Timer(_) | Action::Dealt(_) | Action::Over(_) => {
-                Ok(())
-            }
+            Action::Send(..)
+            | Action::Sort(..)
+            | Action::Timer(_)
+            | Action::Dealt(_)
+            | Action::Dismiss(..)
+            | Action::Over(_) => Ok(()),
         }
     }
 }

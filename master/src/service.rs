@@ -10,7 +10,10 @@ use std::{
 
 use deck::model::Model;
 use mechanics::contact::Surface;
-use protocol::request::{Ended, JobOptions, Share, Status};
+use protocol::{
+    message::ToMaster,
+    request::{Ended, JobOptions, Share, Status},
+};
 use tokio::sync::{mpsc, watch};
 use tracing::{info, warn};
 
@@ -19,12 +22,16 @@ use crate::{
     drive::{self, Input, Seat, drive},
     embedded::Sink,
     event::{Action, Deal, Hand, Options},
+    http::board::{self, Board, Sheet},
     job::Job,
     queue::Event,
-    results::{Folder, TRACE, trace},
-    run::{Census, Output, limit, options_for, progress_line, summarise},
+    results::{Folder, TRACE, report, trace},
+    run::{Census, Output, interval_for, keep_for, limit, options_for, progress_line, summarise},
+    snapshot::{keeper::Keeper, store::Store},
 };
 
+/// Seconds between snapshots of a job that asks for no other.
+const SNAPSHOT_SECONDS: f64 = 10.0;
 /// The shortest time between two changes of what watchers see of a run.
 const REPORT_EVERY: Duration = Duration::from_millis(100);
 
@@ -40,6 +47,10 @@ pub struct Order {
     pub options: JobOptions,
     /// Where results go.
     pub folder: Option<PathBuf>,
+    /// Where it is stored while it runs.
+    pub snapshots: PathBuf,
+    /// Of a job that an earlier session has begun: how many workers it had.
+    pub crew_before: Option<usize>,
     /// Its workers.
     pub seats: Vec<Seat>,
     /// The way to its thread; taken when it is driven.
@@ -48,6 +59,8 @@ pub struct Order {
     pub stop: Arc<AtomicBool>,
     /// What watchers see.
     pub status: watch::Sender<Status>,
+    /// What the page shows of runs, if there is a page.
+    pub board: Option<Arc<Board>>,
 }
 
 /// Runs the job; gives how it ended. A bug becomes a failure of this job alone.
@@ -93,24 +106,67 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     let beside: Vec<bool> = order.seats.iter().map(|seat| is_here(&seat.address)).collect();
     share_with_sorts(&model, &mut hands, &beside);
     let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
-    let options = options_for(&order.options, hands.len(), all_take_peers);
-    let options = Options { waits: true, ..options };
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options, None)?;
+    let interval = interval_for(&order.options, &model, Some(SNAPSHOT_SECONDS));
+    let keep = keep_for(order.options.keep_every, interval);
+    // The others will be back.
+    let workers = hands.len().max(order.crew_before.unwrap_or_default());
+    let options = options_for(&order.options, workers, all_take_peers);
+    let options = Options { waits: true, keep, store: true, ..options };
+    let (store, found) = Store::open(&order.snapshots)?;
+    for why in &found.warnings {
+        warn!(job = order.number, "{why}");
+    }
+    let states = found.snapshot.as_ref().map(|snapshot| snapshot.states.clone());
+    let (job, first) = Job::new(Arc::clone(&model), &hands, options, found.snapshot)?;
+    if order.crew_before.is_some() {
+        info!(job = order.number, cycle = job.start_state().cycle, "the job goes on");
+    }
     let line = order.line.lock().unwrap_or_else(PoisonError::into_inner).take();
     let line = line.unwrap_or_else(|| drive::channel(order.seats.len()));
-    let folder = order.folder.as_ref().map(|path| Folder::create(path, false)).transpose();
-    let mut output = Output::new(Arc::clone(&model), folder.map_err(|e| e.to_string())?, true)?;
-    output.state(job.start_state())?;
+    let folder = order.folder.as_ref().map(|path| match &states {
+        Some(_) => Folder::reopen(path),
+        None => Folder::create(path, order.crew_before.is_some()),
+    });
+    let folder = folder.transpose().map_err(|e| e.to_string())?;
+    let mut output = Output::new(Arc::clone(&model), folder, true)?;
+    let results = output.folder.as_ref().map(|folder| folder.path().to_owned());
+    output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
+    output.go_on(&job, states)?;
+    let sheet = order.board.as_ref().map(|board| board.begin(order.number, &model));
+    if let Some(sheet) = &sheet {
+        let mut sheet = board::lock(sheet);
+        job.rows_before().iter().for_each(|row| sheet.row(row));
+        sheet.state(&model, job.start_state());
+    }
     let census = Census::of(&job, &model);
     let started = Instant::now();
-    let mut reporter =
-        Reporter { number: order.number, output, model: &model, status: &order.status, started, last: None };
+    let mut reporter = Reporter {
+        number: order.number,
+        output,
+        model: &model,
+        status: &order.status,
+        started,
+        last: None,
+        sheet: sheet.clone(),
+    };
     let (outcome, traffic) = drive(job, first, order.number, &order.seats, line, &mut reporter, &order.stop)?;
+    if let Some(sheet) = &sheet {
+        board::lock(sheet).over(outcome.failure.is_none() && !outcome.stopped);
+    }
     let wall = started.elapsed().as_secs_f64();
+    if let Some(keeper) = reporter.output.keeper.take() {
+        if outcome.suspended {
+            let kept = keeper.flush();
+            info!(job = order.number, cycle = kept.cycle, "the job is stored and waits for the next master");
+            return Ok((Event::Suspend, Ended::default()));
+        }
+        keeper.discard();
+    }
     let threads = hands.iter().map(|hand| hand.threads).sum();
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
+        report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
         if order.options.trace {
             trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
                 .map_err(|e| e.to_string())?;
@@ -143,9 +199,25 @@ struct Reporter<'a> {
     status: &'a watch::Sender<Status>,
     started: Instant,
     last: Option<Instant>,
+    /// What the page shows.
+    sheet: Option<Arc<Mutex<Sheet>>>,
 }
 
 impl Reporter<'_> {
+    /// What the page shows of an action.
+    fn show(&self, action: &Action) {
+        let Some(sheet) = &self.sheet else { return };
+        let mut sheet = board::lock(sheet);
+        match action {
+            Action::Row(row) => sheet.row(row),
+            Action::State(state) => sheet.state(self.model, state),
+            Action::Dealt(deals) => sheet.dealt(deals),
+            Action::Rewind { cycle, .. } => sheet.rewind(*cycle),
+            Action::Progress(progress) => sheet.progress(progress),
+            _ => {}
+        }
+    }
+
     /// Work was dealt out anew; with nobody to deal it to, the job waits.
     fn dealt(&self, deals: Vec<Deal>) {
         let workers = deals.len();
@@ -161,7 +233,14 @@ impl Reporter<'_> {
 }
 
 impl Sink for Reporter<'_> {
+    fn heard(&mut self, worker: &str, message: &ToMaster) {
+        if let Some(sheet) = &self.sheet {
+            board::lock(sheet).heard(worker, message);
+        }
+    }
+
     fn take(&mut self, action: Action) -> Result<(), String> {
+        self.show(&action);
         let progress = match action {
             Action::Progress(progress) => progress,
             Action::Dealt(deals) => {

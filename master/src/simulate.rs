@@ -30,13 +30,14 @@ pub mod timeline;
 pub mod virtual_clock;
 
 use crate::{
+    balance::Costs,
     command::{Clock, SimulateArgs},
-    event::{Balance, Rebalance},
+    event::{Balance, Loss, Rebalance},
     run::read_deck,
 };
 
 use cluster::{Cluster, ElementCost};
-use machines::{Machines, Scheme};
+use machines::{Machines, Scheme, What};
 use real_clock::Strain;
 use timeline::{Phases, Timeline};
 
@@ -87,8 +88,8 @@ fn print_rows<T: Serialize>(rows: &[T]) -> Result<ExitCode, String> {
 }
 
 fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
-    let rows =
-        mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, cluster.pair)?;
+    let costs = Costs { node: cluster.node, pair: cluster.pair };
+    let rows = mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, costs)?;
     if args.json {
         return print_rows(&rows);
     }
@@ -102,7 +103,8 @@ fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitC
         .map(|lanes| lanes.name().parse::<Width>().and_then(Width::require))
         .transpose()
         .map_err(|e| e.to_string())?;
-    let (all, medians) = measure::run(&model(deck, args.cycles)?, lanes, args.repetitions)?;
+    let (all, medians) =
+        measure::run(&model(deck, args.cycles)?, cluster.speeds.len(), lanes, args.repetitions)?;
     if args.json {
         println!("{}", serde_json::to_string(&medians).map_err(|e| e.to_string())?);
     } else {
@@ -121,6 +123,9 @@ fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitC
 }
 
 fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
+    if cluster.changes.iter().any(|change| !matches!(change.what, What::Speed(_))) {
+        return Err(format!("{}: hosts that come and go are for runs of one deck", args.cluster.display()));
+    }
     let tables = cluster
         .tables
         .as_ref()
@@ -167,6 +172,8 @@ struct Summary<'a> {
     phases: Vec<Phases>,
     /// When work was dealt out by other speeds.
     rebalances: &'a [Rebalance],
+    /// Hosts that were lost.
+    losses: &'a [Loss],
     digest: &'a str,
     /// Under the real clock.
     strain: Option<Strain>,
@@ -210,6 +217,9 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
     if args.clock == Clock::Real && scheme.balance != Balance::Given {
         return Err("--balance measured is followed under --clock virtual only".to_owned());
     }
+    if args.clock == Clock::Real && machines.come_and_go() {
+        return Err("hosts that die, stop and join are followed under --clock virtual only".to_owned());
+    }
     let bound = calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>();
     let (timeline, strain) = match args.clock {
         Clock::Virtual => (virtual_clock::run(&model, &machines, scheme, None)?.0, None),
@@ -241,6 +251,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         bytes_per_cycle: timeline.bytes_per_cycle(),
         phases: (0..cluster.speeds.len()).map(|worker| timeline.mean_phases(worker)).collect(),
         rebalances: &timeline.rebalances,
+        losses: &timeline.losses,
         digest: &timeline.digest,
         strain,
         refused: strain.is_some_and(|strain| strain.refused()),
@@ -298,6 +309,9 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         println!(
             "cycle {cycle}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}"
         );
+    }
+    for Loss { worker, cycle, back_to, why } in summary.losses {
+        println!("cycle {cycle}: {worker} is lost, {why}; back to cycle {back_to}");
     }
     println!("digest {}", summary.digest);
     Ok(verdict(strain.as_ref()))

@@ -1,9 +1,18 @@
-//! Snapshots on disk: the whole run at the start of a cycle, with a checksum.
+//! Snapshots: the whole run at the start of a cycle, and how it gets to the disk and back.
+//!
+//! [`file`] is the form of one on disk, [`store`] a folder of two generations, [`keeper`] the thread that writes beside
+//! the run. What a snapshot holds is decided by the job: it is one of its bases.
 
-use std::{fs, io::Write, path::Path};
+pub mod file;
+pub mod keeper;
+pub mod store;
+
+use std::sync::Arc;
 
 use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
 use serde::{Deserialize, Serialize};
+
+pub use file::{read, write};
 
 use crate::{ledger::Ledger, results::history::HistoryRow};
 
@@ -11,7 +20,7 @@ use crate::{ledger::Ledger, results::history::HistoryRow};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
     /// State at the start of a cycle.
-    pub state: GlobalState,
+    pub state: Arc<GlobalState>,
     /// `dt` of the cycle before (time).
     pub dt_previous: f64,
     /// `dt` of the cycle to come (time).
@@ -27,45 +36,7 @@ pub struct Snapshot {
     /// Energies and worst ratios so far.
     pub ledger: Ledger,
     /// Rows of history so far.
-    pub rows: Vec<HistoryRow>,
-}
-
-/// First bytes of a snapshot file.
-const MAGIC: &[u8; 8] = b"BLDSNAP3";
-
-/// Writes a snapshot: temporary file, checksum, fsync, rename.
-///
-/// # Errors
-/// What the disk refused, with the path.
-pub fn write(path: &Path, snapshot: &Snapshot) -> Result<(), String> {
-    let fault = |e: &dyn std::fmt::Display| format!("snapshot {}: {e}", path.display());
-    let body = protocol::codec::encode(snapshot).map_err(|e| fault(&e))?;
-    let temporary = path.with_extension("tmp");
-    let mut file = fs::File::create(&temporary).map_err(|e| fault(&e))?;
-    let write = |file: &mut fs::File| {
-        file.write_all(MAGIC)?;
-        file.write_all(blake3::hash(&body).as_bytes())?;
-        file.write_all(&body)?;
-        file.sync_all()
-    };
-    write(&mut file).map_err(|e| fault(&e))?;
-    fs::rename(&temporary, path).map_err(|e| fault(&e))
-}
-
-/// Reads a snapshot and checks it.
-///
-/// # Errors
-/// If the file cannot be read, is not a snapshot, or its checksum does not match.
-pub fn read(path: &Path) -> Result<Snapshot, String> {
-    let fault = |e: &dyn std::fmt::Display| format!("snapshot {}: {e}", path.display());
-    let bytes = fs::read(path).map_err(|e| fault(&e))?;
-    let header = MAGIC.len() + blake3::OUT_LEN;
-    if bytes.len() < header || &bytes[..MAGIC.len()] != MAGIC {
-        return Err(fault(&"not a snapshot of this version"));
-    }
-    let (sum, body) = (&bytes[MAGIC.len()..header], &bytes[header..]);
-    if blake3::hash(body).as_bytes() != sum {
-        return Err(fault(&"checksum does not match: the file is torn; use an older one"));
-    }
-    protocol::codec::decode(body, body.len()).map_err(|e| fault(&e))
+    pub rows: Vec<Arc<HistoryRow>>,
+    /// Cycle and time of each state file so far; filled in by whoever writes those.
+    pub states: Vec<(u64, f64)>,
 }

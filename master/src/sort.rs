@@ -13,7 +13,8 @@ use protocol::message::Route;
 
 use crate::{
     balance::{self, Dealing},
-    exchange::{Exchange, Holdings},
+    exchange::Exchange,
+    holdings::Holdings,
 };
 
 /// All that a sort needs and that stays the same between two decompositions.
@@ -24,6 +25,8 @@ pub struct Sorter {
     speeds: Vec<f64>,
     route: Route,
     dealing: Dealing,
+    /// What a pair costs, in element-cycles.
+    pair: f64,
     /// By worker: surface node index of each gathered position.
     gather: Vec<Vec<u32>>,
 }
@@ -43,6 +46,7 @@ pub struct Sorted {
 
 impl Sorter {
     /// `gather` lists, by worker, the global surface nodes whose positions it sends, in its order.
+    #[expect(clippy::too_many_arguments, reason = "what a sort needs, once by epoch")]
     pub fn new(
         surface: Arc<Surface>,
         settings: contact::Settings,
@@ -50,13 +54,14 @@ impl Sorter {
         speeds: Vec<f64>,
         route: Route,
         dealing: Dealing,
+        pair: f64,
         gather: &[Vec<u32>],
     ) -> Self {
         let gather = gather
             .iter()
             .map(|nodes| nodes.iter().filter_map(|&node| surface.node_index(node)).collect())
             .collect();
-        Self { surface, settings, exclusions, speeds, route, dealing, gather }
+        Self { surface, settings, exclusions, speeds, route, dealing, pair, gather }
     }
 
     /// The surface it sorts.
@@ -87,20 +92,20 @@ impl Sorter {
 
     /// Sorts, balances, plans. `x` by surface node; of `state` only masses and constraints are read.
     pub fn run(&self, epoch: u32, x: &[[f64; 3]], holdings: &Holdings, state: &GlobalState) -> Sorted {
-        let units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
+        let mut units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
         let census = Census::of(&units);
         let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
         let worker_of = match self.dealing {
             Dealing::Owners => {
-                let weights = balance::pairs(&units, &self.surface, x, &self.settings);
-                balance::assign(&units, &weights, &self.speeds, &holdings.work, &owner)
+                let weights = contact::cull(&mut units, &self.surface, x, &self.settings, &self.exclusions);
+                balance::assign(&units, (&weights, self.pair), &self.speeds, &holdings.work, &owner)
             }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
         };
         let n = self.speeds.len();
         let mut mine: Vec<Vec<&contact::WorkUnit>> = vec![Vec::new(); n];
         let mut interactions = vec![0; n];
-        for (unit, &worker) in units.iter().zip(&worker_of) {
+        for (unit, &worker) in units.iter().zip(&worker_of).filter(|(unit, _)| !unit.faces.is_empty()) {
             mine[worker].push(unit);
             interactions[worker] += unit.interactions;
         }

@@ -11,7 +11,7 @@ use deck::model::Model;
 use master::{
     run::read_deck,
     simulate::{
-        machines::{Change, Costs, Machines, Scheme},
+        machines::{Change, Costs, Machines, Scheme, What},
         network::{Network, Wires},
         real_clock::{self, Strain},
         timeline::{Phases, Timeline},
@@ -87,7 +87,7 @@ fn the_real_clock_charges_the_same_work_and_carries_the_same_bytes_to_the_same_d
 fn no_cycle_ends_before_its_charges_and_a_host_that_slows_down_takes_longer_from_then_on() {
     let model = model("plates-joined.toml", 9);
     let mut two = machines(2, Wires::Switch, 1e9);
-    two.changes.push(Change { host: 1, cycle: 5, speed: 0.25 });
+    two.changes.push(Change { host: 1, cycle: 5, what: What::Speed(0.25) });
     let (real, _) = real_clock::run(&model, &two, Route::Direct, 0.5).expect("the deck runs");
     let charge = |cycle: usize| {
         let p = real.phases[1][cycle];

@@ -87,6 +87,7 @@ fn plates(cells: u32) -> Model {
         units: "cm-g-us".into(),
         mesh,
         velocity: vec![[0.0; 3]; n_nodes],
+        spin: Vec::new(),
         constraint: vec![0; n_nodes],
         join_energy: 0.0,
         setup: Setup {
@@ -109,6 +110,8 @@ fn plates(cells: u32) -> Model {
             loads: Default::default(),
         },
         output: Output {
+            snapshot_seconds: None,
+            snapshot_cycles: None,
             period: None,
             history_cycles: 1,
             fields: Vec::new(),

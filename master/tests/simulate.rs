@@ -14,7 +14,7 @@ use master::{
     simulate::{
         calibrate,
         cluster::{self, Cluster},
-        machines::{Change, Costs, Machines, Scheme},
+        machines::{Change, Costs, Machines, Scheme, What},
         network::{Network, Wires},
         paper::{self, Verdict},
         table,
@@ -125,7 +125,7 @@ fn a_hub_carries_in_turn_what_a_switch_carries_at_once() {
 fn a_host_that_slows_down_holds_up_the_others_from_then_on() {
     let model = model("plates-joined.toml", 8);
     let mut two = machines(2);
-    two.changes.push(Change { host: 1, cycle: 4, speed: 0.5 });
+    two.changes.push(Change { host: 1, cycle: 4, what: What::Speed(0.5) });
     let timeline = run(&model, &two, Scheme::bolide(Route::Direct));
     close(timeline.reached(4) - timeline.reached(3), 13_500.0);
     close(timeline.reached(6) - timeline.reached(5), 27_000.0);
@@ -204,7 +204,9 @@ fn every_cluster_file_and_route_gives_the_digest_of_a_plain_run() {
 
 #[test]
 fn a_sort_that_is_late_makes_workers_wait_and_changes_no_later_sort() {
-    let model = model("plates-free-slip.toml", 40);
+    let mut model = Arc::unwrap_or_clone(model("plates-free-slip.toml", 60));
+    model.setup.control.sort_lag = 4;
+    let model = Arc::new(model);
     let mut three = machines(3);
     let (quick, tape) = virtual_clock::run(&model, &three, Scheme::control(), None).expect("the deck runs");
     // Six cycles of one host, where the lag is four.
@@ -302,8 +304,10 @@ fn a_host_that_drops_to_half_speed_and_comes_back_is_followed_within_two_boundar
         let mut model = Arc::unwrap_or_clone(model(deck, 180));
         model.setup.control.plan_interval = 20;
         let model = Arc::new(model);
-        let changes =
-            vec![Change { host: 3, cycle: 45, speed: 0.5 }, Change { host: 3, cycle: 105, speed: 1.0 }];
+        let changes = vec![
+            Change { host: 3, cycle: 45, what: What::Speed(0.5) },
+            Change { host: 3, cycle: 105, what: What::Speed(1.0) },
+        ];
         let measured = Scheme { balance: Balance::Measured, ..Scheme::bolide(route) };
         let steady = run(&model, &eight(Vec::new()), measured);
         assert_eq!(steady.rebalances, [], "{deck}: nothing changes, nothing is dealt anew");
@@ -312,9 +316,11 @@ fn a_host_that_drops_to_half_speed_and_comes_back_is_followed_within_two_boundar
         assert_eq!(followed.digest, given.digest, "{deck}");
         assert_eq!(followed.digest, steady.digest, "{deck}");
         let at: Vec<u64> = followed.rebalances.iter().map(|r| r.cycle).collect();
-        // With contact boundaries are the sorts as well.
-        assert_eq!(at.len(), 2, "{deck}: {at:?}");
-        assert!((46..=85).contains(&at[0]) && (106..=145).contains(&at[1]), "{deck}: {at:?}");
+        // With contact boundaries are the sorts as well; what one saw in part the next sees whole.
+        let after_each =
+            [46..=85_u64, 106..=145].map(|window| at.iter().filter(|c| window.contains(c)).count());
+        assert!(after_each.iter().all(|n| (1..=2).contains(n)), "{deck}: {at:?}");
+        assert_eq!(after_each.iter().sum::<usize>(), at.len(), "{deck}: {at:?}");
         let alone = run(
             &model,
             &Machines { speeds: vec![1.0], believed: vec![1.0], ..eight(Vec::new()) },
@@ -342,5 +348,43 @@ fn a_host_that_drops_to_half_speed_and_comes_back_is_followed_within_two_boundar
         assert!(figures[2] <= 1.0 / 0.95, "{deck}: {figures:?}");
         assert!(figures[4] <= 1.0 / 0.95, "{deck}: {figures:?}");
         assert!(figures[3] > 1.5, "{deck}: without it the slow host holds all up: {figures:?}");
+    }
+}
+
+#[test]
+fn hosts_that_die_stop_and_join_cost_time_and_no_bit() {
+    let model = model("plates-free-slip.toml", 120);
+    let what = |host, cycle, what| Change { host, cycle, what };
+    for route in [Route::Direct, Route::Master] {
+        let steady = run(&model, &eight(Vec::new()), Scheme::bolide(route));
+        let after = |timeline: &Timeline| timeline.reached(110) - timeline.reached(100);
+
+        let died = run(&model, &eight(vec![what(3, 40, What::Die)]), Scheme::bolide(route));
+        assert_eq!(died.digest, steady.digest);
+        assert_eq!(died.losses.len(), 1, "{:?}", died.losses);
+        let loss = &died.losses[0];
+        assert!(loss.worker == "host-4" && loss.back_to <= loss.cycle && loss.cycle <= 41, "{loss:?}");
+        let ratio = after(&died) / after(&steady);
+        assert!((1.1..1.35).contains(&ratio), "seven compute what eight did: {ratio}");
+        assert!(died.reached(119) > steady.reached(119), "cycles were computed again");
+
+        let short = run(&model, &eight(vec![what(3, 40, What::Stop(5.0))]), Scheme::bolide(route));
+        assert_eq!((&short.digest, short.losses.len()), (&steady.digest, 0), "it is waited for");
+        let waited = short.reached(119) - steady.reached(119);
+        assert!((4.5..5.5).contains(&waited), "{waited} s");
+
+        // Given up after ten seconds of silence, it joins anew at a boundary after it goes on.
+        let events = vec![what(3, 20, What::Stop(12.0))];
+        let long = run(&model, &eight(events), Scheme::bolide(route));
+        assert_eq!((&long.digest, long.losses.len()), (&steady.digest, 1), "{:?}", long.losses);
+        assert!(long.losses[0].why.contains("no byte for 10 s"), "{:?}", long.losses);
+        let ratio = after(&long) / after(&steady);
+        assert!((0.95..1.05).contains(&ratio), "all eight compute again: {ratio}");
+
+        let joined = run(&model, &eight(vec![what(3, 40, What::Join)]), Scheme::bolide(route));
+        assert_eq!((&joined.digest, joined.losses.len()), (&steady.digest, 0));
+        let before = |timeline: &Timeline| timeline.reached(35) - timeline.reached(25);
+        let ratios = [before(&joined) / before(&steady), after(&joined) / after(&steady)];
+        assert!((1.1..1.35).contains(&ratios[0]) && (0.95..1.05).contains(&ratios[1]), "{ratios:?}");
     }
 }

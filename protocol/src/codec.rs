@@ -34,6 +34,18 @@ pub fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// How long [`encode`] of `value` would be.
+///
+/// # Errors
+/// As there, but for a length over the limit.
+pub fn measure<T: Serialize>(value: &T) -> Result<u64> {
+    let config = bincode::config::standard().with_little_endian().with_fixed_int_encoding();
+    let mut writer = bincode::enc::write::SizeWriter::default();
+    bincode::serde::encode_into_writer(value, &mut writer, config)
+        .map_err(|error| Error::Message(error.to_string()))?;
+    Ok(writer.bytes_written as u64)
+}
+
 /// The value whose bytes are all of `bytes`, which may be at most `limit` (and [`MESSAGE_LIMIT`]) long.
 ///
 /// A length inside the message can make it allocate at most the next of 64 KiB, 1 MiB, 32 MiB and 1 GiB

@@ -217,7 +217,7 @@ pub enum ToMaster {
         /// What this worker's compute threads have used so far.
         work: Work,
     },
-    /// Before the last `Image`: how the worker's time went, from its runtime.
+    /// Before the last `Image`, and about once a second: how the worker's time went, from its runtime.
     Report(Box<Report>),
     /// The worker cannot go on.
     Failed {
@@ -226,6 +226,8 @@ pub enum ToMaster {
         /// Why: a sentence for the user.
         reason: String,
     },
+    /// The worker wants to go: it computes on until it is released, at the next plan boundary.
+    Leaving,
 }
 
 impl ToMaster {

@@ -55,6 +55,11 @@ pub enum Request {
         /// Where to start (bytes).
         offset: u64,
     },
+    /// Put a job that failed back into the queue, to go on where it was stored. Answered by [`Reply::Done`].
+    Resume {
+        /// The job.
+        job: u32,
+    },
 }
 
 /// From the master to a client.
@@ -108,6 +113,12 @@ pub struct JobOptions {
     pub balance: Balance,
     /// Seconds from one state kept in memory to the next; none if it is never kept, so that a loss begins the run anew.
     pub keep_every: Option<f64>,
+    /// Seconds from one snapshot on disk to the next; 0 for none, none for the deck's or the master's choice.
+    pub snapshot_every: Option<f64>,
+    /// The same in cycles.
+    pub snapshot_cycles: Option<u64>,
+    /// Jobs of a higher one go first.
+    pub priority: i32,
     /// Write `trace.json`: what every worker did in its last cycles.
     pub trace: bool,
 }
@@ -198,6 +209,23 @@ pub struct Status {
     pub shares: Vec<Share>,
     /// Set once it is over.
     pub ended: Option<Ended>,
+}
+
+impl Status {
+    /// Of a job that nothing has happened to.
+    pub const fn queued(job: u32, title: String) -> Self {
+        Self {
+            job,
+            title,
+            state: State::Queued,
+            waits_for: None,
+            cycle: 0,
+            time: 0.0,
+            progress: String::new(),
+            shares: Vec::new(),
+            ended: None,
+        }
+    }
 }
 
 /// A worker's part of a job.

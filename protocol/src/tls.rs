@@ -119,6 +119,22 @@ pub fn server_config(paths: &Paths) -> Result<Arc<ServerConfig>> {
     files.server(paths)
 }
 
+/// The configuration of a page for browsers, which hold no certificate: what they may is not decided by TLS.
+///
+/// # Errors
+/// As for [`server_config`].
+pub fn page_config(paths: &Paths) -> Result<Arc<ServerConfig>> {
+    let files = Files::load(paths)?;
+    files.check_dates(&paths.certificate, SystemTime::now())?;
+    ServerConfig::builder_with_provider(provider())
+        .with_safe_default_protocol_versions()
+        .map_err(|error| unusable(&paths.certificate, &error))?
+        .with_no_client_auth()
+        .with_single_cert(files.chain, files.key)
+        .map(Arc::new)
+        .map_err(|error| unusable(&paths.key, &error))
+}
+
 /// The dialling side's configuration.
 ///
 /// # Errors

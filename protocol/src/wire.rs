@@ -24,15 +24,36 @@ pub struct Packed {
     pub bytes: Vec<u8>,
 }
 
+/// Bytes on the wire of a control message of `n` bytes, headers included.
+fn control_bytes(n: u64) -> u64 {
+    if n > u64::from(CONTROL_LIMIT) {
+        n + n.div_ceil(CHUNK as u64) * (HEADER_LEN + CHUNK_PREFIX) as u64
+    } else {
+        n + HEADER_LEN as u64
+    }
+}
+
+/// Bytes on the wire of a message to a worker that is no totals, without packing it.
+///
+/// # Errors
+/// If it cannot be packed.
+pub fn measure_to_worker(message: &ToWorker) -> Result<u64> {
+    codec::measure(message).map(control_bytes)
+}
+
+/// Bytes on the wire of a message to the master that is no cycle, without packing it.
+///
+/// # Errors
+/// If it cannot be packed.
+pub fn measure_to_master(message: &ToMaster) -> Result<u64> {
+    codec::measure(message).map(control_bytes)
+}
+
 impl Packed {
     /// Bytes on the wire, headers included.
     pub fn wire_bytes(&self) -> u64 {
-        let n = self.bytes.len();
-        if self.goes_in_bulk() {
-            (n + n.div_ceil(CHUNK) * (HEADER_LEN + CHUNK_PREFIX)) as u64
-        } else {
-            (n + HEADER_LEN) as u64
-        }
+        let n = self.bytes.len() as u64;
+        if self.kind == Kind::Control { control_bytes(n) } else { n + HEADER_LEN as u64 }
     }
 
     /// Whether it is cut into bulk chunks.

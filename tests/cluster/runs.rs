@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fs};
 
-use tests::cluster::{Cluster, said};
+use tests::cluster::{Cluster, repository, said};
 
 use crate::{BOLIDE, digest_of, reference, run, small};
 
@@ -105,6 +105,32 @@ fn jobs_run_one_after_another_and_one_waits_for_its_workers() {
     let none = cluster.client(&["results", "1"]);
     assert_eq!(none.code, Some(1));
     assert!(none.err.contains("job 1 writes no results"), "{none:?}");
+}
+
+#[test]
+fn a_keyword_deck_is_submitted_with_what_it_includes() {
+    let deck = repository("deck/examples/block-on-plate.k").display().to_string();
+    let mut command = std::process::Command::new(BOLIDE);
+    command.args(["run", &deck, "--cycles", "40", "--no-output", "--threads", "1", "--json"]);
+    let alone = said(&mut command);
+    let expected = digest_of(&serde_json::from_str(&alone.out).unwrap_or_else(|e| panic!("{e}: {alone:?}")));
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker("a", "1");
+    cluster.worker("b", "2");
+    let submitted =
+        cluster.client(&["submit", &deck, "--cycles", "40", "--no-output", "--min-workers", "2", "--json"]);
+    assert!(
+        submitted.err.contains("warning: ") && submitted.err.contains("*DATABASE_GLSTAT"),
+        "{submitted:?}"
+    );
+    assert_eq!(digest_of(&cluster.json(&["watch", "1"])), expected);
+
+    // A bad deck comes back with the lines of its files.
+    let bad = repository("tests/decks/bad/keyword-implicit.k").display().to_string();
+    let refused = cluster.client(&["submit", &bad]);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert!(refused.err.contains("keyword-implicit.k:8:1: read *CONTROL_IMPLICIT_GENERAL"), "{refused:?}");
+    assert!(refused.err.contains("keyword-implicit-nodes.inc:3:8: "), "{refused:?}");
 }
 
 #[test]

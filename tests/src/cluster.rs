@@ -103,6 +103,15 @@ impl Process {
         self.child.try_wait().is_ok_and(|status| status.is_none())
     }
 
+    /// Sends it a signal, by its name without `SIG`.
+    ///
+    /// # Panics
+    /// If there is no such signal.
+    pub fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args([&format!("-{name}"), &self.id().to_string()]).status();
+        assert!(sent.expect("kill is there").success(), "kill -{name} {}", self.id());
+    }
+
     /// Ends it as `kill -9` does.
     pub fn kill(&mut self) {
         // It may have ended by itself; both fail only then.
@@ -166,6 +175,10 @@ pub struct Cluster {
     pub address: String,
     workers: Vec<(String, Process)>,
     tls: bool,
+    /// Of the master.
+    flags: Vec<String>,
+    /// Of the environment of all daemons.
+    variables: Vec<(String, String)>,
 }
 
 impl Cluster {
@@ -174,21 +187,73 @@ impl Cluster {
     /// # Panics
     /// If it does not come up.
     pub fn start(binary: &str, tls: bool) -> Self {
+        Self::start_with(binary, tls, &[], None)
+    }
+
+    /// The same with further flags, and with faults ordered by `BOLIDE_FAIL`.
+    ///
+    /// # Panics
+    /// If it does not come up.
+    pub fn start_with(binary: &str, tls: bool, flags: &[&str], fail: Option<&str>) -> Self {
         let binary = PathBuf::from(binary);
         let folder = tempfile::tempdir().expect("a folder for the test");
-        let certs = folder.path().join("certs");
         if tls {
-            make_certificates(&binary, &certs);
+            make_certificates(&binary, &folder.path().join("certs"));
         }
-        let mut command = Command::new(&binary);
-        command.args(["master", "--listen", "127.0.0.1:0", "--spool"]).arg(folder.path().join("spool"));
-        if tls {
-            command.arg("--certs").arg(certs.join("master"));
-        }
-        let master = Process::start("master", command.env("BOLIDE_LOG", "info"));
+        Self::start_in(&binary, folder, tls, flags, fail, &[])
+    }
+
+    /// The same in a folder that has what it needs, with further variables of the environment for all daemons.
+    ///
+    /// # Panics
+    /// If it does not come up.
+    pub fn start_in(
+        binary: &Path,
+        folder: tempfile::TempDir,
+        tls: bool,
+        flags: &[&str],
+        fail: Option<&str>,
+        variables: &[(&str, &str)],
+    ) -> Self {
+        let flags: Vec<String> = flags.iter().map(|&flag| flag.to_owned()).collect();
+        let variables: Vec<_> =
+            variables.iter().map(|&(name, value)| (name.to_owned(), value.to_owned())).collect();
+        let mut command = master_of(binary, folder.path(), "127.0.0.1:0", tls, &flags, fail);
+        let master = Process::start("master", command.envs(variables.iter().cloned()));
         let line = master.wait_for("listening on ");
         let address = line.trim_start_matches("listening on ").to_owned();
-        Self { binary, folder, master, address, workers: Vec::new(), tls }
+        Self {
+            binary: binary.to_owned(),
+            folder,
+            master,
+            address,
+            workers: Vec::new(),
+            tls,
+            flags,
+            variables,
+        }
+    }
+
+    /// Starts another master at the same address on the same files, once the present one has ended.
+    ///
+    /// # Panics
+    /// If it does not come up.
+    pub fn restart_master(&mut self) {
+        self.master.wait();
+        let mut command =
+            master_of(&self.binary, self.folder.path(), &self.address, self.tls, &self.flags, None);
+        self.master = Process::start("master", command.envs(self.variables.iter().cloned()));
+        self.master.wait_for("listening on ");
+    }
+
+    /// The folder of the results of a job.
+    pub fn results(&self, job: u32) -> PathBuf {
+        self.folder().join(format!("spool/job-{job}"))
+    }
+
+    /// The folder of the snapshots of a job.
+    pub fn snapshots(&self, job: u32) -> PathBuf {
+        self.folder().join(format!("spool/queue/job-{job}.snapshots"))
     }
 
     /// The folder of this cluster's files, gone with it.
@@ -221,10 +286,45 @@ impl Cluster {
     pub fn worker_with(&mut self, name: &str, speed: &str, flags: &[&str]) {
         let mut arguments = vec!["worker", "--name", name, "--speed", speed, "--threads", "1"];
         arguments.extend(flags);
-        let worker = Process::start(name, self.command("worker", &arguments).env("BOLIDE_LOG", "info"));
+        let mut command = self.command("worker", &arguments);
+        command.envs(self.variables.iter().cloned());
+        let worker = Process::start(name, command.env("BOLIDE_LOG", "info"));
         worker.wait_for("joined");
         self.master.wait_for(&format!("worker {name} joined"));
         self.workers.push((name.to_owned(), worker));
+    }
+
+    /// Starts a worker with faults ordered by `BOLIDE_FAIL`.
+    ///
+    /// # Panics
+    /// If it does not join.
+    pub fn worker_that_fails(&mut self, name: &str, fail: &str) {
+        let address = self.address.clone();
+        self.worker_through(name, &address, fail);
+    }
+
+    /// Starts a worker that dials the master at another address, with faults ordered by `BOLIDE_FAIL`.
+    ///
+    /// # Panics
+    /// If it does not join.
+    pub fn worker_through(&mut self, name: &str, address: &str, fail: &str) {
+        let arguments = ["worker", "--name", name, "--threads", "1"];
+        let mut command = Command::new(&self.binary);
+        command.args(arguments).args(["--master", address]).current_dir(self.folder.path());
+        command.envs(self.variables.iter().cloned());
+        let worker = Process::start(name, command.env("BOLIDE_LOG", "info").env("BOLIDE_FAIL", fail));
+        worker.wait_for("joined");
+        self.master.wait_for(&format!("worker {name} joined"));
+        self.workers.push((name.to_owned(), worker));
+    }
+
+    /// The process of a worker, to wait for its end.
+    ///
+    /// # Panics
+    /// If there is none of that name.
+    pub fn process_mut(&mut self, name: &str) -> &mut Process {
+        let worker = self.workers.iter_mut().find(|(n, _)| n == name);
+        &mut worker.expect("a worker of that name").1
     }
 
     /// The process of a worker.
@@ -283,8 +383,10 @@ impl Cluster {
         self.find_job(job).unwrap_or_else(|| panic!("no job {job}"))
     }
 
-    fn find_job(&self, job: u64) -> Option<serde_json::Value> {
-        self.json(&["jobs"]).as_array().and_then(|jobs| jobs.iter().find(|s| s["job"] == job).cloned())
+    /// The same, if the master can be asked and knows the job.
+    pub fn find_job(&self, job: u64) -> Option<serde_json::Value> {
+        let jobs: serde_json::Value = serde_json::from_str(&self.client(&["jobs", "--json"]).out).ok()?;
+        jobs.as_array().and_then(|jobs| jobs.iter().find(|s| s["job"] == job).cloned())
     }
 
     /// Waits until a job is under way in its cycles.
@@ -299,6 +401,23 @@ impl Cluster {
             },
         );
     }
+}
+
+fn master_of(
+    binary: &Path,
+    folder: &Path,
+    listen: &str,
+    tls: bool,
+    flags: &[String],
+    fail: Option<&str>,
+) -> Command {
+    let mut command = Command::new(binary);
+    command.args(["master", "--listen", listen, "--spool"]).arg(folder.join("spool")).args(flags);
+    if tls {
+        command.arg("--certs").arg(folder.join("certs/master"));
+    }
+    command.env("BOLIDE_LOG", "info").env("BOLIDE_FAIL", fail.unwrap_or_default());
+    command
 }
 
 /// Runs a command to its end.

@@ -7,8 +7,11 @@
 
 pub mod bits;
 pub mod book;
+pub mod browser;
 pub mod case;
 pub mod checker;
 pub mod cluster;
+pub mod faults;
+pub mod left;
 pub mod proxy;
 pub mod solve;

@@ -7,7 +7,11 @@ use std::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
+    time::Duration,
 };
+
+/// Between two looks whether a frozen proxy was thawed.
+const LOOK_EVERY: Duration = Duration::from_millis(5);
 
 /// A forwarded port. Its threads end with their connections, the listening one with the process.
 pub struct Proxy {
@@ -22,6 +26,9 @@ struct Shared {
     to: Mutex<Option<String>>,
     connections: Mutex<Vec<TcpStream>>,
     frozen: AtomicBool,
+    flip: AtomicBool,
+    litter: AtomicBool,
+    delay_us: AtomicU64,
     bytes: AtomicU64,
 }
 
@@ -43,8 +50,8 @@ impl Proxy {
             for near in listener.incoming().flatten() {
                 let Some(to) = lock(&of_thread.to).clone() else { continue };
                 let Ok(far) = TcpStream::connect(to) else { continue };
-                of_thread.join(&near, &far);
-                of_thread.join(&far, &near);
+                of_thread.join(&near, &far, true);
+                of_thread.join(&far, &near, false);
             }
         });
         Self { port, shared }
@@ -73,6 +80,27 @@ impl Proxy {
         lock(&self.shared.connections).len() / 2
     }
 
+    /// Passes on again what a frozen proxy held back, and takes callers to this address.
+    pub fn thaw(&self, to: &str) {
+        self.shared.frozen.store(false, Ordering::Relaxed);
+        self.forward(to);
+    }
+
+    /// Flips a bit of the next bytes that a caller sends.
+    pub fn flip(&self) {
+        self.shared.flip.store(true, Ordering::Relaxed);
+    }
+
+    /// Puts garbage before the next bytes that a caller sends.
+    pub fn litter(&self) {
+        self.shared.litter.store(true, Ordering::Relaxed);
+    }
+
+    /// Passes on what a caller sends only after so long.
+    pub fn delay(&self, delay: Duration) {
+        self.shared.delay_us.store(delay.as_micros() as u64, Ordering::Relaxed);
+    }
+
     /// Bytes passed on so far, both ways.
     pub fn bytes(&self) -> u64 {
         self.shared.bytes.load(Ordering::Relaxed)
@@ -81,7 +109,7 @@ impl Proxy {
 
 impl Shared {
     /// Starts a thread that passes bytes one way.
-    fn join(self: &Arc<Self>, from: &TcpStream, to: &TcpStream) {
+    fn join(self: &Arc<Self>, from: &TcpStream, to: &TcpStream, of_caller: bool) {
         let clone = |stream: &TcpStream| stream.try_clone().expect("a file descriptor");
         let (mut from, mut to) = (clone(from), clone(to));
         to.set_nodelay(true).expect("an option of every system");
@@ -91,12 +119,26 @@ impl Shared {
             let mut buffer = vec![0; 64 << 10];
             while let Ok(n @ 1..) = from.read(&mut buffer) {
                 while shared.frozen.load(Ordering::Relaxed) {
-                    std::thread::park();
+                    std::thread::sleep(LOOK_EVERY);
+                }
+                if of_caller {
+                    let delay = shared.delay_us.load(Ordering::Relaxed);
+                    std::thread::sleep(Duration::from_micros(delay));
+                    if shared.flip.swap(false, Ordering::Relaxed) {
+                        buffer[n / 2] ^= 0x08;
+                    }
+                    if shared.litter.swap(false, Ordering::Relaxed) && to.write_all(&[0x5a; 333]).is_err() {
+                        break;
+                    }
                 }
                 if to.write_all(&buffer[..n]).is_err() {
                     break;
                 }
                 shared.bytes.fetch_add(n as u64, Ordering::Relaxed);
+            }
+            // A pulled cable does not carry the end of a connection either.
+            while shared.frozen.load(Ordering::Relaxed) {
+                std::thread::sleep(LOOK_EVERY);
             }
             // The other side has gone, or the proxy was cut.
             let _ = to.shutdown(Shutdown::Write);

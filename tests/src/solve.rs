@@ -32,6 +32,15 @@ pub fn example(name: &str) -> Model {
     model(&std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}")))
 }
 
+/// Reads an example of a keyword deck, with what it includes.
+///
+/// # Panics
+/// If it is not there or has faults.
+pub fn keyword(name: &str) -> Model {
+    let path = format!("{}/../deck/examples/{name}.k", env!("CARGO_MANIFEST_DIR"));
+    master::run::read_deck(std::path::Path::new(&path)).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
 /// Who computes, and what is asked beside the deck.
 #[derive(Clone, Debug)]
 pub struct Crew {
@@ -207,7 +216,10 @@ pub fn solve_through(
         .map(|(i, &speed)| Hand { name: format!("worker-{i}"), speed, threads: crew.threads })
         .collect();
     let (job, first) = Job::new(Arc::clone(&model), &hands, crew.options, crew.resume)?;
-    let mut keep = Keep { rows: job.rows_before().to_vec(), ..Keep::default() };
+    let mut keep = Keep {
+        rows: job.rows_before().iter().map(|row| HistoryRow::clone(row)).collect(),
+        ..Keep::default()
+    };
     let stop = AtomicBool::new(false);
     let (n, threads) = (hands.len(), crew.threads as usize);
     let (mut outcome, _) = embedded::run_through(job, first, n, threads, &mut keep, &stop, fate)?;

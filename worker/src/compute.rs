@@ -56,6 +56,17 @@ pub fn lowest_priority() {
     let _ = rustix::process::setpriority_process(Some(rustix::thread::gettid()), LOWEST);
 }
 
+/// Confines the calling thread, and all that it starts from now on, to processors of this machine.
+///
+/// # Errors
+/// If the machine has none of them, or refuses.
+pub fn pin(processors: &[usize]) -> Result<(), String> {
+    let mut set = rustix::thread::CpuSet::new();
+    processors.iter().filter(|n| **n < rustix::thread::CpuSet::MAX_CPU).for_each(|&n| set.set(n));
+    rustix::thread::sched_setaffinity(None, &set)
+        .map_err(|e| format!("processors {processors:?}: {e}; `nproc --all` says how many there are"))
+}
+
 /// The highest nice value of Linux.
 const LOWEST: i32 = 19;
 
@@ -120,6 +131,11 @@ impl Machine {
         if let Task::Load { assign, prepare } = task {
             return self.build(*assign, prepare);
         }
+        if let Task::Image { last: true } = task {
+            let domain = self.domain.take().ok_or("an image without an assignment")?;
+            let pieces = self.laps.time(Phase::Other, || domain.into_pieces());
+            return Ok(Outcome::Image { pieces, work: self.clock.work() });
+        }
         let (clock, laps) = (&self.clock, &mut self.laps);
         let domain = self.domain.as_mut().ok_or("a task without an assignment")?;
         Ok(match task {
@@ -161,7 +177,7 @@ impl Machine {
                     .time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, &walls, clock))?;
                 Outcome::Integrated(Box::new(vote))
             }
-            Task::Image => {
+            Task::Image { .. } => {
                 laps.time(Phase::Other, || Outcome::Image { pieces: domain.pieces(), work: clock.work() })
             }
         })
@@ -184,11 +200,10 @@ impl Machine {
             assign.setup,
             assign.n_parts as usize,
             assign.quanta,
-            &assign.subdomains,
+            assign.subdomains,
             &assign.gauges,
             width,
         );
-        drop(assign.subdomains);
         domain.install(&assign.plan, &assign.guest_state)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
         if !further_epoch {

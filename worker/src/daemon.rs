@@ -23,12 +23,12 @@ use protocol::{
     wire,
 };
 use rayon::ThreadPool;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
 
 use crate::{
     peers::{Peers, links::Links},
-    runner::{Input, Runner},
+    runner::{GOODBYE, Input, Runner},
 };
 
 /// Messages that may wait for the compute thread: a master sends at most a few ahead, a neighbour two.
@@ -37,6 +37,9 @@ pub const WAITING_MESSAGES: usize = 256;
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
 /// The longest pause before dialling again.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+
+/// The longest that a worker which is to end waits to be released.
+const LEAVE_LIMIT: Duration = Duration::from_secs(60);
 
 /// How a worker process runs.
 #[derive(Clone, Debug)]
@@ -101,9 +104,10 @@ pub fn run(options: &Options) -> std::result::Result<(), String> {
         .map_err(|e| format!("threads of the link: {e}"))?;
     let hello = greeting(options);
     let result = runtime.block_on(async {
+        let (told, leaving) = watch::channel(false);
         tokio::select! {
-            result = stay(options, certificates.as_ref(), &hello, &pool) => result,
-            () = interrupted() => Ok(()),
+            result = stay(options, certificates.as_ref(), &hello, &pool, leaving) => result,
+            () = leave_by_and_by(&told) => Ok(()),
         }
     });
     // A task under way need not be waited for.
@@ -138,13 +142,23 @@ fn greeting(options: &Options) -> Hello {
     hello
 }
 
-/// Ends at Ctrl-C or SIGTERM.
-async fn interrupted() {
+/// At Ctrl-C or SIGTERM asks to leave at the next plan boundary; ends at the second one, or when the master takes too long.
+async fn leave_by_and_by(told: &watch::Sender<bool>) {
     use tokio::signal::unix::{SignalKind, signal};
-    let Ok(mut term) = signal(SignalKind::terminate()) else { return std::future::pending().await };
+    let both = (signal(SignalKind::interrupt()), signal(SignalKind::terminate()));
+    let (Ok(mut interrupt), Ok(mut term)) = both else { return std::future::pending().await };
     tokio::select! {
-        interrupt = tokio::signal::ctrl_c() => if interrupt.is_err() { std::future::pending().await },
+        _ = interrupt.recv() => {}
         _ = term.recv() => {}
+    }
+    warn!("leaving at the next plan boundary; once more to leave at once");
+    told.send_replace(true);
+    tokio::select! {
+        _ = interrupt.recv() => {}
+        _ = term.recv() => {}
+        () = tokio::time::sleep(LEAVE_LIMIT) => {
+            warn!("no plan boundary within {} s; leaving", LEAVE_LIMIT.as_secs());
+        }
     }
 }
 
@@ -154,6 +168,7 @@ async fn stay(
     certificates: Option<&Arc<ClientConfig>>,
     hello: &Hello,
     pool: &Arc<ThreadPool>,
+    mut leaving: watch::Receiver<bool>,
 ) -> std::result::Result<(), String> {
     let mut service = Service { pool: Arc::clone(pool), peers: None };
     let mut hello = hello.clone();
@@ -169,8 +184,8 @@ async fn stay(
                     "joined {}",
                     options.master
                 );
-                let error = serve(call, service.clone()).await;
-                if options.once {
+                let error = serve_until(call, service.clone(), leaving.clone()).await;
+                if options.once || *leaving.borrow() {
                     return Ok(());
                 }
                 (alone_since, pause) = (Instant::now(), FIRST_PAUSE);
@@ -184,7 +199,10 @@ async fn stay(
             let seconds = options.patience.as_secs();
             return Err(format!("no master at {} for {seconds} s; last: {error}", options.master));
         }
-        tokio::time::sleep(pause).await;
+        tokio::select! {
+            () = tokio::time::sleep(pause) => {}
+            Ok(_) = leaving.wait_for(|leaving| *leaving) => return Ok(()),
+        }
         pause = (2 * pause).min(LONGEST_PAUSE);
     }
 }
@@ -232,7 +250,17 @@ fn is_final(error: &Error) -> bool {
 }
 
 /// Computes for the master at the other end until the connection ends; gives the reason.
-pub async fn serve(call: Call, Service { pool, peers }: Service) -> Error {
+pub async fn serve(call: Call, service: Service) -> Error {
+    let (_told, leaving) = watch::channel(false);
+    serve_until(call, service, leaving).await
+}
+
+/// [`serve`] until this process is told to leave and the master has released it.
+async fn serve_until(
+    call: Call,
+    Service { pool, peers }: Service,
+    mut leaving: watch::Receiver<bool>,
+) -> Error {
     let Call { sender, mut receiver, welcome } = call;
     let (send, messages) = mpsc::channel(WAITING_MESSAGES);
     let (fail, mut failed) = oneshot::channel();
@@ -245,14 +273,29 @@ pub async fn serve(call: Call, Service { pool, peers }: Service) -> Error {
             let _ = fail.send(error);
         }
     });
+    let asking = send.clone();
+    let ask = async move {
+        if leaving.wait_for(|leaving| *leaving).await.is_ok() {
+            // The compute thread ends only with this function.
+            let _ = asking.send(Input::Leave).await;
+        }
+        std::future::pending().await
+    };
+    let mut released = false;
     let error = match &computing {
         Err(error) => Error::io("starting the compute thread", error),
         Ok(_) => tokio::select! {
             error = listen(&mut receiver, &send) => error,
-            Ok(error) = &mut failed => error,
+            Ok(error) = &mut failed => {
+                released = matches!(&error, Error::Message(words) if words == GOODBYE);
+                error
+            }
+            error = ask => error,
         },
     };
-    if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
+    if released {
+        dial::leave(&sender, GOODBYE).await;
+    } else if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
         dial::leave(&sender, &error.to_string()).await;
     }
     drop((receiver, send));

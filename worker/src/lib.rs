@@ -8,6 +8,7 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 
 pub mod compute;
 pub mod daemon;
+pub mod failpoint;
 pub mod peers;
 pub mod runner;
 pub mod session;

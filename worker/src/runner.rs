@@ -21,11 +21,12 @@ use tokio::sync::mpsc;
 
 use crate::{
     compute::Machine,
+    failpoint,
     peers::{
         Key, News,
         links::{Links, Step},
     },
-    session::{Action, Event, Outcome, Session},
+    session::{Action, Event, Outcome, Session, Task},
     stopwatch::{Lap, Stopwatch},
 };
 
@@ -35,7 +36,14 @@ pub enum Input {
     Master(Header, ToWorker),
     /// Of a link to another worker.
     Peer(News),
+    /// This process is to end: the master is asked to release it.
+    Leave,
 }
+
+/// How often the master hears between cycles how the time goes.
+const REPORT_EVERY: Duration = Duration::from_secs(1);
+/// What a worker says that was asked to end and holds nothing any more.
+pub const GOODBYE: &str = "the worker was told to end";
 
 /// The compute thread's own.
 pub struct Runner {
@@ -49,6 +57,9 @@ pub struct Runner {
     busy: Duration,
     /// The answer to an assignment, while links are being made.
     ready: Option<ToMaster>,
+    /// When the last report left.
+    reported: Instant,
+    leaving: bool,
 }
 
 impl Runner {
@@ -63,6 +74,8 @@ impl Runner {
             links,
             busy: Duration::ZERO,
             ready: None,
+            reported: Instant::now(),
+            leaving: false,
         }
     }
 
@@ -78,6 +91,15 @@ impl Runner {
                     let step = self.links.hear(news, &self.session);
                     self.step(step)?;
                 }
+                Input::Leave => {
+                    self.leaving = true;
+                    if !self.session.is_idle() {
+                        self.send(&ToMaster::Leaving)?;
+                    }
+                }
+            }
+            if self.leaving && self.session.is_idle() {
+                return Err(Error::Message(GOODBYE.to_owned()));
             }
             if !self.links.are_dialling()
                 && let Some(ready) = self.ready.take()
@@ -163,7 +185,10 @@ impl Runner {
                 match action {
                     Action::Send(ready @ ToMaster::Ready { .. }) => self.ready = Some(ready),
                     Action::Send(message) => self.timed(|runner| {
-                        if let ToMaster::Image { last: Some(_), .. } = message {
+                        let last = matches!(message, ToMaster::Image { last: Some(_), .. });
+                        let due = runner.reported.elapsed() > REPORT_EVERY;
+                        if last || (due && matches!(message, ToMaster::Cycle { .. })) {
+                            runner.reported = Instant::now();
                             let mut report = runner.stopwatch.report();
                             runner.links.report(&mut report);
                             runner.send(&ToMaster::Report(Box::new(report)))?;
@@ -174,7 +199,8 @@ impl Runner {
                     Action::SendPeer(to, message) => self.timed(|runner| runner.send_peer(to, message))?,
                     Action::Compute(task) => {
                         let (machine, started) = (&mut self.machine, Instant::now());
-                        let outcome = catch_unwind(AssertUnwindSafe(|| machine.run(task)));
+                        let cycle = self.session.cycle();
+                        let outcome = catch_unwind(AssertUnwindSafe(|| sabotaged(machine, task, cycle)));
                         self.busy += started.elapsed();
                         for lap in self.machine.take_laps() {
                             self.stopwatch.book(self.session.cycle(), lap);
@@ -198,6 +224,40 @@ impl Runner {
         self.stopwatch.book(cycle, Lap { phase: Phase::Send, from, to: Instant::now() });
         result
     }
+}
+
+/// A task, with the faults that a test has ordered for it.
+fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
+    let name = match &task {
+        Task::Load { .. } => "die-in-load",
+        Task::Transfer { .. } => "die-in-transfer",
+        Task::Elements { .. } => "die-in-elements",
+        Task::Install { .. } => "die-in-install",
+        Task::Border { .. } => "die-in-border",
+        Task::Interior { .. } => "die-in-interior",
+        Task::Integrate { .. } => "die-in-integrate",
+        Task::Image { .. } => "die-in-image",
+    };
+    failpoint::die(name);
+    if let Task::Border { gather: true, .. } | Task::Install { gather: true, .. } = &task {
+        failpoint::die("die-in-gather");
+    }
+    if failpoint::in_cycle("panic", cycle) || failpoint::at_cycle("panic-always", cycle) {
+        panic!("a panic that a test has ordered");
+    }
+    let mut outcome = machine.run(task);
+    match &mut outcome {
+        Outcome::Integrated(vote) if failpoint::in_cycle("nan-vote", cycle) => {
+            vote.parts.iter_mut().for_each(|part| part.internal = f64::NAN);
+        }
+        Outcome::Forces { partials, .. }
+            if !partials.is_empty() && failpoint::in_cycle("nan-force", cycle) =>
+        {
+            partials[0] = f64::NAN;
+        }
+        _ => {}
+    }
+    outcome
 }
 
 /// What tasks took on this host, with the share of contact as the threads' own clocks have it. The wall clock tells that
@@ -231,7 +291,9 @@ impl Watch {
             return Ok(());
         }
         let (theirs, ours) = ((header.job, header.epoch), (self.place.job, self.place.epoch));
-        if theirs != ours {
+        // The others may be in their next epoch when one that asked to leave is released.
+        let released = matches!(message, ToWorker::Release) && theirs.0 == ours.0 && theirs.1 > ours.1;
+        if theirs != ours && !released {
             return Err(Error::Message(format!(
                 "{} frame of job {} epoch {}, this worker has job {} epoch {}",
                 header.kind, theirs.0, theirs.1, ours.0, ours.1

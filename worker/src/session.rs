@@ -103,7 +103,10 @@ pub enum Task {
         walls: Vec<Pose>,
     },
     /// State of all sub-domains.
-    Image,
+    Image {
+        /// Nothing is computed on them after that.
+        last: bool,
+    },
 }
 
 /// What came of a task.
@@ -250,6 +253,11 @@ impl Session {
             imaged: false,
             whole: false,
         }
+    }
+
+    /// Whether it has no job.
+    pub fn is_idle(&self) -> bool {
+        self.phase == Phase::Idle
     }
 
     /// The cycle it is in.
@@ -464,6 +472,7 @@ impl Session {
                 self.begin_cycle(actions)
             }
             (Phase::Packing, Outcome::Transferred(state)) => {
+                all_finite("position or velocity", &state)?;
                 if !state.is_empty() {
                     actions.push(Action::Send(ToMaster::Transfer { cycle: self.cycle, state }));
                 }
@@ -479,6 +488,7 @@ impl Session {
                 self.try_boundary(actions)
             }
             (Phase::Border, Outcome::Forces { partials, gathered }) => {
+                all_finite("partial force", &partials)?;
                 let vote = self.vote.take();
                 let (cycle, busy) = (self.cycle, Work::default());
                 if self.route == Route::Master {
@@ -538,7 +548,7 @@ impl Session {
         }
         if (stop || collect) && !self.imaged {
             self.phase = Phase::Imaging;
-            actions.push(Action::Compute(Task::Image));
+            actions.push(Action::Compute(Task::Image { last: stop }));
             return Ok(());
         }
         if gather {
@@ -647,6 +657,16 @@ impl Session {
         }
         Ok(Some(totals))
     }
+}
+
+/// What leaves a worker is finite: numbers that are none stay with the worker that made them.
+fn all_finite(what: &str, values: &[f64]) -> Result<(), String> {
+    // Without a way out of the loop it takes a vector at a time.
+    if values.iter().fold(true, |all, value| all & value.is_finite()) {
+        return Ok(());
+    }
+    let bad = values.iter().position(|value| !value.is_finite()).unwrap_or_default();
+    Err(format!("{what} {} of {} is {}, must be finite", bad + 1, values.len(), values[bad]))
 }
 
 /// The numbers, `stride` each, of these nodes.

@@ -45,8 +45,7 @@ pub(crate) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
                 }
                 let nodes = face.map(|c| corners[c]);
                 let element = (offsets[p] + e) as u32;
-                let mut key = nodes;
-                key.sort_unstable();
+                let Some(key) = key_of(nodes) else { continue };
                 keyed.push((
                     key,
                     order,
@@ -71,6 +70,19 @@ pub(crate) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
     }
     keyed.sort_unstable_by_key(|(_, order, _)| *order);
     keyed.into_iter().map(|(_, _, face)| face).collect()
+}
+
+/// What two elements at a face have in common: its nodes, each once. None where an element that repeats corners has
+/// drawn the face to an edge.
+fn key_of(mut nodes: [u32; 4]) -> Option<[u32; 4]> {
+    nodes.sort_unstable();
+    for i in 1..4 {
+        if nodes[i] == nodes[i - 1] {
+            nodes[i - 1] = u32::MAX;
+        }
+    }
+    nodes.sort_unstable();
+    (nodes[2] != u32::MAX).then_some(nodes)
 }
 
 /// The index into [`mechanics::mesh::FACES`] of the face with these corners.
@@ -103,9 +115,11 @@ pub(crate) fn smallest_face_dimension(
     let mut smallest = f64::INFINITY;
     for face in faces.iter().filter(|face| meets[face.part as usize] && !face.inside) {
         for side in 0..4 {
-            let [a, b] =
-                [side, (side + 1) % 4].map(|corner| assembly.mesh.positions[face.nodes[corner] as usize]);
-            smallest = smallest.min(norm(sub(a, b)));
+            let ends = [side, (side + 1) % 4].map(|corner| face.nodes[corner]);
+            if ends[0] != ends[1] {
+                let [a, b] = ends.map(|node| assembly.mesh.positions[node as usize]);
+                smallest = smallest.min(norm(sub(a, b)));
+            }
         }
     }
     (smallest > 0.0 && smallest.is_finite()).then_some(smallest)

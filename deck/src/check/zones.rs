@@ -33,31 +33,8 @@ pub(crate) fn overlaps(
     contact: &ContactDraft,
     faults: &Faults<'_>,
 ) {
-    let n = parts.len();
-    let surfaces: Vec<Surface> = (0..n).map(|p| Surface::of(p as u32, assembly, &contact.faces)).collect();
     let gap = contact.settings.gap;
-    let mut found: BTreeMap<(usize, usize), Worst> = BTreeMap::new();
-    for (a, nodes) in surfaces.iter().enumerate() {
-        for (b, faces) in surfaces.iter().enumerate() {
-            let pair = (a.min(b), a.max(b));
-            let apart = a == b
-                || !contact.settings.interacts[a * n + b]
-                || assembly.joined.binary_search(&pair).is_ok();
-            if apart || !nodes.meets(faces, gap) {
-                continue;
-            }
-            if let Some(worst) = worst_node(nodes, faces, assembly, gap) {
-                let deeper = |old: &Worst| {
-                    (worst.inside && !old.inside)
-                        || (worst.inside == old.inside && worst.distance < old.distance)
-                };
-                let entry = found.entry(pair).or_insert(worst);
-                if deeper(entry) {
-                    *entry = worst;
-                }
-            }
-        }
-    }
+    let found = worst_of_pairs(assembly, &contact.settings.interacts, &contact.faces, gap);
     for ((a, b), worst) in found {
         let (line, _) = faults.place(parts[a].at);
         let id = assembly.mesh.node_ids[worst.node as usize];
@@ -73,6 +50,45 @@ pub(crate) fn overlaps(
             "move one of them, join them, or switch the pair off in [[contact.pair]]",
         );
     }
+}
+
+/// The least distance of a node of one part from the surface of another that it may meet, as far as it is below
+/// `within`; 0 where a node is inside.
+pub(crate) fn clearance(assembly: &Assembly, interacts: &[bool], faces: &[Face], within: f64) -> Option<f64> {
+    let found = worst_of_pairs(assembly, interacts, faces, within);
+    found.values().map(|w| if w.inside { 0.0 } else { w.distance }).min_by(f64::total_cmp)
+}
+
+/// The worst node of each pair of parts that are nearer than `gap`, lower part first.
+fn worst_of_pairs(
+    assembly: &Assembly,
+    interacts: &[bool],
+    faces: &[Face],
+    gap: f64,
+) -> BTreeMap<(usize, usize), Worst> {
+    let n = assembly.mesh.parts.len();
+    let surfaces: Vec<Surface> = (0..n).map(|p| Surface::of(p as u32, assembly, faces)).collect();
+    let mut found: BTreeMap<(usize, usize), Worst> = BTreeMap::new();
+    for (a, nodes) in surfaces.iter().enumerate() {
+        for (b, faces) in surfaces.iter().enumerate() {
+            let pair = (a.min(b), a.max(b));
+            let apart = a == b || !interacts[a * n + b] || assembly.joined.binary_search(&pair).is_ok();
+            if apart || !nodes.meets(faces, gap) {
+                continue;
+            }
+            if let Some(worst) = worst_node(nodes, faces, assembly, gap) {
+                let deeper = |old: &Worst| {
+                    (worst.inside && !old.inside)
+                        || (worst.inside == old.inside && worst.distance < old.distance)
+                };
+                let entry = found.entry(pair).or_insert(worst);
+                if deeper(entry) {
+                    *entry = worst;
+                }
+            }
+        }
+    }
+    found
 }
 
 /// The outer faces and nodes of one part, and the box around them.

@@ -4,14 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mechanics::{
     load::{Drive, Loads, SurfaceKind, SurfaceLoad},
-    setup::Constraint,
+    setup::{Constraint, MAX_WALLS},
     wall::RigidWall,
 };
 
 use super::{MAX_ENTRIES, Names, PartDraft, curve::Curves, load, wall};
 use crate::{
     assembly::Assembly,
-    check::outer_faces,
+    check::{Face, outer_faces},
+    fault::nearest,
     geometry::{dot, norm, scaled, sub},
     table::{Range, Table, Value},
 };
@@ -112,13 +113,23 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembl
             "take the nodes out of one of the two",
         );
     }
+    let mut walls = Vec::new();
+    // By node: the walls that name it, one bit each. Walls that name parts are bound at the start of a run.
+    let mut touched: BTreeMap<u32, u32> = BTreeMap::new();
+    for table in deck.tables("wall", MAX_ENTRIES) {
+        let at = table.at;
+        let Some((wall, nodes)) = wall::read(table, names, assembly, &curves) else { continue };
+        if nodes.is_some() && walls.len() >= MAX_WALLS {
+            deck.faults.add(at, "a wall by nodes after 32 others", "at most 32 walls", "join some");
+            continue;
+        }
+        for node in nodes.into_iter().flatten() {
+            *touched.entry(node).or_default() |= 1 << walls.len();
+        }
+        walls.push(wall);
+    }
     let (constraints, constraint) =
-        number(deck, &boundaries, &prescribed, &clamps, &loads.forces, assembly.mesh.n_nodes());
-    let walls = deck
-        .tables("wall", MAX_ENTRIES)
-        .into_iter()
-        .filter_map(|table| wall::read(table, names, assembly, &curves))
-        .collect();
+        number(deck, &boundaries, &prescribed, &clamps, &loads.forces, &touched, assembly.mesh.n_nodes());
     let loads = Loads { curves: curves.list, ..loads.list };
     Conditions { constraints, constraint, walls, loads }
 }
@@ -130,18 +141,21 @@ fn number(
     prescribed: &BTreeMap<u32, [Option<usize>; 3]>,
     clamps: &BTreeMap<u32, u8>,
     forces: &BTreeMap<u32, u32>,
+    touched: &BTreeMap<u32, u32>,
     n_nodes: usize,
 ) -> (Vec<Constraint>, Vec<u16>) {
     let mut list = vec![Constraint::default()];
-    let mut known: BTreeMap<([DriveBits; 3], u32, u8), u16> = BTreeMap::new();
+    let mut known: BTreeMap<([DriveBits; 3], u32, u32, u8), u16> = BTreeMap::new();
     let mut of_node = vec![0u16; n_nodes];
-    let nodes: BTreeSet<u32> = prescribed.keys().chain(clamps.keys()).chain(forces.keys()).copied().collect();
+    let nodes: BTreeSet<u32> =
+        prescribed.keys().chain(clamps.keys()).chain(forces.keys()).chain(touched.keys()).copied().collect();
     for node in nodes {
         let held = prescribed.get(&node).copied().unwrap_or_default();
         let forces = forces.get(&node).copied().unwrap_or_default();
+        let walls = touched.get(&node).copied().unwrap_or_default();
         let clamped = clamps.get(&node).copied().unwrap_or_default();
         let velocity = [0, 1, 2].map(|axis| held[axis].and_then(|b| boundaries[b].velocity[axis]));
-        let key = (velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve))), forces, clamped);
+        let key = (velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve))), forces, walls, clamped);
         let next = list.len();
         let index = match known.get(&key) {
             Some(index) => *index,
@@ -155,7 +169,7 @@ fn number(
                     );
                     return (list, of_node);
                 };
-                list.push(Constraint { velocity, walls: 0, forces, clamped });
+                list.push(Constraint { velocity, walls, forces, clamped });
                 known.insert(key, index);
                 index
             }
@@ -189,12 +203,16 @@ fn read_boundary(
             (velocity, 0b111 & !(1 << axis), nodes)
         }
         kind => {
-            let velocity = if kind == "fixed" { read_axes(table) } else { read_velocity(table, curves) };
-            let nodes = read_nodes(table, &selected, assembly);
             let clamped = match table.get("rotations") {
                 None => Some(0),
                 Some(value) => read_letters(value),
             };
+            let velocity = if kind == "fixed" {
+                read_axes(table, clamped.is_some_and(|clamped| clamped != 0))
+            } else {
+                read_velocity(table, curves)
+            };
+            let nodes = read_nodes(table, &selected, assembly);
             (velocity?, clamped?, nodes?)
         }
     };
@@ -236,8 +254,8 @@ fn read_letters(value: Value<'_>) -> Option<u8> {
     Some(bits)
 }
 
-/// `axes = "xy"`: zero velocity on those; all three where it is absent.
-fn read_axes(table: &Table<'_>) -> Option<Prescribed> {
+/// `axes = "xy"`: zero velocity on those; all three where it is absent. It may be empty where rotations are held.
+fn read_axes(table: &Table<'_>, turns_held: bool) -> Option<Prescribed> {
     let Some(value) = table.get("axes") else { return Some([Some(Drive::constant(0.0)); 3]) };
     let text = value.text()?;
     let mut velocity = [None; 3];
@@ -250,7 +268,7 @@ fn read_axes(table: &Table<'_>) -> Option<Prescribed> {
             }
         }
     }
-    if velocity.iter().all(Option::is_none) {
+    if velocity.iter().all(Option::is_none) && !turns_held {
         value.fault("some of the letters x, y, z", "write for instance \"xz\"");
         return None;
     }
@@ -299,6 +317,19 @@ pub(super) fn read_nodes(table: &Table<'_>, selected: &[usize], assembly: &Assem
             plane.finish();
             let (point, normal) = (point?, normal?);
             Some(choose(assembly, selected, |x, near| dot(sub(x, point), normal).abs() <= near))
+        }
+        [("nodes", value)] if value.is_text() => {
+            let name = value.text()?;
+            let set = assembly.sets.get(name);
+            if set.is_none() {
+                let known = assembly.sets.keys().map(String::as_str);
+                let advice = match nearest(name, known) {
+                    Some(near) => format!("write \"{near}\""),
+                    None => "add the set to the mesh file".to_string(),
+                };
+                value.fault("the name of a set of a mesh file", &advice);
+            }
+            Some(set?.clone())
         }
         [("nodes", value)] => {
             let mut nodes = Vec::new();
@@ -390,8 +421,11 @@ pub(super) fn read_faces(
 ) -> Vec<(u32, u8)> {
     let selected = names.of_table(table);
     let broken = selected.is_empty() || selected.iter().any(|&p| parts[p].block.is_none());
-    let Some(nodes) = read_nodes(table, &selected, assembly) else { return Vec::new() };
     let outer = outer_faces(assembly);
+    if let Some(value) = table.get("segments") {
+        return read_segments(value, assembly, &outer);
+    }
+    let Some(nodes) = read_nodes(table, &selected, assembly) else { return Vec::new() };
     let chosen = outer.iter().filter(|face| {
         !face.inside
             && selected.contains(&(face.part as usize))
@@ -407,4 +441,31 @@ pub(super) fn read_faces(
         );
     }
     faces
+}
+
+/// The outer faces of a named set of a mesh file, whichever way round the file lists their nodes.
+fn read_segments(value: Value<'_>, assembly: &Assembly, outer: &[Face]) -> Vec<(u32, u8)> {
+    let Some(name) = value.text() else { return Vec::new() };
+    let Some(set) = assembly.segments.get(name) else {
+        let advice = match nearest(name, assembly.segments.keys().map(String::as_str)) {
+            Some(near) => format!("write \"{near}\""),
+            None => "add the segments to the mesh file".to_string(),
+        };
+        value.fault("the name of segments of a mesh file", &advice);
+        return Vec::new();
+    };
+    let sorted = |mut nodes: [u32; 4]| {
+        nodes.sort_unstable();
+        nodes
+    };
+    let wanted: BTreeSet<[u32; 4]> = set.iter().map(|face| sorted(*face)).collect();
+    let found: Vec<&Face> =
+        outer.iter().filter(|face| !face.inside && wanted.contains(&sorted(face.nodes))).collect();
+    if found.len() < wanted.len() || found.is_empty() {
+        value.fault(
+            &format!("{} outer faces of parts; {} of them are", wanted.len(), found.len()),
+            "take out those that are not, and those that two parts share",
+        );
+    }
+    found.into_iter().map(|face| (face.element, face.side)).collect()
 }

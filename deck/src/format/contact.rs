@@ -5,7 +5,7 @@ use mechanics::{contact::Settings, load::Drive, material::Material, setup::Const
 use super::{MAX_CONTACT_PARTS, MAX_ENTRIES, Names, boundary::Conditions};
 use crate::{
     assembly::Assembly,
-    check::{Face, outer_faces, smallest_face_dimension},
+    check::{Face, clearance, outer_faces, smallest_face_dimension},
     fault::short,
     geometry::{norm, sub},
     table::{Range, Table},
@@ -20,9 +20,16 @@ pub(crate) struct ContactDraft {
 
 /// Default gap over the smallest face dimension.
 const GAP_FRACTION: f64 = 0.1;
-/// Default slack over the gap. A node travels at most 20 % of the gap in a cycle, so lists last a dozen
-/// cycles at the least.
-const SLACK_GAPS: f64 = 2.5;
+/// Least gap over the smallest face dimension that fits itself to bodies which start close: the time step shrinks with
+/// the gap.
+const FIT_LEAST: f64 = 0.01;
+/// A gap that fits over the distance of the bodies.
+const FIT_SHARE: f64 = 0.95;
+/// Default slack over the gap. Two nodes travel at most 40 % of the gap against each other in a cycle, so lists last ten
+/// cycles at the least: two for votes and orders, eight for a sort.
+const SLACK_GAPS: f64 = 4.0;
+/// Default slack over the gap where that is more than half a face: longer lists would cost more than sorts.
+const LEAST_SLACK_GAPS: f64 = 2.5;
 /// Default friction velocity over the largest difference of initial velocities.
 const FRICTION_VELOCITY: f64 = 0.01;
 /// Default friction velocity over the largest bulk sound speed where nothing moves at the start.
@@ -48,7 +55,8 @@ pub(crate) fn read(
         return None;
     }
     let friction = table.number_or("friction", 0.0, Range::NotNegative);
-    let mut interacts: Vec<bool> = (0..n * n).map(|i| i / n != i % n).collect();
+    let others = table.get("default_interacts").and_then(|v| v.boolean()).unwrap_or(true);
+    let mut interacts: Vec<bool> = (0..n * n).map(|i| others && i / n != i % n).collect();
     let mut frictions = vec![friction; n * n];
     if let Some(value) = table.get("self_interaction") {
         for p in names.several(value).unwrap_or_default() {
@@ -57,17 +65,28 @@ pub(crate) fn read(
     }
     read_pairs(&table, names, &mut interacts, &mut frictions);
     let faces = outer_faces(assembly);
-    let gap = read_gap(&table, smallest_face_dimension(assembly, &faces, &interacts));
+    let smallest = smallest_face_dimension(assembly, &faces, &interacts);
+    let gap = match table.get("gap_fraction").filter(|v| v.is_text()) {
+        Some(value) if value.one_of(&["fit"]).is_some() => {
+            let fit = |face: f64| {
+                // A gap of half the thickness stands for it.
+                let most = thinnest(assembly, &interacts).map_or(GAP_FRACTION * face, |h| 0.5 * h.min(face));
+                let clearance = clearance(assembly, &interacts, &faces, most);
+                clearance.map_or(most, |d| (FIT_SHARE * d).clamp(FIT_LEAST * face, most))
+            };
+            smallest.map(fit)
+        }
+        Some(_) => None,
+        None => read_gap(&table, smallest),
+    };
     let slack = match (table.get("slack_gaps"), table.get("slack_length")) {
         (Some(_), Some(second)) => {
             second.fault("one of slack_gaps and slack_length", "remove one of the two");
             None
         }
         (None, Some(length)) => length.number(Range::Positive),
-        (gaps, None) => {
-            let gaps = gaps.map_or(Some(SLACK_GAPS), |v| v.number(Range::Positive));
-            gaps.zip(gap).map(|(gaps, gap)| gaps * gap)
-        }
+        (Some(gaps), None) => gaps.number(Range::Positive).zip(gap).map(|(gaps, gap)| gaps * gap),
+        (None, None) => gap.map(|gap| default_slack(gap, smallest)),
     };
     let stiffness =
         table.number_or("stiffness", 0.5, Range::Within(0.0, 1.0, "a number above 0 and at most 1"));
@@ -96,6 +115,14 @@ pub(crate) fn read(
     Some(ContactDraft { settings, faces })
 }
 
+/// The least thickness of shells that interact.
+fn thinnest(assembly: &Assembly, interacts: &[bool]) -> Option<f64> {
+    let parts = &assembly.mesh.parts;
+    let meets = |p: usize| interacts[p * parts.len()..(p + 1) * parts.len()].contains(&true);
+    let of_shells = (0..parts.len()).filter(|&p| meets(p)).filter_map(|p| parts[p].section());
+    of_shells.map(|section| section.thickness).min_by(f64::total_cmp)
+}
+
 /// `[[contact.pair]]`: whether two parts interact, and their friction.
 fn read_pairs(table: &Table<'_>, names: &Names, interacts: &mut [bool], frictions: &mut [f64]) {
     let n = names.len();
@@ -122,6 +149,12 @@ fn read_pairs(table: &Table<'_>, names: &Names, interacts: &mut [bool], friction
             }
         }
     }
+}
+
+/// Default slack for a gap and the smallest face dimension (lengths).
+fn default_slack(gap: f64, smallest: Option<f64>) -> f64 {
+    let wide = smallest.map_or(f64::INFINITY, |face| 0.5 * face);
+    (SLACK_GAPS * gap).min(wide).max(LEAST_SLACK_GAPS * gap)
 }
 
 /// The gap as a length; outside 10 % to 50 % of the smallest face dimension it is a fault.
@@ -170,6 +203,7 @@ fn read_gap(table: &Table<'_>, smallest: Option<f64>) -> Option<f64> {
 /// rest where there is a wall or one part only); where nothing moves, 1e-5 of the largest sound speed.
 fn default_friction_velocity(assembly: &Assembly, materials: &[Material], conditions: &Conditions) -> f64 {
     let mut velocities = assembly.part_velocity.clone();
+    velocities.extend(&assembly.file_velocities);
     // At its greatest, where it follows a curve.
     let speed = |v: Drive| v.greatest(&conditions.loads.curves).copysign(v.factor);
     let of_constraint = |c: &Constraint| c.velocity.map(|v| v.map_or(0.0, speed));

@@ -11,10 +11,19 @@ use crate::{
 
 /// Reads `[output]` and every `[[gauge]]`.
 pub(crate) fn read(deck: &Table<'_>, names: &Names, assembly: &Assembly) -> Output {
-    let mut output = Output { period: None, history_cycles: 10, fields: Vec::new(), gauges: Vec::new() };
+    let mut output = Output {
+        period: None,
+        history_cycles: 10,
+        snapshot_seconds: None,
+        snapshot_cycles: None,
+        fields: Vec::new(),
+        gauges: Vec::new(),
+    };
     if let Some(table) = deck.get("output").and_then(|v| v.table("[output]".to_string())) {
         output.period = table.get("period").and_then(|v| v.number(Range::Positive));
         output.history_cycles = table.integer_or("history_cycles", 10, 1, 1_000_000_000) as u32;
+        output.snapshot_seconds = table.get("snapshot_seconds").and_then(|v| v.number(Range::Positive));
+        output.snapshot_cycles = table.get("snapshot_cycles").and_then(|v| v.integer(1, 1_000_000_000));
         output.fields = read_fields(&table);
         table.finish();
     }

@@ -7,10 +7,11 @@ use mechanics::{
     mesh::{Section, Topology},
 };
 
-use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, shape};
+use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, Meshes, shape};
 use crate::{
     blocks::Block,
     geometry::{norm, scaled},
+    mesh_file::Body,
     table::{Range, Table, Value},
 };
 
@@ -39,10 +40,12 @@ pub(crate) struct Explicit {
     pub(crate) node_places: Vec<usize>,
     /// Offset of each element in the text.
     pub(crate) element_places: Vec<usize>,
+    /// The file it comes from, whose parts share nodes.
+    pub(crate) file: Option<String>,
 }
 
 /// Reads every part. A part with a fault keeps its place in the list, so that others may refer to it.
-pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials) -> Vec<PartDraft> {
+pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials, meshes: &Meshes) -> Vec<PartDraft> {
     let tables = deck.tables("part", MAX_PARTS);
     if tables.is_empty() && !deck.has("part") {
         deck.faults.add(0, "a deck without [[part]]", "at least one part", "add a [[part]]");
@@ -71,12 +74,19 @@ pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials) -> Vec<Par
             .require("material", "a material by name or as an inline table")
             .and_then(|v| materials.resolve(v, &name, fracture));
         let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
-        let (mut block, explicit) = read_mesh(&table, &name, &mut budget);
-        if let Some(block) = &mut block {
+        let (mut block, explicit) = read_mesh(&table, &name, meshes, &mut budget);
+        let movable = explicit.as_ref().is_none_or(|own| own.file.is_none());
+        if let Some(block) = &mut block
+            && movable
+        {
             transform(&table, block);
         } else {
             // The keys are known even where there is nothing to move.
-            let _ = (table.get("rotate"), table.get("translate"));
+            for key in [table.get("rotate"), table.get("translate")].into_iter().flatten() {
+                if !movable {
+                    key.fault("a mesh file where it is", "move the nodes in the file");
+                }
+            }
         }
         table.finish();
         parts.push(PartDraft { name, at, material, velocity, block, explicit });
@@ -114,7 +124,12 @@ impl Budget {
 }
 
 /// The mesh of a part: exactly one of the blocks, or `mesh`.
-fn read_mesh(table: &Table<'_>, name: &str, budget: &mut Budget) -> (Option<Block>, Option<Explicit>) {
+fn read_mesh(
+    table: &Table<'_>,
+    name: &str,
+    meshes: &Meshes,
+    budget: &mut Budget,
+) -> (Option<Block>, Option<Explicit>) {
     const KINDS: [&str; 7] = ["box", "cylinder", "sphere", "tube", "plate", "prism", "mesh"];
     let shell = table.get("shell");
     let section = shell.and_then(|value| read_section(value, name));
@@ -147,7 +162,12 @@ fn read_mesh(table: &Table<'_>, name: &str, budget: &mut Budget) -> (Option<Bloc
         if shell.is_some() && section.is_none() {
             return (None, None);
         }
-        return match read_explicit(inner, budget, section) {
+        let read = if inner.has("file") {
+            read_file(inner, name, meshes, budget, section)
+        } else {
+            read_explicit(inner, budget, section)
+        };
+        return match read {
             Some((block, explicit)) => (Some(block), Some(explicit)),
             None => (None, None),
         };
@@ -191,6 +211,7 @@ fn read_explicit(
         element_ids: Vec::new(),
         node_places: Vec::new(),
         element_places: Vec::new(),
+        file: None,
     };
     let mut positions = Vec::new();
     let mut index: BTreeMap<u32, u32> = BTreeMap::new();
@@ -289,6 +310,95 @@ fn read_explicit(
     };
     let block = Block { positions, topology, faces: Vec::new() };
     clean.then_some((block, explicit))
+}
+
+/// `file = "name"` and `body = "name"`: a body of a mesh file, by default the one called like the part.
+fn read_file(
+    table: Table<'_>,
+    part: &str,
+    meshes: &Meshes,
+    budget: &mut Budget,
+    section: Option<Section>,
+) -> Option<(Block, Explicit)> {
+    let file = table.require("file", "the name of a mesh file")?;
+    let name = file.text();
+    let body = table.get("body");
+    let body_name = body.map_or(Some(part), |v| v.text());
+    let (at, title) = (table.at, table.title.clone());
+    let (name, body_name) = (name?, body_name?);
+    let Some(mesh) = meshes.get(name) else {
+        file.fault("a mesh file that can be read", "put it beside the deck, or correct the name");
+        table.finish();
+        return None;
+    };
+    let holds =
+        |body: &&Body| if section.is_some() { !body.shells.is_empty() } else { !body.solids.is_empty() };
+    if section.is_none() && mesh.body(body_name).is_some_and(|body| !body.shells.is_empty()) {
+        let read = format!("the shells of body \"{body_name}\" in part \"{part}\"");
+        table.faults.add(at, read, "their thickness", "add shell = { thickness = ... } to the part");
+        table.finish();
+        return None;
+    }
+    let Some(found) = mesh.body(body_name).filter(holds) else {
+        let names: Vec<&str> = mesh.bodies.iter().filter(holds).map(|b| b.name.as_str()).take(20).collect();
+        let what = if section.is_some() { "shells" } else { "solids" };
+        body.unwrap_or(file).fault(
+            &format!("a body with {what} of that file ({})", names.join(", ")),
+            "choose one with body = \"name\"",
+        );
+        table.finish();
+        return None;
+    };
+    let mut index: BTreeMap<u32, u32> = BTreeMap::new();
+    for id in found.corners() {
+        index.entry(id).or_insert(0);
+    }
+    let n_elements = found.solids.len() + found.shells.len();
+    let all = found.solids.iter().map(|(id, corners)| (id, &corners[..]));
+    let mut all = all.chain(found.shells.iter().map(|(id, corners)| (id, &corners[..])));
+    let distinct =
+        |corners: &[u32]| (0..corners.len()).filter(|&i| !corners[..i].contains(&corners[i])).count();
+    let (kinds, expected): (&[usize], _) = match section {
+        None => (&[4, 5, 6, 8], "eight, or six, five or four of a wedge, a pyramid or a tetrahedron"),
+        Some(_) => (&[3, 4], "four, or three of a triangle"),
+    };
+    if let Some((id, corners)) = all.find(|(_, corners)| !kinds.contains(&distinct(corners))) {
+        let read = format!("element {id} with {} different corners", distinct(corners));
+        table.faults.add(at, read, expected, "correct the element");
+        table.finish();
+        return None;
+    }
+    budget.take(Some((index.len() as u64, n_elements as u64)), at, &title, &table)?;
+    let mut positions = Vec::with_capacity(index.len());
+    let mut node_ids = Vec::with_capacity(index.len());
+    // Nodes in the order of the file.
+    for (id, x) in &mesh.nodes {
+        if let Some(local) = index.get_mut(id) {
+            *local = positions.len() as u32;
+            positions.push(*x);
+            node_ids.push(*id);
+        }
+    }
+    let topology = match section {
+        None => Topology::Explicit {
+            hexahedra: found.solids.iter().map(|(_, corners)| corners.map(|id| index[&id])).collect(),
+        },
+        Some(section) => Topology::Shells {
+            quads: found.shells.iter().map(|(_, corners)| corners.map(|id| index[&id])).collect(),
+            section,
+        },
+    };
+    let ids = found.solids.iter().map(|(id, _)| id).chain(found.shells.iter().map(|(id, _)| id));
+    let element_ids: Vec<u32> = ids.copied().collect();
+    table.finish();
+    let explicit = Explicit {
+        node_places: vec![at; node_ids.len()],
+        element_places: vec![at; element_ids.len()],
+        node_ids,
+        element_ids,
+        file: Some(name.to_string()),
+    };
+    Some((Block { positions, topology, faces: Vec::new() }, explicit))
 }
 
 /// `rotate`, then `translate`.

@@ -7,7 +7,7 @@ use mechanics::{
 
 use super::{
     Names,
-    boundary::{ON_PLANE, read_direction, read_velocity},
+    boundary::{ON_PLANE, read_direction, read_nodes, read_velocity},
     curve::Curves,
 };
 use crate::{
@@ -18,13 +18,13 @@ use crate::{
 
 const SHAPES: [&str; 3] = ["plane", "cylinder", "sphere"];
 
-/// Reads one `[[wall]]`; a part that starts inside it is a fault.
+/// Reads one `[[wall]]`, with its nodes where it names some; a body that starts inside it is a fault.
 pub(crate) fn read(
     table: Table<'_>,
     names: &Names,
     assembly: &Assembly,
     curves: &Curves,
-) -> Option<RigidWall> {
+) -> Option<(RigidWall, Option<Vec<u32>>)> {
     let kind = match table.get("shape") {
         // Which keys belong depends on the shape, so without one none is called unknown.
         Some(value) => value.one_of(&SHAPES)?,
@@ -48,15 +48,18 @@ pub(crate) fn read(
     let friction = table.number_or("friction", 0.0, Range::NotNegative);
     let motion = read_motion(&table, curves);
     let selected = names.of_table(&table);
+    let chosen = if table.has("nodes") { Some(read_nodes(&table, &selected, assembly)?) } else { None };
     let (at, title, faults) = (table.at, table.title.clone(), table.faults);
     table.finish();
     let (shape, motion) = (shape?, motion?);
     let mut parts = vec![false; names.len()];
     for &p in &selected {
-        parts[p] = true;
+        parts[p] = chosen.is_none();
         let part = &assembly.mesh.parts[p];
         let height = |node: u32| shape.height(assembly.mesh.positions[node as usize]).0;
-        let deepest = part.nodes.iter().copied().min_by(|a, b| height(*a).total_cmp(&height(*b)));
+        let felt = |node: &u32| chosen.as_ref().is_none_or(|list| list.binary_search(node).is_ok());
+        let nodes = part.nodes.iter().copied().filter(felt);
+        let deepest = nodes.min_by(|a, b| height(*a).total_cmp(&height(*b)));
         let Some(deepest) = deepest else { continue };
         if height(deepest) < -ON_PLANE * assembly.smallest_edge[p] {
             let plane = matches!(shape, Shape::Plane { .. });
@@ -81,7 +84,7 @@ pub(crate) fn read(
             );
         }
     }
-    Some(RigidWall { shape, motion, friction, parts })
+    Some((RigidWall { shape, motion, friction, parts }, chosen))
 }
 
 /// `velocity` and `mass`: with a mass the velocity is that of the start.

@@ -32,6 +32,8 @@ pub(super) struct Member {
     pub(super) hand: Hand,
     /// Not lost.
     pub(super) alive: bool,
+    /// It wants to go, at the next plan boundary.
+    pub(super) leaves: bool,
 }
 
 /// What a base holds beside the state.
@@ -168,13 +170,19 @@ impl Job {
 
     /// A worker has come: it is taken in at the next plan boundary, or at once by a job that waits.
     pub(super) fn joined(&mut self, hand: Hand, actions: &mut Vec<Action>) -> Result<(), String> {
-        self.members.push(Member { hand, alive: true });
+        self.members.push(Member { hand, alive: true, leaves: false });
         if self.epoch.crew.is_empty() { self.next_epoch(actions) } else { Ok(()) }
     }
 
     /// Whether somebody waits to be taken in.
     pub(super) fn has_newcomers(&self) -> bool {
-        self.members.iter().filter(|member| member.alive).count() > self.epoch.n()
+        self.members.iter().filter(|member| member.alive && !member.leaves).count()
+            > self.epoch.crew.iter().filter(|&&member| !self.members[member].leaves).count()
+    }
+
+    /// Whether somebody wants to go.
+    pub(super) fn has_leavers(&self) -> bool {
+        self.epoch.crew.iter().any(|&member| self.members[member].leaves)
     }
 
     /// Everything that was booked after the base is forgotten, here and in the results.
@@ -195,25 +203,34 @@ impl Job {
         vote: Vote,
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
-        let step = |cycle: u64| {
-            self.epoch.steps.get(&cycle).copied().ok_or_else(|| format!("cycle {cycle} was not ordered"))
-        };
         let cycle = state.cycle;
-        let (now, before) = (step(cycle)?, step(cycle.saturating_sub(1))?);
-        let rest = Rest {
-            dt_previous: before.dt,
-            dt: Some(now.dt),
-            quanta: [now.quantum, self.epoch.quantum],
+        let rest = self.rest_at(cycle, vote)?;
+        self.base = Arc::new(Base { state: Arc::new(state), rest });
+        self.store(cycle, actions);
+        self.adopt_proposal(cycle);
+        for &member in &self.epoch.crew {
+            if self.members[member].leaves {
+                self.members[member].alive = false;
+                actions.push(Action::Send(member, ToWorker::Release));
+            }
+        }
+        self.next_epoch(actions)
+    }
+
+    /// What a base at the start of a cycle holds beside the state, once the cycle before is booked with this vote.
+    pub(super) fn rest_at(&self, cycle: u64, vote: Vote) -> Result<Rest, String> {
+        let step = self.epoch.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
+        let before = cycle.checked_sub(1).and_then(|cycle| self.epoch.steps.get(&cycle));
+        Ok(Rest {
+            dt_previous: before.map_or(0.0, |step| step.dt),
+            dt: Some(step.dt),
+            quanta: [step.quantum, self.epoch.quantum],
             vote: Some(vote),
             walls: self.walls.clone(),
             ledger: self.ledger.clone(),
             n_rows: self.rows.len(),
             spread_rate: self.epoch.spread_rate,
-        };
-        self.base = Arc::new(Base { state: Arc::new(state), rest });
-        self.store(cycle, actions);
-        self.adopt_proposal(cycle);
-        self.next_epoch(actions)
+        })
     }
 
     /// Deals the base out to all that are alive; with nobody, the job waits.
@@ -222,7 +239,15 @@ impl Job {
         let crew: Vec<usize> = (0..self.members.len()).filter(|&m| self.members[m].alive).collect();
         let nobody = crew.is_empty();
         self.epoch = self.deal(number, crew, actions)?;
-        if nobody && self.stop_asked { self.finish_at_base(actions) } else { Ok(()) }
+        if self.lean {
+            self.forget_base();
+        }
+        if nobody && self.leaves {
+            self.suspend_at_base(actions);
+        } else if nobody && self.stop_asked {
+            return self.finish_at_base(actions);
+        }
+        Ok(())
     }
 
     /// The user does not want to wait for a worker any longer.

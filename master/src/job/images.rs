@@ -46,8 +46,9 @@ impl Job {
             return Ok(());
         }
         let Some(collected) = self.epoch.collecting.remove(&cycle) else { return Ok(()) };
-        let mut state = GlobalState::clone(&self.base.state);
-        for piece in &collected.pieces {
+        let before = &self.base.state;
+        let mut state = if before.is_static() { before.to_fill() } else { GlobalState::clone(before) };
+        for piece in collected.pieces {
             piece::put_back(piece, &mut state)?;
         }
         state.cycle = cycle;
@@ -68,7 +69,7 @@ impl Job {
             }
             Some(vote) => {
                 self.book_last(cycle, &vote, actions);
-                self.end_with(state, actions)
+                self.stopped(state, vote, actions)
             }
             None => {
                 if due {
@@ -96,12 +97,14 @@ impl Job {
         if state.cycle > self.first_cycle && last != Some(state.cycle - 1) {
             self.row(actions);
         }
-        actions.push(Action::State(Box::new(state.clone())));
+        if self.options.states {
+            actions.push(Action::State(Box::new(state.clone())));
+        }
         self.finish(Some(state), actions);
         Ok(())
     }
 
-    /// The newest base, once both halves of it are here; and to the disk where that was asked for.
+    /// The newest base, once both halves of it are here; and to the disk where that is asked for.
     pub(super) fn complete_base(&mut self, cycle: u64, actions: &mut Vec<Action>) {
         let Some(Halves { state: Some(_), rest: Some(_) }) = self.epoch.halves.get(&cycle) else { return };
         let Some(Halves { state: Some(state), rest: Some(rest) }) = self.epoch.halves.remove(&cycle) else {
@@ -111,23 +114,34 @@ impl Job {
         self.store(cycle, actions);
     }
 
-    /// Stores the base if it is the one that was asked for.
+    /// Gives the base to the sink, where that is asked for.
     pub(super) fn store(&self, cycle: u64, actions: &mut Vec<Action>) {
-        let Base { state, rest } = &*self.base;
-        let (Some(vote), Some(dt)) = (rest.vote.clone(), rest.dt) else { return };
-        if self.options.snapshot_at == Some(cycle) {
-            let snapshot = Snapshot {
-                state: GlobalState::clone(state),
-                dt_previous: rest.dt_previous,
-                dt,
-                force_quanta: rest.quanta,
-                spread_rate: rest.spread_rate,
-                vote,
-                walls: rest.walls.clone(),
-                ledger: rest.ledger.clone(),
-                rows: self.rows[..rest.n_rows].to_vec(),
-            };
-            actions.push(Action::Snapshot(Box::new(snapshot)));
+        if self.options.snapshot_at == Some(cycle)
+            && let Some(snapshot) = self.base_as_snapshot()
+        {
+            actions.push(Action::Snapshot(snapshot));
         }
+        if self.options.store
+            && let Some(snapshot) = self.base_as_snapshot()
+        {
+            actions.push(Action::Base { snapshot, last: false });
+        }
+    }
+
+    /// The base as it is stored; none at the start of a run, which the deck gives as well.
+    pub(super) fn base_as_snapshot(&self) -> Option<Box<Snapshot>> {
+        let Base { state, rest } = &*self.base;
+        Some(Box::new(Snapshot {
+            state: Arc::clone(state),
+            dt_previous: rest.dt_previous,
+            dt: rest.dt?,
+            force_quanta: rest.quanta,
+            spread_rate: rest.spread_rate,
+            vote: rest.vote.clone()?,
+            walls: rest.walls.clone(),
+            ledger: rest.ledger.clone(),
+            rows: self.rows[..rest.n_rows].to_vec(),
+            states: Vec::new(),
+        }))
     }
 }

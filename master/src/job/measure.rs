@@ -131,7 +131,7 @@ impl Job {
             return None;
         }
         let mut elements = vec![0.0; n];
-        for subdomain in decompose(&self.model.mesh, &speeds) {
+        for subdomain in decompose(&self.model.mesh, &speeds, self.options.costs.node) {
             elements[subdomain.worker] += subdomain.region.n_elements() as f64;
         }
         // Contact in elements, dealt out by speed.

@@ -4,7 +4,7 @@ use mechanics::{contact::reach, exact::Quantum, vote::Vote, wall::Motion};
 use protocol::message::Orders;
 
 use super::{Job, start::output_after};
-use crate::event::{Action, Keep, Limit};
+use crate::event::{Action, Limit};
 /// Part of the slack kept free for a rate of spread that rises between the trigger of a sort and the cycle it acts at:
 /// surfaces that shake change it threefold in a few cycles.
 const SPREAD_MARGIN: f64 = 0.25;
@@ -27,6 +27,7 @@ impl Job {
         let after = next + 1;
         if self.epoch.stop_at.is_none() {
             let ends = self.stop_asked
+                || self.leaves
                 || self.failure.is_some()
                 || time_after >= control.end_time
                 || after >= control.end_cycle;
@@ -73,23 +74,23 @@ impl Job {
 
     /// Whether the epoch is to end at a boundary.
     fn wants_next_epoch(&mut self, boundary: u64) -> bool {
-        boundary > self.epoch.first_cycle && (self.has_newcomers() || self.wants_other_speeds(boundary))
+        boundary > self.epoch.first_cycle
+            && (self.has_newcomers() || self.has_leavers() || self.wants_other_speeds(boundary))
     }
 
     /// Whether the state at the start of a cycle is to be kept, to go back to.
     fn base_due(&mut self, cycle: u64, actions: &mut Vec<Action>) -> bool {
-        let due = match self.options.keep {
-            Keep::Never => false,
-            Keep::Seconds(seconds) => {
-                let due = self.keep_due && self.is_boundary(cycle);
-                if due {
-                    self.keep_due = false;
-                    actions.push(Action::Timer(seconds));
-                }
-                due
-            }
-            Keep::Cycles(n) => cycle >= self.epoch.last_base + n && self.is_boundary(cycle),
-        };
+        let keep = self.options.keep;
+        let in_time = self.keep_due;
+        let in_cycles = keep.cycles().is_some_and(|n| cycle >= self.epoch.last_base.saturating_add(n));
+        let due = (in_time || in_cycles) && self.is_boundary(cycle);
+        if due
+            && in_time
+            && let Some(seconds) = keep.seconds()
+        {
+            self.keep_due = false;
+            actions.push(Action::Timer(seconds));
+        }
         if due {
             self.epoch.last_base = cycle;
         }

@@ -29,9 +29,10 @@ use super::{
 };
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
-    decompose::{self, decompose},
-    event::{Action, Deal, Hand, Keep, Options},
-    exchange::{Exchange, Holdings},
+    decompose::{self, decompose, work},
+    event::{Action, Deal, Hand, Options},
+    exchange::Exchange,
+    holdings::Holdings,
     ledger::Ledger,
     snapshot::Snapshot,
     sort::Sorter,
@@ -60,7 +61,8 @@ impl Job {
         let mut setup = model.setup.clone();
         let mut constraint = model.constraint.clone();
         initial::bind_walls(&model.mesh, &mut setup, &mut constraint)?;
-        let start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
+        let mut start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
+        initial::spin(&mut start, &setup.constraints, &model.spin);
         let quanta = initial::quanta(&model.mesh, &setup, &start);
         let (base, rows) = match resume {
             None => {
@@ -97,7 +99,7 @@ impl Job {
                     n_rows: snapshot.rows.len(),
                     spread_rate: snapshot.spread_rate,
                 };
-                (Base { state: Arc::new(snapshot.state), rest }, snapshot.rows)
+                (Base { state: snapshot.state, rest }, snapshot.rows)
             }
         };
         let mut model = model;
@@ -122,15 +124,21 @@ impl Job {
         let mut job = Self {
             quanta,
             touching: touching.transpose()?,
-            members: hands.iter().map(|hand| Member { hand: hand.clone(), alive: true }).collect(),
+            members: hands
+                .iter()
+                .map(|hand| Member { hand: hand.clone(), alive: true, leaves: false })
+                .collect(),
             epoch: Epoch::without_workers(0, &base, &model),
             ledger: base.rest.ledger.clone(),
             walls: base.rest.walls.clone(),
             base: Arc::new(base),
             keep_due: false,
+            lean: false,
             first_cycle,
             lanes: String::new(),
             stop_asked: false,
+            leaves: false,
+            blamed: Vec::new(),
             failure: None,
             proposal: None,
             patience: Patience::default(),
@@ -149,10 +157,25 @@ impl Job {
         let mut actions = Vec::new();
         job.epoch = job.deal(0, (0..hands.len()).collect(), &mut actions)?;
         job.sorts = u64::from(job.census.units > 0);
-        if let Keep::Seconds(seconds) = keep {
+        if let Some(seconds) = keep.seconds() {
             actions.push(Action::Timer(seconds));
         }
         Ok((job, actions))
+    }
+
+    /// From now on no state is kept to go back to: for a crew of which nobody can be lost, as it shares this process.
+    pub fn keep_no_state(&mut self) {
+        self.lean = true;
+        self.forget_base();
+    }
+
+    /// Drops what only going back would need of the base that has been dealt out.
+    pub(super) fn forget_base(&mut self) {
+        let state = Arc::new(self.base.state.statics());
+        if let Some(bench) = self.epoch.bench.as_mut().and_then(Arc::get_mut) {
+            bench.state = Arc::clone(&state);
+        }
+        self.base = Arc::new(Base { state, rest: self.base.rest.clone() });
     }
 
     /// Deals the base out to a crew, as epoch `number`.
@@ -163,6 +186,9 @@ impl Job {
         actions: &mut Vec<Action>,
     ) -> Result<Epoch, String> {
         let base = Arc::clone(&self.base);
+        if base.state.is_static() {
+            return Err(format!("no state of cycle {} is kept to go back to", base.state.cycle));
+        }
         let mut epoch = Epoch::without_workers(number, &base, &self.model);
         let n = crew.len();
         if n == 0 {
@@ -172,9 +198,11 @@ impl Job {
         let (model, state) = (&self.model, &base.state);
         let hands: Vec<&Hand> = crew.iter().map(|&member| &self.members[member].hand).collect();
         let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
-        let layout = decompose(&model.mesh, &speeds);
+        let costs = self.options.costs;
+        let layout = decompose(&model.mesh, &speeds, costs.node);
         let threads: Vec<u32> = hands.iter().map(|hand| hand.threads).collect();
-        let cut = Cut::new(model, state, &layout, &threads, self.touching.as_ref());
+        let held = work(&layout, n, costs.node);
+        let cut = Cut::new(model, state, (&layout, held), &threads, self.touching.as_ref());
         let mut elements = vec![0.0; n];
         for s in &layout {
             elements[s.worker] += s.region.n_elements() as f64;
@@ -188,6 +216,7 @@ impl Job {
                     speeds.clone(),
                     self.options.route,
                     self.options.dealing,
+                    costs.pair,
                     &cut.gather,
                 );
                 let x = sorter.positions_of(state);
@@ -309,7 +338,7 @@ impl Cut {
     fn new(
         model: &Model,
         state: &GlobalState,
-        layout: &[decompose::Subdomain],
+        (layout, work): (&[decompose::Subdomain], Vec<f64>),
         threads: &[u32],
         touching: Option<&Touching>,
     ) -> Self {
@@ -329,7 +358,7 @@ impl Cut {
             nodes_of.push(nodes);
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
         }
-        let holdings = Holdings::new(model.mesh.n_nodes(), n, layout, &nodes_of);
+        let holdings = Holdings::new(model.mesh.n_nodes(), work, layout, &nodes_of);
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
         for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {

@@ -182,6 +182,21 @@ fn a_job_without_workers_that_is_stopped_ends_with_the_state_it_went_back_to() {
 }
 
 #[test]
+fn a_job_that_keeps_no_state_sorts_all_the_same_and_says_so_when_a_worker_is_lost() {
+    let (mut job, _) = job(2);
+    let bench = job.epoch.bench.clone().expect("the cubes may meet");
+    let x = bench.sorter.positions_of(job.start_state());
+    let interactions = bench.sort(&x).interactions;
+    drop(bench);
+    job.keep_no_state();
+    let bench = job.epoch.bench.clone().expect("as before");
+    assert!(bench.state.is_static() && bench.sort(&x).interactions == interactions);
+    let actions = job.apply(Event::Lost(0, "cable".into()));
+    let says = |a: &Action| matches!(a, Action::Over(o) if o.failure.as_deref() == Some("no state of cycle 0 is kept to go back to"));
+    assert!(actions.iter().any(says));
+}
+
+#[test]
 fn a_sort_of_an_epoch_that_is_over_is_of_no_use() {
     let (mut job, _) = job(2);
     let bench = job.epoch.bench.clone().expect("the cubes may meet");

@@ -1,5 +1,7 @@
 //! The verdict on a cycle: its vote is booked, and a run whose physics went wrong is stopped with its reason.
 
+use std::sync::Arc;
+
 use mechanics::{contact::reach, vote::Vote};
 
 use super::{Job, epoch::Step};
@@ -59,7 +61,7 @@ impl Job {
     }
 
     pub(super) fn row(&mut self, actions: &mut Vec<Action>) {
-        self.rows.push(self.ledger.last.clone());
+        self.rows.push(Arc::new(self.ledger.last.clone()));
         actions.push(Action::Row(Box::new(self.ledger.last.clone())));
     }
 

@@ -14,7 +14,7 @@ use crate::event::{Loss, Rebalance};
 
 /// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no
 /// others.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Title of the deck.
     pub title: String,
@@ -282,7 +282,7 @@ fn grouped(n: u64) -> String {
 }
 
 /// Six significant digits, with an exponent outside 0.001 to 1,000,000.
-fn significant(x: f64) -> String {
+pub(super) fn significant(x: f64) -> String {
     let magnitude = x.abs();
     if x == 0.0 {
         "0".to_owned()

@@ -12,7 +12,7 @@ use deck::{
 use toml::de::DeTable;
 
 use super::{
-    machines::Change,
+    machines::{Change, What},
     network::{Network, Wires},
 };
 
@@ -42,7 +42,7 @@ pub struct Cluster {
     pub sort: f64,
     /// The network.
     pub network: Network,
-    /// Changes of speed.
+    /// What happens to hosts.
     pub changes: Vec<Change>,
     /// Tables to print with `--table`.
     pub tables: Option<Tables>,
@@ -214,16 +214,47 @@ fn read_network(file: &Table<'_>) -> Option<Network> {
 }
 
 fn read_changes(file: &Table<'_>, n_hosts: usize) -> Option<Vec<Change>> {
-    let mut changes = Vec::new();
+    let (mut changes, mut all) = (Vec::new(), true);
     for event in file.tables("event", MAX_ENTRIES) {
         let host =
             event.require("host", "the number of a host").and_then(|v| v.integer(1, n_hosts.max(1) as u64));
         let cycle = event.require("cycle", "a cycle").and_then(|v| v.integer(1, u64::from(u32::MAX)));
-        let speed = event.number("speed", Range::Positive);
+        let what = read_event(&event);
+        if let (Some(1), Some(What::Die | What::Stop(_) | What::Join), Some(value)) =
+            (host, what, event.get("host"))
+        {
+            value.fault("a host from 2 on", "the master is on host 1, and stays");
+        }
         event.finish();
-        changes.push(Change { host: host? as usize - 1, cycle: cycle?, speed: speed? });
+        match (host, cycle, what) {
+            (Some(host), Some(cycle), Some(what)) => {
+                changes.push(Change { host: host as usize - 1, cycle, what });
+            }
+            _ => all = false,
+        }
     }
-    Some(changes)
+    all.then_some(changes)
+}
+
+/// Exactly one of `speed`, `die`, `stop_seconds` and `join`.
+fn read_event(event: &Table<'_>) -> Option<What> {
+    let on = |key: &'static str| event.get(key).and_then(|value| value.boolean()).filter(|on| *on);
+    let number = |key: &'static str| event.get(key).and_then(|value| value.number(Range::Positive));
+    let found = [
+        number("speed").map(What::Speed),
+        on("die").map(|_| What::Die),
+        number("stop_seconds").map(What::Stop),
+        on("join").map(|_| What::Join),
+    ];
+    let mut found = found.into_iter().flatten();
+    let (first, more) = (found.next(), found.next().is_some());
+    if more && let Some(value) = event.get("cycle") {
+        value.fault("one thing at a time", "give each its own [[event]]");
+    }
+    if first.is_none() {
+        event.require("speed", "speed = X, die = true, stop_seconds = X or join = true")?;
+    }
+    first
 }
 
 fn read_tables(file: &Table<'_>, n_hosts: usize) -> Option<Option<Tables>> {
@@ -278,6 +309,18 @@ mod tests {
         let lines: Vec<u32> = faults.iter().map(|f| f.line).collect();
         assert_eq!(lines, [3, 4, 9, 11], "{faults:?}");
         assert!(faults[2].to_string().contains("sport"), "{}", faults[2]);
+    }
+
+    #[test]
+    fn hosts_die_stop_and_join_but_the_first_one() {
+        let events = "[[event]]\nhost = 2\ncycle = 5\ndie = true\n[[event]]\nhost = 2\ncycle = 9\nstop_seconds = 3\n[[event]]\nhost = 2\ncycle = 2\njoin = true\n";
+        let cluster = read(&format!("{GOOD}{events}"), "good.toml").expect("three events");
+        let what: Vec<What> = cluster.changes.iter().map(|change| change.what).collect();
+        assert_eq!(what, [What::Die, What::Stop(3.0), What::Join]);
+        let bad = "[[event]]\nhost = 1\ncycle = 5\ndie = true\n[[event]]\nhost = 2\ncycle = 5\n[[event]]\nhost = 2\ncycle = 5\ndie = true\nspeed = 2\n";
+        let faults = read(&format!("{GOOD}{bad}"), "bad.toml").expect_err("three faults were put in");
+        let lines: Vec<u32> = faults.iter().map(|f| f.line).collect();
+        assert_eq!(lines, [17, 20, 25], "{faults:?}");
     }
 
     #[test]

@@ -7,7 +7,10 @@ use super::{
     network::Network,
     timeline::{Kind, Phases},
 };
-use crate::{balance::Dealing, event::Balance};
+use crate::{
+    balance::{self, Dealing},
+    event::Balance,
+};
 
 /// What work costs on a host of speed 1 (s).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,6 +28,12 @@ pub struct Costs {
 }
 
 impl Costs {
+    /// What the master deals out work by: relative to an element.
+    pub fn relative(&self) -> balance::Costs {
+        let of = |seconds: f64| if self.element > 0.0 { seconds / self.element } else { 0.0 };
+        balance::Costs { node: of(self.node), pair: of(self.pair) }
+    }
+
     /// Contact, elements and integration of a task (s).
     pub fn of(&self, task: Kind, load: &Load) -> Phases {
         let elements = |n: u64| self.element * n as f64;
@@ -52,20 +61,49 @@ pub struct Machines {
     pub costs: Costs,
     /// The network.
     pub network: Network,
-    /// Changes of speed, by cycle.
+    /// What happens to hosts, by cycle.
     pub changes: Vec<Change>,
 }
 
-/// A host's speed changes when its worker starts a cycle.
+impl Machines {
+    /// Whether hosts come and go.
+    pub fn come_and_go(&self) -> bool {
+        self.changes.iter().any(|change| !matches!(change.what, What::Speed(_)))
+    }
+
+    /// Whether a host is there only from a later cycle on.
+    pub fn comes_later(&self, host: usize) -> bool {
+        self.changes.iter().any(|change| change.host == host && change.what == What::Join)
+    }
+}
+
+/// Something happens to a host when its worker starts a cycle; if it is not there, when the first host's worker does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Host, from 0.
     pub host: usize,
     /// The cycle.
     pub cycle: u64,
-    /// Relative speed from then on.
-    pub speed: f64,
+    /// What happens.
+    pub what: What,
 }
+
+/// What happens to a host.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum What {
+    /// It has another relative speed from then on.
+    Speed(f64),
+    /// Its worker dies and its connections close: the master hears of it after the latency of the network.
+    Die,
+    /// It stands still for so long (s), as a stopped process does. Silent for longer than [`SILENCE`] it is given up; when it
+    /// goes on, it dials again and joins anew.
+    Stop(f64),
+    /// It joins.
+    Join,
+}
+
+/// After so long without a byte the master gives a host up (s).
+pub const SILENCE: f64 = 10.0;
 
 /// How the program itself goes about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

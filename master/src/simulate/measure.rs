@@ -1,8 +1,8 @@
 //! `--measure-costs`: what an element, a node, a pair, a search, a sort and a message cost on this machine.
 //!
 //! A problem runs on one emulated host, its tasks one after the other on one thread, and the thread-CPU time of each is
-//! taken: an element-cycle out of tasks that compute elements alone, and so on. Of every task the median over the run
-//! counts, and of repetitions the median again. These are the constants of cluster files; nothing else sets them.
+//! taken: an element-cycle out of tasks that compute elements alone, and so on. Sorts are taken from a second run, on as many
+//! hosts as the cluster has, for lists of what they share are part of a sort. Of every task the median over the run counts, and of repetitions the median again. These are the constants of cluster files; nothing else sets them.
 
 use std::{
     fmt::Write as _,
@@ -59,12 +59,12 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Measures once.
 ///
 /// # Errors
-/// Whatever keeps the run from its end, a problem without sorts, sockets.
-pub fn once(model: &Arc<Model>, lanes: Option<Width>) -> Result<Measured, String> {
+/// Whatever keeps the runs from their end, a problem without sorts, sockets.
+pub fn once(model: &Arc<Model>, hosts: usize, lanes: Option<Width>) -> Result<Measured, String> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| e.to_string())?;
-    let one = Machines {
-        speeds: vec![1.0],
-        believed: vec![1.0],
+    let machines = |hosts: usize| Machines {
+        speeds: vec![1.0; hosts],
+        believed: vec![1.0; hosts],
         costs: Costs { element: 1.0, ..Costs::default() },
         network: Network {
             wires: Wires::Switch,
@@ -77,10 +77,12 @@ pub fn once(model: &Arc<Model>, lanes: Option<Width>) -> Result<Measured, String
         },
         changes: Vec::new(),
     };
-    let (_, tape) = pool.install(|| {
-        virtual_clock::run(model, &one, Scheme { lanes, ..Scheme::bolide(Route::Direct) }, None)
-    })?;
-    let tape = tape.ok_or("a run that computes keeps a tape")?;
+    let run = |hosts: usize| {
+        let scheme = Scheme { lanes, ..Scheme::bolide(Route::Direct) };
+        let (_, tape) = pool.install(|| virtual_clock::run(model, &machines(hosts), scheme, None))?;
+        tape.ok_or_else(|| "a run that computes keeps a tape".to_owned())
+    };
+    let tape = run(1)?;
     let per = |kind: Kind, count: fn(&mechanics::cycle::Load) -> u64| -> Vec<f64> {
         let tasks = tape.workers.iter().flatten().filter(|taped| taped.kind() == kind);
         tasks
@@ -92,7 +94,7 @@ pub fn once(model: &Arc<Model>, lanes: Option<Width>) -> Result<Measured, String
     let node = median(per(Kind::Integrate, |load| load.nodes));
     let pair = median(per(Kind::Border, |load| load.pairs));
     let install = median(per(Kind::Install, |load| load.pairs));
-    let sort = median(tape.sort_ns.clone());
+    let sort = median(run(hosts)?.sort_ns);
     if element <= 0.0 || pair <= 0.0 || install <= 0.0 || sort <= 0.0 {
         return Err("no plan began to act in the run: take a deck with contact, or more --cycles".to_owned());
     }
@@ -172,10 +174,11 @@ fn messages() -> std::io::Result<[f64; 2]> {
 /// As [`once`].
 pub fn run(
     model: &Arc<Model>,
+    hosts: usize,
     lanes: Option<Width>,
     repetitions: u32,
 ) -> Result<(Vec<Measured>, Measured), String> {
-    let all: Vec<Measured> = (0..repetitions).map(|_| once(model, lanes)).collect::<Result<_, _>>()?;
+    let all: Vec<Measured> = (0..repetitions).map(|_| once(model, hosts, lanes)).collect::<Result<_, _>>()?;
     let of = |get: fn(&Measured) -> f64| median(all.iter().map(get).collect());
     let medians = Measured {
         element_ns: of(|m| m.element_ns),

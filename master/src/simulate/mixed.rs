@@ -16,7 +16,7 @@ use mechanics::{
 use serde::Serialize;
 
 use crate::{
-    balance,
+    balance::{self, Costs},
     decompose::{Subdomain, decompose, work},
 };
 
@@ -109,24 +109,25 @@ impl Sorted {
         let x: Vec<[f64; 3]> =
             surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
         let exclusions = Exclusions::new(&surface, &initial_pairs(&surface, &x, settings));
-        let units = contact::sort(&surface, &x, settings, &exclusions);
-        let weights = balance::pairs(&units, &surface, &x, settings);
+        let mut units = contact::sort(&surface, &x, settings, &exclusions);
+        let weights = contact::cull(&mut units, &surface, &x, settings, &exclusions);
         Ok(Self { model, surface, exclusions, x, units, weights })
     }
 
-    /// What hosts of these speeds come to. `pair` is the cost of a pair in elements.
-    pub fn row(&self, edge: u32, seed: u64, speeds: &[f64], pair: f64) -> Row {
+    /// What hosts of these speeds come to. `costs` in elements.
+    pub fn row(&self, edge: u32, seed: u64, speeds: &[f64], costs: Costs) -> Row {
+        let Costs { node, pair } = costs;
         let mesh = &self.model.mesh;
-        let layout = decompose(mesh, speeds);
+        let layout = decompose(mesh, speeds, node);
         let elements = elements_of(&layout, speeds.len());
         let owner = owners(mesh, &layout);
         let owner = |node: u32| owner[self.surface.nodes[node as usize] as usize] as usize;
-        let held = work(&layout, speeds.len());
-        let chosen = balance::assign(&self.units, &self.weights, speeds, &held, &owner);
+        let held = work(&layout, speeds.len(), node);
+        let chosen = balance::assign(&self.units, (&self.weights, pair), speeds, &held, &owner);
         let pairs = self.pairs(&chosen, speeds.len());
 
         let slabs = slabs(mesh, speeds);
-        let whole = decompose(mesh, &[1.0]);
+        let whole = decompose(mesh, &[1.0], node);
         let slab_owner = owners(mesh, &slabs);
         let slab_owner = |node: u32| slab_owner[self.surface.nodes[node as usize] as usize] as usize;
         let slab_chosen = balance::assign_to_owners(&self.units, speeds.len(), &slab_owner);
@@ -139,8 +140,8 @@ impl Sorted {
             speeds: speeds.to_vec(),
             elements_over_bound: over_bound(&elements, &vec![0; speeds.len()], pair, speeds),
             time_over_bound: over_bound(&held, &pairs, pair, speeds),
-            slabs_over_bound: over_bound(&work(&slabs, speeds.len()), &slab_pairs, pair, speeds),
-            copies: held.iter().sum::<f64>() / work(&whole, 1)[0],
+            slabs_over_bound: over_bound(&work(&slabs, speeds.len(), node), &slab_pairs, pair, speeds),
+            copies: held.iter().sum::<f64>() / work(&whole, 1, node)[0],
             pairs: pairs.iter().sum(),
             interactions: self.units.iter().map(|unit| unit.interactions).sum(),
         }
@@ -234,16 +235,16 @@ fn slabs(mesh: &Mesh, speeds: &[f64]) -> Vec<Subdomain> {
 ///
 /// # Errors
 /// As [`plates`] and [`Sorted::new`].
-pub fn run(hosts: usize, edges: &[u32], seeds: u64, pair: f64) -> Result<Vec<Row>, String> {
+pub fn run(hosts: usize, edges: &[u32], seeds: u64, costs: Costs) -> Result<Vec<Row>, String> {
     let mut rows = Vec::new();
     for &edge in edges {
         let sorted = Sorted::new(plates(edge)?)?;
         let equal = EQUAL.iter().filter(|(of, _)| *of == edge).flat_map(|(_, hosts)| hosts.iter());
         for &n in equal {
-            rows.push(sorted.row(edge, 0, &speeds(n, 0), pair));
+            rows.push(sorted.row(edge, 0, &speeds(n, 0), costs));
         }
         for seed in 1..=seeds {
-            rows.push(sorted.row(edge, seed, &speeds(hosts, seed), pair));
+            rows.push(sorted.row(edge, seed, &speeds(hosts, seed), costs));
         }
     }
     Ok(rows)
@@ -280,7 +281,7 @@ mod tests {
 
     #[test]
     fn a_mixed_lab_is_near_its_bound_with_contact_and_slabs_are_not() {
-        for row in run(16, &[30], 1, 1.0).expect("the plates have contact") {
+        for row in run(16, &[30], 1, Costs { node: 0.1, pair: 1.0 }).expect("the plates have contact") {
             println!("{row:?}");
             if row.seed == 0 {
                 assert_eq!(row.elements_over_bound, 1.0, "the paper's cells divide evenly: {row:?}");

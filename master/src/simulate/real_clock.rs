@@ -31,7 +31,7 @@ use worker::{
 };
 
 use super::{
-    machines::{Machines, Scheme},
+    machines::{Machines, Scheme, What},
     processor::{Processor, Rank},
     timeline::{Flight, Kind, Span, Timeline, counts_at, phases_at},
 };
@@ -213,7 +213,8 @@ pub fn run(
         .map(|(i, &speed)| Hand { name: format!("host-{}", i + 1), speed, threads: 1 })
         .collect();
     let scheme = Scheme::bolide(route);
-    let options = Options { route, dealing: scheme.dealing, ..Options::default() };
+    let options =
+        Options { route, dealing: scheme.dealing, costs: machines.costs.relative(), ..Options::default() };
     let (job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
     let (send, receive) = mpsc::channel();
     let arrived =
@@ -450,7 +451,10 @@ impl Clock<'_> {
         let cycle = self.places[worker].session.cycle();
         self.timeline.end_cycle(worker, cycle, self.now);
         for change in self.machines.changes.iter().filter(|c| c.host == worker && c.cycle == cycle + 1) {
-            self.processors[worker].set_speed(self.now, change.speed);
+            // Hosts that come and go are refused before the run.
+            if let What::Speed(speed) = change.what {
+                self.processors[worker].set_speed(self.now, speed);
+            }
         }
     }
 
@@ -580,6 +584,8 @@ impl Clock<'_> {
                 Action::Row(_)
                 | Action::State(_)
                 | Action::Snapshot(_)
+                | Action::Base { .. }
+                | Action::Dismiss(..)
                 | Action::Progress(_)
                 | Action::Dealt(_)
                 | Action::Rewind { .. }

@@ -77,7 +77,7 @@ impl Kept {
                 | (Self::Computed, Task::Elements { .. } | Task::Interior { .. })
                 | (Self::Forces(..), Task::Install { .. } | Task::Border { .. })
                 | (Self::Integrated(_), Task::Integrate { .. })
-                | (Self::Image, Task::Image)
+                | (Self::Image, Task::Image { .. })
         )
     }
 }

@@ -3,7 +3,7 @@
 use mechanics::cycle::Load;
 use worker::session::Task;
 
-use crate::event::Rebalance;
+use crate::event::{Loss, Rebalance};
 
 /// Seconds of a worker's cycle by what they went into, at the speed of its host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -67,7 +67,7 @@ impl Kind {
             Task::Border { .. } => Kind::Border,
             Task::Interior { .. } => Kind::Interior,
             Task::Integrate { .. } => Kind::Integrate,
-            Task::Image => Kind::Image,
+            Task::Image { .. } => Kind::Image,
         }
     }
 }
@@ -136,6 +136,8 @@ pub struct Timeline {
     pub flights: Vec<Flight>,
     /// When work was dealt out by other speeds.
     pub rebalances: Vec<Rebalance>,
+    /// Hosts that were lost.
+    pub losses: Vec<Loss>,
     /// Digest of the final state.
     pub digest: String,
 }
@@ -181,6 +183,9 @@ impl Timeline {
     pub fn end_cycle(&mut self, worker: usize, cycle: u64, now: f64) {
         let ends = &mut self.ends[worker];
         let wall = now - ends.last().copied().unwrap_or(0.0);
+        // What a run that went back does again counts when it is done again; cycles before a host joined are the others'.
+        ends.truncate(cycle as usize);
+        ends.resize(cycle as usize, 0.0);
         ends.push(now);
         let phases = phases_at(&mut self.phases[worker], cycle);
         phases.wait = (wall - phases.busy()).max(0.0);
@@ -235,7 +240,9 @@ impl Timeline {
         let window = self.window();
         let cycles = (window.end - window.start).max(1) as f64;
         let mut mean = Phases::default();
-        for p in &self.phases[worker][window.start as usize..window.end as usize] {
+        // A host may have come later or gone earlier.
+        let there = self.phases[worker].iter().take(window.end as usize);
+        for p in there.skip(window.start as usize) {
             mean.border += p.border / cycles;
             mean.contact += p.contact / cycles;
             mean.interior += p.interior / cycles;

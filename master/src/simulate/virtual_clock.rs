@@ -23,7 +23,7 @@ use protocol::{
 use worker::session::{self, Session, Task};
 
 use super::{
-    machines::{Machines, Scheme},
+    machines::{self, Machines, SILENCE, Scheme},
     network::{Stage, Traffic},
     processor::{Processor, Rank},
     tape::{Player, Tape},
@@ -31,11 +31,16 @@ use super::{
 };
 use crate::{
     embedded::timed_sort,
-    event::{Action, Event, Hand, Options},
+    event::{Action, Event, Hand, Keep, Options},
     job::Job,
     sort::Sorted,
 };
 use agenda::{Begun, Due, End, Parcel, What, Work};
+
+/// How often the state is kept while hosts come and go, as the master does where nothing else is asked (s).
+const KEEP_SECONDS: f64 = 10.0;
+/// The part of its speed that a host which stands still has.
+const STANDSTILL: f64 = 1e-12;
 
 struct Place {
     session: Session,
@@ -44,12 +49,20 @@ struct Place {
     busy: protocol::message::Work,
     /// Messages that wait for the end of a task: without overlap.
     held: Vec<Parcel>,
+    /// Its index in the job, since it last joined.
+    member: Option<usize>,
+    /// Counts how often it died or was given up.
+    incarnation: u32,
 }
 
 struct Clock<'a> {
     machines: &'a Machines,
     overlap: bool,
     job: Job,
+    /// By index in the job: host, and its incarnation then.
+    members: Vec<(usize, u32)>,
+    /// Of the machines' changes: those that have happened, which a run that goes back does not repeat.
+    happened: Vec<bool>,
     places: Vec<Place>,
     sorts: VecDeque<Sorted>,
     sorts_kept: Vec<Sorted>,
@@ -79,15 +92,15 @@ pub fn run(
     tape: Option<&Tape>,
 ) -> Result<(Timeline, Option<Tape>), String> {
     let n = machines.speeds.len();
-    let hands: Vec<Hand> = machines
-        .believed
-        .iter()
-        .enumerate()
-        .map(|(i, &speed)| Hand { name: format!("host-{}", i + 1), speed, threads: 1 })
-        .collect();
+    let first_crew: Vec<usize> = (0..n).filter(|&host| !machines.comes_later(host)).collect();
+    let hands: Vec<Hand> = first_crew.iter().map(|&host| hand(machines, host)).collect();
+    let come_and_go = machines.come_and_go();
     let options = Options {
+        keep: if come_and_go { Keep::Seconds(KEEP_SECONDS) } else { Keep::Never },
+        waits: come_and_go,
         route: scheme.route,
         dealing: scheme.dealing,
+        costs: machines.costs.relative(),
         balance: scheme.balance,
         lanes: scheme.lanes.map(|width| width.to_string()),
         ..Options::default()
@@ -111,8 +124,12 @@ pub fn run(
                 player,
                 busy: Default::default(),
                 held: Vec::new(),
+                member: None,
+                incarnation: 0,
             })
             .collect(),
+        members: first_crew.iter().map(|&host| (host, 0)).collect(),
+        happened: vec![false; machines.changes.len()],
         sorts: tape.map(|tape| tape.sorts.iter().cloned().collect()).unwrap_or_default(),
         sorts_kept: Vec::new(),
         sort_ns: Vec::new(),
@@ -127,6 +144,9 @@ pub fn run(
         timeline: Timeline { ends: vec![Vec::new(); n], phases: vec![Vec::new(); n], ..Timeline::default() },
         over: false,
     };
+    for (member, host) in first_crew.into_iter().enumerate() {
+        clock.places[host].member = Some(member);
+    }
     clock.master_acts(first)?;
     clock.drive()?;
     let Clock { mut timeline, places, sorts_kept, sort_ns, .. } = clock;
@@ -144,6 +164,11 @@ pub fn run(
         .collect();
     let digest = timeline.digest.clone();
     Ok((timeline, Some(Tape { workers, sorts: sorts_kept, sort_ns, digest })))
+}
+
+/// A host as the job sees it.
+fn hand(machines: &Machines, host: usize) -> Hand {
+    Hand { name: format!("host-{}", host + 1), speed: machines.believed[host], threads: 1 }
 }
 
 impl Clock<'_> {
@@ -168,6 +193,23 @@ impl Clock<'_> {
                 What::Arrives(parcel) => {
                     self.now = time;
                     self.take_in(parcel);
+                }
+                What::Timer => {
+                    self.now = time;
+                    let actions = self.job.apply(Event::Timer);
+                    self.master_acts(actions)?;
+                }
+                What::Lost(member, why) => {
+                    self.now = time;
+                    self.lost(member, why)?;
+                }
+                What::GoesOn(host, speed) => {
+                    self.now = time;
+                    self.processors[host].set_speed(time, speed);
+                    self.foresee(host);
+                    if self.places[host].member.is_none() {
+                        self.join(host)?;
+                    }
                 }
             }
         }
@@ -195,10 +237,52 @@ impl Clock<'_> {
     fn parcel(&mut self, from: End, to: End, packed: Packed) -> Parcel {
         let bytes = packed.wire_bytes();
         let worker = if from == End::Master { to.host() } else { from.host() };
-        let session = &self.places[worker].session;
-        let (epoch, cycle) = (session.epoch(), session.cycle());
+        let place = &self.places[worker];
+        let (epoch, cycle) = (place.session.epoch(), place.session.cycle());
+        let member = place.member.unwrap_or(usize::MAX);
+        let incarnations = [from, to].map(|end| self.incarnation(end));
         self.parcels += 1;
-        Parcel { number: self.parcels, from, to, packed, bytes, epoch, cycle, sent: self.now }
+        let (number, sent) = (self.parcels, self.now);
+        Parcel { number, from, to, packed, bytes, incarnations, member, epoch, cycle, sent }
+    }
+
+    /// The master has one.
+    fn incarnation(&self, end: End) -> u32 {
+        match end {
+            End::Master => 0,
+            End::Worker(host) => self.places[host].incarnation,
+        }
+    }
+
+    /// Whether both ends of a message are those that they were when it was sent.
+    fn stands(&self, parcel: &Parcel) -> bool {
+        [parcel.from, parcel.to].map(|end| self.incarnation(end)) == parcel.incarnations
+    }
+
+    /// What a host was, it is no more: its process has ended, or its connections have.
+    fn end_incarnation(&mut self, host: usize) -> Option<usize> {
+        let place = &mut self.places[host];
+        place.incarnation += 1;
+        place.session = Session::new();
+        place.held.clear();
+        place.member.take()
+    }
+
+    /// The master gives a worker up.
+    fn lost(&mut self, member: usize, why: String) -> Result<(), String> {
+        let (host, incarnation) = self.members[member];
+        if self.places[host].incarnation == incarnation && self.places[host].member == Some(member) {
+            self.end_incarnation(host);
+        }
+        let actions = self.job.apply(Event::Lost(member, why));
+        self.master_acts(actions)
+    }
+
+    fn join(&mut self, host: usize) -> Result<(), String> {
+        self.places[host].member = Some(self.members.len());
+        self.members.push((host, self.places[host].incarnation));
+        let actions = self.job.apply(Event::Joined(hand(self.machines, host)));
+        self.master_acts(actions)
     }
 
     fn hand_over(&mut self, parcel: Parcel) {
@@ -210,6 +294,9 @@ impl Clock<'_> {
     }
 
     fn take_in(&mut self, parcel: Parcel) {
+        if !self.stands(&parcel) {
+            return;
+        }
         let host = parcel.to.host();
         if parcel.from.host() != host {
             let hosts = (parcel.from.host(), host);
@@ -250,6 +337,8 @@ impl Clock<'_> {
             _ => from,
         };
         match work {
+            Work::Send(parcel) | Work::Receive(parcel) if !self.stands(&parcel) => Ok(()),
+            Work::Task(worker, incarnation, ..) if self.places[worker].incarnation != incarnation => Ok(()),
             Work::Send(parcel) => {
                 self.span(host, parcel.from == End::Master, Kind::Send, from, Some(parcel.number));
                 if parcel.to.host() == host {
@@ -271,40 +360,75 @@ impl Clock<'_> {
                 let actions = self.job.apply(Event::Sorted(sorted));
                 self.master_acts(actions)
             }
-            Work::Task(worker, kind, outcome) => {
+            Work::Task(worker, _, kind, outcome) => {
                 self.span(host, false, kind, from, None);
                 for parcel in std::mem::take(&mut self.places[worker].held) {
                     self.hand_over(parcel);
                 }
                 if kind == Kind::Integrate {
-                    self.end_cycle(worker);
+                    self.end_cycle(worker)?;
+                    if self.places[worker].member.is_none() {
+                        return Ok(());
+                    }
                 }
                 self.step(worker, session::Event::Done(outcome))
             }
         }
     }
 
-    fn end_cycle(&mut self, worker: usize) {
+    fn end_cycle(&mut self, worker: usize) -> Result<(), String> {
         let cycle = self.places[worker].session.cycle();
         self.timeline.end_cycle(worker, cycle, self.now);
-        for change in self.machines.changes.iter().filter(|c| c.host == worker && c.cycle == cycle + 1) {
-            self.processors[worker].set_speed(self.now, change.speed);
+        for (number, change) in self.machines.changes.iter().enumerate() {
+            // The first host says when one is due that is not there.
+            let due = change.cycle == cycle + 1
+                && (change.host == worker || worker == 0 && change.what == machines::What::Join);
+            if !due || std::mem::replace(&mut self.happened[number], true) {
+                continue;
+            }
+            match change.what {
+                machines::What::Speed(speed) => self.processors[change.host].set_speed(self.now, speed),
+                machines::What::Die => {
+                    if let Some(member) = self.end_incarnation(change.host) {
+                        let heard = self.now + self.machines.network.latency;
+                        self.at(heard, What::Lost(member, "its connection was closed".to_owned()));
+                    }
+                }
+                machines::What::Stop(seconds) => {
+                    let processor = &mut self.processors[change.host];
+                    let speed = processor.speed();
+                    processor.set_speed(self.now, speed * STANDSTILL);
+                    self.at(self.now + seconds, What::GoesOn(change.host, speed));
+                    if let Some(member) = self.places[change.host].member.filter(|_| seconds > SILENCE) {
+                        let why = format!("no byte for {SILENCE} s");
+                        self.at(self.now + SILENCE, What::Lost(member, why));
+                    }
+                }
+                machines::What::Join if self.places[change.host].member.is_none() => {
+                    self.join(change.host)?
+                }
+                machines::What::Join => {}
+            }
         }
+        Ok(())
     }
 
     fn deliver(&mut self, parcel: Parcel) -> Result<(), String> {
-        let Parcel { from, to, packed, epoch, .. } = parcel;
+        let Parcel { from, to, packed, epoch, member, .. } = parcel;
         let fault = |e: protocol::Error| e.to_string();
         match (from, to) {
-            (End::Worker(from), End::Master) => {
+            (End::Worker(_), End::Master) => {
                 let message = wire::unpack_to_master(packed.kind, &packed.bytes).map_err(fault)?;
-                let actions = self.job.apply(Event::Message(from, epoch, message));
+                let actions = self.job.apply(Event::Message(member, epoch, message));
                 self.master_acts(actions)
             }
             // Of an epoch that is over: nobody hears it.
             (End::Worker(_), End::Worker(to)) if self.places[to].session.epoch() != epoch => Ok(()),
-            (End::Worker(from), End::Worker(to)) => {
+            (End::Worker(_), End::Worker(to)) => {
                 let message = wire::unpack_to_peer(packed.kind, &packed.bytes).map_err(fault)?;
+                let from = self.job.crew().iter().position(|&other| other == member);
+                // Of an epoch that is over, as above.
+                let Some(from) = from.filter(|_| epoch == self.job.epoch()) else { return Ok(()) };
                 self.step(to, session::Event::Peer(from as u32, message))
             }
             (End::Master, End::Worker(to)) => {
@@ -330,7 +454,11 @@ impl Clock<'_> {
                     (End::Master, wire::pack_to_master(&message).map_err(|e| e.to_string())?)
                 }
                 session::Action::SendPeer(to, message) => {
-                    (End::Worker(to as usize), wire::pack_to_peer(&message))
+                    let member = self.job.crew().get(to as usize).copied();
+                    let epoch = self.places[worker].session.epoch();
+                    // Of an epoch that is over, there is nobody to hear it.
+                    let Some(member) = member.filter(|_| epoch == self.job.epoch()) else { continue };
+                    (End::Worker(self.members[member].0), wire::pack_to_peer(&message))
                 }
             };
             let from = End::Worker(worker);
@@ -357,7 +485,8 @@ impl Clock<'_> {
         let busy = &mut self.places[worker].busy;
         busy.compute_ns += (costs.busy() / speed * 1e9) as u64;
         busy.contact_ns += (costs.contact / speed * 1e9) as u64;
-        let work = Begun(self.now, Work::Task(worker, kind, outcome));
+        let incarnation = self.places[worker].incarnation;
+        let work = Begun(self.now, Work::Task(worker, incarnation, kind, outcome));
         self.processors[worker].add(self.now, Rank::Compute, costs.busy(), work);
         self.foresee(worker);
         Ok(())
@@ -370,8 +499,11 @@ impl Clock<'_> {
                     if let ToWorker::Plan { acts_at, .. } = &message {
                         self.timeline.boundaries.push(*acts_at);
                     }
-                    let packed = wire::pack_to_worker(&message).map_err(|e| e.to_string())?;
-                    self.post(End::Master, End::Worker(worker), packed);
+                    let (host, incarnation) = self.members[worker];
+                    if self.places[host].incarnation == incarnation {
+                        let packed = wire::pack_to_worker(&message).map_err(|e| e.to_string())?;
+                        self.post(End::Master, End::Worker(host), packed);
+                    }
                 }
                 Action::Sort(bench, x) => {
                     let sorted = if self.live {
@@ -395,15 +527,18 @@ impl Clock<'_> {
                     }
                     self.timeline.digest = outcome.digest;
                     self.timeline.rebalances = outcome.rebalances;
+                    self.timeline.losses = outcome.losses;
                     self.over = true;
                 }
                 Action::Row(_)
                 | Action::State(_)
                 | Action::Snapshot(_)
+                | Action::Base { .. }
+                | Action::Dismiss(..)
                 | Action::Progress(_)
                 | Action::Dealt(_)
-                | Action::Rewind { .. }
-                | Action::Timer(_) => {}
+                | Action::Rewind { .. } => {}
+                Action::Timer(seconds) => self.at(self.now + seconds, What::Timer),
             }
         }
         Ok(())

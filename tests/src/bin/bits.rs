@@ -179,7 +179,7 @@ fn with_doubled_slack(deck: &Path, folder: &Path) -> Result<Option<PathBuf>, Str
         return Ok(None);
     }
     let copy = folder.join("doubled-slack.toml");
-    std::fs::write(&copy, text.replace("[contact]\n", "[contact]\nslack_gaps = 5.0\n"))
+    std::fs::write(&copy, text.replace("[contact]\n", "[contact]\nslack_gaps = 8.0\n"))
         .map_err(|e| format!("{}: {e}", copy.display()))?;
     Ok(Some(copy))
 }

@@ -283,6 +283,7 @@ pub(super) fn bodies_that_close_in_from_both_sides_are_sorted_in_time(sheet: &mu
         end_time = 0.02
         [contact]
         gap_fraction = 0.1
+        slack_gaps = 2.5
         stiffness = 1
         [[part]]
         name = "lower"

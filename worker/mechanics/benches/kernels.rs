@@ -204,7 +204,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         })
         .collect();
     let n_elements = mesh.n_elements();
-    let mut domain = Domain::new(setup, 2, quanta, &subdomains, &[], width);
+    let mut domain = Domain::new(setup, 2, quanta, subdomains, &[], width);
     domain.install(&Default::default(), &[]).expect("a plan without other workers");
     (domain, n_elements)
 }

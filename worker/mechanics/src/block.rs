@@ -7,7 +7,7 @@
 //! wherever a result leaves the kernel. A block knows nothing of other blocks: nodes that several hold are kept
 //! equal by whoever integrates them.
 
-use std::ops::Range;
+use std::{mem::take, ops::Range};
 
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +27,7 @@ use crate::{
     lanes::{SET, Width, scalar::Scalar},
     material::{Eos, Failure, Material, Strength},
     mesh::{Topology, quad_area, twice},
-    state::{N_FIELDS, ShellState},
+    state::{N_FIELDS, ShellState, sparse, write_changed},
     strength::{Elastic, Hydro, JohnsonCook, RateFactor, StrengthLaw, Tabulated, VonMises},
 };
 
@@ -108,15 +108,16 @@ impl Block {
     /// # Panics
     /// As [`Block::of`], and if the piece is of shells.
     pub fn new(piece: &Piece) -> Block {
-        Block::of(piece, &[])
+        Self::of(piece.clone(), &[])
     }
 
-    /// Lays out a piece of one of `materials`. Forces are zero.
+    /// Lays out a piece of one of `materials`. Its arrays go one by one, so that there need not be room for all of both.
+    /// Forces are zero.
     ///
     /// # Panics
     /// If the arrays of the piece do not fit its topology or shells cannot be of its material, which whoever made or
     /// decoded it has checked.
-    pub fn of(piece: &Piece, materials: &[Material]) -> Block {
+    pub fn of(mut piece: Piece, materials: &[Material]) -> Block {
         let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
         let by_node = [piece.x.len(), piece.v.len(), piece.mass.len(), piece.constraint.len()];
         assert!(by_node == [n_nodes; 4], "node arrays of {by_node:?} entries for {n_nodes} nodes");
@@ -143,15 +144,15 @@ impl Block {
             Layout::Structured { base, .. } => base.len() * SET,
             Layout::Explicit { corners } => corners[0].len(),
         };
-        let by_slot = |values: &[f64], phantom: f64| {
+        let by_slot = |values: Vec<f64>, phantom: f64| {
             let mut array = vec![phantom; n_slots];
-            for (&slot, &value) in slots.iter().zip(values) {
-                array[slot as usize] = value;
+            for (&slot, value) in slots.iter().zip(values) {
+                write_changed(&mut array[slot as usize], value);
             }
             array
         };
         let n_padded = reach.max(n_nodes.next_multiple_of(SET));
-        let by_axis = |values: &[[f64; 3]]| -> [Vec<f64>; 3] {
+        let by_axis = |values: Vec<[f64; 3]>| -> [Vec<f64>; 3] {
             std::array::from_fn(|axis| {
                 let mut array: Vec<f64> = values.iter().map(|value| value[axis]).collect();
                 array.resize(n_padded, 0.0);
@@ -165,17 +166,17 @@ impl Block {
         Block {
             part: piece.part,
             material: piece.material,
-            nodes: piece.nodes.clone(),
-            elements: piece.elements.clone(),
-            x: by_axis(&piece.x),
-            v: by_axis(&piece.v),
+            x: by_axis(take(&mut piece.x)),
+            v: by_axis(take(&mut piece.v)),
             f: std::array::from_fn(|_| vec![0.0; n_padded]),
             mass: piece.mass.iter().copied().chain(std::iter::repeat_n(1.0, n_padded - n_nodes)).collect(),
-            constraint: piece.constraint.clone(),
             shells,
-            topology: piece.topology.clone(),
-            fields: std::array::from_fn(|field| by_slot(&piece.fields[field], 0.0)),
-            initial_volume: by_slot(&piece.initial_volume, 1.0),
+            fields: std::array::from_fn(|field| by_slot(take(&mut piece.fields[field]), 0.0)),
+            initial_volume: by_slot(take(&mut piece.initial_volume), 1.0),
+            constraint: piece.constraint,
+            topology: piece.topology,
+            nodes: piece.nodes,
+            elements: piece.elements,
             alive: slot_elements
                 .chunks(SET)
                 .map(|set| (0..).zip(set).map(|(i, &element)| u8::from(element != PHANTOM) << i).sum())
@@ -193,11 +194,8 @@ impl Block {
 
     /// The state image: what [`Block::new`] was given, to the bit, with the state of now.
     pub fn piece(&self) -> Piece {
-        let by_element =
-            |array: &[f64]| self.slots.iter().map(|&slot| array[slot as usize]).collect::<Vec<f64>>();
-        let by_node = |arrays: &[Vec<f64>; 3]| {
-            (0..self.nodes.len()).map(|node| std::array::from_fn(|axis| arrays[axis][node])).collect()
-        };
+        let by_element = |array: &[f64]| sparse(self.slots.iter().map(|&slot| array[slot as usize]));
+        let by_node = |arrays: &[Vec<f64>; 3]| by_node(self.nodes.len(), arrays);
         Piece {
             part: self.part,
             material: self.material,
@@ -225,6 +223,31 @@ impl Block {
                 .shells
                 .as_ref()
                 .map_or_else(ShellState::default, |core| core.image(self.nodes.len(), self.elements.len())),
+        }
+    }
+
+    /// [`Block::piece`] of a block that goes array by array, so that there need not be room for all of both.
+    pub fn into_piece(mut self) -> Piece {
+        if self.shells.is_some() {
+            return self.piece();
+        }
+        let (n, slots) = (self.nodes.len(), take(&mut self.slots));
+        let by_element = |array: Vec<f64>| sparse(slots.iter().map(|&slot| array[slot as usize]));
+        drop((take(&mut self.f), take(&mut self.slot_elements)));
+        self.mass.truncate(n);
+        Piece {
+            part: self.part,
+            material: self.material,
+            x: by_node(n, &take(&mut self.x)),
+            v: by_node(n, &take(&mut self.v)),
+            initial_volume: by_element(take(&mut self.initial_volume)),
+            fields: self.fields.each_mut().map(|field| by_element(take(field))),
+            topology: self.topology,
+            nodes: self.nodes,
+            elements: self.elements,
+            mass: self.mass,
+            constraint: self.constraint,
+            shells: ShellState::default(),
         }
     }
 
@@ -462,6 +485,11 @@ impl Block {
             }
         }
     }
+}
+
+/// The first `n` of arrays by axis, by node.
+fn by_node(n: usize, arrays: &[Vec<f64>; 3]) -> Vec<[f64; 3]> {
+    (0..n).map(|node| std::array::from_fn(|axis| arrays[axis][node])).collect()
 }
 
 /// The failure law of a material made ready, if it has one.

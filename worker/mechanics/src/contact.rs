@@ -33,7 +33,7 @@ pub mod zone;
 pub use cycle::{Contact, initial_pairs};
 pub use force::ContactVote;
 pub use reach::Extent;
-pub use search::Exclusions;
+pub use search::{Exclusions, cull};
 pub use sort::sort;
 pub use surface::{Face, Surface};
 pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
@@ -72,6 +72,18 @@ impl Settings {
     #[inline(always)]
     pub fn permits(&self, a: u32, b: u32) -> bool {
         self.interacts[a as usize * self.n_parts() + b as usize]
+    }
+
+    /// Cycles between trigger and sort after which nodes cannot have left the slack at the speeds that votes allow, where
+    /// orders answer a vote two cycles later; 0 if one is too many.
+    pub fn longest_lag(&self) -> u32 {
+        ((self.slack / reach::lag_travel(self, 1) * (1.0 + 1e-9)) as u32).saturating_sub(2)
+    }
+
+    /// How near a pair is that a cycle looks at (length): the zone of warning and the spread of a worker's list between
+    /// sorts, but no more than the reach.
+    pub fn near(&self) -> f64 {
+        WARNING.mul_add(self.gap, self.slack.min(watch::SPREAD * self.gap))
     }
 
     /// Reach of the sort (length): the zone of warning plus the slack.

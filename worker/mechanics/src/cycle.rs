@@ -221,7 +221,7 @@ impl Domain {
         setup: Setup,
         n_parts: usize,
         quanta: Quanta,
-        subdomains: &[Subdomain],
+        subdomains: Vec<Subdomain>,
         gauges: &[u32],
         width: Width,
     ) -> Self {
@@ -229,9 +229,9 @@ impl Domain {
         let pieces = subdomains.iter().flat_map(|subdomain| &subdomain.pieces);
         let home = Home::new(pieces.map(|piece| piece.nodes.as_slice()));
         let mut gather = Vec::new();
-        for subdomain in subdomains {
+        for Subdomain { pieces, unowned, surface, .. } in subdomains {
             let first = rooms.len();
-            for piece in &subdomain.pieces {
+            for piece in pieces {
                 let block = Block::of(piece, &setup.materials);
                 let all = 0..block.n_sets();
                 let material = &setup.materials[block.material as usize];
@@ -256,15 +256,15 @@ impl Domain {
             for room in own.clone() {
                 for local in 0..rooms[room as usize].block.nodes.len() as u32 {
                     let node = rooms[room as usize].block.nodes[local as usize];
-                    let owned = subdomain.unowned.binary_search(&node).is_err();
+                    let owned = unowned.binary_search(&node).is_err();
                     if owned && first_copy(node) == Some((room, local)) {
                         rooms[room as usize].sets[local as usize / SET].booked |= 1 << (local as usize % SET);
                     }
                 }
             }
-            for &node in &subdomain.surface {
+            for &node in &surface {
                 if let Some((room, local)) = first_copy(node) {
-                    if subdomain.unowned.binary_search(&node).is_err() {
+                    if unowned.binary_search(&node).is_err() {
                         gather.push((room, local));
                     }
                     rooms[room as usize].sets[local as usize / SET].surface |= 1 << (local as usize % SET);
@@ -744,6 +744,11 @@ impl Domain {
     /// The state of all blocks, to be put back into a global state.
     pub fn pieces(&self) -> Vec<Piece> {
         self.rooms.iter().map(|room| room.block.piece()).collect()
+    }
+
+    /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
+    pub fn into_pieces(self) -> Vec<Piece> {
+        self.rooms.into_iter().map(|room| room.block.into_piece()).collect()
     }
 }
 

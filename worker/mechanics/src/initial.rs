@@ -82,6 +82,17 @@ pub fn state(
     Ok(state)
 }
 
+/// Gives nodes of shells their rotation rates at the start, about the axes about which they may turn; `given` is by node,
+/// or empty.
+pub fn spin(state: &mut GlobalState, constraints: &[Constraint], given: &[[f64; 3]]) {
+    for (n, (spin, given)) in state.shells.spin.iter_mut().zip(given).enumerate() {
+        let clamped = constraints[state.constraint[n] as usize].clamped;
+        if state.shells.inertia[n] > 0.0 {
+            *spin = std::array::from_fn(|axis| if clamped >> axis & 1 == 1 { 0.0 } else { given[axis] });
+        }
+    }
+}
+
 /// The state of shells at time zero. A node has the rotational inertia of a quarter of each of its elements, about any axis:
 /// `mass max(h^2 / 12, A / 8)`, so that bending and transverse shear never ask for a smaller step than the membrane.
 fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
@@ -201,7 +212,7 @@ fn largest_face(x: &[[f64; 3]; 8]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Gives each node of a part that feels a wall a constraint that says so.
+/// Gives each node of a part that feels a wall a constraint that says so, beside the walls that a deck gave it.
 ///
 /// # Errors
 /// If there are more than [`MAX_WALLS`] walls or more kinds of constraint than an index can tell apart.
@@ -223,7 +234,8 @@ pub fn bind_walls(mesh: &Mesh, setup: &mut Setup, constraint: &mut [u16]) -> Res
         let next = setup.constraints.len();
         let index = *index_of.entry((held, walls)).or_insert(next);
         if index == next {
-            setup.constraints.push(Constraint { walls, ..setup.constraints[held as usize] });
+            let held = setup.constraints[held as usize];
+            setup.constraints.push(Constraint { walls: walls | held.walls, ..held });
         }
         constraint[n] =
             u16::try_from(index).map_err(|_| "more than 65,535 kinds of constraint".to_owned())?;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     block::Piece,
     mesh::{Mesh, Topology},
-    state::{GlobalState, N_FIELDS, ShellState},
+    state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},
 };
 
 /// Which elements of a part.
@@ -152,7 +152,7 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         constraint: nodes.iter().map(|&n| state.constraint[n as usize]).collect(),
         initial_volume: elements.iter().map(|&e| state.initial_volume[e as usize]).collect(),
         fields: std::array::from_fn(|k: usize| {
-            elements.iter().map(|&e| state.elements[k][e as usize]).collect()
+            sparse(elements.iter().map(|&e| state.elements[k][e as usize]))
         }),
         nodes,
         elements,
@@ -160,16 +160,18 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
     }
 }
 
-/// Writes what a cycle changes of a piece back into the global state.
+/// Writes what a cycle changes of a piece back into the global state. Its arrays go one by one, so that there need not be
+/// room for all of both.
 ///
 /// # Errors
 /// If an index or a length of the piece does not fit the state; the state is then untouched.
-pub fn put_back(piece: &Piece, state: &mut GlobalState) -> Result<(), String> {
+pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String> {
     let (n_nodes, n_elements) = (state.x.len(), state.initial_volume.len());
     let lengths_fit = piece.x.len() == piece.nodes.len()
         && piece.v.len() == piece.nodes.len()
         && (0..N_FIELDS).all(|k| piece.fields[k].len() == piece.elements.len())
-        && (piece.shells.spin.is_empty() || piece.shells.spin.len() == piece.nodes.len())
+        && (piece.shells.spin.is_empty()
+            || (piece.shells.spin.len() == piece.nodes.len() && state.shells.spin.len() == n_nodes))
         && piece.shells.fields.iter().all(|field| field.len() == piece.elements.len())
         && piece.shells.fields.len() <= state.shells.fields.len();
     if !lengths_fit {
@@ -189,9 +191,10 @@ pub fn put_back(piece: &Piece, state: &mut GlobalState) -> Result<(), String> {
             piece.part
         ));
     }
-    for (i, &n) in piece.nodes.iter().enumerate() {
-        state.x[n as usize] = piece.x[i];
-        state.v[n as usize] = piece.v[i];
+    for (from, to) in [(&mut piece.x, &mut state.x), (&mut piece.v, &mut state.v)] {
+        for (&n, value) in piece.nodes.iter().zip(std::mem::take(from)) {
+            to[n as usize] = value;
+        }
     }
     for (&n, &spin) in piece.nodes.iter().zip(&piece.shells.spin) {
         state.shells.spin[n as usize] = spin;
@@ -201,9 +204,9 @@ pub fn put_back(piece: &Piece, state: &mut GlobalState) -> Result<(), String> {
             field[e as usize] = value;
         }
     }
-    for (k, values) in piece.fields.iter().enumerate() {
-        for (&e, &value) in piece.elements.iter().zip(values) {
-            state.elements[k][e as usize] = value;
+    for (values, to) in piece.fields.iter_mut().zip(&mut state.elements) {
+        for (&e, value) in piece.elements.iter().zip(std::mem::take(values)) {
+            write_changed(&mut to[e as usize], value);
         }
     }
     Ok(())

@@ -35,8 +35,8 @@ pub struct Constraint {
     /// Prescribed velocity by axis x, y, z (length per time); `None` is free, a constant 0 is fixed, and one
     /// fixed axis is a symmetry plane.
     pub velocity: [Option<Drive>; 3],
-    /// Walls that the node feels, one bit per entry of [`Setup::walls`]. Decks leave it 0: the start of a run
-    /// derives it from the parts that each wall names ([`crate::initial::bind_walls`]).
+    /// Walls that the node feels, one bit per entry of [`Setup::walls`]. Decks give it for walls that name nodes; the
+    /// start of a run adds the walls that name parts ([`crate::initial::bind_walls`]).
     pub walls: u32,
     /// Forces on the node, one bit per entry of [`Loads::forces`].
     pub forces: u32,

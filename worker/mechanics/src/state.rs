@@ -54,6 +54,23 @@ pub mod field {
     pub const TIME_TO_LIGHT: usize = 11;
 }
 
+/// An array of these values of which pages that hold nothing but zeros take no memory until they are written.
+pub(crate) fn sparse(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64> {
+    let mut array = vec![0.0; values.len()];
+    for (place, value) in array.iter_mut().zip(values) {
+        write_changed(place, value);
+    }
+    array
+}
+
+/// Writes a value where another stands: reading alone does not give memory to a page of zeros.
+#[inline(always)]
+pub(crate) fn write_changed(place: &mut f64, value: f64) {
+    if place.to_bits() != value.to_bits() {
+        *place = value;
+    }
+}
+
 /// The whole state of a run at the start of a cycle. Node arrays by global node index, element arrays by
 /// global element index.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -89,4 +106,44 @@ pub struct ShellState {
     /// through the thickness, from below, stress xx, yy, xy, yz, zx in the frame of the element, plastic strain,
     /// temperature.
     pub fields: Vec<Vec<f64>>,
+}
+
+impl GlobalState {
+    /// What of the state no cycle changes, with the time; the rest is empty.
+    pub fn statics(&self) -> Self {
+        Self {
+            cycle: self.cycle,
+            time: self.time,
+            mass: self.mass.clone(),
+            constraint: self.constraint.clone(),
+            initial_volume: self.initial_volume.clone(),
+            shells: ShellState {
+                spin: Vec::new(),
+                inertia: self.shells.inertia.clone(),
+                fields: vec![Vec::new(); self.shells.fields.len()],
+            },
+            ..Self::default()
+        }
+    }
+
+    /// Whether it is no more than [`GlobalState::statics`].
+    pub fn is_static(&self) -> bool {
+        self.x.len() < self.mass.len()
+    }
+
+    /// A state to put images of all elements and nodes back into; zeros until then.
+    pub fn to_fill(&self) -> Self {
+        let (n_nodes, n_elements) = (self.mass.len(), self.initial_volume.len());
+        Self {
+            x: vec![[0.0; 3]; n_nodes],
+            v: vec![[0.0; 3]; n_nodes],
+            elements: std::array::from_fn(|_| vec![0.0; n_elements]),
+            shells: ShellState {
+                spin: vec![[0.0; 3]; self.shells.inertia.len()],
+                inertia: self.shells.inertia.clone(),
+                fields: vec![vec![0.0; n_elements]; self.shells.fields.len()],
+            },
+            ..self.statics()
+        }
+    }
 }

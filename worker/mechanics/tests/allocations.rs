@@ -122,7 +122,7 @@ fn domain() -> Domain {
     let whole = Region::Cells { low: [0; 3], high: cells };
     let pieces = whole.split(4).iter().map(|region| cut(&mesh, &state, 0, region)).collect();
     let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: (0..base).collect() };
-    let mut domain = Domain::new(setup, 1, quanta, &[subdomain], &[], Width::best());
+    let mut domain = Domain::new(setup, 1, quanta, vec![subdomain], &[], Width::best());
     let plan = Plan { exchange: (n_nodes / 2..n_nodes).collect(), ..Plan::default() };
     domain.install(&plan, &[]).expect("all nodes are held");
     domain

@@ -190,7 +190,7 @@ fn stop_sends_the_image_with_the_last_vote() {
     done(&mut session, Outcome::Computed);
     hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
     let actions = done(&mut session, vote());
-    assert!(matches!(actions[..], [Action::Compute(Task::Image)]));
+    assert!(matches!(actions[..], [Action::Compute(Task::Image { last: true })]));
     let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
     assert!(matches!(actions[..], [Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. })]));
 }

@@ -39,6 +39,10 @@ pub struct Parcel {
     pub packed: Packed,
     /// Its bytes with the frames' headers.
     pub bytes: u64,
+    /// Incarnations of the hosts at its ends: of one that died or was given up it never comes.
+    pub incarnations: [u32; 2],
+    /// Index in the job of the worker at one of its ends; of its sender between workers.
+    pub member: usize,
     /// The epoch of the worker at one of its ends.
     pub epoch: u32,
     /// The cycle of the worker at one of its ends.
@@ -49,8 +53,8 @@ pub struct Parcel {
 
 /// What a processor works on.
 pub enum Work {
-    /// A worker's task, and what will come of it.
-    Task(usize, Kind, Outcome),
+    /// A task of a worker in this incarnation, and what will come of it.
+    Task(usize, u32, Kind, Outcome),
     /// The master's sort, and what will come of it.
     Sort(Box<Sorted>),
     /// A message that leaves.
@@ -70,6 +74,12 @@ pub enum What {
     Enters(Parcel),
     /// All of a message is there.
     Arrives(Parcel),
+    /// The time that the job asked for has passed.
+    Timer,
+    /// The master finds a worker lost: its index in the job, and why.
+    Lost(usize, String),
+    /// A host that stood still goes on, at this speed.
+    GoesOn(usize, f64),
 }
 
 /// Something due: the earliest first, and of those due at once the first that was foreseen.

@@ -56,9 +56,6 @@ pub fn initial_pairs(surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> 
     pairs
 }
 
-/// Candidate nodes whose pairs are computed together: their lists fit the first cache.
-const BLOCK: usize = 64;
-
 /// The contact of one batch, from one sort to the next.
 #[derive(Clone, Debug)]
 pub struct Contact {
@@ -90,10 +87,9 @@ pub struct Contact {
 #[derive(Clone, Debug, Default)]
 struct Work {
     boxes: Boxes,
-    /// Active faces whose boxes hold a node, and the end of those of each node.
+    /// Active faces whose boxes hold a node, and the end of those of each node, while a list is taken.
     held: Vec<u32>,
     ends: Vec<u32>,
-    pairs: Pairs,
     closest: Closest,
     /// Features near nodes: where the pushes act.
     near_pairs: Pairs,
@@ -172,12 +168,25 @@ impl Contact {
         contact.candidates = candidates;
         contact.watch =
             Watch::new(settings, &contact.candidates, &contact.faces, &contact.parts, &contact.part);
+        let (mut watch, mut work) = (std::mem::take(&mut contact.watch), Work::default());
+        contact.look(&mut watch, &mut work, x);
+        (contact.watch, contact.work) = (watch, work);
         contact
     }
 
-    /// Number of node-face pairs on the candidate list.
+    /// Number of node-face pairs that a cycle looks at.
     pub fn n_pairs(&self) -> usize {
-        self.candidates.faces.len()
+        self.watch.candidates.faces.len()
+    }
+
+    /// Lists the candidates that can be near before nodes have moved much further.
+    fn look(&self, watch: &mut Watch, work: &mut Work, x: &[Vec<f64>; 3]) {
+        let Work { boxes, held, ends, .. } = work;
+        let grow = WARNING.mul_add(self.settings.gap, watch.spread(&self.settings));
+        boxes.measure(self.width, x, &self.faces, &watch.all, grow);
+        let n = self.candidates.nodes.len();
+        boxes.hold(self.width, &self.candidates, (0, n), held, ends);
+        watch.take(x, &self.candidates.nodes, held, ends, &self.faces);
     }
 
     /// Adds the contact forces at positions `x` into `f`, and says what they mean for the cycle.
@@ -215,75 +224,53 @@ impl Contact {
         let mut watch = std::mem::take(&mut self.watch);
         let mut vote = ContactVote { pairs: self.candidates.faces.len() as u64, ..ContactVote::default() };
         let mut frequency2 = 0.0;
-        let warning = WARNING * self.settings.gap;
         if watch.is_stale(cycle.x, &self.settings) {
-            let Work { boxes, held, ends, .. } = &mut work;
-            boxes.measure(
-                self.width,
-                cycle.x,
-                &self.faces,
-                &watch.all,
-                warning + watch.spread(&self.settings),
-            );
-            let n = self.candidates.nodes.len();
-            boxes.hold(self.width, &self.candidates, (0, n), held, ends);
-            watch.take(cycle.x, &self.candidates.nodes, held, ends, &self.faces);
+            self.look(&mut watch, &mut work, cycle.x);
         }
-        work.boxes.measure(self.width, cycle.x, &self.faces, &watch.listed, warning);
-        let n = watch.candidates.nodes.len();
-        let mut first = 0;
-        while first < n {
-            let end = (first + BLOCK).min(n);
-            let voted = self.block(&watch.candidates, first, end, &mut work, &mut cycle, &mut vote);
+        for bounds in watch.blocks.windows(2) {
+            let voted = self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, &mut vote);
             frequency2 = if voted > frequency2 { voted } else { frequency2 };
-            first = end;
         }
         (self.work, self.watch) = (work, watch);
         vote.dt = force::time_step(frequency2);
         vote
     }
 
-    /// Forces of nodes `first..end` of the candidates. Gives the greatest squared frequency of their springs.
+    /// Forces of one block of the list, from where it begins among nodes and pairs to where it ends. Gives the greatest
+    /// squared frequency of their springs.
     #[inline(always)]
     fn block(
         &self,
-        candidates: &Candidates,
-        first: usize,
-        end: usize,
+        watch: &Watch,
+        ((first, first_pair), (end, end_pair)): ((u32, u32), (u32, u32)),
         work: &mut Work,
         cycle: &mut Cycle,
         vote: &mut ContactVote,
     ) -> f64 {
-        let nodes = &candidates.nodes[first..end];
-        work.boxes.hold(self.width, candidates, (first, end), &mut work.held, &mut work.ends);
-        if work.held.is_empty() {
-            return 0.0;
-        }
-        work.pairs.expand(nodes, &work.ends, &work.held, &self.faces);
-        lanes::nearest(self.width, cycle.x, &work.pairs, &mut work.closest);
+        let range = first_pair as usize..end_pair as usize;
+        let warning = WARNING * self.settings.gap;
+        lanes::nearest(self.width, cycle.x, warning, &watch.pairs, range.clone(), &mut work.closest);
         work.approach.clear();
         work.share.clear();
         work.stacking.clear();
         work.long_way.clear();
-        let mut start = 0;
-        for i in 0..nodes.len() {
-            let end = work.ends[i] as usize;
-            if start < end {
-                self.node(start, end, work, cycle.x);
-            }
-            start = end;
+        let starts = &watch.candidates.starts[first as usize..=end as usize];
+        let listed = &watch.candidates.faces[starts[0] as usize..];
+        for bounds in starts.windows(2) {
+            let (start, end) = (bounds[0] - starts[0], bounds[1] - starts[0]);
+            self.node(start as usize, end as usize, listed, work, cycle.x);
         }
         let n = work.approach.index.len();
         if n == 0 {
             return 0.0;
         }
-        work.near_pairs.choose(&work.pairs, &work.approach.index);
+        work.near_pairs.choose(&watch.pairs, range.start, &work.approach.index);
         work.approach.fill_up();
         let filled = work.approach.index.len();
-        let Work { approach, face, share, stacking, held, .. } = work;
+        let Work { approach, face, share, stacking, .. } = work;
         // Of the last set what is left over repeats a pair and pushes nothing.
         face.clear();
-        face.extend(approach.index.iter().map(|&i| held[i as usize]));
+        face.extend(approach.index.iter().map(|&i| listed[i as usize]));
         share.resize(filled, 0.0);
         stacking.resize(filled, 0.0);
         let gap = self.settings.gap;
@@ -302,13 +289,14 @@ impl Contact {
         !self.shells.is_empty() && self.shells[face as usize]
     }
 
-    /// Takes the near features of one node, whose pairs are `start..end`, into the lists.
+    /// Takes the near features of one node, whose pairs are `start..end` of the block, into the lists; `listed` are the
+    /// faces of the block.
     #[inline(always)]
-    fn node(&self, start: usize, end: usize, work: &mut Work, x: &[Vec<f64>; 3]) {
+    fn node(&self, start: usize, end: usize, listed: &[u32], work: &mut Work, x: &[Vec<f64>; 3]) {
         let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
         let closest = &work.closest;
         let distance2 = &closest.distance2[start..end];
-        let held = &work.held[start..end];
+        let held = &listed[start..end];
         let (mut nearest, mut least) = (usize::MAX, warning * warning);
         for (i, &d2) in distance2.iter().enumerate() {
             let tie = d2 == least && nearest != usize::MAX;
@@ -343,29 +331,29 @@ impl Contact {
             work.share.push(1.0);
             work.stacking.push(1.0);
         } else {
-            self.reduce(start, end, work, x);
+            self.reduce(start, end, listed, work, x);
         }
     }
 
     /// As [`Contact::node`], the long way.
     #[inline(never)]
-    fn reduce(&self, start: usize, end: usize, work: &mut Work, x: &[Vec<f64>; 3]) {
+    fn reduce(&self, start: usize, end: usize, listed: &[u32], work: &mut Work, x: &[Vec<f64>; 3]) {
         let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
-        let Work { held, closest, near, hits, beyond, .. } = work;
+        let Work { closest, near, hits, beyond, .. } = work;
         near.clear();
         for i in start..end {
             if closest.distance2[i] < warning * warning {
-                let face = held[i] as usize;
+                let face = listed[i] as usize;
                 let (id, corners) = (self.ids[face], self.corners[face]);
                 let mut nearest = closest.nearest(i);
-                if self.is_shell(held[i]) {
+                if self.is_shell(listed[i]) {
                     nearest.sides = OUTER;
                 }
                 near.push(Near { face: i as u32, id, corners, nearest });
             }
         }
         let frame = |i: u32| {
-            let corners = self.faces[held[i as usize] as usize];
+            let corners = self.faces[listed[i as usize] as usize];
             Frame::new(&corners.map(|n| x.each_ref().map(|x| x[n as usize])))
         };
         joint::reduce(near, gap, frame, hits, beyond);
@@ -403,7 +391,7 @@ impl Contact {
         vote.hits += approach.depth.iter().map(|&depth| u64::from(depth > 0.0)).sum::<u64>();
         if sums.deepest > 0.0 && sums.deepest / self.settings.gap >= vote.worst_depth {
             for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
-                let pair = (self.global[pairs.node[i] as usize], self.ids[work.face[i] as usize]);
+                let pair = (self.global[pairs.node()[i] as usize], self.ids[work.face[i] as usize]);
                 vote.deepest(depth / self.settings.gap, pair);
             }
         }
@@ -412,13 +400,8 @@ impl Contact {
             if sums.force_bound > vote.force_bound { sums.force_bound } else { vote.force_bound };
         for a in 0..3 {
             let f = &mut cycle.f[a];
-            let ends = [
-                &work.near_pairs.node,
-                &work.near_pairs.corners[0],
-                &work.near_pairs.corners[1],
-                &work.near_pairs.corners[2],
-                &work.near_pairs.corners[3],
-            ];
+            let corners = work.near_pairs.corners().each_ref().map(Vec::as_slice);
+            let ends = [work.near_pairs.node(), corners[0], corners[1], corners[2], corners[3]];
             for (e, nodes) in ends.into_iter().enumerate() {
                 for (&node, &term) in nodes[..n].iter().zip(&work.terms[3 * e + a]) {
                     f[node as usize] += term;
@@ -434,7 +417,7 @@ impl Contact {
         let (approach, statics) = (&work.approach, &self.statics);
         let mut frequency2 = 0.0_f64;
         for i in 0..n {
-            let node = work.near_pairs.node[i] as usize;
+            let node = work.near_pairs.node()[i] as usize;
             let face = work.face[i] as usize;
             let nodes = self.faces[face];
             let weights = [0, 1, 2, 3].map(|k| approach.weights[k][i]);

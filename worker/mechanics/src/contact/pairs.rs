@@ -1,59 +1,72 @@
-//! Node-face pairs as lists of batch nodes, the form in which lanes gather them.
+//! Node-face pairs as lists of batch nodes, the form in which lanes gather them. What is in the lists is written here
+//! alone, so that their highest index is known.
 
 use crate::lanes::{SET, Width};
 
 /// Pairs by batch node indices. All lists are equally long.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairs {
-    pub(super) node: Vec<u32>,
-    pub(super) corners: [Vec<u32>; 4],
+    node: Vec<u32>,
+    corners: [Vec<u32>; 4],
+    /// No index is higher.
+    highest: u32,
 }
 
 impl Pairs {
-    /// Room for `n` pairs, in whole lane sets; what they hold is for the caller to write.
-    fn resize(&mut self, n: usize) {
-        let n = n.next_multiple_of(SET);
-        self.node.resize(n, 0);
-        self.corners.iter_mut().for_each(|list| list.resize(n, 0));
+    /// The node of each pair.
+    pub(super) fn node(&self) -> &[u32] {
+        &self.node
     }
 
-    /// Pairs each of `nodes` with its faces among `held`, up to its end in `ends`; `faces` gives batch nodes. The
-    /// last is repeated until lane sets are full.
-    #[inline(always)]
-    pub(super) fn expand(&mut self, nodes: &[u32], ends: &[u32], held: &[u32], faces: &[[u32; 4]]) {
-        self.resize(held.len());
-        let mut start = 0;
-        for (&node, &end) in nodes.iter().zip(ends) {
-            self.node[start..end as usize].fill(node);
-            start = end as usize;
-        }
-        let [a, b, c, d] = &mut self.corners;
-        let lists = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
-        for (((a, b), (c, d)), &face) in lists.zip(held) {
-            [*a, *b, *c, *d] = faces[face as usize];
-        }
-        self.repeat_last(held.len());
+    /// The corners of the face of each pair.
+    pub(super) fn corners(&self) -> &[Vec<u32>; 4] {
+        &self.corners
     }
 
-    /// The pairs of another list at `indices`; the last is repeated until lane sets are full.
+    pub(super) fn clear(&mut self) {
+        self.node.clear();
+        self.corners.iter_mut().for_each(Vec::clear);
+        self.highest = 0;
+    }
+
+    pub(super) fn reserve(&mut self, n: usize) {
+        self.node.reserve(n);
+        self.corners.iter_mut().for_each(|list| list.reserve(n));
+    }
+
+    /// Appends each of `nodes` with its faces among `listed`, which begin and end where `starts` says; `faces` gives
+    /// batch nodes. The last is repeated until lane sets are full.
+    pub(super) fn extend(&mut self, nodes: &[u32], starts: &[u32], listed: &[u32], faces: &[[u32; 4]]) {
+        for (&node, bounds) in nodes.iter().zip(starts.windows(2)) {
+            for &face in &listed[bounds[0] as usize..bounds[1] as usize] {
+                let corners = faces[face as usize];
+                self.node.push(node);
+                self.corners.iter_mut().zip(corners).for_each(|(list, corner)| list.push(corner));
+                let [a, b, c, d] = corners;
+                self.highest = self.highest.max(node).max(a.max(b)).max(c.max(d));
+            }
+        }
+        self.fill_up();
+    }
+
+    /// The pairs of another list, from `first` on, at `indices`; the last is repeated until lane sets are full.
     #[inline(always)]
-    pub(super) fn choose(&mut self, from: &Pairs, indices: &[u32]) {
-        self.resize(indices.len());
+    pub(super) fn choose(&mut self, from: &Pairs, first: usize, indices: &[u32]) {
         let lists =
             std::iter::once((&mut self.node, &from.node)).chain(self.corners.iter_mut().zip(&from.corners));
         for (list, from) in lists {
-            for (node, &i) in list.iter_mut().zip(indices) {
-                *node = from[i as usize];
-            }
+            let from = &from[first..];
+            list.clear();
+            list.extend(indices.iter().map(|&i| from[i as usize]));
         }
-        self.repeat_last(indices.len());
+        self.highest = from.highest;
+        self.fill_up();
     }
 
-    #[inline(always)]
-    fn repeat_last(&mut self, n: usize) {
+    fn fill_up(&mut self) {
         for list in std::iter::once(&mut self.node).chain(&mut self.corners) {
-            let last = if n > 0 { list[n - 1] } else { 0 };
-            list[n..].fill(last);
+            let last = list.last().copied().unwrap_or(0);
+            list.resize(list.len().next_multiple_of(SET), last);
         }
     }
 
@@ -73,10 +86,9 @@ impl Pairs {
         assert!(width.available(), "lane width {width} on a machine that lacks it");
         assert!(self.node.len().is_multiple_of(SET), "{} pairs in sets of {SET}", self.node.len());
         let n = n_nodes.min(1 << 31);
-        for list in std::iter::once(&self.node).chain(&self.corners) {
+        for list in &self.corners {
             assert!(list.len() == self.node.len(), "{} indices of {} pairs", list.len(), self.node.len());
-            let highest = list.iter().fold(0, |highest, &i| if i > highest { i } else { highest });
-            assert!(list.is_empty() || (highest as usize) < n, "node {highest} of {n}");
         }
+        assert!(self.node.is_empty() || (self.highest as usize) < n, "node {} of {n}", self.highest);
     }
 }

@@ -12,7 +12,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Settings, WARNING, surface::Surface, work_unit::Batch};
+use super::{
+    Settings, WARNING,
+    surface::Surface,
+    work_unit::{Batch, WorkUnit},
+};
 
 /// Pairs that never interact because they were inside the zone at time zero.
 ///
@@ -76,6 +80,11 @@ impl Bounds {
         }
     }
 
+    /// The box that is smaller on all sides.
+    fn shrunk(&self, by: f64) -> Self {
+        Self { min: self.min.map(|c| c + by), max: self.max.map(|c| c - by) }
+    }
+
     /// Whether a point lies inside or on the border.
     #[inline(always)]
     pub fn holds(&self, p: [f64; 3]) -> bool {
@@ -86,6 +95,61 @@ impl Bounds {
             & (p[2] >= self.min[2])
             & (p[2] <= self.max[2])
     }
+}
+
+/// Leaves in each unit the nodes and faces that have a pair which can meet before the next sort (checks 1 to 4, with one
+/// slack, for `x` are the sorted positions, by surface node), and gives by unit the number of those that are near
+/// ([`Settings::near`]): what a cycle looks at, and what a unit weighs. The others cost a look once in several cycles. A cube of the sort reaches as far on all sides, a face's box only across the face;
+/// on a plain surface far from others nothing is left.
+pub fn cull(
+    units: &mut [WorkUnit],
+    surface: &Surface,
+    x: &[[f64; 3]],
+    settings: &Settings,
+    exclusions: &Exclusions,
+) -> Vec<u64> {
+    let reach = settings.reach();
+    let beyond = reach - settings.near();
+    let mut excluded: Vec<(u32, u32)> = exclusions.on(surface).collect();
+    excluded.sort_unstable();
+    const NONE: u32 = u32::MAX;
+    // A face is in several units; its box is made once.
+    let mut place = vec![NONE; surface.faces.len()];
+    let mut boxes: Vec<Bounds> = Vec::new();
+    let (mut at, mut met) = (Vec::new(), Vec::new());
+    let of_unit = |unit: &mut WorkUnit| {
+        let WorkUnit { nodes, faces, .. } = unit;
+        at.clear();
+        at.extend(nodes.iter().map(|&n| x[n as usize]));
+        met.clear();
+        met.resize(nodes.len(), false);
+        let mut pairs = 0;
+        faces.retain(|&f| {
+            let face = &surface.faces[f as usize];
+            let place = &mut place[f as usize];
+            if *place == NONE {
+                *place = boxes.len() as u32;
+                boxes.push(Bounds::of(&face.nodes.map(|n| x[n as usize]), reach));
+            }
+            let bounds = boxes[*place as usize];
+            let near = bounds.shrunk(beyond);
+            let mut any = false;
+            for (i, _) in at.iter().enumerate().filter(|(_, p)| bounds.holds(**p)) {
+                let n = nodes[i];
+                let meets = settings.permits(surface.node_part[n as usize], face.part)
+                    && !face.own.contains(&n)
+                    && (excluded.is_empty() || excluded.binary_search(&(n, f)).is_err());
+                met[i] |= meets;
+                any |= meets;
+                pairs += u64::from(meets && near.holds(at[i]));
+            }
+            any
+        });
+        let mut met = met.iter();
+        nodes.retain(|_| met.next().is_some_and(|met| *met));
+        pairs
+    };
+    units.iter_mut().map(of_unit).collect()
 }
 
 /// Stage zero: the pairs of each unit that can meet before the next sort (checks 1 to 4). `x` by batch node.

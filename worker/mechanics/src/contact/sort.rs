@@ -9,8 +9,16 @@
 //! without any are removed.
 //!
 //! Cubes are counted from the lowest corner of all interacting nodes, so that a translation changes nothing.
+//!
+//! Before all that, what lies outside the box of the parts that it may meet, grown by the reach, is left out: of two
+//! bodies that touch, most of the surface.
 
-use super::{Settings, search::Exclusions, surface::Surface, work_unit::WorkUnit};
+use super::{
+    Settings,
+    search::Exclusions,
+    surface::{Face, Surface},
+    work_unit::WorkUnit,
+};
 
 /// Greatest cube index along an axis: three of them fit one key.
 const MAX_CUBE: f64 = 2_097_000.0;
@@ -18,7 +26,7 @@ const MAX_CUBE: f64 = 2_097_000.0;
 /// Sorts a surface into work units, in the order in which its nodes first touch them. `x` by surface node.
 ///
 /// Every pair that interacts and of which the node lies in the face's box grown by the reach is in exactly one
-/// unit. Nodes and faces of parts that interact with nothing are left out.
+/// unit. Nodes and faces that can meet nothing are left out.
 ///
 /// # Panics
 /// If the settings know fewer parts than the surface.
@@ -28,17 +36,72 @@ pub fn sort(
     settings: &Settings,
     exclusions: &Exclusions,
 ) -> Vec<WorkUnit> {
-    let n_parts = settings.n_parts();
-    let interacting: Vec<bool> =
-        settings.interacts.chunks(n_parts.max(1)).map(|row| row.contains(&true)).collect();
-    let Some(grid) = Grid::new(surface, x, settings, &interacting) else { return Vec::new() };
-    let (table, unit_of) = sort_nodes(surface, x, &grid, &interacting);
+    let sides = Sides::new(surface, x, settings);
+    let Some(grid) = Grid::new(surface, x, settings, &sides) else { return Vec::new() };
+    let (table, unit_of) = sort_nodes(x, &grid, &sides);
     let nodes = group(table.cubes.len(), unit_of.iter().zip(0..).map(|(&unit, node)| (unit, node)));
     let census = PartCensus::new(surface, &nodes);
     let mut interactions = vec![0_u64; table.cubes.len()];
     let incidences =
-        sort_faces(surface, x, settings, &grid, &table, &unit_of, &census, &interacting, &mut interactions);
+        sort_faces(surface, x, settings, &grid, &table, &unit_of, &census, &sides, &mut interactions);
     assemble(surface, settings, exclusions, &table.cubes, &unit_of, &nodes, &incidences, interactions)
+}
+
+/// Where nodes lie beside the box of all that they may meet: the box around the nodes of the parts that theirs interacts
+/// with, grown by the reach.
+struct Sides {
+    /// By surface node: a bit for each side of the box of its part on which the node lies outside; 0 inside.
+    outside: Vec<u8>,
+    /// Faces that touch the box of their part, with their reach; ascending.
+    faces: Vec<u32>,
+}
+
+impl Sides {
+    fn new(surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> Self {
+        let n_parts = settings.n_parts();
+        let nothing = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        let grow = |around: &mut [[f64; 3]; 2], low: [f64; 3], high: [f64; 3]| {
+            for a in 0..3 {
+                around[0][a] = if low[a] < around[0][a] { low[a] } else { around[0][a] };
+                around[1][a] = if high[a] > around[1][a] { high[a] } else { around[1][a] };
+            }
+        };
+        let mut parts = vec![nothing; n_parts];
+        for (&p, &part) in x.iter().zip(&surface.node_part) {
+            grow(&mut parts[part as usize], p, p);
+        }
+        for &(node, part) in &surface.joined {
+            grow(&mut parts[part as usize], x[node as usize], x[node as usize]);
+        }
+        let reach = settings.reach();
+        let boxes: Vec<[[f64; 3]; 2]> = (0..n_parts)
+            .map(|part| {
+                let mut around = nothing;
+                for other in (0..n_parts).filter(|&other| settings.permits(part as u32, other as u32)) {
+                    grow(&mut around, parts[other][0], parts[other][1]);
+                }
+                [around[0].map(|low| low - reach), around[1].map(|high| high + reach)]
+            })
+            .collect();
+        let outside: Vec<u8> =
+            x.iter().zip(&surface.node_part).map(|(&p, &part)| side(&boxes[part as usize], p)).collect();
+        let beside = |face: &Face, n: u32| {
+            if surface.node_part[n as usize] == face.part {
+                outside[n as usize]
+            } else {
+                side(&boxes[face.part as usize], x[n as usize])
+            }
+        };
+        let touches = |face: &Face| face.nodes.into_iter().fold(u8::MAX, |all, n| all & beside(face, n)) == 0;
+        let faces = (0..).zip(&surface.faces).filter(|(_, face)| touches(face)).map(|(f, _)| f).collect();
+        Self { outside, faces }
+    }
+}
+
+/// A bit for each side of a box on which a point lies outside.
+#[inline(always)]
+fn side([low, high]: &[[f64; 3]; 2], p: [f64; 3]) -> u8 {
+    (0..3).fold(0, |bits, a| bits | u8::from(p[a] < low[a]) << a | u8::from(p[a] > high[a]) << (a + 3))
 }
 
 /// The virtual grid.
@@ -52,10 +115,10 @@ struct Grid {
 
 impl Grid {
     /// The grid for these positions; none if nothing interacts.
-    fn new(surface: &Surface, x: &[[f64; 3]], settings: &Settings, interacting: &[bool]) -> Option<Self> {
+    fn new(surface: &Surface, x: &[[f64; 3]], settings: &Settings, sides: &Sides) -> Option<Self> {
         let mut min = [f64::INFINITY; 3];
         let mut max = [f64::NEG_INFINITY; 3];
-        for (p, _) in x.iter().zip(&surface.node_part).filter(|(_, part)| interacting[**part as usize]) {
+        for (p, _) in x.iter().zip(&sides.outside).filter(|(_, outside)| **outside == 0) {
             for a in 0..3 {
                 min[a] = if p[a] < min[a] { p[a] } else { min[a] };
                 max[a] = if p[a] > max[a] { p[a] } else { max[a] };
@@ -65,7 +128,8 @@ impl Grid {
             return None;
         }
         let reach = settings.reach();
-        let smallest = surface.smallest_dimension_of(x, &|part| interacting[part as usize]);
+        let smallest =
+            surface.smallest_dimension_of(x, &mut sides.faces.iter().map(|&f| &surface.faces[f as usize]));
         let floor = (0..3).map(|a| (max[a] - min[a]) / MAX_CUBE).fold(2.0 * reach, f64::max);
         // Without a reach and with faces of no size any side will do.
         let side = if smallest.is_finite() { floor.max(2.0 * smallest) } else { floor };
@@ -213,21 +277,14 @@ impl Table {
     }
 }
 
-/// Unit of a node that interacts with nothing.
+/// Unit of a node that can meet nothing.
 const NO_UNIT: u32 = u32::MAX;
 
 /// First pass: the cubes that hold nodes, and the unit of each surface node.
-fn sort_nodes(surface: &Surface, x: &[[f64; 3]], grid: &Grid, interacting: &[bool]) -> (Table, Vec<u32>) {
-    let mut table = Table::with_room(surface.nodes.len(), grid.last);
-    let unit_of = x
-        .iter()
-        .zip(&surface.node_part)
-        .map(
-            |(&p, &part)| {
-                if interacting[part as usize] { table.find_or_create(grid.cube(p)) } else { NO_UNIT }
-            },
-        )
-        .collect();
+fn sort_nodes(x: &[[f64; 3]], grid: &Grid, sides: &Sides) -> (Table, Vec<u32>) {
+    let mut table = Table::with_room(x.len(), grid.last);
+    let unit = |(&p, &outside)| if outside == 0 { table.find_or_create(grid.cube(p)) } else { NO_UNIT };
+    let unit_of = x.iter().zip(&sides.outside).map(unit).collect();
     (table, unit_of)
 }
 
@@ -276,15 +333,13 @@ fn sort_faces(
     table: &Table,
     unit_of: &[u32],
     census: &PartCensus,
-    interacting: &[bool],
+    sides: &Sides,
     interactions: &mut [u64],
 ) -> Vec<(u32, u32)> {
     let n_parts = settings.n_parts();
-    let mut incidences = Vec::with_capacity(6 * surface.faces.len());
-    for (f, face) in surface.faces.iter().enumerate() {
-        if !interacting[face.part as usize] {
-            continue;
-        }
+    let mut incidences = Vec::with_capacity(6 * sides.faces.len());
+    for &f in &sides.faces {
+        let face = &surface.faces[f as usize];
         let permitted = &settings.interacts[face.part as usize * n_parts..][..n_parts];
         let (mut min, mut max) = (x[face.nodes[0] as usize], x[face.nodes[0] as usize]);
         for n in &face.nodes[1..] {
@@ -312,7 +367,7 @@ fn sort_faces(
             if all > 0 {
                 let own = own.iter().filter(|&&u| u == unit).count() as u64;
                 interactions[unit as usize] += u64::from(all) - own;
-                incidences.push((unit, f as u32));
+                incidences.push((unit, f));
             }
         };
         let cells: f64 = (0..3).map(|a| f64::from(high[a]) - f64::from(low[a]) + 1.0).product();

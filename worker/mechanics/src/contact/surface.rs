@@ -31,6 +31,9 @@ pub struct Surface {
     pub node_share: Vec<f64>,
     /// Faces by element, then side.
     pub faces: Vec<Face>,
+    /// Nodes that joined parts share, with each part of theirs beside that of `node_part`: such a node interacts as one of the
+    /// lowest part alone, but is a corner of faces of all.
+    pub joined: Vec<(u32, u32)>,
 }
 
 /// One outer face.
@@ -148,7 +151,14 @@ impl Surface {
             let half_mean = 0.5 * node_share[n] / f64::from(count[n]);
             node_share[n] = if half_mean > 0.0 { (around[n] / half_mean).min(1.0) } else { 1.0 };
         }
-        Self { nodes, node_part, node_stiffness, node_share, faces }
+        let mut joined: Vec<(u32, u32)> = faces
+            .iter()
+            .flat_map(|face| face.nodes.map(|n| (n, face.part)))
+            .filter(|&(n, part)| node_part[n as usize] != part)
+            .collect();
+        joined.sort_unstable();
+        joined.dedup();
+        Self { nodes, node_part, node_stiffness, node_share, faces, joined }
     }
 
     /// Raises stiffness where bodies close in so fast that `K A^2 / V` could not stop them inside the gap.
@@ -190,16 +200,17 @@ impl Surface {
 
     /// Shortest edge of any face (length); infinite without faces. `x` by surface node.
     pub fn smallest_dimension(&self, x: &[[f64; 3]]) -> f64 {
-        self.smallest_dimension_of(x, &|_| true)
+        self.smallest_dimension_of(x, &mut self.faces.iter())
     }
 
-    /// Shortest edge of the faces of the parts that `keep` names (length).
-    pub(crate) fn smallest_dimension_of(&self, x: &[[f64; 3]], keep: &dyn Fn(u32) -> bool) -> f64 {
+    /// Shortest edge of some faces (length).
+    pub(crate) fn smallest_dimension_of(
+        &self,
+        x: &[[f64; 3]],
+        faces: &mut dyn Iterator<Item = &Face>,
+    ) -> f64 {
         let mut smallest = f64::INFINITY;
-        for face in &self.faces {
-            if !keep(face.part) {
-                continue;
-            }
+        for face in faces {
             for i in 0..4 {
                 let (a, b) = (face.nodes[i], face.nodes[(i + 1) & 3]);
                 if a != b {

@@ -8,16 +8,21 @@
 
 use super::{
     Settings,
+    pairs::Pairs,
     reach::{self, Extent},
     search::Candidates,
 };
+use crate::lanes::SET;
 
 /// Spread of a list, in gaps: it lasts five cycles at the fastest that nodes may travel, and grows boxes by as much as
 /// the zone of warning does.
-const SPREAD: f64 = 2.0;
+pub(super) const SPREAD: f64 = 2.0;
 
 /// A list counts as stale this fraction before its spread: far more than rounding of positions can hide.
 const MARGIN: f64 = 1e-3;
+
+/// Nodes whose pairs are computed together: their lists fit the first cache.
+const BLOCK: usize = 64;
 
 /// Batch nodes and active faces.
 #[derive(Clone, Debug, Default)]
@@ -34,8 +39,10 @@ pub(super) struct Watch {
     pub(super) all: Listed,
     /// Pairs on the list.
     pub(super) candidates: Candidates,
-    /// Their nodes and faces.
-    pub(super) listed: Listed,
+    /// The same for lanes, those of each block of nodes in whole sets.
+    pub(super) pairs: Pairs,
+    /// Where each block begins: among the nodes, among `pairs`; and the ends.
+    pub(super) blocks: Vec<(u32, u32)>,
     /// Positions at which the list was taken, by batch node; empty before the first.
     x: [Vec<f64>; 3],
     /// Runs of batch nodes of one part: part, first, end.
@@ -46,8 +53,6 @@ pub(super) struct Watch {
     extents: Vec<Extent>,
     /// Part of the node and part of the face of all candidates, each once.
     meeting: Vec<(u32, u32)>,
-    /// Marks of nodes and of faces while a list is taken.
-    marks: [Vec<bool>; 2],
 }
 
 impl Watch {
@@ -61,7 +66,6 @@ impl Watch {
         part: &[u32],
     ) -> Self {
         let mut watch = Self {
-            marks: [vec![false; part.len()], vec![false; faces.len()]],
             extents: vec![Extent::NONE; settings.n_parts()],
             candidates: Candidates {
                 nodes: Vec::with_capacity(candidates.nodes.len()),
@@ -70,11 +74,10 @@ impl Watch {
             },
             ..Self::default()
         };
-        for list in [&mut watch.all, &mut watch.listed] {
-            list.nodes.reserve(part.len());
-            list.faces.reserve(faces.len());
-        }
-        list(&candidates.nodes, &candidates.faces, faces, &mut watch.marks, &mut watch.all);
+        let n_blocks = candidates.nodes.len().div_ceil(BLOCK);
+        watch.blocks.reserve(n_blocks + 1);
+        watch.pairs.reserve(candidates.faces.len() + SET * n_blocks);
+        watch.all = Listed::of(candidates, faces, part.len());
         for (node, &part) in (0..).zip(part) {
             match watch.runs.last_mut() {
                 Some((of, _, end)) if *of == part => *end = node + 1,
@@ -165,7 +168,14 @@ impl Watch {
                 starts.push(end);
             }
         }
-        list(near, near_faces, faces, &mut self.marks, &mut self.listed);
+        self.pairs.clear();
+        self.blocks.clear();
+        for first in (0..near.len()).step_by(BLOCK) {
+            let end = (first + BLOCK).min(near.len());
+            self.blocks.push((first as u32, self.pairs.node().len() as u32));
+            self.pairs.extend(&near[first..end], &starts[first..=end], near_faces, faces);
+        }
+        self.blocks.push((near.len() as u32, self.pairs.node().len() as u32));
     }
 }
 
@@ -195,33 +205,16 @@ fn range(now: &[f64], then: &[f64]) -> (f64, f64) {
     (min, max)
 }
 
-/// Lists the nodes and faces of pairs, each once and ascending.
-fn list(
-    nodes: &[u32],
-    pair_faces: &[u32],
-    faces: &[[u32; 4]],
-    [node_marks, face_marks]: &mut [Vec<bool>; 2],
-    listed: &mut Listed,
-) {
-    for &face in pair_faces {
-        face_marks[face as usize] = true;
-    }
-    for &node in nodes {
-        node_marks[node as usize] = true;
-    }
-    listed.faces.clear();
-    for (face, mark) in (0..).zip(face_marks) {
-        if std::mem::take(mark) {
-            listed.faces.push(face);
-            for node in faces[face as usize] {
-                node_marks[node as usize] = true;
-            }
+impl Listed {
+    /// The nodes and faces of pairs, each once and ascending; `faces` gives the corners among `n_nodes`.
+    fn of(pairs: &Candidates, faces: &[[u32; 4]], n_nodes: usize) -> Self {
+        let (mut node_marks, mut face_marks) = (vec![false; n_nodes], vec![false; faces.len()]);
+        pairs.nodes.iter().for_each(|&node| node_marks[node as usize] = true);
+        for &face in &pairs.faces {
+            face_marks[face as usize] = true;
+            faces[face as usize].iter().for_each(|&node| node_marks[node as usize] = true);
         }
-    }
-    listed.nodes.clear();
-    for (node, mark) in (0..).zip(node_marks) {
-        if std::mem::take(mark) {
-            listed.nodes.push(node);
-        }
+        let marked = |marks: &[bool]| (0..).zip(marks).filter(|(_, mark)| **mark).map(|(i, _)| i).collect();
+        Self { nodes: marked(&node_marks), faces: marked(&face_marks) }
     }
 }

@@ -114,20 +114,31 @@ impl Batch {
         const NONE: u32 = u32::MAX;
         let mut face_index = vec![NONE; surface.faces.len()];
         let mut node_index = vec![NONE; surface.nodes.len()];
+        let (mut nodes_of, mut faces_of) = (Vec::new(), Vec::new());
+        let take = |index: &mut [u32], list: &mut Vec<u32>, item: u32| {
+            let new = std::mem::replace(&mut index[item as usize], 0) == NONE;
+            if new {
+                list.push(item);
+            }
+            new
+        };
         for unit in units {
             for &node in &unit.nodes {
-                node_index[node as usize] = 0;
+                take(&mut node_index, &mut nodes_of, node);
             }
             for &face in &unit.faces {
-                face_index[face as usize] = 0;
-                for node in surface.faces[face as usize].nodes {
-                    node_index[node as usize] = 0;
+                if take(&mut face_index, &mut faces_of, face) {
+                    for node in surface.faces[face as usize].nodes {
+                        take(&mut node_index, &mut nodes_of, node);
+                    }
                 }
             }
         }
-        let mut nodes = Vec::new();
-        for (n, index) in node_index.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
-            *index = nodes.len() as u32;
+        nodes_of.sort_unstable();
+        faces_of.sort_unstable();
+        let mut nodes = Vec::with_capacity(nodes_of.len());
+        for n in nodes_of.into_iter().map(|n| n as usize) {
+            node_index[n] = nodes.len() as u32;
             let global = surface.nodes[n];
             nodes.push(BatchNode {
                 global,
@@ -137,13 +148,13 @@ impl Batch {
                 share: surface.node_share[n],
             });
         }
-        let mut faces = Vec::new();
-        for (f, index) in face_index.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
-            *index = faces.len() as u32;
-            let face = &surface.faces[f];
+        let mut faces = Vec::with_capacity(faces_of.len());
+        for f in faces_of {
+            face_index[f as usize] = faces.len() as u32;
+            let face = &surface.faces[f as usize];
             faces.push(BatchFace {
                 nodes: face.nodes.map(|n| node_index[n as usize]),
-                id: f as u32,
+                id: f,
                 part: face.part,
                 stiffness: face.stiffness,
                 corners: face.corners,

@@ -3,12 +3,13 @@
 //! The return to the von Mises surface is that of Simo and Taylor (1986): with
 //! `s^2 = A / (1 + E g / (3 (1 - nu)))^2 + B / (1 + 2 G g)^2`, `A = (xx + yy)^2 / 4`,
 //! `B = 3/4 (xx - yy)^2 + 3 (xy^2 + yz^2 + zx^2)` of the trial, and a plastic increment of `2/3 g s`, the multiplier g is
-//! where s meets the yield stress. Newton's steps come from one side, since the difference is convex; their number is
-//! fixed, so that a lane does not know its neighbours.
+//! where s meets the yield stress. Newton's steps come from one side where hardening does not grow steeper, since the
+//! difference is then convex; their number is fixed, so that a lane does not know its neighbours.
 
+use super::RateFactor;
 use crate::{
     lanes::{Lane, functions},
-    material::{Material, Strength},
+    material::{CowperSymonds, Hardening, Material, Strength},
 };
 
 /// Newton steps of the return; the residual is below 1e-12 of the yield stress well before.
@@ -43,6 +44,8 @@ pub(crate) struct PlaneLaw {
     pub poisson: f64,
     /// Yield stress; none for elastic layers.
     pub flow: Flow,
+    /// Factor of the strain rate on a linear or tabulated yield stress.
+    pub rate: Option<CowperSymonds>,
 }
 
 /// Yield stress of a layer.
@@ -52,6 +55,8 @@ pub(crate) enum Flow {
     Elastic,
     /// `Y = yield_stress + hardening e`.
     Linear { yield_stress: f64, hardening: f64 },
+    /// In straight lines from point to point, constant beyond the last.
+    Tabulated(Hardening),
     /// Johnson and Cook's; `heating` is `1 / (density specific heat)`.
     JohnsonCook {
         a: f64,
@@ -67,18 +72,21 @@ pub(crate) enum Flow {
 }
 
 impl PlaneLaw {
-    /// The law of a material, or its name if layers do not know it: shells need strength, and tabulated hardening and
-    /// strain-rate factors are for solids.
+    /// The law of a material, or its name if layers do not know it: shells need strength.
     pub fn of(material: &Material) -> Result<PlaneLaw, &'static str> {
+        let mut factor = None;
         let flow = match material.strength {
             _ if material.is_gas() => return Err("a gas"),
             Strength::Hydro => return Err("hydro"),
             Strength::Elastic { .. } => Flow::Elastic,
-            Strength::VonMises { yield_stress, hardening, rate: None, .. } => {
+            Strength::VonMises { yield_stress, hardening, rate, .. } => {
+                factor = rate;
                 Flow::Linear { yield_stress, hardening }
             }
-            Strength::VonMises { rate: Some(_), .. } => return Err("von Mises with Cowper-Symonds"),
-            Strength::Tabulated { .. } => return Err("tabulated hardening"),
+            Strength::Tabulated { hardening, rate, .. } => {
+                factor = rate;
+                Flow::Tabulated(hardening)
+            }
             Strength::JohnsonCook { a, b, n, c, m, t_melt, t_room, specific_heat, rate0, .. } => {
                 Flow::JohnsonCook {
                     a,
@@ -95,7 +103,7 @@ impl PlaneLaw {
         };
         let (bulk, shear) = (material.bulk(), material.shear());
         let young = 9.0 * bulk * shear / (3.0 * bulk + shear);
-        Ok(PlaneLaw { young, poisson: young / (2.0 * shear) - 1.0, flow })
+        Ok(PlaneLaw { young, poisson: young / (2.0 * shear) - 1.0, flow, rate: factor })
     }
 
     /// Shear modulus.
@@ -109,7 +117,26 @@ impl PlaneLaw {
         match self.flow {
             Flow::Elastic => (L::splat(f64::MAX), L::splat(0.0)),
             Flow::Linear { yield_stress, hardening } => {
-                (L::splat(hardening).mul_add(strain, L::splat(yield_stress)), L::splat(hardening))
+                let stress = L::splat(hardening).mul_add(strain, L::splat(yield_stress));
+                (stress * factor, L::splat(hardening) * factor)
+            }
+            Flow::Tabulated(table) => {
+                let (mut stress, mut slope) = (L::splat(table.stress[0]), L::splat(0.0));
+                let mut point = 0;
+                while point < table.n_points as usize {
+                    let (at, here) = (table.strain[point], table.stress[point]);
+                    let next = if point + 1 < table.n_points as usize {
+                        (table.stress[point + 1] - here) / (table.strain[point + 1] - at)
+                    } else {
+                        0.0
+                    };
+                    let beyond = L::splat(at).less_equal(strain);
+                    let line = L::splat(next).mul_add(strain - L::splat(at), L::splat(here));
+                    stress = L::select(beyond, line, stress);
+                    slope = L::select(beyond, L::splat(next), slope);
+                    point += 1;
+                }
+                (stress * factor, slope * factor)
             }
             Flow::JohnsonCook { a, b, n, .. } => {
                 let grown = L::splat(b) * functions::pow(strain, L::splat(n));
@@ -131,7 +158,8 @@ impl PlaneLaw {
                 let hot = hot.max(L::splat(0.0)).min(one);
                 L::splat(c).mul_add(logarithm, one) * (one - functions::pow(hot, L::splat(m)))
             }
-            _ => one,
+            Flow::Elastic => one,
+            Flow::Linear { .. } | Flow::Tabulated(_) => RateFactor::of(self.rate).at(rate),
         }
     }
 
@@ -208,7 +236,7 @@ mod tests {
     #[test]
     fn the_return_ends_on_the_hardened_surface_and_in_the_closed_form_of_shear() {
         let flow = Flow::Linear { yield_stress: 300e6, hardening: 1e9 };
-        let law = PlaneLaw { young: 200e9, poisson: 0.3, flow };
+        let law = PlaneLaw { young: 200e9, poisson: 0.3, flow, rate: None };
         let mut mixed = layer([500e6, -200e6, 150e6, 20e6, -40e6]);
         assert!(law.update(&mut mixed, Scalar(0.0)));
         let s = mixed.stress;
@@ -236,7 +264,7 @@ mod tests {
             heating: 0.0,
             inverse_rate0: 1.0,
         };
-        let law = PlaneLaw { young: 124e9, poisson: 0.34, flow };
+        let law = PlaneLaw { young: 124e9, poisson: 0.34, flow, rate: None };
         let mut layer = layer([0.0, 0.0, 120e6, 0.0, 0.0]);
         layer.temperature = Scalar(294.0);
         law.update(&mut layer, Scalar(1.0));
@@ -246,9 +274,35 @@ mod tests {
     }
 
     #[test]
+    fn a_table_is_followed_from_line_to_line_and_the_rate_factor_multiplies_it() {
+        let points = [[0.0, 300e6], [0.001, 400e6], [0.005, 450e6], [0.02, 460e6]];
+        let mut table = Hardening { n_points: 4, strain: [0.0; 10], stress: [0.0; 10] };
+        for (i, [strain, stress]) in points.into_iter().enumerate() {
+            (table.strain[i], table.stress[i]) = (strain, stress);
+        }
+        let on_table = |e: f64| {
+            let last = points.iter().rposition(|p| p[0] <= e).expect("the first is 0");
+            let Some(next) = points.get(last + 1) else { return points[last][1] };
+            let [at, stress] = points[last];
+            stress + (next[1] - stress) * (e - at) / (next[0] - at)
+        };
+        let rated = CowperSymonds { reference: 40.4, exponent: 5.0 };
+        for (rate, factor) in [(None, 1.0), (Some(rated), 1.0 + (200.0_f64 / 40.4).powf(0.2))] {
+            let law = PlaneLaw { young: 200e9, poisson: 0.3, flow: Flow::Tabulated(table), rate };
+            for overshoot in [1.001, 1.2, 2.0, 5.0, 40.0] {
+                let mut layer = layer([0.0, 0.0, overshoot * factor * 300e6 / 3f64.sqrt(), 0.0, 0.0]);
+                assert!(law.update(&mut layer, Scalar(200.0)));
+                let expected = factor * on_table(layer.plastic_strain.0);
+                let found = layer.stress.xy.0 * 3f64.sqrt();
+                assert!((found / expected - 1.0).abs() < 1e-9, "{overshoot}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
     fn a_layer_inside_the_surface_keeps_its_bits() {
-        let law =
-            PlaneLaw { young: 2e11, poisson: 0.3, flow: Flow::Linear { yield_stress: 3e8, hardening: 0.0 } };
+        let flow = Flow::Linear { yield_stress: 3e8, hardening: 0.0 };
+        let law = PlaneLaw { young: 2e11, poisson: 0.3, flow, rate: None };
         let mut inside = layer([1.1e8, 0.7e8, -0.3e8, 1.0, 2.0]);
         assert!(!law.update(&mut inside, Scalar(0.0)));
         assert_eq!(inside.stress.xx.0.to_bits(), 1.1e8f64.to_bits());

@@ -239,6 +239,9 @@ fn an_image_returns_to_the_bit() {
     assert_eq!(Block::new(&piece).piece(), piece);
     let explicit = written_out(&piece);
     assert_eq!(Block::new(&explicit).piece(), explicit);
+    for piece in [piece, explicit] {
+        assert_eq!(Block::of(piece.clone(), &[]).into_piece(), piece);
+    }
 }
 
 #[test]

@@ -72,7 +72,7 @@ fn slowly(contact: &Contact, cycle: Cycle) -> ContactVote {
     let warning = WARNING * contact.settings.gap;
     let at = |n: u32| cycle.x.each_ref().map(|x| x[n as usize]);
     let frame = |f: u32| Frame::new(&contact.faces[f as usize].map(at));
-    let mut vote = ContactVote { pairs: contact.n_pairs() as u64, ..ContactVote::default() };
+    let mut vote = ContactVote { pairs: contact.candidates.faces.len() as u64, ..ContactVote::default() };
     let (mut hits, mut beyond, mut frequency2) = (vec![], vec![], 0.0_f64);
     for (i, &node) in contact.candidates.nodes.iter().enumerate() {
         let (n, p) = (node as usize, at(node));
@@ -164,7 +164,8 @@ fn watching_few_pairs_for_several_cycles_loses_no_bit_of_bodies_that_move() {
     let mut contact = Contact::new(&batch, &settings, &x);
     let quantum = Quantum::for_reference(1.0, 42);
     // A common motion, a slide of the nodes over the patch, and noise, in all about an eighth of the spread.
-    let (mut taken, mut fewest, mut hits) = (0, usize::MAX, Vec::new());
+    // The first list is taken with the candidates.
+    let (mut taken, mut fewest, mut hits) = (1, usize::MAX, Vec::new());
     for cycle in 0..40 {
         let before = contact.watch.taken_at(0);
         let mut run = |fast: bool| {
@@ -191,6 +192,7 @@ fn watching_few_pairs_for_several_cycles_loses_no_bit_of_bodies_that_move() {
         }
     }
     assert!((4..20).contains(&taken), "{taken} lists in 40 cycles");
-    assert!(4 * fewest < 3 * contact.n_pairs(), "{fewest} of {} pairs", contact.n_pairs());
+    let all = contact.candidates.faces.len();
+    assert!(4 * fewest < 3 * all, "{fewest} of {all} pairs");
     assert!(hits.iter().any(|&n| n != hits[0]), "nothing changed: {hits:?}");
 }

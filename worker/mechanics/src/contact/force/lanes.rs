@@ -67,7 +67,7 @@ pub(in crate::contact) fn push(
     (force_quantum, energy_quantum): (Quantum, Quantum),
     terms: &mut Terms,
 ) -> Sums {
-    let n = pairs.node.len();
+    let n = pairs.node().len();
     let highest = pushes.face.iter().fold(0, |highest, &i| if i > highest { i } else { highest });
     assert!(pushes.face.len() == n && (n == 0 || (highest as usize) < statics.face_stiffness.len()));
     let n_nodes = statics.factor.len();
@@ -132,11 +132,11 @@ unsafe fn kernel<L: Lane>(
     let (force_magic, energy_magic) = (L::splat(magic[0]), L::splat(magic[1]));
     let (mut energy, mut bound, mut frequency2, mut deepest) = (zero, zero, zero, zero);
     let mut at = 0;
-    while at < pairs.node.len() {
+    while at < pairs.node().len() {
         // SAFETY: the caller's; `at + N` is within the lists because N divides SET.
         unsafe {
-            let factor = L::gather(&statics.factor, &pairs.node, at);
-            let of_node = L::gather(&statics.stiffness, &pairs.node, at);
+            let factor = L::gather(&statics.factor, pairs.node(), at);
+            let of_node = L::gather(&statics.stiffness, pairs.node(), at);
             let of_face = L::gather(&statics.face_stiffness, pushes.face, at);
             let sum = of_node + of_face;
             let mean = L::splat(2.0) * of_node * of_face / sum;
@@ -147,10 +147,10 @@ unsafe fn kernel<L: Lane>(
                 L::load(&pushes.weights[2], at),
                 L::load(&pushes.weights[3], at),
             ];
-            let mut inverse_mass = L::gather(&statics.inverse_mass, &pairs.node, at);
+            let mut inverse_mass = L::gather(&statics.inverse_mass, pairs.node(), at);
             let mut i = 0;
             while i < 4 {
-                let of_corner = L::gather(&statics.inverse_mass, &pairs.corners[i], at);
+                let of_corner = L::gather(&statics.inverse_mass, &pairs.corners()[i], at);
                 inverse_mass = (weights[i] * weights[i]).mul_add(of_corner, inverse_mass);
                 i += 1;
             }

@@ -4,6 +4,8 @@
 //! what any of them needs and select. A pair measures its face anew: its twelve coordinates are fewer than
 //! the forty numbers of a frame. Small whole numbers (features, triangles) travel as f64.
 
+use std::ops::Range;
+
 use super::{COPLANAR, Feature, INNER, JOINT, Nearest, OUTER, PLANE};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
@@ -103,22 +105,33 @@ impl Closest {
     }
 }
 
-/// Closest points of all pairs. `x` by batch node; the result does not depend on the width.
+/// Closest points of the pairs of a range. `x` by batch node. Where the face's box, grown by `grow`, does not hold the
+/// node ([`Bounds::holds`](crate::contact::search::Bounds::holds)) the distance is infinite and the rest means nothing.
+/// The result does not depend on the width.
 ///
 /// # Panics
-/// If the pairs do not fill whole lane sets, an index is out of range or the machine lacks the width.
-pub(in crate::contact) fn nearest(width: Width, x: &[Vec<f64>; 3], pairs: &Pairs, found: &mut Closest) {
+/// If the range is not whole lane sets of the pairs, an index is out of range or the machine lacks the width.
+pub(in crate::contact) fn nearest(
+    width: Width,
+    x: &[Vec<f64>; 3],
+    grow: f64,
+    pairs: &Pairs,
+    range: Range<usize>,
+    found: &mut Closest,
+) {
     pairs.check(width, x);
-    found.resize(pairs.node.len());
+    let whole = range.start.is_multiple_of(SET) && range.end.is_multiple_of(SET);
+    assert!(whole && range.start <= range.end && range.end <= pairs.node().len(), "pairs {range:?}");
+    found.resize(range.len());
     match width {
-        // SAFETY: the pairs have been checked, the width too; `found` is as long as they.
-        Width::Scalar => unsafe { kernel::<Scalar>(x, pairs, found) },
+        // SAFETY: the pairs have been checked, the width too; `found` is as long as the range.
+        Width::Scalar => unsafe { kernel::<Scalar>(x, grow, pairs, range, found) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Width::Avx2 => unsafe { on_avx2(x, pairs, found) },
+        Width::Avx2 => unsafe { on_avx2(x, grow, pairs, range, found) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Width::Avx512 => unsafe { on_avx512(x, pairs, found) },
+        Width::Avx512 => unsafe { on_avx512(x, grow, pairs, range, found) },
         #[cfg(not(target_arch = "x86_64"))]
         Width::Avx2 | Width::Avx512 => unreachable!("not available"),
     }
@@ -126,35 +139,50 @@ pub(in crate::contact) fn nearest(width: Width, x: &[Vec<f64>; 3], pairs: &Pairs
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2(x: &[Vec<f64>; 3], pairs: &Pairs, found: &mut Closest) {
+unsafe fn on_avx2(x: &[Vec<f64>; 3], grow: f64, pairs: &Pairs, range: Range<usize>, found: &mut Closest) {
     // SAFETY: the caller's.
-    unsafe { kernel::<Avx2>(x, pairs, found) }
+    unsafe { kernel::<Avx2>(x, grow, pairs, range, found) }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512(x: &[Vec<f64>; 3], pairs: &Pairs, found: &mut Closest) {
+unsafe fn on_avx512(x: &[Vec<f64>; 3], grow: f64, pairs: &Pairs, range: Range<usize>, found: &mut Closest) {
     // SAFETY: the caller's.
-    unsafe { kernel::<Avx512>(x, pairs, found) }
+    unsafe { kernel::<Avx512>(x, grow, pairs, range, found) }
 }
 
 /// # Safety
-/// Lists equally long and filling whole sets, indices in range; `found` as long as they.
+/// Lists equally long, the range whole sets of them, indices in range; `found` as long as the range.
 #[inline(always)]
-unsafe fn kernel<L: Lane>(x: &[Vec<f64>; 3], pairs: &Pairs, found: &mut Closest) {
+unsafe fn kernel<L: Lane>(
+    x: &[Vec<f64>; 3],
+    grow: f64,
+    pairs: &Pairs,
+    range: Range<usize>,
+    found: &mut Closest,
+) {
+    let (far, grow) = (L::splat(f64::INFINITY), L::splat(grow));
+    let (node, of) = (pairs.node(), pairs.corners());
     let mut at = 0;
-    while at < pairs.node.len() {
+    while at < range.len() {
+        let from = range.start + at;
         // SAFETY: the caller's; `at + N` is within the lists because N divides SET.
         unsafe {
-            let p = gather::<L>(x, &pairs.node, at);
+            let p = gather::<L>(x, node, from);
             let corners = [
-                gather::<L>(x, &pairs.corners[0], at),
-                gather::<L>(x, &pairs.corners[1], at),
-                gather::<L>(x, &pairs.corners[2], at),
-                gather::<L>(x, &pairs.corners[3], at),
+                gather::<L>(x, &of[0], from),
+                gather::<L>(x, &of[1], from),
+                gather::<L>(x, &of[2], from),
+                gather::<L>(x, &of[3], from),
             ];
+            let held = holds(p, &corners, grow);
+            if !L::any(held) {
+                far.store(&mut found.distance2, at);
+                at += L::N;
+                continue;
+            }
             let point = closest(p, &corners);
-            point.distance2.store(&mut found.distance2, at);
+            L::select(held, point.distance2, far).store(&mut found.distance2, at);
             point.code.store(&mut found.code, at);
             point.vector[0].store(&mut found.vector[0], at);
             point.vector[1].store(&mut found.vector[1], at);
@@ -165,6 +193,26 @@ unsafe fn kernel<L: Lane>(x: &[Vec<f64>; 3], pairs: &Pairs, found: &mut Closest)
         }
         at += L::N;
     }
+}
+
+/// Whether the box of four corners, grown on all sides, holds a point.
+#[inline(always)]
+fn holds<L: Lane>(p: V<L>, x: &[V<L>; 4], grow: L) -> L::Mask {
+    L::both(
+        spans(p[0], [x[0][0], x[1][0], x[2][0], x[3][0]], grow),
+        L::both(
+            spans(p[1], [x[0][1], x[1][1], x[2][1], x[3][1]], grow),
+            spans(p[2], [x[0][2], x[1][2], x[2][2], x[3][2]], grow),
+        ),
+    )
+}
+
+/// [`holds`] along one axis.
+#[inline(always)]
+fn spans<L: Lane>(p: L, [a, b, c, d]: [L; 4], grow: L) -> L::Mask {
+    let low = a.min(b).min(c.min(d)) - grow;
+    let high = a.max(b).max(c.max(d)) + grow;
+    L::both(low.less_equal(p), p.less_equal(high))
 }
 
 /// # Safety
@@ -242,7 +290,7 @@ pub(in crate::contact) fn approach(
     found: &mut Approach,
 ) {
     pairs.check(width, x);
-    let n = pairs.node.len();
+    let n = pairs.node().len();
     assert!(found.index.len() == n && found.sign.len() == n, "{} features of {n} pairs", found.index.len());
     let highest = found.index.iter().fold(0, |highest, &i| if i > highest { i } else { highest });
     let lists = closest.vector.iter().chain(&closest.shares).chain([&closest.code, &closest.distance2]);
@@ -288,7 +336,7 @@ unsafe fn near_on_avx512(
 unsafe fn near<L: Lane>(x: &[Vec<f64>; 3], gap: f64, pairs: &Pairs, closest: &Closest, found: &mut Approach) {
     let (zero, gap) = (L::splat(0.0), L::splat(gap));
     let mut at = 0;
-    while at < pairs.node.len() {
+    while at < pairs.node().len() {
         // SAFETY: the caller's; `at + N` is within the lists because N divides SET.
         unsafe {
             let index = &found.index[..];
@@ -306,12 +354,12 @@ unsafe fn near<L: Lane>(x: &[Vec<f64>; 3], gap: f64, pairs: &Pairs, closest: &Cl
             let mut weights = of_shares(code, shares);
             let plane = L::splat(OF_TRIANGLE * PLANE as f64).less_equal(code);
             if L::any(plane) {
-                let p = gather::<L>(x, &pairs.node, at);
+                let p = gather::<L>(x, pairs.node(), at);
                 let corners = [
-                    gather::<L>(x, &pairs.corners[0], at),
-                    gather::<L>(x, &pairs.corners[1], at),
-                    gather::<L>(x, &pairs.corners[2], at),
-                    gather::<L>(x, &pairs.corners[3], at),
+                    gather::<L>(x, &pairs.corners()[0], at),
+                    gather::<L>(x, &pairs.corners()[1], at),
+                    gather::<L>(x, &pairs.corners()[2], at),
+                    gather::<L>(x, &pairs.corners()[3], at),
                 ];
                 let inside = bilinear(sub(sub(p, vector), corners[0]), &corners);
                 weights = [
@@ -667,7 +715,7 @@ fn split_sides<L: Lane>(x: &[V<L>; 4], vector: V<L>, feature: L, triangle: L, ne
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::zone::Frame;
+    use crate::contact::{search::Bounds, zone::Frame};
 
     /// Bits, but for the sign of zeros.
     fn bits(nearest: &Nearest) -> (Feature, u8, u8, [u64; 7]) {
@@ -684,7 +732,7 @@ mod tests {
             (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         let (mut x, mut pairs) = ([vec![], vec![], vec![]], Pairs::default());
-        let (mut frames, mut nodes, mut faces) = (vec![], vec![], vec![]);
+        let (mut frames, mut nodes, mut faces, mut quads) = (vec![], vec![], vec![], vec![]);
         for round in 0..20_000_u32 {
             let mut quad = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
             // Coplanar, warped, hardly warped, or with two corners in one.
@@ -712,13 +760,18 @@ mod tests {
             faces.push([1, 2, 3, 4].map(|i| first + i));
             nodes.push(first);
             frames.push((Frame::new(&quad), p));
+            quads.push(quad);
         }
-        let (ends, held): (Vec<u32>, Vec<u32>) = (0..nodes.len() as u32).map(|i| (i + 1, i)).unzip();
-        pairs.expand(&nodes, &ends, &held, &faces);
-        let mut counts = [0; 9];
+        let held: Vec<u32> = (0..nodes.len() as u32).collect();
+        let starts: Vec<u32> = (0..=nodes.len() as u32).collect();
+        pairs.extend(&nodes, &starts, &held, &faces);
+        let all = 0..pairs.node().len();
+        let mut counts = [0; 11];
         for width in Width::ALL.into_iter().filter(|width| width.available()) {
             let mut found = Closest::default();
-            nearest(width, &x, &pairs, &mut found);
+            nearest(width, &x, 0.3, &pairs, all.clone(), &mut found);
+            let within = found.distance2.clone();
+            nearest(width, &x, f64::INFINITY, &pairs, all.clone(), &mut found);
             let mut near =
                 Approach { index: held.clone(), sign: vec![1.0; held.len()], ..Approach::default() };
             near.fill_up();
@@ -726,6 +779,9 @@ mod tests {
             let weighed = &near.weights;
             for (i, (frame, p)) in frames.iter().enumerate() {
                 let wanted = frame.nearest(*p);
+                let holds = Bounds::of(&quads[i], 0.3).holds(*p);
+                assert_eq!(within[i], if holds { wanted.distance2 } else { f64::INFINITY }, "{width}");
+                counts[9 + usize::from(holds)] += 1;
                 assert_eq!(bits(&found.nearest(i)), bits(&wanted), "{width}: {frame:?} {p:?}");
                 let of = frame.weights(&wanted, *p).map(|w| (w + 0.0).to_bits());
                 assert_eq!(

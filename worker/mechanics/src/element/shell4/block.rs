@@ -64,8 +64,8 @@ impl fmt::Display for SectionError {
             }
             SectionError::Law { material, law } => write!(
                 f,
-                "shells of {material:?}: {law} has no plane-stress form; take elastic, von Mises with linear hardening \
-                 or Johnson-Cook"
+                "shells of {material:?}: {law} has no plane-stress form; take elastic, von Mises, tabulated or \
+                 Johnson-Cook strength"
             ),
         }
     }

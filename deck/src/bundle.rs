@@ -1,0 +1,228 @@
+//! A deck and the files that it refers to, as one text: what is sent to a master, and what [`crate::read`] takes.
+//!
+//! A deck of one file and no options is its own text. Any other starts with the line `#bolide-bundle 1`; then come
+//! lines `units NAME`, `case NUMBER`, and for each file, the deck first, `file BYTES NAME` with its text below.
+
+use std::collections::BTreeSet;
+
+use toml::de::DeTable;
+
+use crate::{
+    fault::{Fault, Faults},
+    keyword,
+};
+
+const FIRST: &str = "#bolide-bundle 1";
+
+/// Most files of a deck.
+pub const MAX_FILES: usize = 1_000;
+/// Most bytes of a deck with its files.
+pub const MAX_BYTES: usize = 256 << 20;
+
+/// What a deck does not say itself. Only keyword decks need it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Consistent units of a keyword deck; guessed from its densities where absent.
+    pub units: Option<String>,
+    /// The case of a keyword deck with several.
+    pub case: Option<u32>,
+}
+
+/// The kinds of text that are a deck.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Toml,
+    Keyword,
+    Bundle,
+}
+
+impl Kind {
+    /// The kind of a text: keyword decks start with `*` or `$`.
+    pub(crate) fn of(text: &str) -> Self {
+        let first = text.trim_start_matches('\u{feff}').trim_start();
+        match first.as_bytes().first() {
+            Some(b'*' | b'$') => Self::Keyword,
+            _ if text.starts_with(FIRST) => Self::Bundle,
+            _ => Self::Toml,
+        }
+    }
+}
+
+/// Named texts, the deck first.
+pub(crate) struct Bundle<'a> {
+    pub(crate) options: Options,
+    pub(crate) files: Vec<(&'a str, &'a str)>,
+}
+
+impl<'a> Bundle<'a> {
+    /// Takes a text apart. A text that is no bundle is a deck without other files.
+    pub(crate) fn of(text: &'a str, name: &'a str) -> Result<Self, Vec<Fault>> {
+        let mut bundle = Self { options: Options::default(), files: Vec::new() };
+        if Kind::of(text) != Kind::Bundle {
+            bundle.files.push((name, text));
+            return Ok(bundle);
+        }
+        let broken = |at: usize| {
+            let faults = Faults::new(name, text);
+            let advice = "let submit or run make the bundle";
+            faults.add(
+                at,
+                faults.quote(at, at + 60),
+                "a heading of a bundle and all that it announces",
+                advice,
+            );
+            faults.into_list()
+        };
+        let mut at = FIRST.len();
+        while at < text.len() {
+            let end = text[at..].find('\n').map_or(text.len(), |n| at + n);
+            let line = text[at..end].trim();
+            let start = at;
+            at = (end + 1).min(text.len());
+            let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
+            match word {
+                "" => {}
+                "units" => bundle.options.units = Some(rest.to_string()),
+                "case" => bundle.options.case = Some(rest.parse().map_err(|_| broken(start))?),
+                "file" => {
+                    let (bytes, name) = rest.split_once(' ').ok_or_else(|| broken(start))?;
+                    let bytes: usize = bytes.parse().map_err(|_| broken(start))?;
+                    let end = at.checked_add(bytes).ok_or_else(|| broken(start))?;
+                    let body = text.get(at..end).ok_or_else(|| broken(start))?;
+                    if bundle.files.len() == MAX_FILES {
+                        return Err(broken(start));
+                    }
+                    bundle.files.push((name, body));
+                    at = end;
+                }
+                _ => return Err(broken(start)),
+            }
+        }
+        if bundle.files.is_empty() {
+            return Err(broken(0));
+        }
+        Ok(bundle)
+    }
+
+    /// The text of a file by its name.
+    pub(crate) fn file(&self, name: &str) -> Option<usize> {
+        self.files.iter().position(|(known, _)| *known == name)
+    }
+}
+
+/// A deck with every file that it refers to, ready for [`crate::read`]. `open` gives the text of a file by the path
+/// that the deck's own `path` leads to, or nothing; a file that is missing is a fault when the deck is read.
+///
+/// # Errors
+/// If there are too many files, or too many bytes.
+pub fn gather(
+    path: &str,
+    text: String,
+    options: &Options,
+    open: &mut dyn FnMut(&str) -> Option<String>,
+) -> Result<String, String> {
+    let mut files = vec![(path.to_string(), text)];
+    let mut tried: BTreeSet<String> = BTreeSet::from([path.to_string()]);
+    let mut folders: Vec<String> = Vec::new();
+    let mut bytes = files[0].1.len();
+    let mut next = 0;
+    while next < files.len() {
+        let (name, text) = &files[next];
+        let wanted = match Kind::of(text) {
+            Kind::Keyword => keyword::includes(name, text, &mut folders),
+            Kind::Toml if next == 0 => mesh_files(name, text),
+            _ => Vec::new(),
+        };
+        for candidates in wanted {
+            for candidate in candidates {
+                if files.iter().any(|(known, _)| *known == candidate) {
+                    break;
+                }
+                if !tried.insert(candidate.clone()) {
+                    continue;
+                }
+                let Some(text) = open(&candidate) else { continue };
+                bytes += text.len();
+                if files.len() == MAX_FILES || bytes > MAX_BYTES {
+                    return Err(format!(
+                        "{path}: more than {MAX_FILES} files or {MAX_BYTES} bytes with its includes; join or shorten them"
+                    ));
+                }
+                files.push((candidate, text));
+                break;
+            }
+        }
+        next += 1;
+    }
+    if files.len() == 1 && *options == Options::default() {
+        return Ok(files.swap_remove(0).1);
+    }
+    let mut packed = format!("{FIRST}\n");
+    if let Some(units) = &options.units {
+        packed += &format!("units {}\n", units.replace(char::is_whitespace, ""));
+    }
+    if let Some(case) = options.case {
+        packed += &format!("case {case}\n");
+    }
+    for (name, text) in &files {
+        packed += &format!("file {} {}\n{text}\n", text.len(), name.replace('\n', " "));
+    }
+    Ok(packed)
+}
+
+/// The mesh files that a TOML deck names; what cannot be read is a fault later.
+fn mesh_files(path: &str, text: &str) -> Vec<Vec<String>> {
+    let Ok(document) = DeTable::parse(text) else { return Vec::new() };
+    let parts = document.get_ref().get("part").and_then(|parts| parts.get_ref().as_array());
+    let file = |part: &toml::Spanned<toml::de::DeValue<'_>>| {
+        let mesh = part.get_ref().as_table()?.get("mesh")?.get_ref().as_table()?;
+        Some(beside(path, mesh.get("file")?.get_ref().as_str()?))
+    };
+    parts.into_iter().flatten().filter_map(file).map(|name| vec![name]).collect()
+}
+
+/// A path that a file says, as seen from where that file is seen from.
+pub(crate) fn beside(file: &str, name: &str) -> String {
+    let name = name.replace('\\', "/");
+    match file.rsplit_once('/') {
+        Some((folder, _)) if !name.starts_with('/') => format!("{folder}/{name}"),
+        _ => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_deck_of_one_file_is_its_own_bundle() {
+        let packed = gather("a/deck.toml", "title = \"x\"".to_string(), &Options::default(), &mut |_| None);
+        assert_eq!(packed.as_deref(), Ok("title = \"x\""));
+    }
+
+    #[test]
+    fn includes_are_gathered_once_from_where_they_stand_and_come_back() {
+        let texts = [
+            ("a/main.k", "*KEYWORD\n*INCLUDE\nmesh/one.k\nmissing.k\n*END\n"),
+            ("a/mesh/one.k", "*KEYWORD\n*INCLUDE\n$ twice\ntwo.k\n*include\n two.k \n"),
+            ("a/mesh/two.k", "$ nothing\u{e9}\n"),
+        ];
+        let mut asked = Vec::new();
+        let options = Options { units: Some("mm-s-t".to_string()), case: Some(7) };
+        let packed = gather(texts[0].0, texts[0].1.to_string(), &options, &mut |path| {
+            asked.push(path.to_string());
+            texts.iter().find(|(name, _)| *name == path).map(|(_, text)| (*text).to_string())
+        })
+        .expect("few files");
+        assert_eq!(asked, ["a/mesh/one.k", "a/missing.k", "a/mesh/two.k"]);
+        let bundle = Bundle::of(&packed, "other").expect("whole");
+        assert_eq!(bundle.files, texts);
+        assert_eq!(bundle.options, options);
+        for cut in 0..packed.len() {
+            if let Some(part) = packed.get(..cut) {
+                // Every piece is read or refused.
+                let _ = Bundle::of(part, "cut");
+            }
+        }
+    }
+}

@@ -1,0 +1,399 @@
+//! `*INITIAL_`, `*BOUNDARY_`, `*LOAD_`, `*RIGIDWALL_`: what nodes start with, what holds, moves, pushes and stops them.
+
+use super::{
+    cards::Block,
+    fields::{Context, Fields, TENS},
+    log::Place,
+};
+
+/// Which nodes something speaks of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Target {
+    All,
+    Node(u32),
+    NodeSet(u32),
+    Part(u32),
+    PartSet(u32),
+}
+
+/// An initial velocity: a translation and a rotation about an axis.
+pub(super) struct Velocity {
+    pub(super) at: Place,
+    pub(super) target: Target,
+    /// Set of nodes that are left out, and the box that bounds the others; 0 is none.
+    pub(super) except: u32,
+    pub(super) inside: u32,
+    pub(super) velocity: [f64; 3],
+    /// Angular velocity, and a point of its axis.
+    pub(super) spin: [f64; 3],
+    pub(super) point: [f64; 3],
+    /// Coordinate system of both vectors; 0 is the global one.
+    pub(super) system: u32,
+    /// Whether the rotations that were given turn each node about itself, as shells can.
+    pub(super) own_turn: [f64; 3],
+}
+
+/// Degrees of freedom of nodes that are held at rest.
+pub(super) struct Held {
+    pub(super) at: Place,
+    pub(super) target: Target,
+    pub(super) system: u32,
+    /// x, y, z, then the rotations about them.
+    pub(super) axes: [bool; 6],
+}
+
+/// How a curve is meant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Meaning {
+    Velocity,
+    Acceleration,
+    Displacement,
+}
+
+/// A motion by curve along one axis.
+pub(super) struct Motion {
+    pub(super) at: Place,
+    pub(super) target: Target,
+    pub(super) axis: usize,
+    pub(super) meaning: Meaning,
+    pub(super) curve: u32,
+    pub(super) factor: f64,
+}
+
+/// A force by curve along one axis, on each node.
+pub(super) struct Force {
+    pub(super) at: Place,
+    pub(super) target: Target,
+    pub(super) axis: usize,
+    pub(super) curve: u32,
+    pub(super) factor: f64,
+}
+
+/// A pressure by curve.
+pub(super) struct Pressure {
+    pub(super) at: Place,
+    /// Faces by their nodes, or a set of segments.
+    pub(super) faces: Vec<[u32; 4]>,
+    pub(super) set: u32,
+    pub(super) curve: u32,
+    pub(super) factor: f64,
+}
+
+/// `*LOAD_BODY_X` and its like.
+pub(super) struct Body {
+    pub(super) at: Place,
+    pub(super) axis: usize,
+    pub(super) curve: u32,
+    pub(super) factor: f64,
+}
+
+/// A plane that nodes do not pass.
+pub(super) struct Wall {
+    pub(super) at: Place,
+    pub(super) target: Target,
+    pub(super) except: u32,
+    pub(super) inside: u32,
+    /// Only nodes nearer than this at the start; 0 is all.
+    pub(super) offset: f64,
+    pub(super) point: [f64; 3],
+    /// Towards the material, of any length.
+    pub(super) normal: [f64; 3],
+    pub(super) friction: f64,
+    /// Mass and speed along the normal of a wall that moves.
+    pub(super) moving: Option<[f64; 2]>,
+}
+
+/// All conditions of a deck, in its order.
+#[derive(Default)]
+pub(super) struct Conditions {
+    pub(super) velocities: Vec<Velocity>,
+    pub(super) held: Vec<Held>,
+    pub(super) motions: Vec<Motion>,
+    pub(super) forces: Vec<Force>,
+    pub(super) pressures: Vec<Pressure>,
+    pub(super) bodies: Vec<Body>,
+    pub(super) walls: Vec<Wall>,
+}
+
+/// A time that means never.
+const NEVER: f64 = 1e15;
+
+/// Reports a birth or death time that is not from the start to the end.
+pub(super) fn all_along(f: &Fields<'_>, birth: usize, death: usize) {
+    if f.real(birth, 0.0) != 0.0 {
+        f.fault(birth, "a birth time of 0", "start the run there, or put it into the curve");
+    }
+    let end = f.real(death, 0.0);
+    if end != 0.0 && end < NEVER {
+        f.fault(death, "no death time", "end the run there, or put it into the curve");
+    }
+}
+
+impl Conditions {
+    /// Whether a keyword is read here.
+    pub(super) fn knows(word: &str) -> bool {
+        let plain = word.strip_suffix("_ID").unwrap_or(word);
+        matches!(
+            plain,
+            "INITIAL_VELOCITY"
+                | "INITIAL_VELOCITY_NODE"
+                | "INITIAL_VELOCITY_GENERATION"
+                | "BOUNDARY_SPC_NODE"
+                | "BOUNDARY_SPC_SET"
+                | "BOUNDARY_PRESCRIBED_MOTION_NODE"
+                | "BOUNDARY_PRESCRIBED_MOTION_SET"
+                | "LOAD_NODE_POINT"
+                | "LOAD_NODE_SET"
+                | "LOAD_SEGMENT"
+                | "LOAD_SEGMENT_SET"
+                | "LOAD_BODY_X"
+                | "LOAD_BODY_Y"
+                | "LOAD_BODY_Z"
+        ) || matches!(
+            plain,
+            "RIGIDWALL_PLANAR"
+                | "RIGIDWALL_PLANAR_FORCES"
+                | "RIGIDWALL_PLANAR_MOVING"
+                | "RIGIDWALL_PLANAR_MOVING_FORCES"
+        )
+    }
+
+    /// Reads one of them.
+    pub(super) fn read(&mut self, block: &mut Block<'_>, context: &Context<'_>) {
+        let named = block.take("_ID");
+        let per_card = block.keyword.starts_with("BOUNDARY") || block.keyword.starts_with("LOAD");
+        if named && per_card {
+            // A card with a number and a heading stands before each.
+            let mut n = 0;
+            block.cards.retain(|_| {
+                n += 1;
+                n % 2 == 0
+            });
+        } else if named && !block.cards.is_empty() {
+            block.cards.remove(0);
+        }
+        let word = block.keyword.clone();
+        match word.as_str() {
+            "INITIAL_VELOCITY" => self.velocity(block, context),
+            "INITIAL_VELOCITY_GENERATION" => self.generation(block, context),
+            word if word.starts_with("RIGIDWALL") => self.wall(block, context),
+            word => {
+                for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
+                    let widths: &[usize] = if word == "LOAD_SEGMENT" { &[10; 10] } else { &TENS };
+                    let f = context.fields(card, block.width, widths);
+                    self.line(word, &f);
+                }
+            }
+        }
+    }
+
+    /// A keyword of one card each.
+    fn line(&mut self, word: &str, f: &Fields<'_>) {
+        let at = f.at;
+        let of_set = word.ends_with("_SET");
+        match word {
+            "INITIAL_VELOCITY_NODE" => {
+                let target = Target::Node(f.id(0));
+                let turn = f.vector(4);
+                self.velocities.push(Velocity {
+                    at,
+                    target,
+                    except: 0,
+                    inside: 0,
+                    velocity: f.vector(1),
+                    spin: [0.0; 3],
+                    point: [0.0; 3],
+                    system: f.id(7),
+                    own_turn: turn,
+                });
+            }
+            "BOUNDARY_SPC_NODE" | "BOUNDARY_SPC_SET" => {
+                let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
+                let axes = [2, 3, 4, 5, 6, 7].map(|i| f.integer(i) != 0);
+                self.held.push(Held { at, target, system: f.id(1), axes });
+            }
+            "LOAD_NODE_POINT" | "LOAD_NODE_SET" => {
+                let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
+                let Some(axis) = axis_of(f, 1) else { return };
+                if f.id(4) != 0 {
+                    f.fault(4, "the global system", "leave CID blank and give components");
+                }
+                self.forces.push(Force { at, target, axis, curve: f.id(2), factor: scale(f, 3) });
+            }
+            "LOAD_SEGMENT" | "LOAD_SEGMENT_SET" => {
+                let (set, curve, i) = if of_set { (f.id(0), f.id(1), 2) } else { (0, f.id(0), 1) };
+                if f.real(i + 1, 0.0) != 0.0 {
+                    f.fault(i + 1, "an arrival time of 0", "put it into the curve");
+                }
+                let mut faces = Vec::new();
+                if !of_set {
+                    let mut face = [3, 4, 5, 6].map(|i| f.id(i));
+                    if face[3] == 0 {
+                        face[3] = face[2];
+                    }
+                    faces.push(face);
+                }
+                self.pressures.push(Pressure { at, faces, set, curve, factor: scale(f, i) });
+            }
+            "LOAD_BODY_X" | "LOAD_BODY_Y" | "LOAD_BODY_Z" => {
+                let axis = usize::from(word.as_bytes()[word.len() - 1] - b'X');
+                if f.id(2) != 0 {
+                    f.fault(2, "no curve for dynamic relaxation", "leave LCIDDR blank");
+                }
+                if f.id(6) != 0 {
+                    f.fault(6, "the global system", "leave CID blank");
+                }
+                self.bodies.push(Body { at, axis, curve: f.id(0), factor: scale(f, 1) });
+            }
+            _ => {
+                let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
+                let Some(axis) = axis_of(f, 1) else { return };
+                let meaning = match f.integer(2) {
+                    0 => Meaning::Velocity,
+                    1 => Meaning::Acceleration,
+                    2 => Meaning::Displacement,
+                    _ => {
+                        f.fault(
+                            2,
+                            "VAD 0, 1 or 2",
+                            "give a velocity, an acceleration or a displacement by time",
+                        );
+                        return;
+                    }
+                };
+                all_along(f, 7, 6);
+                self.motions.push(Motion { at, target, axis, meaning, curve: f.id(3), factor: scale(f, 4) });
+            }
+        }
+    }
+
+    /// `*INITIAL_VELOCITY`: a set, and perhaps another for those it leaves out.
+    fn velocity(&mut self, block: &Block<'_>, context: &Context<'_>) {
+        let cards = [block.card(0), block.card(1), block.card(2)];
+        let [f, g, h] = [0, 1, 2].map(|i| context.fields(&cards[i], block.width, &TENS));
+        let base = |target, except, inside, velocity, own_turn| Velocity {
+            at: f.at,
+            target,
+            except,
+            inside,
+            velocity,
+            spin: [0.0; 3],
+            point: [0.0; 3],
+            system: f.id(4),
+            own_turn,
+        };
+        let target = if f.id(0) == 0 { Target::All } else { Target::NodeSet(f.id(0)) };
+        self.velocities.push(base(target, f.id(1), f.id(2), g.vector(0), g.vector(3)));
+        if f.id(1) != 0 && !h.all_blank() {
+            self.velocities.push(base(Target::NodeSet(f.id(1)), 0, 0, h.vector(0), h.vector(3)));
+        }
+    }
+
+    /// `*INITIAL_VELOCITY_GENERATION`: two cards each.
+    fn generation(&mut self, block: &Block<'_>, context: &Context<'_>) {
+        let n = block.cards.len().div_ceil(2);
+        for i in 0..n {
+            let cards = [block.card(2 * i), block.card(2 * i + 1)];
+            let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+            let id = f.id(0);
+            let target = match f.integer(1) {
+                _ if id == 0 => Target::All,
+                1 => Target::PartSet(id),
+                2 => Target::Part(id),
+                3 => Target::NodeSet(id),
+                _ => {
+                    f.fault(1, "STYP 1, 2 or 3", "name a set of parts, a part, or a set of nodes");
+                    continue;
+                }
+            };
+            if g.integer(6) != 0 {
+                g.fault(6, "PHASE 0", "start with the velocity");
+            }
+            let omega = f.real(2, 0.0);
+            let axis = g.vector(3);
+            let mut spin = [0.0; 3];
+            if omega != 0.0 {
+                if axis[0] == -999.0 {
+                    g.fault(3, "an axis by its direction", "give NX, NY, NZ instead of nodes");
+                }
+                match super::problem::unit(axis) {
+                    Some(axis) => spin = axis.map(|c| omega * c),
+                    None => g.fault(3, "an axis of some length", "give NX, NY, NZ"),
+                }
+            }
+            self.velocities.push(Velocity {
+                at: f.at,
+                target,
+                except: 0,
+                inside: 0,
+                velocity: f.vector(3),
+                spin,
+                point: g.vector(0),
+                system: f.id(7),
+                own_turn: [0.0; 3],
+            });
+        }
+    }
+
+    /// `*RIGIDWALL_PLANAR`.
+    fn wall(&mut self, block: &Block<'_>, context: &Context<'_>) {
+        let moving = block.keyword.contains("_MOVING");
+        let cards = [block.card(0), block.card(1), block.card(2)];
+        let [f, g, h] = [0, 1, 2].map(|i| context.fields(&cards[i], block.width, &TENS));
+        all_along(&f, 4, 5);
+        let point = g.vector(0);
+        let head = g.vector(3);
+        let normal = super::problem::minus(head, point);
+        if super::problem::unit(normal).is_none() {
+            g.fault(3, "a head of the normal apart from its tail", "give XH, YH, ZH");
+            return;
+        }
+        let friction = match g.real(6, 0.0) {
+            // No sliding once it touches.
+            1.0 => 1e6,
+            mu if (0.0..1.0).contains(&mu) => mu,
+            _ => {
+                g.fault(6, "a coefficient of friction from 0 to 1", "correct it");
+                return;
+            }
+        };
+        if moving && friction != 0.0 {
+            g.fault(6, "a moving wall without friction", "leave FRIC blank");
+        }
+        let moving = moving.then(|| [h.real(0, 0.0), h.real(1, 0.0)]);
+        if moving.is_some_and(|[mass, _]| mass <= 0.0) {
+            h.fault(0, "a mass above 0", "give the wall its mass");
+            return;
+        }
+        self.walls.push(Wall {
+            at: f.at,
+            target: if f.id(0) == 0 { Target::All } else { Target::NodeSet(f.id(0)) },
+            except: f.id(1),
+            inside: f.id(2),
+            offset: f.real(3, 0.0),
+            point,
+            normal,
+            friction,
+            moving,
+        });
+    }
+}
+
+/// x, y or z by DOF 1, 2, 3.
+fn axis_of(f: &Fields<'_>, i: usize) -> Option<usize> {
+    match f.integer(i) {
+        dof @ 1..=3 => Some(dof as usize - 1),
+        _ => {
+            f.fault(i, "DOF 1, 2 or 3, along x, y or z", "give components along the global axes");
+            None
+        }
+    }
+}
+
+/// A scale factor, where 0 stands for 1.
+fn scale(f: &Fields<'_>, i: usize) -> f64 {
+    match f.real(i, 1.0) {
+        0.0 => 1.0,
+        factor => factor,
+    }
+}

@@ -1,0 +1,160 @@
+//! `*CONTACT_`: which parts meet.
+
+use super::{
+    cards::Block,
+    condition::all_along,
+    fields::{Context, TENS},
+    log::{Log, Place},
+    problem::Problem,
+};
+
+/// One side of a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Side {
+    /// Every part.
+    All,
+    Part(u32),
+    PartSet(u32),
+    /// All parts but those of the set.
+    NotPartSet(u32),
+    NodeSet(u32),
+    SegmentSet(u32),
+}
+
+/// A contact that is honoured.
+pub(super) struct ContactCard {
+    pub(super) at: Place,
+    pub(super) first: Side,
+    /// None where the first meets itself.
+    pub(super) second: Option<Side>,
+    pub(super) friction: f64,
+}
+
+impl ContactCard {
+    /// Reads a `*CONTACT_` keyword; none after a fault, and for force transducers.
+    pub(super) fn read(block: &mut Block<'_>, context: &Context<'_>) -> Option<Self> {
+        let log = context.log;
+        let whole = block.keyword.clone();
+        let mut extra = usize::from(block.take("_ID") || block.take("_TITLE"));
+        extra += usize::from(block.take("_MPP"));
+        extra += usize::from(extra == 0 && (block.take("_ID") || block.take("_TITLE")));
+        let word = block.keyword["CONTACT_".len()..].to_string();
+        if word.starts_with("FORCE_TRANSDUCER") {
+            log.ignore(block.at, &whole);
+            return None;
+        }
+        let single = match word.as_str() {
+            "AUTOMATIC_SINGLE_SURFACE" | "AUTOMATIC_GENERAL" | "ERODING_SINGLE_SURFACE" => true,
+            "AUTOMATIC_SURFACE_TO_SURFACE"
+            | "AUTOMATIC_NODES_TO_SURFACE"
+            | "AUTOMATIC_ONE_WAY_SURFACE_TO_SURFACE"
+            | "ERODING_SURFACE_TO_SURFACE"
+            | "ERODING_NODES_TO_SURFACE" => false,
+            _ => {
+                log.fault(
+                    block.at,
+                    format!("*{}", log.quote(&whole)),
+                    "a contact of the table in deck/README.md",
+                    "use an AUTOMATIC or ERODING one",
+                );
+                return None;
+            }
+        };
+        let cards = [block.card(extra), block.card(extra + 1)];
+        let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+        for i in [4, 5].into_iter().filter(|i| f.integer(*i) != 0) {
+            f.fault(i, "contact wherever its parts are", "leave the boxes blank");
+        }
+        all_along(&g, 6, 7);
+        let side = |i: usize| {
+            let id = f.id(i);
+            match f.integer(i + 2) {
+                _ if id == 0 && i == 0 && single => Some(Side::All),
+                5 if i == 0 => Some(Side::All),
+                0 => Some(Side::SegmentSet(id)),
+                2 => Some(Side::PartSet(id)),
+                3 => Some(Side::Part(id)),
+                4 => Some(Side::NodeSet(id)),
+                6 => Some(Side::NotPartSet(id)),
+                _ => {
+                    f.fault(i + 2, "a kind of surface from 0 to 6 without 1", "name parts");
+                    None
+                }
+            }
+        };
+        let (fixed, moving, decay) = (g.real(0, 0.0), g.real(1, 0.0), g.real(2, 0.0));
+        if fixed < 0.0 {
+            g.fault(0, "a coefficient of friction of 0 or above", "give the contact its own");
+            return None;
+        }
+        let decays = decay != 0.0 && fixed != moving;
+        if decays {
+            log.warn(g.at, format!("friction does not depend on the velocity: FD {moving} is taken"));
+        }
+        if g.real(3, 0.0) != 0.0 {
+            log.warn(g.at, "VC: friction is not bounded by a stress");
+        }
+        let second = if single { None } else { Some(side(1)?) };
+        let friction = if decays { moving } else { fixed };
+        Some(Self { at: f.at, first: side(0)?, second, friction })
+    }
+
+    /// Pairs of parts that meet, lower number first, in order.
+    pub(super) fn pairs(&self, problem: &Problem, log: &Log) -> Vec<(u32, u32)> {
+        let first = self.parts(self.first, problem, log);
+        let mut pairs = Vec::new();
+        match self.second {
+            None => {
+                for (i, a) in first.iter().enumerate() {
+                    pairs.extend(first[i..].iter().map(|b| (*a, *b)));
+                }
+            }
+            Some(second) => {
+                let second = self.parts(second, problem, log);
+                for a in &first {
+                    pairs.extend(second.iter().map(|b| (*a.min(b), *a.max(b))));
+                }
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs
+    }
+
+    fn parts(&self, side: Side, problem: &Problem, log: &Log) -> Vec<u32> {
+        let holding = |nodes: Vec<u32>, what: &str| {
+            let held = |id: &u32| nodes.binary_search(id).is_ok();
+            let solids = problem.solids.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
+            let shells = problem.shells.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
+            let mut parts: Vec<u32> = solids.chain(shells).collect();
+            parts.sort_unstable();
+            parts.dedup();
+            log.warn(
+                self.at,
+                format!("a contact of a set of {what}: the parts that hold them meet as a whole"),
+            );
+            parts
+        };
+        match side {
+            Side::All => problem.parts.keys().copied().collect(),
+            Side::Part(id) => {
+                if !problem.parts.contains_key(&id) {
+                    log.fault(self.at, format!("part {id}"), "a part of the deck", "correct the number");
+                }
+                vec![id]
+            }
+            Side::PartSet(id) => problem.part_set(id, self.at, log),
+            Side::NotPartSet(id) => {
+                let out = problem.part_set(id, self.at, log);
+                problem.parts.keys().copied().filter(|p| out.binary_search(p).is_err()).collect()
+            }
+            Side::NodeSet(id) => holding(problem.node_set(id, self.at, log), "nodes"),
+            Side::SegmentSet(id) => {
+                let mut nodes: Vec<u32> =
+                    problem.segment_set(id, self.at, log).into_iter().flatten().collect();
+                nodes.sort_unstable();
+                holding(nodes, "segments")
+            }
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! `*CONTROL_` and `*DATABASE_`: how long and how finely, and what is written.
+
+use super::{
+    cards::Block,
+    fields::{Context, TENS},
+    log::Place,
+};
+
+/// What the control cards say; none is what no card said.
+#[derive(Default)]
+pub(super) struct ControlCards {
+    pub(super) end_time: Option<(Place, f64)>,
+    pub(super) end_cycle: Option<u64>,
+    /// LS-DYNA's factor on the time step.
+    pub(super) step_factor: Option<(Place, f64)>,
+    /// Quadratic and linear coefficient of bulk viscosity.
+    pub(super) viscosity: Option<(Place, [f64; 2])>,
+    /// Kind and coefficient of hourglass control.
+    pub(super) hourglass: Option<(Place, i64, f64)>,
+    pub(super) period: Option<(Place, f64)>,
+    /// Nodes and sets of nodes whose motion is to be written.
+    pub(super) gauges: Vec<(Place, u32)>,
+    pub(super) gauge_sets: Vec<(Place, u32)>,
+}
+
+impl ControlCards {
+    /// Reads a `*CONTROL_` keyword.
+    pub(super) fn read(&mut self, block: &Block<'_>, context: &Context<'_>) {
+        let log = context.log;
+        let card = block.card(0);
+        let f = context.fields(&card, block.width, &TENS);
+        match block.keyword.as_str() {
+            "CONTROL_TERMINATION" => {
+                let end = f.real(0, 0.0);
+                if end > 0.0 {
+                    self.end_time = Some((card.at, end));
+                }
+                self.end_cycle = u64::try_from(f.integer(1)).ok().filter(|n| *n > 0);
+                if f.real(3, 0.0) != 0.0 {
+                    log.warn(
+                        card.at,
+                        "ENDENG: the run does not stop by its energy; the summary has the error",
+                    );
+                }
+                if f.integer(5) != 0 {
+                    f.fault(5, "NOSOL 0", "check the deck with bolide check");
+                }
+            }
+            "CONTROL_TIMESTEP" => {
+                let factor = f.real(1, 0.9);
+                if factor < 0.0 {
+                    f.fault(1, "a factor above 0", "leave TSSFAC blank");
+                } else if factor > 0.0 {
+                    self.step_factor = Some((card.at, factor));
+                }
+                if f.real(4, 0.0) != 0.0 {
+                    log.warn(card.at, "DT2MS: no mass is added; small elements rule the time step");
+                }
+                if f.integer(5) != 0 {
+                    log.warn(card.at, "LCTM: the time step is not bounded by a curve");
+                }
+                if f.real(3, 0.0) != 0.0 {
+                    log.warn(card.at, "TSLIMT: stiffness is not reduced for the time step");
+                }
+            }
+            "CONTROL_BULK_VISCOSITY" => {
+                let [quadratic, linear] = [f.real(0, 1.5), f.real(1, 0.06)];
+                if quadratic < 0.0 || linear < 0.0 {
+                    f.fault(0, "coefficients of 0 or above", "correct Q1 and Q2");
+                } else {
+                    self.viscosity = Some((card.at, [quadratic, linear]));
+                }
+            }
+            "CONTROL_HOURGLASS" => self.hourglass = Some((card.at, f.integer(0), f.real(1, 0.0))),
+            // The energies that it switches on are always reckoned.
+            "CONTROL_ENERGY" => {}
+            "CONTROL_DYNAMIC_RELAXATION" => {
+                log.warn(
+                    block.at,
+                    "no dynamic relaxation before the run; [relaxation] of a TOML deck brings bodies to rest",
+                );
+            }
+            word if word.starts_with("CONTROL_IMPLICIT") => log.fault(
+                block.at,
+                format!("*{word}"),
+                "explicit dynamics; implicit ones are not computed here",
+                "take the keyword out if the problem is one of impact, else use another program",
+            ),
+            word if word.starts_with("CONTROL_THERMAL") || word.starts_with("CONTROL_ALE") => log.fault(
+                block.at,
+                format!("*{word}"),
+                "Lagrangian mechanics",
+                "take the keyword out if the problem does without it",
+            ),
+            word => log.ignore(block.at, word),
+        }
+    }
+
+    /// Reads a `*DATABASE_` keyword.
+    pub(super) fn read_database(&mut self, block: &Block<'_>, context: &Context<'_>) {
+        match block.keyword.as_str() {
+            "DATABASE_BINARY_D3PLOT" => {
+                let card = block.card(0);
+                let period = context.fields(&card, block.width, &TENS).real(0, 0.0);
+                if period > 0.0 {
+                    self.period = Some((card.at, period));
+                }
+            }
+            word @ ("DATABASE_HISTORY_NODE" | "DATABASE_HISTORY_NODE_SET") => {
+                let sets = word.ends_with("SET");
+                for card in &block.cards {
+                    let f = context.fields(card, block.width, &TENS);
+                    let list = if sets { &mut self.gauge_sets } else { &mut self.gauges };
+                    list.extend((0..8).map(|i| (card.at, f.id(i))).filter(|(_, id)| *id != 0));
+                }
+            }
+            word => context.log.ignore(block.at, word),
+        }
+    }
+}

@@ -1,0 +1,358 @@
+//! Keyword decks: the examples are what they say, converted decks are the same problem, bad decks are refused at their
+//! lines, and no change of a deck makes the reader panic.
+
+use std::{fs, path::Path};
+
+use deck::{
+    Fault, Model, Reading,
+    bundle::{self, Options},
+    mesh_file,
+};
+use mechanics::{load::Drive, material::Strength, mesh::Topology, wall::Shape};
+
+fn folder(name: &str) -> String {
+    format!("{}/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A deck of a folder with what it includes.
+fn gathered(folder: &str, name: &str, options: &Options) -> String {
+    let text = fs::read_to_string(Path::new(folder).join(name)).expect("the deck is in the repository");
+    let mut open = |path: &str| fs::read_to_string(Path::new(folder).join(path)).ok();
+    bundle::gather(name, text, options, &mut open).expect("few files")
+}
+
+fn example(name: &str, case: Option<u32>) -> Reading {
+    let options = Options { units: None, case };
+    deck::read_whole(&gathered(&folder("examples"), name, &options), name)
+        .unwrap_or_else(|f| panic!("{}", lines(&f)))
+}
+
+fn lines(faults: &[Fault]) -> String {
+    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+/// A small deck: one cube of one element of steel, and what is added to it.
+fn cube(more: &str) -> String {
+    let nodes: String = (0..8)
+        .map(|i: u32| {
+            let x = [(i ^ i >> 1) & 1, i >> 1 & 1, i >> 2];
+            format!("{:8}{:16}{:16}{:16}\n", i + 1, x[0], x[1], x[2])
+        })
+        .collect();
+    format!(
+        "*KEYWORD\n*CONTROL_TERMINATION\n1e-6\n*PART\ncube\n1,1,1\n*SECTION_SOLID\n1,1\n*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n*NODE\n{nodes}*ELEMENT_SOLID\n       1       1       1       2       3       4       5       6       7       8\n{more}*END\n"
+    )
+}
+
+fn read(text: &str) -> Result<Model, Vec<Fault>> {
+    deck::read(text, "a.k")
+}
+
+fn good(more: &str) -> Model {
+    read(&cube(more)).unwrap_or_else(|f| panic!("{}", lines(&f)))
+}
+
+/// The first fault of the small deck with something added.
+fn fault(more: &str) -> String {
+    read(&cube(more)).expect_err("a fault")[0].to_string()
+}
+
+#[test]
+fn block_on_plate_is_a_quarter_with_curves_sets_and_contact() {
+    let Reading { model, warnings } = example("block-on-plate.k", None);
+    assert_eq!((model.title.as_str(), model.units.as_str()), ("Block on a plate", "mm-ms-kg"));
+    assert_eq!((model.mesh.n_elements(), model.mesh.n_nodes()), (4 * 4 * 6 + 12 * 12 * 3, 851));
+    let names: Vec<&str> = model.mesh.parts.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["block", "plate"]);
+    let moving: Vec<&[f64; 3]> = model.velocity.iter().filter(|v| **v != [0.0; 3]).collect();
+    assert!(moving.len() == 5 * 5 * 7 && moving.iter().all(|v| **v == [0.0, 0.0, -150.0]));
+    let Strength::Tabulated { hardening, .. } = model.setup.materials[1].strength else { panic!("a curve") };
+    // In GPa by SFO; the last slope goes on.
+    assert_eq!((hardening.n_points, hardening.strain[1], hardening.stress[1]), (5, 0.05, 0.3));
+    let contact = model.setup.contact.as_ref().expect("the deck has contact");
+    assert_eq!(contact.interacts, [false, true, true, false]);
+    // The bodies are 0.2 apart, more than a tenth of the smallest edge.
+    assert!((contact.gap - 0.4 / 3.0).abs() < 1e-6, "{}", contact.gap);
+    let gauges: Vec<&str> = model.output.gauges.iter().map(|g| g.name.as_str()).collect();
+    assert_eq!((model.output.period, gauges), (Some(0.01), vec!["node 1", "node 1001"]));
+    assert_eq!(warnings.len(), 1);
+    assert!(warnings[0].to_string().starts_with("block-on-plate.k:"), "{}", warnings[0]);
+    assert!(warnings[0].words.contains("*DATABASE_GLSTAT (line 18)"), "{}", warnings[0]);
+}
+
+#[test]
+fn bar_on_wall_runs_the_case_that_is_chosen() {
+    for (case, speed, title) in
+        [(101, -190e3, "Bar on a wall, 190 m/s"), (102, -100e3, "Bar on a wall, 100 m/s")]
+    {
+        let Reading { model, warnings } = example("bar-on-wall.k", Some(case));
+        assert_eq!((model.title.as_str(), model.units.as_str(), warnings.len()), (title, "mm-s-t", 0));
+        assert!(model.velocity.iter().all(|v| v[2] == speed));
+        let Shape::Plane { normal, .. } = model.setup.walls[0].shape else { panic!("a plane") };
+        assert_eq!(normal, [0.0, 0.0, 1.0]);
+        assert!(matches!(model.setup.materials[0].strength, Strength::JohnsonCook { shear: 46e3, .. }));
+    }
+    let undecided = example("bar-on-wall.k", None);
+    assert!(
+        undecided.warnings[0].words.contains("--case takes one of 101, 102"),
+        "{}",
+        undecided.warnings[0]
+    );
+}
+
+#[test]
+fn a_converted_deck_is_the_same_problem() {
+    for (name, case) in [("block-on-plate.k", None), ("bar-on-wall.k", Some(102))] {
+        let options = Options { units: None, case };
+        let text = gathered(&folder("examples"), name, &options);
+        let converted = deck::convert(&text, name, "out.mesh").unwrap_or_else(|f| panic!("{}", lines(&f)));
+        mesh_file::parse(&converted.mesh, "out.mesh").unwrap_or_else(|f| panic!("{}", lines(&f)));
+        let mesh = converted.mesh;
+        let mut open = |path: &str| (path == "some/out.mesh").then(|| mesh.clone());
+        let packed = bundle::gather("some/out.toml", converted.deck, &Options::default(), &mut open)
+            .expect("two files");
+        let again = deck::read(&packed, "out.toml").unwrap_or_else(|f| panic!("{}", lines(&f)));
+        assert_eq!(again, example(name, case).model, "{name}");
+    }
+    let toml = deck::convert("title = \"x\"\n", "a.toml", "out.mesh").expect_err("no keyword deck");
+    assert!(toml[0].to_string().contains("expected an LS-DYNA keyword deck"), "{}", toml[0]);
+}
+
+#[test]
+fn a_mesh_file_that_is_missing_is_a_fault_of_the_deck() {
+    let deck = "title = \"x\"\nunits = \"SI\"\n[control]\nend_cycle = 1\n[[part]]\nname = \"a\"\nmaterial = \"LEAD\"\nmesh = { file = \"none.mesh\" }\n";
+    let faults = deck::read(deck, "deck.toml").expect_err("no such file");
+    assert_eq!(
+        lines(&faults),
+        "deck.toml:8:17: read file = \"none.mesh\"; expected a mesh file that can be read; put it beside the deck, or correct the name"
+    );
+}
+
+#[test]
+fn wedges_pyramids_and_tetrahedra_are_hexahedra_whose_corners_coincide() {
+    let more = "*ELEMENT_SOLID\n2,1,1,2,3,4,5,5,8,8\n3,1,1,2,3,4,5,5,5,5\n4,1,1,2,3,5,5,5,5,5\n5,1,1,2,3,5\n";
+    let model = good(more);
+    let corners = |e: usize| model.mesh.parts[0].corners(e).map(|n| model.mesh.node_ids[n as usize]);
+    assert_eq!(corners(1), [1, 2, 3, 4, 5, 5, 8, 8]);
+    assert_eq!(corners(2), [1, 2, 3, 4, 5, 5, 5, 5]);
+    assert_eq!(corners(3), [1, 2, 3, 3, 5, 5, 5, 5]);
+    assert_eq!(corners(4), corners(3));
+    let seven = fault("*ELEMENT_SOLID\n2,1,1,2,3,4,5,6,7,7\n");
+    assert!(seven.starts_with("a.k:23:1: read element 2 with 7 different corners"), "{seven}");
+}
+
+#[test]
+fn parts_that_name_the_same_nodes_share_them() {
+    let second = "*NODE\n9,0,0,2\n10,1,0,2\n11,1,1,2\n12,0,1,2\n*PART\nupper\n2,1,1\n*ELEMENT_SOLID\n2,2,5,6,7,8,9,10,11,12\n*CONTACT_AUTOMATIC_SINGLE_SURFACE\n\n\n";
+    let model = good(second);
+    assert_eq!(model.mesh.n_nodes(), 12);
+    assert_eq!(model.mesh.parts[0].nodes[4..], model.mesh.parts[1].nodes[..4]);
+    assert!(
+        matches!(&model.mesh.parts[1].topology, Topology::Explicit { hexahedra } if hexahedra.len() == 1)
+    );
+    assert_eq!(model.setup.contact.expect("contact").interacts, [true; 4]);
+}
+
+#[test]
+fn spinning_bodies_and_local_axes_give_each_node_its_velocity() {
+    // About the axis through (1, 0, 0) along z: node 1 at the origin moves along -y.
+    let model = good("*INITIAL_VELOCITY_GENERATION\n1,2,10.0,0.0,0.0,5.0\n1.0,0.0,0.0,0.0,0.0,2.0\n");
+    assert_eq!(model.velocity[0], [0.0, -10.0, 5.0]);
+    assert_eq!(model.velocity[1], [0.0, 0.0, 5.0]);
+    // x of the system is global y, y is -x; the later card goes over the earlier one, in its box only.
+    let system = "*DEFINE_COORDINATE_SYSTEM\n3,0,0,0,0,1,0\n-1,0,0\n*DEFINE_BOX\n7,-1,0.5,-9,9,-9,9\n";
+    let model =
+        good(&format!("{system}*INITIAL_VELOCITY\n\n4.0\n*INITIAL_VELOCITY\n0,0,7,0,3\n1.0,2.0,0.0\n"));
+    assert_eq!(model.velocity[0], [-2.0, 1.0, 0.0]);
+    assert_eq!(model.velocity[1], [4.0, 0.0, 0.0]);
+}
+
+#[test]
+fn sets_and_what_is_held_moved_and_pushed_reach_the_nodes_meant() {
+    let sets = "*SET_NODE_GENERAL\n1\nBOX,1\nDNODE,4\n*DEFINE_BOX\n1,-9,9,-9,9,-0.1,0.1\n*SET_NODE_LIST_GENERATE_TITLE\nup\n2\n5,7\n*SET_NODE_ADD\n4\n2\n";
+    let conditions = "*BOUNDARY_SPC_SET_ID\n9,held\n1,0,1,0,1\n*BOUNDARY_PRESCRIBED_MOTION_SET\n4,3,2,5,2.0\n*DEFINE_CURVE\n5\n0,0\n1e-6,1e-3\n*LOAD_NODE_SET\n2,1,6,-3.0\n*LOAD_NODE_POINT\n6,1,6,-3.0\n*DEFINE_CURVE\n6\n0,1\n*LOAD_BODY_Z\n6,9810.\n*LOAD_SEGMENT\n6,2.0,0.0,1,2,3,4\n*LOAD_SEGMENT\n6,2.0,0.0,4,3,2,1\n";
+    let model = good(&format!("{sets}{conditions}"));
+    let of = |node: usize| model.setup.constraints[usize::from(model.constraint[node])];
+    for node in 0..3 {
+        let zero = Some(Drive::constant(0.0));
+        assert_eq!(of(node).velocity, [zero, None, zero], "node {}", node + 1);
+    }
+    assert_eq!(of(3).velocity, [None; 3]);
+    let curves = &model.setup.loads.curves;
+    for node in 4..7 {
+        let drive = of(node).velocity[2].expect("moved");
+        // Twice the displacement of 1e-3 in 1e-6.
+        assert!((drive.at(curves, 0.5e-6) - 2000.0).abs() < 1e-9);
+        assert!((drive.integral(curves, 2e-6) - 2e-3).abs() < 1e-8);
+    }
+    // Node 6 is pushed by both keywords.
+    let force = |node: usize| -> f64 {
+        let forces = model.setup.loads.forces.iter().enumerate();
+        forces.filter(|(f, _)| of(node).forces >> f & 1 == 1).map(|(_, f)| f.force[0]).sum()
+    };
+    assert_eq!([4, 5, 6, 7].map(force), [-3.0, -6.0, -3.0, 0.0]);
+    let gravity = model.setup.loads.gravity.expect("gravity");
+    assert_eq!(gravity.acceleration, [0.0, 0.0, -9810.0]);
+    // The lower face, once from outside, once from inside.
+    assert_eq!(model.setup.loads.surfaces.len(), 2);
+}
+
+#[test]
+fn a_wall_stops_the_nodes_that_it_names() {
+    let model = good("*SET_NODE_LIST\n1\n1,2\n*RIGIDWALL_PLANAR\n1\n0,0,-1,0,0,3\n");
+    let of = |node: usize| model.setup.constraints[usize::from(model.constraint[node])].walls;
+    assert_eq!([0, 1, 2, 7].map(of), [1, 1, 0, 0]);
+    assert_eq!(model.setup.walls[0].parts, [false]);
+    assert!(fault("*RIGIDWALL_PLANAR\n\n0,0,0.5,0,0,3\n").contains("behind it"));
+}
+
+#[test]
+fn what_cannot_be_honoured_is_refused_where_it_stands() {
+    let refused = [
+        ("*DEFORMABLE_TO_RIGID\n1\n", "a.k:22:1: read *DEFORMABLE_TO_RIGID; expected parts that deform"),
+        ("*MAT_ADD_EROSION\n1\n", "a.k:22:1: read *MAT_ADD_EROSION; expected no erosion"),
+        (
+            "*INITIAL_VELOCITY_RIGID_BODY\n1,1.0\n",
+            "a.k:22:1: read *INITIAL_VELOCITY_RIGID_BODY; expected a keyword",
+        ),
+        ("*MAT_VISCOELASTIC\n2,1.0\n", "a.k:22:1: read *MAT_VISCOELASTIC; expected a material of the table"),
+        ("*ELEMENT_BEAM\n1,1,1,2,3\n", "a.k:22:1: read *ELEMENT_BEAM; expected a keyword of the table"),
+        (
+            "*CONTROL_IMPLICIT_GENERAL\n1\n",
+            "a.k:22:1: read *CONTROL_IMPLICIT_GENERAL; expected explicit dynamics",
+        ),
+        (
+            "*CONTACT_TIED_SURFACE_TO_SURFACE\n\n",
+            "a.k:22:1: read *CONTACT_TIED_SURFACE_TO_SURFACE; expected a contact",
+        ),
+        ("*ELEMENT_SOLID\n2,1,1,2,3,4,8,7,6,5\n", "a.k:23:1: read element 2 with volume"),
+        (
+            "*ELEMENT_SOLID\n2,1,1,2,3,4,5,6,7,99\n",
+            "a.k:23:1: read element 2 with node 99; expected nodes of the deck",
+        ),
+        ("*ELEMENT_SOLID\n1,1,1,2,3,4,5,6,7,8\n", "a.k:23:1: read element 1; expected a number other than 1"),
+        (
+            "*NODE\n1,5.0\n",
+            "a.k:23:1: read 1; expected a number other than 1, which line 12 has with another place",
+        ),
+        ("*SECTION_SOLID\n2,24\n", "a.k:23:3: read 24; expected ELFORM 1"),
+        ("*BOUNDARY_SPC_SET\n5,0,1,1,1\n", "a.k:23:1: read set 5; expected a set of nodes of the deck"),
+        ("*LOAD_NODE_POINT\n1,5,1,1.0\n", "a.k:23:3: read 5; expected DOF 1, 2 or 3"),
+        ("*CONSTRAINED_SPOTWELD\n1,2\n", "a.k:22:1: read *CONSTRAINED_SPOTWELD"),
+        (
+            "*SET_NODE_ADD\n1\n1\n*BOUNDARY_SPC_SET\n1,0,1\n",
+            "a.k:23:1: read set 1; expected sets that do not hold themselves",
+        ),
+        (
+            "*CONTACT_AUTOMATIC_SINGLE_SURFACE\n1,0,3\n0.1,0.1,0,0,0,0,1e-7\n",
+            "a.k:24:17: read 1e-7; expected a birth time of 0",
+        ),
+    ];
+    for (more, expected) in refused {
+        let found = fault(more);
+        assert!(found.starts_with(expected), "{found}");
+    }
+    let empty = read("*KEYWORD\n*END\n").expect_err("nothing in it");
+    assert!(lines(&empty).contains("expected *ELEMENT_SOLID"), "{}", lines(&empty));
+}
+
+#[test]
+fn every_bad_keyword_deck_gives_exactly_its_faults() {
+    let path = folder("../tests/decks/bad");
+    let mut seen = 0;
+    for entry in fs::read_dir(&path).expect("the folder is in the repository") {
+        let name = entry.expect("a file").file_name().to_string_lossy().into_owned();
+        if !name.ends_with(".k") {
+            continue;
+        }
+        seen += 1;
+        let text = fs::read_to_string(Path::new(&path).join(&name)).expect("a deck is text");
+        let expected: Vec<String> =
+            text.lines().filter_map(|line| line.strip_prefix("$ expect: ")).map(str::to_string).collect();
+        assert!(!expected.is_empty(), "{name} expects nothing");
+        let faults = deck::read(&gathered(&path, &name, &Options::default()), &name).expect_err("a bad deck");
+        let found: Vec<String> = faults.iter().map(ToString::to_string).collect();
+        assert_eq!(found, expected, "{name}");
+    }
+    assert!(seen >= 3, "only {seen} bad keyword decks");
+}
+
+/// xorshift64*: a seeded stream of numbers, so that a failure can be repeated.
+struct Stream(u64);
+
+impl Stream {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 33) as usize % n
+    }
+}
+
+/// A deck with a few changes: words, columns, lines.
+fn mutated(text: &str, stream: &mut Stream) -> String {
+    const WORDS: [&str; 14] =
+        ["-1", "0", "99999999999", "1e308", "1.5", "nan", "&x", "&(((", ",", "*", "$", "\u{e9}", "+", "1-"];
+    let mut lines: Vec<String> = text.lines().map(str::to_string).collect();
+    for _ in 0..1 + stream.below(4) {
+        // Mostly where the keywords are, not in the long lists.
+        let n = if stream.below(4) == 0 { lines.len() } else { lines.len().min(90) };
+        let (a, b) = (stream.below(n), stream.below(n));
+        match stream.below(6) {
+            0 => lines.swap(a, b),
+            1 => {
+                lines.remove(a);
+            }
+            2 => lines.insert(a, lines[b].clone()),
+            3 => {
+                let word = WORDS[stream.below(WORDS.len())];
+                let cells: Vec<&str> = lines[a].split_inclusive([' ', ',']).collect();
+                if !cells.is_empty() {
+                    let at = stream.below(cells.len());
+                    lines[a] =
+                        cells.iter().enumerate().map(|(i, cell)| if i == at { word } else { cell }).collect();
+                }
+            }
+            4 => {
+                let at = stream.below(lines[a].chars().count() + 1);
+                lines[a] = lines[a].chars().skip(at).collect();
+            }
+            _ => {
+                let at = stream.below(lines[a].chars().count() + 1);
+                let word = WORDS[stream.below(WORDS.len())];
+                let mut chars: Vec<char> = lines[a].chars().collect();
+                chars.splice(at..at, word.chars());
+                lines[a] = chars.into_iter().collect();
+            }
+        }
+        if lines.is_empty() {
+            lines.push(String::new());
+        }
+    }
+    lines.join("\n")
+}
+
+#[test]
+fn mutated_keyword_decks_never_panic_and_faults_always_have_a_place() {
+    let conditions = "*SET_NODE_LIST\n1\n1,2,3\n*SET_SEGMENT\n2\n5,6,7,8\n*DEFINE_CURVE\n3\n0,1\n1,2\n*LOAD_SEGMENT_SET\n2,3\n*LOAD_NODE_SET\n1,1,3\n*BOUNDARY_PRESCRIBED_MOTION_SET\n1,2,2,3\n*BOUNDARY_SPC_SET\n1,0,0,0,1\n*RIGIDWALL_PLANAR_MOVING\n1\n0,0,-1,0,0,2\n1e-3,0\n*HOURGLASS\n1,1,0.1\n*EOS_GRUNEISEN\n1,3e6,1.4\n*CONTROL_BULK_VISCOSITY\n1.4,0.05\n";
+    let (mut read, mut refused) = (0, 0);
+    for text in [cube(conditions), gathered(&folder("examples"), "bar-on-wall.k", &Options::default())] {
+        for seed in 1..=800 {
+            let deck = mutated(&text, &mut Stream(seed));
+            match deck::read(&deck, "a.k") {
+                Ok(model) => {
+                    read += 1;
+                    assert!(model.mesh.positions.iter().flatten().all(|x| x.is_finite()), "seed {seed}");
+                }
+                Err(faults) => {
+                    refused += 1;
+                    let lines = deck.split('\n').count() as u32;
+                    assert!(!faults.is_empty(), "seed {seed}");
+                    let placed = |f: &Fault| (1..=lines).contains(&f.line) && f.column > 0;
+                    assert!(faults.iter().all(placed), "seed {seed}: {}", faults[0]);
+                }
+            }
+        }
+    }
+    assert!(read > 100 && refused > 100, "the changes test nothing: {read} read, {refused} refused");
+}

@@ -1,0 +1,336 @@
+//! `bolide bench`: what this machine takes for an element, a node and a pair in a cycle, for a sort and for a message, and
+//! the speed that a worker of it would state.
+//!
+//! Whole runs of small decks in this process, on one thread: elements, shared sums, integration, votes and energies are
+//! all in the figures, which are thread-CPU time. Of several rounds the median and the least are printed; on a machine
+//! that others use too the least is the steadier.
+
+use std::{
+    process::ExitCode,
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
+
+use deck::model::Model;
+use mechanics::{lanes::Width, mesh::Topology};
+use serde::Serialize;
+
+use crate::{
+    command::GrindArgs,
+    embedded::{self, Sink},
+    event::{Action, Hand, Options},
+    job::Job,
+    run::list_of_faults,
+    simulate::measure::{self, Measured},
+};
+
+/// The grind time of speed 1 (ns): a thread that takes half as long has speed 2.
+const SPEED_ONE: f64 = 100.0;
+
+/// Cycles of a run that is measured.
+const CYCLES: u64 = 40;
+
+/// A plate of aluminium below one of steel, as in benchmark 1, at 500 m/s; or both of `material`, at 50 m/s, since a soft
+/// one stiffens faster than its time step follows.
+fn plates(side: u32, material: Option<&str>, gap: f64) -> String {
+    let (below, above) = (side / 3 * 2, side / 3);
+    let [target, projectile] = match material {
+        Some(_) => ["own", "own"],
+        None => ["AL_2024_T351", "STEEL_1006"],
+    };
+    let own = material.map_or(String::new(), |laws| format!("[[material]]\nname = \"own\"\n{laws}\n"));
+    let between = if gap > 0.0 {
+        format!("[contact]\ngap_length = {gap}\n")
+    } else {
+        "[[join]]\nparts = [\"target\", \"projectile\"]\n".to_owned()
+    };
+    format!(
+        "title = \"bench\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n{own}\
+         [[part]]\nname = \"target\"\nmaterial = \"{target}\"\n\
+         box = {{ origin = [0, 0, 0], size = [{side}, {side}, {below}], cells = [{side}, {side}, {below}] }}\n\
+         [[part]]\nname = \"projectile\"\nmaterial = \"{projectile}\"\nvelocity = [0, 0, -{speed}]\n\
+         box = {{ origin = [0, 0, {base}], size = [{side}, {side}, {above}], cells = [{side}, {side}, {above}] }}\n{between}",
+        base = f64::from(below) + gap,
+        speed = if material.is_some() { 50 } else { 500 },
+    )
+}
+
+/// Laws beside Johnson-Cook and shock, as a deck has them.
+const LAWS: [(&str, &str); 4] = [
+    (
+        "von Mises, shock",
+        "density = 7896\neos = { type = \"shock\", c0 = 4569, s = 1.49, gamma = 2.17 }\nstrength = { type = \"von-mises\", shear = 81.8e9, yield_stress = 350e6, hardening = 1e8 }",
+    ),
+    (
+        "elastic, linear",
+        "density = 7896\neos = { type = \"linear\", bulk = 164e9 }\nstrength = { type = \"elastic\", shear = 81.8e9 }",
+    ),
+    (
+        "hydro, polynomial",
+        "density = 1000\neos = { type = \"polynomial\", a1 = 2.2e9, a2 = 9.5e9, a3 = 1.4e10, b0 = 0.28, b1 = 0.28 }\nstrength = { type = \"hydro\" }",
+    ),
+    (
+        "hydro, ideal gas",
+        "density = 1.2\neos = { type = \"ideal-gas\", gamma = 1.4, energy = 2e5 }\nstrength = { type = \"hydro\" }",
+    ),
+];
+
+fn model(text: &str, explicit: bool) -> Result<Arc<Model>, String> {
+    let mut model = deck::read(text, "bench")
+        .map_err(|faults| list_of_faults(&faults.iter().map(ToString::to_string).collect::<Vec<_>>()))?;
+    model.setup.control.end_cycle = CYCLES;
+    if explicit {
+        for part in &mut model.mesh.parts {
+            if let Topology::Structured { cells } = part.topology {
+                part.topology = Topology::Explicit { hexahedra: connectivity(cells) };
+            }
+        }
+    }
+    Ok(Arc::new(model))
+}
+
+/// Corners of the elements of a grid, as local nodes.
+fn connectivity([ni, nj, nk]: [u32; 3]) -> Vec<[u32; 8]> {
+    let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
+    let mut hexahedra = Vec::with_capacity((ni * nj * nk) as usize);
+    for k in 0..nk {
+        for j in 0..nj {
+            hexahedra.extend((0..ni).map(|i| {
+                let n = i + j * row + k * plane;
+                [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| n + d)
+            }));
+        }
+    }
+    hexahedra
+}
+
+/// Takes nothing: a bench has no results.
+struct Nothing;
+
+impl Sink for Nothing {
+    fn take(&mut self, _: Action) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// What one run took.
+#[derive(Clone, Copy)]
+struct Taken {
+    /// Of a cycle and element (ns of thread CPU).
+    element_ns: f64,
+    /// Contact, without sorts, of a cycle and surface node (ns of thread CPU).
+    contact_ns: f64,
+    /// Wall clock of a cycle (ns), the start of the run left out as far as its own phases go.
+    wall_ns: f64,
+}
+
+fn once(model: &Arc<Model>, threads: u32, lanes: Option<Width>) -> Result<Taken, String> {
+    let hands = [Hand { name: "bench".to_owned(), speed: 1.0, threads }];
+    let options = Options { lanes: lanes.map(|width| width.to_string()), ..Options::default() };
+    let (mut job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
+    job.keep_no_state();
+    let surface_nodes = job.surface().map_or(0, |surface| surface.nodes.len());
+    let started = Instant::now();
+    let (outcome, traffic) =
+        embedded::run(job, first, 1, threads as usize, &mut Nothing, &AtomicBool::new(false))?;
+    let wall = started.elapsed().as_nanos() as f64;
+    if let Some(failure) = outcome.failure {
+        return Err(failure);
+    }
+    let cycles = outcome.cycles_run.max(1) as f64;
+    let all: u64 = outcome.work.iter().map(|work| work.compute_ns).sum::<u64>() + traffic.sort_ns;
+    let contact: u64 = outcome.work.iter().map(|work| work.contact_ns).sum();
+    Ok(Taken {
+        element_ns: all as f64 / (cycles * model.mesh.n_elements() as f64),
+        contact_ns: contact as f64 / (cycles * surface_nodes.max(1) as f64),
+        wall_ns: wall / cycles,
+    })
+}
+
+/// Median and least.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Median of the rounds.
+    pub median: f64,
+    /// Least of them.
+    pub least: f64,
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Self {
+        values.sort_unstable_by(f64::total_cmp);
+        let least = values.first().copied().unwrap_or(0.0);
+        Self { median: values.get(values.len() / 2).copied().unwrap_or(0.0), least }
+    }
+}
+
+/// Grind time of one kind of element and laws (ns per element and cycle).
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Laws and topology.
+    pub name: String,
+    /// Number of elements.
+    pub elements: usize,
+    /// The time.
+    pub ns: Spread,
+}
+
+/// All that `bolide bench` says.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Lane width.
+    pub lanes: String,
+    /// Element by element kind and laws.
+    pub elements: Vec<Row>,
+    /// Benchmark 2: contact of a surface node in a cycle, sorts aside (ns).
+    pub contact_node_ns: Spread,
+    /// A pair that a cycle looks at (ns).
+    pub pair_ns: f64,
+    /// A surface node in a sort (ns).
+    pub sort_node_ns: f64,
+    /// A short message over loopback, at each end (ns).
+    pub message_ns: f64,
+    /// A byte of a long one, at each end (ns).
+    pub byte_ns: f64,
+    /// Wall clock of one thread over that of two and by two, by turns; none where there is one processor.
+    pub two_threads: Option<Spread>,
+    /// What `--speed auto` says with one thread.
+    pub speed_of_a_thread: f64,
+}
+
+/// Measures and prints.
+///
+/// # Errors
+/// Lanes that this machine lacks, processors that it has not, a run that fails.
+pub fn run(args: &GrindArgs) -> Result<ExitCode, String> {
+    if let Some(pin) = &args.pin {
+        pin.apply()?;
+    }
+    let lanes = args.lanes.map(|lanes| lanes.name().parse::<Width>().and_then(Width::require));
+    let lanes = lanes.transpose().map_err(|e| e.to_string())?;
+    let report = measured(args.rounds, args.side, lanes)?;
+    if args.json {
+        println!("{}", serde_json::to_string(&report).map_err(|e| e.to_string())?);
+    } else {
+        print!("{}", table(&report));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measured(rounds: u32, side: u32, lanes: Option<Width>) -> Result<Report, String> {
+    let mut cases = vec![
+        ("Johnson-Cook, shock".to_owned(), model(&plates(side, None, 0.0), false)?),
+        ("Johnson-Cook, shock, explicit connectivity".to_owned(), model(&plates(side, None, 0.0), true)?),
+    ];
+    for (name, laws) in LAWS {
+        cases.push((name.to_owned(), model(&plates(side, Some(laws), 0.0), false)?));
+    }
+    let touching = model(&plates(side, None, 0.1), false)?;
+    let mut times = vec![Vec::new(); cases.len()];
+    let (mut contact, mut two) = (Vec::new(), Vec::new());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    for _ in 0..rounds {
+        for ((_, model), times) in cases.iter().zip(&mut times) {
+            times.push(once(model, 1, lanes)?.element_ns);
+        }
+        contact.push(once(&touching, 1, lanes)?.contact_ns);
+        if cores > 1 {
+            let (_, joined) = &cases[0];
+            two.push(once(joined, 1, lanes)?.wall_ns / (2.0 * once(joined, 2, lanes)?.wall_ns));
+        }
+    }
+    let (_, Measured { element_ns, pair, sort, message_ns, byte_ns, .. }) =
+        measure::run(&touching, 1, lanes, rounds)?;
+    let elements: Vec<Row> = cases
+        .into_iter()
+        .zip(times)
+        .map(|((name, model), times)| Row { name, elements: model.mesh.n_elements(), ns: Spread::of(times) })
+        .collect();
+    Ok(Report {
+        lanes: lanes.unwrap_or_else(Width::best).to_string(),
+        speed_of_a_thread: speed_of(elements[0].ns.least, 1),
+        elements,
+        contact_node_ns: Spread::of(contact),
+        pair_ns: pair * element_ns,
+        sort_node_ns: sort * pair * element_ns,
+        message_ns,
+        byte_ns,
+        two_threads: (cores > 1).then(|| Spread::of(two)),
+    })
+}
+
+fn table(report: &Report) -> String {
+    let mut lines = vec![format!("lanes {}; thread-CPU time, median and (least)", report.lanes)];
+    for Row { name, elements, ns } in &report.elements {
+        lines.push(format!(
+            "{name:<44}{:>9.1} ({:.1}) ns per element and cycle, {elements} elements",
+            ns.median, ns.least
+        ));
+    }
+    let Spread { median, least } = report.contact_node_ns;
+    lines.push(format!(
+        "{:<44}{median:>9.1} ({least:.1}) ns per surface node and cycle",
+        "contact of free slip, sorts aside"
+    ));
+    lines.push(format!("{:<44}{:>9.1} ns per pair that a cycle looks at", "", report.pair_ns));
+    lines.push(format!("{:<44}{:>9.1} ns per surface node", "sort", report.sort_node_ns));
+    lines.push(format!(
+        "{:<44}{:>9.0} ns, and {:.3} ns per byte, at each end",
+        "message over loopback", report.message_ns, report.byte_ns
+    ));
+    if let Some(Spread { median, .. }) = report.two_threads {
+        lines.push(format!(
+            "{:<44}{:>9.1} % of two (wall clock, start included)",
+            "two threads",
+            100.0 * median
+        ));
+    }
+    lines.push(format!("{:<44}{:>9.2} per thread", "--speed auto", report.speed_of_a_thread));
+    lines.join("\n") + "\n"
+}
+
+/// Speed of so many threads of which each takes `ns` for an element-cycle, to two digits behind the point.
+fn speed_of(ns: f64, threads: u32) -> f64 {
+    let speed = SPEED_ONE / ns * f64::from(threads);
+    (100.0 * speed).round().max(1.0) / 100.0
+}
+
+/// The speed of this machine with so many threads: 1 is a thread that takes 100 ns for an element-cycle of benchmark 1.
+/// The least of three runs of 8,000 elements counts.
+///
+/// # Errors
+/// A run that fails.
+pub fn speed(threads: u32) -> Result<f64, String> {
+    let joined = model(&plates(21, None, 0.0), false)?;
+    let mut least = f64::INFINITY;
+    for _ in 0..3 {
+        least = least.min(once(&joined, 1, None)?.element_ns);
+    }
+    Ok(speed_of(least, threads))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_cases_run_and_explicit_connectivity_is_the_grid_s() {
+        for (_, laws) in LAWS {
+            let taken = once(&model(&plates(6, Some(laws), 0.0), false).expect("a sound deck"), 1, None);
+            assert!(taken.expect("a run to its end").element_ns > 0.0);
+        }
+        let [grid, list] = [false, true].map(|explicit| {
+            let model = model(&plates(6, None, 0.1), explicit).expect("a sound deck");
+            let parts = &model.mesh.parts;
+            (0..parts[1].n_elements()).map(|e| parts[1].corners(e)).collect::<Vec<_>>()
+        });
+        assert_eq!(grid, list);
+    }
+
+    #[test]
+    fn a_thread_of_fifty_nanoseconds_has_speed_two() {
+        assert_eq!(speed_of(50.0, 1), 2.0);
+        assert_eq!(speed_of(80.0, 2), 2.5);
+        assert_eq!(speed_of(1e9, 1), 0.01);
+    }
+}

@@ -1,0 +1,116 @@
+//! Holdings: which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
+
+use std::collections::HashMap;
+
+use mechanics::cycle::Neighbour;
+
+use crate::decompose::Subdomain;
+
+/// Which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
+pub struct Holdings {
+    /// Sub-domain that owns each node: the lowest that has it.
+    pub owner_subdomain: Vec<u32>,
+    /// Worker of that sub-domain.
+    pub owner_worker: Vec<u32>,
+    /// What each worker's sub-domains cost in a cycle ([`crate::decompose::work`]).
+    pub work: Vec<f64>,
+    /// Other workers that hold a node, ascending; most nodes have none and no entry.
+    others: HashMap<u32, Vec<u32>>,
+    /// Nodes that several workers hold, ascending.
+    shared: Vec<u32>,
+    /// By worker: what of the exchange stays the same in all plans.
+    pub standing: Vec<Standing>,
+}
+
+/// The nodes that a worker's sub-domains share with others.
+#[derive(Clone, Default)]
+pub struct Standing {
+    /// Global node indices, ascending.
+    pub nodes: Vec<u32>,
+    /// Place of each among the nodes that several workers hold.
+    pub slots: Vec<u32>,
+    /// Who has which of them, by worker.
+    pub neighbours: Vec<Neighbour>,
+}
+
+impl Holdings {
+    /// From the nodes of each sub-domain (global indices); `work` is what each worker's cost.
+    pub fn new(n_nodes: usize, work: Vec<f64>, subdomains: &[Subdomain], nodes: &[Vec<u32>]) -> Self {
+        let mut owner_subdomain = vec![u32::MAX; n_nodes];
+        let mut owner_worker = vec![u32::MAX; n_nodes];
+        let mut others: HashMap<u32, Vec<u32>> = HashMap::new();
+        for (id, (subdomain, nodes)) in subdomains.iter().zip(nodes).enumerate() {
+            let worker = subdomain.worker as u32;
+            for &node in nodes {
+                let owner = &mut owner_subdomain[node as usize];
+                if *owner == u32::MAX {
+                    *owner = id as u32;
+                    owner_worker[node as usize] = worker;
+                } else if owner_worker[node as usize] != worker {
+                    let list = others.entry(node).or_default();
+                    if let Err(at) = list.binary_search(&worker) {
+                        list.insert(at, worker);
+                    }
+                }
+            }
+        }
+        let mut shared: Vec<u32> = others.keys().copied().collect();
+        shared.sort_unstable();
+        let mut holdings = Self { owner_subdomain, owner_worker, standing: Vec::new(), work, others, shared };
+        holdings.standing = holdings.stand();
+        holdings
+    }
+
+    fn stand(&self) -> Vec<Standing> {
+        let mut standing = vec![Standing::default(); self.work.len()];
+        for (slot, &node) in self.shared.iter().enumerate() {
+            for worker in self.holders(node) {
+                let stand = &mut standing[worker as usize];
+                let at = stand.nodes.len() as u32;
+                stand.nodes.push(node);
+                stand.slots.push(slot as u32);
+                for other in self.holders(node).filter(|&other| other != worker) {
+                    share(&mut stand.neighbours, other, at);
+                }
+            }
+        }
+        for stand in &mut standing {
+            stand.neighbours.sort_unstable_by_key(|neighbour| neighbour.worker);
+        }
+        standing
+    }
+
+    /// Number of workers.
+    pub fn n_workers(&self) -> usize {
+        self.work.len()
+    }
+
+    /// Number of nodes that several workers hold.
+    pub fn n_shared(&self) -> usize {
+        self.shared.len()
+    }
+
+    /// Place of a node among those that several workers hold.
+    pub fn slot(&self, node: u32) -> Option<u32> {
+        self.shared.binary_search(&node).ok().map(|slot| slot as u32)
+    }
+
+    /// Workers whose sub-domains have the node, its owner first.
+    pub fn holders(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        let others = self.others.get(&node).map_or(&[][..], Vec::as_slice);
+        std::iter::once(self.owner_worker[node as usize]).chain(others.iter().copied())
+    }
+
+    /// Whether a sub-domain of the worker has the node.
+    pub fn holds(&self, worker: u32, node: u32) -> bool {
+        self.holders(node).any(|holder| holder == worker)
+    }
+}
+
+/// Enters a place in the list shared with a worker.
+pub fn share(neighbours: &mut Vec<Neighbour>, worker: u32, at: u32) {
+    match neighbours.iter_mut().find(|neighbour| neighbour.worker == worker) {
+        Some(neighbour) => neighbour.shared.push(at),
+        None => neighbours.push(Neighbour { worker, shared: vec![at] }),
+    }
+}

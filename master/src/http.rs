@@ -1,0 +1,281 @@
+//! HTTP: the master's page, its JSON API, `/metrics` and `/healthz`, on an address of their own.
+//!
+//! Loopback speaks HTTP; elsewhere it is HTTPS with the cluster's certificate, which a browser believes once `ca.pem` is
+//! given to it. Every request passes the [`guard`], `/healthz` alone without a token. [`api`] asks the owner of
+//! hosts and queue as any client does; what runs show while they run stands on the [`board`].
+
+use std::{
+    net::SocketAddr,
+    pin::Pin,
+    sync::Arc,
+    task::{Context, Poll},
+    time::Duration,
+};
+
+use axum::{
+    Router,
+    extract::{Query, Request, State},
+    http::{HeaderValue, StatusCode, header},
+    middleware::{self, Next},
+    response::{IntoResponse, Redirect, Response},
+};
+use protocol::tls::{self, ServerConfig};
+use tokio::{
+    io::{AsyncRead, AsyncWrite, ReadBuf},
+    net::{TcpListener, TcpStream},
+    sync::{OwnedSemaphorePermit, Semaphore, mpsc},
+};
+use tokio_rustls::{TlsAcceptor, server::TlsStream};
+use tracing::{debug, warn};
+
+use crate::daemon::Event;
+
+pub mod api;
+pub mod assets;
+pub mod board;
+pub mod guard;
+pub mod metrics;
+pub mod surface;
+
+use board::Board;
+use guard::{Guard, Refusal};
+
+/// Most connections at a time.
+pub const CONNECTIONS: usize = 256;
+/// The longest that a TLS handshake may take.
+const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
+/// What pages may load: their own files and nothing else.
+const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+
+/// What every request needs of the daemon.
+#[derive(Clone)]
+pub struct Office {
+    /// To the owner of hosts and queue.
+    pub events: mpsc::Sender<Event>,
+    /// What runs show.
+    pub board: Arc<Board>,
+    /// The line to paste on a new worker.
+    pub join: String,
+    /// Who may ask.
+    pub guard: Guard,
+}
+
+/// Where the page listens and by which certificate.
+pub struct Place {
+    listener: TcpListener,
+    tls: Option<Arc<ServerConfig>>,
+}
+
+impl Place {
+    /// Listens; TLS off loopback, by the certificates in `certs`.
+    ///
+    /// # Errors
+    /// If it cannot listen there, or there are no certificates and it is not loopback.
+    pub async fn open(address: SocketAddr, certs: Option<&std::path::Path>) -> Result<Self, String> {
+        let tls = match certs {
+            Some(folder) if !address.ip().is_loopback() => {
+                let paths = tls::Paths::in_folder(folder);
+                Some(tls::page_config(&paths).map_err(|e| e.to_string())?)
+            }
+            _ => {
+                tls::loopback_only(address).map_err(|e| e.to_string())?;
+                None
+            }
+        };
+        let listener = TcpListener::bind(address).await.map_err(|e| format!("--http {address}: {e}"))?;
+        Ok(Self { listener, tls })
+    }
+
+    /// Where it listens.
+    ///
+    /// # Errors
+    /// The system's reason.
+    pub fn address(&self) -> Result<SocketAddr, String> {
+        self.listener.local_addr().map_err(|e| e.to_string())
+    }
+
+    /// Whether it speaks TLS.
+    pub fn is_secure(&self) -> bool {
+        self.tls.is_some()
+    }
+}
+
+/// Serves for ever.
+pub async fn serve(place: Place, office: Office) {
+    let Ok(address) = place.address() else { return };
+    let (send, ready) = mpsc::channel(16);
+    tokio::spawn(take(place, send));
+    let door = Door { ready, address };
+    if let Err(error) = axum::serve(door, router(office)).await {
+        warn!("the page: {error}");
+    }
+}
+
+fn router(office: Office) -> Router {
+    Router::new()
+        .merge(assets::routes())
+        .nest("/api", api::routes())
+        .route("/metrics", axum::routing::get(metrics::text))
+        .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
+        .layer(middleware::from_fn_with_state(office.clone(), watchman))
+        .with_state(office)
+}
+
+/// Every request passes here.
+async fn watchman(State(office): State<Office>, request: Request, next: Next) -> Response {
+    let guard = &office.guard;
+    let answer = match guard.names(request.headers()) {
+        Err(refusal) => refuse(refusal),
+        Ok(()) if request.uri().path() == "/healthz" => {
+            let ending = office.events.is_closed();
+            if ending { (StatusCode::SERVICE_UNAVAILABLE, "ending\n") } else { (StatusCode::OK, "ok\n") }
+                .into_response()
+        }
+        Ok(()) => match (token_in_address(&request), guard.pass(request.headers())) {
+            (Some(guess), _) if guard.is_token(&guess) => {
+                // The token leaves the address bar, and the history with it.
+                let mut answer = Redirect::to("/").into_response();
+                if let Ok(cookie) = HeaderValue::from_str(&guard.set_cookie()) {
+                    answer.headers_mut().insert(header::SET_COOKIE, cookie);
+                }
+                answer
+            }
+            (_, Ok(())) => next.run(request).await,
+            (_, Err(refusal)) => refuse(refusal),
+        },
+    };
+    with_headers(answer)
+}
+
+fn token_in_address(request: &Request) -> Option<String> {
+    let query = Query::<std::collections::BTreeMap<String, String>>::try_from_uri(request.uri());
+    query.ok().filter(|_| request.uri().path() == "/").and_then(|Query(mut map)| map.remove("token"))
+}
+
+fn refuse(refusal: Refusal) -> Response {
+    let code = if refusal == Refusal::Token { StatusCode::UNAUTHORIZED } else { StatusCode::FORBIDDEN };
+    (code, format!("{}\n", refusal.sentence())).into_response()
+}
+
+fn with_headers(mut answer: Response) -> Response {
+    let headers = answer.headers_mut();
+    headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY));
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    answer
+}
+
+/// Takes connections; handshakes go on beside each other, so that a silent caller holds up nobody.
+async fn take(place: Place, send: mpsc::Sender<Wire>) {
+    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    loop {
+        let (stream, from) = match place.listener.accept().await {
+            Ok(taken) => taken,
+            Err(error) => {
+                warn!("the page, taking a connection: {error}");
+                tokio::time::sleep(Duration::from_millis(100)).await;
+                continue;
+            }
+        };
+        let Ok(permit) = Arc::clone(&places).try_acquire_owned() else {
+            warn!("connection of the page from {from} not taken: {CONNECTIONS} stand, at most {CONNECTIONS}");
+            continue;
+        };
+        // What is said at once is not kept waiting for more; without it answers are a little later.
+        let _ = stream.set_nodelay(true);
+        let (send, tls) = (send.clone(), place.tls.clone());
+        tokio::spawn(async move {
+            let stream = match tls {
+                None => Stream::Plain(stream),
+                Some(config) => {
+                    let shaken = TlsAcceptor::from(config).accept(stream);
+                    match tokio::time::timeout(HANDSHAKE_LIMIT, shaken).await {
+                        Ok(Ok(stream)) => Stream::Tls(Box::new(stream)),
+                        Ok(Err(error)) => return debug!("the page, {from}: {error}"),
+                        Err(_) => return debug!("the page, {from}: no TLS within {HANDSHAKE_LIMIT:?}"),
+                    }
+                }
+            };
+            // The server is gone only when the daemon ends.
+            let _ = send.send(Wire { stream, from, _place: permit }).await;
+        });
+    }
+}
+
+/// Connections that are ready to be served.
+struct Door {
+    ready: mpsc::Receiver<Wire>,
+    address: SocketAddr,
+}
+
+impl axum::serve::Listener for Door {
+    type Io = Wire;
+    type Addr = SocketAddr;
+
+    async fn accept(&mut self) -> (Wire, SocketAddr) {
+        match self.ready.recv().await {
+            Some(wire) => {
+                let from = wire.from;
+                (wire, from)
+            }
+            None => std::future::pending().await,
+        }
+    }
+
+    fn local_addr(&self) -> std::io::Result<SocketAddr> {
+        Ok(self.address)
+    }
+}
+
+/// A connection, which gives its place back when it ends.
+struct Wire {
+    stream: Stream,
+    from: SocketAddr,
+    _place: OwnedSemaphorePermit,
+}
+
+enum Stream {
+    Plain(TcpStream),
+    Tls(Box<TlsStream<TcpStream>>),
+}
+
+impl AsyncRead for Wire {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        into: &mut ReadBuf<'_>,
+    ) -> Poll<std::io::Result<()>> {
+        match &mut self.stream {
+            Stream::Plain(stream) => Pin::new(stream).poll_read(cx, into),
+            Stream::Tls(stream) => Pin::new(stream).poll_read(cx, into),
+        }
+    }
+}
+
+impl AsyncWrite for Wire {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<std::io::Result<usize>> {
+        match &mut self.stream {
+            Stream::Plain(stream) => Pin::new(stream).poll_write(cx, bytes),
+            Stream::Tls(stream) => Pin::new(stream).poll_write(cx, bytes),
+        }
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        match &mut self.stream {
+            Stream::Plain(stream) => Pin::new(stream).poll_flush(cx),
+            Stream::Tls(stream) => Pin::new(stream).poll_flush(cx),
+        }
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        match &mut self.stream {
+            Stream::Plain(stream) => Pin::new(stream).poll_shutdown(cx),
+            Stream::Tls(stream) => Pin::new(stream).poll_shutdown(cx),
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! API: JSON for the page and for programs.
+//!
+//! | request | answer |
+//! |---|---|
+//! | `GET /api/overview` | `{version, join, jobs, hosts}`; a job is a status with `brief` once it runs |
+//! | `GET /api/events` | the same as server-sent events, whenever it changes, at most twice a second |
+//! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N`, body the deck | `{job}`; 422 `{faults: [{line, column, ...}]}` |
+//! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes}`, or 422 as above |
+//! | `POST /api/jobs/N/cancel` | `{done}` |
+//! | `GET /api/jobs/N` | the job's status |
+//! | `GET /api/jobs/N/sheet` | energies, imbalance, phases of workers, list of states |
+//! | `GET /api/jobs/N/surface/K` | the surface of state K, binary, as [`surface`](super::surface) says |
+//!
+//! What cannot be done is 4xx with `{error}`.
+
+use std::{convert::Infallible, time::Duration};
+
+use axum::{
+    Json, Router,
+    extract::{DefaultBodyLimit, Path, Query, State},
+    http::{StatusCode, header},
+    response::{IntoResponse, Response, Sse, sse},
+    routing::{get, post},
+};
+use protocol::request::{DECK_LIMIT, JobOptions, Status};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use tokio::sync::{mpsc, oneshot};
+use tokio_stream::wrappers::ReceiverStream;
+
+use super::{Office, board};
+use crate::daemon::Event;
+
+/// The shortest time between two events of the stream.
+const EVENT_EVERY: Duration = Duration::from_millis(500);
+/// Most characters of a deck's name.
+const NAME_LIMIT: usize = 200;
+
+/// The routes below `/api`.
+pub fn routes() -> Router<Office> {
+    Router::new()
+        .route("/overview", get(overview))
+        .route("/events", get(events))
+        .route("/check", post(check))
+        .route("/jobs", post(submit))
+        .route("/jobs/{job}", get(job))
+        .route("/jobs/{job}/cancel", post(cancel))
+        .route("/jobs/{job}/sheet", get(sheet))
+        .route("/jobs/{job}/surface/{index}", get(surface))
+        .layer(DefaultBodyLimit::max(DECK_LIMIT))
+}
+
+/// What cannot be done.
+struct Fault(StatusCode, serde_json::Value);
+
+impl IntoResponse for Fault {
+    fn into_response(self) -> Response {
+        (self.0, Json(self.1)).into_response()
+    }
+}
+
+impl From<String> for Fault {
+    fn from(why: String) -> Self {
+        Self(StatusCode::CONFLICT, json!({ "error": why }))
+    }
+}
+
+fn missing(what: String) -> Fault {
+    Fault(StatusCode::NOT_FOUND, json!({ "error": what }))
+}
+
+/// Asks the owner of hosts and queue.
+///
+/// # Errors
+/// If the master is ending.
+pub async fn ask<T>(office: &Office, event: impl FnOnce(oneshot::Sender<T>) -> Event) -> Result<T, String> {
+    let (answer, answered) = oneshot::channel();
+    let ending = "the master is ending".to_owned();
+    office.events.send(event(answer)).await.map_err(|_| ending.clone())?;
+    answered.await.map_err(|_| ending)
+}
+
+/// A job as the page lists it: a finished one without the text of its summary.
+fn listed(office: &Office, mut status: Status) -> serde_json::Value {
+    if let Some(ended) = &mut status.ended {
+        (ended.summary, ended.table) = (None, None);
+    }
+    let brief = office.board.sheet(status.job).map(|sheet| board::lock(&sheet).brief().clone());
+    let mut value = json!(status);
+    value["brief"] = json!(brief);
+    value
+}
+
+async fn all(office: &Office) -> Result<serde_json::Value, String> {
+    let jobs = ask(office, Event::Jobs).await?;
+    let hosts = ask(office, Event::Hosts).await?;
+    let jobs: Vec<_> = jobs.into_iter().map(|status| listed(office, status)).collect();
+    let host = |row: protocol::request::HostRow| {
+        let load = if row.state == "busy" { office.board.load(&row.name) } else { None };
+        let mut value = json!(row);
+        value["load"] = json!(load);
+        value
+    };
+    let hosts: Vec<_> = hosts.into_iter().map(host).collect();
+    Ok(json!({ "version": env!("CARGO_PKG_VERSION"), "join": office.join, "jobs": jobs, "hosts": hosts }))
+}
+
+async fn overview(State(office): State<Office>) -> Result<Json<serde_json::Value>, Fault> {
+    Ok(Json(all(&office).await?))
+}
+
+async fn events(State(office): State<Office>) -> impl IntoResponse {
+    let (send, receive) = mpsc::channel::<Result<sse::Event, Infallible>>(1);
+    tokio::spawn(async move {
+        let mut before = serde_json::Value::Null;
+        while let Ok(now) = all(&office).await {
+            if now != before {
+                let event = sse::Event::default().event("overview").data(now.to_string());
+                if send.send(Ok(event)).await.is_err() {
+                    return;
+                }
+                before = now;
+            }
+            tokio::select! {
+                () = send.closed() => return,
+                () = tokio::time::sleep(EVENT_EVERY) => {}
+            }
+        }
+    });
+    Sse::new(ReceiverStream::new(receive)).keep_alive(sse::KeepAlive::default())
+}
+
+/// What is asked beside a deck.
+#[derive(Deserialize)]
+struct Asked {
+    name: Option<String>,
+    cycles: Option<u64>,
+    min_workers: Option<u32>,
+}
+
+/// A fault of a deck and its place.
+#[derive(Serialize)]
+struct Place {
+    line: u32,
+    column: u32,
+    read: String,
+    expected: String,
+    advice: String,
+}
+
+/// Reads a deck on a thread that may block.
+async fn read(name: String, text: String) -> Result<(String, deck::model::Model), Fault> {
+    let read = tokio::task::spawn_blocking(move || deck::read(&text, &name).map(|model| (text, model))).await;
+    let read = read.map_err(|_| "a bug in the master; its log has the words".to_owned())?;
+    read.map_err(|faults| {
+        let place = |fault: deck::Fault| Place {
+            line: fault.line,
+            column: fault.column,
+            read: fault.read,
+            expected: fault.expected,
+            advice: fault.advice,
+        };
+        let faults: Vec<Place> = faults.into_iter().map(place).collect();
+        Fault(StatusCode::UNPROCESSABLE_ENTITY, json!({ "faults": faults }))
+    })
+}
+
+fn name_of(asked: &Asked) -> String {
+    let name = asked.name.clone().unwrap_or_else(|| "deck.toml".to_owned());
+    name.chars().filter(|c| !c.is_control()).take(NAME_LIMIT).collect()
+}
+
+async fn check(Query(asked): Query<Asked>, text: String) -> Result<Json<serde_json::Value>, Fault> {
+    let (_, model) = read(name_of(&asked), text).await?;
+    Ok(Json(json!({
+        "title": model.title, "parts": model.mesh.parts.len(),
+        "elements": model.mesh.n_elements(), "nodes": model.mesh.n_nodes(),
+    })))
+}
+
+async fn submit(
+    State(office): State<Office>,
+    Query(asked): Query<Asked>,
+    text: String,
+) -> Result<Json<serde_json::Value>, Fault> {
+    let name = name_of(&asked);
+    let (text, model) = read(name.clone(), text).await?;
+    let title = model.title.clone();
+    drop(model);
+    let options = JobOptions {
+        cycles: asked.cycles,
+        min_workers: asked.min_workers.unwrap_or(1).clamp(1, 10_000),
+        keep_every: Some(10.0),
+        ..JobOptions::default()
+    };
+    let job = ask(&office, |answer| Event::Submit { name, title, text, options, answer }).await??;
+    Ok(Json(json!({ "job": job })))
+}
+
+async fn job(State(office): State<Office>, Path(job): Path<u32>) -> Result<Json<serde_json::Value>, Fault> {
+    let watch = ask(&office, |answer| Event::Watch(Some(job), answer)).await?.map_err(missing)?;
+    let status = watch.borrow().clone();
+    Ok(Json(json!(status)))
+}
+
+async fn cancel(
+    State(office): State<Office>,
+    Path(job): Path<u32>,
+) -> Result<Json<serde_json::Value>, Fault> {
+    let done = ask(&office, |answer| Event::Cancel(job, answer)).await??;
+    Ok(Json(json!({ "done": done })))
+}
+
+async fn sheet(State(office): State<Office>, Path(job): Path<u32>) -> Result<Json<serde_json::Value>, Fault> {
+    let sheet = office.board.sheet(job).ok_or_else(|| not_kept(job))?;
+    let value = board::lock(&sheet).json();
+    Ok(Json(value))
+}
+
+fn not_kept(job: u32) -> Fault {
+    missing(format!("job {job} has not run since this master started; `bolide results {job}` has its files"))
+}
+
+async fn surface(
+    State(office): State<Office>,
+    Path((job, index)): Path<(u32, usize)>,
+) -> Result<impl IntoResponse, Fault> {
+    let sheet = office.board.sheet(job).ok_or_else(|| not_kept(job))?;
+    let bytes = board::lock(&sheet).surface(index);
+    let bytes = bytes.ok_or_else(|| missing(format!("job {job} has no state {index}")))?;
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], bytes.as_ref().clone()))
+}

@@ -1,0 +1,397 @@
+//! BOARD: what the page shows of jobs while they run: energies, progress, load, phases, surfaces. In memory, bounded.
+//!
+//! A job's thread writes its [`Sheet`], requests read it. Nothing here decides anything, and a master without a page has
+//! no board.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+
+use deck::model::Model;
+use mechanics::state::GlobalState;
+use protocol::{
+    message::{ToMaster, Work},
+    phase::{Phase, Report},
+};
+use serde::Serialize;
+
+use super::surface::Skin;
+use crate::{
+    event::{Deal, Progress},
+    results::{Units, history::HistoryRow},
+};
+
+/// Jobs whose sheets are kept.
+pub const SHEETS_LIMIT: usize = 16;
+/// Most points of a curve; beyond that every second one is dropped.
+pub const POINTS_LIMIT: usize = 2000;
+/// Most bytes of one job's surfaces; beyond that every second state is dropped.
+pub const SURFACES_LIMIT: usize = 32 << 20;
+/// Over how long the load of a host is averaged.
+const LOAD_WINDOW: Duration = Duration::from_secs(2);
+
+/// The sheets of the newest jobs.
+#[derive(Default)]
+pub struct Board(Mutex<BTreeMap<u32, Arc<Mutex<Sheet>>>>);
+
+/// Locks; a reader or writer that panicked leaves numbers to show all the same.
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Board {
+    /// A sheet for a job that starts; the oldest goes when there are too many.
+    pub fn begin(&self, job: u32, model: &Model) -> Arc<Mutex<Sheet>> {
+        let sheet = Arc::new(Mutex::new(Sheet::new(model)));
+        let mut sheets = lock(&self.0);
+        sheets.insert(job, Arc::clone(&sheet));
+        while sheets.len() > SHEETS_LIMIT {
+            sheets.pop_first();
+        }
+        sheet
+    }
+
+    /// A job's sheet.
+    pub fn sheet(&self, job: u32) -> Option<Arc<Mutex<Sheet>>> {
+        lock(&self.0).get(&job).cloned()
+    }
+
+    /// The part of its time that a host computed lately (0 to 1), in the newest job it is seen in.
+    pub fn load(&self, host: &str) -> Option<f64> {
+        let sheets: Vec<_> = lock(&self.0).values().rev().cloned().collect();
+        sheets.iter().find_map(|sheet| lock(sheet).workers.get(host).map(|worker| worker.load))
+    }
+}
+
+/// A point of the energy curves. Energies of the whole problem in the deck's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// Cycles completed.
+    pub cycle: u64,
+    /// Time (time).
+    pub time: f64,
+    /// Kinetic energy.
+    pub kinetic: f64,
+    /// Internal energy.
+    pub internal: f64,
+    /// Energy taken by hourglass forces.
+    pub hourglass: f64,
+    /// Energy of contact springs and friction.
+    pub contact: f64,
+    /// Their sum.
+    pub total: f64,
+}
+
+impl From<&HistoryRow> for Point {
+    fn from(row: &HistoryRow) -> Self {
+        Self {
+            cycle: row.cycle,
+            time: row.time,
+            kinetic: row.kinetic,
+            internal: row.internal,
+            hourglass: row.hourglass,
+            contact: row.contact + row.friction,
+            total: row.total,
+        }
+    }
+}
+
+/// How far a run is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Brief {
+    /// Part of the whole (0 to 1).
+    pub share: f64,
+    /// Seconds to its end, reckoned from what is done; none before the first cycles.
+    pub eta_s: Option<f64>,
+    /// Cycles per second lately.
+    pub rate: f64,
+    /// Slowest worker over mean, lately; none before two cycles.
+    pub imbalance: Option<f64>,
+    /// Time step (time).
+    pub dt: f64,
+    /// Elements of the problem.
+    pub elements: usize,
+    /// States whose surfaces can be asked for.
+    pub states: usize,
+}
+
+/// What one worker does.
+#[derive(Default)]
+struct Worker {
+    elements: u64,
+    speed: f64,
+    busy: Option<Work>,
+    /// Of the cycles on the way: what each took (ns).
+    took: BTreeMap<u64, u64>,
+    load: f64,
+    mark: Option<(Instant, u64)>,
+    report: Option<Report>,
+}
+
+/// A kept surface.
+struct Kept {
+    cycle: u64,
+    time: f64,
+    bytes: Arc<Vec<u8>>,
+}
+
+/// What is known of one job.
+pub struct Sheet {
+    units: Units,
+    end_time: f64,
+    end_cycle: u64,
+    started: Instant,
+    brief: Brief,
+    pace: VecDeque<(Instant, u64)>,
+    points: Vec<Point>,
+    stride: u64,
+    rows: u64,
+    workers: BTreeMap<String, Worker>,
+    balance: Vec<(u64, f64)>,
+    skin: Skin,
+    states: Vec<Kept>,
+}
+
+impl Sheet {
+    fn new(model: &Model) -> Self {
+        let control = &model.setup.control;
+        Self {
+            units: Units::named(&model.units),
+            end_time: control.end_time,
+            end_cycle: control.end_cycle,
+            started: Instant::now(),
+            brief: Brief { elements: model.mesh.n_elements(), ..Brief::default() },
+            pace: VecDeque::new(),
+            points: Vec::new(),
+            stride: 1,
+            rows: 0,
+            workers: BTreeMap::new(),
+            balance: Vec::new(),
+            skin: Skin::new(model),
+            states: Vec::new(),
+        }
+    }
+
+    /// How far it is.
+    pub fn brief(&self) -> &Brief {
+        &self.brief
+    }
+
+    /// Takes a row of history.
+    pub fn row(&mut self, row: &HistoryRow) {
+        self.rows += 1;
+        if self.rows.is_multiple_of(self.stride) || self.points.is_empty() {
+            self.points.push(row.into());
+        }
+        if self.points.len() > POINTS_LIMIT {
+            halve(&mut self.points);
+            self.stride *= 2;
+        }
+    }
+
+    /// Takes a written state.
+    pub fn state(&mut self, model: &Model, state: &GlobalState) {
+        if self.states.last().is_some_and(|last| last.cycle == state.cycle) {
+            return;
+        }
+        let bytes = Arc::new(self.skin.pack(model, state));
+        self.states.push(Kept { cycle: state.cycle, time: state.time, bytes });
+        while self.states.len() > 2
+            && self.states.iter().map(|kept| kept.bytes.len()).sum::<usize>() > SURFACES_LIMIT
+        {
+            halve(&mut self.states);
+        }
+        self.brief.states = self.states.len();
+    }
+
+    /// A state's surface.
+    pub fn surface(&self, index: usize) -> Option<Arc<Vec<u8>>> {
+        self.states.get(index).map(|kept| Arc::clone(&kept.bytes))
+    }
+
+    /// Work was dealt out.
+    pub fn dealt(&mut self, deals: &[Deal]) {
+        for worker in self.workers.values_mut() {
+            *worker = Worker::default();
+        }
+        self.workers.retain(|name, _| deals.iter().any(|deal| deal.name == *name));
+        for deal in deals {
+            let worker = self.workers.entry(deal.name.clone()).or_default();
+            (worker.elements, worker.speed) = (deal.elements, deal.speed);
+        }
+    }
+
+    /// The run goes back to a cycle.
+    pub fn rewind(&mut self, cycle: u64) {
+        self.points.retain(|point| point.cycle <= cycle);
+        self.balance.retain(|(at, _)| *at < cycle);
+        self.states.retain(|kept| kept.cycle <= cycle);
+        self.brief.states = self.states.len();
+        self.pace.clear();
+    }
+
+    /// Takes progress.
+    pub fn progress(&mut self, progress: &Progress) {
+        let now = Instant::now();
+        let share = progress.time / self.end_time;
+        let share = share.max(progress.cycle as f64 / self.end_cycle as f64).clamp(0.0, 1.0);
+        let elapsed = now.duration_since(self.started).as_secs_f64();
+        self.pace.push_back((now, progress.cycle));
+        while self.pace.len() > 2 && now.duration_since(self.pace[1].0) > LOAD_WINDOW {
+            self.pace.pop_front();
+        }
+        let (from, cycle) = self.pace[0];
+        let passed = now.duration_since(from).as_secs_f64();
+        self.brief.share = share;
+        self.brief.eta_s = (share > 0.0).then(|| elapsed * (1.0 - share) / share);
+        self.brief.dt = progress.dt;
+        if passed > 0.0 {
+            self.brief.rate = progress.cycle.saturating_sub(cycle) as f64 / passed;
+        }
+    }
+
+    /// It is over: the last cycle was reached if `whole`.
+    pub fn over(&mut self, whole: bool) {
+        self.brief.eta_s = None;
+        self.brief.rate = 0.0;
+        if whole {
+            self.brief.share = 1.0;
+        }
+        for worker in self.workers.values_mut() {
+            worker.load = 0.0;
+        }
+    }
+
+    /// Looks at a message of a worker on its way to the job.
+    pub fn heard(&mut self, host: &str, message: &ToMaster) {
+        match message {
+            ToMaster::Cycle { cycle, busy, .. } => self.cycle(host, *cycle, *busy),
+            ToMaster::Report(report) => {
+                let worker = self.workers.entry(host.to_owned()).or_default();
+                worker.report = Some(report.as_ref().clone());
+            }
+            _ => {}
+        }
+    }
+
+    fn cycle(&mut self, host: &str, cycle: u64, busy: Work) {
+        let now = Instant::now();
+        let worker = self.workers.entry(host.to_owned()).or_default();
+        if let Some(before) = worker.busy.replace(busy) {
+            worker.took.insert(cycle, busy.compute_ns.saturating_sub(before.compute_ns));
+        }
+        let (since, ns) = *worker.mark.get_or_insert((now, busy.compute_ns));
+        let passed = now.duration_since(since);
+        if passed > LOAD_WINDOW / 2 {
+            let computed = busy.compute_ns.saturating_sub(ns) as f64;
+            worker.load = (computed / passed.as_nanos() as f64).clamp(0.0, 1.0);
+            worker.mark = Some((now, busy.compute_ns));
+        }
+        if self.workers.values().all(|worker| worker.took.contains_key(&cycle)) {
+            let took = self.workers.values().map(|worker| worker.took[&cycle] as f64);
+            let mean = took.clone().sum::<f64>() / self.workers.len() as f64;
+            let most = took.fold(0.0, f64::max);
+            for worker in self.workers.values_mut() {
+                worker.took.retain(|&at, _| at > cycle);
+            }
+            if mean > 0.0 {
+                self.balance.push((cycle, most / mean));
+                let lately = &self.balance[self.balance.len().saturating_sub(32)..];
+                let sum: f64 = lately.iter().map(|(_, ratio)| ratio).sum();
+                self.brief.imbalance = Some(sum / lately.len() as f64);
+            }
+            if self.balance.len() > 2 * POINTS_LIMIT {
+                halve(&mut self.balance);
+            }
+        }
+    }
+
+    /// Everything but the surfaces, as JSON.
+    pub fn json(&self) -> serde_json::Value {
+        let spans = || self.workers.values().filter_map(|w| w.report.as_ref()).flat_map(|r| &r.spans);
+        let start = spans().map(|span| span.start_ns).min().unwrap_or(0);
+        let workers: Vec<_> = self.workers.iter().map(|(name, worker)| worker.json(name, start)).collect();
+        let states: Vec<_> =
+            self.states.iter().map(|s| serde_json::json!({ "cycle": s.cycle, "time": s.time })).collect();
+        let parts = self.skin.parts();
+        serde_json::json!({
+            "brief": self.brief,
+            "end_time": self.end_time,
+            "units": { "length": self.units.length, "time": self.units.time, "energy": self.units.energy },
+            "elapsed_s": self.started.elapsed().as_secs_f64(),
+            "energies": self.points,
+            "imbalance": self.balance,
+            "phases": Phase::ALL.map(Phase::name),
+            "workers": workers,
+            "states": states,
+            "fields": super::surface::FIELDS,
+            "parts": parts,
+        })
+    }
+}
+
+impl Worker {
+    /// Spans as (phase, cycle, start, length) in nanoseconds since the first of all workers.
+    fn json(&self, name: &str, start: u64) -> serde_json::Value {
+        let spans = self.report.iter().flat_map(|report| &report.spans);
+        let spans: Vec<[u64; 4]> =
+            spans.map(|s| [s.phase as u64, s.cycle, s.start_ns - start, s.length_ns]).collect();
+        serde_json::json!({
+            "name": name, "elements": self.elements, "speed": self.speed, "load": self.load,
+            "phase_ns": self.report.as_ref().map(|report| report.ns), "spans": spans,
+        })
+    }
+}
+
+/// Drops every second entry but keeps the last.
+fn halve<T>(list: &mut Vec<T>) {
+    let last = list.len().saturating_sub(1);
+    let mut index = 0;
+    list.retain(|_| {
+        index += 1;
+        (index - 1) % 2 == 0 || index - 1 == last
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sheet() -> Sheet {
+        let text = include_str!("../../../tests/decks/plates-small.toml");
+        Sheet::new(&deck::read(text, "small").expect("without faults"))
+    }
+
+    fn frame(cycle: u64, compute_ns: u64) -> ToMaster {
+        let busy = Work { compute_ns, contact_ns: 0 };
+        ToMaster::Cycle { cycle, vote: None, partials: Vec::new(), gathered: Vec::new(), busy }
+    }
+
+    #[test]
+    fn curves_are_thinned_and_keep_their_ends() {
+        let mut sheet = sheet();
+        for cycle in 0..10 * POINTS_LIMIT as u64 {
+            sheet.row(&HistoryRow { cycle, ..HistoryRow::default() });
+        }
+        assert!(sheet.points.len() <= POINTS_LIMIT + 1);
+        assert_eq!(sheet.points[0].cycle, 0);
+        assert!(sheet.points.last().is_some_and(|p| p.cycle > 9 * POINTS_LIMIT as u64));
+        sheet.rewind(100);
+        assert!(sheet.points.iter().all(|point| point.cycle <= 100));
+    }
+
+    #[test]
+    fn imbalance_is_the_slowest_over_the_mean_of_whole_cycles() {
+        let mut sheet = sheet();
+        let deal = |name: &str| Deal { name: name.to_owned(), speed: 1.0, elements: 1 };
+        sheet.dealt(&[deal("a"), deal("b")]);
+        for cycle in 1..=3 {
+            sheet.heard("a", &frame(cycle, 100 * cycle));
+            sheet.heard("b", &frame(cycle, 300 * cycle));
+        }
+        assert_eq!(sheet.balance, [(2, 1.5), (3, 1.5)]);
+        assert_eq!(sheet.brief.imbalance, Some(1.5));
+    }
+}
