@@ -405,10 +405,7 @@ mod tests {
             faulty("nodes 8", "nodes 9")
                 .contains("a.mesh:11:1: read solids 1 \"the cube\"; expected number x y z")
         );
-        assert!(
-            faulty("velocities 1", "velocities 2")
-                .contains("read the end of the file; expected 1 more lines")
-        );
+        assert!(faulty("spins 1", "spins 2").contains("read the end of the file; expected 1 more lines"));
         assert!(parse("", "a.mesh").expect_err("empty")[0].read.contains("empty"));
     }
 }

@@ -271,11 +271,16 @@ mod tests {
                 let node = |&global| BatchNode { global, part: 0, mass: 1.0, stiffness: 1.0, share: 1.0 };
                 Some(Batch { nodes: nodes.iter().map(node).collect(), ..Batch::default() })
             };
-            let state = GlobalState {
+            let mut state = GlobalState {
                 mass: vec![1.0; NODES as usize],
                 constraint: vec![0; NODES as usize],
                 ..GlobalState::default()
             };
+            // With shells a node has six numbers: here the same three twice.
+            let twice = 1 + seed as usize % 2;
+            if twice == 2 {
+                state.shells.inertia = vec![1.0; NODES as usize];
+            }
             let holds =
                 |worker: usize, node: u32| nodes[worker].contains(&node) || guests[worker].contains(&node);
             let batches: Vec<_> = guests.iter().map(batch).collect();
@@ -308,17 +313,19 @@ mod tests {
                 let partials: Vec<f64> = master.plans[worker]
                     .exchange
                     .iter()
-                    .flat_map(|&node| [f64::from(node), 1.0, worker as f64])
+                    .flat_map(|&node| [f64::from(node), 1.0, worker as f64].repeat(twice))
                     .collect();
+                assert_eq!(partials.len(), master.n_partials(worker));
                 master.add(worker, &partials, &mut totals);
             }
             for worker in 0..n {
                 let sums = master.of_worker(worker, &totals);
-                for (&node, sum) in master.plans[worker].exchange.iter().zip(sums.chunks_exact(3)) {
+                for (&node, sum) in master.plans[worker].exchange.iter().zip(sums.chunks_exact(3 * twice)) {
                     let holders: Vec<usize> = (0..n).filter(|&w| holds(w, node)).collect();
                     let count = holders.len() as f64;
                     assert_eq!(sum[..2], [count * f64::from(node), count], "seed {seed}, node {node}");
                     assert_eq!(sum[2], holders.iter().sum::<usize>() as f64);
+                    assert_eq!(sum[3 * (twice - 1)..], sum[..3]);
                 }
             }
         }

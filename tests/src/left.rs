@@ -22,7 +22,9 @@ impl Left {
         let mut files: Vec<(String, Vec<u8>)> = fs::read_dir(folder)
             .expect("a results folder")
             .map(|entry| entry.expect("readable").path())
-            .filter(|path| path.is_file() && !path.ends_with("summary.json") && !path.ends_with("report.html"))
+            .filter(|path| {
+                path.is_file() && !path.ends_with("summary.json") && !path.ends_with("report.html")
+            })
             .map(|path| {
                 let name = path.file_name().expect("a file").to_string_lossy().into_owned();
                 (name, fs::read(&path).expect("readable"))

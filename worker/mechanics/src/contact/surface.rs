@@ -58,7 +58,7 @@ pub struct Face {
 impl Face {
     /// Whether it is a shell, which pushes nodes away on both its sides.
     pub fn is_shell(corners: &[u32; 8]) -> bool {
-        corners[..4] == corners[4..]
+        corners[..4] == corners[4..] && corners[0] != corners[1]
     }
 
     /// A number that stays with this face when the surface is redefined.
