@@ -275,12 +275,11 @@ mod tests {
         let uppers: std::collections::BTreeSet<u32> =
             found.iter().flat_map(|p| [p.edge_of, p.element]).filter(|e| *e >= 25).collect();
         assert_eq!(uppers.into_iter().collect::<Vec<_>>(), [25 + 5, 25 + 6, 25 + 9, 25 + 10], "{found:?}");
-        // Edge through edge, no node on the wrong side of a face that it lies over: a corner hooked under a rim.
+        // A sheet that stands upright across the other.
         let mut x = mesh.positions.clone();
         for n in &mesh.parts[1].nodes {
             let x = &mut x[*n as usize];
-            // Turned about a line beside the rim, the sheet stands upright across the lower one.
-            *x = [2.5, x[1], x[0] - 2.3];
+            *x = [2.6, x[1], x[0] - 2.35];
         }
         let found = pierced(&mesh, &x);
         assert!(found.iter().any(|p| p.edge_of >= 25 && p.element < 25), "{found:?}");
