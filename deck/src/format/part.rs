@@ -269,8 +269,11 @@ fn read_explicit(
         sorted.sort_unstable();
         if complete && sorted.windows(2).any(|w| w[0] == w[1]) {
             complete = false;
-            let expected = if section.is_some() { "four different nodes" } else { "eight different nodes" };
-            element.fault(expected, "list each corner once; wedges and triangles are not read");
+            let (expected, advice) = match section {
+                None => ("eight different nodes", "list each corner once; wedges are not read"),
+                Some(_) => ("four different nodes", "list each corner once; triangles come in mesh files"),
+            };
+            element.fault(expected, advice);
         }
         if complete {
             hexahedra.push(corners);

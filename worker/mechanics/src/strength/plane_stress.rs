@@ -4,7 +4,7 @@
 //! `s^2 = A / (1 + E g / (3 (1 - nu)))^2 + B / (1 + 2 G g)^2`, `A = (xx + yy)^2 / 4`,
 //! `B = 3/4 (xx - yy)^2 + 3 (xy^2 + yz^2 + zx^2)` of the trial, and a plastic increment of `2/3 g s`, the multiplier g is
 //! where s meets the yield stress. Newton's steps come from one side where hardening does not grow steeper, since the
-//! difference is then convex; their number is fixed, so that a lane does not know its neighbours.
+//! difference is then convex. Each lane stops where its own step was small, whatever its neighbours do.
 
 use super::RateFactor;
 use crate::{
@@ -12,8 +12,10 @@ use crate::{
     material::{CowperSymonds, Hardening, Material, Strength},
 };
 
-/// Newton steps of the return; the residual is below 1e-12 of the yield stress well before.
+/// Most Newton steps of the return.
 const STEPS: usize = 10;
+/// A lane stops after a step of this part of its multiplier: the next would be smaller than its rounding.
+const SMALL: f64 = 1e-9;
 
 /// Stress of a layer: the components that plane stress leaves.
 #[derive(Clone, Copy)]
@@ -188,8 +190,9 @@ impl PlaneLaw {
         let two_thirds = L::splat(2.0 / 3.0);
         let tiny = L::splat(f64::MIN_POSITIVE);
         let mut g = zero;
+        let mut open = yields;
         let mut step = 0;
-        while step < STEPS {
+        while step < STEPS && L::any(open) {
             let (u, w) = (one / k_a.mul_add(g, one), one / k_b.mul_add(g, one));
             let (au, bw) = (a * u * u, b * w * w);
             let sigma = (au + bw).sqrt().max(tiny);
@@ -198,7 +201,10 @@ impl PlaneLaw {
             let (flow, hardening) = self.yield_stress(strain, factor);
             let strain_slope = two_thirds * g.mul_add(slope, sigma);
             let descent = hardening.mul_add(strain_slope, -slope).max(tiny);
-            g = (g + (sigma - flow) / descent).max(zero);
+            let next = (g + (sigma - flow) / descent).max(zero);
+            let far = (L::splat(SMALL) * next).less((next - g).abs());
+            g = L::select(open, next, g);
+            open = L::both(open, far);
             step += 1;
         }
         let (u, w) = (one / k_a.mul_add(g, one), one / k_b.mul_add(g, one));
