@@ -119,7 +119,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
-    check::spans(&parts, &assembly, contact.as_ref(), faults);
+    check::spans(&parts, &assembly, contact.as_ref(), &materials.list, faults);
     let contact = contact.map(|c| c.settings);
 
     let mut velocity = assembly.velocity;
@@ -136,6 +136,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
         units: units.name.to_string(),
         mesh: assembly.mesh,
         velocity,
+        spin: assembly.spin,
         constraint: conditions.constraint,
         join_energy: assembly.join_energy,
         setup: Setup {

@@ -28,7 +28,7 @@ const GROUPINGS: u64 = 25;
 /// How often a grouping is cut again, each time for shares corrected by what came of the last.
 const CORRECTIONS: usize = 4;
 
-/// Cuts the mesh for workers of these relative speeds, on which a node costs `node` elements. Sub-domains come part by part; those without elements are left
+/// Cuts the mesh for workers of these relative speeds, on which a node costs `node` elements. Sub-domains come part by part, shells first; those without elements are left
 /// out, so a worker may have none in a small problem. `alive` says by global index which elements cost anything; all do
 /// where it is none.
 pub fn decompose(mesh: &Mesh, speeds: &[f64], node: f64, alive: Option<&[bool]>) -> Vec<Subdomain> {
@@ -125,7 +125,7 @@ impl Living {
                 return None;
             }
             Some(match &part.topology {
-                Topology::Explicit { .. } => Part::List(alive.to_vec()),
+                Topology::Explicit { .. } | Topology::Shells { .. } => Part::List(alive.to_vec()),
                 Topology::Structured { cells } => {
                     let [ni, nj, nk] = cells.map(|n| n as usize);
                     let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
@@ -221,8 +221,9 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec
                     cut_planes(vec![all], shortest, order, speeds, &count, &mut pieces);
                 }
             }
-            Topology::Explicit { hexahedra } => {
-                let centres: Vec<[f64; 3]> = (0..hexahedra.len())
+            Topology::Explicit { .. } | Topology::Shells { .. } => {
+                let n_elements = mesh_part.n_elements();
+                let centres: Vec<[f64; 3]> = (0..n_elements)
                     .map(|e| {
                         let corners = mesh_part.corners(e);
                         std::array::from_fn(|a| {
@@ -230,13 +231,15 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec
                         })
                     })
                     .collect();
-                let all = (0..hexahedra.len() as u32).collect();
+                let all = (0..n_elements as u32).collect();
                 bisect(all, &centres, order, speeds, &|e| living.counts(part, e), &mut pieces);
             }
         }
         pieces.retain(|(region, _): &(Region, usize)| region.n_elements() > 0);
         out.extend(pieces.into_iter().map(|(region, worker)| Subdomain { part, region, worker }));
     }
+    // The lowest sub-domain that has a node books it, and only shells know of its rotation.
+    out.sort_by_key(|subdomain| mesh.parts[subdomain.part].section().is_none());
     out
 }
 

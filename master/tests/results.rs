@@ -88,6 +88,7 @@ fn plates(cells: u32) -> Model {
         units: "cm-g-us".into(),
         mesh,
         velocity: vec![[0.0; 3]; n_nodes],
+        spin: Vec::new(),
         constraint: vec![0; n_nodes],
         join_energy: 0.0,
         setup: Setup {
@@ -154,6 +155,7 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         elements,
         eroded: Vec::new(),
         strain: Vec::new(),
+        shells: mechanics::state::ShellState::default(),
     }
 }
 

@@ -217,6 +217,8 @@ pub struct Session {
     n_exchange: usize,
     route: Route,
     neighbours: Vec<Neighbour>,
+    /// Numbers by node of the exchange.
+    stride: usize,
     /// On route direct: own partial forces of this cycle, and what neighbours sent, by (cycle, worker).
     partials: Vec<f64>,
     heard: BTreeMap<(u64, u32), Vec<f64>>,
@@ -259,6 +261,7 @@ impl Session {
             n_exchange: 0,
             route: Route::Master,
             neighbours: Vec::new(),
+            stride: 3,
             partials: Vec::new(),
             heard: BTreeMap::new(),
             plan_hash: 0,
@@ -381,6 +384,7 @@ impl Session {
                 self.n_exchange = assign.plan.exchange.len();
                 self.route = assign.route;
                 self.neighbours.clone_from(&assign.plan.neighbours);
+                self.stride = assign.plan.stride();
                 self.plan_hash = assign.plan_hash;
                 self.resumed = assign.cycle > 0;
                 if self.busy {
@@ -528,7 +532,7 @@ impl Session {
                     actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered, busy }));
                 } else {
                     for neighbour in &self.neighbours {
-                        let partials = of_nodes(&partials, &neighbour.shared)?;
+                        let partials = of_nodes(&partials, &neighbour.shared, self.stride)?;
                         actions.push(Action::SendPeer(neighbour.worker, ToPeer { cycle, partials }));
                     }
                     self.partials = partials;
@@ -650,6 +654,7 @@ impl Session {
             self.boundaries.pop_front();
             self.n_exchange = plan.exchange.len();
             self.neighbours.clone_from(&plan.neighbours);
+            self.stride = plan.stride();
             self.plan_hash = hash;
             self.phase = Phase::Border;
             actions.push(Action::Compute(Task::Install {
@@ -704,17 +709,17 @@ impl Session {
         let mut totals = std::mem::take(&mut self.partials);
         for neighbour in &self.neighbours {
             let Some(partials) = self.heard.remove(&(self.cycle, neighbour.worker)) else { continue };
-            if partials.len() != 3 * neighbour.shared.len() {
+            if partials.len() != self.stride * neighbour.shared.len() {
                 return Err(format!(
                     "worker {} sends {} numbers in cycle {}, the plan has {}",
                     neighbour.worker,
                     partials.len(),
                     self.cycle,
-                    3 * neighbour.shared.len()
+                    self.stride * neighbour.shared.len()
                 ));
             }
-            for (&at, partial) in neighbour.shared.iter().zip(partials.chunks_exact(3)) {
-                for (total, term) in totals[3 * at as usize..].iter_mut().zip(partial) {
+            for (&at, partial) in neighbour.shared.iter().zip(partials.chunks_exact(self.stride)) {
+                for (total, term) in totals[self.stride * at as usize..].iter_mut().zip(partial) {
                     *total += term;
                 }
             }
@@ -733,13 +738,13 @@ fn all_finite(what: &str, values: &[f64]) -> Result<(), String> {
     Err(format!("{what} {} of {} is {}, must be finite", bad + 1, values.len(), values[bad]))
 }
 
-/// Three numbers of each of these nodes.
-fn of_nodes(values: &[f64], nodes: &[u32]) -> Result<Vec<f64>, String> {
-    let mut out = Vec::with_capacity(3 * nodes.len());
+/// The numbers, `stride` each, of these nodes.
+fn of_nodes(values: &[f64], nodes: &[u32], stride: usize) -> Result<Vec<f64>, String> {
+    let mut out = Vec::with_capacity(stride * nodes.len());
     for &node in nodes {
-        let at = 3 * node as usize;
+        let at = stride * node as usize;
         out.extend_from_slice(
-            values.get(at..at + 3).ok_or("a neighbour shares a node that is not in the exchange")?,
+            values.get(at..at + stride).ok_or("a neighbour shares a node that is not in the exchange")?,
         );
     }
     Ok(out)

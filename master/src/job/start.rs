@@ -69,7 +69,8 @@ impl Job {
         let mut setup = model.setup.clone();
         let mut constraint = model.constraint.clone();
         initial::bind_walls(&model.mesh, &mut setup, &mut constraint)?;
-        let start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
+        let mut start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
+        initial::spin(&mut start, &setup.constraints, &model.spin);
         let quanta = initial::quanta(&model.mesh, &setup, &start);
         let (base, rows) = match resume {
             None => {

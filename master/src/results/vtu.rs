@@ -10,13 +10,19 @@ mod appended;
 pub mod read;
 
 use deck::model::Model;
-use mechanics::state::{GlobalState, field};
+use mechanics::{
+    element::shell4,
+    state::{GlobalState, field},
+};
 
 use super::{Error, FIELD_NAMES, Folder, PVD, state_name, surface::Probe, write_whole};
 use appended::Appended;
 
 /// Cell type of the eight-node hexahedron.
 const VTK_HEXAHEDRON: u8 = 12;
+
+/// Cell type of the four-node quadrilateral: shells.
+const VTK_QUAD: u8 = 9;
 
 /// Fields whose numbers identify rather than measure: written whatever the deck selects.
 const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
@@ -33,6 +39,9 @@ const ON_REQUEST: [&str; 9] = [
     "mass",
     "time_to_light",
 ];
+
+/// Arrays that are written wherever they exist: the worker, and what shells have.
+const ALWAYS: [&str; 3] = ["worker", "thickness", "von_mises_max"];
 
 /// Which fields a state file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -155,6 +164,10 @@ impl Elements<'_> {
         self.model.mesh.parts[part].corners(local).map(i64::from)
     }
 
+    fn is_shell(&self, element: usize) -> bool {
+        self.model.mesh.parts[self.locate(element).0].section().is_some()
+    }
+
     fn element_id(&self, element: usize) -> u32 {
         let (part, local) = self.locate(element);
         self.model.mesh.parts[part].element_ids[local]
@@ -176,7 +189,14 @@ pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
     (1.5 * (xx * xx + yy * yy + zz * zz) + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
 }
 
-/// Writes one state as a `.vtu` file, whole or not at all.
+/// Von Mises stress of a layer of a shell, given by xx, yy, xy, yz, zx; its normal stress is zero.
+fn plane_von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
+    (xx * xx + yy * yy - xx * yy + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
+}
+
+/// Writes one state as a `.vtu` file, whole or not at all. With shells, which are quadrilaterals in it, there are two
+/// more element fields: `thickness` (zero for solids) and `von_mises_max`, the greatest of their layers; other stresses of
+/// shells are means through the thickness in the frame of the element.
 ///
 /// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`,
 /// `mass`. Element fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
@@ -221,7 +241,7 @@ fn stream(
 
     let elements = Elements { model, offsets: model.mesh.element_offsets() };
     let [point, cell] = data_arrays(&elements, state, worker).map(|mut arrays: Vec<Array>| {
-        arrays.retain(|array| array.name == "worker" || fields.contains(array.name));
+        arrays.retain(|array| ALWAYS.contains(&array.name) || fields.contains(array.name));
         arrays
     });
     // Eroded elements are left out, their nodes are not.
@@ -230,9 +250,23 @@ fn stream(
     let cell: Vec<Array> =
         if n_cells < n_elements { cell.into_iter().map(|array| array.only(&kept)).collect() } else { cell };
     let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
+    // A shell has four corners, so with shells the lists are made first.
+    let with_shells = model.mesh.parts.iter().any(|part| part.section().is_some());
+    let (mut corners, mut ends) = (Vec::new(), Vec::new());
+    if with_shells {
+        for &e in &kept {
+            corners.extend_from_slice(&elements.corners(e)[..if elements.is_shell(e) { 4 } else { 8 }]);
+            ends.push(corners.len() as i64);
+        }
+    }
+    let connectivity = if with_shells {
+        Array::i64("connectivity", corners.len(), |i| [corners[i]])
+    } else {
+        Array::i64("connectivity", n_cells, |cell| elements.corners(kept[cell]))
+    };
     let cells = [
-        Array::i64("connectivity", n_cells, |cell| elements.corners(kept[cell])),
-        Array::i64("offsets", n_cells, |cell| [8 * (cell as i64 + 1)]),
+        connectivity,
+        Array::i64("offsets", n_cells, |cell| [if with_shells { ends[cell] } else { 8 * (cell as i64 + 1) }]),
         Array {
             name: "types",
             kind: "UInt8",
@@ -240,7 +274,10 @@ fn stream(
             components: 1,
             tuples: n_cells,
             grouped: true,
-            put: Box::new(|_, out| out.push(VTK_HEXAHEDRON)),
+            put: Box::new(|cell, out| {
+                let quad = with_shells && elements.is_shell(kept[cell]);
+                out.push(if quad { VTK_QUAD } else { VTK_HEXAHEDRON });
+            }),
         },
     ];
     let sections: [(&str, &[Array]); 4] =
@@ -351,6 +388,16 @@ fn data_arrays<'a>(
         ]
         .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
     );
+    if !state.shells.fields.is_empty() {
+        cell.push(Array::f64("thickness", n_elements, move |e| [state.shells.fields[shell4::THICKNESS][e]]));
+        cell.push(Array::f64("von_mises_max", n_elements, move |e| {
+            let layers = state.shells.fields[shell4::ELEMENT..].chunks(shell4::LAYER);
+            let largest = |layer: &[Vec<f64>]| plane_von_mises([0, 1, 2, 3, 4].map(|i| layer[i][e]));
+            [layers
+                .map(largest)
+                .fold(if elements.is_shell(e) { 0.0 } else { von_mises(deviator(e)) }, f64::max)]
+        }));
+    }
     if let Some(worker) = worker {
         cell.push(Array::u32("worker", n_elements, move |e| worker[e]));
     }

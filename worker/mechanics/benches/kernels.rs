@@ -77,6 +77,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         initial_volume,
         fields,
         erosion: None,
+        shells: mechanics::state::ShellState::default(),
     }
 }
 
@@ -98,6 +99,7 @@ fn grind(material: &Material, explicit: bool, width: Width) -> [f64; 2] {
         hourglass: 0.1,
         force_quantum: Quantum::for_reference(2e8, 42),
         energy_quantum: Quantum::for_reference(1e9, 40),
+        arm: 1.0,
     };
     let sets = 0..block.n_sets();
     let mut times: Vec<f64> = (0..60)

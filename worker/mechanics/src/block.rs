@@ -17,6 +17,7 @@ use crate::{
     element::{
         ElementVote, Step,
         hex8::{self, Laws, Layout, View},
+        shell4::{Core, ShellStep},
     },
     eos::{EquationOfState, IdealGas, Jwl, Linear, Polynomial, Shock},
     erosion::PieceErosion,
@@ -26,8 +27,8 @@ use crate::{
     },
     lanes::{SET, Width, scalar::Scalar},
     material::{Eos, Failure, Material, Strength},
-    mesh::Topology,
-    state::{N_FIELDS, field::ENERGY, sparse, write_changed},
+    mesh::{Topology, quad_area, twice},
+    state::{N_FIELDS, ShellState, field::ENERGY, sparse, write_changed},
     strength::{Elastic, Hydro, JohnsonCook, RateFactor, StrengthLaw, Tabulated, VonMises},
 };
 
@@ -62,6 +63,8 @@ pub struct Piece {
     pub fields: [Vec<f64>; N_FIELDS],
     /// In runs where anything erodes.
     pub erosion: Option<PieceErosion>,
+    /// What shells have beside that; empty of solids.
+    pub shells: ShellState,
 }
 
 /// Elements of one kind and one material, laid out for the kernels. The first `nodes.len()` entries of the node
@@ -85,6 +88,8 @@ pub struct Block {
     pub mass: Vec<f64>,
     /// Index into [`crate::setup::Setup::constraints`].
     pub constraint: Vec<u16>,
+    /// Rotations, moments and layers of shells; none of solids.
+    pub shells: Option<Box<Core>>,
     topology: Topology,
     layout: Layout,
     /// Slot of each local element.
@@ -101,19 +106,21 @@ pub struct Block {
 }
 
 impl Block {
-    /// Lays out a piece. Forces are zero.
+    /// Lays out a piece of solids. Forces are zero.
     ///
     /// # Panics
-    /// If the arrays of the piece do not fit its topology, which whoever decoded it has checked.
+    /// As [`Block::of`], and if the piece is of shells.
     pub fn new(piece: &Piece) -> Block {
-        Self::take(piece.clone())
+        Self::of(piece.clone(), &[])
     }
 
-    /// As [`Block::new`], of a piece that goes array by array, so that there need not be room for all of both.
+    /// Lays out a piece of one of `materials`. Its arrays go one by one, so that there need not be room for all of both.
+    /// Forces are zero.
     ///
     /// # Panics
-    /// As there.
-    pub fn take(mut piece: Piece) -> Block {
+    /// If the arrays of the piece do not fit its topology or shells cannot be of its material, which whoever made or
+    /// decoded it has checked.
+    pub fn of(mut piece: Piece, materials: &[Material]) -> Block {
         let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
         let by_node = [piece.x.len(), piece.v.len(), piece.mass.len(), piece.constraint.len()];
         assert!(by_node == [n_nodes; 4], "node arrays of {by_node:?} entries for {n_nodes} nodes");
@@ -122,6 +129,18 @@ impl Block {
         let (layout, slots, reach) = match &piece.topology {
             Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
             Topology::Explicit { hexahedra } => explicit(hexahedra, n_nodes),
+            Topology::Shells { quads, .. } => {
+                explicit(&quads.iter().map(|&quad| twice(quad)).collect::<Vec<_>>(), n_nodes)
+            }
+        };
+        let shells = match &piece.topology {
+            Topology::Shells { quads, section } => {
+                let material = materials.get(piece.material as usize).expect("shells need their material");
+                let volume = &piece.initial_volume;
+                let core = Core::new(quads, &piece.elements, volume, &piece.shells, section, material);
+                Some(Box::new(core.expect("the deck has checked section and material")))
+            }
+            _ => None,
         };
         assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
         let n_slots = match &layout {
@@ -154,6 +173,7 @@ impl Block {
             v: by_axis(take(&mut piece.v)),
             f: std::array::from_fn(|_| vec![0.0; n_padded]),
             mass: piece.mass.iter().copied().chain(std::iter::repeat_n(1.0, n_padded - n_nodes)).collect(),
+            shells,
             fields: std::array::from_fn(|field| by_slot(take(&mut piece.fields[field]), 0.0)),
             initial_volume: by_slot(take(&mut piece.initial_volume), 1.0),
             constraint: piece.constraint,
@@ -191,13 +211,31 @@ impl Block {
             mass: self.mass[..self.nodes.len()].to_vec(),
             constraint: self.constraint.clone(),
             initial_volume: by_element(&self.initial_volume),
-            fields: std::array::from_fn(|field| by_element(&self.fields[field])),
+            fields: match &self.shells {
+                None => std::array::from_fn(|field| by_element(&self.fields[field])),
+                Some(core) => {
+                    let summary = |e: usize| {
+                        let [a, b, c, d, ..] = self.corners(e);
+                        let x = [a, b, c, d].map(|n| std::array::from_fn(|axis| self.x[axis][n as usize]));
+                        core.summary(e, self.initial_volume[e], quad_area(&x))
+                    };
+                    let all: Vec<_> = (0..self.elements.len()).map(summary).collect();
+                    std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect())
+                }
+            },
+            shells: self
+                .shells
+                .as_ref()
+                .map_or_else(ShellState::default, |core| core.image(self.nodes.len(), self.elements.len())),
             erosion: None,
         }
     }
 
     /// [`Block::piece`] of a block that goes array by array, so that there need not be room for all of both.
     pub fn into_piece(mut self) -> Piece {
+        if self.shells.is_some() {
+            return self.piece();
+        }
         let (n, slots) = (self.nodes.len(), take(&mut self.slots));
         let by_element = |array: Vec<f64>| sparse(slots.iter().map(|&slot| array[slot as usize]));
         drop((take(&mut self.f), take(&mut self.slot_elements)));
@@ -215,6 +253,7 @@ impl Block {
             mass: self.mass,
             constraint: self.constraint,
             erosion: None,
+            shells: ShellState::default(),
         }
     }
 
@@ -336,7 +375,8 @@ impl Block {
 
     /// Sets all forces to zero.
     pub fn clear_forces(&mut self) {
-        for f in &mut self.f {
+        let moments = self.shells.iter_mut().flat_map(|core| &mut core.m);
+        for f in self.f.iter_mut().chain(moments) {
             f.fill(0.0);
         }
     }
@@ -356,6 +396,16 @@ impl Block {
         width: Width,
         vote: &mut ElementVote,
     ) {
+        if let Some(core) = &mut self.shells {
+            let step = ShellStep {
+                dt: step.dt,
+                force_quantum: step.force_quantum,
+                moment_quantum: step.force_quantum.times(step.arm),
+                energy_quantum: step.energy_quantum,
+            };
+            core.compute(&self.x, &self.v, &mut self.f, sets, &step, width, vote);
+            return;
+        }
         match material.eos {
             Eos::Linear { bulk } => {
                 self.compute_with(Linear { bulk }, material, sets, step, width, vote);

@@ -26,6 +26,7 @@ use crate::{
     load::face::{self, FaceVote, LoadedFace},
     nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
+    spin,
     vote::{Gone, Quanta, Vote, Watched},
     wall::{self, Pose, WallVote},
 };
@@ -62,11 +63,20 @@ pub struct Plan {
     pub guests: Vec<Guest>,
     /// Global nodes whose state this worker sends to others when the plan starts to act.
     pub send: Vec<u32>,
+    /// Whether moments travel behind the forces of each node: six numbers instead of three.
+    pub moments: bool,
     /// On route direct: the workers that hold nodes of `exchange` too.
     pub neighbours: Vec<Neighbour>,
     /// Nodes held here that have no element left and leave the run with this plan; in the first plan of an epoch, all that
     /// have left before.
     pub dropped: Vec<u32>,
+}
+
+impl Plan {
+    /// Numbers that travel for each node of the exchange.
+    pub fn stride(&self) -> usize {
+        if self.moments { 6 } else { 3 }
+    }
 }
 
 /// Another worker that holds nodes of the exchange.
@@ -218,6 +228,8 @@ pub struct Domain {
     rooms: Vec<Room>,
     guests: Guests,
     contact: Option<ContactRoom>,
+    /// Whether there are shells anywhere in the run.
+    moments: bool,
     exchange: Vec<Shared>,
     local: Vec<Shared>,
     copies: Vec<(u32, u32)>,
@@ -261,7 +273,7 @@ impl Domain {
             let first = rooms.len();
             for mut piece in pieces {
                 let erosion = piece.erosion.take();
-                let mut block = Block::take(piece);
+                let mut block = Block::of(piece, &setup.materials);
                 let all = 0..block.n_sets();
                 let material = &setup.materials[block.material as usize];
                 let eroding = setup.erosion.of_part(block.part as usize).map(|criteria| {
@@ -337,6 +349,7 @@ impl Domain {
             rooms,
             guests: Guests::default(),
             contact: None,
+            moments: false,
             exchange: Vec::new(),
             local: Vec::new(),
             copies: Vec::new(),
@@ -455,6 +468,7 @@ impl Domain {
             self.contact = Some(ContactRoom { contact, sources, x, v, f: zeros() });
         }
         // Every node with more than one copy, here or elsewhere, and every contact node.
+        self.moments = plan.moments;
         self.copies.clear();
         self.exchange.clear();
         self.local.clear();
@@ -639,6 +653,7 @@ impl Domain {
             hourglass: control.hourglass,
             force_quantum: self.quanta.force,
             energy_quantum: self.quanta.energy,
+            arm: self.quanta.arm,
         };
         let (materials, width, cycle) = (&self.setup.materials, self.width, self.cycle);
         let work = |room: &mut Room| {
@@ -664,12 +679,15 @@ impl Domain {
         each(&mut self.rooms, work);
     }
 
-    /// Partial forces of the nodes of the exchange, three numbers each.
+    /// Partial forces of the nodes of the exchange, three numbers each, with moments six.
     pub fn partials(&self, meter: &dyn Meter) -> Vec<f64> {
         let mark = meter.start();
-        let mut out = Vec::with_capacity(3 * self.exchange.len());
+        let mut out = Vec::with_capacity(self.stride() * self.exchange.len());
         for shared in &self.exchange {
             out.extend(self.sum(shared));
+            if self.moments {
+                out.extend(self.moment(shared));
+            }
         }
         meter.stop(mark, false);
         out
@@ -693,11 +711,34 @@ impl Domain {
         total
     }
 
-    fn set(&mut self, index: usize, of_exchange: bool, total: [f64; 3]) {
+    /// Numbers that travel for each node of the exchange.
+    fn stride(&self) -> usize {
+        if self.moments { 6 } else { 3 }
+    }
+
+    fn moment(&self, shared: &Shared) -> [f64; 3] {
+        let mut total = [0.0; 3];
+        for &(room, local) in &self.copies[shared.copies.start as usize..shared.copies.end as usize] {
+            if let Some(core) = &self.rooms[room as usize].block.shells {
+                for a in 0..3 {
+                    total[a] += core.m[a][local as usize];
+                }
+            }
+        }
+        total
+    }
+
+    fn set(&mut self, index: usize, of_exchange: bool, total: [f64; 3], moment: [f64; 3]) {
         let shared = if of_exchange { &self.exchange[index] } else { &self.local[index] };
         for &(room, local) in &self.copies[shared.copies.start as usize..shared.copies.end as usize] {
+            let block = &mut self.rooms[room as usize].block;
             for a in 0..3 {
-                self.rooms[room as usize].block.f[a][local as usize] = total[a];
+                block.f[a][local as usize] = total[a];
+            }
+            if let Some(core) = &mut block.shells {
+                for a in 0..3 {
+                    core.m[a][local as usize] = moment[a];
+                }
             }
         }
         if shared.guest != NONE {
@@ -720,20 +761,23 @@ impl Domain {
         free_walls: &[Pose],
         meter: &dyn Meter,
     ) -> Result<Vote, String> {
-        if totals.len() != 3 * self.exchange.len() {
+        let stride = self.stride();
+        if totals.len() != stride * self.exchange.len() {
             return Err(format!(
-                "{} numbers of total forces for {} shared nodes, expected 3 each",
+                "{} numbers of total forces for {} shared nodes, expected {stride} each",
                 totals.len(),
                 self.exchange.len()
             ));
         }
         let mark = meter.start();
-        for (i, total) in totals.chunks_exact(3).enumerate() {
-            self.set(i, true, [total[0], total[1], total[2]]);
+        for (i, total) in totals.chunks_exact(stride).enumerate() {
+            let moment = if self.moments { [total[3], total[4], total[5]] } else { [0.0; 3] };
+            self.set(i, true, [total[0], total[1], total[2]], moment);
         }
         for i in 0..self.local.len() {
             let total = self.sum(&self.local[i]);
-            self.set(i, false, total);
+            let moment = if self.moments { self.moment(&self.local[i]) } else { [0.0; 3] };
+            self.set(i, false, total, moment);
         }
         meter.stop(mark, false);
         let setup = &self.setup;
@@ -763,6 +807,11 @@ impl Domain {
                 walls: &mut room.walls,
             };
             room.booked = advance.run(&mut nodes, width);
+            if let Some(core) = &mut block.shells {
+                let (kinetic, external) = spin::advance(&advance, core, &block.constraint, &room.sets);
+                room.booked.kinetic += kinetic;
+                room.booked.external += external;
+            }
             if !room.faces.is_empty() {
                 let half_steps = 0.5 * (dt_previous + dt);
                 room.booked.external += face::work(&room.faces, block, half_steps, advance.quanta.energy);

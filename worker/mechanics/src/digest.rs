@@ -44,5 +44,12 @@ pub fn digest(state: &GlobalState) -> String {
             hasher.update(&strain.to_le_bytes());
         }
     }
+    // A run without shells has nothing here, and the digest that it had before there were shells.
+    for spin in state.shells.spin.iter().flatten() {
+        hasher.update(&spin.to_le_bytes());
+    }
+    for value in state.shells.fields.iter().flatten() {
+        hasher.update(&value.to_le_bytes());
+    }
     hasher.finalize().to_hex()[..32].to_owned()
 }

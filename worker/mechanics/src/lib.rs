@@ -38,6 +38,7 @@ pub mod nodes;
 pub mod piece;
 pub mod proof;
 pub mod setup;
+pub(crate) mod spin;
 pub mod state;
 mod strength;
 pub mod vote;

@@ -16,7 +16,7 @@ use crate::{
     material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength},
     mesh::{Part, Topology},
     setup::{Constraint, Control, Setup},
-    state::{N_FIELDS, field},
+    state::{N_FIELDS, ShellState, field},
     vote::Quanta,
 };
 
@@ -237,6 +237,7 @@ fn stirred(material: &Material, seed: u64) -> Piece {
         initial_volume,
         fields,
         erosion: None,
+        shells: ShellState::default(),
     }
 }
 
@@ -268,7 +269,7 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
         erosion: Erosion::default(),
     };
     let (force, energy) = (Quantum::for_reference(3e7, 42), Quantum::for_reference(1e6, 42));
-    let quanta = Quanta { force, energy, momentum: energy };
+    let quanta = Quanta { force, energy, momentum: energy, arm: 1.0 };
     let subdomain = Subdomain { id: 0, pieces: vec![piece], unowned: Vec::new(), surface: Vec::new() };
     let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], width);
     for cycle in 0..3 {
@@ -364,6 +365,7 @@ mod tests {
             hourglass: 0.1,
             force_quantum: Quantum::for_reference(3e7, 42),
             energy_quantum: Quantum::for_reference(1e6, 42),
+            arm: 1.0,
         };
         let of = |block: &mut Block, cuts: &[u32]| {
             let mut vote = ElementVote::default();

@@ -43,6 +43,8 @@ pub struct Constraint {
     pub walls: u32,
     /// Forces on the node, one bit per entry of [`Loads::forces`].
     pub forces: u32,
+    /// Axes about which a node of shells does not turn: bit 0 is x.
+    pub clamped: u8,
 }
 
 /// Most walls in a run: one bit each in [`Constraint::walls`].

@@ -280,4 +280,6 @@ pub struct Quanta {
     pub energy: crate::exact::Quantum,
     /// Momenta.
     pub momentum: crate::exact::Quantum,
+    /// Quantum of moments over that of forces, a power of two (length).
+    pub arm: f64,
 }

@@ -30,7 +30,7 @@ fn assign(cycle: u64) -> Box<Assign> {
             erosion: Default::default(),
         },
         n_parts: 1,
-        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
+        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
         subdomains: Vec::new(),
         gauges: Vec::new(),
         watched: Default::default(),

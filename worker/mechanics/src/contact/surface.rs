@@ -8,13 +8,16 @@
 //! from the start, so that the nodes whose positions and votes travel stay the same; [`Surface::active`] says which of them
 //! can meet anything: those on faces, and those that have no element left.
 
-use crate::{element::hex8, material::Material, mesh::Mesh};
+use crate::{material::Material, mesh::Mesh};
 
 pub use crate::mesh::FACES as SIDES;
 
 /// Depth (gaps) within which the penalty stops a node at the closing speed of its part; the rest of 0.9 is for the bodies
 /// behind it.
 const STOPPING_DEPTH: f64 = 0.75;
+
+/// The side of a shell that stands for it, an index into [`SIDES`].
+const UPPER: usize = 1;
 
 /// The outer faces of a mesh and their nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,6 +62,11 @@ pub struct Face {
 }
 
 impl Face {
+    /// Whether it is a shell, which pushes nodes away on both its sides.
+    pub fn is_shell(corners: &[u32; 8]) -> bool {
+        corners[..4] == corners[4..] && corners[0] != corners[1]
+    }
+
     /// A number that stays with this face when the surface is redefined.
     pub fn key(&self) -> u64 {
         u64::from(self.element) * 6 + u64::from(self.side)
@@ -109,11 +117,16 @@ impl Surface {
             let bulk = materials[mesh.parts[part].material as usize].bulk();
             let nodes = SIDES[side as usize].map(|c| corners[c]);
             let area = area(nodes.map(|n| mesh.positions[n as usize]));
-            let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
+            let volume = mesh.parts[part].volume(&corners.map(|n| mesh.positions[n as usize]));
             for n in nodes {
                 index[n as usize] = 0;
             }
-            let stiffness = if volume > 0.0 { bulk * area * area / volume } else { 0.0 };
+            let stiffness = match mesh.parts[part].section() {
+                // As the shell itself resists in its plane: across its thickness it would rule the time step.
+                Some(section) => bulk * section.thickness,
+                None if volume > 0.0 => bulk * area * area / volume,
+                None => 0.0,
+            };
             let part = part as u32;
             faces.push(Face { nodes, element, side, part, stiffness, corners, own: [u32::MAX; 8] });
         }
@@ -145,7 +158,7 @@ impl Surface {
                     continue;
                 }
                 let positions = corners.map(|n| mesh.positions[n as usize]);
-                let volume = hex8::volume(&positions);
+                let volume = part.volume(&positions);
                 for (corner, n) in corners.iter().map(|&n| index[n as usize] as usize).enumerate() {
                     if n == u32::MAX as usize {
                         continue;
@@ -166,7 +179,8 @@ impl Surface {
             }
         }
         for face in &mut faces {
-            let face_volume = hex8::volume(&face.corners.map(|n| mesh.positions[n as usize]));
+            let x = face.corners.map(|n| mesh.positions[n as usize]);
+            let face_volume = mesh.parts[face.part as usize].volume(&x);
             face.nodes = face.nodes.map(|n| index[n as usize]);
             for (i, n) in face.corners.into_iter().enumerate() {
                 if !face.corners[..i].contains(&n) {
@@ -212,7 +226,7 @@ impl Surface {
         let mut count = vec![0_u32; self.nodes.len()];
         let least = |part: usize, corners: &[u32; 8]| {
             let density = materials[mesh.parts[part].material as usize].density;
-            let mass = density * hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
+            let mass = density * mesh.parts[part].volume(&corners.map(|n| mesh.positions[n as usize]));
             0.5 * mass * speed[part] * speed[part] / (depth * depth * settings.stiffness)
         };
         for face in &mut self.faces {
@@ -339,7 +353,10 @@ fn for_each_side(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, visit: &mut dyn FnMut
         for e in 0..part.n_elements() {
             if alive(element) {
                 let corners = part.corners(e);
-                for (side, local) in SIDES.iter().enumerate() {
+                // A shell is one face, whose zone acts on both its sides: the upper.
+                let of_shell = part.section().is_some();
+                for (side, local) in SIDES.iter().enumerate().filter(|(side, _)| !of_shell || *side == UPPER)
+                {
                     let mut key = local.map(|c| corners[c]);
                     key.sort_unstable();
                     for i in 1..4 {
