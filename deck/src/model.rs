@@ -40,6 +40,8 @@ pub struct Model {
     pub mesh: Mesh,
     /// Initial velocity by global node index (mass-weighted at merged nodes).
     pub velocity: Vec<[f64; 3]>,
+    /// Initial rotation rate by global node index (1/time), of nodes of shells; empty where all are zero.
+    pub spin: Vec<[f64; 3]>,
     /// Index into `setup.constraints` by global node index; 0 is free.
     pub constraint: Vec<u16>,
     /// Kinetic energy lost where joined nodes of different velocity merged.

@@ -33,6 +33,8 @@ pub enum Command {
     Master(MasterArgs),
     /// Compute for a master
     Worker(WorkerArgs),
+    /// Start workers over ssh, on the hosts of a file
+    Add(AddArgs),
     /// Put a deck into a master's queue
     Submit(SubmitArgs),
     /// Follow a job until it ends, then print its summary
@@ -481,6 +483,25 @@ pub struct WorkerArgs {
     /// Take no other workers and dial none: what it exchanges with them passes the master
     #[arg(long, conflicts_with_all = ["peer_port", "peer_announce"])]
     pub no_peers: bool,
+}
+
+/// Flags of `add`.
+#[derive(Args, Clone, Debug)]
+pub struct AddArgs {
+    /// Those to start, deferred ones too [default: all that are not deferred]
+    pub names: Vec<String>,
+    /// The host file (TOML)
+    #[arg(long, value_name = "FILE", default_value = "hosts.toml")]
+    pub hosts: PathBuf,
+    /// The master as the hosts reach it, HOST:PORT [default: the host file's]
+    #[arg(long)]
+    pub master: Option<String>,
+    /// Print the commands and do nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Print JSON
+    #[arg(long, conflicts_with = "dry_run")]
+    pub json: bool,
 }
 
 /// How a client reaches a master, and how it prints.

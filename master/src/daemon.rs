@@ -27,6 +27,7 @@ use tokio::{
     sync::{Semaphore, mpsc, oneshot, watch},
 };
 use tracing::{info, warn};
+use worker::notify;
 
 use crate::{
     command::MasterArgs,
@@ -149,6 +150,7 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         tokio::spawn(listen(listener, Arc::clone(&gate)));
         let board = open_page(args, join, &events).await?;
         let stop = crate::run::stop_on_interrupt("ending; the job under way is stored for the next master");
+        notify::say(&format!("READY=1\nSTATUS=listening on {address}"));
         Owner::new(args.spool.clone(), spool, left, events, board).run(heard, &stop, &gate).await;
         Ok(ExitCode::SUCCESS)
     });
@@ -350,6 +352,7 @@ impl Owner {
 
     async fn run(mut self, mut heard: mpsc::Receiver<Event>, stop: &AtomicBool, gate: &Gate) {
         let mut look = tokio::time::interval(Duration::from_millis(100));
+        let (alive, mut said) = (notify::interval(), Instant::now());
         while !stop.load(Ordering::Relaxed) {
             tokio::select! {
                 event = heard.recv() => if let Some(event) = event {
@@ -359,7 +362,15 @@ impl Owner {
                 // An interrupted job waits for its workers for a while.
                 _ = look.tick() => self.start_next(),
             }
+            // Here, so that a manager sees an owner that is stuck.
+            if alive.is_some_and(|interval| said.elapsed() >= interval) {
+                notify::say("WATCHDOG=1");
+                said = Instant::now();
+            }
         }
+        notify::say("STOPPING=1\nSTATUS=storing the job under way");
+        // From here on END_LIMIT bounds what it waits for.
+        tokio::spawn(notify::live());
         self.end(&mut heard, gate).await;
     }
 

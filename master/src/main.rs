@@ -8,7 +8,7 @@ use clap::{CommandFactory, Parser};
 use deck::bundle::Options;
 
 use master::{
-    bench, certs, client,
+    add, bench, certs, client,
     command::{Bench, Certs, Cli, Command, Speed, WorkerArgs},
     convert, daemon,
     lab::Lab,
@@ -35,6 +35,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(&args),
         Command::Master(args) => daemon::run(&args),
         Command::Worker(args) => work(args),
+        Command::Add(args) => add::run(&args),
         Command::Submit(args) => client::submit(&args),
         Command::Watch { job, at } => client::watch(job, &at),
         Command::Jobs { at } => client::jobs(&at),

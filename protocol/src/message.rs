@@ -36,6 +36,8 @@ pub enum ToWorker {
     },
     /// A new plan, sent before the cycle it acts at.
     Plan {
+        /// The cycle whose positions it was sorted from: a plan of a gathering that a later one replaced is dropped.
+        gathered_at: u64,
         /// Start of this cycle.
         acts_at: u64,
         /// Whom this worker shares nodes with and what it computes.
@@ -160,6 +162,9 @@ pub struct Orders {
     /// At the start of cycle `next + 1`, the positions of surface nodes travel; the plan sorted from them acts a sort
     /// lag later.
     pub gather: bool,
+    /// With `gather`: elements have eroded. The plan sorted from these positions has the new surface and acts in the cycle
+    /// after, for which all wait; plans of earlier gatherings that would act later than cycle `next + 1` do not come any more.
+    pub blocking: bool,
     /// At the start of cycle `next + 1`, images are sent.
     pub collect: bool,
     /// The run ends at the start of cycle `next + 1`.
@@ -259,8 +264,8 @@ impl ToMaster {
 }
 
 /// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
-/// 2: with damage and the time until an explosive is lit behind them.
-pub const IMAGE_VERSION: u32 = 2;
+/// 2: with damage and the time until an explosive is lit behind them. 3: with what has eroded.
+pub const IMAGE_VERSION: u32 = 3;
 
 /// Time that a worker has computed for (ns): of its threads in an image, of its host in the frame of a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,5 +1,6 @@
 //! The daemons as real processes: the same digest as `bolide run`, and what goes wrong stays where it is.
 
+mod add;
 mod disk;
 mod faults;
 mod links;

@@ -131,10 +131,10 @@ impl Runner {
                 self.links.want(neighbours);
                 self.apply(Event::Message(ToWorker::Assign(assign)))
             }
-            ToWorker::Plan { acts_at, plan, hash } => {
+            ToWorker::Plan { gathered_at, acts_at, plan, hash } => {
                 let neighbours: Vec<u32> = plan.neighbours.iter().map(|n| n.worker).collect();
                 self.links.want(neighbours);
-                self.apply(Event::Message(ToWorker::Plan { acts_at, plan, hash }))?;
+                self.apply(Event::Message(ToWorker::Plan { gathered_at, acts_at, plan, hash }))?;
                 for step in self.links.release(&self.session) {
                     self.step(step)?;
                 }
@@ -350,6 +350,7 @@ mod tests {
             walls: Vec::new(),
             force_quantum: quantum,
             gather: false,
+            blocking: false,
             collect: false,
             stop: false,
             sample: false,

@@ -19,8 +19,9 @@ use std::{
 use mechanics::{exact::Quantum, piece::Region, state::GlobalState, vote::Vote, wall::Pose};
 use protocol::message::ToWorker;
 
-use super::{Arrivals, Bench, Job, images::Collecting, measure::Meter};
+use super::{Arrivals, Bench, Job, erosion::Eroded, images::Collecting, measure::Meter};
 use crate::{
+    decompose::Subdomain,
     event::{Action, Hand, Loss},
     exchange::Exchange,
     ledger::Ledger,
@@ -84,7 +85,22 @@ pub(super) struct Step {
 /// An exchange and where it begins to act.
 pub(super) struct Acting {
     pub(super) at: u64,
+    /// The cycle whose positions it was sorted from.
+    pub(super) gathered: u64,
     pub(super) exchange: Arc<Exchange>,
+}
+
+/// A sort that was ordered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct SortUnderWay {
+    /// The cycle at whose start positions travel.
+    pub(super) gathered: u64,
+    /// The cycle from which its plan acts.
+    pub(super) acts_at: u64,
+    /// All wait for it, because the surface changes.
+    pub(super) blocking: bool,
+    /// Such a one has replaced it since it was begun: what comes of it is thrown away.
+    pub(super) replaced: bool,
 }
 
 /// All that is fixed for one epoch or counted in it. *Positions* are indices into its crew.
@@ -112,8 +128,12 @@ pub(super) struct Epoch {
     pub(super) exchanges: VecDeque<Acting>,
     /// The last complete cycle plus one.
     pub(super) completed: u64,
-    /// Cycles whose positions a sort works on, oldest first.
-    pub(super) sorts_under_way: VecDeque<u64>,
+    /// Sorts that were ordered and are not done, oldest first.
+    pub(super) sorts_under_way: VecDeque<SortUnderWay>,
+    /// What has eroded; none where nothing can.
+    pub(super) eroded: Option<Eroded>,
+    /// Which worker has which elements.
+    pub(super) layout: Vec<Subdomain>,
     pub(super) transfers: BTreeMap<u64, Vec<Option<Vec<f64>>>>,
     pub(super) collecting: BTreeMap<u64, Collecting>,
     /// Time of each image that was ordered and is not complete, and whether it is for the user.

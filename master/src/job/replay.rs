@@ -112,7 +112,7 @@ impl Job {
             let block = sampled_block(cycle, blocks.len());
             let Some((part, region)) = blocks.get(block) else { continue };
             let pieces = vec![piece::cut(&self.model.mesh, state, *part, region)];
-            let ours = self.replay(pieces, dt_previous, quantum, time)?;
+            let ours = self.replay((pieces, cycle), dt_previous, quantum, time)?;
             let theirs = theirs.unwrap_or_default();
             if ours != theirs {
                 let why = format!(
@@ -135,10 +135,10 @@ impl Job {
         }
     }
 
-    /// Hash of what the elements of a block come to.
+    /// Hash of what the elements of a block come to in a cycle.
     fn replay(
         &self,
-        pieces: Vec<Piece>,
+        (pieces, cycle): (Vec<Piece>, u64),
         dt_previous: f64,
         quantum: Quantum,
         time: f64,
@@ -146,7 +146,7 @@ impl Job {
         let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: Vec::new() };
         let quanta = Quanta { force: quantum, ..self.quanta };
         let (setup, n_parts) = (self.model.setup.clone(), self.model.mesh.parts.len());
-        let mut domain = Domain::new(setup, n_parts, quanta, vec![subdomain], &[], Width::best());
+        let mut domain = Domain::new(setup, n_parts, quanta, (vec![subdomain], cycle), &[], Width::best());
         let clock = ThreadClock::default();
         domain.begin(quantum, time);
         domain.contact(dt_previous, &clock);

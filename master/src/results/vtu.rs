@@ -7,12 +7,18 @@
 use std::{io, io::Write, path::Path};
 
 use deck::model::Model;
-use mechanics::state::{GlobalState, field};
+use mechanics::{
+    element::shell4,
+    state::{GlobalState, field},
+};
 
 use super::{Error, FIELD_NAMES, Folder, PVD, state_name, write_whole};
 
 /// Cell type of the eight-node hexahedron.
 const VTK_HEXAHEDRON: u8 = 12;
+
+/// Cell type of the four-node quadrilateral: shells.
+const VTK_QUAD: u8 = 9;
 
 /// Fields whose numbers identify rather than measure: written whatever the deck selects.
 const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
@@ -29,6 +35,9 @@ const ON_REQUEST: [&str; 9] = [
     "mass",
     "time_to_light",
 ];
+
+/// Arrays that are written wherever they exist: the worker, and what shells have.
+const ALWAYS: [&str; 3] = ["worker", "thickness", "von_mises_max"];
 
 /// Which fields a state file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,6 +107,12 @@ impl<'a> Array<'a> {
         Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
     }
 
+    /// The tuples of some elements alone.
+    fn only(self, kept: &'a [usize]) -> Self {
+        let put = self.put;
+        Self { tuples: kept.len(), put: Box::new(move |i, out| put(kept[i], out)), ..self }
+    }
+
     /// Size of the numbers, without the header that precedes them.
     fn n_bytes(&self) -> u64 {
         self.tuples as u64 * self.components as u64 * self.width as u64
@@ -152,6 +167,10 @@ impl Elements<'_> {
         self.model.mesh.parts[part].corners(local).map(i64::from)
     }
 
+    fn is_shell(&self, element: usize) -> bool {
+        self.model.mesh.parts[self.locate(element).0].section().is_some()
+    }
+
     fn element_id(&self, element: usize) -> u32 {
         let (part, local) = self.locate(element);
         self.model.mesh.parts[part].element_ids[local]
@@ -173,14 +192,21 @@ pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
     (1.5 * (xx * xx + yy * yy + zz * zz) + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
 }
 
-/// Writes one state as a `.vtu` file, whole or not at all.
+/// Von Mises stress of a layer of a shell, given by xx, yy, xy, yz, zx; its normal stress is zero.
+fn plane_von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
+    (xx * xx + yy * yy - xx * yy + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
+}
+
+/// Writes one state as a `.vtu` file, whole or not at all. With shells, which are quadrilaterals in it, there are two
+/// more element fields: `thickness` (zero for solids) and `von_mises_max`, the greatest of their layers; other stresses of
+/// shells are means through the thickness in the frame of the element.
 ///
 /// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`,
 /// `mass`. Element fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
 /// `temperature` (K), `damage`, `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
 /// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric), `time_to_light`.
 /// `worker` gives, by global element index, the worker that computes the element, and becomes the element
-/// field of that name. Units are the deck's.
+/// field of that name. Eroded elements are left out. Units are the deck's.
 ///
 /// # Errors
 /// [`Error::Io`] if the disk refuses.
@@ -218,21 +244,43 @@ fn stream(
 
     let elements = Elements { model, offsets: model.mesh.element_offsets() };
     let [point, cell] = data_arrays(&elements, state, worker).map(|mut arrays: Vec<Array>| {
-        arrays.retain(|array| array.name == "worker" || fields.contains(array.name));
+        arrays.retain(|array| ALWAYS.contains(&array.name) || fields.contains(array.name));
         arrays
     });
+    // Eroded elements are left out, their nodes are not.
+    let kept: Vec<usize> = (0..n_elements).filter(|&e| !state.is_eroded(e)).collect();
+    let n_cells = kept.len();
+    let cell: Vec<Array> =
+        if n_cells < n_elements { cell.into_iter().map(|array| array.only(&kept)).collect() } else { cell };
     let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
+    // A shell has four corners, so with shells the lists are made first.
+    let with_shells = model.mesh.parts.iter().any(|part| part.section().is_some());
+    let (mut corners, mut ends) = (Vec::new(), Vec::new());
+    if with_shells {
+        for &e in &kept {
+            corners.extend_from_slice(&elements.corners(e)[..if elements.is_shell(e) { 4 } else { 8 }]);
+            ends.push(corners.len() as i64);
+        }
+    }
+    let connectivity = if with_shells {
+        Array::i64("connectivity", corners.len(), |i| [corners[i]])
+    } else {
+        Array::i64("connectivity", n_cells, |cell| elements.corners(kept[cell]))
+    };
     let cells = [
-        Array::i64("connectivity", n_elements, |e| elements.corners(e)),
-        Array::i64("offsets", n_elements, |e| [8 * (e as i64 + 1)]),
+        connectivity,
+        Array::i64("offsets", n_cells, |cell| [if with_shells { ends[cell] } else { 8 * (cell as i64 + 1) }]),
         Array {
             name: "types",
             kind: "UInt8",
             width: 1,
             components: 1,
-            tuples: n_elements,
+            tuples: n_cells,
             grouped: true,
-            put: Box::new(|_, out| out.push(VTK_HEXAHEDRON)),
+            put: Box::new(|cell, out| {
+                let quad = with_shells && elements.is_shell(kept[cell]);
+                out.push(if quad { VTK_QUAD } else { VTK_HEXAHEDRON });
+            }),
         },
     ];
     let sections: [(&str, &[Array]); 4] =
@@ -255,7 +303,7 @@ fn stream(
         state.cycle
     )?;
     writeln!(out, "    </FieldData>")?;
-    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_elements}">"#)?;
+    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_cells}">"#)?;
     let mut offset = 0;
     for (section, arrays) in sections {
         writeln!(out, "      <{section}>")?;
@@ -327,6 +375,16 @@ fn data_arrays<'a>(
         ]
         .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
     );
+    if !state.shells.fields.is_empty() {
+        cell.push(Array::f64("thickness", n_elements, move |e| [state.shells.fields[shell4::THICKNESS][e]]));
+        cell.push(Array::f64("von_mises_max", n_elements, move |e| {
+            let layers = state.shells.fields[shell4::ELEMENT..].chunks(shell4::LAYER);
+            let largest = |layer: &[Vec<f64>]| plane_von_mises([0, 1, 2, 3, 4].map(|i| layer[i][e]));
+            [layers
+                .map(largest)
+                .fold(if elements.is_shell(e) { 0.0 } else { von_mises(deviator(e)) }, f64::max)]
+        }));
+    }
     if let Some(worker) = worker {
         cell.push(Array::u32("worker", n_elements, move |e| worker[e]));
     }

@@ -30,6 +30,11 @@ impl Quantum {
         Self { q: power_of_two(exponent) }
     }
 
+    /// This quantum times a power of two.
+    pub fn times(self, power_of_two: f64) -> Self {
+        Self { q: self.q * power_of_two }
+    }
+
     /// The quantum itself.
     pub fn value(self) -> f64 {
         self.q

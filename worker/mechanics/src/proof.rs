@@ -9,13 +9,14 @@ use crate::{
     contact::{Batch, BatchFace, BatchNode, BatchUnit, Contact, Settings},
     cycle::{Domain, Meter, Sets, Subdomain},
     element::{ElementVote, hex8},
+    erosion::Erosion,
     exact::Quantum,
     lanes::{Width, functions, scalar::Scalar},
     load::Loads,
     material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength},
     mesh::{Part, Topology},
     setup::{Constraint, Control, Setup},
-    state::{N_FIELDS, field},
+    state::{N_FIELDS, ShellState, field},
     vote::Quanta,
 };
 
@@ -235,6 +236,8 @@ fn stirred(material: &Material, seed: u64) -> Piece {
         mass,
         initial_volume,
         fields,
+        erosion: None,
+        shells: ShellState::default(),
     }
 }
 
@@ -252,6 +255,8 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
         hourglass: 0.1,
         sort_lag: 2,
         plan_interval: 50,
+        energy_error: 0.5,
+        time_step_floor: 0.0,
     };
     let setup = Setup {
         materials: vec![material],
@@ -261,11 +266,12 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
         walls: Vec::new(),
         detonations: Vec::new(),
         loads: Loads::default(),
+        erosion: Erosion::default(),
     };
     let (force, energy) = (Quantum::for_reference(3e7, 42), Quantum::for_reference(1e6, 42));
-    let quanta = Quanta { force, energy, momentum: energy };
+    let quanta = Quanta { force, energy, momentum: energy, arm: 1.0 };
     let subdomain = Subdomain { id: 0, pieces: vec![piece], unowned: Vec::new(), surface: Vec::new() };
-    let mut domain = Domain::new(setup, 1, quanta, vec![subdomain], &[], width);
+    let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], width);
     for cycle in 0..3 {
         domain.begin(force, DT * f64::from(cycle));
         domain.elements(Sets::All, DT, &Unmeasured);
@@ -359,6 +365,7 @@ mod tests {
             hourglass: 0.1,
             force_quantum: Quantum::for_reference(3e7, 42),
             energy_quantum: Quantum::for_reference(1e6, 42),
+            arm: 1.0,
         };
         let of = |block: &mut Block, cuts: &[u32]| {
             let mut vote = ElementVote::default();

@@ -14,6 +14,8 @@ fn assign(cycle: u64) -> Box<Assign> {
                 end_cycle: 10,
                 safety_factor: 0.6666,
                 growth: 1.05,
+                energy_error: 0.5,
+                time_step_floor: 0.0,
                 linear_viscosity: 0.2,
                 quadratic_viscosity: 1.0,
                 hourglass: 0.1,
@@ -25,9 +27,10 @@ fn assign(cycle: u64) -> Box<Assign> {
             walls: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
+            erosion: Default::default(),
         },
         n_parts: 1,
-        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
+        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
         subdomains: Vec::new(),
         gauges: Vec::new(),
         lanes: None,
@@ -43,7 +46,18 @@ fn assign(cycle: u64) -> Box<Assign> {
 fn orders(next: u64) -> Orders {
     let force_quantum = Quantum::for_reference(1.0, 42);
     let (dt, time, walls) = (1e-3, 1e-3 * next as f64, Vec::new());
-    Orders { next, dt, time, walls, force_quantum, gather: false, collect: false, stop: false, sample: false }
+    Orders {
+        next,
+        dt,
+        time,
+        walls,
+        force_quantum,
+        gather: false,
+        blocking: false,
+        collect: false,
+        stop: false,
+        sample: false,
+    }
 }
 
 fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
@@ -157,7 +171,7 @@ fn a_plan_is_installed_when_it_and_the_guests_are_there() {
     let plan =
         Box::new(Plan { guests: vec![Guest { node: 9, mass: 1.0, constraint: 0 }], ..Plan::default() });
     assert_eq!((session.plan_at(2), session.plan_at(3)), (Some(7), None), "that of cycle 3 is still to come");
-    let actions = hear(&mut session, ToWorker::Plan { acts_at: 3, plan, hash: 8 });
+    let actions = hear(&mut session, ToWorker::Plan { gathered_at: 1, acts_at: 3, plan, hash: 8 });
     assert_eq!((session.plan_at(3), session.plan_at(4)), (Some(8), Some(8)));
     assert!(matches!(actions[..], [Action::Compute(Task::Transfer { .. })]));
     let actions = done(&mut session, Outcome::Transferred(vec![0.0; 6]));

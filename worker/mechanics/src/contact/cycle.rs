@@ -68,6 +68,8 @@ pub struct Contact {
     corners: Vec<[u32; 4]>,
     ids: Vec<u32>,
     parts: Vec<u32>,
+    /// By active face, whether it is a shell; empty if none is.
+    shells: Vec<bool>,
     /// By batch node.
     global: Vec<u32>,
     part: Vec<u32>,
@@ -134,6 +136,7 @@ impl Contact {
             corners: Vec::new(),
             ids: Vec::new(),
             parts: Vec::new(),
+            shells: Vec::new(),
             global: batch.nodes.iter().map(|n| n.global).collect(),
             part: batch.nodes.iter().map(|n| n.part).collect(),
             statics: Statics {
@@ -152,8 +155,12 @@ impl Contact {
             contact.faces.push(face.nodes);
             contact.corners.push(face.nodes.map(|n| batch.nodes[n as usize].global));
             contact.ids.push(face.id);
+            contact.shells.push(super::surface::Face::is_shell(&face.corners));
             contact.parts.push(face.part);
             contact.statics.face_stiffness.push(face.stiffness);
+        }
+        if !contact.shells.contains(&true) {
+            contact.shells.clear();
         }
         for f in &mut candidates.faces {
             *f = index[*f as usize];
@@ -281,6 +288,12 @@ impl Contact {
         if self.smooth { self.push(n, work, cycle, vote) } else { self.rub(n, work, cycle, vote) }
     }
 
+    /// Whether an active face is a shell: nodes are outside of it wherever they are.
+    #[inline(always)]
+    fn is_shell(&self, face: u32) -> bool {
+        !self.shells.is_empty() && self.shells[face as usize]
+    }
+
     /// Takes the near features of one node, whose pairs are `start..end` of the block, into the lists; `listed` are the
     /// faces of the block.
     #[inline(always)]
@@ -312,6 +325,9 @@ impl Contact {
                 sides |= if shared { closest.sides(start + i) } else { 0 };
             }
         }
+        if self.is_shell(held[nearest]) {
+            sides = OUTER;
+        }
         // Nodes on the feature, whose line has no direction, and some that are only very near it.
         let touches = least <= 1e-17 * gap * gap;
         if alone && (sides == OUTER || sides == INNER) && !touches {
@@ -334,7 +350,11 @@ impl Contact {
             if closest.distance2[i] < warning * warning {
                 let face = listed[i] as usize;
                 let (id, corners) = (self.ids[face], self.corners[face]);
-                near.push(Near { face: i as u32, id, corners, nearest: closest.nearest(i) });
+                let mut nearest = closest.nearest(i);
+                if self.is_shell(listed[i]) {
+                    nearest.sides = OUTER;
+                }
+                near.push(Near { face: i as u32, id, corners, nearest });
             }
         }
         let frame = |i: u32| {
