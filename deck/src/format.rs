@@ -11,6 +11,7 @@ mod boundary;
 mod burn;
 mod contact;
 mod curve;
+mod erosion;
 mod load;
 mod output;
 mod part;
@@ -114,6 +115,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = control
         .map(|control| Control { sort_lag: sort_lag(&deck, control.sort_lag, settings, faults), ..control });
+    let erosion = erosion::read(&deck, &parts, settings.is_some());
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
@@ -145,6 +147,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
             walls: conditions.walls,
             detonations,
             loads: conditions.loads,
+            erosion,
         },
         output,
     })
@@ -203,6 +206,8 @@ fn read_control(deck: &Table<'_>, faults: &Faults<'_>) -> Option<Control> {
             Range::Within(0.0, 1.0, "a number above 0 and at most 1"),
         ),
         growth: control.number_or("growth", 1.05, Range::Within(1.0, 2.0, "a number above 1 and at most 2")),
+        energy_error: control.number_or("energy_error", 0.5, Range::Positive),
+        time_step_floor: control.number_or("time_step_floor", 0.0, Range::NotNegative),
         linear_viscosity: control.number_or("linear_viscosity", 0.2, coefficient),
         quadratic_viscosity: control.number_or("quadratic_viscosity", 1.0, coefficient),
         hourglass: control.number_or("hourglass", 0.1, coefficient),

@@ -1,7 +1,10 @@
 //! The ledger of a run: energies and momentum from votes, the worst ratios, rows of history.
 
 use deck::model::Model;
-use mechanics::vote::Vote;
+use mechanics::{
+    element::hex8,
+    vote::{PartVote, Vote},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::results::history::{GaugeRow, HistoryRow, PartEnergy};
@@ -17,10 +20,24 @@ pub struct Ledger {
     pub friction: f64,
     /// Work of supports and walls so far.
     pub external: f64,
+    /// Internal energy of eroded elements, and kinetic energy of nodes that were dropped.
+    pub eroded: f64,
+    /// Momentum of those nodes.
+    pub eroded_momentum: [f64; 3],
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass.
+    pub eroded_mass: f64,
     /// Total energy less external work after the first cycle; none before it.
     pub initial_total: Option<f64>,
     /// Greatest kinetic energy so far.
     pub greatest_kinetic: f64,
+    /// Greatest size of the external work so far.
+    pub greatest_external: f64,
+    /// Sums of each part after the first cycle, and up to now; empty before it.
+    pub parts: [Vec<PartEnergy>; 2],
+    /// The first time step that was booked (time); none before it.
+    pub first_step: Option<f64>,
     /// Momentum before the first cycle.
     pub initial_momentum: [f64; 3],
     /// Greatest momentum of a part before the first cycle.
@@ -58,8 +75,15 @@ impl Ledger {
             viscosity: 0.0,
             friction: 0.0,
             external: 0.0,
+            eroded: 0.0,
+            eroded_momentum: [0.0; 3],
+            eroded_elements: 0,
+            eroded_mass: 0.0,
             initial_total: None,
             greatest_kinetic: 0.0,
+            greatest_external: 0.0,
+            parts: Default::default(),
+            first_step: None,
             initial_momentum: momentum_of(&mut (0..model.mesh.n_nodes())),
             part_momentum,
             worst_courant: 0.0,
@@ -71,16 +95,23 @@ impl Ledger {
 
     /// Books the whole vote of a cycle that began at `time` with step `dt`; `gap` where there is contact.
     pub fn book(&mut self, vote: &Vote, cycle: u64, time: f64, dt: f64, gap: Option<f64>) {
-        let sum = |f: &dyn Fn(&mechanics::vote::PartVote) -> f64| vote.parts.iter().map(f).sum::<f64>();
+        let sum = |f: &dyn Fn(&PartVote) -> f64| vote.parts.iter().map(f).sum::<f64>();
         self.hourglass += sum(&|p| p.hourglass);
         self.viscosity += sum(&|p| p.viscosity);
         self.friction += vote.friction;
         self.external += vote.external;
         let kinetic = sum(&|p| p.kinetic);
         let internal = sum(&|p| p.internal);
-        let total = kinetic + internal + self.hourglass + vote.contact + self.friction;
+        self.eroded += vote.gone.internal + vote.gone.kinetic;
+        for (sum, lost) in self.eroded_momentum.iter_mut().zip(vote.gone.momentum) {
+            *sum += lost;
+        }
+        let total = kinetic + internal + self.hourglass + vote.contact + self.friction + self.eroded;
         let initial = *self.initial_total.get_or_insert(total - self.external);
         self.greatest_kinetic = self.greatest_kinetic.max(kinetic);
+        self.greatest_external = self.greatest_external.max(self.external.abs());
+        self.first_step.get_or_insert(dt);
+        self.book_parts(&vote.parts);
         let scale = initial.abs().max(self.greatest_kinetic);
         let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
         self.worst_courant = self.worst_courant.max(dt / vote.courant);
@@ -97,15 +128,14 @@ impl Ledger {
             hourglass: self.hourglass,
             contact: vote.contact,
             friction: self.friction,
+            eroded: self.eroded,
+            eroded_elements: self.eroded_elements,
+            eroded_mass: self.eroded_mass,
             external: self.external,
             total,
             error,
             momentum: vote.momentum,
-            parts: vote
-                .parts
-                .iter()
-                .map(|p| PartEnergy { kinetic: p.kinetic, internal: p.internal })
-                .collect(),
+            parts: self.parts[1].clone(),
             gauges: vote
                 .gauges
                 .iter()
@@ -114,12 +144,66 @@ impl Ledger {
         };
     }
 
+    /// Books the number and mass of the elements that eroded in the cycle booked last. Their mass is that of the deck: it stays at
+    /// the nodes until those are dropped.
+    pub fn book_eroded(&mut self, vote: &Vote, model: &Model) {
+        if vote.eroded.is_empty() {
+            return;
+        }
+        let offsets = model.mesh.element_offsets();
+        for &element in &vote.eroded {
+            let part = offsets.partition_point(|&first| first <= element as usize) - 1;
+            let Some(of_part) = model.mesh.parts.get(part) else { continue };
+            let corners = of_part.corners(element as usize - offsets[part]);
+            let volume = hex8::volume(&corners.map(|n| model.mesh.positions[n as usize]));
+            self.eroded_mass += model.setup.materials[of_part.material as usize].density * volume;
+        }
+        self.eroded_elements += vote.eroded.len() as u64;
+        self.last.eroded_elements = self.eroded_elements;
+        self.last.eroded_mass = self.eroded_mass;
+    }
+
+    fn book_parts(&mut self, votes: &[PartVote]) {
+        let [first, now] = &mut self.parts;
+        now.resize(votes.len(), PartEnergy::default());
+        for (part, vote) in now.iter_mut().zip(votes) {
+            (part.kinetic, part.internal) = (vote.kinetic, vote.internal);
+            part.hourglass += vote.hourglass;
+            part.viscosity += vote.viscosity;
+            part.external += vote.external;
+        }
+        if first.is_empty() {
+            first.clone_from(now);
+        }
+    }
+
+    /// Energy that appeared or vanished over the scale of the problem, by which a run is judged: the largest of initial
+    /// energy, greatest kinetic energy and greatest external work, so that slow loading is not judged by the little
+    /// kinetic energy it has.
+    pub fn imbalance(&self) -> f64 {
+        let Some(initial) = self.initial_total else { return 0.0 };
+        let scale = initial.abs().max(self.greatest_kinetic).max(self.greatest_external);
+        if scale > 0.0 { (self.last.total - self.external - initial) / scale } else { 0.0 }
+    }
+
+    /// The part whose own energy grew most since the first cycle: its index and what it gained; the first of equals.
+    pub fn greediest_part(&self) -> Option<(usize, f64)> {
+        let [first, now] = &self.parts;
+        let gains = first.iter().zip(now).map(|(first, now)| now.own() - first.own()).enumerate();
+        gains.fold(None, |best, (p, gain)| match best {
+            Some((_, most)) if most >= gain => best,
+            _ => Some((p, gain)),
+        })
+    }
+
     /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
     pub fn momentum_error(&self) -> f64 {
         if self.part_momentum == 0.0 {
             return 0.0;
         }
-        let change: f64 = (0..3).map(|a| (self.last.momentum[a] - self.initial_momentum[a]).powi(2)).sum();
+        let change: f64 = (0..3)
+            .map(|a| (self.last.momentum[a] + self.eroded_momentum[a] - self.initial_momentum[a]).powi(2))
+            .sum();
         change.sqrt() / self.part_momentum
     }
 }

@@ -31,9 +31,9 @@ use crate::{
     processes::Processes,
     results::{
         Folder,
-        history::{History, HistoryRow},
+        history::{History, HistoryRow, PartEnergy},
         report,
-        summary::{Energies, Summary, WorkUnits, WorkerTimes},
+        summary::{Energies, NamedPart, Summary, WorkUnits, WorkerTimes},
         trace,
         vtu::Series,
     },
@@ -140,6 +140,7 @@ pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> 
         store: false,
         balance: asked.balance,
         waits: false,
+        replay: false,
         states: !asked.no_output,
         force_sorts: match (asked.sort_every, asked.sort_seed) {
             (Some(n), _) => ForceSorts::Every(n),
@@ -325,7 +326,7 @@ fn resuming_command(folder: &Path) -> String {
 }
 
 /// A word as a shell takes it.
-fn quoted(word: &str) -> String {
+pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();
@@ -354,7 +355,7 @@ impl Census {
         Self {
             elements: surface.n_elements() as u64,
             faces: surface.faces.len() as u64,
-            nodes: surface.nodes.len() as u64,
+            nodes: surface.active.iter().filter(|active| **active).count() as u64,
         }
     }
 }
@@ -444,14 +445,19 @@ pub fn summarise(
         bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
         master_bytes_per_cycle: per((traffic.bytes - traffic.peer_bytes) as f64, run_cycles),
         worker_times: worker_times(&outcome.workers, &outcome.reports),
+        eroded_elements: ledger.eroded_elements,
+        eroded_mass: ledger.eroded_mass,
+        eroded_energy: ledger.eroded,
         energies: Energies {
             kinetic: ledger.last.kinetic,
             internal: ledger.last.internal,
             hourglass: ledger.hourglass,
             viscosity: ledger.viscosity,
             contact: ledger.last.contact + ledger.friction,
+            friction: ledger.friction,
             external: ledger.external,
             error: ledger.last.error,
+            parts: named_parts(model, &ledger.last.parts),
         },
         momentum_error: ledger.momentum_error(),
         worst_courant: ledger.worst_courant,
@@ -461,6 +467,19 @@ pub fn summarise(
         losses: outcome.losses.clone(),
         digest: outcome.digest.clone(),
     }
+}
+
+/// Energies of the parts beside their names.
+fn named_parts(model: &Model, parts: &[PartEnergy]) -> Vec<NamedPart> {
+    let of = |(part, e): (&mechanics::mesh::Part, &PartEnergy)| NamedPart {
+        name: part.name.clone(),
+        kinetic: e.kinetic,
+        internal: e.internal,
+        hourglass: e.hourglass,
+        viscosity: e.viscosity,
+        external: e.external,
+    };
+    model.mesh.parts.iter().zip(parts).map(of).collect()
 }
 
 /// Pairs of workers that exchange over a link of their own, and those that the master relays for.

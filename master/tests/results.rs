@@ -9,7 +9,7 @@ use deck::model::{Gauge, Model, Output};
 use master::results::{
     self, Error, Folder,
     history::{GaugeRow, History, HistoryRow, PartEnergy, Table},
-    summary::{Energies, Summary, WorkUnits, WorkerTimes},
+    summary::{Energies, NamedPart, Summary, WorkUnits, WorkerTimes},
     vtu::{Fields, Series, von_mises, write_vtu},
 };
 use mechanics::{
@@ -97,6 +97,8 @@ fn plates(cells: u32) -> Model {
                 end_cycle: 10,
                 safety_factor: 0.6666,
                 growth: 1.05,
+                energy_error: 0.5,
+                time_step_floor: 0.0,
                 linear_viscosity: 0.2,
                 quadratic_viscosity: 1.0,
                 hourglass: 0.1,
@@ -108,6 +110,7 @@ fn plates(cells: u32) -> Model {
             walls: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
+            erosion: Default::default(),
         },
         output: Output {
             snapshot_seconds: None,
@@ -149,6 +152,8 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         constraint: vec![0; model.mesh.n_nodes()],
         initial_volume: vec![1.0; n],
         elements,
+        eroded: Vec::new(),
+        strain: Vec::new(),
         shells: mechanics::state::ShellState::default(),
     }
 }
@@ -193,8 +198,10 @@ fn summary(model: &Model) -> Summary {
             hourglass: 1e-3,
             viscosity: 2.2e-2,
             contact: 5e-324,
+            friction: 3e-9,
             external: -0.0,
             error: -3.2e-5,
+            parts: vec![NamedPart { name: "target".into(), kinetic: 0.7, ..NamedPart::default() }],
         },
         momentum_error: 1.6e-15,
         worst_courant: 0.6912,
@@ -203,6 +210,7 @@ fn summary(model: &Model) -> Summary {
         rebalances: Vec::new(),
         losses: Vec::new(),
         digest: "00ff".repeat(16),
+        ..Summary::default()
     }
 }
 
@@ -217,11 +225,23 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
         hourglass: -0.0,
         contact: 1e-7,
         friction: 1e16,
+        eroded: 0.0,
+        eroded_elements: 0,
+        eroded_mass: 0.0,
         external: 2.0,
         total: x.sqrt(),
         error: -1.0 / 7.0,
         momentum: [x, -x / 3.0, f64::MIN_POSITIVE],
-        parts: vec![PartEnergy { kinetic: x + 0.1, internal: x + 0.2 }; model.mesh.parts.len()],
+        parts: vec![
+            PartEnergy {
+                kinetic: x + 0.1,
+                internal: x + 0.2,
+                hourglass: -x,
+                viscosity: 0.3,
+                external: x + 0.4
+            };
+            model.mesh.parts.len()
+        ],
         gauges: vec![GaugeRow { x: [1.0, 2.0, x], v: [0.1, 0.2, 0.3] }; model.output.gauges.len()],
     }
 }
@@ -394,7 +414,9 @@ fn history_reads_back_to_the_same_bits_under_names_with_units() {
         let mut expected = vec![row.cycle as f64, row.time, row.dt, row.kinetic, row.internal, row.hourglass];
         expected.extend([row.contact, row.friction, row.external, row.total, row.error]);
         expected.extend(row.momentum);
-        expected.extend(row.parts.iter().flat_map(|p| [p.kinetic, p.internal]));
+        expected.extend(
+            row.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity, p.external]),
+        );
         expected.extend(row.gauges.iter().flat_map(|g| g.x.into_iter().chain(g.v)));
         assert_eq!(bytes_of(read.iter().copied()), bytes_of(expected), "cycle {cycle}");
     }
@@ -467,7 +489,10 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
          linked_pairs losses master_bytes_per_cycle momentum_error nodes rebalances relayed_pairs route sorts surface_elements surface_faces surface_nodes threads title wall_s \
          work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
     );
-    assert_eq!(keys(&json["energies"]), "contact error external hourglass internal kinetic viscosity");
+    assert_eq!(
+        keys(&json["energies"]),
+        "contact error external friction hourglass internal kinetic parts viscosity"
+    );
     assert_eq!(
         keys(&json["work_units"]),
         "count faces_max faces_mean faces_min interactions nodes_max nodes_mean nodes_min"

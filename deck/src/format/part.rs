@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use mechanics::{
     element::shell4::Rule,
+    erosion::Criteria,
     mesh::{Section, Topology},
 };
 
-use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, Meshes, shape};
+use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, Meshes, erosion, shape};
 use crate::{
     blocks::Block,
     geometry::{norm, scaled},
@@ -26,6 +27,8 @@ pub(crate) struct PartDraft {
     /// Index into the materials in use; none after a fault.
     pub(crate) material: Option<u32>,
     pub(crate) velocity: [f64; 3],
+    /// When its elements erode; none if they do not.
+    pub(crate) erosion: Option<Criteria>,
     /// None after a fault.
     pub(crate) block: Option<Block>,
     /// Numbers and places of an explicit mesh.
@@ -74,6 +77,14 @@ pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials, meshes: &M
             .require("material", "a material by name or as an inline table")
             .and_then(|v| materials.resolve(v, &name, fracture));
         let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
+        let of_material = material.map(|m| &materials.list[m as usize]);
+        let shells = table.get("shell").is_some();
+        let erosion = table.get("erosion").and_then(|v| {
+            if shells {
+                v.fault("solids: shells do not erode", "remove erosion, or make the part of solids");
+            }
+            erosion::read_criteria(v, &name, of_material)
+        });
         let (mut block, explicit) = read_mesh(&table, &name, meshes, &mut budget);
         let movable = explicit.as_ref().is_none_or(|own| own.file.is_none());
         if let Some(block) = &mut block
@@ -89,7 +100,7 @@ pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials, meshes: &M
             }
         }
         table.finish();
-        parts.push(PartDraft { name, at, material, velocity, block, explicit });
+        parts.push(PartDraft { name, at, material, velocity, erosion, block, explicit });
     }
     parts
 }

@@ -12,7 +12,7 @@ use mechanics::{
     cycle::Subdomain,
     initial,
     mesh::Mesh,
-    piece,
+    piece::{self, Region},
     state::GlobalState,
     vote::Quanta,
     wall,
@@ -25,11 +25,12 @@ use protocol::{
 use super::{
     Bench, Job,
     epoch::{Acting, Base, Epoch, Member, Rest, Step},
+    erosion::{self, Eroded},
     measure::{Meter, Patience},
 };
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
-    decompose::{self, decompose, work},
+    decompose::{self, Living, decompose, work},
     event::{Action, Deal, Hand, Options},
     exchange::Exchange,
     holdings::Holdings,
@@ -109,15 +110,13 @@ impl Job {
             model = Arc::new(with_walls);
         }
         let touching = model.setup.contact.as_ref().map(|settings| {
-            let speed = initial::closing_speeds(&model.mesh, settings, &model.velocity);
-            let mut surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
-            surface.stiffen(&model.mesh, &model.setup.materials, settings, &speed);
+            let surface = erosion::surface(&model, &|_| true);
             let at_start: Vec<[f64; 3]> =
                 surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
             let inside = initial_pairs(&surface, &at_start, settings);
             refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
             let exclusions = Arc::new(Exclusions::new(&surface, &inside));
-            Ok::<_, String>(Touching { surface: Arc::new(surface), exclusions })
+            Ok::<_, String>(Touching { surface, exclusions })
         });
         let first_cycle = base.state.cycle;
         let keep = options.keep;
@@ -151,6 +150,7 @@ impl Job {
             rebalances: Vec::new(),
             losses: Vec::new(),
             over: false,
+            unfenced: false,
             model,
             options,
         };
@@ -199,18 +199,22 @@ impl Job {
         let hands: Vec<&Hand> = crew.iter().map(|&member| &self.members[member].hand).collect();
         let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
         let costs = self.options.costs;
-        let layout = decompose(&model.mesh, &speeds, costs.node);
+        let alive = self.alive_at_base();
+        let layout = decompose(&model.mesh, &speeds, costs.node, alive.as_deref());
         let threads: Vec<u32> = hands.iter().map(|hand| hand.threads).collect();
-        let held = work(&layout, n, costs.node);
+        let held = work(&layout, n, costs.node, &Living::new(&model.mesh, alive.as_deref()));
         let cut = Cut::new(model, state, (&layout, held), &threads, self.touching.as_ref());
-        let mut elements = vec![0.0; n];
-        for s in &layout {
-            elements[s.worker] += s.region.n_elements() as f64;
+        let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
+        let dropped =
+            epoch.eroded.as_ref().map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
+        if self.options.replay {
+            epoch.blocks = blocks_of(&layout, &threads);
         }
         let (exchange, interactions) = match (&self.touching, &model.setup.contact) {
             (Some(touching), Some(settings)) => {
+                let surface = epoch.eroded.as_ref().map(|eroded| eroded.surface(model, state.cycle));
                 let sorter = Sorter::new(
-                    Arc::clone(&touching.surface),
+                    surface.unwrap_or_else(|| Arc::clone(&touching.surface)),
                     settings.clone(),
                     Arc::clone(&touching.exclusions),
                     speeds.clone(),
@@ -220,9 +224,15 @@ impl Job {
                     &cut.gather,
                 );
                 let x = sorter.positions_of(state);
-                let bench = Bench { epoch: number, sorter, holdings: cut.holdings, state: Arc::clone(state) };
+                let bench = Bench {
+                    epoch: number,
+                    sorter,
+                    holdings: Arc::new(cut.holdings),
+                    state: Arc::clone(state),
+                    dropped,
+                };
                 let sorted = bench.sort(&x);
-                epoch.bench = Some(Arc::new(bench));
+                epoch.bench = Some(Arc::new(Bench { dropped: Vec::new(), ..bench }));
                 self.census = sorted.census;
                 (sorted.exchange, sorted.interactions)
             }
@@ -256,13 +266,20 @@ impl Job {
                 .map(|(hand, &e)| Deal { name: hand.name.clone(), speed: hand.speed, elements: e as u64 })
                 .collect(),
         ));
-        epoch.exchanges = VecDeque::from([Acting { at: state.cycle, exchange }]);
+        epoch.exchanges = VecDeque::from([Acting { at: state.cycle, gathered: state.cycle, exchange }]);
         epoch.ready = vec![false; n];
         epoch.meter = Meter::new(n);
         epoch.crew = crew;
         epoch.speeds = speeds;
         epoch.elements = elements;
+        epoch.layout = layout;
         Ok(epoch)
+    }
+
+    /// Which elements are alive at the start of the next epoch; none where nothing can erode.
+    fn alive_at_base(&self) -> Option<Vec<bool>> {
+        let state = &self.base.state;
+        (!state.eroded.is_empty()).then(|| (0..state.eroded.len()).map(|e| !state.is_eroded(e)).collect())
     }
 }
 
@@ -296,9 +313,13 @@ impl Epoch {
             exchanges: VecDeque::new(),
             completed: first,
             sorts_under_way: VecDeque::new(),
+            eroded: Eroded::new(state),
+            layout: Vec::new(),
             transfers: BTreeMap::new(),
             collecting: BTreeMap::new(),
             image_times: BTreeMap::new(),
+            blocks: Vec::new(),
+            samples: BTreeMap::new(),
             halves: BTreeMap::new(),
             last_base: first,
             next_state_time: model.output.period.map(|period| output_after(time, period)),
@@ -307,6 +328,8 @@ impl Epoch {
             last_spread: 0.0,
             spread_rate: rest.spread_rate,
             stop_at: None,
+            stop_sampled: false,
+            stopped: None,
             pauses: false,
             meter: Meter::new(0),
         }
@@ -346,9 +369,7 @@ impl Cut {
         let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
         let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
         for (id, subdomain) in layout.iter().enumerate() {
-            let pieces: Vec<Piece> = subdomain
-                .region
-                .split(threads[subdomain.worker].max(1) as usize)
+            let pieces: Vec<Piece> = blocks(subdomain, threads)
                 .iter()
                 .map(|region| piece::cut(&model.mesh, state, subdomain.part, region))
                 .collect();
@@ -376,6 +397,21 @@ impl Cut {
         }
         Self { by_worker, holdings, gather }
     }
+}
+
+/// The blocks of a sub-domain, one for each thread of its worker.
+fn blocks(subdomain: &decompose::Subdomain, threads: &[u32]) -> Vec<Region> {
+    subdomain.region.split(threads[subdomain.worker].max(1) as usize)
+}
+
+/// By worker: part and elements of each of its blocks, in the worker's order.
+fn blocks_of(layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<(usize, Region)>> {
+    let mut by_worker = vec![Vec::new(); threads.len()];
+    for subdomain in layout {
+        let regions = blocks(subdomain, threads);
+        by_worker[subdomain.worker].extend(regions.into_iter().map(|region| (subdomain.part, region)));
+    }
+    by_worker
 }
 
 /// Largest over mean of cost over speed, workers without a speed aside.

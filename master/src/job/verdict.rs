@@ -5,9 +5,15 @@ use std::sync::Arc;
 use mechanics::{contact::reach, vote::Vote};
 
 use super::{Job, epoch::Step};
-use crate::event::Action;
-/// Deepest contact (gaps) before the run is stopped.
+use crate::event::{Action, Limit};
+
+/// Deepest contact (gaps) before the run is stopped. Where elements erode, a face that they leave bare may have a node at any
+/// depth, and one that comes through is pushed on from the other side: there it is only reported.
 const DEEPEST: f64 = 0.9;
+/// Cycles before energies are judged: work is booked over half steps, which in the first cycles from rest is all there is.
+const SETTLED: u64 = 20;
+/// Share of the first time step below which a run is stopped where the deck gives no floor.
+const FLOOR: f64 = 1e-4;
 
 impl Job {
     /// Books the whole vote of a cycle, and stops the run where the physics went wrong.
@@ -15,7 +21,9 @@ impl Job {
         let Some(&Step { dt, time, .. }) = self.epoch.steps.get(&cycle) else { return };
         let gap = self.model.setup.contact.as_ref().map(|c| c.gap);
         self.ledger.book(vote, cycle, time, dt, gap);
-        if cycle.is_multiple_of(u64::from(self.model.output.history_cycles.max(1))) {
+        self.ledger.book_eroded(vote, &self.model);
+        let written = cycle.is_multiple_of(u64::from(self.model.output.history_cycles.max(1)));
+        if written {
             self.row(actions);
         }
         if self.failure.is_some() {
@@ -23,7 +31,7 @@ impl Job {
         }
         self.failure = if let Some((element, volume)) = vote.fault {
             Some(self.element_fault(element, volume, cycle))
-        } else if vote.worst_depth >= DEEPEST {
+        } else if vote.worst_depth >= DEEPEST && !self.model.setup.erosion.is_on() {
             let (node, face) = vote.worst_pair;
             Some(format!(
                 "node {} is {:.2} gaps into the contact zone of surface face {face} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap",
@@ -42,8 +50,56 @@ impl Job {
                 self.ledger.worst_gap_travel
             ))
         } else {
-            self.stale(vote, cycle)
+            self.stale(vote, cycle).or_else(|| self.run_away(cycle))
         };
+        if self.failure.is_some() && !written {
+            self.row(actions);
+        }
+    }
+
+    /// Whether more energy appeared or vanished than the deck allows.
+    fn run_away(&self, cycle: u64) -> Option<String> {
+        let (error, limit) = (self.ledger.imbalance(), self.model.setup.control.energy_error);
+        if cycle < SETTLED || error.abs() <= limit {
+            return None;
+        }
+        let last = &self.ledger.last;
+        let part = self.ledger.greediest_part().map(|(p, gain)| {
+            let name = self.model.mesh.parts.get(p).map_or("", |part| part.name.as_str());
+            format!("; part `{name}` gained most, {gain:e}")
+        });
+        Some(format!(
+            "energy error {:e} at cycle {cycle}, at most {:e}: total {:e}, external work {:e}, at first {:e}{}; lower control.safety_factor, refine the mesh, or raise control.energy_error",
+            error,
+            limit,
+            last.total,
+            last.external,
+            self.ledger.initial_total.unwrap_or_default(),
+            part.unwrap_or_default()
+        ))
+    }
+
+    /// Stops the run if the next time step is under its floor. `limit` is what holds it down.
+    pub(super) fn check_floor(&mut self, cycle: u64, dt: f64, limit: Limit, element: Option<u32>) {
+        let given = self.model.setup.control.time_step_floor;
+        let floor = if given > 0.0 { given } else { FLOOR * self.ledger.first_step.unwrap_or_default() };
+        if self.failure.is_some() || limit == Limit::End || dt >= floor {
+            return;
+        }
+        let why = match (limit, element) {
+            (Limit::Courant, Some(element)) => {
+                format!("the Courant limit of element {}", self.element_name(element))
+            }
+            (Limit::Courant, None) => "the Courant limit".to_owned(),
+            (Limit::Volume, _) => "the rate of volume of an element".to_owned(),
+            (Limit::Contact, _) => "the stiffness of contacts or transmitting faces".to_owned(),
+            (Limit::Travel, _) => "the travel of contact nodes, a share of the gap".to_owned(),
+            (Limit::Growth, _) => "the growth from the step before".to_owned(),
+            (Limit::End, _) => return,
+        };
+        self.failure = Some(format!(
+            "time step {dt:e} at cycle {cycle}, at least {floor:e}; {why} holds it down; coarsen or repair the mesh there, add an erosion strain, or lower control.time_step_floor"
+        ));
     }
 
     pub(super) fn stale(&self, vote: &Vote, cycle: u64) -> Option<String> {

@@ -35,9 +35,15 @@ pub struct HistoryRow {
     pub contact: f64,
     /// Energy taken by friction.
     pub friction: f64,
+    /// Energy that left with eroded elements and dropped nodes.
+    pub eroded: f64,
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass.
+    pub eroded_mass: f64,
     /// Work done on the bodies from outside, by prescribed velocities and walls.
     pub external: f64,
-    /// Sum of kinetic, internal, hourglass, contact and friction energy.
+    /// Sum of kinetic, internal, hourglass, contact, friction and eroded energy.
     pub total: f64,
     /// Energy error, relative, as in the summary.
     pub error: f64,
@@ -54,8 +60,29 @@ pub struct HistoryRow {
 pub struct PartEnergy {
     /// Kinetic energy.
     pub kinetic: f64,
-    /// Internal energy.
+    /// Internal energy, with what artificial viscosity put in.
     pub internal: f64,
+    /// Energy taken by hourglass forces so far.
+    pub hourglass: f64,
+    /// Work of artificial viscosity so far (part of internal energy).
+    pub viscosity: f64,
+    /// Work done on it from outside so far.
+    pub external: f64,
+}
+
+impl PartEnergy {
+    /// Names of the columns, in the order of [`PartEnergy::numbers`].
+    pub const NAMES: [&'static str; 5] = ["kinetic", "internal", "hourglass", "viscosity", "external"];
+
+    /// Its numbers, in the order of the columns.
+    pub fn numbers(&self) -> [f64; 5] {
+        [self.kinetic, self.internal, self.hourglass, self.viscosity, self.external]
+    }
+
+    /// What the part has by itself: kinetic, internal and hourglass energy less the work done on it.
+    pub fn own(&self) -> f64 {
+        self.kinetic + self.internal + self.hourglass - self.external
+    }
 }
 
 /// What a gauge reads.
@@ -78,6 +105,8 @@ pub struct History {
     length: u64,
     n_parts: usize,
     n_gauges: usize,
+    /// Whether anything can erode: then rows say what has.
+    erodes: bool,
     row: String,
 }
 
@@ -113,6 +142,7 @@ impl History {
             length,
             n_parts: model.mesh.parts.len(),
             n_gauges: model.output.gauges.len(),
+            erodes: model.setup.erosion.is_on(),
             row: String::new(),
         };
         history.cut()?;
@@ -154,10 +184,14 @@ impl History {
             .into_iter()
             .chain([row.external, row.total, row.error])
             .chain(row.momentum)
-            .chain(row.parts.iter().flat_map(|part| [part.kinetic, part.internal]))
+            .chain([row.eroded, row.eroded_mass].into_iter().filter(|_| self.erodes))
+            .chain(row.parts.iter().flat_map(PartEnergy::numbers))
             .chain(row.gauges.iter().flat_map(|gauge| gauge.x.into_iter().chain(gauge.v)));
         for number in numbers {
             let _ = write!(self.row, ",{number:?}");
+        }
+        if self.erodes {
+            let _ = write!(self.row, ",{}", row.eroded_elements);
         }
         self.row.push('\n');
         if let Err(source) = self.file.write_all(self.row.as_bytes()) {
@@ -187,13 +221,20 @@ fn header(model: &Model) -> String {
     columns.extend(energies.iter().map(|name| format!("{name} [{energy}]")));
     columns.push("error".to_owned());
     columns.extend(["x", "y", "z"].iter().map(|axis| format!("momentum_{axis} [{mass}*{length}/{time}]")));
+    if model.setup.erosion.is_on() {
+        columns.push(format!("eroded [{energy}]"));
+        columns.push(format!("eroded mass [{mass}]"));
+    }
     for part in &model.mesh.parts {
-        columns.extend(["kinetic", "internal"].iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
+        columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
     }
     for gauge in &model.output.gauges {
         columns.extend(["x", "y", "z"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));
         columns
             .extend(["vx", "vy", "vz"].iter().map(|axis| format!("{}:{axis} [{length}/{time}]", gauge.name)));
+    }
+    if model.setup.erosion.is_on() {
+        columns.push("eroded elements".to_owned());
     }
     let mut header = columns.iter().map(|column| cell(column)).collect::<Vec<_>>().join(",");
     header.push('\n');

@@ -64,6 +64,12 @@ pub struct Summary {
     pub worker_times: Vec<WorkerTimes>,
     /// Energies at the end.
     pub energies: Energies,
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass, which stays at the nodes as long as those do.
+    pub eroded_mass: f64,
+    /// Energy that left with them, and with nodes that were dropped.
+    pub eroded_energy: f64,
     /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
     pub momentum_error: f64,
     /// Largest time step over the true Courant limit; below 1 is stable.
@@ -124,8 +130,25 @@ pub struct WorkUnits {
     pub interactions: u64,
 }
 
+/// Energies of one part in the deck's unit of energy, sums over the run but for kinetic and internal.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NamedPart {
+    /// Its name in the deck.
+    pub name: String,
+    /// Kinetic energy.
+    pub kinetic: f64,
+    /// Internal energy.
+    pub internal: f64,
+    /// Energy taken by hourglass forces.
+    pub hourglass: f64,
+    /// Part of `internal` that artificial viscosity put in.
+    pub viscosity: f64,
+    /// Work done on it from outside.
+    pub external: f64,
+}
+
 /// Energies of the whole problem in the deck's unit of energy; `error` is relative.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energies {
     /// Kinetic energy.
     pub kinetic: f64,
@@ -137,10 +160,14 @@ pub struct Energies {
     pub viscosity: f64,
     /// Energy held by contact springs and taken by friction.
     pub contact: f64,
+    /// Part of `contact` that friction took.
+    pub friction: f64,
     /// Work done on the bodies from outside.
     pub external: f64,
     /// Energy error: what appeared or vanished, relative.
     pub error: f64,
+    /// By part, in deck order.
+    pub parts: Vec<NamedPart>,
 }
 
 impl Summary {
@@ -164,7 +191,8 @@ impl Summary {
     }
 
     fn print(&self, out: &mut String, Units { time, energy, .. }: Units) -> fmt::Result {
-        let Energies { kinetic, internal, hourglass, viscosity, contact, external, error } = self.energies;
+        let Energies { kinetic, internal, hourglass, viscosity, contact, friction, external, error, .. } =
+            self.energies;
         writeln!(out, "{}", self.title.replace(char::is_control, " "))?;
         writeln!(out, "  problem    {} elements, {} nodes", grouped(self.elements), grouped(self.nodes))?;
         writeln!(
@@ -248,11 +276,27 @@ impl Summary {
             ("viscosity*", viscosity),
             ("hourglass", hourglass),
             ("contact", contact),
+            ("friction**", friction),
             ("external", external),
         ] {
             writeln!(out, "             {name:<10} {:>14}", significant(value))?;
         }
-        writeln!(out, "             {:<10} {:>14}   *part of internal", "error", percent(error))?;
+        if self.eroded_elements > 0 {
+            writeln!(
+                out,
+                "             {:<10} {:>14}   {} elements, mass {}",
+                "eroded",
+                significant(self.eroded_energy),
+                grouped(self.eroded_elements),
+                significant(self.eroded_mass)
+            )?;
+        }
+        writeln!(
+            out,
+            "             {:<10} {:>14}   *part of internal, **of contact",
+            "error",
+            percent(error)
+        )?;
         writeln!(
             out,
             "  momentum   {:<10} {:>14}   supports and walls included",

@@ -107,6 +107,12 @@ impl<'a> Array<'a> {
         Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
     }
 
+    /// The tuples of some elements alone.
+    fn only(self, kept: &'a [usize]) -> Self {
+        let put = self.put;
+        Self { tuples: kept.len(), put: Box::new(move |i, out| put(kept[i], out)), ..self }
+    }
+
     /// Size of the numbers, without the header that precedes them.
     fn n_bytes(&self) -> u64 {
         self.tuples as u64 * self.components as u64 * self.width as u64
@@ -200,7 +206,7 @@ fn plane_von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
 /// `temperature` (K), `damage`, `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
 /// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric), `time_to_light`.
 /// `worker` gives, by global element index, the worker that computes the element, and becomes the element
-/// field of that name. Units are the deck's.
+/// field of that name. Eroded elements are left out. Units are the deck's.
 ///
 /// # Errors
 /// [`Error::Io`] if the disk refuses.
@@ -241,12 +247,17 @@ fn stream(
         arrays.retain(|array| ALWAYS.contains(&array.name) || fields.contains(array.name));
         arrays
     });
+    // Eroded elements are left out, their nodes are not.
+    let kept: Vec<usize> = (0..n_elements).filter(|&e| !state.is_eroded(e)).collect();
+    let n_cells = kept.len();
+    let cell: Vec<Array> =
+        if n_cells < n_elements { cell.into_iter().map(|array| array.only(&kept)).collect() } else { cell };
     let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
     // A shell has four corners, so with shells the lists are made first.
     let with_shells = model.mesh.parts.iter().any(|part| part.section().is_some());
     let (mut corners, mut ends) = (Vec::new(), Vec::new());
     if with_shells {
-        for e in 0..n_elements {
+        for &e in &kept {
             corners.extend_from_slice(&elements.corners(e)[..if elements.is_shell(e) { 4 } else { 8 }]);
             ends.push(corners.len() as i64);
         }
@@ -254,20 +265,20 @@ fn stream(
     let connectivity = if with_shells {
         Array::i64("connectivity", corners.len(), |i| [corners[i]])
     } else {
-        Array::i64("connectivity", n_elements, |e| elements.corners(e))
+        Array::i64("connectivity", n_cells, |cell| elements.corners(kept[cell]))
     };
     let cells = [
         connectivity,
-        Array::i64("offsets", n_elements, |e| [if with_shells { ends[e] } else { 8 * (e as i64 + 1) }]),
+        Array::i64("offsets", n_cells, |cell| [if with_shells { ends[cell] } else { 8 * (cell as i64 + 1) }]),
         Array {
             name: "types",
             kind: "UInt8",
             width: 1,
             components: 1,
-            tuples: n_elements,
+            tuples: n_cells,
             grouped: true,
-            put: Box::new(|e, out| {
-                let quad = with_shells && elements.is_shell(e);
+            put: Box::new(|cell, out| {
+                let quad = with_shells && elements.is_shell(kept[cell]);
                 out.push(if quad { VTK_QUAD } else { VTK_HEXAHEDRON });
             }),
         },
@@ -292,7 +303,7 @@ fn stream(
         state.cycle
     )?;
     writeln!(out, "    </FieldData>")?;
-    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_elements}">"#)?;
+    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_cells}">"#)?;
     let mut offset = 0;
     for (section, arrays) in sections {
         writeln!(out, "      <{section}>")?;

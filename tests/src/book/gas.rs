@@ -64,7 +64,7 @@ fn sod(x: f64) -> f64 {
 pub(super) fn sods_tube_has_its_plateaus_and_its_shock_in_place(sheet: &mut Sheet) {
     let side = 0.01;
     let deck = format!(
-        "title = \"Sod\"\nunits = \"SI\"\n[control]\nend_time = 0.2\nsafety_factor = 0.3\nlinear_viscosity = 0.06\n{}{}[[join]]\nparts = \"all\"\n\
+        "title = \"Sod\"\nunits = \"SI\"\n[control]\nend_time = 0.2\nlinear_viscosity = 0.06\n{}{}[[join]]\nparts = \"all\"\n\
          [[boundary]]\ntype = \"fixed\"\naxes = \"yz\"\n\
          [[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\nat = 1\n",
         column("high", 0.0, 50, side, &gas(1.4, 1.0, 2.5)),

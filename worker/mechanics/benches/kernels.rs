@@ -76,6 +76,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         constraint: vec![0; n_nodes],
         initial_volume,
         fields,
+        erosion: None,
         shells: mechanics::state::ShellState::default(),
     }
 }
@@ -172,6 +173,8 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
             end_cycle: u64::MAX,
             safety_factor: 0.6666,
             growth: 1.05,
+            energy_error: 0.5,
+            time_step_floor: 0.0,
             linear_viscosity: 0.2,
             quadratic_viscosity: 1.0,
             hourglass: 0.1,
@@ -183,6 +186,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         walls: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
+        erosion: Default::default(),
     };
     let falls = |n: u32| [0.0, 0.0, if n / plane > below { -500.0 } else { 0.0 }];
     let velocity: Vec<[f64; 3]> = mesh.node_ids.iter().map(|&n| falls(n)).collect();
@@ -204,7 +208,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         })
         .collect();
     let n_elements = mesh.n_elements();
-    let mut domain = Domain::new(setup, 2, quanta, subdomains, &[], width);
+    let mut domain = Domain::new(setup, 2, quanta, (subdomains, 0), &[], width);
     domain.install(&Default::default(), &[]).expect("a plan without other workers");
     (domain, n_elements)
 }

@@ -20,6 +20,7 @@ use crate::{
         shell4::{Core, ShellStep},
     },
     eos::{EquationOfState, IdealGas, Jwl, Linear, Polynomial, Shock},
+    erosion::PieceErosion,
     failure::{
         Failing, FailureLaw, Unfailing, hydrostatic::Hydrostatic, johnson_cook::JohnsonCookDamage,
         plastic_strain::PlasticStrain, principal_stress::PrincipalStress,
@@ -27,7 +28,7 @@ use crate::{
     lanes::{SET, Width, scalar::Scalar},
     material::{Eos, Failure, Material, Strength},
     mesh::{Topology, quad_area, twice},
-    state::{N_FIELDS, ShellState, sparse, write_changed},
+    state::{N_FIELDS, ShellState, field::ENERGY, sparse, write_changed},
     strength::{Elastic, Hydro, JohnsonCook, RateFactor, StrengthLaw, Tabulated, VonMises},
 };
 
@@ -60,6 +61,8 @@ pub struct Piece {
     pub initial_volume: Vec<f64>,
     /// One array per entry of [`crate::state::FIELDS`].
     pub fields: [Vec<f64>; N_FIELDS],
+    /// In runs where anything erodes.
+    pub erosion: Option<PieceErosion>,
     /// What shells have beside that; empty of solids.
     pub shells: ShellState,
 }
@@ -192,7 +195,8 @@ impl Block {
         }
     }
 
-    /// The state image: what [`Block::new`] was given, to the bit, with the state of now.
+    /// The state image: what [`Block::new`] was given, to the bit, with the state of now. Which elements have eroded is not in
+    /// it: whoever watches them adds that.
     pub fn piece(&self) -> Piece {
         let by_element = |array: &[f64]| sparse(self.slots.iter().map(|&slot| array[slot as usize]));
         let by_node = |arrays: &[Vec<f64>; 3]| by_node(self.nodes.len(), arrays);
@@ -223,6 +227,7 @@ impl Block {
                 .shells
                 .as_ref()
                 .map_or_else(ShellState::default, |core| core.image(self.nodes.len(), self.elements.len())),
+            erosion: None,
         }
     }
 
@@ -247,8 +252,47 @@ impl Block {
             elements: self.elements,
             mass: self.mass,
             constraint: self.constraint,
+            erosion: None,
             shells: ShellState::default(),
         }
+    }
+
+    /// Number of slots, phantoms included.
+    pub(crate) fn n_slots(&self) -> usize {
+        self.slot_elements.len()
+    }
+
+    /// The slot of a local element.
+    pub(crate) fn slot(&self, element: usize) -> usize {
+        self.slots[element] as usize
+    }
+
+    /// Where corners are, and the entries of a node array that a pass over all slots may touch.
+    pub(crate) fn layout(&self) -> (&Layout, usize) {
+        (&self.layout, self.reach)
+    }
+
+    /// Bits of the slots of each set whose elements take part.
+    pub(crate) fn alive(&self) -> &[u8] {
+        &self.alive
+    }
+
+    /// Whether a local element takes part.
+    pub(crate) fn is_alive(&self, element: usize) -> bool {
+        let slot = self.slot(element);
+        self.alive[slot / SET] >> (slot % SET) & 1 == 1
+    }
+
+    /// One state field by slot.
+    pub(crate) fn field_slots(&self, field: usize) -> &[f64] {
+        &self.fields[field]
+    }
+
+    /// Takes the element of a slot out: it gives no force and no vote any more and keeps its state. Gives its global index and
+    /// internal energy.
+    pub(crate) fn take_out(&mut self, slot: usize) -> (u32, f64) {
+        self.alive[slot / SET] &= !(1 << (slot % SET));
+        (self.slot_elements[slot], self.fields[ENERGY][slot] * self.initial_volume[slot])
     }
 
     /// Number of lane sets.
@@ -256,13 +300,13 @@ impl Block {
         self.alive.len() as u32
     }
 
-    /// Number of elements in a range of lane sets.
+    /// Number of elements that take part in a range of lane sets.
     ///
     /// # Panics
     /// If there are no such sets.
     pub fn n_elements_of(&self, sets: &Range<u32>) -> u64 {
-        let slots = sets.start as usize * SET..sets.end as usize * SET;
-        self.slot_elements[slots].iter().filter(|&&element| element != PHANTOM).count() as u64
+        let alive = &self.alive[sets.start as usize..sets.end as usize];
+        alive.iter().map(|bits| u64::from(bits.count_ones())).sum()
     }
 
     /// One state field of a local element.
@@ -313,6 +357,14 @@ impl Block {
         assert!(marked.len() == self.nodes.len(), "{} marks, {} nodes", marked.len(), self.nodes.len());
         let touches = |set| self.nodes_of_set(set).iter().any(|&node| marked[node as usize]);
         (0..self.n_sets()).map(touches).collect()
+    }
+
+    /// See [`crate::cycle::Domain::plant_fault`].
+    pub(crate) fn plant_fault(&mut self) {
+        if let Some(&slot) = self.slots.first() {
+            let pressure = &mut self.fields[crate::state::field::PRESSURE][slot as usize];
+            *pressure = pressure.next_up();
+        }
     }
 
     /// Sets all forces to zero.

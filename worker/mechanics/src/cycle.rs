@@ -20,13 +20,14 @@ use crate::{
     block::{Block, Piece},
     contact::{Batch, Contact},
     element::{ElementVote, Step},
+    erosion::{Eroding, PieceErosion},
     home::Home,
     lanes::{SET, Width},
     load::face::{self, FaceVote, LoadedFace},
     nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
     spin,
-    vote::{Quanta, Vote},
+    vote::{Gone, Quanta, Vote},
     wall::{self, Pose, WallVote},
 };
 
@@ -66,6 +67,9 @@ pub struct Plan {
     pub moments: bool,
     /// On route direct: the workers that hold nodes of `exchange` too.
     pub neighbours: Vec<Neighbour>,
+    /// Nodes held here that have no element left and leave the run with this plan; in the first plan of an epoch, all that
+    /// have left before.
+    pub dropped: Vec<u32>,
 }
 
 impl Plan {
@@ -144,6 +148,8 @@ struct Room {
     face_vote: FaceVote,
     /// What booked nodes gave each wall.
     walls: Vec<WallVote>,
+    /// Where the part erodes.
+    eroding: Option<Eroding>,
 }
 
 impl Room {
@@ -153,6 +159,30 @@ impl Room {
         std::array::from_fn(|a| {
             touched().flat_map(|(set, _)| &self.block.x[a][set * SET..(set + 1) * SET]).copied().collect()
         })
+    }
+
+    /// Takes a copy of a node out of the sums and off the surface; true if it was the one that is booked. Reference positions
+    /// of its set go with its last node on the surface.
+    fn drop_node(&mut self, local: u32) -> bool {
+        let (set, bit) = (local as usize / SET, 1 << (local as usize % SET));
+        let booked = self.sets[set].booked & bit != 0;
+        self.sets[set].booked &= !bit;
+        let before = self.sets[set].surface;
+        self.sets[set].surface &= !bit;
+        if before != 0 && self.sets[set].surface == 0 {
+            let at = SET * self.sets[..set].iter().filter(|set| set.surface != 0).count();
+            for positions in std::iter::once(&mut self.reference).chain(&mut self.gathered) {
+                for along in positions {
+                    along.drain(at..at + SET);
+                }
+            }
+        }
+        booked
+    }
+
+    /// Which elements have eroded and how far the others are, where they can.
+    fn erosion(&self) -> Option<PieceErosion> {
+        self.eroding.as_ref().map(|eroding| eroding.state(&self.block))
     }
 
     fn is_booked(&self, local: u32) -> bool {
@@ -207,8 +237,14 @@ pub struct Domain {
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
     vote: Vote,
+    /// `n`.
+    cycle: u64,
     /// `t_n`.
     time: f64,
+    /// Whether the first plan is installed.
+    installed: bool,
+    /// What left with dropped nodes in this cycle.
+    gone: Gone,
     /// Where the walls are and how they move in this step.
     poses: Vec<Pose>,
     /// Takes what guests give walls, which their owners book.
@@ -216,12 +252,12 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Builds the blocks of the sub-domains. `gauges` are global node indices by gauge.
+    /// Builds the blocks of the sub-domains at the start of a cycle. `gauges` are global node indices by gauge.
     pub fn new(
         setup: Setup,
         n_parts: usize,
         quanta: Quanta,
-        subdomains: Vec<Subdomain>,
+        (subdomains, cycle): (Vec<Subdomain>, u64),
         gauges: &[u32],
         width: Width,
     ) -> Self {
@@ -231,10 +267,14 @@ impl Domain {
         let mut gather = Vec::new();
         for Subdomain { pieces, unowned, surface, .. } in subdomains {
             let first = rooms.len();
-            for piece in pieces {
-                let block = Block::of(piece, &setup.materials);
+            for mut piece in pieces {
+                let erosion = piece.erosion.take();
+                let mut block = Block::of(piece, &setup.materials);
                 let all = 0..block.n_sets();
                 let material = &setup.materials[block.material as usize];
+                let eroding = setup.erosion.of_part(block.part as usize).map(|criteria| {
+                    Eroding::new(criteria, erosion.as_ref(), &mut block, material, setup.control.safety_factor)
+                });
                 let faces = face::faces_of(&block, &setup.loads, material);
                 rooms.push(Room {
                     sets: NodeSet::all(&block.constraint),
@@ -248,6 +288,7 @@ impl Domain {
                     faces,
                     face_vote: NO_FACES,
                     walls: vec![WallVote::default(); setup.walls.len()],
+                    eroding,
                 });
             }
             let own = first as u32..rooms.len() as u32;
@@ -285,7 +326,10 @@ impl Domain {
             .collect();
         Self {
             vote: Vote::empty(n_parts),
+            cycle,
             time: 0.0,
+            installed: false,
+            gone: Gone::default(),
             poses: Vec::with_capacity(setup.walls.len()),
             unbooked: vec![WallVote::default(); setup.walls.len()],
             setup,
@@ -314,10 +358,9 @@ impl Domain {
     pub fn load(&self) -> Load {
         let mut load = Load::default();
         for room in &self.rooms {
-            let n = room.block.elements.len() as u64;
-            let interior: u64 = room.interior.iter().map(|sets| room.block.n_elements_of(sets)).sum();
-            load.border += n - interior;
-            load.interior += interior;
+            let count = |sets: &[Range<u32>]| sets.iter().map(|s| room.block.n_elements_of(s)).sum::<u64>();
+            load.border += count(&room.border);
+            load.interior += count(&room.interior);
             load.nodes += room.block.nodes.len() as u64;
         }
         load.nodes += self.guests.node.len() as u64;
@@ -433,11 +476,49 @@ impl Domain {
                 let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
                 split(&room.block.sets_touching(&touched))
             };
+            if room.eroding.is_some() {
+                let alive = room.block.alive();
+                room.border = living(&room.border, alive);
+                room.interior = living(&room.interior, alive);
+            }
             if let Some(gathered) = room.gathered.pop_front() {
                 room.reference = gathered;
             }
         }
+        self.drop_nodes(&plan.dropped);
+        self.installed = true;
         Ok(())
+    }
+
+    /// Takes freed nodes out of the run: they stand still from now on, and nothing feels them. Those that the first plan names
+    /// were booked before.
+    fn drop_nodes(&mut self, nodes: &[u32]) {
+        for &node in nodes {
+            for &(room, local) in self.home.get(node) {
+                let room = &mut self.rooms[room as usize];
+                let booked = room.drop_node(local);
+                if !self.installed {
+                    continue;
+                }
+                let (v, mass) = (&mut room.block.v, room.block.mass[local as usize]);
+                let velocity: [f64; 3] = std::array::from_fn(|a| std::mem::take(&mut v[a][local as usize]));
+                if booked {
+                    let [x, y, z] = velocity;
+                    let square = x.mul_add(x, y.mul_add(y, z * z));
+                    self.gone.kinetic += self.quanta.energy.round(0.5 * mass * square);
+                    for (sum, v) in self.gone.momentum.iter_mut().zip(velocity) {
+                        *sum += self.quanta.momentum.round(mass * v);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Forgets gatherings whose plans will not come: that of this cycle replaces them.
+    pub fn forget_gathered(&mut self) {
+        for room in &mut self.rooms {
+            room.gathered.clear();
+        }
     }
 
     /// Books the copies of a held node that is not exchanged.
@@ -544,10 +625,18 @@ impl Domain {
             energy_quantum: self.quanta.energy,
             arm: self.quanta.arm,
         };
-        let (materials, width) = (&self.setup.materials, self.width);
+        let (materials, width, cycle) = (&self.setup.materials, self.width, self.cycle);
         let work = |room: &mut Room| {
             let mark = meter.start();
             let material = &materials[room.block.material as usize];
+            if let Some(eroding) = room.eroding.as_mut().filter(|_| dt > 0.0) {
+                if sets != Sets::Interior {
+                    eroding.watch(&mut room.block, &room.border, &step, cycle, width);
+                }
+                if sets != Sets::Border {
+                    eroding.watch(&mut room.block, &room.interior, &step, cycle, width);
+                }
+            }
             if sets != Sets::Interior {
                 room.vote = ElementVote::default();
                 room.block.compute(material, &room.border, &step, width, &mut room.vote);
@@ -697,6 +786,11 @@ impl Domain {
                 let half_steps = 0.5 * (dt_previous + dt);
                 room.booked.external += face::work(&room.faces, block, half_steps, advance.quanta.energy);
             }
+            // Loads leave with the faces of eroded elements.
+            if room.eroding.as_mut().is_some_and(Eroding::take_change) && !room.faces.is_empty() {
+                let material = &setup.materials[block.material as usize];
+                room.faces = face::faces_of(block, &setup.loads, material);
+            }
             meter.stop(mark, false);
         });
         let guests = &mut self.guests;
@@ -711,6 +805,7 @@ impl Domain {
             walls: &mut self.unbooked,
         };
         advance.run(&mut nodes, width);
+        self.cycle += 1;
         Ok(self.finish_vote())
     }
 
@@ -725,13 +820,20 @@ impl Domain {
             room.walls.fill(WallVote::default());
             vote.parts[part].kinetic += room.booked.kinetic;
             vote.external += room.booked.external;
+            vote.parts[part].external += room.booked.external;
             for a in 0..3 {
                 vote.momentum[a] += room.booked.momentum[a];
             }
             vote.extents[part].merge(&room.booked.extent);
             vote.contact_speed_squared = vote.contact_speed_squared.max(room.booked.speed_squared);
             vote.contact_speed_ahead = vote.contact_speed_ahead.max(room.booked.speed_ahead);
+            if let Some(eroding) = &mut room.eroding {
+                let casualties = eroding.take_casualties();
+                vote.add_eroded(&casualties.elements);
+                vote.gone.internal += casualties.internal;
+            }
         }
+        vote.gone.merge(&std::mem::take(&mut self.gone));
         for &(gauge, room, local) in &self.gauges {
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
             let values =
@@ -743,12 +845,37 @@ impl Domain {
 
     /// The state of all blocks, to be put back into a global state.
     pub fn pieces(&self) -> Vec<Piece> {
-        self.rooms.iter().map(|room| room.block.piece()).collect()
+        self.rooms.iter().map(|room| Piece { erosion: room.erosion(), ..room.block.piece() }).collect()
+    }
+
+    /// Number of blocks.
+    pub fn n_blocks(&self) -> usize {
+        self.rooms.len()
+    }
+
+    /// What the elements of a block made of `x_n`, between all its elements and integration: forces of its elements and
+    /// of the loads on its faces by node, state by element, and its vote, hashed. It depends on the state of this block
+    /// at the start of the cycle and on nothing else of the domain, so that whoever has that state can compute it again.
+    ///
+    /// # Errors
+    /// If there is no such block.
+    pub fn sample(&self, block: usize) -> Result<[u8; 16], String> {
+        let n = self.rooms.len();
+        let room = self.rooms.get(block).ok_or_else(|| format!("block {block} of {n} to sample"))?;
+        Ok(crate::proof::of_block(&room.block, &room.vote))
+    }
+
+    /// Makes the pressure of the first element of every block wrong by one unit in the last place: what a faulty
+    /// processor might do. For tests of who finds it.
+    #[doc(hidden)]
+    pub fn plant_fault(&mut self) {
+        self.rooms.iter_mut().for_each(|room| room.block.plant_fault());
     }
 
     /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
     pub fn into_pieces(self) -> Vec<Piece> {
-        self.rooms.into_iter().map(|room| room.block.into_piece()).collect()
+        let image = |room: Room| Piece { erosion: room.erosion(), ..room.block.into_piece() };
+        self.rooms.into_iter().map(image).collect()
     }
 }
 
@@ -782,6 +909,18 @@ fn pack(
             v[a][i] = from_v[a][local];
         }
     }
+}
+
+/// The sets among these in which an element is alive, as ranges.
+fn living(ranges: &[Range<u32>], alive: &[u8]) -> Vec<Range<u32>> {
+    let mut living: Vec<Range<u32>> = Vec::new();
+    for set in ranges.iter().cloned().flatten().filter(|&set| alive[set as usize] != 0) {
+        match living.last_mut() {
+            Some(last) if last.end == set => last.end += 1,
+            _ => living.push(set..set + 1),
+        }
+    }
+    living
 }
 
 /// Sets that touch marked nodes and the others, as ranges.

@@ -31,6 +31,19 @@ pub fn digest(state: &GlobalState) -> String {
             hasher.update(&value.to_le_bytes());
         }
     }
+    // Likewise erosion: a run in which nothing eroded has the digest of one in which nothing could.
+    if state.n_eroded() > 0 {
+        hasher.update(b"eroded");
+        for cycle in &state.eroded {
+            hasher.update(&cycle.to_le_bytes());
+        }
+    }
+    if state.strain.iter().any(|strain| *strain != 0.0) {
+        hasher.update(b"strain");
+        for strain in &state.strain {
+            hasher.update(&strain.to_le_bytes());
+        }
+    }
     // A run without shells has nothing here, and the digest that it had before there were shells.
     for spin in state.shells.spin.iter().flatten() {
         hasher.update(&spin.to_le_bytes());

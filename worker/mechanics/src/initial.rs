@@ -5,6 +5,7 @@ use crate::{
     burn::lighting_time,
     contact::Extent,
     element::shell4,
+    erosion::ALIVE,
     exact::Quantum,
     load::SurfaceKind,
     mesh::{Mesh, Part},
@@ -36,6 +37,8 @@ pub fn state(
         constraint: constraint.to_vec(),
         initial_volume: Vec::with_capacity(n_elements),
         elements: std::array::from_fn(|_: usize| vec![0.0; n_elements]),
+        eroded: vec![ALIVE; if setup.erosion.is_on() { n_elements } else { 0 }],
+        strain: vec![0.0; if setup.erosion.counts_strain() { n_elements } else { 0 }],
         shells: ShellState::default(),
     };
     let mut mass_of = Vec::with_capacity(n_elements);

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     block::Piece,
+    erosion::PieceErosion,
     mesh::{Mesh, Topology},
     state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},
 };
@@ -154,6 +155,15 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         fields: std::array::from_fn(|k: usize| {
             sparse(elements.iter().map(|&e| state.elements[k][e as usize]))
         }),
+        erosion: (!state.eroded.is_empty()).then(|| PieceErosion {
+            eroded: elements.iter().map(|&e| state.eroded[e as usize]).collect(),
+            strain: if state.strain.is_empty() {
+                Vec::new()
+            } else {
+                elements.iter().map(|&e| state.strain[e as usize]).collect()
+            },
+            initial: nodes.iter().map(|&n| mesh.positions[n as usize]).collect(),
+        }),
         nodes,
         elements,
         shells,
@@ -170,6 +180,10 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
     let lengths_fit = piece.x.len() == piece.nodes.len()
         && piece.v.len() == piece.nodes.len()
         && (0..N_FIELDS).all(|k| piece.fields[k].len() == piece.elements.len())
+        && piece.erosion.as_ref().is_none_or(|erosion| {
+            let n = piece.elements.len();
+            erosion.eroded.len() == n && (erosion.strain.is_empty() || erosion.strain.len() == n)
+        })
         && (piece.shells.spin.is_empty()
             || (piece.shells.spin.len() == piece.nodes.len() && state.shells.spin.len() == n_nodes))
         && piece.shells.fields.iter().all(|field| field.len() == piece.elements.len())
@@ -194,6 +208,16 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
     for (from, to) in [(&mut piece.x, &mut state.x), (&mut piece.v, &mut state.v)] {
         for (&n, value) in piece.nodes.iter().zip(std::mem::take(from)) {
             to[n as usize] = value;
+        }
+    }
+    if let Some(erosion) = &piece.erosion {
+        for (i, e) in piece.elements.iter().map(|&e| e as usize).enumerate() {
+            if let Some(eroded) = state.eroded.get_mut(e) {
+                *eroded = erosion.eroded[i];
+            }
+            if let (Some(to), Some(from)) = (state.strain.get_mut(e), erosion.strain.get(i)) {
+                *to = *from;
+            }
         }
     }
     for (&n, &spin) in piece.nodes.iter().zip(&piece.shells.spin) {

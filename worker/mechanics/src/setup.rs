@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     burn::Detonation,
     contact,
+    erosion::Erosion,
     load::{Drive, Loads},
     material::Material,
     wall::RigidWall,
@@ -27,6 +28,8 @@ pub struct Setup {
     pub detonations: Vec<Detonation>,
     /// Curves, forces, gravity, loads on faces, relaxation.
     pub loads: Loads,
+    /// Which parts erode and when.
+    pub erosion: Erosion,
 }
 
 /// What acts on a node alone: prescribed velocities, walls, forces. A node's constraint is the same on every holder.
@@ -58,6 +61,10 @@ pub struct Control {
     pub safety_factor: f64,
     /// Greatest growth of the time step from one cycle to the next; 1.05.
     pub growth: f64,
+    /// Energy that may appear or vanish, over the scale of the problem, before the run is stopped; 0.5.
+    pub energy_error: f64,
+    /// Least time step (time) before the run is stopped; 0 stands for 1e-4 of the first.
+    pub time_step_floor: f64,
     /// Linear artificial viscosity coefficient; default 0.2.
     pub linear_viscosity: f64,
     /// Quadratic artificial viscosity coefficient; default 1.0 (enters squared).

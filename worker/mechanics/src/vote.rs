@@ -54,6 +54,32 @@ pub struct Vote {
     pub gauges: Vec<(u32, [f64; 6])>,
     /// The first element that went wrong, if any: global index and its volume.
     pub fault: Option<(u32, f64)>,
+    /// Global indices of the elements that eroded in this cycle, ascending.
+    pub eroded: Vec<u32>,
+    /// What left the run with them, and with nodes that were dropped.
+    pub gone: Gone,
+}
+
+/// What left the run in a cycle through erosion: exact sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Gone {
+    /// Internal energy of eroded elements.
+    pub internal: f64,
+    /// Kinetic energy of freed nodes that were dropped.
+    pub kinetic: f64,
+    /// Their momentum.
+    pub momentum: [f64; 3],
+}
+
+impl Gone {
+    /// Adds what left with others.
+    pub fn merge(&mut self, other: &Self) {
+        self.internal += other.internal;
+        self.kinetic += other.kinetic;
+        for a in 0..3 {
+            self.momentum[a] += other.momentum[a];
+        }
+    }
 }
 
 /// Energies of one part in one cycle.
@@ -67,6 +93,8 @@ pub struct PartVote {
     pub hourglass: f64,
     /// Work of artificial viscosity in this cycle (part of `internal`).
     pub viscosity: f64,
+    /// Work of prescribed velocities, walls and loads in this cycle.
+    pub external: f64,
 }
 
 impl Vote {
@@ -93,6 +121,8 @@ impl Vote {
             extents: vec![Extent::NONE; n_parts],
             gauges: Vec::new(),
             fault: None,
+            eroded: Vec::new(),
+            gone: Gone::default(),
         }
     }
 
@@ -120,6 +150,7 @@ impl Vote {
             mine.internal += theirs.internal;
             mine.hourglass += theirs.hourglass;
             mine.viscosity += theirs.viscosity;
+            mine.external += theirs.external;
         }
         for (mine, theirs) in self.extents.iter_mut().zip(&other.extents) {
             mine.merge(theirs);
@@ -128,6 +159,16 @@ impl Vote {
         self.gauges.extend_from_slice(&other.gauges);
         self.gauges.sort_by_key(|g| g.0);
         self.note_fault(other.fault);
+        self.add_eroded(&other.eroded);
+        self.gone.merge(&other.gone);
+    }
+
+    /// Joins elements that eroded elsewhere.
+    pub fn add_eroded(&mut self, eroded: &[u32]) {
+        if !eroded.is_empty() {
+            self.eroded.extend_from_slice(eroded);
+            self.eroded.sort_unstable();
+        }
     }
 
     /// Joins what the elements of one block of part `part` said.

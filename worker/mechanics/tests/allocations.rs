@@ -99,6 +99,8 @@ fn domain() -> Domain {
             end_cycle: 100,
             safety_factor: 0.6666,
             growth: 1.05,
+            energy_error: 0.5,
+            time_step_floor: 0.0,
             linear_viscosity: 0.2,
             quadratic_viscosity: 1.0,
             hourglass: 0.1,
@@ -113,6 +115,7 @@ fn domain() -> Domain {
         walls: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
+        erosion: Default::default(),
     };
     let base = (cells[0] + 1) * (cells[1] + 1);
     let held: Vec<u16> = (0..n_nodes).map(|n| u16::from(n < base)).collect();
@@ -122,7 +125,7 @@ fn domain() -> Domain {
     let whole = Region::Cells { low: [0; 3], high: cells };
     let pieces = whole.split(4).iter().map(|region| cut(&mesh, &state, 0, region)).collect();
     let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: (0..base).collect() };
-    let mut domain = Domain::new(setup, 1, quanta, vec![subdomain], &[], Width::best());
+    let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], Width::best());
     let plan = Plan { exchange: (n_nodes / 2..n_nodes).collect(), ..Plan::default() };
     domain.install(&plan, &[]).expect("all nodes are held");
     domain

@@ -148,6 +148,7 @@ fn half(piece: &Piece, cut: u32, low: bool) -> Piece {
         constraint: nodes.iter().map(|&n| piece.constraint[n]).collect(),
         initial_volume: by_element(&piece.initial_volume),
         fields: std::array::from_fn(|field| by_element(&piece.fields[field])),
+        erosion: None,
         shells: piece.shells.clone(),
         ..*piece
     }

@@ -163,6 +163,7 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
         mass,
         initial_volume,
         fields,
+        erosion: None,
         shells: mechanics::state::ShellState::default(),
     }
 }
