@@ -10,9 +10,14 @@ use deck::bundle::Options;
 use master::{
     add, bench, certs, client,
     command::{Bench, Certs, Cli, Command, Speed, WorkerArgs},
-    convert, daemon, memory, processes, run, simulate,
+    convert, daemon,
+    lab::Lab,
+    memory, newcomer, processes, run, simulate,
 };
-use protocol::shape::{Shape, Wire};
+use protocol::{
+    shape::{Shape, Wire},
+    tls,
+};
 use worker::daemon::Listen;
 
 fn main() -> ExitCode {
@@ -63,6 +68,12 @@ fn main() -> ExitCode {
 }
 
 fn work(args: WorkerArgs) -> Result<ExitCode, String> {
+    if let (Some(token), Some(folder)) = (&args.join, &args.certs)
+        && !tls::Paths::in_folder(folder).certificate.exists()
+    {
+        let name = args.name.clone().unwrap_or_else(daemon::host_name);
+        newcomer::join(&args.master, token, &name, folder)?;
+    }
     if let Some(pin) = &args.pin {
         pin.apply()?;
     }
@@ -103,6 +114,20 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
         Certs::Host { folder, name, address, role, force } => {
             certs::make_host(&folder, &name, &address, role.role(), force).map_err(|e| e.to_string())?;
             println!("made {}; copy this folder to {name}", folder.join(&name).display());
+        }
+        Certs::Token { folder, role, hours, master } => {
+            let token = Lab::open(&folder).and_then(|lab| lab.issue(role.role(), hours));
+            println!("{}", daemon::line_to_paste(&master, &token.map_err(|e| e.to_string())?, role.role()));
+        }
+        Certs::Join { master, token, folder, name } => {
+            newcomer::join(&master, &token, &name.unwrap_or_else(daemon::host_name), &folder)?;
+            println!("made {}", tls::Paths::in_folder(&folder).certificate.display());
+        }
+        Certs::Revoke { folder, name } => {
+            let revoked = Lab::open(&folder).and_then(|lab| lab.revoke(&name)).map_err(|e| e.to_string())?;
+            println!(
+                "revoked {revoked} of {name}; a running master with --lab ends its links within seconds"
+            );
         }
     }
     Ok(ExitCode::SUCCESS)

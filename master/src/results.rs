@@ -9,7 +9,7 @@
 
 use std::{
     fmt, fs,
-    fs::File,
+    fs::{File, OpenOptions},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
@@ -191,6 +191,19 @@ fn is_written_by_a_run(name: &str) -> bool {
         || state.is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
+/// Creates a file that was not there: what stood under the name is removed, a link itself and not what it leads to, so
+/// that nothing is ever written outside of the folder.
+///
+/// # Errors
+/// What the system says.
+pub fn create_anew(path: &Path) -> io::Result<File> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    OpenOptions::new().write(true).create_new(true).open(path)
+}
+
 /// Writes a file under the temporary name `.NAME.tmp` beside it and renames it, so that readers and killed runs
 /// see the former file or the new one.
 ///
@@ -208,7 +221,7 @@ pub fn write_whole(
     hidden.push(name);
     hidden.push(".tmp");
     let temporary = path.with_file_name(hidden);
-    let file = File::create(&temporary).map_err(Error::io("create", path))?;
+    let file = create_anew(&temporary).map_err(Error::io("create", path))?;
     let mut out = BufWriter::with_capacity(1 << 16, file);
     // Network file systems report a full disk only when the data is synchronised.
     let written = content(&mut out).and_then(|()| out.flush()).and_then(|()| out.get_ref().sync_data());
@@ -259,6 +272,23 @@ impl Units {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(unix)]
+    fn links_in_the_folder_of_a_job_are_not_followed() {
+        let folder = tempfile::tempdir().expect("room for a folder");
+        let outside = folder.path().join("outside");
+        fs::write(&outside, "untouched").expect("room");
+        let job = folder.path().join("job-1");
+        fs::create_dir(&job).expect("room");
+        for name in [HISTORY, ".history.csv.tmp"] {
+            std::os::unix::fs::symlink(&outside, job.join(name)).expect("a link");
+        }
+        write_whole(&job.join(HISTORY), |out| out.write_all(b"row")).expect("room");
+        assert_eq!(fs::read(job.join(HISTORY)).expect("a file"), b"row");
+        assert!(job.join(HISTORY).symlink_metadata().expect("there").is_file());
+        assert_eq!(fs::read(&outside).expect("there"), b"untouched");
+    }
 
     #[test]
     fn force_knows_the_names_of_a_run_and_no_others() {

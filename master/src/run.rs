@@ -140,6 +140,7 @@ pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> 
         store: false,
         balance: asked.balance,
         waits: false,
+        replay: false,
         states: !asked.no_output,
         force_sorts: match (asked.sort_every, asked.sort_seed) {
             (Some(n), _) => ForceSorts::Every(n),

@@ -132,7 +132,8 @@ fn a_worker_that_joins_is_used_from_the_next_boundary_and_changes_no_bit() {
     let (one, written, arrivals) = undisturbed();
     for seed in 0..12 {
         let mut draw = random(seed);
-        let (at, lost_at) = (draw(arrivals / 2), draw(arrivals / 2));
+        // One worker alone has a third of the arrivals.
+        let (at, lost_at) = (draw(arrivals / 4), draw(arrivals / 4));
         let route = [Route::Master, Route::Direct][draw(2) as usize];
         let mut fate = |number: u64| match number {
             n if n == at => Some(Fate::Join(Hand { name: "late".into(), speed: 2.0, threads: 1 })),

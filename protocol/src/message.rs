@@ -169,6 +169,16 @@ pub struct Orders {
     pub collect: bool,
     /// The run ends at the start of cycle `next + 1`.
     pub stop: bool,
+    /// In cycle `next + 1`, a sample of what elements come to is sent.
+    pub sample: bool,
+}
+
+/// The block of a worker's `n_blocks` that a sample of `cycle` is of; as good as random, and known to both sides.
+pub const fn sampled_block(cycle: u64, n_blocks: usize) -> usize {
+    let mut x = cycle.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x ^= x >> 31;
+    if n_blocks == 0 { 0 } else { (x % n_blocks as u64) as usize }
 }
 
 /// From a worker to the master.
@@ -221,6 +231,13 @@ pub enum ToMaster {
         last: Option<Box<Vote>>,
         /// What this worker's compute threads have used so far.
         work: Work,
+    },
+    /// What the elements of one block came to in a cycle, to be computed again by the master.
+    Sample {
+        /// The cycle.
+        cycle: u64,
+        /// `mechanics::cycle::Domain::sample` of the block that [`sampled_block`] names; zeros of a worker without any.
+        hash: [u8; 16],
     },
     /// Before the last `Image`, and about once a second: how the worker's time went, from its runtime.
     Report(Box<Report>),

@@ -49,6 +49,7 @@ fn greeting_has_its_golden_bytes() {
         0,                                               // no token
         0, 0,                                            // takes no peers
         0,                                               // no place in a job
+        0,                                               // no proof
     ];
     assert_eq!(frame.payload, golden);
     assert_eq!(frame.header, Header::new(Kind::Hello));
@@ -118,7 +119,7 @@ fn frames_that_are_no_greeting_are_refused() {
     let (_, mut frame) = Client::new(&hello()).expect("a good greeting");
     frame.payload.push(0);
     let reason = refusal(policy(), &frame);
-    assert_eq!(reason, "hello: message of 54 bytes in a payload of 55");
+    assert_eq!(reason, "hello: message of 55 bytes in a payload of 56");
     for length in 0..frame.payload.len() - 1 {
         let cut = Frame::new(frame.header, frame.payload[..length].to_vec());
         assert!(refusal(policy(), &cut).starts_with("hello: control message: "), "{length} bytes");

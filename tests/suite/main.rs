@@ -4,6 +4,8 @@
 
 mod bits;
 mod book;
+mod fuzz;
+mod seeds;
 
 /// A row that nobody computes would look like one that holds.
 #[test]

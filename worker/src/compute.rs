@@ -10,7 +10,7 @@ use mechanics::{
     lanes::Width,
 };
 use protocol::{
-    message::{Assign, Work},
+    message::{Assign, Work, sampled_block},
     phase::Phase,
 };
 
@@ -130,6 +130,12 @@ impl Machine {
         std::mem::take(&mut self.laps.0).into_iter()
     }
 
+    /// See [`Domain::plant_fault`].
+    #[doc(hidden)]
+    pub fn plant_fault(&mut self) {
+        self.domain.iter_mut().for_each(Domain::plant_fault);
+    }
+
     /// Does one task. Failures are outcomes.
     pub fn run(&mut self, task: Task) -> Outcome {
         self.try_run(task).unwrap_or_else(Outcome::Failed)
@@ -187,6 +193,10 @@ impl Machine {
                     .time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, &walls, clock))?;
                 Outcome::Integrated(Box::new(vote))
             }
+            Task::Sample { cycle } => laps.time(Phase::Other, || match domain.n_blocks() {
+                0 => Ok::<_, String>(Outcome::Sampled([0; 16])),
+                n => Ok(Outcome::Sampled(domain.sample(sampled_block(cycle, n))?)),
+            })?,
             Task::Image { .. } => {
                 laps.time(Phase::Other, || Outcome::Image { pieces: domain.pieces(), work: clock.work() })
             }

@@ -143,6 +143,7 @@ fn greeting(options: &Options) -> Hello {
         crate::random(),
     );
     hello.token.clone_from(&options.token);
+    hello.proof = Some(mechanics::proof::of_this_machine());
     hello
 }
 

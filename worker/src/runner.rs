@@ -237,6 +237,7 @@ fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
         Task::Interior { .. } => "die-in-interior",
         Task::Integrate { .. } => "die-in-integrate",
         Task::Image { .. } => "die-in-image",
+        Task::Sample { .. } => "die-in-sample",
     };
     failpoint::die(name);
     if let Task::Border { gather: true, .. } | Task::Install { gather: true, .. } = &task {
@@ -247,6 +248,7 @@ fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
     }
     let mut outcome = machine.run(task);
     match &mut outcome {
+        Outcome::Computed if failpoint::from_cycle("ulp", cycle) => machine.plant_fault(),
         Outcome::Integrated(vote) if failpoint::in_cycle("nan-vote", cycle) => {
             vote.parts.iter_mut().for_each(|part| part.internal = f64::NAN);
         }
@@ -351,6 +353,7 @@ mod tests {
             blocking: false,
             collect: false,
             stop: false,
+            sample: false,
         };
         ToWorker::Totals { cycle, orders, totals: Vec::new() }
     }

@@ -3,7 +3,7 @@
 //! It knows no socket, clock or thread. Computation is an action whose outcome comes back as an event; at most one
 //! is under way. An assignment of a later epoch replaces the one in hand at any time: the outcome of the task under way
 //! is then thrown away, and the new domain is built when it has come. The steps of a cycle, in order: images if ordered; at a plan boundary transfer, all elements, install;
-//! else contact and border; send; interior; totals; integrate.
+//! else contact and border; send; interior; a sample if ordered; totals; integrate.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -111,6 +111,11 @@ pub enum Task {
         /// Nothing is computed on them after that.
         last: bool,
     },
+    /// What elements came to in this cycle, in one block.
+    Sample {
+        /// The cycle.
+        cycle: u64,
+    },
 }
 
 /// What came of a task.
@@ -143,6 +148,8 @@ pub enum Outcome {
         /// Compute time so far.
         work: Work,
     },
+    /// Of `Sample`.
+    Sampled([u8; 16]),
     /// The task failed: a sentence for the user.
     Failed(String),
 }
@@ -170,6 +177,10 @@ enum Phase {
     Interior,
     /// Waiting for totals or orders.
     AwaitTotals,
+    /// Hashing a sample, with all elements done.
+    Sampling,
+    /// After the last image: computing the elements of the cycle that will not be, for a sample of them.
+    Proving,
     /// Integrating.
     Integrating,
     /// Failed or finished; only `Release` or `Assign` is heard.
@@ -213,6 +224,8 @@ pub struct Session {
     vote: Option<Box<Vote>>,
     resumed: bool,
     imaged: bool,
+    /// This cycle's sample is still to be sent.
+    sample_due: bool,
     /// The interior was computed with the border: at a plan boundary.
     whole: bool,
 }
@@ -252,6 +265,7 @@ impl Session {
             vote: None,
             resumed: false,
             imaged: false,
+            sample_due: false,
             whole: false,
         }
     }
@@ -470,6 +484,13 @@ impl Session {
                     last,
                     work,
                 }));
+                if stop && self.sample_due {
+                    self.phase = Phase::Proving;
+                    let (quantum, time) = self.quantum_and_time()?;
+                    let (dt_previous, gather, blocking) = (self.dt_previous, false, false);
+                    actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather, blocking }));
+                    return Ok(());
+                }
                 if stop {
                     self.phase = Phase::Over;
                     return Ok(());
@@ -520,6 +541,25 @@ impl Session {
                 self.phase = Phase::AwaitTotals;
                 self.try_integrate(actions)
             }
+            (Phase::Sampling, Outcome::Sampled(hash)) => {
+                actions.push(Action::Send(ToMaster::Sample { cycle: self.cycle, hash }));
+                self.sample_due = false;
+                self.phase = Phase::AwaitTotals;
+                self.try_integrate(actions)
+            }
+            (Phase::Proving, Outcome::Forces { .. }) => {
+                actions.push(Action::Compute(Task::Interior { dt_previous: self.dt_previous }));
+                Ok(())
+            }
+            (Phase::Proving, Outcome::Computed) => {
+                actions.push(Action::Compute(Task::Sample { cycle: self.cycle }));
+                Ok(())
+            }
+            (Phase::Proving, Outcome::Sampled(hash)) => {
+                actions.push(Action::Send(ToMaster::Sample { cycle: self.cycle, hash }));
+                self.phase = Phase::Over;
+                Ok(())
+            }
             (Phase::Integrating, Outcome::Integrated(vote)) => {
                 self.vote = Some(vote);
                 self.dt_previous = self.dt;
@@ -546,7 +586,8 @@ impl Session {
     }
 
     fn begin_cycle(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let Orders { stop, collect, gather, blocking, .. } = *self.flags()?;
+        let Orders { stop, collect, gather, blocking, sample, .. } = *self.flags()?;
+        self.sample_due = sample;
         while let Some(entry) = self.orders.first_entry()
             && entry.key().wrapping_add(1) < self.cycle
         {
@@ -554,7 +595,7 @@ impl Session {
         }
         if (stop || collect) && !self.imaged {
             self.phase = Phase::Imaging;
-            actions.push(Action::Compute(Task::Image { last: stop }));
+            actions.push(Action::Compute(Task::Image { last: stop && !sample }));
             return Ok(());
         }
         if gather {
@@ -618,6 +659,11 @@ impl Session {
 
     /// A worker that shares no node needs only the orders of the cycle before.
     fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+        if self.sample_due {
+            self.phase = Phase::Sampling;
+            actions.push(Action::Compute(Task::Sample { cycle: self.cycle }));
+            return Ok(());
+        }
         let Some(orders) = self.orders.get(&self.cycle) else { return Ok(()) };
         let (dt, walls) = (orders.dt, orders.walls.clone());
         let totals = match self.route {

@@ -16,7 +16,7 @@ use std::{
     sync::Arc,
 };
 
-use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
+use mechanics::{exact::Quantum, piece::Region, state::GlobalState, vote::Vote, wall::Pose};
 use protocol::message::ToWorker;
 
 use super::{Arrivals, Bench, Job, erosion::Eroded, images::Collecting, measure::Meter};
@@ -138,6 +138,10 @@ pub(super) struct Epoch {
     pub(super) collecting: BTreeMap<u64, Collecting>,
     /// Time of each image that was ordered and is not complete, and whether it is for the user.
     pub(super) image_times: BTreeMap<u64, (f64, bool)>,
+    /// By position: part and elements of each block, where samples are computed again.
+    pub(super) blocks: Vec<Vec<(usize, Region)>>,
+    /// Samples by cycle, then by position.
+    pub(super) samples: BTreeMap<u64, Vec<Option<[u8; 16]>>>,
     /// Bases on their way.
     pub(super) halves: BTreeMap<u64, Halves>,
     /// The cycle of the newest base, whole or on its way.
@@ -151,6 +155,10 @@ pub(super) struct Epoch {
     pub(super) spread_rate: f64,
     /// All stop at the start of this cycle.
     pub(super) stop_at: Option<u64>,
+    /// Samples come with that stop.
+    pub(super) stop_sampled: bool,
+    /// All have stopped, and their images are here: state, last vote, whether the state is for the user.
+    pub(super) stopped: Option<(GlobalState, Vote, bool)>,
     /// They stop for the next epoch, not for the end.
     pub(super) pauses: bool,
     pub(super) meter: Meter,
@@ -206,7 +214,7 @@ impl Job {
     }
 
     /// Everything that was booked after the base is forgotten, here and in the results.
-    fn go_back(&mut self, actions: &mut Vec<Action>) {
+    pub(super) fn go_back(&mut self, actions: &mut Vec<Action>) {
         let rest = &self.base.rest;
         self.ledger = rest.ledger.clone();
         self.walls.clone_from(&rest.walls);
@@ -254,7 +262,7 @@ impl Job {
     }
 
     /// Deals the base out to all that are alive; with nobody, the job waits.
-    fn next_epoch(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+    pub(super) fn next_epoch(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
         let number = self.epoch.number.checked_add(1).ok_or("2^32 epochs of one job")?;
         let crew: Vec<usize> = (0..self.members.len()).filter(|&m| self.members[m].alive).collect();
         let nobody = crew.is_empty();

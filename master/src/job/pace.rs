@@ -59,7 +59,9 @@ impl Job {
             self.gather_at(after, blocking);
         }
         let (walls, force_quantum) = (self.walls.clone(), self.epoch.quantum);
-        Orders { next, dt, time, walls, force_quantum, gather, blocking, collect, stop }
+        let sample = (keep || stop) && self.options.replay;
+        self.epoch.stop_sampled |= stop && sample;
+        Orders { next, dt, time, walls, force_quantum, gather, blocking, collect, stop, sample }
     }
 
     /// Plan boundaries are the cycles at which plans begin to act, and at latest every so many.

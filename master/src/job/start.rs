@@ -12,7 +12,7 @@ use mechanics::{
     cycle::Subdomain,
     initial,
     mesh::Mesh,
-    piece,
+    piece::{self, Region},
     state::GlobalState,
     vote::Quanta,
     wall,
@@ -149,6 +149,7 @@ impl Job {
             rebalances: Vec::new(),
             losses: Vec::new(),
             over: false,
+            unfenced: false,
             model,
             options,
         };
@@ -205,6 +206,9 @@ impl Job {
         let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
         let dropped =
             epoch.eroded.as_ref().map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
+        if self.options.replay {
+            epoch.blocks = blocks_of(&layout, &threads);
+        }
         let (exchange, interactions) = match (&self.touching, &model.setup.contact) {
             (Some(touching), Some(settings)) => {
                 let surface = epoch.eroded.as_ref().map(|eroded| eroded.surface(model, state.cycle));
@@ -313,6 +317,8 @@ impl Epoch {
             transfers: BTreeMap::new(),
             collecting: BTreeMap::new(),
             image_times: BTreeMap::new(),
+            blocks: Vec::new(),
+            samples: BTreeMap::new(),
             halves: BTreeMap::new(),
             last_base: first,
             next_state_time: model.output.period.map(|period| output_after(time, period)),
@@ -321,6 +327,8 @@ impl Epoch {
             last_spread: 0.0,
             spread_rate: rest.spread_rate,
             stop_at: None,
+            stop_sampled: false,
+            stopped: None,
             pauses: false,
             meter: Meter::new(0),
         }
@@ -360,9 +368,7 @@ impl Cut {
         let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
         let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
         for (id, subdomain) in layout.iter().enumerate() {
-            let pieces: Vec<Piece> = subdomain
-                .region
-                .split(threads[subdomain.worker].max(1) as usize)
+            let pieces: Vec<Piece> = blocks(subdomain, threads)
                 .iter()
                 .map(|region| piece::cut(&model.mesh, state, subdomain.part, region))
                 .collect();
@@ -390,6 +396,21 @@ impl Cut {
         }
         Self { by_worker, holdings, gather }
     }
+}
+
+/// The blocks of a sub-domain, one for each thread of its worker.
+fn blocks(subdomain: &decompose::Subdomain, threads: &[u32]) -> Vec<Region> {
+    subdomain.region.split(threads[subdomain.worker].max(1) as usize)
+}
+
+/// By worker: part and elements of each of its blocks, in the worker's order.
+fn blocks_of(layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<(usize, Region)>> {
+    let mut by_worker = vec![Vec::new(); threads.len()];
+    for subdomain in layout {
+        let regions = blocks(subdomain, threads);
+        by_worker[subdomain.worker].extend(regions.into_iter().map(|region| (subdomain.part, region)));
+    }
+    by_worker
 }
 
 /// Largest over mean of cost over speed, workers without a speed aside.

@@ -320,6 +320,14 @@ impl Block {
         (0..self.n_sets()).map(touches).collect()
     }
 
+    /// See [`crate::cycle::Domain::plant_fault`].
+    pub(crate) fn plant_fault(&mut self) {
+        if let Some(&slot) = self.slots.first() {
+            let pressure = &mut self.fields[crate::state::field::PRESSURE][slot as usize];
+            *pressure = pressure.next_up();
+        }
+    }
+
     /// Sets all forces to zero.
     pub fn clear_forces(&mut self) {
         for f in &mut self.f {

@@ -805,6 +805,30 @@ impl Domain {
         self.rooms.iter().map(|room| Piece { erosion: room.erosion(), ..room.block.piece() }).collect()
     }
 
+    /// Number of blocks.
+    pub fn n_blocks(&self) -> usize {
+        self.rooms.len()
+    }
+
+    /// What the elements of a block made of `x_n`, between all its elements and integration: forces of its elements and
+    /// of the loads on its faces by node, state by element, and its vote, hashed. It depends on the state of this block
+    /// at the start of the cycle and on nothing else of the domain, so that whoever has that state can compute it again.
+    ///
+    /// # Errors
+    /// If there is no such block.
+    pub fn sample(&self, block: usize) -> Result<[u8; 16], String> {
+        let n = self.rooms.len();
+        let room = self.rooms.get(block).ok_or_else(|| format!("block {block} of {n} to sample"))?;
+        Ok(crate::proof::of_block(&room.block, &room.vote))
+    }
+
+    /// Makes the pressure of the first element of every block wrong by one unit in the last place: what a faulty
+    /// processor might do. For tests of who finds it.
+    #[doc(hidden)]
+    pub fn plant_fault(&mut self) {
+        self.rooms.iter_mut().for_each(|room| room.block.plant_fault());
+    }
+
     /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
     pub fn into_pieces(self) -> Vec<Piece> {
         let image = |room: Room| Piece { erosion: room.erosion(), ..room.block.into_piece() };

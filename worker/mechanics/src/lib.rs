@@ -36,6 +36,7 @@ pub mod material;
 pub mod mesh;
 pub mod nodes;
 pub mod piece;
+pub mod proof;
 pub mod setup;
 pub mod state;
 mod strength;

@@ -56,6 +56,7 @@ fn orders(next: u64) -> Orders {
         blocking: false,
         collect: false,
         stop: false,
+        sample: false,
     }
 }
 
@@ -103,6 +104,51 @@ fn totals_may_come_before_the_interior_is_done() {
     let actions = done(&mut session, vote());
     assert!(matches!(actions[..], [Action::Compute(Task::Border { .. })]));
     assert_eq!(session.cycle(), 1);
+}
+
+#[test]
+fn a_sample_is_taken_once_between_the_elements_and_integration() {
+    let mut session = in_first_cycle(Orders { sample: true, ..orders(0) });
+    done(&mut session, Outcome::Computed);
+    hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+    done(&mut session, vote());
+    done(&mut session, forces());
+    hear(&mut session, ToWorker::Totals { cycle: 1, orders: orders(2), totals: vec![0.0; 3] });
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Sample { cycle: 1 })]));
+    let actions = done(&mut session, Outcome::Sampled([7; 16]));
+    assert!(matches!(
+        actions[..],
+        [Action::Send(ToMaster::Sample { cycle: 1, hash: [7, ..] }), Action::Compute(Task::Integrate { .. })]
+    ));
+    done(&mut session, vote());
+    done(&mut session, forces());
+    hear(&mut session, ToWorker::Totals { cycle: 2, orders: orders(3), totals: vec![0.0; 3] });
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Integrate { .. })]), "{actions:?}");
+}
+
+#[test]
+fn after_the_last_image_a_sample_is_computed_of_the_cycle_that_will_not_be() {
+    let mut session = in_first_cycle(Orders { stop: true, sample: true, ..orders(0) });
+    done(&mut session, Outcome::Computed);
+    hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+    let actions = done(&mut session, vote());
+    assert!(matches!(actions[..], [Action::Compute(Task::Image { last: false })]));
+    let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
+    assert!(matches!(
+        actions[..],
+        [
+            Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. }),
+            Action::Compute(Task::Border { gather: false, .. })
+        ]
+    ));
+    let actions = done(&mut session, forces());
+    assert!(matches!(actions[..], [Action::Compute(Task::Interior { .. })]));
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Sample { cycle: 1 })]));
+    let actions = done(&mut session, Outcome::Sampled([9; 16]));
+    assert!(matches!(actions[..], [Action::Send(ToMaster::Sample { cycle: 1, .. })]));
 }
 
 #[test]

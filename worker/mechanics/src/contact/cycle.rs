@@ -167,6 +167,11 @@ impl Contact {
         contact
     }
 
+    /// The same on lanes of another width, which the machine must have; the forces do not depend on it.
+    pub(crate) fn on(self, width: Width) -> Self {
+        Self { width, ..self }
+    }
+
     /// Number of node-face pairs that a cycle looks at.
     pub fn n_pairs(&self) -> usize {
         self.watch.candidates.faces.len()
