@@ -492,7 +492,13 @@ impl Session {
                     self.phase = Phase::Proving;
                     let (quantum, time) = self.quantum_and_time()?;
                     let (dt_previous, gather, blocking) = (self.dt_previous, false, false);
-                    actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather, blocking }));
+                    actions.push(Action::Compute(Task::Border {
+                        dt_previous,
+                        quantum,
+                        time,
+                        gather,
+                        blocking,
+                    }));
                     return Ok(());
                 }
                 if stop {

@@ -273,7 +273,13 @@ impl Domain {
                 let all = 0..block.n_sets();
                 let material = &setup.materials[block.material as usize];
                 let eroding = setup.erosion.of_part(block.part as usize).map(|criteria| {
-                    Eroding::new(criteria, erosion.as_ref(), &mut block, material, setup.control.safety_factor)
+                    Eroding::new(
+                        criteria,
+                        erosion.as_ref(),
+                        &mut block,
+                        material,
+                        setup.control.safety_factor,
+                    )
                 });
                 let faces = face::faces_of(&block, &setup.loads, material);
                 rooms.push(Room {
