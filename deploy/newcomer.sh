@@ -52,7 +52,7 @@ for pc in 1 2; do
 done
 cp "$DECK" "$FOLDER/pc1/plates.toml"
 
-mapfile -t LINES < <(sed -n '/^```$/,/^```$/p' "$README" | grep -E '^pc[12]\$ ' | head -n 6)
+mapfile -t LINES < <(sed -n '/^<!-- deploy\/newcomer.sh runs/,/^pc1\$ bolide submit/p' "$README" | grep -E '^pc[12]\$ ')
 [ ${#LINES[@]} -eq 6 ] || fail "$README has ${#LINES[@]} lines with a prompt, expected 6"
 
 for line in "${LINES[@]}"; do

@@ -1,9 +1,9 @@
 #!/bin/bash
 # Runs the job scripts of this folder on a real Slurm: one machine, four virtual nodes of two speeds, a munge and daemons of
 # its own in a temporary folder. Every job must give the digest of `bolide run`: an undisturbed one, one whose worker is
-# killed, a heterogeneous one, and one that is preempted and goes on.
+# killed, a heterogeneous one, one that is preempted and one that is told to leave before its time limit, which both go on.
 #
-# usage: deploy/slurm/test.sh [undisturbed] [killed] [heterogeneous] [preempted]    (all without names)
+# usage: deploy/slurm/test.sh [undisturbed] [killed] [heterogeneous] [preempted] [signalled]    (all without names)
 #        Debian: slurmctld slurmd slurm-client munge
 #
 # environment: BOLIDE  the executable [default: target/release/bolide]
@@ -18,7 +18,7 @@ BOLIDE=$(realpath "${BOLIDE:-target/release/bolide}")
 CYCLES=${CYCLES:-6000}
 DECK=$PWD/tests/decks/plates-small.toml
 cases=("$@")
-[ $# -gt 0 ] || cases=(undisturbed killed heterogeneous preempted)
+[ $# -gt 0 ] || cases=(undisturbed killed heterogeneous preempted signalled)
 
 for program in munged slurmctld slurmd sbatch srun scontrol; do
     if ! PATH=$PATH:/usr/sbin command -v $program >/dev/null; then
@@ -191,6 +191,15 @@ for case in "${cases[@]}"; do
             check preempted "$preempted"
             grep -hE 'told to leave|no worker is left|back to the queue|start 2' "$T/jobs/slurm-$preempted.out" || fail "it was not preempted"
             grep -ohE 'the job goes on.*' "$(spool_of "$preempted")/log/master.log" || fail "it did not go on where it was"
+            ;;
+        signalled)
+            put "$BOLIDE_JOB" "${flags[@]}"
+            wait_until "cycles of job $job" 60 runs "$job"
+            # What --signal=B:TERM@90 does before the time limit.
+            scancel --batch --signal=TERM "$job" || fail "scancel refused job $job"
+            check signalled "$job"
+            grep -hE 'told to leave|back to the queue|start 2' "$T/jobs/slurm-$job.out" || fail "it did not come back"
+            grep -ohE 'the job goes on.*' "$(spool_of "$job")/log/master.log" || fail "it did not go on where it was"
             ;;
         *) fail "no case $case" ;;
     esac

@@ -9,6 +9,8 @@ use protocol::{
     tls,
 };
 
+use crate::picture::arguments::PictureArgs;
+
 /// What the process ends with, as `--help` says it.
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 a fault, which is printed (deck, disk, physics, peer); 2 wrong flags; 130 \
 stopped by Ctrl-C, or the followed job was cancelled. The log goes to standard error, BOLIDE_LOG=debug for more.";
@@ -111,6 +113,8 @@ pub enum Command {
         #[command(flatten)]
         reading: ReadingArgs,
     },
+    /// Draw a state of a results folder as a PNG, coloured by a field
+    Picture(PictureArgs),
     /// Write an LS-DYNA keyword deck as a TOML deck, with its mesh in a file beside it
     Convert {
         /// The keyword deck

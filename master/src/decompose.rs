@@ -59,6 +59,30 @@ pub fn decompose(mesh: &Mesh, speeds: &[f64], node: f64, alive: Option<&[bool]>)
     best.map(|(_, subdomains)| subdomains).unwrap_or_default()
 }
 
+/// The worker of every element, by global index.
+pub fn owners(mesh: &Mesh, subdomains: &[Subdomain]) -> Vec<u32> {
+    let offsets = mesh.element_offsets();
+    let mut owners = vec![0; mesh.n_elements()];
+    for Subdomain { part, region, worker } in subdomains {
+        let mut own = |element: usize| owners[offsets[*part] + element] = *worker as u32;
+        match (region, &mesh.parts[*part].topology) {
+            (Region::Cells { low, high }, Topology::Structured { cells }) => {
+                let [ni, nj, _] = cells.map(|c| c as usize);
+                let [i0, j0, k0] = low.map(|c| c as usize);
+                let [i1, j1, k1] = high.map(|c| c as usize);
+                for k in k0..k1 {
+                    for j in j0..j1 {
+                        (i0..i1).for_each(|i| own(i + ni * (j + nj * k)));
+                    }
+                }
+            }
+            (Region::List(elements), _) => elements.iter().for_each(|&e| own(e as usize)),
+            (Region::Cells { .. }, _) => unreachable!("cells are cut from structured parts alone"),
+        }
+    }
+    owners
+}
+
 /// What each worker's sub-domains cost in a cycle (element-cycles): their living elements, and all their nodes at `node` each.
 pub fn work(subdomains: &[Subdomain], n: usize, node: f64, living: &Living) -> Vec<f64> {
     let mut work = vec![0.0; n];

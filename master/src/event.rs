@@ -197,6 +197,8 @@ pub enum Action {
         /// The run stops here.
         last: bool,
     },
+    /// The worker of every element from now on, by global index, where the deck wants states to say it.
+    Owners(Arc<[u32]>),
     /// Have no more to do with a worker, and tell it why: it failed by itself, or its numbers are wrong. The job has gone on
     /// without it, and it must not come back.
     Dismiss(usize, String),

@@ -35,10 +35,11 @@ use crate::{
     exchange::Exchange,
     holdings::Holdings,
     ledger::Ledger,
-    results::history::HistoryRow,
+    results::{history::HistoryRow, surface::Probe},
     sort::{Sorted, Sorter},
 };
 use epoch::{Acting, Base, Epoch, Member, SortUnderWay, Step};
+pub(crate) use erosion::surface_of;
 use measure::{Patience, Proposal};
 use start::Touching;
 use stop::not_a_number;
@@ -168,6 +169,18 @@ impl Job {
     /// Surface of the problem; none without contact.
     pub fn surface(&self) -> Option<&Surface> {
         self.epoch.bench.as_ref().map(|bench| bench.sorter.surface())
+    }
+
+    /// What computes contact again from a state; none without contact.
+    pub fn probe(&self) -> Option<Probe> {
+        let (touching, settings) = self.touching.as_ref().zip(self.model.setup.contact.clone())?;
+        let (surface, exclusions) = touching.parts();
+        Some(Probe { surface, settings, exclusions, quantum: self.quanta.force })
+    }
+
+    /// The worker of every element, where the deck wants states to say it.
+    pub fn owners(&self) -> Option<Arc<[u32]>> {
+        self.epoch.owners.clone()
     }
 
     /// How partial forces travel.

@@ -141,6 +141,8 @@ impl Ledger {
                 .iter()
                 .map(|(_, g)| GaugeRow { x: [g[0], g[1], g[2]], v: [g[3], g[4], g[5]] })
                 .collect(),
+            element_gauges: vote.element_gauges.iter().map(|(_, state)| *state).collect(),
+            contacts: vote.contacts.clone(),
         };
     }
 

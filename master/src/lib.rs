@@ -30,6 +30,7 @@ pub mod ledger;
 pub mod memory;
 pub mod newcomer;
 pub mod peers;
+pub mod picture;
 pub mod processes;
 pub mod queue;
 pub mod results;

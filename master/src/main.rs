@@ -12,7 +12,7 @@ use master::{
     command::{Bench, Certs, Cli, Command, Speed, WorkerArgs},
     convert, daemon,
     lab::Lab,
-    memory, newcomer, processes, run, simulate,
+    memory, newcomer, picture, processes, run, simulate,
 };
 use protocol::{
     shape::{Shape, Wire},
@@ -54,6 +54,7 @@ fn main() -> ExitCode {
         Command::Man { out } => manual(out.as_deref()),
         Command::Check { deck, reading } => check(&deck, &reading.options()),
         Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
+        Command::Picture(args) => picture::run(&args),
         Command::Materials => {
             for name in deck::materials() {
                 println!("{name}");

@@ -153,6 +153,7 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
         sheet: sheet.clone(),
     };
     let (outcome, traffic) = drive(job, first, order.number, &order.seats, line, &mut reporter, &order.stop)?;
+    reporter.output.flush()?;
     if let Some(sheet) = &sheet {
         board::lock(sheet).over(outcome.failure.is_none() && !outcome.stopped);
     }

@@ -45,10 +45,16 @@ fn plates() -> Model {
         [output]
         history_cycles = 3
         period = 2
+        contact_forces = [["projectile", "target"]]
         [[gauge]]
         name = "struck face"
         part = "target"
         point = [4, 4, 4]
+        [[gauge]]
+        name = "below it"
+        of = "element"
+        part = "target"
+        point = [4.5, 4.5, 3.5]
         "#,
     )
 }

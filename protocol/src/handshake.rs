@@ -13,7 +13,8 @@ use std::fmt;
 ///
 /// 1: the first. 2: links between workers (`peer_port` and `member` in [`Hello`]), introductions and reports.
 /// 3: the work of loads by part in votes, elements that erode; proof of arithmetic in [`Hello`], samples of cycles.
-pub const VERSION: u16 = 3;
+/// 4: what is watched in assignments, and in votes what was seen.
+pub const VERSION: u16 = 4;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

@@ -16,7 +16,7 @@ use mechanics::{
     cycle::{Plan, Subdomain},
     exact::Quantum,
     setup::Setup,
-    vote::{Quanta, Vote},
+    vote::{Quanta, Vote, Watched},
     wall::Pose,
 };
 use serde::{Deserialize, Serialize};
@@ -130,6 +130,8 @@ pub struct Assign {
     pub subdomains: Vec<Subdomain>,
     /// Global node of each gauge.
     pub gauges: Vec<u32>,
+    /// Elements and contacts that votes are to speak of.
+    pub watched: Watched,
     /// Lane width to use: `scalar`, `avx2`, `avx512`; none for the best of the machine.
     pub lanes: Option<String>,
     /// The cycle to start at.

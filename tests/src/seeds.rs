@@ -472,7 +472,7 @@ impl World {
                 }
                 Action::Over(outcome) if outcome.suspended => self.without_master(),
                 Action::Over(outcome) => self.outcome = Some(*outcome),
-                Action::Dealt(_) | Action::Progress(_) => {}
+                Action::Dealt(_) | Action::Progress(_) | Action::Owners(_) => {}
             }
         }
         Ok(())

@@ -224,6 +224,7 @@ impl Machine {
             &assign.gauges,
             width,
         );
+        domain.watch(&assign.watched);
         domain.install(&assign.plan, &assign.guest_state)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
         if !further_epoch {

@@ -113,6 +113,8 @@ pub(super) struct Epoch {
     pub(super) speeds: Vec<f64>,
     /// By position.
     pub(super) elements: Vec<f64>,
+    /// The worker of every element, where the deck wants states to say it.
+    pub(super) owners: Option<Arc<[u32]>>,
     pub(super) bench: Option<Arc<Bench>>,
     pub(super) ready: Vec<bool>,
     pub(super) running: bool,

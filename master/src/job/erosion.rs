@@ -155,6 +155,12 @@ fn leaves_before(eroded: u64, cycle: u64) -> bool {
     eroded.saturating_add(SURFACE_LAG) <= cycle
 }
 
+/// The contact surface in force in the cycle of a state, where elements have eroded; none where it is still the first.
+pub(crate) fn surface_of(model: &Model, state: &GlobalState) -> Option<Arc<Surface>> {
+    let eroded = Eroded::new(state).filter(|_| state.n_eroded() > 0)?;
+    Some(eroded.surface(model, state.cycle))
+}
+
 /// The surface of the elements for which `stands` holds, with the nodes of all parts that can erode.
 pub(super) fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Arc<Surface> {
     let setup = &model.setup;

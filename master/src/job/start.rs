@@ -14,7 +14,7 @@ use mechanics::{
     mesh::Mesh,
     piece::{self, Region},
     state::GlobalState,
-    vote::Quanta,
+    vote::{Quanta, Watched},
     wall,
 };
 use protocol::{
@@ -43,6 +43,13 @@ use crate::{
 pub(super) struct Touching {
     surface: Arc<Surface>,
     exclusions: Arc<Exclusions>,
+}
+
+impl Touching {
+    /// Surface and exclusions.
+    pub(super) fn parts(&self) -> (Arc<Surface>, Arc<Exclusions>) {
+        (Arc::clone(&self.surface), Arc::clone(&self.exclusions))
+    }
 }
 
 impl Job {
@@ -201,6 +208,11 @@ impl Job {
         let costs = self.options.costs;
         let alive = self.alive_at_base();
         let layout = decompose(&model.mesh, &speeds, costs.node, alive.as_deref());
+        if model.output.workers {
+            let owners: Arc<[u32]> = decompose::owners(&model.mesh, &layout).into();
+            actions.push(Action::Owners(Arc::clone(&owners)));
+            epoch.owners = Some(owners);
+        }
         let threads: Vec<u32> = hands.iter().map(|hand| hand.threads).collect();
         let held = work(&layout, n, costs.node, &Living::new(&model.mesh, alive.as_deref()));
         let cut = Cut::new(model, state, (&layout, held), &threads, self.touching.as_ref());
@@ -241,6 +253,10 @@ impl Job {
         self.imbalance = imbalance(&elements, &interactions, &speeds);
         let exchange = Arc::new(exchange);
         let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
+        let watched = Watched {
+            elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
+            contacts: model.output.contact_forces.clone(),
+        };
         for (position, subdomains) in cut.by_worker.into_iter().enumerate() {
             let assign = Assign {
                 epoch: number,
@@ -249,6 +265,7 @@ impl Job {
                 quanta: Quanta { force: base.rest.quanta[0], ..self.quanta },
                 subdomains,
                 gauges: gauges.clone(),
+                watched: watched.clone(),
                 lanes: self.options.lanes.clone(),
                 cycle: state.cycle,
                 dt_previous: base.rest.dt_previous,
@@ -302,6 +319,7 @@ impl Epoch {
             crew: Vec::new(),
             speeds: Vec::new(),
             elements: Vec::new(),
+            owners: None,
             bench: None,
             ready: Vec::new(),
             running: false,

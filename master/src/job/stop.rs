@@ -98,7 +98,11 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<Stri
         }
         let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
         let numbers = energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external]);
-        let bad = numbers.chain([vote.force_bound, vote.contact_speed_squared]).find(|v| !v.is_finite());
+        let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);
+        let mut numbers = numbers
+            .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| *state)))
+            .chain([vote.force_bound, vote.contact_speed_squared]);
+        let bad = numbers.find(|v| !v.is_finite());
         if let Some(value) = bad.or(Some(vote.courant).filter(|courant| courant.is_nan())) {
             return Some(format!(
                 "an energy, momentum, force or limit of its vote is {value}, must be finite"

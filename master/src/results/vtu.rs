@@ -1,10 +1,13 @@
 //! States as VTK unstructured grids, and the index of them.
 //!
-//! A file holds one piece: points, hexahedra and raw appended arrays, little-endian with 64-bit sizes, each
-//! streamed from the state as it is written. The corner order of [`mechanics`] is that of VTK's cell type 12.
-//! Format: the VTK file format documentation, section "XML file formats".
+//! A file holds one piece: points, hexahedra and appended arrays, little-endian with 64-bit sizes, each taken from
+//! the state as it is written, raw or compressed ([`appended`]). The corner order of [`mechanics`] is that of VTK's
+//! cell type 12. Format: the VTK file format documentation, section "XML file formats". [`read`] reads the files back.
 
 use std::{io, io::Write, path::Path};
+
+mod appended;
+pub mod read;
 
 use deck::model::Model;
 use mechanics::{
@@ -12,7 +15,8 @@ use mechanics::{
     state::{GlobalState, field},
 };
 
-use super::{Error, FIELD_NAMES, Folder, PVD, state_name, write_whole};
+use super::{Error, FIELD_NAMES, Folder, PVD, state_name, surface::Probe, write_whole};
+use appended::Appended;
 
 /// Cell type of the eight-node hexahedron.
 const VTK_HEXAHEDRON: u8 = 12;
@@ -74,7 +78,7 @@ impl Fields {
 type Put<'a> = Box<dyn Fn(usize, &mut Vec<u8>) + 'a>;
 
 /// One array of the file: its description and where its numbers come from.
-struct Array<'a> {
+pub(super) struct Array<'a> {
     name: &'static str,
     /// VTK's name of the type.
     kind: &'static str,
@@ -89,20 +93,28 @@ struct Array<'a> {
 }
 
 impl<'a> Array<'a> {
-    fn f64<const N: usize>(name: &'static str, tuples: usize, of: impl Fn(usize) -> [f64; N] + 'a) -> Self {
+    pub(super) fn f64<const N: usize>(
+        name: &'static str,
+        tuples: usize,
+        of: impl Fn(usize) -> [f64; N] + 'a,
+    ) -> Self {
         let put: Put =
             Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
         Self { name, kind: "Float64", width: 8, components: N, tuples, grouped: true, put }
     }
 
     /// A list of indices, `N` per tuple; VTK refuses grouped ones.
-    fn i64<const N: usize>(name: &'static str, tuples: usize, of: impl Fn(usize) -> [i64; N] + 'a) -> Self {
+    pub(super) fn i64<const N: usize>(
+        name: &'static str,
+        tuples: usize,
+        of: impl Fn(usize) -> [i64; N] + 'a,
+    ) -> Self {
         let put: Put =
             Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
         Self { name, kind: "Int64", width: 8, components: N, tuples, grouped: false, put }
     }
 
-    fn u32(name: &'static str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
+    pub(super) fn u32(name: &'static str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
         let put: Put = Box::new(move |i, out| out.extend_from_slice(&of(i).to_le_bytes()));
         Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
     }
@@ -130,21 +142,6 @@ impl<'a> Array<'a> {
             }
         }
         writeln!(out, r#" format="appended" offset="{offset}"/>"#)
-    }
-
-    /// The size header and the numbers, through a buffer of bounded size.
-    fn append(&self, out: &mut impl Write) -> io::Result<()> {
-        const CHUNK: usize = 1 << 16;
-        out.write_all(&self.n_bytes().to_le_bytes())?;
-        let mut buffer = Vec::with_capacity(CHUNK + self.components * self.width);
-        for tuple in 0..self.tuples {
-            (self.put)(tuple, &mut buffer);
-            if buffer.len() >= CHUNK {
-                out.write_all(&buffer)?;
-                buffer.clear();
-            }
-        }
-        out.write_all(&buffer)
     }
 }
 
@@ -285,38 +282,54 @@ fn stream(
     ];
     let sections: [(&str, &[Array]); 4] =
         [("PointData", &point), ("CellData", &cell), ("Points", &points), ("Cells", &cells)];
+    let sizes = format!(r#"NumberOfPoints="{n_nodes}" NumberOfCells="{n_cells}""#);
+    let moment = (state.time, state.cycle);
+    write_piece(out, "UnstructuredGrid", &sizes, moment, &sections, model.output.compress)
+}
 
+/// A VTK file of one piece: `grid` is the kind of its data, `sizes` the attributes of the piece, `moment` time and cycle.
+pub(super) fn write_piece(
+    out: &mut impl Write,
+    grid: &str,
+    sizes: &str,
+    (time, cycle): (f64, u64),
+    sections: &[(&str, &[Array])],
+    compress: bool,
+) -> io::Result<()> {
+    let compressor = if compress { r#" compressor="vtkZLibDataCompressor""# } else { "" };
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(
         out,
-        r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
+        r#"<VTKFile type="{grid}" version="1.0" byte_order="LittleEndian" header_type="UInt64"{compressor}>"#
     )?;
-    writeln!(out, "  <UnstructuredGrid>\n    <FieldData>")?;
+    writeln!(out, "  <{grid}>\n    <FieldData>")?;
     writeln!(
         out,
-        r#"      <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{:?}</DataArray>"#,
-        state.time
+        r#"      <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{time:?}</DataArray>"#
     )?;
     writeln!(
         out,
-        r#"      <DataArray type="Int64" Name="cycle" NumberOfTuples="1" format="ascii">{}</DataArray>"#,
-        state.cycle
+        r#"      <DataArray type="Int64" Name="cycle" NumberOfTuples="1" format="ascii">{cycle}</DataArray>"#
     )?;
     writeln!(out, "    </FieldData>")?;
-    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_cells}">"#)?;
+    writeln!(out, "    <Piece {sizes}>")?;
+    // Where an array begins is said before it comes, so what is compressed is compressed first.
+    let arrays = || sections.iter().flat_map(|(_, arrays)| *arrays);
+    let data: Vec<Appended> = arrays().map(|array| Appended::of(array, compress)).collect();
+    let mut sized = data.iter();
     let mut offset = 0;
     for (section, arrays) in sections {
         writeln!(out, "      <{section}>")?;
-        for array in arrays {
+        for array in *arrays {
             array.describe(out, offset)?;
-            offset += 8 + array.n_bytes();
+            offset += sized.next().map_or(0, Appended::n_bytes);
         }
         writeln!(out, "      </{section}>")?;
     }
-    writeln!(out, "    </Piece>\n  </UnstructuredGrid>")?;
+    writeln!(out, "    </Piece>\n  </{grid}>")?;
     write!(out, "  <AppendedData encoding=\"raw\">\n_")?;
-    for array in sections.iter().flat_map(|(_, arrays)| *arrays) {
-        array.append(out)?;
+    for (array, data) in arrays().zip(data) {
+        data.write(array, out)?;
     }
     // Some readers look for the closing tag at the start of a line.
     writeln!(out, "\n  </AppendedData>\n</VTKFile>")
@@ -394,10 +407,11 @@ fn data_arrays<'a>(
 /// The states of a run in order, and their index `results.pvd`.
 ///
 /// The index is written anew, whole, after each state, so it names only files that exist.
-#[derive(Debug)]
 pub struct Series {
     folder: Folder,
     fields: Fields,
+    /// What computes contact again, where its surface is wanted.
+    probe: Option<Probe>,
     /// Time of each state written.
     times: Vec<f64>,
 }
@@ -408,7 +422,17 @@ impl Series {
     /// # Errors
     /// [`Error::UnknownField`].
     pub fn new(folder: &Folder, model: &Model) -> Result<Self, Error> {
-        Ok(Self { folder: folder.clone(), fields: Fields::select(&model.output.fields)?, times: Vec::new() })
+        Ok(Self {
+            folder: folder.clone(),
+            fields: Fields::select(&model.output.fields)?,
+            probe: None,
+            times: Vec::new(),
+        })
+    }
+
+    /// From now on the contact surface is written beside every state.
+    pub fn with_contact(&mut self, probe: Probe) {
+        self.probe = Some(probe);
     }
 
     /// Writes a state under the next number, then the index. `worker` is as in [`write_vtu`].
@@ -420,6 +444,9 @@ impl Series {
     /// As [`write_vtu`].
     pub fn write(&mut self, model: &Model, state: &GlobalState, worker: Option<&[u32]>) -> Result<(), Error> {
         let index = u32::try_from(self.times.len()).expect("a run writes fewer than 2^32 states");
+        if let Some(probe) = &self.probe {
+            probe.write(&self.folder, index, model, state)?;
+        }
         write_vtu(&self.folder.file(&state_name(index)), model, state, &self.fields, worker)?;
         self.times.push(state.time);
         let indexed = self.write_index();
@@ -445,18 +472,22 @@ impl Series {
     }
 
     fn write_index(&self) -> Result<(), Error> {
-        write_whole(&self.folder.file(PVD), |out| {
-            writeln!(out, r#"<?xml version="1.0"?>"#)?;
-            writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">"#)?;
-            writeln!(out, "  <Collection>")?;
-            for (index, time) in (0..).zip(&self.times) {
-                writeln!(
-                    out,
-                    r#"    <DataSet timestep="{time:?}" group="" part="0" file="{}"/>"#,
-                    state_name(index)
-                )?;
-            }
-            writeln!(out, "  </Collection>\n</VTKFile>")
-        })
+        if self.probe.is_some() {
+            Probe::write_index(&self.folder, &self.times)?;
+        }
+        write_index(&self.folder.file(PVD), &self.times, state_name)
     }
+}
+
+/// Writes an index of files by time; `name` gives the file of each.
+pub(super) fn write_index(path: &Path, times: &[f64], name: impl Fn(u32) -> String) -> Result<(), Error> {
+    write_whole(path, |out| {
+        writeln!(out, r#"<?xml version="1.0"?>"#)?;
+        writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">"#)?;
+        writeln!(out, "  <Collection>")?;
+        for (index, time) in (0..).zip(times) {
+            writeln!(out, r#"    <DataSet timestep="{time:?}" group="" part="0" file="{}"/>"#, name(index))?;
+        }
+        writeln!(out, "  </Collection>\n</VTKFile>")
+    })
 }

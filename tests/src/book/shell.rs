@@ -257,13 +257,14 @@ pub(super) fn the_impulsive_panel_of_shells_is_dented_about_as_deep(sheet: &mut 
     sheet.add("impulsive panel of shells: energy error", solved.outcome.ledger.last.error);
 }
 
-/// A square tube of 50 by 50 by 2 mm that a wall shortens at 20 m/s by 0.2 m.
+/// A square tube of 50 by 50 by 2 mm that a wall shortens at 20 m/s by 0.2 m. Two of its sides bulge by half a millimetre over
+/// the first fold, the others are dented: without that a perfect tube stretches its corners first.
 pub(super) fn a_square_tube_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
     let (side, length, stroke) = (0.05, 0.3, 0.2);
     let deck = format!(
         "title = \"square tube\"\nunits = \"SI\"\n[control]\nend_time = {:e}\n[output]\nhistory_cycles = 100\n\
          [[part]]\nname = \"tube\"\nmaterial = {}\nshell = {{ thickness = 2e-3, points = 5 }}\n\
-         prism = {{ axis = \"z\", base = [0, 0, 0], radius = {:e}, length = {length}, sides = 4, cells = [56, 84] }}\n\
+         prism = {{ axis = \"z\", base = [0, 0, 0], radius = {:e}, length = {length}, sides = 4, cells = [48, 72] }}\n\
          [[wall]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\nfriction = 0.3\n\
          [[wall]]\npoint = [0, 0, {length}]\nnormal = [0, 0, -1]\nfriction = 0.3\nvelocity = {{ z = -20 }}\n\
          [contact]\ngap_length = 1e-3\nself_interaction = \"all\"\n",
@@ -271,7 +272,17 @@ pub(super) fn a_square_tube_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
         plastic(7830.0, 2.1e11, 0.3, 250e6),
         side * 0.5_f64.sqrt()
     );
-    let solved = run(model(&deck));
+    let mut model = model(&deck);
+    let (radius, fold) = (side * 0.5_f64.sqrt(), 0.0168);
+    for [x, y, z] in &mut model.mesh.positions {
+        let below = length - *z;
+        if below < fold {
+            let sign = (*x * *y).signum();
+            let by = 5e-4 * sign * (PI * x.abs() / radius).sin() * (PI * below / fold).sin() * 0.5_f64.sqrt();
+            (*x, *y) = (by.mul_add(x.signum(), *x), by.mul_add(y.signum(), *y));
+        }
+    }
+    let solved = run(model);
     let last = solved.rows.last().expect("rows");
     sheet.add("square tube: mean crush force (N)", (last.internal + last.hourglass) / stroke);
     sheet.add("square tube: energy error", last.error);

@@ -314,6 +314,12 @@ impl Block {
         self.fields[field][self.slots[element] as usize]
     }
 
+    /// The state of a local element, one number per entry of [`crate::state::FIELDS`].
+    pub fn element(&self, element: usize) -> [f64; N_FIELDS] {
+        let slot = self.slots[element] as usize;
+        self.fields.each_ref().map(|values| values[slot])
+    }
+
     /// The lane set of a local element.
     pub fn set_of_element(&self, element: usize) -> u32 {
         self.slots[element] / SET as u32

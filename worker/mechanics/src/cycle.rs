@@ -27,7 +27,7 @@ use crate::{
     nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
     spin,
-    vote::{Gone, Quanta, Vote},
+    vote::{Gone, Quanta, Vote, Watched},
     wall::{self, Pose, WallVote},
 };
 
@@ -236,6 +236,10 @@ pub struct Domain {
     home: Home,
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
+    /// Element gauges: gauge, room, local element.
+    element_gauges: Vec<(u32, u32, u32)>,
+    /// Pairs of parts whose contact force is wanted.
+    watched_pairs: Vec<[u32; 2]>,
     vote: Vote,
     /// `n`.
     cycle: u64,
@@ -352,7 +356,23 @@ impl Domain {
             home,
             gather,
             gauges,
+            element_gauges: Vec::new(),
+            watched_pairs: Vec::new(),
         }
+    }
+
+    /// From now on votes say how these elements and contacts are; before the first plan is installed.
+    pub fn watch(&mut self, watched: &Watched) {
+        self.watched_pairs.clone_from(&watched.contacts);
+        let place = |element: &u32| {
+            let found = |room: &Room| room.block.elements.iter().position(|e| e == element);
+            let mut rooms = (0..).zip(&self.rooms);
+            rooms.find_map(|(index, room)| found(room).map(|local| (index, local as u32)))
+        };
+        let places = (0..).zip(&watched.elements);
+        self.element_gauges = places
+            .filter_map(|(gauge, element)| place(element).map(|(room, local)| (gauge, room, local)))
+            .collect();
     }
 
     /// Number of elements held.
@@ -443,7 +463,8 @@ impl Domain {
             let zeros = || std::array::from_fn(|_| vec![0.0; n]);
             let (mut x, mut v) = (zeros(), zeros());
             pack(&self.rooms, &self.guests, &sources, &mut x, &mut v);
-            let contact = Contact::new(batch, settings, &x);
+            let mut contact = Contact::new(batch, settings, &x);
+            contact.watch_pairs(&self.watched_pairs);
             self.contact = Some(ContactRoom { contact, sources, x, v, f: zeros() });
         }
         // Every node with more than one copy, here or elsewhere, and every contact node.
@@ -600,6 +621,9 @@ impl Domain {
             let vote =
                 room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
             self.vote.add_contact(&vote);
+            if !self.watched_pairs.is_empty() {
+                self.vote.add_contacts(&room.contact.pair_votes());
+            }
         }
         meter.stop(mark, true);
         self.load_faces(meter);
@@ -845,6 +869,9 @@ impl Domain {
             let values =
                 [block.x[0][i], block.x[1][i], block.x[2][i], block.v[0][i], block.v[1][i], block.v[2][i]];
             vote.gauges.push((gauge, values));
+        }
+        for &(gauge, room, local) in &self.element_gauges {
+            vote.element_gauges.push((gauge, self.rooms[room as usize].block.element(local as usize)));
         }
         vote
     }

@@ -7,7 +7,7 @@ use crate::state::{FIELDS, GlobalState};
 const LAW_FIELDS: [&str; 2] = ["damage", "time_to_light"];
 
 /// BLAKE3 over cycle, time, positions, velocities (by global node index) and element fields (field by field, by global
-/// element index; [`LAW_FIELDS`] after their names, if anything is in them), each number as its eight little-endian
+/// element index; `LAW_FIELDS` after their names, if anything is in them), each number as its eight little-endian
 /// bytes; the first 32 hexadecimal digits.
 pub fn digest(state: &GlobalState) -> String {
     let mut hasher = blake3::Hasher::new();

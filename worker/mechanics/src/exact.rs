@@ -40,6 +40,12 @@ impl Quantum {
         self.q
     }
 
+    /// The quantum that is `2^bits` times as large: sums of so many more terms stay exact.
+    #[must_use]
+    pub fn coarser(self, bits: u32) -> Self {
+        Self { q: self.q * power_of_two(bits as i32) }
+    }
+
     /// The number `M` that rounds when added and taken away.
     pub fn magic(self) -> f64 {
         self.q * (1.5 * 4_503_599_627_370_496.0)

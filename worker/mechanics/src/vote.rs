@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     contact::{ContactVote, Extent},
     element::ElementVote,
+    state::N_FIELDS,
     wall::WallVote,
 };
 
@@ -52,6 +53,10 @@ pub struct Vote {
     pub extents: Vec<Extent>,
     /// Position and velocity of gauge nodes: gauge index, then x, y, z, vx, vy, vz.
     pub gauges: Vec<(u32, [f64; 6])>,
+    /// State of the elements that are watched: gauge index, and one number per entry of [`crate::state::FIELDS`].
+    pub element_gauges: Vec<(u32, [f64; N_FIELDS])>,
+    /// Contact between the pairs of parts that are watched: index of the pair, ascending; pairs without force are left out.
+    pub contacts: Vec<(u32, PairVote)>,
     /// The first element that went wrong, if any: global index and its volume.
     pub fault: Option<(u32, f64)>,
     /// Global indices of the elements that eroded in this cycle, ascending.
@@ -79,6 +84,34 @@ impl Gone {
         for a in 0..3 {
             self.momentum[a] += other.momentum[a];
         }
+    }
+}
+
+/// What of a run is watched beside its energies, because a deck asks for it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Watched {
+    /// Global element of each element gauge.
+    pub elements: Vec<u32>,
+    /// Pairs of parts.
+    pub contacts: Vec<[u32; 2]>,
+}
+
+/// Contact of one pair of parts in one cycle: exact sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PairVote {
+    /// Force on the first part from the second.
+    pub force: [f64; 3],
+    /// Contacts in force: nodes of either in zones of the other.
+    pub hits: u64,
+}
+
+impl PairVote {
+    /// Adds what other contacts of the same pair give.
+    pub fn merge(&mut self, other: &Self) {
+        for axis in 0..3 {
+            self.force[axis] += other.force[axis];
+        }
+        self.hits += other.hits;
     }
 }
 
@@ -120,6 +153,8 @@ impl Vote {
             walls: Vec::new(),
             extents: vec![Extent::NONE; n_parts],
             gauges: Vec::new(),
+            element_gauges: Vec::new(),
+            contacts: Vec::new(),
             fault: None,
             eroded: Vec::new(),
             gone: Gone::default(),
@@ -158,6 +193,9 @@ impl Vote {
         self.add_walls(&other.walls);
         self.gauges.extend_from_slice(&other.gauges);
         self.gauges.sort_by_key(|g| g.0);
+        self.element_gauges.extend_from_slice(&other.element_gauges);
+        self.element_gauges.sort_by_key(|g| g.0);
+        self.add_contacts(&other.contacts);
         self.note_fault(other.fault);
         self.add_eroded(&other.eroded);
         self.gone.merge(&other.gone);
@@ -193,6 +231,16 @@ impl Vote {
         self.hits += vote.hits;
         self.contact += vote.energy;
         self.friction += vote.friction;
+    }
+
+    /// Joins contacts of the pairs of parts that are watched.
+    pub fn add_contacts(&mut self, others: &[(u32, PairVote)]) {
+        for (pair, vote) in others {
+            match self.contacts.binary_search_by_key(pair, |(pair, _)| *pair) {
+                Ok(at) => self.contacts[at].1.merge(vote),
+                Err(at) => self.contacts.insert(at, (*pair, *vote)),
+            }
+        }
     }
 
     /// Joins what other nodes gave the walls.

@@ -33,6 +33,7 @@ fn assign(cycle: u64) -> Box<Assign> {
         quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
         subdomains: Vec::new(),
         gauges: Vec::new(),
+        watched: Default::default(),
         lanes: None,
         cycle,
         dt_previous: 0.0,

@@ -15,6 +15,7 @@ use super::{
     search::{self, Bounds, Candidates},
     sort::sort,
     surface::Surface,
+    tally::Tally,
     watch::Watch,
     work_unit::Batch,
     zone::{
@@ -22,7 +23,7 @@ use super::{
         lanes::{self, Approach, Closest},
     },
 };
-use crate::{exact::Quantum, lanes::Width};
+use crate::{exact::Quantum, lanes::Width, vote::PairVote};
 
 /// A pair at exactly one gap is outside the zone, rounding or not: only nearer ones by this fraction are
 /// inside it at time zero.
@@ -81,6 +82,8 @@ pub struct Contact {
     /// The candidates that can be near before nodes have moved much further.
     watch: Watch,
     work: Work,
+    /// Sums by pair of parts, where somebody wants them.
+    tally: Option<Tally>,
 }
 
 /// Work space of one block of nodes.
@@ -149,6 +152,7 @@ impl Contact {
             width: Width::best(),
             watch: Watch::default(),
             work: Work::default(),
+            tally: None,
         };
         for (index, face) in index.iter_mut().zip(&batch.faces).filter(|(index, _)| **index == 0) {
             *index = contact.faces.len() as u32;
@@ -172,6 +176,16 @@ impl Contact {
         contact.look(&mut watch, &mut work, x);
         (contact.watch, contact.work) = (watch, work);
         contact
+    }
+
+    /// From now on the forces between these pairs of parts are summed; none of them for none.
+    pub fn watch_pairs(&mut self, pairs: &[[u32; 2]]) {
+        self.tally = (!pairs.is_empty()).then(|| Tally::new(self.n_parts, pairs));
+    }
+
+    /// What [`Contact::forces`] found last between each watched pair that is in contact, by index of the pair.
+    pub fn pair_votes(&self) -> Vec<(u32, PairVote)> {
+        self.tally.as_ref().map(Tally::votes).unwrap_or_default()
     }
 
     /// The same on lanes of another width, which the machine must have; the forces do not depend on it.
@@ -229,14 +243,19 @@ impl Contact {
         let mut watch = std::mem::take(&mut self.watch);
         let mut vote = ContactVote { pairs: self.candidates.faces.len() as u64, ..ContactVote::default() };
         let mut frequency2 = 0.0;
+        if let Some(tally) = &mut self.tally {
+            tally.clear(cycle.force_quantum);
+        }
         if watch.is_stale(cycle.x, &self.settings) {
             self.look(&mut watch, &mut work, cycle.x);
         }
+        let mut tally = self.tally.take();
         for bounds in watch.blocks.windows(2) {
-            let voted = self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, &mut vote);
+            let voted =
+                self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, &mut vote, &mut tally);
             frequency2 = if voted > frequency2 { voted } else { frequency2 };
         }
-        (self.work, self.watch) = (work, watch);
+        (self.work, self.watch, self.tally) = (work, watch, tally);
         vote.dt = force::time_step(frequency2);
         vote
     }
@@ -251,6 +270,7 @@ impl Contact {
         work: &mut Work,
         cycle: &mut Cycle,
         vote: &mut ContactVote,
+        tally: &mut Option<Tally>,
     ) -> f64 {
         let range = first_pair as usize..end_pair as usize;
         let warning = WARNING * self.settings.gap;
@@ -285,7 +305,12 @@ impl Contact {
             (0..3).for_each(|a| approach.direction[a][i] = direction[a]);
         }
         approach.depth[n..].fill(0.0);
-        if self.smooth { self.push(n, work, cycle, vote) } else { self.rub(n, work, cycle, vote) }
+        let tally = tally.as_mut();
+        if self.smooth {
+            self.push(n, work, cycle, vote, tally)
+        } else {
+            self.rub(n, work, cycle, vote, tally)
+        }
     }
 
     /// Whether an active face is a shell: nodes are outside of it wherever they are.
@@ -380,7 +405,14 @@ impl Contact {
 
     /// Forces without friction of the first `n` pushes. Gives the greatest squared frequency.
     #[inline(always)]
-    fn push(&self, n: usize, work: &mut Work, cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
+    fn push(
+        &self,
+        n: usize,
+        work: &mut Work,
+        cycle: &mut Cycle,
+        vote: &mut ContactVote,
+        tally: Option<&mut Tally>,
+    ) -> f64 {
         let approach = &work.approach;
         let pushes = Pushes {
             face: &work.face,
@@ -398,6 +430,12 @@ impl Contact {
             for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
                 let pair = (self.global[pairs.node()[i] as usize], self.ids[work.face[i] as usize]);
                 vote.deepest(depth / self.settings.gap, pair);
+            }
+        }
+        if let Some(tally) = tally {
+            for (i, _) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+                let parts = (self.part[pairs.node()[i] as usize], self.parts[work.face[i] as usize]);
+                tally.add(parts, [0, 1, 2].map(|a| work.terms[a][i]));
             }
         }
         vote.energy += sums.energy;
@@ -418,7 +456,14 @@ impl Contact {
 
     /// Forces with friction of the first `n` pushes. Gives the greatest squared frequency.
     #[inline(always)]
-    fn rub(&self, n: usize, work: &mut Work, cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
+    fn rub(
+        &self,
+        n: usize,
+        work: &mut Work,
+        cycle: &mut Cycle,
+        vote: &mut ContactVote,
+        mut tally: Option<&mut Tally>,
+    ) -> f64 {
         let (approach, statics) = (&work.approach, &self.statics);
         let mut frequency2 = 0.0_f64;
         for i in 0..n {
@@ -454,6 +499,9 @@ impl Contact {
             });
             let reaction = force::react(&push, sliding.as_ref(), cycle.force_quantum, cycle.energy_quantum);
             vote.count(&reaction);
+            if let Some(tally) = &mut tally {
+                tally.add((self.part[node], self.parts[face]), reaction.node);
+            }
             for a in 0..3 {
                 let f = &mut cycle.f[a];
                 f[node] += reaction.node[a];
