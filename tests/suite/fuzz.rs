@@ -4,7 +4,7 @@
 //! anew in every run, takes what is in `__fuzz__` first and prints the input of a failure with its seed. Long runs:
 //! `cargo run --release -p tests --bin fuzz` for the first, `BOLERO_RANDOM_TEST_TIME_MS=60000
 //! BOLERO_RANDOM_ITERATIONS=1000000000 cargo test --release -p tests --test suite fuzz` for the second, and
-//! `cargo bolero test --all-features -p tests suite::fuzz::deck` for engines that watch the code's branches.
+//! `cargo bolero test -p tests fuzz::deck` for engines that watch the code's branches.
 
 use std::{cell::RefCell, panic::AssertUnwindSafe, time::Duration};
 

@@ -91,7 +91,8 @@ pub struct Stage {
     length: u64,
 }
 
-/// Two small blocks that collide askew on a wall of finite mass, with friction and a gauge: a few cells, many cycles.
+/// Two small blocks that collide askew on a wall of finite mass, a plate of shells behind them, with friction and a gauge: a
+/// few cells, many cycles.
 const DECK: &str = r#"
     title = "two small blocks"
     units = "cm-g-us"
@@ -109,6 +110,12 @@ const DECK: &str = r#"
     material = "STEEL_1006"
     velocity = [0.03, 0.01, -0.08]
     box = { origin = [1.3, 0.7, 2.2], size = [2, 2, 1], cells = [2, 2, 1] }
+    [[part]]
+    name = "plate"
+    material = "AL_2024_T351"
+    velocity = [0, 0, -0.14]
+    shell = { thickness = 0.3 }
+    plate = { origin = [1.2, 0.8, 3.4], side_i = [2, 0.1, 0], side_j = [0, 2, 0.1], cells = [2, 3] }
     [contact]
     gap_length = 0.15
     friction = 0.1

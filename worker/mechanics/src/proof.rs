@@ -43,12 +43,18 @@ pub fn of_this_machine() -> String {
     others.map(digest).find(|other| *other != one).unwrap_or(one)
 }
 
-/// Hash of what the elements of a block made of its state: forces by node, fields by element, the vote.
+/// Hash of what the elements of a block made of its state: forces and moments by node, fields by element, the vote.
 pub(crate) fn of_block(block: &Block, vote: &ElementVote) -> [u8; 16] {
     let mut hasher = blake3::Hasher::new();
     let n = block.nodes.len();
     for f in &block.f {
         put(&mut hasher, f[..n].iter().copied());
+    }
+    if let Some(shells) = &block.shells {
+        // What layers come to shows in forces and moments.
+        for m in &shells.m {
+            put(&mut hasher, m[..n].iter().copied());
+        }
     }
     for index in 0..N_FIELDS {
         put(&mut hasher, (0..block.elements.len()).map(|element| block.field(element, index)));
