@@ -4,7 +4,7 @@
 //! functions of a cycle. Friction is left out: what is mapped is the push between bodies.
 
 use super::{
-    Batch, Contact, Exclusions, Settings, Surface, WARNING, WorkUnit,
+    Batch, Contact, Exclusions, Face, Settings, Surface, WARNING, WorkUnit,
     search::{Bounds, candidates},
     sort::sort,
     zone::Frame,
@@ -19,7 +19,7 @@ pub struct Map {
     /// Distance of each surface node from the nearest face that it may meet, or of a face's corner from a node that
     /// meets the face; at most [`Map::reach`] (length).
     pub gap: Vec<f64>,
-    /// Pressure of contact on each face, positive where it is pushed inwards: forces on its nodes, shared by the faces
+    /// Pressure of contact on each face, positive where it is pushed inwards (a shell: from either side): forces on its nodes, shared by the faces
     /// that they push on in proportion to the areas seen along the force, over its area.
     pub pressure: Vec<f64>,
     /// Distances are not looked at beyond this (length).
@@ -117,19 +117,24 @@ fn pressures(surface: &Surface, x: &[[f64; 3]], force: &[[f64; 3]]) -> Vec<f64> 
         let size = dot(f, f).sqrt();
         (size > 0.0).then(|| (f.map(|c| c / size), size))
     };
+    // How much of a face is seen along a force; a shell is pushed on either side.
+    let facing = |face: &Face, area: [f64; 3], along: [f64; 3]| {
+        let inwards = -dot(area, along);
+        if Face::is_shell(&face.corners) { inwards.abs() } else { inwards.max(0.0) }
+    };
     let mut seen = vec![0.0; x.len()];
     for (face, &area) in surface.faces.iter().zip(&quarter) {
         for n in face.nodes {
             if let Some((along, _)) = direction(n) {
-                seen[n as usize] += (-dot(area, along)).max(0.0);
+                seen[n as usize] += facing(face, area, along);
             }
         }
     }
-    let of = |(face, &area): (&super::Face, &[f64; 3])| {
+    let of = |(face, &area): (&Face, &[f64; 3])| {
         let size = dot(area, area).sqrt();
         let push = |n: u32| match direction(n) {
             Some((along, force)) if seen[n as usize] > 0.0 && size > 0.0 => {
-                0.25 * (force / seen[n as usize]) * ((-dot(area, along)).max(0.0) / size)
+                0.25 * (force / seen[n as usize]) * (facing(face, area, along) / size)
             }
             _ => 0.0,
         };
