@@ -50,14 +50,21 @@ pub(crate) fn of_block(block: &Block, vote: &ElementVote) -> [u8; 16] {
     for f in &block.f {
         put(&mut hasher, f[..n].iter().copied());
     }
-    if let Some(shells) = &block.shells {
-        // What layers come to shows in forces and moments.
-        for m in &shells.m {
-            put(&mut hasher, m[..n].iter().copied());
+    match &block.shells {
+        None => {
+            for index in 0..N_FIELDS {
+                put(&mut hasher, (0..block.elements.len()).map(|element| block.field(element, index)));
+            }
         }
-    }
-    for index in 0..N_FIELDS {
-        put(&mut hasher, (0..block.elements.len()).map(|element| block.field(element, index)));
+        // The fields of their block are those of its beginning.
+        Some(shells) => {
+            for m in &shells.m {
+                put(&mut hasher, m[..n].iter().copied());
+            }
+            for layer in shells.image(n, block.elements.len()).fields {
+                put(&mut hasher, layer.into_iter());
+            }
+        }
     }
     let ElementVote {
         courant,
