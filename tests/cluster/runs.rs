@@ -84,11 +84,12 @@ fn a_process_for_each_worker_gives_the_digest_of_one_process() {
     let summary = run(&[&three[..], &["--processes"]].concat());
     assert_eq!(digest_of(&summary), reference());
     assert_eq!((&summary["workers"], &summary["cycles"]), (&3.into(), &40.into()));
-    // Every byte that the pipe in memory counts passes a link, and heartbeats and the like are few.
+    // Every byte that the pipe in memory counts passes a link, and heartbeats and the like are few. A plan that would act after
+    // the last cycle is sent or is not, as its sort is done in time or not: 3 % of such a short run.
     let embedded = run(&three);
     let ratio = summary["bytes_per_cycle"].as_f64().expect("bytes")
         / embedded["bytes_per_cycle"].as_f64().expect("bytes");
-    assert!((0.99..1.01).contains(&ratio), "{ratio}");
+    assert!((0.95..1.05).contains(&ratio), "{ratio}");
 }
 
 #[test]
