@@ -367,6 +367,10 @@ impl Block {
 
     /// See [`crate::cycle::Domain::plant_fault`].
     pub(crate) fn plant_fault(&mut self) {
+        if let Some(core) = &mut self.shells {
+            core.plant_fault();
+            return;
+        }
         if let Some(&slot) = self.slots.first() {
             let pressure = &mut self.fields[crate::state::field::PRESSURE][slot as usize];
             *pressure = pressure.next_up();

@@ -898,7 +898,7 @@ impl Domain {
         Ok(crate::proof::of_block(&room.block, &room.vote))
     }
 
-    /// Makes the pressure of the first element of every block wrong by one unit in the last place: what a faulty
+    /// Makes the pressure (of shells a stress) of the first element of every block wrong by one unit in the last place: what a faulty
     /// processor might do. For tests of who finds it.
     #[doc(hidden)]
     pub fn plant_fault(&mut self) {

@@ -176,6 +176,13 @@ impl Core {
         }
     }
 
+    /// Makes a stress of the first element wrong by one unit in the last place, see [`crate::cycle::Domain::plant_fault`].
+    pub(crate) fn plant_fault(&mut self) {
+        if let Some(stress) = self.layers.first_mut().and_then(|layer| layer.first_mut()) {
+            *stress = stress.next_up();
+        }
+    }
+
     /// What an element says of itself in the fields of solids: greatest plastic strain and temperature of its layers,
     /// energy, pressure and deviator of the mean stress in its own frame. `volume` is that of the start, `area` of now.
     pub fn summary(&self, element: usize, volume: f64, area: f64) -> [f64; crate::state::N_FIELDS] {
