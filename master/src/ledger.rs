@@ -179,13 +179,18 @@ impl Ledger {
         }
     }
 
+    /// Energy that appeared or vanished since the first cycle.
+    pub fn unexplained(&self) -> f64 {
+        self.initial_total.map_or(0.0, |initial| self.last.total - self.external - initial)
+    }
+
     /// Energy that appeared or vanished over the scale of the problem, by which a run is judged: the largest of initial
     /// energy, greatest kinetic energy and greatest external work, so that slow loading is not judged by the little
     /// kinetic energy it has.
     pub fn imbalance(&self) -> f64 {
         let Some(initial) = self.initial_total else { return 0.0 };
         let scale = initial.abs().max(self.greatest_kinetic).max(self.greatest_external);
-        if scale > 0.0 { (self.last.total - self.external - initial) / scale } else { 0.0 }
+        if scale > 0.0 { self.unexplained() / scale } else { 0.0 }
     }
 
     /// The part whose own energy grew most since the first cycle: its index and what it gained; the first of equals.

