@@ -14,6 +14,7 @@ mod condition;
 mod contact;
 mod control;
 mod draft;
+mod erosion;
 mod fields;
 mod log;
 mod material;

@@ -16,11 +16,21 @@ const STRAIN: Range = Range::Within(0.0, 100.0, "a strain above 0 and at most 10
 pub(super) fn read_criteria(value: Value<'_>, part: &str, material: Option<&Material>) -> Option<Criteria> {
     let table = value.table(format!("erosion of \"{part}\""))?;
     let strain = |key| table.get(key).and_then(|v| v.number(STRAIN));
+    let stress = |key| table.get(key).and_then(|v| v.number(Range::Positive));
     let mut criteria = Criteria {
         geometric_strain: strain("geometric_strain"),
         incremental_strain: strain("incremental_strain"),
         plastic_strain: strain("plastic_strain"),
         failure: table.get("failure").and_then(|v| v.boolean()).unwrap_or(false),
+        shear_strain: strain("shear_strain"),
+        principal_strain: strain("principal_strain"),
+        compressive_strain: strain("compressive_strain"),
+        expansion: strain("expansion"),
+        compaction: strain("compaction"),
+        pressure: stress("pressure"),
+        tension: stress("tension"),
+        principal_stress: stress("principal_stress"),
+        von_mises: stress("von_mises"),
         time_step: table.get("time_step").and_then(|v| v.number(Range::Positive)),
     };
     if let Some(material) = material {
@@ -32,6 +42,16 @@ pub(super) fn read_criteria(value: Value<'_>, part: &str, material: Option<&Mate
                 "a material whose strength law yields",
                 "give the material such a strength, or erode by geometric_strain",
             );
+        }
+        for key in ["principal_stress", "von_mises"] {
+            if let Some(value) = table.get(key)
+                && material.shear() == 0.0
+            {
+                value.fault(
+                    "a material with shear stiffness",
+                    "give the material a strength, or erode by pressure or tension",
+                );
+            }
         }
         if let Some(value) = table.get("failure")
             && criteria.failure

@@ -28,6 +28,8 @@ pub(super) struct ContactCard {
     /// None where the first meets itself.
     pub(super) second: Option<Side>,
     pub(super) friction: f64,
+    /// Whether it follows the surface that erosion leaves.
+    pub(super) erodes: bool,
 }
 
 impl ContactCard {
@@ -60,6 +62,12 @@ impl ContactCard {
                 return None;
             }
         };
+        let mut erodes = word.starts_with("ERODING");
+        if erodes {
+            // The card of an eroding contact is its fourth.
+            let card = block.card(extra + 3);
+            erodes = context.fields(&card, block.width, &TENS).integer(1) != 0;
+        }
         let cards = [block.card(extra), block.card(extra + 1)];
         let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
         for i in [4, 5].into_iter().filter(|i| f.integer(*i) != 0) {
@@ -96,7 +104,7 @@ impl ContactCard {
         }
         let second = if single { None } else { Some(side(1)?) };
         let friction = if decays { moving } else { fixed };
-        Some(Self { at: f.at, first: side(0)?, second, friction })
+        Some(Self { at: f.at, first: side(0)?, second, friction, erodes })
     }
 
     /// Pairs of parts that meet, lower number first, in order.

@@ -17,6 +17,8 @@ pub(super) struct ControlCards {
     pub(super) viscosity: Option<(Place, [f64; 2])>,
     /// Kind and coefficient of hourglass control.
     pub(super) hourglass: Option<(Place, i64, f64)>,
+    /// Whether nodes without elements stay in the run.
+    pub(super) freed_nodes: Option<(Place, bool)>,
     pub(super) period: Option<(Place, f64)>,
     /// Nodes and sets of nodes whose motion is to be written.
     pub(super) gauges: Vec<(Place, u32)>,
@@ -56,6 +58,12 @@ impl ControlCards {
                 if f.real(4, 0.0) != 0.0 {
                     log.warn(card.at, "DT2MS: no mass is added; small elements rule the time step");
                 }
+                if f.integer(6) != 0 {
+                    log.warn(
+                        card.at,
+                        "ERODE: elements leave by the criteria of their materials, not by DTMIN",
+                    );
+                }
                 if f.integer(5) != 0 {
                     log.warn(card.at, "LCTM: the time step is not bounded by a curve");
                 }
@@ -72,6 +80,18 @@ impl ControlCards {
                 }
             }
             "CONTROL_HOURGLASS" => self.hourglass = Some((card.at, f.integer(0), f.real(1, 0.0))),
+            "CONTROL_CONTACT" => {
+                match f.integer(7) {
+                    0 => self.freed_nodes = Some((card.at, false)),
+                    1 | 2 => self.freed_nodes = Some((card.at, true)),
+                    _ => f.fault(
+                        7,
+                        "ENMASS 0, 1 or 2",
+                        "leave it blank, or say 1 to keep the mass of freed nodes",
+                    ),
+                }
+                log.ignore(block.at, "CONTROL_CONTACT");
+            }
             // The energies that it switches on are always reckoned.
             "CONTROL_ENERGY" => {}
             "CONTROL_DYNAMIC_RELAXATION" => {

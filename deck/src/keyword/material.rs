@@ -2,6 +2,7 @@
 
 use super::{
     cards::Block,
+    erosion::{self, Limits},
     fields::{Context, TENS},
     log::{Log, Place},
     problem::{CurveCard, Problem},
@@ -15,8 +16,8 @@ pub(super) struct MaterialCard {
     /// Young's modulus and Poisson's ratio; none where an equation of state stands for them.
     pub(super) elastic: Option<(f64, f64)>,
     pub(super) law: Law,
-    /// Plastic strain at which elements are taken out.
-    pub(super) failure_strain: Option<f64>,
+    /// When elements leave by its own card.
+    pub(super) erosion: Limits,
 }
 
 /// The law of a material.
@@ -90,11 +91,12 @@ impl Problem {
         let f: [_; 8] = std::array::from_fn(|i| context.fields(&cards[i], block.width, &TENS));
         let id = f[0].id(0);
         if word == "MAT_ADD_EROSION" {
-            self.erosions.insert(id, block.at);
+            let (id, limits) = erosion::read(block, context);
+            self.erosions.entry(id).or_default().merge(&limits);
             return;
         }
         let density = f[0].positive(1, "a density");
-        let mut failure_strain = None;
+        let mut limits = Limits::default();
         let moduli = |i: usize| {
             let (young, poisson) = (f[0].positive(i, "Young's modulus"), f[0].real(i + 1, 0.0));
             if !(-1.0 < poisson && poisson < 0.5) {
@@ -129,7 +131,7 @@ impl Problem {
                         "VP: the rate of the whole deviatoric strain is used, as with VP 0",
                     );
                 }
-                failure_strain = Some((1, 2));
+                limits.read_failure_strain(&f[1], 2);
                 let yield_stress = f[0].positive(4, "a yield stress");
                 let tangent = f[0].real(5, 0.0);
                 (
@@ -138,9 +140,7 @@ impl Problem {
                 )
             }
             "MAT_PIECEWISE_LINEAR_PLASTICITY" => {
-                if f[0].real(7, 0.0) != 0.0 {
-                    f[0].fault(7, "no step at which elements fail", "leave TDEL blank");
-                }
+                limits.read_time_step(&f[0], 7);
                 if f[1].integer(3) != 0 {
                     f[1].fault(3, "no curve for the rate", "use C and P, Cowper and Symonds");
                 }
@@ -150,7 +150,7 @@ impl Problem {
                         "VP: the rate of the whole deviatoric strain is used, as with VP 0",
                     );
                 }
-                failure_strain = Some((0, 6));
+                limits.read_failure_strain(&f[0], 6);
                 let curve = f[1].integer(2);
                 let points: Vec<[f64; 2]> = (0..8)
                     .map(|i| [f[2].real(i, 0.0), f[3].real(i, 0.0)])
@@ -180,7 +180,7 @@ impl Problem {
                 {
                     f[1].fault(i, "no bound of the stress", "leave SIGMAX and SIGSAT blank");
                 }
-                failure_strain = Some((1, 4));
+                limits.read_failure_strain(&f[1], 4);
                 let elastic = moduli(2);
                 let (a, n) = (f[1].positive(0, "A"), f[1].real(2, 0.0));
                 let law = elastic.zip(a).map(|((young, poisson), a)| Law::JohnsonCook {
@@ -195,7 +195,14 @@ impl Problem {
                 });
                 (elastic, law)
             }
-            "MAT_JOHNSON_COOK" => (None, self.johnson_cook(&f, &mut needs_moduli)),
+            "MAT_JOHNSON_COOK" => {
+                let law = self.johnson_cook(&f, &mut needs_moduli);
+                // EROD other than 0 keeps broken elements in the mesh, without shear stress.
+                if matches!(&law, Some(Law::JohnsonCook { damage: Some(_), .. })) && f[3].integer(2) == 0 {
+                    limits.by_failure(cards[2].at);
+                }
+                (None, law)
+            }
             "MAT_NULL" => {
                 needs_moduli = false;
                 let cut_off = f[0].real(2, 0.0);
@@ -226,14 +233,11 @@ impl Problem {
                 return;
             }
         };
-        let failure_strain = failure_strain
-            .map(|(card, i): (usize, usize)| f[card].real(i, 0.0))
-            .filter(|e| *e > 0.0 && *e < 1e15);
         let (Some(density), Some(law)) = (density, law) else { return };
         if elastic.is_none() && needs_moduli {
             return;
         }
-        let card = MaterialCard { at: cards[0].at, density, elastic, law, failure_strain };
+        let card = MaterialCard { at: cards[0].at, density, elastic, law, erosion: limits };
         if let Some(first) = self.materials.insert(id, card) {
             f[0].fault(
                 0,

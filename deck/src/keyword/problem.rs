@@ -10,6 +10,7 @@ use super::{
     condition::Conditions,
     contact::ContactCard,
     control::ControlCards,
+    erosion::Limits,
     fields::{Context, EIGHTS, TENS},
     log::{Log, Place},
     material::{EosCard, MaterialCard},
@@ -97,8 +98,8 @@ pub(super) struct Problem {
     pub(super) sections: BTreeMap<u32, (Place, Section)>,
     pub(super) materials: BTreeMap<u32, MaterialCard>,
     pub(super) equations: BTreeMap<u32, EosCard>,
-    /// Where `*MAT_ADD_EROSION` names each material.
-    pub(super) erosions: BTreeMap<u32, Place>,
+    /// What `*MAT_ADD_EROSION` says of each material.
+    pub(super) erosions: BTreeMap<u32, Limits>,
     pub(super) hourglasses: BTreeMap<u32, Hourglass>,
     pub(super) sets: Sets,
     pub(super) curves: BTreeMap<u32, CurveCard>,

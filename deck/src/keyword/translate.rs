@@ -1,6 +1,7 @@
 //! A deck by its numbers, put into the words of a TOML deck and a mesh file.
 
 mod conditions;
+mod eroded;
 mod motion;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -380,17 +381,6 @@ impl Translation<'_> {
                 );
                 continue;
             }
-            if let Some(strain) = material.failure_strain {
-                log.fault(
-                    at,
-                    format!("a failure strain of {strain}"),
-                    "no erosion, which is not computed",
-                    "leave it blank",
-                );
-            }
-            if let Some(erosion) = problem.erosions.get(&part.material) {
-                log.fault(*erosion, "*MAT_ADD_EROSION", "no erosion, which is not computed", "take it out");
-            }
             let curve_of = |id: u32| {
                 let curve = problem.curves.get(&id);
                 if curve.is_none() {
@@ -446,6 +436,9 @@ impl Translation<'_> {
                     format!("shell = {{ thickness = {thickness:?}, points = {points}, rule = \"{rule}\" }}");
                 self.draft.line(at, words);
             }
+            if let Some((at, words)) = self.erosion_of(part.material) {
+                self.draft.line(at, format!("erosion = {words}"));
+            }
             let (file, body) = (quoted(self.mesh_name), format!("part {id}"));
             self.draft.line(at, format!("mesh = {{ file = {file}, body = \"{body}\" }}"));
         }
@@ -468,6 +461,7 @@ impl Translation<'_> {
         else {
             return;
         };
+        self.freed_nodes();
         self.draft.heading(at, "[contact]");
         self.draft.line(at, "gap_fraction = \"fit\"");
         self.draft.line(at, "default_interacts = false");

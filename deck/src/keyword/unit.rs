@@ -106,7 +106,7 @@ pub(super) fn choose<'m>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::keyword::material::Law;
+    use crate::keyword::{erosion::Limits, material::Law};
 
     fn chosen(asked: Option<&str>, density: f64, young: f64) -> (&'static str, usize) {
         let log = Log::new(vec!["a.k".to_string()]);
@@ -115,7 +115,7 @@ mod tests {
             density,
             elastic: Some((young, 0.3)),
             law: Law::Elastic,
-            failure_strain: None,
+            erosion: Limits::default(),
         };
         let name = choose(asked, std::iter::once(&steel), &log);
         let (faults, warnings) = log.into_lists();

@@ -24,8 +24,10 @@ use crate::{
     state::field,
 };
 
+mod limits;
 mod scan;
 
+use limits::{Shape, Stress, Volume};
 use scan::Scan;
 
 /// Limit of a geometric strain where the deck gives none.
@@ -83,6 +85,25 @@ pub struct Criteria {
     pub plastic_strain: Option<f64>,
     /// The failure law of the material: damage has reached 1.
     pub failure: bool,
+    /// Greatest logarithmic shear strain from the initial shape: half of what the greatest principal one is above the least.
+    /// An element that is turned inside out has met it, here and in the next two.
+    pub shear_strain: Option<f64>,
+    /// Greatest logarithmic principal strain from the initial shape, in tension.
+    pub principal_strain: Option<f64>,
+    /// Greatest logarithmic principal strain from the initial shape, in compression.
+    pub compressive_strain: Option<f64>,
+    /// Logarithm of the volume over the initial one.
+    pub expansion: Option<f64>,
+    /// Logarithm of the initial volume over the volume.
+    pub compaction: Option<f64>,
+    /// Pressure, without artificial viscosity (stress).
+    pub pressure: Option<f64>,
+    /// Mean stress in tension: the pressure with its sign turned (stress).
+    pub tension: Option<f64>,
+    /// Greatest principal stress, in tension (stress).
+    pub principal_stress: Option<f64>,
+    /// Von Mises stress (stress).
+    pub von_mises: Option<f64>,
     /// The time step that the element allows, by the wave speed of its material at rest and with the safety factor, is below
     /// this (time).
     pub time_step: Option<f64>,
@@ -92,6 +113,11 @@ impl Criteria {
     /// Whether there is any.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Whether the shape of now is compared with the initial one.
+    fn measures_shape(&self) -> bool {
+        Shape::of(self).is_some()
     }
 }
 
@@ -149,9 +175,7 @@ impl Eroding {
             frequency: criteria.time_step.map_or(f64::INFINITY, |limit| safety_factor / limit),
             eroded: vec![ALIVE; n_slots],
             strain: vec![0.0; if criteria.incremental_strain.is_some() { n_slots } else { 0 }],
-            inverse: std::array::from_fn(|_| {
-                vec![0.0; if criteria.geometric_strain.is_some() { n_slots } else { 0 }]
-            }),
+            inverse: std::array::from_fn(|_| vec![0.0; if criteria.measures_shape() { n_slots } else { 0 }]),
             casualties: Casualties::default(),
             changed: false,
         };
@@ -165,7 +189,7 @@ impl Eroding {
             if let (Some(to), Some(from)) = (eroding.strain.get_mut(slot), state.strain.get(e)) {
                 *to = *from;
             }
-            if criteria.geometric_strain.is_some() && state.initial.len() == block.nodes.len() {
+            if criteria.measures_shape() && state.initial.len() == block.nodes.len() {
                 let corners = block.corners(e).map(|n| state.initial[n as usize]);
                 let axis = |a: usize| modes_of(corners.map(|x| Scalar(x[a]))).map(|mode| mode.0);
                 let [x, y, z] = [axis(0), axis(1), axis(2)];
@@ -198,7 +222,12 @@ impl Eroding {
             alive: block.alive(),
             plastic: criteria.plastic_strain.map(|limit| (block.field_slots(field::PLASTIC_STRAIN), limit)),
             damage: criteria.failure.then(|| block.field_slots(field::DAMAGE)),
-            shape: criteria.geometric_strain.map(|limit| (&*inverse, limit)),
+            stress: Stress::of(criteria).map(|limits| {
+                let fields = [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX, field::PRESSURE];
+                (fields.map(|field| block.field_slots(field)), limits)
+            }),
+            volume: Volume::of(criteria).map(|limits| (block.field_slots(field::RELATIVE_VOLUME), limits)),
+            shape: Shape::of(criteria).map(|limits| (&*inverse, limits)),
             strain: criteria.incremental_strain.map(|limit| (strain.as_mut_slice(), limit)),
             step: criteria.time_step.map(|_| (self.sound_square, self.frequency)),
             dt: step.dt,

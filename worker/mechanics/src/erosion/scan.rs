@@ -13,8 +13,11 @@ use crate::{
         vector::{Tensor, Vector},
         viscosity::{Spread, frequency},
     },
-    lanes::{Lane, SET, Width, functions::ln, scalar::Scalar},
+    lanes::{Lane, SET, Width, scalar::Scalar},
+    strength::Deviator,
 };
+
+use super::limits::{Shape, Stress, Volume};
 
 /// What the pass goes by. State arrays are by slot.
 pub(super) struct Scan<'a> {
@@ -27,8 +30,12 @@ pub(super) struct Scan<'a> {
     pub plastic: Option<(&'a [f64], f64)>,
     /// Damage, if failed elements erode.
     pub damage: Option<&'a [f64]>,
-    /// Inverse of the Jacobian at time zero by rows, and the limit of the instantaneous strain.
-    pub shape: Option<(&'a [Vec<f64>; 9], f64)>,
+    /// Deviatoric stress xx, yy, xy, yz, zx and pressure, and their limits.
+    pub stress: Option<([&'a [f64]; 6], Stress)>,
+    /// Volume over initial volume, and its limits.
+    pub volume: Option<(&'a [f64], Volume)>,
+    /// Inverse of the Jacobian at time zero by rows, and the limits of the instantaneous strain.
+    pub shape: Option<(&'a [Vec<f64>; 9], Shape)>,
     /// Incremental strain and its limit.
     pub strain: Option<(&'a mut [f64], f64)>,
     /// Square of the sound speed, and the frequency above which an element erodes.
@@ -51,6 +58,11 @@ pub(super) fn run(scan: &mut Scan<'_>, sets: &[Range<u32>], reach: usize, width:
         "plastic strain of {n_slots} slots"
     );
     assert!(scan.damage.is_none_or(|values| values.len() >= n_slots), "damage of {n_slots} slots");
+    assert!(
+        scan.stress.is_none_or(|(fields, _)| fields.iter().all(|values| values.len() >= n_slots)),
+        "stress of {n_slots} slots"
+    );
+    assert!(scan.volume.is_none_or(|(values, _)| values.len() >= n_slots), "volumes of {n_slots} slots");
     assert!(
         scan.shape.is_none_or(|(rows, _)| rows.iter().all(|row| row.len() >= n_slots)),
         "initial shapes of {n_slots} slots"
@@ -144,6 +156,15 @@ unsafe fn slots<L: Lane>(scan: &mut Scan<'_>, slot: usize, alive: L::Mask) -> u3
         // SAFETY: as above.
         bits |= L::bits(L::splat(1.0).less_equal(unsafe { L::load(damage, slot) }));
     }
+    if let Some((fields, limits)) = &scan.stress {
+        // SAFETY: as above.
+        let [xx, yy, xy, yz, zx, pressure] = fields.map(|field| unsafe { L::load(field, slot) });
+        bits |= limits.met(&Deviator { xx, yy, zz: -(xx + yy), xy, yz, zx }, pressure);
+    }
+    if let Some((relative, limits)) = &scan.volume {
+        // SAFETY: as above.
+        bits |= limits.met(unsafe { L::load(relative, slot) });
+    }
     if scan.shape.is_none() && scan.strain.is_none() && scan.step.is_none() {
         return bits & L::bits(alive);
     }
@@ -168,7 +189,7 @@ unsafe fn slots<L: Lane>(scan: &mut Scan<'_>, slot: usize, alive: L::Mask) -> u3
             }
         }
     }
-    if let Some((rows, limit)) = scan.shape {
+    if let Some((rows, limits)) = scan.shape {
         // SAFETY: as above.
         let row = |i: usize| unsafe {
             Vector {
@@ -178,7 +199,7 @@ unsafe fn slots<L: Lane>(scan: &mut Scan<'_>, slot: usize, alive: L::Mask) -> u3
             }
         };
         let gradient = Tensor::outer(&x.a, &row(0)).outer_add(&x.b, &row(3)).outer_add(&x.c, &row(6));
-        bits |= L::bits(beyond(&gradient, limit));
+        bits |= L::bits(limits.met(&gradient));
     }
     if let Some((sound_square, most)) = scan.step {
         let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
@@ -216,87 +237,4 @@ fn effective<L: Lane>(gradient: &Tensor<L>) -> L {
         gradient.x.x.mul_add(gradient.x.x, gradient.y.y.mul_add(gradient.y.y, gradient.z.z * gradient.z.z));
     let across = xy.mul_add(xy, yz.mul_add(yz, zx * zx));
     (L::splat(2.0 / 3.0) * L::splat(0.5).mul_add(across, straight)).sqrt()
-}
-
-/// Lanes whose deformation gradient F turns the element inside out or stretches it to a logarithmic strain h with
-/// `sqrt(2/3 h:h)` of the limit or more.
-///
-/// No stretch is above `sqrt(tr C)`, `C = F^T F`, nor below `det F / sqrt(tr cof C)`; most elements are far below the limit by
-/// these bounds, for `sqrt(2/3 h:h)` is at most `sqrt(2)` times the greatest magnitude of h.
-#[inline(always)]
-fn beyond<L: Lane>(f: &Tensor<L>, limit: f64) -> L::Mask {
-    let (zero, one) = (L::splat(0.0), L::splat(1.0));
-    let cofactor = [f.y.cross(&f.z), f.z.cross(&f.x), f.x.cross(&f.y)];
-    let determinant = f.x.dot(&cofactor[0]);
-    let square = determinant * determinant;
-    let stretch = Spread::gram([&f.x, &f.y, &f.z]);
-    let shrink = Spread::gram([&cofactor[0], &cofactor[1], &cofactor[2]]);
-    let most = L::splat((std::f64::consts::SQRT_2 * limit).exp());
-    let within = L::both(stretch.trace().less(most), shrink.trace().less(most * square));
-    let upright = zero.less(determinant);
-    let whole = L::both(within, upright);
-    if !L::any(not::<L>(whole)) {
-        return L::mask(0);
-    }
-    // Of those that are inside out the logarithms mean nothing.
-    let largest = L::select(upright, stretch.largest_eigenvalue(), one);
-    let two_largest = L::select(upright, shrink.largest_eigenvalue(), one);
-    let logarithm = |eigenvalue: L| ln(eigenvalue.max(L::splat(f64::MIN_POSITIVE)));
-    let (of_square, of_largest, of_two) =
-        (logarithm(L::select(upright, square, one)), logarithm(largest), logarithm(two_largest));
-    let (first, second, third) = (of_largest, of_two - of_largest, of_square - of_two);
-    let sum = first.mul_add(first, second.mul_add(second, third * third));
-    // Logarithms of squared stretches are twice the strains.
-    let met = L::splat(limit * limit).less_equal(L::splat(1.0 / 6.0) * sum);
-    L::mask(L::bits(met) | !L::bits(upright))
-}
-
-/// The lanes that a mask leaves out.
-#[inline(always)]
-fn not<L: Lane>(mask: L::Mask) -> L::Mask {
-    L::mask(!L::bits(mask) & ((1 << L::N) - 1))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Whether a deformation gradient, by rows, is beyond a limit.
-    fn erodes(f: [[f64; 3]; 3], limit: f64) -> bool {
-        let [x, y, z] = f.map(|[x, y, z]| Vector { x: Scalar(x), y: Scalar(y), z: Scalar(z) });
-        Scalar::bits(beyond(&Tensor { x, y, z }, limit)) & 1 == 1
-    }
-
-    #[test]
-    fn a_bar_drawn_out_at_constant_volume_has_the_logarithm_of_its_length_as_strain() {
-        for length in [0.2_f64, 0.5, 1.5, 4.0, 20.0] {
-            let thin = 1.0 / length.sqrt();
-            let f = [[length, 0.0, 0.0], [0.0, thin, 0.0], [0.0, 0.0, thin]];
-            let strain = length.ln().abs();
-            assert!(erodes(f, strain * (1.0 - 1e-9)) && !erodes(f, strain * (1.0 + 1e-9)), "{length}");
-        }
-    }
-
-    #[test]
-    fn strain_is_that_of_the_singular_values_and_turning_adds_none() {
-        let mut seed = 0x1234_5678_9abc_def1_u64;
-        let mut draw = || {
-            seed ^= seed << 13;
-            seed ^= seed >> 7;
-            seed ^= seed << 17;
-            seed as f64 / u64::MAX as f64 - 0.5
-        };
-        for _ in 0..500 {
-            let m = nalgebra::Matrix3::from_fn(|r, c| f64::from(u8::from(r == c)) + 1.2 * draw());
-            let rows = [0, 1, 2].map(|r| [m[(r, 0)], m[(r, 1)], m[(r, 2)]]);
-            if m.determinant() <= 0.0 {
-                assert!(erodes(rows, 50.0), "an element inside out erodes at any limit");
-                continue;
-            }
-            let logarithms = m.singular_values().map(f64::ln);
-            let strain = (2.0 / 3.0 * logarithms.norm_squared()).sqrt();
-            assert!(erodes(rows, strain * (1.0 - 1e-7)), "{strain}: {m}");
-            assert!(!erodes(rows, strain * (1.0 + 1e-7)), "{strain}: {m}");
-        }
-    }
 }

@@ -4,7 +4,21 @@
 //! minors tell (Sylvester's criterion) without a root of the cubic. There is no damage before failure.
 
 use super::{FailureLaw, Loading};
-use crate::lanes::Lane;
+use crate::{lanes::Lane, strength::Deviator};
+
+/// Lanes in which every principal stress of the deviator `s` and the pressure is below `limit`.
+#[inline(always)]
+pub(crate) fn below<L: Lane>(s: &Deviator<L>, pressure: L, limit: f64) -> L::Mask {
+    let zero = L::splat(0.0);
+    let left = L::splat(limit) + pressure;
+    let (xx, yy, zz) = (left - s.xx, left - s.yy, left - s.zz);
+    let minor = s.xy.neg_mul_add(s.xy, xx * yy);
+    // Along the last row; the off-diagonal entries are -xy, -yz and -zx.
+    let by_zx = s.yz.mul_add(s.xy, yy * s.zx);
+    let by_yz = s.xy.mul_add(s.zx, xx * s.yz);
+    let determinant = by_yz.neg_mul_add(s.yz, by_zx.neg_mul_add(s.zx, minor * zz));
+    L::both(zero.less(xx), L::both(zero.less(minor), zero.less(determinant)))
+}
 
 /// The limit.
 #[derive(Clone, Copy)]
@@ -18,24 +32,15 @@ impl FailureLaw for PrincipalStress {
 
     #[inline(always)]
     fn damage<L: Lane>(&self, damage: L, loading: &Loading<L>) -> L {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let s = &loading.stress;
-        let left = L::splat(self.tension) + loading.pressure;
-        let (xx, yy, zz) = (left - s.xx, left - s.yy, left - s.zz);
-        let minor = s.xy.neg_mul_add(s.xy, xx * yy);
-        // Along the last row; the off-diagonal entries are -xy, -yz and -zx.
-        let by_zx = s.yz.mul_add(s.xy, yy * s.zx);
-        let by_yz = s.xy.mul_add(s.zx, xx * s.yz);
-        let determinant = by_yz.neg_mul_add(s.yz, by_zx.neg_mul_add(s.zx, minor * zz));
-        let whole = L::both(zero.less(xx), L::both(zero.less(minor), zero.less(determinant)));
-        L::select(whole, damage, one)
+        let whole = below(&loading.stress, loading.pressure, self.tension);
+        L::select(whole, damage, L::splat(1.0))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{failure::uniaxial, lanes::scalar::Scalar, strength::Deviator};
+    use crate::{failure::uniaxial, lanes::scalar::Scalar};
     use nalgebra::{Matrix3, Rotation3, Vector3};
 
     #[test]
