@@ -10,6 +10,7 @@ use deck::{
 };
 use mechanics::{
     element::shell4::Rule,
+    erosion::Criteria,
     load::Drive,
     material::Strength,
     mesh::{Section, Topology},
@@ -178,6 +179,106 @@ fn bar_on_wall_runs_the_case_that_is_chosen() {
 }
 
 #[test]
+fn punch_through_plate_erodes_by_failure_strain_and_mat_add_erosion_and_drops_freed_nodes() {
+    let Reading { model, warnings } = example("punch-through-plate.k", None);
+    assert_eq!(
+        (model.mesh.n_elements(), model.mesh.n_nodes()),
+        (4 * 2 * 8 + 14 * 7 * 3, 5 * 3 * 9 + 15 * 8 * 4)
+    );
+    let none = Criteria::default();
+    let punch = Criteria { plastic_strain: Some(0.8), ..none };
+    let plate = Criteria { plastic_strain: Some(0.7), tension: Some(0.08), shear_strain: Some(0.9), ..none };
+    assert_eq!(model.setup.erosion.parts, [Some(punch), Some(plate)]);
+    assert!(!model.setup.erosion.retain_inertia);
+    assert!(model.setup.contact.is_some());
+    let words: Vec<&str> = warnings.iter().map(|w| w.words.as_str()).collect();
+    assert_eq!(words, ["ignored, nothing here depends on it: *CONTROL_CONTACT (line 7)"]);
+    // ENMASS 1 keeps them.
+    let text = gathered(&folder("examples"), "punch-through-plate.k", &Options::default());
+    let blank = format!("{:>10}{:>70}", "1.0", "0");
+    assert!(text.contains(&blank), "the card of *CONTROL_CONTACT");
+    let kept =
+        read(&text.replace(&blank, &format!("{:>10}{:>70}", "1.0", "1"))).expect("it is the same deck");
+    assert!(kept.setup.erosion.retain_inertia);
+    // A contact that does not erode follows the surface all the same, and says so.
+    let plain = text.replace("*CONTACT_ERODING_SURFACE_TO_SURFACE", "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE");
+    let warnings = deck::read_whole(&plain, "a.k").unwrap_or_else(|f| panic!("{}", lines(&f))).warnings;
+    assert!(
+        warnings.iter().any(|w| w.words.contains("as in an ERODING contact with EROSOP 1")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn each_field_of_mat_add_erosion_is_its_criterion() {
+    let none = Criteria::default();
+    // Fields of the first two cards in their order.
+    let cases: [(&str, &str, Criteria); 13] = [
+        (",0.5", "", Criteria { pressure: Some(0.5), ..none }),
+        (",,-0.5", "", Criteria { compressive_strain: Some(0.5), ..none }),
+        (",,,0.5", "", Criteria { geometric_strain: Some(0.5), ..none }),
+        (",,,,0.5", "", Criteria { expansion: Some(0.5), ..none }),
+        (",,,,-0.5", "", Criteria { compaction: Some(0.5), ..none }),
+        ("", "-0.5", Criteria { tension: Some(0.5), ..none }),
+        ("", ",0.5", Criteria { principal_stress: Some(0.5), ..none }),
+        ("", ",,0.5", Criteria { von_mises: Some(0.5), ..none }),
+        ("", ",,,0.5", Criteria { principal_strain: Some(0.5), ..none }),
+        ("", ",,,,0.5", Criteria { shear_strain: Some(0.5), ..none }),
+        (",,,,,1,1", ",,,,0.5", Criteria { shear_strain: Some(0.5), ..none }),
+        (",7,,7", ",,7,,0.5", Criteria { shear_strain: Some(0.5), ..none }),
+        (
+            "",
+            ",0.25,,,0.5\n\n\n,,,1e-7",
+            Criteria { principal_stress: Some(0.25), shear_strain: Some(0.5), time_step: Some(1e-7), ..none },
+        ),
+    ];
+    for (first, second, expected) in cases {
+        // EXCL 7 takes out what is 7.
+        let excluded = if first.contains('7') { "7" } else { "" };
+        let model = good(&format!("*MAT_ADD_EROSION\n1,{excluded}{first}\n{second}\n"));
+        assert_eq!(model.setup.erosion.parts, [Some(expected)], "{first} / {second}");
+    }
+    // Without contact nodes stay; of two limits the lower counts; without any nothing erodes.
+    let twice = good("*MAT_ADD_EROSION\n1,,0.5\n*MAT_ADD_EROSION\n1,,0.4\n-0.1\n");
+    assert_eq!(
+        twice.setup.erosion.parts,
+        [Some(Criteria { pressure: Some(0.4), tension: Some(0.1), ..none })]
+    );
+    assert!(twice.setup.erosion.retain_inertia);
+    assert!(!good("*MAT_ADD_EROSION\n1\n").setup.erosion.is_on());
+}
+
+#[test]
+fn materials_with_a_failure_strain_a_failure_law_or_a_least_step_erode_by_it() {
+    let of = |card: &str| {
+        let deck = cube("").replace("*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n", card);
+        assert!(deck.contains(card));
+        read(&deck).unwrap_or_else(|f| panic!("{}", lines(&f))).setup
+    };
+    let none = Criteria::default();
+    let strain = Criteria { plastic_strain: Some(0.8), ..none };
+    assert_eq!(of("*MAT_003\n1,7.85e-9,2.1e5,0.3,300.\n,,0.8\n").erosion.parts, [Some(strain)]);
+    let both = Criteria { time_step: Some(1e-8), ..strain };
+    assert_eq!(of("*MAT_024\n1,7.85e-9,2.1e5,0.3,300.,,0.8,1e-8\n").erosion.parts, [Some(both)]);
+    assert_eq!(of("*MAT_098\n1,7.85e-9,2.1e5,0.3\n300.,200.,0.3,0.01,0.8\n").erosion.parts, [Some(strain)]);
+    assert!(!of("*MAT_024\n1,7.85e-9,2.1e5,0.3,300.,,1e21\n").erosion.is_on());
+    // Johnson and Cook: D1 to D5, and EROD in the card of D5.
+    let cook = |last: &str| {
+        let deck = cube(&format!("*EOS_GRUNEISEN\n1,3.9e6,1.49,,,2.0\n"))
+            .replace("\n1,1,1\n", "\n1,1,1,1\n")
+            .replace(
+                "*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n",
+                &format!(
+                    "*MAT_JOHNSON_COOK\n1,7.85e-9,8e4\n300.,200.,0.3,0.01\n,,,,0.1,0.2,-1.5,0.0\n{last}\n"
+                ),
+            );
+        read(&deck).unwrap_or_else(|f| panic!("{}", lines(&f))).setup
+    };
+    assert_eq!(cook("0.0").erosion.parts, [Some(Criteria { failure: true, ..none })]);
+    assert!(!cook("0.0,0.0,1").erosion.is_on(), "EROD 1 keeps broken elements");
+}
+
+#[test]
 fn a_converted_deck_is_the_same_problem() {
     for (name, case) in [("block-on-plate.k", None), ("bar-on-wall.k", Some(102)), ("ball-on-shell.k", None)]
     {
@@ -287,8 +388,21 @@ fn a_wall_stops_the_nodes_that_it_names() {
 #[test]
 fn what_cannot_be_honoured_is_refused_where_it_stands() {
     let refused = [
+        ("*MAT_ADD_EROSION\n1,,-0.5\n", "a.k:23:4: read -0.5; expected MXPRES above 0"),
+        ("*MAT_ADD_EROSION\n1,,,,-0.5\n", "a.k:23:1: read plastic_strain of erosion"),
+        ("*MAT_ADD_EROSION\n1\n,,,,,1.0,2.0\n", "a.k:24:6: read 1.0; expected SIGTH blank: the impulse"),
+        (
+            "*MAT_ADD_EROSION\n1\n,,,,,,,3.0\n",
+            "a.k:24:8: read 3.0; expected FAILTM blank: elements do not leave",
+        ),
+        ("*MAT_ADD_EROSION\n1\n\n1\n", "a.k:25:1: read 1; expected IDAM blank: damage models"),
+        ("*MAT_ADD_EROSION\n1,,1.0,,,,,2\n", "a.k:23:13: read 2; expected NCS 0 or 1"),
+        (
+            "*MAT_PLASTIC_KINEMATIC\n2,7.85e-9,2.1e5,0.3,300.\n,,-0.8\n",
+            "a.k:24:3: read -0.8; expected a failure strain of 0 or above",
+        ),
+        ("*CONTROL_CONTACT\n,,,,,,,3\n", "a.k:23:8: read 3; expected ENMASS 0, 1 or 2"),
         ("*DEFORMABLE_TO_RIGID\n1\n", "a.k:22:1: read *DEFORMABLE_TO_RIGID; expected parts that deform"),
-        ("*MAT_ADD_EROSION\n1\n", "a.k:22:1: read *MAT_ADD_EROSION; expected no erosion"),
         (
             "*INITIAL_VELOCITY_RIGID_BODY\n1,1.0\n",
             "a.k:22:1: read *INITIAL_VELOCITY_RIGID_BODY; expected a keyword",

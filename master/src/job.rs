@@ -39,7 +39,7 @@ use crate::{
     sort::{Sorted, Sorter},
 };
 use epoch::{Acting, Base, Epoch, Member, SortUnderWay, Step};
-pub(crate) use erosion::surface_of;
+pub use erosion::surface_of;
 use measure::{Patience, Proposal};
 use start::Touching;
 use stop::not_a_number;

@@ -353,6 +353,87 @@ fn a_host_that_drops_to_half_speed_and_comes_back_is_followed_within_two_boundar
     }
 }
 
+/// A bar whose lower half is pressed together all at once until its elements leave for their time step.
+fn half_a_bar_erodes() -> Model {
+    let mut model = deck::read(
+        r#"
+        title = "half a bar erodes"
+        units = "cm-g-us"
+        [control]
+        end_time = 1e3
+        end_cycle = 200
+        plan_interval = 20
+        [[part]]
+        name = "bar"
+        material = "STEEL_1006"
+        box = { origin = [0, 0, 0], size = [32, 8, 8], cells = [32, 8, 8] }
+        erosion = { compressive_strain = 0.1 }
+        [output]
+        history_cycles = 1
+        "#,
+        "deck",
+    )
+    .unwrap_or_else(|faults| panic!("{}", faults[0]));
+    for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
+        v[0] = -0.012 * x[0].min(16.0);
+    }
+    model
+}
+
+#[test]
+fn elements_lost_to_erosion_are_followed_within_two_boundaries() {
+    let model = Arc::new(half_a_bar_erodes());
+    let (job, first) = Job::new(
+        Arc::clone(&model),
+        &[Hand { name: "worker".into(), speed: 1.0, threads: 1 }],
+        Options::default(),
+        None,
+    )
+    .expect("the deck starts");
+    let (outcome, _) =
+        embedded::run(job, first, 1, 1, &mut Nowhere, &AtomicBool::new(false)).expect("the deck runs");
+    let state = outcome.state.expect("the worker gives it");
+    let mut cycles: Vec<u64> =
+        state.eroded.iter().copied().filter(|&c| c != mechanics::erosion::ALIVE).collect();
+    cycles.sort_unstable();
+    let n = model.mesh.n_elements();
+    let (from, to) = (cycles[cycles.len() / 20], cycles[cycles.len() * 19 / 20]);
+    println!(
+        "{} of {n} eroded, most from cycle {from} to {to}, the last in {:?}",
+        cycles.len(),
+        cycles.last()
+    );
+    assert!((n / 4..n * 3 / 4).contains(&cycles.len()), "{} of {n}", cycles.len());
+    assert!(from > 25 && to < 120, "{from} to {to}");
+    for route in [Route::Direct, Route::Master] {
+        let measured = Scheme { balance: Balance::Measured, ..Scheme::bolide(route) };
+        let given = run(&model, &eight(Vec::new()), Scheme::bolide(route));
+        let followed = run(&model, &eight(Vec::new()), measured);
+        assert_eq!((&followed.digest, &given.digest), (&outcome.digest, &outcome.digest), "{route:?}");
+        let alone = run(
+            &model,
+            &Machines { speeds: vec![1.0], believed: vec![1.0], ..eight(Vec::new()) },
+            Scheme::bolide(route),
+        );
+        let window = |from: u64, to: u64, timeline: &Timeline| {
+            let alone = (alone.reached(to) - alone.reached(from)) / (to - from) as f64;
+            over_the_bound(timeline, from..to, 8.0, alone)
+        };
+        let at: Vec<u64> = followed.rebalances.iter().map(|r| r.cycle).collect();
+        // The second boundary after most have gone.
+        let settled = (to / 20 + 2) * 20;
+        let figures = [
+            window(5, from, &followed),
+            window(settled + 1, 198, &followed),
+            window(settled + 1, 198, &given),
+        ];
+        println!("{route:?}: rebalanced at {at:?}; time over the bound {figures:.3?}");
+        assert!(at.iter().all(|&cycle| (from..=settled).contains(&cycle)) && !at.is_empty(), "{at:?}");
+        assert!(figures[1] <= 1.0 / 0.95, "{route:?}: {figures:?}");
+        assert!(figures[2] > 1.5, "{route:?}: without it some hosts have nothing to do: {figures:?}");
+    }
+}
+
 #[test]
 fn hosts_that_die_stop_and_join_cost_time_and_no_bit() {
     let model = model("plates-free-slip.toml", 120);

@@ -57,6 +57,7 @@ fn numbers(row: &HistoryRow) -> Vec<u64> {
     [row.time, row.dt, row.kinetic, row.internal, row.hourglass, row.contact, row.friction]
         .into_iter()
         .chain([row.external, row.total, row.error])
+        .chain([row.eroded, row.eroded_elements as f64, row.eroded_mass])
         .chain(row.momentum)
         .chain(row.parts.iter().flat_map(|part| [part.kinetic, part.internal]))
         .chain(row.gauges.iter().flat_map(|gauge| gauge.x.into_iter().chain(gauge.v)))

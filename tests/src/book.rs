@@ -7,6 +7,7 @@
 
 mod contact;
 mod element;
+mod erosion;
 mod gas;
 mod load;
 mod shell;
@@ -62,6 +63,8 @@ macro_rules! each_case_of_the_book {
             load: a_driven_wall_pushes_as_a_bar_that_strikes_it_is_pushed quick;
             load: a_wall_gives_the_impulse_that_bodies_lack_and_rubs_after_coulomb quick;
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
+            erosion: a_rod_goes_through_a_plate_and_the_ledger_closes quick;
+            erosion: a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked quick;
             contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
             contact: struck_plates_conserve_keep_apart_and_move_together quick;
             contact: strengthless_plates_reach_the_impedance_match_on_the_axis quick;

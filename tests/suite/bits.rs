@@ -15,12 +15,12 @@ use master::{
 };
 use protocol::message::Route;
 
-fn fingerprint(model: &Model, crew: Crew) -> Fingerprint {
+pub(crate) fn fingerprint(model: &Model, crew: Crew) -> Fingerprint {
     Fingerprint::of(&solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}")))
 }
 
 /// A crew with these options.
-fn asked(workers: usize, options: Options) -> Crew {
+pub(crate) fn asked(workers: usize, options: Options) -> Crew {
     Crew { options, ..Crew::of(workers) }
 }
 
@@ -42,7 +42,7 @@ fn crews() -> Vec<(String, Crew)> {
 }
 
 /// Compares runs of a problem on all crews, with sorts forced, and over a snapshot.
-fn same_bits(model: &Model) {
+pub(crate) fn same_bits(model: &Model) {
     let cycles = model.setup.control.end_cycle;
     let alone = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
     let one = Fingerprint::of(&alone);

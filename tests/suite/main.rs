@@ -4,6 +4,7 @@
 
 mod bits;
 mod book;
+mod erosion;
 mod fuzz;
 mod seeds;
 
@@ -19,6 +20,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/shell.rs"),
         include_str!("../src/book/load.rs"),
         include_str!("../src/book/contact.rs"),
+        include_str!("../src/book/erosion.rs"),
     ]
     .concat();
     for name in tests::case::names() {

@@ -156,7 +156,7 @@ fn leaves_before(eroded: u64, cycle: u64) -> bool {
 }
 
 /// The contact surface in force in the cycle of a state, where elements have eroded; none where it is still the first.
-pub(crate) fn surface_of(model: &Model, state: &GlobalState) -> Option<Arc<Surface>> {
+pub fn surface_of(model: &Model, state: &GlobalState) -> Option<Arc<Surface>> {
     let eroded = Eroded::new(state).filter(|_| state.n_eroded() > 0)?;
     Some(eroded.surface(model, state.cycle))
 }

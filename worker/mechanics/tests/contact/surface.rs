@@ -5,7 +5,9 @@ use mechanics::{
     mesh::{Mesh, Part, Topology},
 };
 
-use crate::world::{add_block, block, deform, materials, on_surface};
+use std::collections::BTreeMap;
+
+use crate::world::{Random, add_block, block, deform, materials, on_surface};
 
 fn faces_without(gone: u32) -> usize {
     Surface::new(&block([4, 4, 4], 1.0), &materials(), &|e| e != gone).faces.len()
@@ -18,6 +20,58 @@ fn removing_an_element_of_a_block_exposes_its_neighbours() {
     assert_eq!(faces_without(1), 98, "edge: two lost, four gained");
     assert_eq!(faces_without(5), 100, "face: one lost, five gained");
     assert_eq!(faces_without(21), 102, "inside: six gained");
+}
+
+/// Faces that one living element has and no other, by their nodes: the slow way, over all elements.
+fn lone_faces(mesh: &Mesh, alive: &dyn Fn(u32) -> bool) -> Vec<[u32; 4]> {
+    let sides: [[usize; 4]; 6] =
+        [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+    let mut count: BTreeMap<[u32; 4], usize> = BTreeMap::new();
+    let mut element = 0;
+    for part in &mesh.parts {
+        for e in 0..part.n_elements() {
+            let corners = part.corners(e);
+            for side in sides.iter().filter(|_| alive(element)) {
+                let mut nodes = side.map(|c| corners[c]);
+                nodes.sort_unstable();
+                *count.entry(nodes).or_default() += 1;
+            }
+            element += 1;
+        }
+    }
+    count.into_iter().filter(|(_, n)| *n == 1).map(|(nodes, _)| nodes).collect()
+}
+
+#[test]
+fn whatever_elements_erode_the_surface_is_the_faces_that_one_living_element_has() {
+    let mut random = Random(0x2545_f491_4f6c_dd1d);
+    let structured = block([5, 4, 3], 1.0);
+    let mut joined = block([3, 3, 2], 1.0);
+    add_block(&mut joined, [3, 3, 2], [0.0, 0.0, 2.0], 1.0);
+    for i in 0..16 {
+        joined.parts[1].nodes[i] = 32 + i as u32;
+    }
+    let mut explicit = structured.clone();
+    let hexahedra: Vec<[u32; 8]> =
+        (0..explicit.parts[0].n_elements()).map(|e| explicit.parts[0].corners(e)).collect();
+    explicit.parts[0].topology = Topology::Explicit { hexahedra };
+    for mesh in [structured, joined, explicit] {
+        let n: usize = mesh.parts.iter().map(Part::n_elements).sum();
+        for round in 0..60 {
+            let share = f64::from(round) / 59.0;
+            let living: Vec<bool> = (0..n).map(|_| random.next() >= share).collect();
+            let alive = |e: u32| living[e as usize];
+            for retain_inertia in [true, false] {
+                let erodes = vec![true; mesh.parts.len()];
+                let surface = Surface::eroded(&mesh, &materials(), &alive, &erodes, retain_inertia);
+                let mut found: Vec<[u32; 4]> = surface.faces.iter().map(|face| face.nodes).collect();
+                found.iter_mut().for_each(|nodes| nodes.sort_unstable());
+                found.sort_unstable();
+                assert_eq!(found, lone_faces(&mesh, &alive), "round {round}");
+                assert!(surface.faces.iter().all(|face| alive(face.element)), "round {round}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,0 +1,64 @@
+//! Erosion: a rod goes through a plate, and what left is in the ledger.
+
+use mechanics::erosion::ALIVE;
+
+use crate::{
+    case::Sheet,
+    solve::{Solved, example, keyword, run},
+};
+
+/// Whether what an instant of a run has lost is never less than what an earlier one had.
+fn never_falls(solved: &Solved) -> bool {
+    let grows = |read: &dyn Fn(usize) -> f64| (1..solved.rows.len()).all(|i| read(i) >= read(i - 1));
+    grows(&|i| solved.rows[i].eroded_mass) && grows(&|i| solved.rows[i].eroded_elements as f64)
+}
+
+/// Mass of the elements of the whole mesh that have eroded, over that which the ledger has.
+fn mass_of_the_eroded(solved: &Solved) -> f64 {
+    let offsets = solved.model.mesh.element_offsets();
+    let mut mass = 0.0;
+    for (part, first) in solved.model.mesh.parts.iter().zip(offsets) {
+        let density = solved.model.setup.materials[part.material as usize].density;
+        for e in (first..first + part.n_elements()).filter(|&e| solved.state.eroded[e] != ALIVE) {
+            mass += density * solved.state.initial_volume[e];
+        }
+    }
+    solved.outcome.ledger.eroded_mass / mass
+}
+
+/// Tungsten of 6 mm x 24 mm through 5 mm of steel at 1200 m/s, elements out at a geometric strain of 1.5: nodes that
+/// lost all their elements fly on.
+pub(super) fn a_rod_goes_through_a_plate_and_the_ledger_closes(sheet: &mut Sheet) {
+    let mut model = example("rod-through-plate");
+    model.output.history_cycles = 10;
+    let solved = run(model);
+    let ledger = &solved.outcome.ledger;
+    assert!(never_falls(&solved), "what has eroded came back");
+    sheet.add("rod through plate: energy error", ledger.last.error);
+    sheet.add("rod through plate: momentum error", ledger.momentum_error());
+    sheet.add("rod through plate: mass of the eroded over the ledger's", mass_of_the_eroded(&solved));
+    let mass: f64 = solved.state.mass.iter().sum();
+    let first: f64 = (0..solved.model.mesh.n_elements())
+        .map(|e| {
+            let part = solved.model.mesh.element_offsets().partition_point(|&first| first <= e) - 1;
+            let material = solved.model.mesh.parts[part].material as usize;
+            solved.model.setup.materials[material].density * solved.state.initial_volume[e]
+        })
+        .sum();
+    sheet.add("rod through plate: mass of all nodes over that of all elements", mass / first);
+    let speed = -solved.part_velocity(0)[2];
+    assert!(speed < 1200.0, "{speed}");
+    sheet.add("rod through plate: deepest contact over the gap", ledger.worst_penetration);
+    let front = solved.model.mesh.parts[0].nodes.iter().map(|&n| solved.state.x[n as usize][2]);
+    assert!(front.fold(f64::INFINITY, f64::min) < -5.0, "the rod is not through");
+}
+
+/// The keyword example: a punch slantwise through a held plate; nodes without elements leave the run.
+pub(super) fn a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked(sheet: &mut Sheet) {
+    let solved = run(keyword("punch-through-plate"));
+    let ledger = &solved.outcome.ledger;
+    assert!(never_falls(&solved), "what has eroded came back");
+    assert!(ledger.eroded_momentum[2] < 0.0, "nothing was dropped: {:?}", ledger.eroded_momentum);
+    sheet.add("punch through plate: energy error", ledger.last.error);
+    sheet.add("punch through plate: mass of the eroded over the ledger's", mass_of_the_eroded(&solved));
+}

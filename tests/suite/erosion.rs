@@ -1,0 +1,383 @@
+//! Erosion in whole runs: each criterion takes out the elements that meet it and no other, the surface is that of the rest,
+//! freed nodes keep colliding or leave with what they have, and none of it changes a bit with the cut, the route, the lanes, a
+//! restart or a loss.
+
+use std::collections::BTreeMap;
+
+use deck::Model;
+use master::{
+    embedded::Fate,
+    event::{Keep, Options},
+};
+use mechanics::{
+    erosion::{ALIVE, SURFACE_LAG},
+    mesh::FACES,
+    state::{GlobalState, field},
+};
+use protocol::message::Route;
+use tests::{
+    bits::Fingerprint,
+    solve::{Crew, Solved, keyword, model, solve, solve_through},
+};
+
+use crate::bits::{asked, fingerprint, same_bits};
+
+/// Cycles of the keyword deck in which punch and plate both erode.
+const PUNCHED: u64 = 420;
+
+/// The keyword example: a punch and a plate that erode by strain, tension and shear; freed nodes leave or stay.
+fn punch(retain_inertia: bool) -> Model {
+    let mut model = keyword("punch-through-plate");
+    model.setup.control.end_cycle = PUNCHED;
+    model.output.history_cycles = 1;
+    model.setup.erosion.retain_inertia = retain_inertia;
+    model
+}
+
+/// Cycles in which anything eroded, ascending.
+fn cycles_of_erosion(state: &GlobalState) -> Vec<u64> {
+    let mut cycles: Vec<u64> = state.eroded.iter().copied().filter(|&cycle| cycle != ALIVE).collect();
+    cycles.sort_unstable();
+    cycles.dedup();
+    cycles
+}
+
+fn solved(model: &Model, crew: Crew) -> Solved {
+    solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn a_punch_that_erodes_a_plate_has_the_same_bits_on_any_crew() {
+    for retain_inertia in [false, true] {
+        let model = punch(retain_inertia);
+        let alone = solved(&model, Crew::default());
+        let of_part = |part: usize| {
+            let first = model.mesh.element_offsets()[part];
+            (first..first + model.mesh.parts[part].n_elements())
+                .filter(|&e| alone.state.eroded[e] != ALIVE)
+                .count()
+        };
+        assert!(of_part(0) > 3 && of_part(1) > 10, "{} and {} eroded", of_part(0), of_part(1));
+        same_bits(&model);
+        let one = Fingerprint::of(&alone);
+        for workers in [2, 5] {
+            let options = Options { route: Route::Direct, ..Options::default() };
+            one.assert_equal(
+                &fingerprint(&model, asked(workers, options)),
+                &format!("{workers} workers, direct"),
+            );
+        }
+    }
+}
+
+#[test]
+fn a_snapshot_while_an_element_has_eroded_and_its_faces_still_stand_changes_no_bit() {
+    let model = punch(true);
+    let alone = solved(&model, Crew::default());
+    let one = Fingerprint::of(&alone);
+    let cycles = cycles_of_erosion(&alone.state);
+    assert!(cycles.len() > 5, "{cycles:?}");
+    let eroded = cycles[cycles.len() / 2];
+    for after in 1..=SURFACE_LAG + 1 {
+        let options = Options { snapshot_at: Some(eroded + after), ..Options::default() };
+        let whole = solved(&model, asked(2, options));
+        one.assert_equal(&Fingerprint::of(&whole), &format!("a snapshot {after} cycles after"));
+        let snapshot = whole.snapshot.expect("a snapshot was asked for");
+        assert!(snapshot.state.eroded.contains(&eroded));
+        for (workers, route) in [(1, Route::Master), (3, Route::Direct)] {
+            let crew = Crew {
+                resume: Some(snapshot.clone()),
+                ..asked(workers, Options { route, ..Options::default() })
+            };
+            one.assert_equal(
+                &fingerprint(&model, crew),
+                &format!("resumed {after} cycles after on {workers}"),
+            );
+        }
+    }
+}
+
+#[test]
+fn a_worker_of_eroding_parts_that_is_lost_changes_no_bit() {
+    let model = punch(false);
+    let one = fingerprint(&model, Crew::default());
+    let mut arrivals = 0;
+    let mut count = |number: u64| {
+        arrivals = number;
+        None
+    };
+    solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
+    let mut midway = 0;
+    for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
+        let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
+        let at = arrivals * (seed as u64 + 2) / 12;
+        let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
+        let solved = solve_through(model.clone(), asked(3, options), &mut fate)
+            .unwrap_or_else(|e| panic!("{seed}: {e}"));
+        one.assert_equal(&Fingerprint::of(&solved), &format!("loss {seed}, {route:?}"));
+        assert_eq!(solved.outcome.losses.len(), 1, "{seed}");
+        midway += usize::from(solved.outcome.losses[0].back_to > 0);
+    }
+    assert!(midway >= 4, "{midway} of 8 went back to a state on the way");
+}
+
+/// A small block that strikes a plate, whose elements erode by `criterion`.
+fn struck(criterion: &str, material: &str) -> Model {
+    model(&format!(
+        r#"
+        title = "a block strikes a plate"
+        units = "cm-g-us"
+        [control]
+        end_cycle = 160
+        end_time = 1e3
+        [[material]]
+        name = "steel"
+        density = 7.9
+        eos = {{ type = "shock", c0 = 0.46, s = 1.5, gamma = 2.0 }}
+        strength = {{ type = "von-mises", shear = 0.8, yield_stress = 0.012, hardening = 0.01 }}
+        {material}
+        [[part]]
+        name = "block"
+        material = "steel"
+        velocity = [0.01, 0, -0.15]
+        box = {{ origin = [-0.5, -0.5, 0.05], size = [1, 1, 1], cells = [4, 4, 4] }}
+        [[part]]
+        name = "plate"
+        material = "steel"
+        box = {{ origin = [-1.5, -1.25, -0.75], size = [3, 2.5, 0.75], cells = [12, 10, 3] }}
+        erosion = {{ {criterion} }}
+        [contact]
+        gap_length = 0.04
+        [output]
+        history_cycles = 1
+        "#
+    ))
+}
+
+/// The deformation gradient in the middle of an element.
+fn gradient(model: &Model, state: &GlobalState, corners: [u32; 8]) -> [[f64; 3]; 3] {
+    // Corners as signs along the three natural axes.
+    const SIGNS: [[f64; 3]; 8] = [
+        [-1.0, -1.0, -1.0],
+        [1.0, -1.0, -1.0],
+        [1.0, 1.0, -1.0],
+        [-1.0, 1.0, -1.0],
+        [-1.0, -1.0, 1.0],
+        [1.0, -1.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [-1.0, 1.0, 1.0],
+    ];
+    let jacobian = |of: &[[f64; 3]]| -> [[f64; 3]; 3] {
+        [0, 1, 2].map(|row| {
+            [0, 1, 2]
+                .map(|axis| (0..8).map(|c| SIGNS[c][axis] * of[corners[c] as usize][row]).sum::<f64>() / 8.0)
+        })
+    };
+    let (now, first) = (jacobian(&state.x), jacobian(&model.mesh.positions));
+    let columns = [0, 1, 2].map(|c| [0, 1, 2].map(|r| first[r][c]));
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
+    let rows = [cross(columns[1], columns[2]), cross(columns[2], columns[0]), cross(columns[0], columns[1])];
+    let volume: f64 = (0..3).map(|a| rows[0][a] * columns[0][a]).sum();
+    [0, 1, 2].map(|r| [0, 1, 2].map(|c| (0..3).map(|k| now[r][k] * rows[k][c] / volume).sum::<f64>()))
+}
+
+/// Eigenvalues of a symmetric matrix by Jacobi's rotations, descending.
+fn eigenvalues(mut a: [[f64; 3]; 3]) -> [f64; 3] {
+    for _ in 0..60 {
+        for (p, q) in [(0, 1), (1, 2), (0, 2)] {
+            if a[p][q].abs() < 1e-300 {
+                continue;
+            }
+            let angle = 0.5 * (2.0 * a[p][q]).atan2(a[q][q] - a[p][p]);
+            let (s, c) = angle.sin_cos();
+            for row in &mut a {
+                (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+            }
+            let (rp, rq) = (a[p], a[q]);
+            for k in 0..3 {
+                a[p][k] = c * rp[k] - s * rq[k];
+                a[q][k] = s * rp[k] + c * rq[k];
+            }
+        }
+    }
+    let mut values = [a[0][0], a[1][1], a[2][2]];
+    values.sort_by(|x, y| y.total_cmp(x));
+    values
+}
+
+/// What a criterion measures of an element: logarithmic strains or stresses, positive where they count.
+fn measured(criterion: &str, model: &Model, state: &GlobalState, element: usize) -> f64 {
+    let field = |f: usize| state.elements[f][element];
+    let part = 1;
+    let corners = model.mesh.parts[part].corners(element - model.mesh.element_offsets()[part]);
+    let [sxx, syy, sxy, syz, szx] = [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX].map(field);
+    let p = field(field::PRESSURE);
+    let szz = -(sxx + syy);
+    let f = gradient(model, state, corners);
+    let c = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| f[k][i] * f[k][j]).sum::<f64>()));
+    let h = eigenvalues(c).map(|square| 0.5 * square.max(1e-300).ln());
+    match criterion {
+        "geometric_strain" => (2.0 / 3.0 * h.iter().map(|h| h * h).sum::<f64>()).sqrt(),
+        "shear_strain" => 0.5 * (h[0] - h[2]),
+        "principal_strain" => h[0],
+        "compressive_strain" => -h[2],
+        "plastic_strain" => field(field::PLASTIC_STRAIN),
+        "expansion" => field(field::RELATIVE_VOLUME).ln(),
+        "compaction" => -field(field::RELATIVE_VOLUME).ln(),
+        "pressure" => p,
+        "tension" => -p,
+        "principal_stress" => eigenvalues([[sxx - p, sxy, szx], [sxy, syy - p, syz], [szx, syz, szz - p]])[0],
+        "von_mises" => {
+            let square = sxx * sxx + syy * syy + szz * szz + 2.0 * (sxy * sxy + syz * syz + szx * szx);
+            (1.5 * square).sqrt()
+        }
+        "failure" => field(field::DAMAGE),
+        other => panic!("{other}"),
+    }
+}
+
+/// Faces of parts that one of the elements standing has, the slow way.
+fn lone_faces(model: &Model, stands: impl Fn(usize) -> bool) -> usize {
+    let mut count: BTreeMap<[u32; 4], usize> = BTreeMap::new();
+    let mut element = 0;
+    for part in &model.mesh.parts {
+        for e in 0..part.n_elements() {
+            let corners = part.corners(e);
+            for side in FACES.iter().filter(|_| stands(element)) {
+                let mut nodes = side.map(|c| corners[c]);
+                nodes.sort_unstable();
+                *count.entry(nodes).or_default() += 1;
+            }
+            element += 1;
+        }
+    }
+    count.values().filter(|n| **n == 1).count()
+}
+
+#[test]
+fn each_criterion_takes_out_the_elements_that_meet_it_and_the_surface_is_that_of_the_rest() {
+    for (criterion, limit, material) in [
+        ("geometric_strain", 0.25, ""),
+        ("shear_strain", 0.2, ""),
+        ("principal_strain", 0.1, ""),
+        ("compressive_strain", 0.25, ""),
+        ("plastic_strain", 0.2, ""),
+        ("expansion", 0.004, ""),
+        ("compaction", 0.03, ""),
+        ("pressure", 0.06, ""),
+        ("tension", 0.01, ""),
+        ("principal_stress", 0.015, ""),
+        ("von_mises", 0.0135, ""),
+        ("failure", 1.0, "failure = { type = \"plastic-strain\", limit = 0.3 }"),
+        ("incremental_strain", 0.3, ""),
+        ("time_step", 0.24, ""),
+    ] {
+        let words = if criterion == "failure" {
+            "failure = true".to_owned()
+        } else {
+            format!("{criterion} = {limit}")
+        };
+        let mut model = struck(&words, material);
+        let whole = solved(&model, Crew::default());
+        let cycles = cycles_of_erosion(&whole.state);
+        let last = *cycles.last().unwrap_or_else(|| panic!("nothing erodes by {criterion}"));
+        // The state that the last pass with an erosion looked at, and that after it.
+        model.setup.control.end_cycle = last + 1;
+        let options = Options { snapshot_at: Some(last), ..Options::default() };
+        let run = solved(&model, asked(2, options));
+        let before = run.snapshot.expect("a snapshot was asked for").state;
+        assert_eq!((before.cycle, run.state.cycle), (last, last + 1));
+        let n = run.state.n_eroded();
+        assert!((1..model.mesh.n_elements() - 64).contains(&n), "{criterion}: {n} eroded");
+        assert!(
+            run.state.eroded[..64].iter().all(|&cycle| cycle == ALIVE),
+            "{criterion}: the block has none"
+        );
+        if !matches!(criterion, "incremental_strain" | "time_step") {
+            for e in 64..model.mesh.n_elements() {
+                let value = measured(criterion, &model, &before, e);
+                match run.state.eroded[e] {
+                    ALIVE => assert!(value < limit * (1.0 + 1e-6), "{criterion}: {e} lives at {value}"),
+                    cycle if cycle == last => {
+                        assert!(value > limit * (1.0 - 1e-6), "{criterion}: {e} left at {value}");
+                    }
+                    _ => {}
+                }
+            }
+        }
+        for state in [&before, &run.state] {
+            let standing = |e: usize| state.eroded[e].saturating_add(SURFACE_LAG) > state.cycle;
+            let faces = master::job::surface_of(&model, state).map(|surface| surface.faces.len());
+            let brute = lone_faces(&model, standing);
+            assert!(
+                faces.is_none_or(|faces| faces == brute),
+                "{criterion}: {faces:?} faces, {brute} counted"
+            );
+        }
+        let settled = master::job::surface_of(&model, &whole.state).expect("some have eroded");
+        let standing = |e: usize| whole.state.eroded[e].saturating_add(SURFACE_LAG) > whole.state.cycle;
+        assert_eq!(settled.faces.len(), lone_faces(&model, standing), "{criterion}");
+        println!("{criterion}: {n} of 360 eroded by cycle {last}, {} faces", settled.faces.len());
+    }
+}
+
+#[test]
+fn nodes_that_lost_all_elements_keep_colliding_or_leave_with_what_they_have() {
+    // A block whose elements all leave as soon as they are strained flies at a plate that does not erode.
+    let deck = |retain_inertia: bool| {
+        let mut model = struck("plastic_strain = 100", "");
+        let criteria = model.setup.erosion.parts[1].take().expect("the plate has criteria");
+        model.setup.erosion.parts[0] =
+            Some(mechanics::erosion::Criteria { plastic_strain: Some(0.05), ..criteria });
+        model.setup.erosion.retain_inertia = retain_inertia;
+        model.setup.control.end_cycle = 400;
+        model
+    };
+    let momentum = |solved: &Solved| solved.rows.last().expect("rows").momentum;
+    for retain_inertia in [true, false] {
+        let model = deck(retain_inertia);
+        let run = solved(&model, Crew::of(2));
+        let block = &model.mesh.parts[0].nodes;
+        let freed: Vec<u32> = block
+            .iter()
+            .copied()
+            .filter(|&n| {
+                (0..64)
+                    .filter(|&e| model.mesh.parts[0].corners(e).contains(&n))
+                    .all(|e| run.state.eroded[e] != ALIVE)
+            })
+            .collect();
+        assert!(freed.len() > 20, "{} freed", freed.len());
+        let below = freed.iter().filter(|&&n| run.state.x[n as usize][2] < -0.1).count();
+        let ledger = &run.outcome.ledger;
+        assert!(ledger.last.error.abs() < 0.01, "energy error {}", ledger.last.error);
+        assert!(ledger.eroded > 0.0 && ledger.eroded_elements as usize == run.state.n_eroded());
+        let start = ledger.initial_momentum;
+        let now = momentum(&run);
+        let scale = start[2].abs();
+        if retain_inertia {
+            // They would be far below the plate's face without contact.
+            assert_eq!(below, 0, "no freed node is in the plate");
+            assert_eq!(ledger.eroded_momentum, [0.0; 3]);
+            assert!((0..3).all(|a| (now[a] - start[a]).abs() < 1e-10 * scale), "{start:?} {now:?}");
+        } else {
+            let with = [0, 1, 2].map(|a| now[a] + ledger.eroded_momentum[a]);
+            assert!((0..3).all(|a| (with[a] - start[a]).abs() < 1e-10 * scale), "{start:?} {with:?}");
+            assert!((now[2] - start[2]).abs() > 1e-3 * scale, "what was dropped is missing: {now:?}");
+        }
+        // Mass stays at the nodes, of those that were dropped too.
+        let first = solve(
+            {
+                let mut one = model.clone();
+                one.setup.control.end_cycle = 1;
+                one
+            },
+            Crew::default(),
+        )
+        .unwrap_or_else(|e| panic!("{e}"));
+        let masses = |state: &GlobalState| state.mass.iter().map(|m| m.to_bits()).collect::<Vec<_>>();
+        assert_eq!(masses(&first.state), masses(&run.state));
+    }
+}
