@@ -263,3 +263,6 @@ impl Eroding {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
