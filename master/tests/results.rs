@@ -107,6 +107,7 @@ fn plates(cells: u32) -> Model {
             contact: None,
             constraints: vec![Constraint::default()],
             walls: Vec::new(),
+            bodies: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
         },

@@ -12,7 +12,7 @@ use std::fmt;
 /// The version of the messages in this module and in the control messages, stated first in [`Hello`].
 ///
 /// 1: the first. 2: links between workers (`peer_port` and `member` in [`Hello`]), introductions and reports.
-/// 3: the work of loads by part in votes.
+/// 3: the work of loads by part and states of rigid bodies in votes; rigid bodies in assignments.
 pub const VERSION: u16 = 3;
 
 /// Most characters of a host's name.

@@ -82,9 +82,10 @@ impl Job {
                 if snapshot.state.x.len() != start.x.len()
                     || snapshot.state.initial_volume != start.initial_volume
                     || snapshot.walls.len() != wall::first_poses(&setup.walls).len()
+                    || snapshot.vote.bodies.len() != setup.bodies.len()
                 {
                     return Err(
-                        "the snapshot is of another problem: its mesh or its walls are not this deck's"
+                        "the snapshot is of another problem: its mesh, its walls or its rigid bodies are not this deck's"
                             .to_owned(),
                     );
                 }
@@ -229,6 +230,10 @@ impl Job {
         };
         self.imbalance = imbalance(&elements, &interactions, &speeds);
         let exchange = Arc::new(exchange);
+        let bodies = match &base.rest.vote {
+            Some(vote) => vote.bodies.clone(),
+            None => model.setup.bodies.iter().map(|body| body.start).collect(),
+        };
         let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
         for (position, subdomains) in cut.by_worker.into_iter().enumerate() {
             let assign = Assign {
@@ -245,6 +250,7 @@ impl Job {
                 plan: exchange.plans[position].clone(),
                 plan_hash: exchange.hash,
                 guest_state: exchange.guest_state_from(position, state),
+                bodies: bodies.clone(),
             };
             actions.push(Action::Send(crew[position], ToWorker::Assign(Box::new(assign))));
         }
@@ -357,7 +363,8 @@ impl Cut {
             nodes_of.push(nodes);
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
         }
-        let holdings = Holdings::new(model.mesh.n_nodes(), work, layout, &nodes_of);
+        let holdings = Holdings::new(model.mesh.n_nodes(), work, layout, &nodes_of)
+            .with_bodies(model.setup.bodies.len());
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
         for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {

@@ -89,6 +89,9 @@ pub(super) fn not_a_number(vote: &Vote) -> Option<String> {
     if !vote.force_bound.is_finite() && !vote.force_bound.is_nan() {
         return None;
     }
+    if vote.bodies.iter().any(|body| !body.is_finite()) {
+        return Some("the state of a rigid body in its vote is no number".to_owned());
+    }
     let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
     let numbers = energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external]);
     let bad = numbers.chain([vote.force_bound, vote.contact_speed_squared]).find(|value| !value.is_finite());

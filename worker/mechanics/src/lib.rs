@@ -35,6 +35,7 @@ pub mod material;
 pub mod mesh;
 pub mod nodes;
 pub mod piece;
+pub mod rigid;
 pub mod setup;
 pub mod state;
 mod strength;

@@ -7,6 +7,7 @@ use crate::{
     contact,
     load::{Drive, Loads},
     material::Material,
+    rigid::Body,
     wall::RigidWall,
 };
 
@@ -23,6 +24,8 @@ pub struct Setup {
     pub constraints: Vec<Constraint>,
     /// Rigid walls.
     pub walls: Vec<RigidWall>,
+    /// Rigid bodies.
+    pub bodies: Vec<Body>,
     /// Where explosives are lit.
     pub detonations: Vec<Detonation>,
     /// Curves, forces, gravity, loads on faces, relaxation.

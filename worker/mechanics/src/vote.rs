@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     contact::{ContactVote, Extent},
     element::ElementVote,
+    rigid,
     wall::WallVote,
 };
 
@@ -48,6 +49,8 @@ pub struct Vote {
     pub parts: Vec<PartVote>,
     /// What nodes gave each wall; empty if none was touched.
     pub walls: Vec<WallVote>,
+    /// States of the rigid bodies after the cycle; the same from every worker.
+    pub bodies: Vec<rigid::State>,
     /// Displacement extents of surface nodes since the sorted positions, by part.
     pub extents: Vec<Extent>,
     /// Position and velocity of gauge nodes: gauge index, then x, y, z, vx, vy, vz.
@@ -92,6 +95,7 @@ impl Vote {
             momentum: [0.0; 3],
             parts: vec![PartVote::default(); n_parts],
             walls: Vec::new(),
+            bodies: Vec::new(),
             extents: vec![Extent::NONE; n_parts],
             gauges: Vec::new(),
             fault: None,
@@ -128,6 +132,9 @@ impl Vote {
             mine.merge(theirs);
         }
         self.add_walls(&other.walls);
+        if self.bodies.is_empty() {
+            self.bodies.clone_from(&other.bodies);
+        }
         self.gauges.extend_from_slice(&other.gauges);
         self.gauges.sort_by_key(|g| g.0);
         self.note_fault(other.fault);
