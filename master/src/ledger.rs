@@ -1,7 +1,10 @@
 //! The ledger of a run: energies and momentum from votes, the worst ratios, rows of history.
 
 use deck::model::Model;
-use mechanics::vote::{PartVote, Vote};
+use mechanics::{
+    rigid,
+    vote::{PartVote, Vote},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::results::history::{GaugeRow, HistoryRow, PartEnergy};
@@ -37,6 +40,8 @@ pub struct Ledger {
     pub worst_gap_travel: f64,
     /// Deepest contact, in gaps.
     pub worst_penetration: f64,
+    /// Rigid bodies as the last vote had them.
+    pub bodies: Vec<rigid::State>,
     /// The last row.
     pub last: HistoryRow,
 }
@@ -82,6 +87,7 @@ impl Ledger {
             worst_courant: 0.0,
             worst_gap_travel: 0.0,
             worst_penetration: 0.0,
+            bodies: Vec::new(),
             last: HistoryRow::default(),
         }
     }
@@ -101,6 +107,7 @@ impl Ledger {
         self.greatest_external = self.greatest_external.max(self.external.abs());
         self.first_step.get_or_insert(dt);
         self.book_parts(&vote.parts);
+        self.bodies.clone_from(&vote.bodies);
         let scale = initial.abs().max(self.greatest_kinetic);
         let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
         self.worst_courant = self.worst_courant.max(dt / vote.courant);

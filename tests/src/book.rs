@@ -9,6 +9,7 @@ mod contact;
 mod element;
 mod gas;
 mod load;
+mod rigid;
 mod solid;
 mod structure;
 mod wave;
@@ -53,6 +54,9 @@ macro_rules! each_case_of_the_book {
             load: a_driven_wall_pushes_as_a_bar_that_strikes_it_is_pushed quick;
             load: a_wall_gives_the_impulse_that_bodies_lack_and_rubs_after_coulomb quick;
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
+            rigid: a_free_top_precesses_after_euler quick;
+            rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
+            rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;
             contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
             contact: struck_plates_conserve_keep_apart_and_move_together quick;
             contact: strengthless_plates_reach_the_impedance_match_on_the_axis quick;

@@ -48,7 +48,7 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, curves: &Curves) -> Vec<Rigi
             );
         }
         let start_spin = table.get("start_spin").and_then(|v| v.vector());
-        let mut components =
+        let components =
             |key| if table.has(key) { read_components(&table, key, curves) } else { Some([None; 3]) };
         let (velocity, spin) = (components("velocity"), components("spin"));
         for other in
