@@ -2,6 +2,7 @@
 
 use deck::model::Model;
 use mechanics::{
+    contact::{PairEnergies, PairEnergy},
     rigid,
     vote::{PartVote, Vote},
 };
@@ -40,6 +41,8 @@ pub struct Ledger {
     pub worst_gap_travel: f64,
     /// Deepest contact, in gaps.
     pub worst_penetration: f64,
+    /// Energies of contact by pair of parts: in springs now, taken by friction so far.
+    pub contacts: Vec<PairEnergy>,
     /// Rigid bodies as the last vote had them.
     pub bodies: Vec<rigid::State>,
     /// The last row.
@@ -87,6 +90,7 @@ impl Ledger {
             worst_courant: 0.0,
             worst_gap_travel: 0.0,
             worst_penetration: 0.0,
+            contacts: Vec::new(),
             bodies: Vec::new(),
             last: HistoryRow::default(),
         }
@@ -108,6 +112,7 @@ impl Ledger {
         self.first_step.get_or_insert(dt);
         self.book_parts(&vote.parts);
         self.bodies.clone_from(&vote.bodies);
+        self.book_pairs(&vote.contacts);
         let scale = initial.abs().max(self.greatest_kinetic);
         let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
         self.worst_courant = self.worst_courant.max(dt / vote.courant);
@@ -135,6 +140,19 @@ impl Ledger {
                 .map(|(_, g)| GaugeRow { x: [g[0], g[1], g[2]], v: [g[3], g[4], g[5]] })
                 .collect(),
         };
+    }
+
+    fn book_pairs(&mut self, votes: &PairEnergies) {
+        self.contacts.iter_mut().for_each(|pair| pair.contact = 0.0);
+        for vote in votes.pairs() {
+            match self.contacts.binary_search_by_key(&vote.parts, |pair| pair.parts) {
+                Ok(at) => {
+                    self.contacts[at].contact = vote.contact;
+                    self.contacts[at].friction += vote.friction;
+                }
+                Err(at) => self.contacts.insert(at, *vote),
+            }
+        }
     }
 
     fn book_parts(&mut self, votes: &[PartVote]) {

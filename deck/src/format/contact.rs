@@ -102,6 +102,7 @@ pub(crate) fn read(
         Some(value) => value.number(Range::Positive),
         None => Some(default_friction_velocity(assembly, materials, conditions)),
     };
+    let initial = table.get("initial_penetration").and_then(|v| v.one_of(&["refuse", "ignore"]));
     let at = table.at;
     if n > 0 && !interacts.contains(&true) {
         table.faults.add(
@@ -119,6 +120,7 @@ pub(crate) fn read(
         interacts,
         stiffness,
         friction_velocity: friction_velocity?,
+        ignores_initial: initial == Some(1),
     };
     Some(ContactDraft { settings, faces })
 }

@@ -115,8 +115,13 @@ impl Job {
             let at_start: Vec<[f64; 3]> =
                 surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
             let inside = initial_pairs(&surface, &at_start, settings);
-            refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
-            let exclusions = Arc::new(Exclusions::new(&surface, &inside));
+            let exclusions = if settings.ignores_initial {
+                Exclusions::around(&surface, &inside)
+            } else {
+                refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
+                Exclusions::new(&surface, &inside)
+            };
+            let exclusions = Arc::new(exclusions);
             Ok::<_, String>(Touching { surface: Arc::new(surface), exclusions })
         });
         let first_cycle = base.state.cycle;
@@ -409,7 +414,7 @@ fn refuse_overlap(
     match foreign {
         None => Ok(()),
         Some(&(node, face, distance)) => Err(format!(
-            "node {} of part `{}` starts {distance:e} from part `{}`, inside the contact gap {gap:e}; move the parts apart by at least the gap, or join them",
+            "node {} of part `{}` starts {distance:e} from part `{}`, inside the contact gap {gap:e}; move the parts apart by at least the gap, join them, or write contact.initial_penetration = \"ignore\"",
             mesh.node_ids[surface.nodes[node as usize] as usize],
             mesh.parts[surface.node_part[node as usize] as usize].name,
             mesh.parts[surface.faces[face as usize].part as usize].name,

@@ -21,6 +21,7 @@ mod boxes;
 pub mod cycle;
 pub mod force;
 pub mod joint;
+mod pair_energy;
 mod pairs;
 pub mod reach;
 pub mod search;
@@ -32,6 +33,7 @@ pub mod zone;
 
 pub use cycle::{Contact, initial_pairs};
 pub use force::ContactVote;
+pub use pair_energy::{PairEnergies, PairEnergy};
 pub use reach::Extent;
 pub use search::{Exclusions, cull};
 pub use sort::sort;
@@ -60,6 +62,8 @@ pub struct Settings {
     /// Velocity over which friction is regularised (length per time): below it the force is proportional to
     /// the sliding velocity, so bodies creep instead of sticking.
     pub friction_velocity: f64,
+    /// Nodes that start inside the zone of another part never meet the faces there; without it such a start is refused.
+    pub ignores_initial: bool,
 }
 
 impl Settings {

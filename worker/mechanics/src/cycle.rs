@@ -520,6 +520,7 @@ impl Domain {
             let vote =
                 room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
             self.vote.add_contact(&vote);
+            self.vote.contacts.merge(room.contact.by_pair());
         }
         meter.stop(mark, true);
         self.load_faces(meter);

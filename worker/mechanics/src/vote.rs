@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    contact::{ContactVote, Extent},
+    contact::{ContactVote, Extent, PairEnergies},
     element::ElementVote,
     rigid,
     wall::WallVote,
@@ -41,6 +41,8 @@ pub struct Vote {
     pub contact: f64,
     /// Energy lost to friction in this cycle.
     pub friction: f64,
+    /// The last two by pair of parts.
+    pub contacts: PairEnergies,
     /// Work of prescribed velocities, walls and loads in this cycle.
     pub external: f64,
     /// Momentum of all nodes, `m v_{n+1/2}`.
@@ -91,6 +93,7 @@ impl Vote {
             hits: 0,
             contact: 0.0,
             friction: 0.0,
+            contacts: PairEnergies::default(),
             external: 0.0,
             momentum: [0.0; 3],
             parts: vec![PartVote::default(); n_parts],
@@ -117,6 +120,7 @@ impl Vote {
         self.hits += other.hits;
         self.contact += other.contact;
         self.friction += other.friction;
+        self.contacts.merge(&other.contacts);
         self.external += other.external;
         for axis in 0..3 {
             self.momentum[axis] += other.momentum[axis];

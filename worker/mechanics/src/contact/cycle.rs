@@ -11,6 +11,7 @@ use super::{
         lanes::{Pushes, Statics, Terms},
     },
     joint::{self, Hit, Near},
+    pair_energy::PairEnergies,
     pairs::Pairs,
     search::{self, Bounds, Candidates},
     sort::sort,
@@ -75,6 +76,8 @@ pub struct Contact {
     statics: Statics,
     /// Whether no pair has friction.
     smooth: bool,
+    /// Energies of the cycle by pair of parts.
+    by_pair: PairEnergies,
     width: Width,
     /// The candidates that can be near before nodes have moved much further.
     watch: Watch,
@@ -142,6 +145,7 @@ impl Contact {
                 inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
                 face_stiffness: Vec::new(),
             },
+            by_pair: PairEnergies::default(),
             smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
             width: Width::best(),
             watch: Watch::default(),
@@ -165,6 +169,11 @@ impl Contact {
         contact.look(&mut watch, &mut work, x);
         (contact.watch, contact.work) = (watch, work);
         contact
+    }
+
+    /// Energies of the last cycle by pair of parts.
+    pub fn by_pair(&self) -> &PairEnergies {
+        &self.by_pair
     }
 
     /// Number of node-face pairs that a cycle looks at.
@@ -216,15 +225,18 @@ impl Contact {
         let mut work = std::mem::take(&mut self.work);
         let mut watch = std::mem::take(&mut self.watch);
         let mut vote = ContactVote { pairs: self.candidates.faces.len() as u64, ..ContactVote::default() };
+        let mut by_pair = std::mem::take(&mut self.by_pair);
+        by_pair.clear();
         let mut frequency2 = 0.0;
         if watch.is_stale(cycle.x, &self.settings) {
             self.look(&mut watch, &mut work, cycle.x);
         }
         for bounds in watch.blocks.windows(2) {
-            let voted = self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, &mut vote);
+            let voted =
+                self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, (&mut vote, &mut by_pair));
             frequency2 = if voted > frequency2 { voted } else { frequency2 };
         }
-        (self.work, self.watch) = (work, watch);
+        (self.work, self.watch, self.by_pair) = (work, watch, by_pair);
         vote.dt = force::time_step(frequency2);
         vote
     }
@@ -238,7 +250,7 @@ impl Contact {
         ((first, first_pair), (end, end_pair)): ((u32, u32), (u32, u32)),
         work: &mut Work,
         cycle: &mut Cycle,
-        vote: &mut ContactVote,
+        (vote, by_pair): (&mut ContactVote, &mut PairEnergies),
     ) -> f64 {
         let range = first_pair as usize..end_pair as usize;
         let warning = WARNING * self.settings.gap;
@@ -273,7 +285,11 @@ impl Contact {
             (0..3).for_each(|a| approach.direction[a][i] = direction[a]);
         }
         approach.depth[n..].fill(0.0);
-        if self.smooth { self.push(n, work, cycle, vote) } else { self.rub(n, work, cycle, vote) }
+        if self.smooth {
+            self.push(n, work, cycle, (vote, by_pair))
+        } else {
+            self.rub(n, work, cycle, (vote, by_pair))
+        }
     }
 
     /// Takes the near features of one node, whose pairs are `start..end` of the block, into the lists; `listed` are the
@@ -355,7 +371,13 @@ impl Contact {
 
     /// Forces without friction of the first `n` pushes. Gives the greatest squared frequency.
     #[inline(always)]
-    fn push(&self, n: usize, work: &mut Work, cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
+    fn push(
+        &self,
+        n: usize,
+        work: &mut Work,
+        cycle: &mut Cycle,
+        (vote, by_pair): (&mut ContactVote, &mut PairEnergies),
+    ) -> f64 {
         let approach = &work.approach;
         let pushes = Pushes {
             face: &work.face,
@@ -373,6 +395,16 @@ impl Contact {
             for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
                 let pair = (self.global[pairs.node()[i] as usize], self.ids[work.face[i] as usize]);
                 vote.deepest(depth / self.settings.gap, pair);
+            }
+        }
+        if sums.deepest > 0.0 {
+            for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+                let (node, face) = (pairs.node()[i] as usize, work.face[i] as usize);
+                let (factor, of_node) = (statics.factor[node], statics.stiffness[node]);
+                let normal =
+                    force::stiffness(factor, of_node, statics.face_stiffness[face]) * work.share[i] * depth;
+                let energy = cycle.energy_quantum.round(0.5 * normal * depth);
+                by_pair.add(self.part[node], self.parts[face], energy, 0.0);
             }
         }
         vote.energy += sums.energy;
@@ -393,7 +425,13 @@ impl Contact {
 
     /// Forces with friction of the first `n` pushes. Gives the greatest squared frequency.
     #[inline(always)]
-    fn rub(&self, n: usize, work: &mut Work, cycle: &mut Cycle, vote: &mut ContactVote) -> f64 {
+    fn rub(
+        &self,
+        n: usize,
+        work: &mut Work,
+        cycle: &mut Cycle,
+        (vote, by_pair): (&mut ContactVote, &mut PairEnergies),
+    ) -> f64 {
         let (approach, statics) = (&work.approach, &self.statics);
         let mut frequency2 = 0.0_f64;
         for i in 0..n {
@@ -429,6 +467,7 @@ impl Contact {
             });
             let reaction = force::react(&push, sliding.as_ref(), cycle.force_quantum, cycle.energy_quantum);
             vote.count(&reaction);
+            by_pair.add(self.part[node], self.parts[face], reaction.energy, reaction.friction);
             for a in 0..3 {
                 let f = &mut cycle.f[a];
                 f[node] += reaction.node[a];
