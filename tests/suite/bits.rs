@@ -419,8 +419,8 @@ fn rigid_bodies_have_the_same_bits_on_both_routes() {
         friction = 0.1
         [[load]]
         type = "pressure"
-        parts = ["ball"]
-        plane = { point = [3, 4, 8.2], normal = [0, 0, 1] }
+        parts = ["under"]
+        face = "k-min"
         pressure = { curve = "pulse", factor = 2e-3 }
         [[load]]
         type = "force"

@@ -94,7 +94,7 @@ pub(super) fn a_rigid_ball_that_strikes_a_block_keeps_both_momenta(sheet: &mut S
          [[part]]\nname = \"block\"\nmaterial = { density = 2700, eos = { type = \"linear\", bulk = 70e9 }, strength = { type = \"elastic\", shear = 26e9 } }\n\
          box = { origin = [-0.02, -0.02, -0.02], size = [0.04, 0.04, 0.02], cells = [12, 12, 6] }\n\
          [[rigid]]\nparts = [\"ball\"]\nstart_spin = [0, 500, 200]\n\
-         [contact]\ngap_fraction = 0.3\nstiffness = 1\nfriction = 0.3\n[output]\nhistory_cycles = 10\n",
+         [contact]\ngap_fraction = 0.3\nstiffness = 1\n[output]\nhistory_cycles = 10\n",
     ));
     let Solved { model, state, outcome, .. } = &solved;
     let start: Vec<_> = model.setup.bodies.iter().map(|body| body.start).collect();
