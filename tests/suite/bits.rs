@@ -455,7 +455,7 @@ fn rigid_bodies_have_the_same_bits_on_both_routes() {
         change(&mut other);
         fingerprint(&other, Crew::default()).digest
     };
-    for body in 0..3 {
+    for body in 0..2 {
         assert_ne!(without(&|m| m.setup.bodies[body].mass *= 1.001), one.digest, "mass of body {body}");
     }
     assert_ne!(without(&|m| m.setup.bodies[0].forces.clear()), one.digest);
