@@ -78,6 +78,14 @@ impl Settings {
         self.interacts[a as usize * self.n_parts() + b as usize]
     }
 
+    /// The pair of parts that may meet, if there is only one.
+    pub fn only_pair(&self) -> Option<[u32; 2]> {
+        let n = self.n_parts();
+        let mut pairs = (0..n * n).filter(|&i| self.interacts[i] && i / n <= i % n);
+        let pair = pairs.next().map(|i| [(i / n) as u32, (i % n) as u32]);
+        pair.filter(|_| pairs.next().is_none())
+    }
+
     /// Cycles between trigger and sort after which nodes cannot have left the slack at the speeds that votes allow, where
     /// orders answer a vote two cycles later; 0 if one is too many.
     pub fn longest_lag(&self) -> u32 {

@@ -76,6 +76,8 @@ pub struct Contact {
     statics: Statics,
     /// Whether no pair has friction.
     smooth: bool,
+    /// The only pair of parts that may meet, if there is but one: it has all energy.
+    only_pair: Option<[u32; 2]>,
     /// Energies of the cycle by pair of parts.
     by_pair: PairEnergies,
     width: Width,
@@ -145,6 +147,7 @@ impl Contact {
                 inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
                 face_stiffness: Vec::new(),
             },
+            only_pair: settings.only_pair(),
             by_pair: PairEnergies::default(),
             smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
             width: Width::best(),
@@ -398,14 +401,7 @@ impl Contact {
             }
         }
         if sums.deepest > 0.0 {
-            for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
-                let (node, face) = (pairs.node()[i] as usize, work.face[i] as usize);
-                let (factor, of_node) = (statics.factor[node], statics.stiffness[node]);
-                let normal =
-                    force::stiffness(factor, of_node, statics.face_stiffness[face]) * work.share[i] * depth;
-                let energy = cycle.energy_quantum.round(0.5 * normal * depth);
-                by_pair.add(self.part[node], self.parts[face], energy, 0.0);
-            }
+            self.share_out(sums.energy, n, work, cycle.energy_quantum, by_pair);
         }
         vote.energy += sums.energy;
         vote.force_bound =
@@ -421,6 +417,23 @@ impl Contact {
             }
         }
         sums.frequency2
+    }
+
+    /// Books the energy of the first `n` pushes, of which some are in the zone, by pair of parts.
+    fn share_out(&self, energy: f64, n: usize, work: &Work, quantum: Quantum, by_pair: &mut PairEnergies) {
+        if let Some([a, b]) = self.only_pair {
+            by_pair.add(a, b, energy, 0.0);
+            return;
+        }
+        let (statics, nodes) = (&self.statics, work.near_pairs.node());
+        let depths = work.approach.depth[..n].iter().enumerate();
+        for (i, &depth) in depths.filter(|(_, depth)| **depth > 0.0) {
+            let (node, face) = (nodes[i] as usize, work.face[i] as usize);
+            let (factor, of_node) = (statics.factor[node], statics.stiffness[node]);
+            let normal =
+                force::stiffness(factor, of_node, statics.face_stiffness[face]) * work.share[i] * depth;
+            by_pair.add(self.part[node], self.parts[face], quantum.round(0.5 * normal * depth), 0.0);
+        }
     }
 
     /// Forces with friction of the first `n` pushes. Gives the greatest squared frequency.
