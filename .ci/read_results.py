@@ -4,7 +4,8 @@
 
 Checked: states listed in results.pvd exist and their times increase; counts of cells and points are those of the
 summary; every array is finite; every cell has a positive volume; history.csv has whole rows of finite numbers in
-rising cycles, and its last one is that of the last cycle.
+rising cycles, and its last one is that of the last cycle; contact surfaces, where there are any, have finite fields and the
+nodes of their states.
 """
 
 import argparse
@@ -48,6 +49,23 @@ def check_state(path, summary):
     return grid
 
 
+def check_surface(path, state):
+    """The contact surface beside a state."""
+    surface = pyvista.read(path)
+    check(isinstance(surface, pyvista.PolyData), f"{path}: a {type(surface).__name__}, not polygons")
+    check(surface.n_cells > 0, f"{path}: no face")
+    stamps = [float(grid.field_data["TimeValue"][0]) for grid in (surface, state)]
+    check(stamps[0] == stamps[1], f"{path}: time {stamps[0]}, the state has {stamps[1]}")
+    for name in ("contact_pressure", "gap", "part", "element_id"):
+        check(name in surface.cell_data, f"{path}: no {name}")
+    for name, values in {**dict(surface.point_data), **dict(surface.cell_data)}.items():
+        check(numpy.isfinite(values).all(), f"{path}: {name} is not finite somewhere")
+    check((surface.cell_data["contact_pressure"] >= 0).all(), f"{path}: a pressure below zero")
+    place = {number: index for index, number in enumerate(state.point_data["node_id"])}
+    same = state.points[[place[number] for number in surface.point_data["node_id"]]]
+    check((same == surface.points).all(), f"{path}: nodes are elsewhere than in the state")
+
+
 def check_history(path, summary):
     with open(path, newline="", encoding="utf-8") as file:
         header, *rows = csv.reader(file)
@@ -80,6 +98,9 @@ def check_folder(folder):
         grid = check_state(folder / name, summary)
         stamp = float(grid.field_data["TimeValue"][0])
         check(stamp == time, f"{folder / name}: time {stamp}, listed as {time}")
+        surface = folder / name.replace("state-", "contact-").replace(".vtu", ".vtp")
+        if (folder / "contact.pvd").exists():
+            check_surface(surface, grid)
         reader.set_active_time_value(time)
         check(reader.read()[0].n_cells == grid.n_cells, f"{index}: does not open at time {time}")
     header, rows = check_history(folder / "history.csv", summary)

@@ -10,7 +10,7 @@ use mechanics::{
 use crate::{
     fault::{Faults, short},
     format::{Explicit, MAX_ENTRIES, Meshes, Names, PartDraft},
-    geometry::{EDGES, dot, norm, sub, volume},
+    geometry::{EDGES, dot, norm, sub},
     mesh_file::MeshFile,
     table::{Range, Table},
 };
@@ -28,6 +28,8 @@ pub(crate) struct Assembly {
     pub(crate) mesh: Mesh,
     /// Initial velocity by global node.
     pub(crate) velocity: Vec<[f64; 3]>,
+    /// Initial rotation rate by global node (1/time); empty where no mesh file gives one.
+    pub(crate) spin: Vec<[f64; 3]>,
     /// Kinetic energy lost in joins.
     pub(crate) join_energy: f64,
     /// Named faces of each part: their global nodes.
@@ -99,6 +101,7 @@ pub(crate) fn assemble(
     let mut assembly = Assembly {
         mesh: Mesh::default(),
         velocity: Vec::new(),
+        spin: Vec::new(),
         join_energy: 0.0,
         faces: Vec::new(),
         smallest_edge,
@@ -120,7 +123,7 @@ pub(crate) fn assemble(
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
             let corners = part.corners(e).map(|node| mesh.positions[node as usize]);
-            assembly.volumes.push(volume(&corners));
+            assembly.volumes.push(part.volume(&corners));
         }
     }
     assembly.mesh = mesh;
@@ -176,6 +179,12 @@ fn take_over(mesh: &MeshFile, assembly: &mut Assembly) {
         };
         assembly.segments.entry(name.clone()).or_default().extend(faces.iter().filter_map(known));
     }
+    for (id, spin) in &mesh.spins {
+        if let Some(node) = node_of_id.get(id) {
+            assembly.spin.resize(assembly.velocity.len(), [0.0; 3]);
+            assembly.spin[*node as usize] = *spin;
+        }
+    }
     for (id, velocity) in &mesh.velocities {
         if let Some(node) = node_of_id.get(id) {
             assembly.velocity[*node as usize] = *velocity;
@@ -198,7 +207,8 @@ fn number(drafts: &[PartDraft], faults: &Faults<'_>) -> Mesh {
     let mut next_element = explicit().flat_map(|(_, e)| e.element_ids.iter().copied()).max().unwrap_or(0) + 1;
     // Numbers of different parts may not meet; inside a part this was looked at when it was read.
     let mut node_owner: Owners<'_> = BTreeMap::new();
-    let mut element_owner: Owners<'_> = BTreeMap::new();
+    // Solids and shells are numbered apart.
+    let mut element_owner: [Owners<'_>; 2] = Default::default();
     // The node of each number of each file: its parts share them.
     let mut of_file: BTreeMap<(&str, u32), u32> = BTreeMap::new();
     for draft in drafts {
@@ -276,10 +286,13 @@ type Owners<'a> = BTreeMap<u32, (usize, Option<&'a str>)>;
 fn owned<'a>(
     own: &'a Explicit,
     draft: &PartDraft,
-    elements: &mut Owners<'a>,
+    elements: &mut [Owners<'a>; 2],
     nodes: &mut Owners<'a>,
     faults: &Faults<'_>,
 ) {
+    let of_shells =
+        draft.block.as_ref().is_some_and(|block| matches!(block.topology, Topology::Shells { .. }));
+    let elements = &mut elements[usize::from(of_shells)];
     for (ids, places, owner, what) in [
         (&own.node_ids, &own.node_places, nodes, "node"),
         (&own.element_ids, &own.element_places, elements, "element"),

@@ -5,13 +5,14 @@
 //! whole-mesh check confirms again.
 
 mod o_grid;
+mod sheet;
 mod structured;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use structured::graded;
 
-use mechanics::mesh::Topology;
+use mechanics::mesh::{Section, Topology};
 
 use crate::geometry::{add, cross, dot, scaled, sub};
 
@@ -63,6 +64,26 @@ pub(crate) enum Shape {
         /// First angle and angle covered (degrees); 360 closes the tube.
         degrees: [f64; 2],
         cells: [u32; 3],
+    },
+    /// A parallelogram of shells; I along the first side, J along the second, the upper side by the right hand.
+    Plate {
+        origin: [f64; 3],
+        /// From the origin along I and along J.
+        sides: [[f64; 3]; 2],
+        cells: [u32; 2],
+        section: Section,
+    },
+    /// The wall of a tube of shells, round or with flat sides; I goes round, J along the axis, the upper side outward.
+    Prism {
+        axis: usize,
+        base: [f64; 3],
+        /// Of the middle surface, to the corners.
+        radius: f64,
+        length: f64,
+        /// Number of flat sides; none for a round tube.
+        sides: Option<u32>,
+        cells: [u32; 2],
+        section: Section,
     },
 }
 
@@ -126,6 +147,10 @@ impl Shape {
                 let elements = cells.iter().try_fold(1u64, |n, &c| n.checked_mul(wide(c)))?;
                 Some((nodes, elements))
             }
+            Self::Plate { cells: [ni, nj], .. } | Self::Prism { cells: [ni, nj], .. } => {
+                let nodes = (wide(*ni) + 1).checked_mul(wide(*nj) + 1)?;
+                Some((nodes, wide(*ni).checked_mul(wide(*nj))?))
+            }
         }
     }
 
@@ -145,6 +170,12 @@ impl Shape {
             }
             Self::Tube { axis, base, radii, length, degrees, cells } => {
                 let mut block = structured::tube(*radii, *length, *degrees, *cells);
+                block.place(*axis, *base);
+                block
+            }
+            Self::Plate { origin, sides, cells, section } => sheet::plate(*origin, *sides, *cells, *section),
+            Self::Prism { axis, base, radius, length, sides, cells, section } => {
+                let mut block = sheet::prism(*radius, *length, *sides, *cells, *section);
                 block.place(*axis, *base);
                 block
             }

@@ -3,7 +3,10 @@
 mod surface;
 mod zones;
 
-use mechanics::mesh::Topology;
+use mechanics::{
+    material::{Failure, Material},
+    mesh::Topology,
+};
 
 pub(crate) use surface::{Face, outer_faces, smallest_face_dimension};
 pub(crate) use zones::clearance;
@@ -30,13 +33,39 @@ pub(crate) fn spans(
     parts: &[PartDraft],
     assembly: &Assembly,
     contact: Option<&ContactDraft>,
+    materials: &[Material],
     faults: &Faults<'_>,
 ) {
+    sections(parts, assembly, materials, faults);
     // Elements that a join folds together were reported with the join.
     let volumes_fit = !assembly.collapsed && volumes(parts, assembly, faults);
     // Inside and outside mean nothing for inverted elements.
     if volumes_fit && let Some(contact) = contact.filter(|contact| !contact.settings.ignores_initial) {
         zones::overlaps(parts, assembly, contact, faults);
+    }
+}
+
+/// Reports shells of a material that layers do not know.
+fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], faults: &Faults<'_>) {
+    for (part, draft) in assembly.mesh.parts.iter().zip(parts) {
+        let material = draft.material.and_then(|index| materials.get(index as usize));
+        if let (Some(section), Some(material)) = (part.section(), material) {
+            if let Err(error) = section.check(material) {
+                faults.add(
+                    draft.at,
+                    format!("part \"{}\": {error}", part.name),
+                    "a material whose law has a plane-stress form",
+                    "choose another material, or model the part with solids",
+                );
+            } else if material.failure != Failure::None {
+                faults.add(
+                    draft.at,
+                    format!("part \"{}\" of shells, whose material \"{}\" fails", part.name, material.name),
+                    "a material without failure",
+                    "remove the failure of the material, or model the part with solids",
+                );
+            }
+        }
     }
 }
 
@@ -62,6 +91,7 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
         for &e in bad.iter().take(MAX_NAMED) {
             let at = draft.explicit.as_ref().map_or(draft.at, |own| own.element_places[e]);
             let advice = match part.topology {
+                Topology::Shells { .. } => "order the corners around the element",
                 Topology::Explicit { .. } if draft.explicit.is_some() => CORNER_ORDER,
                 _ => "use a size that the numbers can hold, or a smaller join tolerance",
             };
@@ -94,7 +124,9 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
 /// element.
 fn folded(assembly: &Assembly, p: usize, offset: usize, own: &Explicit, faults: &Faults<'_>) -> bool {
     let part = &assembly.mesh.parts[p];
-
+    if part.section().is_some() {
+        return true;
+    }
     let mut n_folded = 0;
     for e in 0..part.n_elements() {
         let nodes = part.corners(e);

@@ -11,6 +11,7 @@ mod boundary;
 mod burn;
 mod contact;
 mod curve;
+mod erosion;
 mod load;
 mod output;
 mod part;
@@ -117,10 +118,11 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = control
         .map(|control| Control { sort_lag: sort_lag(&deck, control.sort_lag, settings, faults), ..control });
+    let erosion = erosion::read(&deck, &parts, settings.is_some());
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();
-    check::spans(&parts, &assembly, contact.as_ref(), faults);
+    check::spans(&parts, &assembly, contact.as_ref(), &materials.list, faults);
     let contact = contact.map(|c| c.settings);
 
     let mut velocity = assembly.velocity;
@@ -137,6 +139,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
         units: units.name.to_string(),
         mesh: assembly.mesh,
         velocity,
+        spin: assembly.spin,
         constraint: conditions.constraint,
         join_energy: assembly.join_energy,
         setup: Setup {
@@ -148,6 +151,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
             bodies,
             detonations,
             loads: conditions.loads,
+            erosion,
         },
         output,
     })

@@ -9,15 +9,19 @@
 //! ...
 //! solids 1 "bar"
 //! 10 1 2 3 4 5 6 7 8
+//! shells 1 "lid"
+//! 11 5 6 7 8
 //! set 2 "left end"
 //! 1 4
 //! segments 1 "top"
 //! 5 6 7 8
 //! velocities 1
 //! 2 0 0 -3.5
+//! spins 1
+//! 5 0 0.1 0
 //! ```
 //!
-//! Bodies of one file share the nodes that they both name. What a deck does with a mesh is in `format/part.rs`.
+//! A triangle among shells names its last node twice. Bodies of one file share the nodes that they both name. What a deck does with a mesh is in `format/part.rs`.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -53,6 +57,8 @@ pub struct MeshFile {
     pub segments: BTreeMap<String, Vec<[u32; 4]>>,
     /// Initial velocities of nodes (length per time); they go before those of parts.
     pub velocities: Vec<(u32, [f64; 3])>,
+    /// Initial rotation rates of nodes of shells (1/time).
+    pub spins: Vec<(u32, [f64; 3])>,
 }
 
 /// The elements of one part.
@@ -62,6 +68,16 @@ pub struct Body {
     pub name: String,
     /// Number and corners of each hexahedron.
     pub solids: Vec<(u32, [u32; 8])>,
+    /// Number and corners of each shell; a body has either solids or shells.
+    pub shells: Vec<(u32, [u32; 4])>,
+}
+
+impl Body {
+    /// The nodes of its elements, as often as they are corners.
+    pub fn corners(&self) -> impl Iterator<Item = u32> + '_ {
+        let of_shells = self.shells.iter().flat_map(|(_, nodes)| *nodes);
+        self.solids.iter().flat_map(|(_, nodes)| *nodes).chain(of_shells)
+    }
 }
 
 impl MeshFile {
@@ -86,10 +102,17 @@ impl MeshFile {
             text.push('\n');
         };
         for body in &self.bodies {
-            let _ = writeln!(text, "solids {} \"{}\"", body.solids.len(), body.name);
+            if body.shells.is_empty() {
+                let _ = writeln!(text, "solids {} \"{}\"", body.solids.len(), body.name);
+            } else {
+                let _ = writeln!(text, "shells {} \"{}\"", body.shells.len(), body.name);
+            }
             for (id, corners) in &body.solids {
                 let [a, b, c, d, e, f, g, h] = *corners;
                 row(&mut text, &[*id, a, b, c, d, e, f, g, h]);
+            }
+            for (id, [a, b, c, d]) in &body.shells {
+                row(&mut text, &[*id, *a, *b, *c, *d]);
             }
         }
         for (name, nodes) in &self.sets {
@@ -100,10 +123,10 @@ impl MeshFile {
             let _ = writeln!(text, "segments {} \"{name}\"", faces.len());
             faces.iter().for_each(|face| row(&mut text, face));
         }
-        if !self.velocities.is_empty() {
-            let _ = writeln!(text, "velocities {}", self.velocities.len());
-            for (id, v) in &self.velocities {
-                triple(&mut text, *id, *v);
+        for (kind, list) in [("velocities", &self.velocities), ("spins", &self.spins)] {
+            if !list.is_empty() {
+                let _ = writeln!(text, "{kind} {}", list.len());
+                list.iter().for_each(|(id, v)| triple(&mut text, *id, *v));
             }
         }
         text
@@ -114,9 +137,11 @@ impl MeshFile {
 enum Section {
     Nodes,
     Solids(usize),
+    Shells(usize),
     Set(String),
     Segments(String),
     Velocities,
+    Spins,
 }
 
 /// Reads a mesh file.
@@ -127,7 +152,8 @@ pub fn parse(text: &str, file_name: &str) -> Result<MeshFile, Vec<Fault>> {
     let faults = Faults::new(file_name, text);
     let mut mesh = MeshFile::default();
     let mut nodes: BTreeSet<u32> = BTreeSet::new();
-    let mut elements: BTreeSet<u32> = BTreeSet::new();
+    // Solids and shells are numbered apart.
+    let mut elements: [BTreeSet<u32>; 2] = Default::default();
     let mut section: Option<(Section, u64)> = None;
     let mut started = false;
     let mut at = 0;
@@ -188,7 +214,7 @@ type Wrong = (String, &'static str);
 /// `kind COUNT "name"`.
 fn heading(line: &str, mesh: &mut MeshFile) -> Result<(Section, u64), Wrong> {
     let wrong = || {
-        let kinds = "nodes N, solids N \"name\", set N \"name\", segments N \"name\" or velocities N";
+        let kinds = "nodes N, solids N \"name\", shells N \"name\", set N \"name\", segments N \"name\", velocities N or spins N";
         (kinds.to_string(), "correct the heading, or the number of lines of the one before")
     };
     let (kind, rest) = line.split_once(' ').ok_or_else(wrong)?;
@@ -198,8 +224,13 @@ fn heading(line: &str, mesh: &mut MeshFile) -> Result<(Section, u64), Wrong> {
         return Err((format!("at most {MAX_NODES} lines"), "make a smaller mesh"));
     }
     let name = name.trim();
-    if matches!(kind, "nodes" | "velocities") {
-        let section = if kind == "nodes" { Section::Nodes } else { Section::Velocities };
+    let nameless = match kind {
+        "nodes" => Some(Section::Nodes),
+        "velocities" => Some(Section::Velocities),
+        "spins" => Some(Section::Spins),
+        _ => None,
+    };
+    if let Some(section) = nameless {
         return if name.is_empty() { Ok((section, count)) } else { Err(wrong()) };
     }
     let name = name.strip_prefix('"').and_then(|n| n.strip_suffix('"')).ok_or_else(wrong)?;
@@ -208,12 +239,13 @@ fn heading(line: &str, mesh: &mut MeshFile) -> Result<(Section, u64), Wrong> {
     }
     let taken = || ("a name that is not taken".to_string(), "choose another name");
     let section = match kind {
-        "solids" => {
+        "solids" | "shells" => {
             if mesh.body(name).is_some() {
                 return Err(taken());
             }
-            mesh.bodies.push(Body { name: name.to_string(), solids: Vec::new() });
-            Section::Solids(mesh.bodies.len() - 1)
+            mesh.bodies.push(Body { name: name.to_string(), ..Body::default() });
+            let body = mesh.bodies.len() - 1;
+            if kind == "solids" { Section::Solids(body) } else { Section::Shells(body) }
         }
         "set" => {
             if mesh.sets.insert(name.to_string(), Vec::new()).is_some() {
@@ -241,7 +273,7 @@ fn row(
     line: &str,
     mesh: &mut MeshFile,
     nodes: &mut BTreeSet<u32>,
-    elements: &mut BTreeSet<u32>,
+    elements: &mut [BTreeSet<u32>; 2],
 ) -> Result<(), Wrong> {
     match section {
         Section::Nodes => {
@@ -251,18 +283,27 @@ fn row(
             }
             mesh.nodes.push((id, x));
         }
-        Section::Velocities => {
+        Section::Velocities | Section::Spins => {
             let (id, v) = place(line).ok_or_else(|| ("node vx vy vz".to_string(), "correct the line"))?;
             known(nodes, &[id])?;
-            mesh.velocities.push((id, v));
+            let list = if matches!(section, Section::Spins) { &mut mesh.spins } else { &mut mesh.velocities };
+            list.push((id, v));
         }
         Section::Solids(body) => {
             let [id, corners @ ..] = numbers::<9>(line)?;
-            if !elements.insert(id) {
+            if !elements[0].insert(id) {
                 return Err((format!("an element number other than {id}"), "renumber one"));
             }
             known(nodes, &corners)?;
             mesh.bodies[*body].solids.push((id, corners));
+        }
+        Section::Shells(body) => {
+            let [id, corners @ ..] = numbers::<5>(line)?;
+            if !elements[1].insert(id) {
+                return Err((format!("an element number other than {id}"), "renumber one"));
+            }
+            known(nodes, &corners)?;
+            mesh.bodies[*body].shells.push((id, corners));
         }
         Section::Set(name) => {
             let ids: Option<Vec<u32>> = line.split_whitespace().map(id).collect();
@@ -321,13 +362,22 @@ mod tests {
         let corner = |i: u32| [i & 1, (i >> 1) & 1, i >> 2].map(|c| f64::from(c) / 3.0);
         MeshFile {
             nodes: (0..8).map(|i| (i + 11, corner(i))).collect(),
-            bodies: vec![Body {
-                name: "the cube".to_string(),
-                solids: vec![(7, [11, 12, 14, 13, 15, 16, 18, 17])],
-            }],
+            bodies: vec![
+                Body {
+                    name: "the cube".to_string(),
+                    solids: vec![(7, [11, 12, 14, 13, 15, 16, 18, 17])],
+                    ..Body::default()
+                },
+                Body {
+                    name: "its lid".to_string(),
+                    shells: vec![(8, [15, 16, 18, 17]), (9, [11, 12, 14, 14])],
+                    ..Body::default()
+                },
+            ],
             sets: BTreeMap::from([("set 1".to_string(), (11..19).chain(11..19).collect())]),
             segments: BTreeMap::from([("top".to_string(), vec![[15, 16, 18, 17]])]),
             velocities: vec![(12, [0.1, -1e-300, 2e30])],
+            spins: vec![(15, [0.0, 0.5, -1.0 / 3.0])],
         }
     }
 
@@ -355,10 +405,7 @@ mod tests {
             faulty("nodes 8", "nodes 9")
                 .contains("a.mesh:11:1: read solids 1 \"the cube\"; expected number x y z")
         );
-        assert!(
-            faulty("velocities 1", "velocities 2")
-                .contains("read the end of the file; expected 1 more lines")
-        );
+        assert!(faulty("spins 1", "spins 2").contains("read the end of the file; expected 1 more lines"));
         assert!(parse("", "a.mesh").expect_err("empty")[0].read.contains("empty"));
     }
 }

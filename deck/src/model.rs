@@ -40,6 +40,8 @@ pub struct Model {
     pub mesh: Mesh,
     /// Initial velocity by global node index (mass-weighted at merged nodes).
     pub velocity: Vec<[f64; 3]>,
+    /// Initial rotation rate by global node index (1/time), of nodes of shells; empty where all are zero.
+    pub spin: Vec<[f64; 3]>,
     /// Index into `setup.constraints` by global node index; 0 is free.
     pub constraint: Vec<u16>,
     /// Kinetic energy lost where joined nodes of different velocity merged.
@@ -63,8 +65,37 @@ pub struct Output {
     pub snapshot_cycles: Option<u64>,
     /// Element and node fields to write, by name; empty means the default set.
     pub fields: Vec<String>,
+    /// Whether the numbers of states are compressed.
+    pub compress: bool,
+    /// Whether states hold the worker of every element.
+    pub workers: bool,
+    /// Whether each state comes with the contact surface and the pressure on it.
+    pub contact_surface: bool,
+    /// Pairs of different parts, by index, whose contact force the history holds: that on the first from the second.
+    pub contact_forces: Vec<[u32; 2]>,
     /// Gauges: histories at nodes.
     pub gauges: Vec<Gauge>,
+    /// Histories of elements.
+    pub element_gauges: Vec<ElementGauge>,
+}
+
+impl Default for Output {
+    /// What a deck without `[output]` asks for.
+    fn default() -> Self {
+        Self {
+            period: None,
+            history_cycles: 10,
+            snapshot_seconds: None,
+            snapshot_cycles: None,
+            fields: Vec::new(),
+            compress: true,
+            workers: false,
+            contact_surface: false,
+            contact_forces: Vec::new(),
+            gauges: Vec::new(),
+            element_gauges: Vec::new(),
+        }
+    }
 }
 
 /// A history at one node.
@@ -74,4 +105,13 @@ pub struct Gauge {
     pub name: String,
     /// Global node index; a gauge given by a point is the nearest node of the initial mesh.
     pub node: u32,
+}
+
+/// A history of one element.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ElementGauge {
+    /// Name: prefix of its columns.
+    pub name: String,
+    /// Global element index; a gauge given by a point is the element whose centre was nearest to it.
+    pub element: u32,
 }

@@ -88,6 +88,29 @@ fn bars_and_blade_are_read() {
 }
 
 #[test]
+fn explosive_and_water_box_are_quarters_that_meet_through_contact_alone() {
+    let disc = example("explosive-on-plate");
+    let [plate, explosive] = &disc.mesh.parts[..] else { panic!("{} parts", disc.mesh.parts.len()) };
+    assert_eq!((plate.n_elements(), explosive.n_elements()), (30 * 30 * 4, (8 * 8 + 2 * 8 * 6) * 10));
+    assert_eq!(disc.setup.detonations.len(), 1);
+    assert_eq!(disc.output.contact_forces, [[0, 1]]);
+    let shared = explosive.nodes.iter().filter(|node| plate.nodes.contains(node)).count();
+    assert_eq!(shared, 0);
+    // The gauge is the element under the axis, in the upper layer of the plate.
+    assert_eq!(disc.output.element_gauges[0].element, 30 * 30 * 3);
+
+    let boxed = example("fragment-on-water-box");
+    let names: Vec<&str> = boxed.mesh.parts.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names, ["water", "front wall", "rear wall", "side wall x", "side wall y", "fragment"]);
+    // Closed: water and walls are one grid of 22 x 22 x 36 cells.
+    let grid: Vec<u32> = boxed.mesh.parts[..5].iter().flat_map(|part| part.nodes.iter().copied()).collect();
+    let nodes: std::collections::BTreeSet<u32> = grid.into_iter().collect();
+    assert_eq!(nodes.len(), 23 * 23 * 37);
+    let elements: usize = boxed.mesh.parts[..5].iter().map(|part| part.n_elements()).sum();
+    assert_eq!(elements, 22 * 22 * 36);
+}
+
+#[test]
 fn the_format_reference_names_every_library_material() {
     let reference = std::fs::read_to_string(format!("{}/README.md", env!("CARGO_MANIFEST_DIR")))
         .expect("the reference is in the repository");

@@ -8,7 +8,13 @@ use deck::{
     bundle::{self, Options},
     mesh_file,
 };
-use mechanics::{load::Drive, material::Strength, mesh::Topology, wall::Shape};
+use mechanics::{
+    element::shell4::Rule,
+    load::Drive,
+    material::Strength,
+    mesh::{Section, Topology},
+    wall::Shape,
+};
 
 fn folder(name: &str) -> String {
     format!("{}/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -81,6 +87,77 @@ fn block_on_plate_is_a_quarter_with_curves_sets_and_contact() {
 }
 
 #[test]
+fn ball_on_shell_has_clamped_shells_of_five_points_that_solids_meet() {
+    let Reading { model, warnings } = example("ball-on-shell.k", None);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let [sheet, ball] = &model.mesh.parts[..] else { panic!("two parts") };
+    assert_eq!((sheet.name.as_str(), sheet.n_elements(), ball.n_elements()), ("sheet", 144, 64));
+    assert_eq!(sheet.section(), Some(Section { thickness: 1.0, rule: Rule::Gauss(5) }));
+    // Both kinds are numbered from 1.
+    assert_eq!((sheet.element_ids[0], ball.element_ids[0]), (1, 1));
+    let held = |n: &&u32| model.setup.constraints[usize::from(model.constraint[**n as usize])].clamped == 7;
+    assert_eq!(sheet.nodes.iter().filter(held).count(), 48);
+    assert!(matches!(model.setup.materials[0].strength, Strength::VonMises { rate: Some(_), .. }));
+    let contact = model.setup.contact.expect("the deck has contact");
+    // Half the thickness.
+    assert_eq!((contact.gap, contact.interacts), (0.5, vec![true; 4]));
+}
+
+/// A square of shells whose edge is 10, spinning about z, and what is added to it.
+fn square(section: &str, more: &str) -> String {
+    format!(
+        "*KEYWORD\n*CONTROL_TERMINATION\n1e-6\n*PART\nsquare\n1,1,1\n{section}*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n\
+         *NODE\n1,0,0,0,1,7\n2,10,0,0\n3,10,10,0\n4,0,10,0\n5,5,15,0\n*ELEMENT_SHELL\n1,1,1,2,3,4\n2,1,4,3,5\n\
+         *INITIAL_VELOCITY_GENERATION\n1,2,3.0\n0,0,0,0,0,1\n{more}*END\n"
+    )
+}
+
+#[test]
+fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
+    let reading = deck::read_whole(&square("*SECTION_SHELL\n1,16,,7,,1\n2,2,2,2\n", ""), "a.k")
+        .unwrap_or_else(|f| panic!("{}", lines(&f)));
+    let part = &reading.model.mesh.parts[0];
+    assert_eq!(part.section(), Some(Section { thickness: 2.0, rule: Rule::Lobatto(5) }));
+    assert_eq!(part.corners(1)[..4], [3, 2, 4, 4]);
+    assert_eq!((reading.model.spin[2], reading.model.velocity[2]), ([0.0, 0.0, 3.0], [-30.0, 30.0, 0.0]));
+    let of = |n: usize| reading.model.setup.constraints[usize::from(reading.model.constraint[n])];
+    assert_eq!((of(0).velocity.map(|v| v.is_some()), of(0).clamped), ([true, false, false], 7));
+    let words: Vec<&str> = reading.warnings.iter().map(|w| w.words.as_str()).collect();
+    assert!(words.iter().any(|w| w.starts_with("ELFORM 16")), "{words:?}");
+    assert!(words.contains(&"NIP 7: 5 points through the thickness"), "{words:?}");
+    assert!(words.iter().any(|w| w.starts_with("1 triangles")), "{words:?}");
+    // Its own thickness goes before that of the section.
+    let own = square("*SECTION_SHELL\n1,2\n", "").replace(
+        "*ELEMENT_SHELL\n1,1,1,2,3,4\n2,1,4,3,5\n",
+        "*ELEMENT_SHELL_THICKNESS\n1,1,1,2,3,4\n1,2,3,2\n2,1,4,3,5\n1,2,3\n",
+    );
+    let model = read(&own).unwrap_or_else(|f| panic!("{}", lines(&f)));
+    assert_eq!(model.mesh.parts[0].section(), Some(Section { thickness: 2.0, rule: Rule::Gauss(2) }));
+}
+
+#[test]
+fn shells_that_cannot_be_computed_are_refused_at_their_line() {
+    let fault = |section: &str, more: &str| read(&square(section, more)).expect_err("a fault")[0].to_string();
+    let sound = "*SECTION_SHELL\n1,2\n2,2,2,2\n";
+    assert!(read(&square(sound, "")).is_ok());
+    for (section, more, expected) in [
+        ("*SECTION_SHELL\n1,5\n2\n", "", "a.k:8:"),
+        ("*SECTION_SHELL\n1,2\n", "", "shell 1 without a thickness"),
+        ("*SECTION_SHELL\n1,2,,,,,1\n2\n", "", "one material through the thickness"),
+        ("*SECTION_SHELL\n1,2\n2,2,2,2,1\n", "", "nodes in the middle of the thickness"),
+        ("*SECTION_SOLID\n1,1\n", "", "shell 1 without a thickness"),
+        (sound, "*ELEMENT_SHELL\n2,1,1,2,3,4\n", "a number other than 2"),
+        (sound, "*ELEMENT_SHELL\n3,1,1,2,3,9\n", "shell 3 with node 9"),
+        (sound, "*ELEMENT_SHELL\n3,1,1,2,1,4\n", "a triangle that repeats the third"),
+        (sound, "*ELEMENT_SHELL_THICKNESS\n3,1,1,2,3,4\n1,1,1,1\n", "shell 3 of thickness 1"),
+        (sound, "*ELEMENT_SHELL\n3,1,1,2,3,4,5\n", "at most four nodes"),
+    ] {
+        let said = fault(section, more);
+        assert!(said.contains(expected), "{said}; expected {expected}");
+    }
+}
+
+#[test]
 fn bar_on_wall_runs_the_case_that_is_chosen() {
     for (case, speed, title) in
         [(101, -190e3, "Bar on a wall, 190 m/s"), (102, -100e3, "Bar on a wall, 100 m/s")]
@@ -102,7 +179,8 @@ fn bar_on_wall_runs_the_case_that_is_chosen() {
 
 #[test]
 fn a_converted_deck_is_the_same_problem() {
-    for (name, case) in [("block-on-plate.k", None), ("bar-on-wall.k", Some(102))] {
+    for (name, case) in [("block-on-plate.k", None), ("bar-on-wall.k", Some(102)), ("ball-on-shell.k", None)]
+    {
         let options = Options { units: None, case };
         let text = gathered(&folder("examples"), name, &options);
         let converted = deck::convert(&text, name, "out.mesh").unwrap_or_else(|f| panic!("{}", lines(&f)));

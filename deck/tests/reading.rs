@@ -167,7 +167,10 @@ fn loads_curves_and_walls_are_as_the_deck_says() {
     assert_eq!(transmit.faces, (0..16).map(|e| (4 * e + 3, 3)).collect::<Vec<_>>());
     // Nodes 1 and 125 have the force, the first a velocity that starts at twice the first value of the curve.
     let of = |node: usize| model.setup.constraints[usize::from(model.constraint[node])];
-    assert_eq!(of(0), Constraint { velocity: [Some(ramp(2.0)), None, None], walls: 0, forces: 1 });
+    assert_eq!(
+        of(0),
+        Constraint { velocity: [Some(ramp(2.0)), None, None], walls: 0, forces: 1, clamped: 0 }
+    );
     assert_eq!(of(124), Constraint { forces: 1, ..Constraint::default() });
     assert_eq!((model.velocity[0], model.velocity[124]), ([6.0, 0.0, 0.0], [0.0; 3]));
     let walls: Vec<_> =

@@ -6,8 +6,8 @@
 
 use protocol::tls::{Paths, Role};
 use rcgen::{
-    BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer,
-    KeyPair, KeyUsagePurpose, SanType, date_time_ymd,
+    BasicConstraints, Certificate, CertificateParams, CertificateSigningRequestParams, DistinguishedName,
+    DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose, SanType, date_time_ymd,
 };
 use std::fmt;
 use std::fs::{self, OpenOptions};
@@ -46,6 +46,8 @@ pub enum Error {
         /// The system's words.
         error: std::io::Error,
     },
+    /// Something that the lab's rules forbid: a used token, an unknown host.
+    Rule(String),
     /// A key that is no key, or a certificate that cannot be made of it.
     Unusable {
         /// The file.
@@ -64,6 +66,7 @@ impl fmt::Display for Error {
             Self::NoAuthority(path) => write!(f, "{} is missing; make the CA first", path.display()),
             Self::Name { given, expected } => write!(f, "{given:?} must be {expected}"),
             Self::Io { path, error } => write!(f, "{}: {error}", path.display()),
+            Self::Rule(why) => f.write_str(why),
             Self::Unusable { path, error } => write!(f, "{}: {error}", path.display()),
         }
     }
@@ -104,24 +107,75 @@ pub fn make_host(
     role: Role,
     force: bool,
 ) -> Result<Paths, Error> {
-    let (authority_path, key_path) = (folder.join("ca.pem"), folder.join("ca-key.pem"));
     let params = host(name, addresses, role)?;
-    let authority_pem = read(&authority_path)?;
-    let authority_key = KeyPair::from_pem(&read(&key_path)?)
-        .map_err(|error| Error::Unusable { path: key_path.clone(), error })?;
+    let (authority_pem, issuer) = issuer(folder)?;
 
     let host_folder = folder.join(name);
     let paths = Paths::in_folder(&host_folder);
     check_absent(&[&paths.ca, &paths.certificate, &paths.key], force)?;
     let unusable = |error| Error::Unusable { path: paths.certificate.clone(), error };
     let key = KeyPair::generate().map_err(unusable)?;
-    let issuer = Issuer::new(authority(), authority_key);
     let certificate = params.signed_by(&key, &issuer).map_err(unusable)?;
 
+    record(folder, &certificate)?;
     create_folder(&host_folder)?;
     write(&paths.key, &key.serialize_pem(), 0o600)?;
     write(&paths.certificate, &certificate.pem(), 0o644)?;
     write(&paths.ca, &authority_pem, 0o644)?;
+    Ok(paths)
+}
+
+/// The CA in `folder`: its certificate in PEM, and what signs in its name.
+fn issuer(folder: &Path) -> Result<(String, Issuer<'static, KeyPair>), Error> {
+    let key_path = folder.join("ca-key.pem");
+    let pem = read(&folder.join("ca.pem"))?;
+    let key =
+        KeyPair::from_pem(&read(&key_path)?).map_err(|error| Error::Unusable { path: key_path, error })?;
+    Ok((pem, Issuer::new(authority(), key)))
+}
+
+/// Keeps a certificate in `folder/issued`, by its fingerprint, so that it can be revoked by its host's name.
+fn record(folder: &Path, certificate: &Certificate) -> Result<(), Error> {
+    let issued = folder.join("issued");
+    create_folder(&issued)?;
+    let name = format!("{}.pem", protocol::tls::fingerprint(certificate.der()));
+    write(&issued.join(name), &certificate.pem(), 0o644)
+}
+
+/// Signs the key of a newcomer's request (PKCS#10, DER) for the host `name`; what else the request says does not count.
+/// Gives the certificate and that of the CA, both in PEM.
+pub(crate) fn sign_request(
+    folder: &Path,
+    request: &[u8],
+    name: &str,
+    addresses: &[String],
+    role: Role,
+) -> Result<(String, String), Error> {
+    let params = host(name, addresses, role)?;
+    let (ca, issuer) = issuer(folder)?;
+    let wrong = |error| Error::Rule(format!("the request for a certificate: {error}"));
+    let request = CertificateSigningRequestParams::from_der(&request.into()).map_err(wrong)?;
+    let certificate = params.signed_by(&request.public_key, &issuer).map_err(wrong)?;
+    record(folder, &certificate)?;
+    Ok((certificate.pem(), ca))
+}
+
+/// A new key, kept to this host, and a request (PKCS#10, DER) to have it signed.
+pub(crate) fn make_request() -> Result<(KeyPair, Vec<u8>), Error> {
+    let wrong = |error: rcgen::Error| Error::Rule(format!("a request for a certificate: {error}"));
+    let key = KeyPair::generate().map_err(wrong)?;
+    let request = CertificateParams::default().serialize_request(&key).map_err(wrong)?;
+    Ok((key, request.der().to_vec()))
+}
+
+/// Puts the three files of this host into `folder`, which must not hold any of them.
+pub(crate) fn install(folder: &Path, key: &KeyPair, certificate: &str, ca: &str) -> Result<Paths, Error> {
+    let paths = Paths::in_folder(folder);
+    check_absent(&[&paths.ca, &paths.certificate, &paths.key], false)?;
+    create_folder(folder)?;
+    write(&paths.key, &key.serialize_pem(), 0o600)?;
+    write(&paths.ca, ca, 0o644)?;
+    write(&paths.certificate, certificate, 0o644)?;
     Ok(paths)
 }
 
@@ -200,7 +254,7 @@ fn check_absent(paths: &[&Path], force: bool) -> Result<(), Error> {
     }
 }
 
-fn create_folder(path: &Path) -> Result<(), Error> {
+pub(crate) fn create_folder(path: &Path) -> Result<(), Error> {
     fs::create_dir_all(path).map_err(|error| Error::Io { path: path.to_owned(), error })
 }
 
@@ -213,7 +267,7 @@ fn read(path: &Path) -> Result<String, Error> {
 
 /// Writes a new file that has `mode` from its first moment on; what was at `path` is removed before, so
 /// that an old mode or a link does not live on.
-fn write(path: &Path, text: &str, mode: u32) -> Result<(), Error> {
+pub(crate) fn write(path: &Path, text: &str, mode: u32) -> Result<(), Error> {
     let fault = |error| Error::Io { path: path.to_owned(), error };
     match fs::remove_file(path) {
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(fault(error)),

@@ -1,7 +1,6 @@
 //! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel`, `resume` and `results`, the other end of the [`desk`](crate::desk).
 
 use std::{
-    fs::File,
     io::Write,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -22,7 +21,7 @@ use protocol::{
 use crate::{
     command::{ClientArgs, SubmitArgs},
     daemon::host_name,
-    results::Folder,
+    results::{Folder, create_anew},
     run::{gather_deck, list_of_faults, warn},
 };
 
@@ -311,7 +310,7 @@ pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> 
         // The master is believed no more than any other peer.
         check_file_name(name)?;
         let path = folder.join(name);
-        let mut file = File::create(&path).map_err(|e| fault(&path, e))?;
+        let mut file = create_anew(&path).map_err(|e| fault(&path, e))?;
         let mut offset = 0;
         loop {
             let request = Request::File { job, name: name.clone(), offset };

@@ -9,6 +9,8 @@ use protocol::{
     tls,
 };
 
+use crate::picture::arguments::PictureArgs;
+
 /// What the process ends with, as `--help` says it.
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 a fault, which is printed (deck, disk, physics, peer); 2 wrong flags; 130 \
 stopped by Ctrl-C, or the followed job was cancelled. The log goes to standard error, BOLIDE_LOG=debug for more.";
@@ -33,6 +35,8 @@ pub enum Command {
     Master(MasterArgs),
     /// Compute for a master
     Worker(WorkerArgs),
+    /// Start workers over ssh, on the hosts of a file
+    Add(AddArgs),
     /// Put a deck into a master's queue
     Submit(SubmitArgs),
     /// Follow a job until it ends, then print its summary
@@ -109,6 +113,8 @@ pub enum Command {
         #[command(flatten)]
         reading: ReadingArgs,
     },
+    /// Draw a state of a results folder as a PNG, coloured by a field
+    Picture(PictureArgs),
     /// Write an LS-DYNA keyword deck as a TOML deck, with its mesh in a file beside it
     Convert {
         /// The keyword deck
@@ -414,6 +420,10 @@ pub struct MasterArgs {
     /// Folder with this host's certificates, as `bolide certs host` makes it
     #[arg(long, value_name = "FOLDER")]
     pub certs: Option<PathBuf>,
+    /// Folder of the CA, as `bolide certs ca` makes it: newcomers exchange tokens for certificates, and those that are
+    /// revoked count no more
+    #[arg(long, value_name = "FOLDER", requires = "certs")]
+    pub lab: Option<PathBuf>,
     /// Folder for jobs, their results and snapshots; a restarted master goes on with what it finds there
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
@@ -465,6 +475,9 @@ pub struct WorkerArgs {
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
     #[arg(long, value_name = "RATE")]
     pub link: Option<Rate>,
+    /// Exchange this token at the master for a certificate, into the folder of --certs, unless it holds one
+    #[arg(long, value_name = "TOKEN", requires = "certs")]
+    pub join: Option<String>,
     /// Port for other workers, on the interface that leads to the master [default: any]
     #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
     pub peer_port: u16,
@@ -474,6 +487,25 @@ pub struct WorkerArgs {
     /// Take no other workers and dial none: what it exchanges with them passes the master
     #[arg(long, conflicts_with_all = ["peer_port", "peer_announce"])]
     pub no_peers: bool,
+}
+
+/// Flags of `add`.
+#[derive(Args, Clone, Debug)]
+pub struct AddArgs {
+    /// Those to start, deferred ones too [default: all that are not deferred]
+    pub names: Vec<String>,
+    /// The host file (TOML)
+    #[arg(long, value_name = "FILE", default_value = "hosts.toml")]
+    pub hosts: PathBuf,
+    /// The master as the hosts reach it, HOST:PORT [default: the host file's]
+    #[arg(long)]
+    pub master: Option<String>,
+    /// Print the commands and do nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Print JSON
+    #[arg(long, conflicts_with = "dry_run")]
+    pub json: bool,
 }
 
 /// How a client reaches a master, and how it prints.
@@ -654,6 +686,58 @@ pub enum Certs {
         #[arg(long)]
         force: bool,
     },
+    /// Issue a token with which a bare PC gets a certificate from the running master, once
+    Token {
+        /// The folder of the CA
+        folder: PathBuf,
+        /// What the host may be
+        #[arg(long, value_enum, default_value = "worker")]
+        role: JoinRole,
+        /// How long the token is good (hours)
+        #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=8760))]
+        hours: u64,
+        /// The master, for the line to paste
+        #[arg(long, value_name = "HOST:PORT", default_value = "HOST:PORT")]
+        master: String,
+    },
+    /// Exchange a token at a master for this host's certificate
+    Join {
+        /// The master: HOST, HOST:PORT or [ADDRESS]:PORT
+        master: String,
+        /// The token, as `bolide certs token` prints it
+        token: String,
+        /// Folder for the certificate
+        folder: PathBuf,
+        /// Name of this host [default: its host name]
+        #[arg(long)]
+        name: Option<String>,
+    },
+    /// Revoke every certificate of a host: a running master ends its links
+    Revoke {
+        /// The folder of the CA
+        folder: PathBuf,
+        /// Name of the host
+        name: String,
+    },
+}
+
+/// What a host that joins by a token may be: masters are made where the CA is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum JoinRole {
+    /// Computes
+    Worker,
+    /// Submits and watches jobs
+    Client,
+}
+
+impl JoinRole {
+    /// The same as certificates spell it.
+    pub const fn role(self) -> tls::Role {
+        match self {
+            Self::Worker => tls::Role::Worker,
+            Self::Client => tls::Role::Client,
+        }
+    }
 }
 
 /// What the holder of a certificate may be.

@@ -21,13 +21,13 @@ use protocol::{
     message::ToMaster,
     order::{BULK_ON_THE_WAY, Inbox, Outbox},
     shape::{Shape, Shaped},
-    tls::{self, ServerConfig},
+    tls::{self, Revoked, ServerConfig},
     wire,
 };
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::TcpStream,
-    sync::{mpsc, oneshot},
+    sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot},
     time::Instant,
 };
 use tracing::{info, warn};
@@ -37,8 +37,14 @@ use crate::{
     desk,
     drive::{Input, Route, Seat},
     event::Hand,
+    lab::Lab,
+    newcomer,
 };
 
+/// Connections that may be in their handshake or greeting at a time, each with some 200 kB of buffers.
+pub const GREETINGS: usize = 256;
+/// The longest that a connection waits for a place among them.
+const PLACE_LIMIT: Duration = Duration::from_secs(30);
 /// A worker is suspect after this part of the silence after which it is dead.
 const SUSPECT: f64 = 0.3;
 
@@ -52,6 +58,10 @@ pub struct Gate {
     token: Option<String>,
     /// Certificates; none on loopback.
     tls: Option<Arc<ServerConfig>>,
+    /// Where newcomers exchange their tokens, and the certificates that count no more.
+    lab: Option<(Lab, Revoked)>,
+    /// Places for connections that are not welcomed yet.
+    greetings: Arc<Semaphore>,
     /// This host's emulated port, which all connections pass.
     port: Option<Shape>,
     /// Without a byte for so long, a peer is dead.
@@ -70,8 +80,16 @@ impl Gate {
         tls: Option<Arc<ServerConfig>>,
     ) -> Self {
         let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
-        let dead_after = Settings::default().silence;
-        Self { events, roles, token, tls, port: None, dead_after, incarnations, ending }
+        let greetings = Arc::new(Semaphore::new(GREETINGS));
+        let (lab, port, dead_after) = (None, None, Settings::default().silence);
+        Self { events, roles, token, tls, lab, greetings, port, dead_after, incarnations, ending }
+    }
+
+    /// Newcomers may exchange tokens of this lab, and certificates on its list are not accepted.
+    #[must_use]
+    pub fn of(mut self, lab: Option<(Lab, Revoked)>) -> Self {
+        self.lab = lab;
+        self
     }
 
     /// All connections pass this emulated port.
@@ -113,13 +131,42 @@ impl Gate {
     /// # Errors
     /// Why it ended, unless a client left.
     pub async fn take(self: Arc<Self>, stream: TcpStream, address: String) -> Result<()> {
-        let stream = Shaped::new(link::Socket::new(stream)?, self.port.as_ref());
+        let socket = link::Socket::new(stream)?;
+        // A connection costs its socket until there is a place to greet it; strangers hold a place no longer than a
+        // handshake and a greeting may take.
+        let place = tokio::time::timeout(PLACE_LIMIT, Arc::clone(&self.greetings).acquire_owned()).await;
+        let full = || Error::Message(format!("{GREETINGS} others are being greeted, at most {GREETINGS}"));
+        let place = place.map_err(|_| full())?.map_err(|_| full())?;
+        let stream = Shaped::new(socket, self.port.as_ref());
         match self.tls.clone() {
-            None => self.serve(stream, address, None).await,
-            Some(config) => {
-                let (stream, identity) = tls::accept(stream, &config).await?;
-                self.serve(stream, address, Some(identity.role)).await
+            None => {
+                let policy = Policy { roles: self.roles.clone(), ..Policy::default() };
+                let (sender, receiver) = link::split(stream, self.settings());
+                self.greet(sender, receiver, address, policy, Some(place)).await
             }
+            Some(config) => {
+                let (stream, identity) = tls::accept_any(stream, &config).await?;
+                let (sender, receiver) = link::split(stream, self.settings());
+                let policy = self.policy_for(identity.as_ref());
+                if let Some(identity) = identity {
+                    tls::watch(&sender, identity, self.lab.as_ref().map(|(_, revoked)| revoked.clone()));
+                }
+                self.greet(sender, receiver, address, policy, Some(place)).await
+            }
+        }
+    }
+
+    /// Whom to take on a connection with this certificate: without one, newcomers only.
+    fn policy_for(&self, identity: Option<&tls::Identity>) -> Policy {
+        let revoked = self.lab.as_ref().map(|(_, revoked)| revoked);
+        match identity {
+            None => Policy { roles: vec![Role::Newcomer], ..Policy::default() },
+            Some(identity) => Policy {
+                roles: self.roles.clone(),
+                certificate: Some(identity.role),
+                refusal: identity.fault(revoked, std::time::SystemTime::now()),
+                ..Policy::default()
+            },
         }
     }
 
@@ -136,15 +183,38 @@ impl Gate {
     where
         S: AsyncRead + AsyncWrite + Send + 'static,
     {
-        let (sender, mut receiver) = link::split(stream, self.settings());
-        let policy = Policy { roles: self.roles.clone(), certificate, token: self.token.clone() };
+        let (sender, receiver) = link::split(stream, self.settings());
+        let policy = Policy { roles: self.roles.clone(), certificate, ..Policy::default() };
+        self.greet(sender, receiver, address, policy, None).await
+    }
+
+    async fn greet(
+        self: Arc<Self>,
+        sender: Sender,
+        mut receiver: Receiver,
+        address: String,
+        policy: Policy,
+        place: Option<OwnedSemaphorePermit>,
+    ) -> Result<()> {
+        let newcomer = policy.roles == [Role::Newcomer];
+        let token = self.token.clone().filter(|_| !newcomer);
+        let policy = Policy { token, ..policy };
         let (server, hello) = link::hear(&sender, &mut receiver, policy).await?;
         let incarnation = self.incarnations.fetch_add(1, Ordering::Relaxed) + 1;
         if hello.role == Role::Worker {
+            drop(place);
             return self.worker(server, &hello, sender, receiver, address, incarnation).await;
         }
         let welcome = Welcome { incarnation, host: 0, heartbeat_ms: self.heartbeat_ms() };
         link::admit(server, &sender, &mut receiver, welcome)?;
+        if newcomer {
+            let (lab, _) = self.lab.as_ref().ok_or_else(|| Error::Message("no lab to join here".into()))?;
+            // It keeps its place: nobody knows it yet.
+            let served = newcomer::serve(lab, &hello, &address, &sender, &mut receiver).await;
+            drop(place);
+            return served;
+        }
+        drop(place);
         match desk::serve(&self.events, &sender, &mut receiver, incarnation).await {
             // A client may go as it likes.
             Error::Closed | Error::Left { .. } | Error::Io { .. } => Ok(()),

@@ -20,12 +20,14 @@ use protocol::{
     request::{Ended, HostRow, JobOptions, State, Status},
     shape::{Shape, Wire},
     tls,
+    token::Token,
 };
 use tokio::{
     net::TcpListener,
     sync::{Semaphore, mpsc, oneshot, watch},
 };
 use tracing::{info, warn};
+use worker::notify;
 
 use crate::{
     command::MasterArgs,
@@ -33,6 +35,7 @@ use crate::{
     drive::{self, Input, Seat},
     hosts::Hosts,
     http::{self, board::Board},
+    lab::Lab,
     queue::{self, Entry, Queue, is_over},
     service::{self, Order},
     spool::{Left, Record, Spool},
@@ -42,6 +45,8 @@ use crate::{
 pub const WAITING_EVENTS: usize = 1024;
 /// Most connections at a time, those in their greeting included.
 pub const CONNECTIONS: usize = 4096;
+/// How long the token that a master prints at its start is good.
+const FIRST_TOKEN_HOURS: u64 = 24;
 /// The longest that an ending master waits until the job under way is stored.
 const END_LIMIT: Duration = Duration::from_secs(60);
 /// How long an interrupted job waits for all of its workers before it goes on with those that are back; later ones are taken
@@ -113,8 +118,10 @@ pub enum Event {
 /// # Errors
 /// If it cannot listen there, or the certificates cannot be used.
 pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
-    let tls = args.certs.as_ref().map(|folder| tls::server_config(&tls::Paths::in_folder(folder)));
-    let tls = tls.transpose().map_err(|e| e.to_string())?;
+    let lab = args.lab.as_ref().map(|folder| Lab::open(folder)).transpose().map_err(|e| e.to_string())?;
+    let tls = args.certs.as_ref().map(|folder| tls::Paths::in_folder(folder));
+    let config = if lab.is_some() { tls::open_server_config } else { tls::server_config };
+    let tls = tls.map(|paths| config(&paths)).transpose().map_err(|e| e.to_string())?;
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
@@ -130,16 +137,20 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     let result = runtime.block_on(async {
         let listener = TcpListener::bind(args.listen).await.map_err(|e| format!("{}: {e}", args.listen))?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
-        let join = announce(address, tls.is_some());
+        let join = announce(address, tls.is_some(), lab.as_ref())?;
+        let lab = lab.map(|lab| lab.follow().map(|revoked| (lab, revoked))).transpose();
+        let lab = lab.map_err(|e| e.to_string())?;
         let (events, heard) = mpsc::channel(WAITING_EVENTS);
         let gate = Arc::new(
             Gate::new(events.clone(), vec![Role::Worker, Role::Client], None, tls)
                 .behind(port)
+                .of(lab)
                 .patient_for(dead_after),
         );
         tokio::spawn(listen(listener, Arc::clone(&gate)));
         let board = open_page(args, join, &events).await?;
         let stop = crate::run::stop_on_interrupt("ending; the job under way is stored for the next master");
+        notify::say(&format!("READY=1\nSTATUS=listening on {address}"));
         Owner::new(args.spool.clone(), spool, left, events, board).run(heard, &stop, &gate).await;
         Ok(ExitCode::SUCCESS)
     });
@@ -195,13 +206,28 @@ async fn open_page(
     Ok(Some(board))
 }
 
-/// Says where it listens and how workers join; gives the line for workers.
-fn announce(address: SocketAddr, certificates: bool) -> String {
+/// Says where it listens and how workers join; gives the line for workers. The page shows it as well, to whoever may submit
+/// jobs, so the line with a token is printed here only.
+fn announce(address: SocketAddr, certificates: bool, lab: Option<&Lab>) -> Result<String, String> {
+    let host = reachable(address);
     let certs = if certificates { " --certs FOLDER" } else { "" };
-    let join = format!("bolide worker --master {}{certs}", reachable(address));
+    let join = format!("bolide worker --master {host}{certs}");
     println!("listening on {address}");
     println!("workers join with: {join}");
-    join
+    if let Some(lab) = lab {
+        let token = lab.issue(tls::Role::Worker, FIRST_TOKEN_HOURS).map_err(|e| e.to_string())?;
+        println!("a new PC joins with: {}", line_to_paste(&host, &token, tls::Role::Worker));
+        println!("more such lines: bolide certs token LAB --master {host}");
+    }
+    Ok(join)
+}
+
+/// What is pasted on a bare PC.
+pub fn line_to_paste(master: &str, token: &Token, role: tls::Role) -> String {
+    match role {
+        tls::Role::Worker => format!("bolide worker --master {master} --certs bolide-certs --join {token}"),
+        _ => format!("bolide certs join {master} {token} bolide-certs"),
+    }
 }
 
 /// Host and port as others write them.
@@ -224,6 +250,8 @@ struct Owner {
     folder: PathBuf,
     spool: Spool,
     started: Instant,
+    /// What every worker's arithmetic must come to.
+    proof: String,
     events: mpsc::Sender<Event>,
     hosts: Hosts,
     /// By connection: those that were welcomed and have not left.
@@ -265,6 +293,7 @@ impl Owner {
             folder,
             spool,
             started: Instant::now(),
+            proof: mechanics::proof::of_this_machine(),
             events,
             hosts: Hosts::default(),
             seats: BTreeMap::new(),
@@ -323,6 +352,7 @@ impl Owner {
 
     async fn run(mut self, mut heard: mpsc::Receiver<Event>, stop: &AtomicBool, gate: &Gate) {
         let mut look = tokio::time::interval(Duration::from_millis(100));
+        let (alive, mut said) = (notify::interval(), Instant::now());
         while !stop.load(Ordering::Relaxed) {
             tokio::select! {
                 event = heard.recv() => if let Some(event) = event {
@@ -332,7 +362,15 @@ impl Owner {
                 // An interrupted job waits for its workers for a while.
                 _ = look.tick() => self.start_next(),
             }
+            // Here, so that a manager sees an owner that is stuck.
+            if alive.is_some_and(|interval| said.elapsed() >= interval) {
+                notify::say("WATCHDOG=1");
+                said = Instant::now();
+            }
         }
+        notify::say("STOPPING=1\nSTATUS=storing the job under way");
+        // From here on END_LIMIT bounds what it waits for.
+        tokio::spawn(notify::live());
         self.end(&mut heard, gate).await;
     }
 
@@ -429,6 +467,7 @@ impl Owner {
     }
 
     fn admit(&mut self, hello: &Hello, address: &str, incarnation: u32) -> Result<u32, String> {
+        hello.proves(&self.proof)?;
         let (number, ghost) = self.hosts.admit(hello, address, incarnation)?;
         if let Some(ghost) = ghost.and_then(|ghost| self.seats.remove(&ghost)) {
             ghost.sender().abort(protocol::Error::Message("its process called again".into()));

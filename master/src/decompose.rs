@@ -3,7 +3,8 @@
 //! Every part is cut among all workers, with the same grouping of workers for all parts, so that facing columns of
 //! neighbouring parts fall on one worker. Structured parts are cut along index planes (paper section 3), explicit
 //! ones by recursive coordinate bisection. The best of several groupings wins, by the
-//! slowest finish of elements and nodes ([`work`]).
+//! slowest finish of elements and nodes ([`work`]). Elements that have eroded cost nothing ([`Living`]); they are dealt out
+//! all the same, since their state is still held.
 
 use mechanics::{
     mesh::{Mesh, Topology},
@@ -27,17 +28,19 @@ const GROUPINGS: u64 = 25;
 /// How often a grouping is cut again, each time for shares corrected by what came of the last.
 const CORRECTIONS: usize = 4;
 
-/// Cuts the mesh for workers of these relative speeds, on which a node costs `node` elements. Sub-domains come part by part; those without elements are left
-/// out, so a worker may have none in a small problem.
-pub fn decompose(mesh: &Mesh, speeds: &[f64], node: f64) -> Vec<Subdomain> {
+/// Cuts the mesh for workers of these relative speeds, on which a node costs `node` elements. Sub-domains come part by part, shells first; those without elements are left
+/// out, so a worker may have none in a small problem. `alive` says by global index which elements cost anything; all do
+/// where it is none.
+pub fn decompose(mesh: &Mesh, speeds: &[f64], node: f64, alive: Option<&[bool]>) -> Vec<Subdomain> {
+    let living = Living::new(mesh, alive);
     let mut best: Option<(f64, Vec<Subdomain>)> = None;
     for seed in 0..GROUPINGS {
         let order = grouping(speeds, seed);
         let equal = speeds.iter().all(|s| *s == speeds[0]);
         let mut shares = speeds.to_vec();
         for _ in 0..if equal { 1 } else { CORRECTIONS } {
-            let subdomains = cut_all(mesh, &shares, &order);
-            let work = work(&subdomains, speeds.len(), node);
+            let subdomains = cut_all(mesh, &shares, &order, &living);
+            let work = work(&subdomains, speeds.len(), node, &living);
             let finish = work.iter().zip(speeds).map(|(w, s)| w / s).fold(0.0, f64::max);
             let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
             // Ragged pieces have more nodes: their workers get fewer elements in the next try.
@@ -56,17 +59,125 @@ pub fn decompose(mesh: &Mesh, speeds: &[f64], node: f64) -> Vec<Subdomain> {
     best.map(|(_, subdomains)| subdomains).unwrap_or_default()
 }
 
-/// What each worker's sub-domains cost in a cycle (element-cycles): their elements, and all their nodes at `node` each.
-pub fn work(subdomains: &[Subdomain], n: usize, node: f64) -> Vec<f64> {
+/// The worker of every element, by global index.
+pub fn owners(mesh: &Mesh, subdomains: &[Subdomain]) -> Vec<u32> {
+    let offsets = mesh.element_offsets();
+    let mut owners = vec![0; mesh.n_elements()];
+    for Subdomain { part, region, worker } in subdomains {
+        let mut own = |element: usize| owners[offsets[*part] + element] = *worker as u32;
+        match (region, &mesh.parts[*part].topology) {
+            (Region::Cells { low, high }, Topology::Structured { cells }) => {
+                let [ni, nj, _] = cells.map(|c| c as usize);
+                let [i0, j0, k0] = low.map(|c| c as usize);
+                let [i1, j1, k1] = high.map(|c| c as usize);
+                for k in k0..k1 {
+                    for j in j0..j1 {
+                        (i0..i1).for_each(|i| own(i + ni * (j + nj * k)));
+                    }
+                }
+            }
+            (Region::List(elements), _) => elements.iter().for_each(|&e| own(e as usize)),
+            (Region::Cells { .. }, _) => unreachable!("cells are cut from structured parts alone"),
+        }
+    }
+    owners
+}
+
+/// What each worker's sub-domains cost in a cycle (element-cycles): their living elements, and all their nodes at `node` each.
+pub fn work(subdomains: &[Subdomain], n: usize, node: f64, living: &Living) -> Vec<f64> {
     let mut work = vec![0.0; n];
     for s in subdomains {
         let nodes = match &s.region {
             Region::Cells { low, high } => (0..3).map(|a| f64::from(high[a] - low[a] + 1)).product(),
             Region::List(elements) => elements.len() as f64,
         };
-        work[s.worker] += node.mul_add(nodes, s.region.n_elements() as f64);
+        work[s.worker] += node.mul_add(nodes, living.of(s.part, &s.region) as f64);
     }
     work
+}
+
+/// Which elements of a mesh are alive, for counting them in boxes.
+pub struct Living {
+    /// By part; none where all are alive.
+    parts: Vec<Option<Part>>,
+}
+
+/// The living elements of one part.
+enum Part {
+    /// Of a structured part: how many lie below each corner of the index space, I fastest; and nodes along I and J.
+    Below(Vec<u64>, [usize; 2]),
+    /// By element of an explicit part.
+    List(Vec<bool>),
+}
+
+impl Living {
+    /// From flags by global element; all are alive where there are none.
+    ///
+    /// # Panics
+    /// If there are flags, but not one for each element of the mesh.
+    pub fn new(mesh: &Mesh, alive: Option<&[bool]>) -> Self {
+        let Some(alive) = alive else { return Self { parts: mesh.parts.iter().map(|_| None).collect() } };
+        let mut first = 0;
+        let of_part = |part: &mechanics::mesh::Part| {
+            let alive = &alive[first..first + part.n_elements()];
+            first += part.n_elements();
+            if !alive.contains(&false) {
+                return None;
+            }
+            Some(match &part.topology {
+                Topology::Explicit { .. } | Topology::Shells { .. } => Part::List(alive.to_vec()),
+                Topology::Structured { cells } => {
+                    let [ni, nj, nk] = cells.map(|n| n as usize);
+                    let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
+                    let mut below = vec![0_u64; plane * (nk + 1)];
+                    for k in 0..nk {
+                        for j in 0..nj {
+                            let mut along = 0;
+                            for i in 0..ni {
+                                along += u64::from(alive[i + ni * (j + nj * k)]);
+                                let at = (i + 1) + row * (j + 1) + plane * (k + 1);
+                                below[at] =
+                                    along + below[at - row] + below[at - plane] - below[at - row - plane];
+                            }
+                        }
+                    }
+                    Part::Below(below, [row, nj + 1])
+                }
+            })
+        };
+        Self { parts: mesh.parts.iter().map(of_part).collect() }
+    }
+
+    /// Living elements in a region of a part.
+    pub fn of(&self, part: usize, region: &Region) -> u64 {
+        match (region, &self.parts[part]) {
+            (Region::Cells { low, high }, _) => self.in_box(part, &Cells { low: *low, high: *high }),
+            (Region::List(elements), Some(Part::List(alive))) => {
+                elements.iter().filter(|&&e| alive[e as usize]).count() as u64
+            }
+            (Region::List(elements), _) => elements.len() as u64,
+        }
+    }
+
+    fn in_box(&self, part: usize, cells: &Cells) -> u64 {
+        let Some(Part::Below(below, [row, rows])) = &self.parts[part] else { return cells.volume() };
+        let (low, high) = (cells.low.map(|n| n as usize), cells.high.map(|n| n as usize));
+        let at = |i: usize, j: usize, k: usize| below[i + row * (j + rows * k)];
+        let up_to = |k: usize| {
+            (at(high[0], high[1], k) + at(low[0], low[1], k))
+                - at(low[0], high[1], k)
+                - at(high[0], low[1], k)
+        };
+        up_to(high[2]) - up_to(low[2])
+    }
+
+    /// Whether an element of an explicit part costs anything.
+    fn counts(&self, part: usize, element: u32) -> bool {
+        match &self.parts[part] {
+            Some(Part::List(alive)) => alive[element as usize],
+            _ => true,
+        }
+    }
 }
 
 /// The largest `elements / speed` of a worker.
@@ -97,7 +208,7 @@ fn grouping(speeds: &[f64], seed: u64) -> Vec<usize> {
     order
 }
 
-fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize]) -> Vec<Subdomain> {
+fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec<Subdomain> {
     let mut out = Vec::new();
     for (part, mesh_part) in mesh.parts.iter().enumerate() {
         let mut pieces = Vec::new();
@@ -106,11 +217,13 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize]) -> Vec<Subdomain> {
                 let all = Cells { low: [0; 3], high: *cells };
                 let shortest = (0..3).fold(2, |best, a| if cells[a] < cells[best] { a } else { best });
                 if all.volume() > 0 {
-                    cut_planes(vec![all], shortest, order, speeds, &mut pieces);
+                    let count = |cells: &Cells| living.in_box(part, cells);
+                    cut_planes(vec![all], shortest, order, speeds, &count, &mut pieces);
                 }
             }
-            Topology::Explicit { hexahedra } => {
-                let centres: Vec<[f64; 3]> = (0..hexahedra.len())
+            Topology::Explicit { .. } | Topology::Shells { .. } => {
+                let n_elements = mesh_part.n_elements();
+                let centres: Vec<[f64; 3]> = (0..n_elements)
                     .map(|e| {
                         let corners = mesh_part.corners(e);
                         std::array::from_fn(|a| {
@@ -118,13 +231,15 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize]) -> Vec<Subdomain> {
                         })
                     })
                     .collect();
-                let all = (0..hexahedra.len() as u32).collect();
-                bisect(all, &centres, order, speeds, &mut pieces);
+                let all = (0..n_elements as u32).collect();
+                bisect(all, &centres, order, speeds, &|e| living.counts(part, e), &mut pieces);
             }
         }
         pieces.retain(|(region, _): &(Region, usize)| region.n_elements() > 0);
         out.extend(pieces.into_iter().map(|(region, worker)| Subdomain { part, region, worker }));
     }
+    // The lowest sub-domain that has a node books it, and only shells know of its rotation.
+    out.sort_by_key(|subdomain| mesh.parts[subdomain.part].section().is_none());
     out
 }
 
@@ -144,9 +259,10 @@ fn cut_planes(
     shortest: usize,
     workers: &[usize],
     speeds: &[f64],
+    count: &dyn Fn(&Cells) -> u64,
     out: &mut Vec<(Region, usize)>,
 ) {
-    let volume: u64 = boxes.iter().map(Cells::volume).sum();
+    let volume: u64 = boxes.iter().map(count).sum();
     if workers.len() == 1 || volume <= 1 {
         let worker = fastest(workers, speeds);
         out.extend(boxes.into_iter().map(|Cells { low, high }| (Region::Cells { low, high }, worker)));
@@ -157,10 +273,10 @@ fn cut_planes(
     for split in [middle, workers.len() - middle] {
         let target = volume as f64 * total(&workers[..split], speeds) / total(workers, speeds);
         for axis in 0..3 {
-            let Some(whole) = Cut::whole(&boxes, axis, target) else { continue };
+            let Some(whole) = Cut::whole(&boxes, axis, target, count) else { continue };
             let interface = volume as f64 / whole.planes;
             let near = NEAR * target.min(volume as f64 - target);
-            let (cut, dearer) = match Cut::jagged(&boxes, axis, shortest, target) {
+            let (cut, dearer) = match Cut::jagged(&boxes, axis, shortest, target, count) {
                 Some(jagged) if whole.missed > near && jagged.missed < whole.missed => (jagged, JAG),
                 _ => (whole, 1.0),
             };
@@ -191,8 +307,8 @@ fn cut_planes(
             }
         }
     }
-    cut_planes(below, shortest, &workers[..split], speeds, out);
-    cut_planes(above, shortest, &workers[split..], speeds, out);
+    cut_planes(below, shortest, &workers[..split], speeds, count, out);
+    cut_planes(above, shortest, &workers[split..], speeds, count, out);
 }
 
 /// How near to the share of the workers whole planes have to come, relative to the smaller side.
@@ -235,10 +351,10 @@ struct Cut {
 
 impl Cut {
     /// The plane whose lower side is nearest to `target` elements, with something on both sides.
-    fn whole(boxes: &[Cells], axis: usize, target: f64) -> Option<Self> {
+    fn whole(boxes: &[Cells], axis: usize, target: f64, count: &dyn Fn(&Cells) -> u64) -> Option<Self> {
         let low = boxes.iter().map(|c| c.low[axis]).min()?;
         let high = boxes.iter().map(|c| c.high[axis]).max()?;
-        let missed = |plane: u32| (below(boxes, axis, plane) as f64 - target).abs();
+        let missed = |plane: u32| (below(boxes, axis, plane, count) as f64 - target).abs();
         let best = (low + 1..high).reduce(|a, b| if missed(b) < missed(a) { b } else { a })?;
         let planes = f64::from(high - low);
         Some(Self { axis, plane: best, row: None, missed: missed(best), planes })
@@ -246,26 +362,32 @@ impl Cut {
 
     /// The same with the plane that crosses the target divided along the longer of the other axes; no part is cut
     /// along its shortest for that.
-    fn jagged(boxes: &[Cells], axis: usize, shortest: usize, target: f64) -> Option<Self> {
+    fn jagged(
+        boxes: &[Cells],
+        axis: usize,
+        shortest: usize,
+        target: f64,
+        count: &dyn Fn(&Cells) -> u64,
+    ) -> Option<Self> {
         let second = if axis == shortest { (axis + 1) % 3 } else { 3 - axis - shortest };
         let low = boxes.iter().map(|c| c.low[axis]).min()?;
         let high = boxes.iter().map(|c| c.high[axis]).max()?;
-        let plane = (low..high).rev().find(|&plane| below(boxes, axis, plane) as f64 <= target)?;
-        let before = below(boxes, axis, plane) as f64;
+        let plane = (low..high).rev().find(|&plane| below(boxes, axis, plane, count) as f64 <= target)?;
+        let before = below(boxes, axis, plane, count) as f64;
         let layer: Vec<Cells> = boxes
             .iter()
             .filter_map(|c| c.at(axis, plane).1)
             .filter_map(|c| c.at(axis, plane + 1).0)
             .collect();
-        let row = Self::whole(&layer, second, target - before)?;
+        let row = Self::whole(&layer, second, target - before, count)?;
         let planes = f64::from(high - low);
         Some(Self { axis, plane, row: Some((second, row.plane)), missed: row.missed, planes })
     }
 }
 
-/// Elements below a plane.
-fn below(boxes: &[Cells], axis: usize, plane: u32) -> u64 {
-    boxes.iter().filter_map(|c| c.at(axis, plane).0).map(|c| c.volume()).sum()
+/// Elements that count below a plane.
+fn below(boxes: &[Cells], axis: usize, plane: u32, count: &dyn Fn(&Cells) -> u64) -> u64 {
+    boxes.iter().filter_map(|c| c.at(axis, plane).0).map(|c| count(&c)).sum()
 }
 
 /// Recursive coordinate bisection along the longest extent of the element centres; ties by element number.
@@ -274,6 +396,7 @@ fn bisect(
     centres: &[[f64; 3]],
     workers: &[usize],
     speeds: &[f64],
+    counts: &dyn Fn(u32) -> bool,
     out: &mut Vec<(Region, usize)>,
 ) {
     if workers.len() == 1 || elements.len() <= 1 {
@@ -291,9 +414,17 @@ fn bisect(
     });
     let split = workers.len() / 2;
     let share = total(&workers[..split], speeds) / total(workers, speeds);
-    let upper = elements.split_off((elements.len() as f64 * share).round() as usize);
-    bisect(elements, centres, &workers[..split], speeds, out);
-    bisect(upper, centres, &workers[split..], speeds, out);
+    let living = elements.iter().filter(|&&e| counts(e)).count();
+    let lower = (living as f64 * share).round() as usize;
+    // Behind the last living element of the lower side.
+    let mut passed = 0;
+    let end = elements.iter().position(|&e| {
+        passed += usize::from(counts(e));
+        passed > lower
+    });
+    let upper = elements.split_off(end.unwrap_or(elements.len()));
+    bisect(elements, centres, &workers[..split], speeds, counts, out);
+    bisect(upper, centres, &workers[split..], speeds, counts, out);
 }
 
 #[cfg(test)]
@@ -327,7 +458,7 @@ mod tests {
         for n in [1, 2, 3, 4, 7, 16, 200] {
             let speeds: Vec<f64> = (0..n).map(|i| 1.0 + (i % 4) as f64).collect();
             let mesh = plate([30, 30, 10]);
-            let total: usize = shares(&decompose(&mesh, &speeds, NODE), n).iter().sum();
+            let total: usize = shares(&decompose(&mesh, &speeds, NODE, None), n).iter().sum();
             assert_eq!(total, 9000, "{n} workers");
         }
     }
@@ -335,7 +466,7 @@ mod tests {
     #[test]
     fn shares_follow_speeds_within_one_index_plane() {
         let speeds = [1.0, 2.0, 0.5];
-        let count = shares(&decompose(&plate([30, 30, 20]), &speeds, NODE), 3);
+        let count = shares(&decompose(&plate([30, 30, 20]), &speeds, NODE, None), 3);
         for (c, s) in count.iter().zip(speeds) {
             let ideal = 18_000.0 * s / 3.5;
             assert!((*c as f64 - ideal).abs() <= 600.0, "{count:?}: {c} against {ideal}");
@@ -344,7 +475,7 @@ mod tests {
 
     #[test]
     fn equal_speeds_share_equally_where_planes_allow() {
-        assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16], NODE), 16), vec![1000; 16]);
+        assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16], NODE, None), 16), vec![1000; 16]);
     }
 
     /// Sixteen hosts with speeds of 1 to 4, by a small generator.
@@ -379,7 +510,7 @@ mod tests {
             for seed in 0..20 {
                 let speeds = mixed_lab(seed);
                 let bound = f64::from(n * n * n) / speeds.iter().sum::<f64>();
-                let ratio = slowest_finish(&decompose(&plate([n; 3]), &speeds, NODE), &speeds) / bound;
+                let ratio = slowest_finish(&decompose(&plate([n; 3]), &speeds, NODE, None), &speeds) / bound;
                 (worst, sum) = (worst.max(ratio), sum + ratio);
                 naive = naive.max(naive_slabs([n; 3], &speeds) / bound);
             }
@@ -400,7 +531,7 @@ mod tests {
         let mut both = plate([40, 40, thick[0]]);
         both.parts.extend(plate([40, 40, thick[1]]).parts);
         let mut owners = [vec![usize::MAX; 1600], vec![usize::MAX; 1600]];
-        for s in decompose(&both, &speeds, NODE) {
+        for s in decompose(&both, &speeds, NODE, None) {
             let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
             assert_eq!((low[2], high[2]), (0, thick[s.part]), "the thin axis stays whole");
             for j in low[1]..high[1] {
@@ -414,7 +545,7 @@ mod tests {
 
     #[test]
     fn cuts_leave_the_thin_axis_whole() {
-        for s in decompose(&plate([30, 30, 10]), &[1.0; 4], NODE) {
+        for s in decompose(&plate([30, 30, 10]), &[1.0; 4], NODE, None) {
             let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
             assert_eq!((low[2], high[2]), (0, 10));
         }

@@ -63,6 +63,8 @@ pub enum Fate {
     Lose(usize),
     /// A worker comes.
     Join(Hand),
+    /// From here on a worker's elements are wrong by one unit in the last place.
+    Spoil(usize),
 }
 
 /// Something on its way between sessions, or a task's end.
@@ -92,6 +94,7 @@ struct Place {
     /// Away while a task runs.
     machine: Option<Box<Machine>>,
     lost: bool,
+    spoilt: bool,
     stopwatch: Stopwatch,
     /// Of this epoch: bytes sent to each neighbour.
     peers: (u32, BTreeMap<u32, u64>),
@@ -104,6 +107,7 @@ impl Place {
             machine: Some(Box::default()),
             stopwatch: Stopwatch::new(),
             lost: false,
+            spoilt: false,
             peers: (0, BTreeMap::new()),
         }
     }
@@ -211,6 +215,7 @@ impl Host {
                     self.places[worker].lost = true;
                     self.apply(Event::Lost(worker, "it was to be lost".to_owned()), sink)?;
                 }
+                Some(Fate::Spoil(worker)) => self.places[worker].spoilt = true,
                 Some(Fate::Join(hand)) => {
                     self.places.push(Place::new());
                     self.apply(Event::Joined(hand), sink)?;
@@ -256,6 +261,9 @@ impl Host {
                     let place = &mut self.places[worker];
                     for lap in machine.take_laps() {
                         place.stopwatch.book(place.session.cycle(), lap);
+                    }
+                    if place.spoilt && matches!(outcome, session::Outcome::Computed) {
+                        machine.plant_fault();
                     }
                     place.machine = Some(machine);
                     self.step(worker, session::Event::Done(outcome))?;

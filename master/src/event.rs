@@ -53,6 +53,9 @@ pub struct Options {
     pub waits: bool,
     /// Write states while the run goes (the last one is always gathered).
     pub states: bool,
+    /// Samples of what elements come to are computed again here, at the first cycle of each epoch and where states are
+    /// kept; a worker whose sample differs is dropped.
+    pub replay: bool,
     /// Forces extra sorts, for tests of bits.
     pub force_sorts: ForceSorts,
 }
@@ -194,7 +197,10 @@ pub enum Action {
         /// The run stops here.
         last: bool,
     },
-    /// Have no more to do with a worker, and tell it why. It is not lost by itself, so it must not come back.
+    /// The worker of every element from now on, by global index, where the deck wants states to say it.
+    Owners(Arc<[u32]>),
+    /// Have no more to do with a worker, and tell it why: it failed by itself, or its numbers are wrong. The job has gone on
+    /// without it, and it must not come back.
     Dismiss(usize, String),
     /// Tell the user how far it is.
     Progress(Progress),

@@ -22,6 +22,8 @@ pub struct Exchange {
     /// Says which exchange this is; frames carry it.
     pub hash: u64,
     route: Route,
+    /// Numbers by node of the exchange: three of the force, and with shells three of the moment.
+    stride: usize,
     /// Number of nodes in the exchange; 0 on route direct.
     n_slots: usize,
     /// By worker: the slot of each node of its exchange list; empty on route direct.
@@ -33,7 +35,10 @@ pub struct Exchange {
 impl Exchange {
     /// Plans for these batches (one per worker, none where there is no contact).
     pub fn new(holdings: &Holdings, batches: Vec<Option<Batch>>, state: &GlobalState, route: Route) -> Self {
-        let mut plans: Vec<Plan> = (0..holdings.n_workers()).map(|_| Plan::default()).collect();
+        let moments = !state.shells.inertia.is_empty();
+        let stride = if moments { 6 } else { 3 };
+        let mut plans: Vec<Plan> =
+            (0..holdings.n_workers()).map(|_| Plan { moments, ..Plan::default() }).collect();
         // Guests: node and worker.
         let mut guests: Vec<(u32, u32)> = Vec::new();
         for (worker, batch) in (0..).zip(&batches) {
@@ -91,13 +96,13 @@ impl Exchange {
             plan.batch = batch;
         }
         let hash = hash(&plans);
-        Self { plans, hash, route, n_slots: n_slots as usize, slots, sources }
+        Self { plans, hash, route, stride, n_slots: n_slots as usize, slots, sources }
     }
 
     /// Numbers in the partial forces that a worker sends to the master: none on route direct.
     pub fn n_partials(&self, worker: usize) -> usize {
         match self.route {
-            Route::Master => 3 * self.slots[worker].len(),
+            Route::Master => self.stride * self.slots[worker].len(),
             Route::Direct => 0,
         }
     }
@@ -110,15 +115,15 @@ impl Exchange {
     /// Zero totals; none on route direct.
     pub fn totals(&self) -> Vec<f64> {
         match self.route {
-            Route::Master => vec![0.0; 3 * self.n_slots],
+            Route::Master => vec![0.0; self.stride * self.n_slots],
             Route::Direct => Vec::new(),
         }
     }
 
     /// Adds the partial forces of one worker; exact, so the order of workers does not matter.
     pub fn add(&self, worker: usize, partials: &[f64], totals: &mut [f64]) {
-        for (&slot, partial) in self.slots[worker].iter().zip(partials.chunks_exact(3)) {
-            for (total, term) in totals[3 * slot as usize..].iter_mut().zip(partial) {
+        for (&slot, partial) in self.slots[worker].iter().zip(partials.chunks_exact(self.stride)) {
+            for (total, term) in totals[self.stride * slot as usize..].iter_mut().zip(partial) {
                 *total += term;
             }
         }
@@ -131,7 +136,8 @@ impl Exchange {
             return out;
         }
         for &slot in &self.slots[worker] {
-            out.extend_from_slice(&totals[3 * slot as usize..3 * slot as usize + 3]);
+            let first = self.stride * slot as usize;
+            out.extend_from_slice(&totals[first..first + self.stride]);
         }
         out
     }
@@ -265,11 +271,16 @@ mod tests {
                 let node = |&global| BatchNode { global, part: 0, mass: 1.0, stiffness: 1.0, share: 1.0 };
                 Some(Batch { nodes: nodes.iter().map(node).collect(), ..Batch::default() })
             };
-            let state = GlobalState {
+            let mut state = GlobalState {
                 mass: vec![1.0; NODES as usize],
                 constraint: vec![0; NODES as usize],
                 ..GlobalState::default()
             };
+            // With shells a node has six numbers: here the same three twice.
+            let twice = 1 + seed as usize % 2;
+            if twice == 2 {
+                state.shells.inertia = vec![1.0; NODES as usize];
+            }
             let holds =
                 |worker: usize, node: u32| nodes[worker].contains(&node) || guests[worker].contains(&node);
             let batches: Vec<_> = guests.iter().map(batch).collect();
@@ -302,17 +313,19 @@ mod tests {
                 let partials: Vec<f64> = master.plans[worker]
                     .exchange
                     .iter()
-                    .flat_map(|&node| [f64::from(node), 1.0, worker as f64])
+                    .flat_map(|&node| [f64::from(node), 1.0, worker as f64].repeat(twice))
                     .collect();
+                assert_eq!(partials.len(), master.n_partials(worker));
                 master.add(worker, &partials, &mut totals);
             }
             for worker in 0..n {
                 let sums = master.of_worker(worker, &totals);
-                for (&node, sum) in master.plans[worker].exchange.iter().zip(sums.chunks_exact(3)) {
+                for (&node, sum) in master.plans[worker].exchange.iter().zip(sums.chunks_exact(3 * twice)) {
                     let holders: Vec<usize> = (0..n).filter(|&w| holds(w, node)).collect();
                     let count = holders.len() as f64;
                     assert_eq!(sum[..2], [count * f64::from(node), count], "seed {seed}, node {node}");
                     assert_eq!(sum[2], holders.iter().sum::<usize>() as f64);
+                    assert_eq!(sum[3 * (twice - 1)..], sum[..3]);
                 }
             }
         }

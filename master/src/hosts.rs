@@ -2,7 +2,7 @@
 //!
 //! A plain table: it knows no socket and no clock. A host's link and the way to its job stand beside it in the daemon.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use protocol::{handshake::Hello, request::HostRow};
 
@@ -43,8 +43,6 @@ pub struct Host {
     pub state: State,
     /// Silent for so long that it may be dead: in words.
     pub suspect: Option<String>,
-    /// A job dropped this process, and why: it gets no work any more.
-    pub dropped: Option<String>,
 }
 
 /// Every host that is or was connected.
@@ -52,6 +50,8 @@ pub struct Host {
 pub struct Hosts {
     by_number: BTreeMap<u32, Host>,
     next: u32,
+    /// Name and nonce of those that a job dropped, and why, oldest first.
+    barred: VecDeque<(String, u64, String)>,
 }
 
 impl Hosts {
@@ -59,20 +59,24 @@ impl Hosts {
     /// process had before and is to be ended, if any.
     ///
     /// # Errors
-    /// The reason to refuse it: another process of that name is connected.
+    /// The reason to refuse it: another process of that name is connected, or a job dropped it.
     pub fn admit(
         &mut self,
         hello: &Hello,
         address: &str,
         incarnation: u32,
     ) -> Result<(u32, Option<u32>), String> {
+        if let Some((name, _, why)) =
+            self.barred.iter().find(|(n, nonce, _)| *n == hello.name || *nonce == hello.nonce)
+        {
+            return Err(format!(
+                "worker {name} was {why}; look after its machine, then start it under another --name, or restart the master"
+            ));
+        }
         let known = self.by_number.values_mut().find(|host| host.name == hello.name);
         let mut ended = None;
         let number = match known {
             Some(host) => {
-                if let (Some(why), true) = (&host.dropped, host.nonce == hello.nonce) {
-                    return Err(format!("this worker was {why}; look after its machine and start it anew"));
-                }
                 if !matches!(host.state, State::Lost(_)) {
                     if host.nonce != hello.nonce {
                         return Err(format!(
@@ -103,7 +107,6 @@ impl Hosts {
                 incarnation,
                 state: State::Idle,
                 suspect: None,
-                dropped: None,
             },
         );
         Ok((number, ended))
@@ -122,12 +125,15 @@ impl Hosts {
         }
     }
 
-    /// The connection has ended because a job dropped its worker: that process is not taken in again.
+    /// The connection has ended because a job dropped its worker: neither its name nor its process is taken in again.
     pub fn drop_out(&mut self, incarnation: u32, why: &str) {
-        self.lose(incarnation, why);
-        if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
-            host.dropped = Some(why.to_owned());
+        let Some(host) = self.on(incarnation) else { return };
+        let entry = (host.name.clone(), host.nonce, why.to_owned());
+        if self.barred.len() >= LOST_LIMIT {
+            self.barred.pop_front();
         }
+        self.barred.push_back(entry);
+        self.lose(incarnation, why);
     }
 
     /// A host is silent, in words, or is heard again.
@@ -225,16 +231,18 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_was_dropped_is_refused_with_the_reason_and_a_new_one_is_not() {
+    fn who_was_dropped_is_refused_by_name_and_by_nonce_with_the_reason() {
         let mut hosts = Hosts::default();
         hosts.admit(&hello("a", 1), "x", 1).expect("new");
         hosts.suspect(1, Some("suspect: silent".to_owned()));
         assert_eq!(hosts.rows()[0].note, "suspect: silent");
-        hosts.drop_out(1, "dropped: cycle 7: a bug");
-        assert_eq!(hosts.rows()[0].note, "dropped: cycle 7: a bug");
-        let refused = hosts.admit(&hello("a", 1), "x", 2).expect_err("the same process");
-        assert!(refused.contains("was dropped: cycle 7: a bug"), "{refused}");
-        assert_eq!(hosts.admit(&hello("a", 2), "x", 3), Ok((0, None)));
+        hosts.drop_out(1, "dropped: block 2 came to other numbers");
+        assert_eq!(hosts.rows()[0].note, "dropped: block 2 came to other numbers");
+        for returned in [hello("a", 1), hello("a", 7), hello("b", 1)] {
+            let refused = hosts.admit(&returned, "x", 2).expect_err("dropped");
+            assert!(refused.contains("worker a was dropped: block 2 came to other numbers"), "{refused}");
+        }
+        assert_eq!(hosts.admit(&hello("b", 7), "x", 3), Ok((1, None)));
     }
 
     #[test]

@@ -4,9 +4,11 @@
 //! ledger. It knows no socket, clock, disk or thread: those are events and actions.
 
 mod epoch;
+mod erosion;
 mod images;
 mod measure;
 mod pace;
+mod replay;
 mod start;
 mod stop;
 #[cfg(test)]
@@ -33,31 +35,52 @@ use crate::{
     exchange::Exchange,
     holdings::Holdings,
     ledger::Ledger,
-    results::history::HistoryRow,
+    results::{history::HistoryRow, surface::Probe},
     sort::{Sorted, Sorter},
 };
-use epoch::{Acting, Base, Epoch, Member, Step};
+use epoch::{Acting, Base, Epoch, Member, SortUnderWay, Step};
+pub(crate) use erosion::surface_of;
 use measure::{Patience, Proposal};
 use start::Touching;
 use stop::not_a_number;
 
-/// What sorts work on: fixed for an epoch.
+/// What sorts work on: fixed for an epoch, but for the surface where elements erode.
 pub struct Bench {
     /// Number of the epoch.
     pub epoch: u32,
     /// Surface, settings, speeds.
     pub sorter: Sorter,
     /// Who holds which nodes.
-    pub holdings: Holdings,
+    pub holdings: Arc<Holdings>,
     /// Masses and constraints (positions are those of the epoch's start).
     pub state: Arc<GlobalState>,
+    /// Nodes (global, ascending) that leave the run with the plan of the sort.
+    pub dropped: Vec<u32>,
 }
 
 impl Bench {
     /// Does the sort that [`Action::Sort`] asks for.
     pub fn sort(&self, x: &[[f64; 3]]) -> Sorted {
         worker::failpoint::die("die-in-sort");
-        self.sorter.run(self.epoch, x, &self.holdings, &self.state)
+        let mut sorted = self.sorter.run(self.epoch, x, &self.holdings, &self.state);
+        if !self.dropped.is_empty() {
+            for (worker, plan) in (0..).zip(&mut sorted.exchange.plans) {
+                plan.dropped =
+                    self.dropped.iter().copied().filter(|&node| self.holdings.holds(worker, node)).collect();
+            }
+        }
+        sorted
+    }
+
+    /// The same with another surface.
+    fn with_surface(&self, surface: Arc<Surface>, dropped: Vec<u32>) -> Self {
+        Self {
+            epoch: self.epoch,
+            sorter: self.sorter.with_surface(surface),
+            holdings: Arc::clone(&self.holdings),
+            state: Arc::clone(&self.state),
+            dropped,
+        }
     }
 }
 
@@ -89,7 +112,8 @@ pub struct Job {
     /// In the order they came: the indices of events and actions.
     members: Vec<Member>,
     epoch: Epoch,
-    /// Where the next epoch begins if a worker is lost.
+    /// Where the next epoch begins if a worker is lost or wrong: where samples are computed again, all that led here
+    /// agreed.
     base: Arc<Base>,
     /// The time for a new base has come.
     keep_due: bool,
@@ -120,9 +144,18 @@ pub struct Job {
     rebalances: Vec<Rebalance>,
     losses: Vec<Loss>,
     over: bool,
+    /// See [`Job::plant_unfenced`].
+    unfenced: bool,
 }
 
 impl Job {
+    /// Plants a bug: messages of epochs that are over are taken as if they were of now. For the test that shows that the
+    /// seeded simulator finds such a bug.
+    #[doc(hidden)]
+    pub fn plant_unfenced(&mut self) {
+        self.unfenced = true;
+    }
+
     /// The state the run starts from.
     pub fn start_state(&self) -> &GlobalState {
         &self.base.state
@@ -136,6 +169,18 @@ impl Job {
     /// Surface of the problem; none without contact.
     pub fn surface(&self) -> Option<&Surface> {
         self.epoch.bench.as_ref().map(|bench| bench.sorter.surface())
+    }
+
+    /// What computes contact again from a state; none without contact.
+    pub fn probe(&self) -> Option<Probe> {
+        let (touching, settings) = self.touching.as_ref().zip(self.model.setup.contact.clone())?;
+        let (surface, exclusions) = touching.parts();
+        Some(Probe { surface, settings, exclusions, quantum: self.quanta.force })
+    }
+
+    /// The worker of every element, where the deck wants states to say it.
+    pub fn owners(&self) -> Option<Arc<[u32]>> {
+        self.epoch.owners.clone()
     }
 
     /// How partial forces travel.
@@ -245,6 +290,7 @@ impl Job {
         message: ToMaster,
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
+        let epoch = if self.unfenced { epoch.max(self.epoch.number) } else { epoch };
         if epoch < self.epoch.number {
             return Ok(());
         }
@@ -294,6 +340,7 @@ impl Job {
                 self.work[member] = work;
                 self.image(worker, cycle, pieces, last, actions)
             }
+            ToMaster::Sample { cycle, hash } => self.sampled(worker, cycle, hash, actions),
             ToMaster::Failed { cycle, reason } => self.blame(worker, cycle, reason, actions),
             ToMaster::Leaving => {
                 let member = self.epoch.crew[worker];
@@ -347,15 +394,21 @@ impl Job {
         let Step { dt, time, quantum } = self.epoch.steps[&first];
         let at_end = time >= control.end_time || first >= control.end_cycle;
         let store = self.options.snapshot_at == Some(first) && self.epoch.number == 0;
+        let blocking = !at_end && self.surface_changes_at(first);
+        if blocking {
+            self.gather_at(first, true);
+        }
         let before = Orders {
             next: first.wrapping_sub(1),
             dt: 0.0,
             time,
             walls: self.walls.clone(),
             force_quantum: quantum,
-            gather: false,
+            gather: blocking,
+            blocking,
             collect: store || at_end,
             stop: at_end,
+            sample: self.options.replay && !at_end,
         };
         if before.collect {
             self.epoch.image_times.insert(first, (time, false));
@@ -390,7 +443,9 @@ impl Job {
                 partials.len()
             ));
         }
-        if let Some(what) = vote.as_deref().and_then(not_a_number) {
+        // Workers look at their forces before they send them; a master does not rely on it.
+        let looked_at = if self.options.replay { partials } else { &[] };
+        if let Some(what) = not_a_number(vote.as_deref(), looked_at) {
             return self.blame(worker, cycle, what, actions);
         }
         let n = self.epoch.n();
@@ -433,8 +488,8 @@ impl Job {
         while let Some(acts_at) = epoch.exchanges.get(1).map(|acting| acting.at).filter(|at| *at <= cycle + 1)
         {
             epoch.exchanges.pop_front();
-            let lag = u64::from(self.model.setup.control.sort_lag);
-            epoch.references = [(acts_at, acts_at - lag), epoch.references[0]];
+            let gathered = epoch.exchanges.front().map_or(acts_at, |acting| acting.gathered);
+            epoch.references = [(acts_at, gathered), epoch.references[0]];
             self.sorts += 1;
         }
     }
@@ -451,11 +506,14 @@ impl Job {
         let now = *self.epoch.steps.get(&cycle).ok_or_else(|| format!("cycle {cycle} was not ordered"))?;
         if fresh {
             self.follow_spread(cycle.saturating_sub(1), &vote);
+            if let (Some(eroded), Some(before)) = (&mut self.epoch.eroded, cycle.checked_sub(1)) {
+                eroded.note(before, &vote.eroded)?;
+            }
         }
         if self.epoch.halves.contains_key(&cycle) {
             let rest = self.rest_at(cycle, vote.clone())?;
             self.epoch.halves.entry(cycle).or_default().rest = Some(rest);
-            self.complete_base(cycle, actions);
+            self.complete_base(cycle, actions)?;
         }
         let control = self.model.setup.control;
         let (dt, limit, element) = self.limit(&vote, control.growth * now.dt);
@@ -479,8 +537,9 @@ impl Job {
             ToWorker::Totals { cycle, orders: orders.clone(), totals }
         });
         self.retire(cycle);
-        if self.epoch.sorts_under_way.contains(&cycle)
-            && let Some(bench) = &self.epoch.bench
+        let sort = self.epoch.sorts_under_way.iter().find(|sort| sort.gathered == cycle);
+        if let Some(blocking) = sort.map(|sort| sort.blocking)
+            && let Some(bench) = self.bench_for(cycle, blocking)
         {
             for (worker, gathered) in arrivals.gathered.iter().enumerate() {
                 let expected = bench.sorter.n_gathered(worker);
@@ -491,7 +550,8 @@ impl Job {
                     ));
                 }
             }
-            actions.push(Action::Sort(Arc::clone(bench), bench.sorter.positions(&arrivals.gathered)));
+            let x = bench.sorter.positions(&arrivals.gathered);
+            actions.push(Action::Sort(bench, x));
         }
         actions.push(Action::Progress(Progress { cycle, time: now.time, dt: now.dt, element, limit }));
         Ok(())
@@ -503,15 +563,18 @@ impl Job {
         if sorted.epoch < self.epoch.number {
             return Ok(());
         }
-        let gathered_at = self.epoch.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
-        let acts_at = gathered_at + u64::from(self.model.setup.control.sort_lag);
+        let sort = self.epoch.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
+        if sort.replaced {
+            return Ok(());
+        }
+        let SortUnderWay { gathered: gathered_at, acts_at, .. } = sort;
         self.census = sorted.census;
         let exchange = Arc::new(sorted.exchange);
         self.send_all(actions, |worker| {
             let plan = Box::new(exchange.plans[worker].clone());
-            ToWorker::Plan { acts_at, plan, hash: exchange.hash }
+            ToWorker::Plan { gathered_at, acts_at, plan, hash: exchange.hash }
         });
-        self.epoch.exchanges.push_back(Acting { at: acts_at, exchange });
+        self.epoch.exchanges.push_back(Acting { at: acts_at, gathered: gathered_at, exchange });
         // A late sort: the cycles before its own are complete, and workers wait for the plan. It is in force from here, as
         // it would be had it come in time, so that the cycles of further sorts do not depend on how long this one took.
         if acts_at <= self.epoch.completed {

@@ -3,6 +3,7 @@
 use deck::model::Model;
 use mechanics::{
     contact::{PairEnergies, PairEnergy},
+    element::hex8,
     rigid,
     vote::{PartVote, Vote},
 };
@@ -21,6 +22,14 @@ pub struct Ledger {
     pub friction: f64,
     /// Work of supports and walls so far.
     pub external: f64,
+    /// Internal energy of eroded elements, and kinetic energy of nodes that were dropped.
+    pub eroded: f64,
+    /// Momentum of those nodes.
+    pub eroded_momentum: [f64; 3],
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass.
+    pub eroded_mass: f64,
     /// Total energy less external work after the first cycle; none before it.
     pub initial_total: Option<f64>,
     /// Greatest kinetic energy so far.
@@ -80,6 +89,10 @@ impl Ledger {
             viscosity: 0.0,
             friction: 0.0,
             external: 0.0,
+            eroded: 0.0,
+            eroded_momentum: [0.0; 3],
+            eroded_elements: 0,
+            eroded_mass: 0.0,
             initial_total: None,
             greatest_kinetic: 0.0,
             greatest_external: 0.0,
@@ -105,14 +118,18 @@ impl Ledger {
         self.external += vote.external;
         let kinetic = sum(&|p| p.kinetic);
         let internal = sum(&|p| p.internal);
-        let total = kinetic + internal + self.hourglass + vote.contact + self.friction;
+        self.eroded += vote.gone.internal + vote.gone.kinetic;
+        for (sum, lost) in self.eroded_momentum.iter_mut().zip(vote.gone.momentum) {
+            *sum += lost;
+        }
+        let total = kinetic + internal + self.hourglass + vote.contact + self.friction + self.eroded;
         let initial = *self.initial_total.get_or_insert(total - self.external);
         self.greatest_kinetic = self.greatest_kinetic.max(kinetic);
         self.greatest_external = self.greatest_external.max(self.external.abs());
         self.first_step.get_or_insert(dt);
         self.book_parts(&vote.parts);
         self.bodies.clone_from(&vote.bodies);
-        self.book_pairs(&vote.contacts);
+        self.book_pairs(&vote.contact_energies);
         let scale = initial.abs().max(self.greatest_kinetic);
         let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
         self.worst_courant = self.worst_courant.max(dt / vote.courant);
@@ -129,6 +146,9 @@ impl Ledger {
             hourglass: self.hourglass,
             contact: vote.contact,
             friction: self.friction,
+            eroded: self.eroded,
+            eroded_elements: self.eroded_elements,
+            eroded_mass: self.eroded_mass,
             external: self.external,
             total,
             error,
@@ -139,6 +159,8 @@ impl Ledger {
                 .iter()
                 .map(|(_, g)| GaugeRow { x: [g[0], g[1], g[2]], v: [g[3], g[4], g[5]] })
                 .collect(),
+            element_gauges: vote.element_gauges.iter().map(|(_, state)| *state).collect(),
+            contacts: vote.contacts.clone(),
         };
     }
 
@@ -155,6 +177,25 @@ impl Ledger {
         }
     }
 
+    /// Books the number and mass of the elements that eroded in the cycle booked last. Their mass is that of the deck: it stays at
+    /// the nodes until those are dropped.
+    pub fn book_eroded(&mut self, vote: &Vote, model: &Model) {
+        if vote.eroded.is_empty() {
+            return;
+        }
+        let offsets = model.mesh.element_offsets();
+        for &element in &vote.eroded {
+            let part = offsets.partition_point(|&first| first <= element as usize) - 1;
+            let Some(of_part) = model.mesh.parts.get(part) else { continue };
+            let corners = of_part.corners(element as usize - offsets[part]);
+            let volume = hex8::volume(&corners.map(|n| model.mesh.positions[n as usize]));
+            self.eroded_mass += model.setup.materials[of_part.material as usize].density * volume;
+        }
+        self.eroded_elements += vote.eroded.len() as u64;
+        self.last.eroded_elements = self.eroded_elements;
+        self.last.eroded_mass = self.eroded_mass;
+    }
+
     fn book_parts(&mut self, votes: &[PartVote]) {
         let [first, now] = &mut self.parts;
         now.resize(votes.len(), PartEnergy::default());
@@ -169,13 +210,18 @@ impl Ledger {
         }
     }
 
+    /// Energy that appeared or vanished since the first cycle.
+    pub fn unexplained(&self) -> f64 {
+        self.initial_total.map_or(0.0, |initial| self.last.total - self.external - initial)
+    }
+
     /// Energy that appeared or vanished over the scale of the problem, by which a run is judged: the largest of initial
     /// energy, greatest kinetic energy and greatest external work, so that slow loading is not judged by the little
     /// kinetic energy it has.
     pub fn imbalance(&self) -> f64 {
         let Some(initial) = self.initial_total else { return 0.0 };
         let scale = initial.abs().max(self.greatest_kinetic).max(self.greatest_external);
-        if scale > 0.0 { (self.last.total - self.external - initial) / scale } else { 0.0 }
+        if scale > 0.0 { self.unexplained() / scale } else { 0.0 }
     }
 
     /// The part whose own energy grew most since the first cycle: its index and what it gained; the first of equals.
@@ -193,7 +239,9 @@ impl Ledger {
         if self.part_momentum == 0.0 {
             return 0.0;
         }
-        let change: f64 = (0..3).map(|a| (self.last.momentum[a] - self.initial_momentum[a]).powi(2)).sum();
+        let change: f64 = (0..3)
+            .map(|a| (self.last.momentum[a] + self.eroded_momentum[a] - self.initial_momentum[a]).powi(2))
+            .sum();
         change.sqrt() / self.part_momentum
     }
 }

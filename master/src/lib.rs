@@ -3,8 +3,10 @@
 //! [`job`] is the pure session of one run; [`embedded`] drives it with workers in the same process, [`drive`] with
 //! workers over links. [`daemon`] owns [`hosts`] and [`queue`]: each [`connection`] is one task that carries messages,
 //! the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
-//! [`processes`] starts workers as children for one run. [`bench`] measures. [`simulate`] drives the sessions on an emulated cluster.
+//! [`lab`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`processes`] starts workers as
+//! children for one run, [`add`] over ssh. [`bench`] measures. [`simulate`] drives the sessions on an emulated cluster.
 
+pub mod add;
 pub mod balance;
 pub mod bench;
 pub mod certs;
@@ -23,9 +25,12 @@ pub mod holdings;
 pub mod hosts;
 pub mod http;
 pub mod job;
+pub mod lab;
 pub mod ledger;
 pub mod memory;
+pub mod newcomer;
 pub mod peers;
+pub mod picture;
 pub mod processes;
 pub mod queue;
 pub mod results;

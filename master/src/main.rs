@@ -8,11 +8,16 @@ use clap::{CommandFactory, Parser};
 use deck::bundle::Options;
 
 use master::{
-    bench, certs, client,
+    add, bench, certs, client,
     command::{Bench, Certs, Cli, Command, Speed, WorkerArgs},
-    convert, daemon, memory, processes, run, simulate,
+    convert, daemon,
+    lab::Lab,
+    memory, newcomer, picture, processes, run, simulate,
 };
-use protocol::shape::{Shape, Wire};
+use protocol::{
+    shape::{Shape, Wire},
+    tls,
+};
 use worker::daemon::Listen;
 
 fn main() -> ExitCode {
@@ -30,6 +35,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(&args),
         Command::Master(args) => daemon::run(&args),
         Command::Worker(args) => work(args),
+        Command::Add(args) => add::run(&args),
         Command::Submit(args) => client::submit(&args),
         Command::Watch { job, at } => client::watch(job, &at),
         Command::Jobs { at } => client::jobs(&at),
@@ -48,6 +54,7 @@ fn main() -> ExitCode {
         Command::Man { out } => manual(out.as_deref()),
         Command::Check { deck, reading } => check(&deck, &reading.options()),
         Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
+        Command::Picture(args) => picture::run(&args),
         Command::Materials => {
             for name in deck::materials() {
                 println!("{name}");
@@ -62,6 +69,12 @@ fn main() -> ExitCode {
 }
 
 fn work(args: WorkerArgs) -> Result<ExitCode, String> {
+    if let (Some(token), Some(folder)) = (&args.join, &args.certs)
+        && !tls::Paths::in_folder(folder).certificate.exists()
+    {
+        let name = args.name.clone().unwrap_or_else(daemon::host_name);
+        newcomer::join(&args.master, token, &name, folder)?;
+    }
     if let Some(pin) = &args.pin {
         pin.apply()?;
     }
@@ -102,6 +115,20 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
         Certs::Host { folder, name, address, role, force } => {
             certs::make_host(&folder, &name, &address, role.role(), force).map_err(|e| e.to_string())?;
             println!("made {}; copy this folder to {name}", folder.join(&name).display());
+        }
+        Certs::Token { folder, role, hours, master } => {
+            let token = Lab::open(&folder).and_then(|lab| lab.issue(role.role(), hours));
+            println!("{}", daemon::line_to_paste(&master, &token.map_err(|e| e.to_string())?, role.role()));
+        }
+        Certs::Join { master, token, folder, name } => {
+            newcomer::join(&master, &token, &name.unwrap_or_else(daemon::host_name), &folder)?;
+            println!("made {}", tls::Paths::in_folder(&folder).certificate.display());
+        }
+        Certs::Revoke { folder, name } => {
+            let revoked = Lab::open(&folder).and_then(|lab| lab.revoke(&name)).map_err(|e| e.to_string())?;
+            println!(
+                "revoked {revoked} of {name}; a running master with --lab ends its links within seconds"
+            );
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -1,7 +1,8 @@
 //! What a run leaves on disk: one folder with states, histories and a summary.
 //!
 //! A results folder holds `state-NNNNNN.vtu` (one file per written state, [`vtu`]), `results.pvd` (the index
-//! that ParaView opens, with the time of each state), `history.csv` ([`history`]), `summary.json`
+//! that ParaView opens, with the time of each state), where the deck asks for it `contact-NNNNNN.vtp` and `contact.pvd`
+//! (the same of the contact surface, [`surface`]), `history.csv` ([`history`]), `summary.json`
 //! ([`summary`]) and `report.html` ([`report`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
 //! Only the history grows in place, by whole rows. So the folder of a killed run opens.
 //!
@@ -9,7 +10,7 @@
 
 use std::{
     fmt, fs,
-    fs::File,
+    fs::{File, OpenOptions},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
@@ -17,11 +18,15 @@ use std::{
 pub mod history;
 pub mod report;
 pub mod summary;
+pub mod surface;
 pub mod trace;
 pub mod vtu;
+pub mod writer;
 
 /// Name of the index of states.
 pub const PVD: &str = "results.pvd";
+/// Name of the index of contact surfaces.
+pub const CONTACT_PVD: &str = "contact.pvd";
 /// Name of the table of histories.
 pub const HISTORY: &str = "history.csv";
 /// Name of the summary.
@@ -153,9 +158,10 @@ impl Folder {
         for entry in fs::read_dir(&self.path).map_err(Error::io("read", &self.path))? {
             let entry = entry.map_err(Error::io("read", &self.path))?;
             let name = entry.file_name();
-            let index = name
-                .to_str()
-                .and_then(|n| n.strip_prefix("state-")?.strip_suffix(".vtu")?.parse::<usize>().ok());
+            let number = |start: &str, end: &str| {
+                name.to_str().and_then(|n| n.strip_prefix(start)?.strip_suffix(end)?.parse::<usize>().ok())
+            };
+            let index = number("state-", ".vtu").or_else(|| number("contact-", ".vtp"));
             if index.is_some_and(|index| index >= count) {
                 fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
             }
@@ -183,12 +189,33 @@ pub fn state_name(index: u32) -> String {
     format!("state-{index:06}.vtu")
 }
 
+/// Name of the file of the contact surface in state `index`.
+pub fn contact_name(index: u32) -> String {
+    format!("contact-{index:06}.vtp")
+}
+
 /// Whether a run writes files of this name: the only ones that `--force` removes.
 fn is_written_by_a_run(name: &str) -> bool {
     let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".tmp")).unwrap_or(name);
     let state = stem.strip_prefix("state-").and_then(|n| n.strip_suffix(".vtu"));
-    [PVD, HISTORY, SUMMARY, REPORT, TRACE].contains(&stem)
-        || state.is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
+    let contact = || stem.strip_prefix("contact-").and_then(|n| n.strip_suffix(".vtp"));
+    [PVD, CONTACT_PVD, HISTORY, SUMMARY, REPORT, TRACE].contains(&stem)
+        || state
+            .or_else(contact)
+            .is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Creates a file that was not there: what stood under the name is removed, a link itself and not what it leads to, so
+/// that nothing is ever written outside of the folder.
+///
+/// # Errors
+/// What the system says.
+pub fn create_anew(path: &Path) -> io::Result<File> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    OpenOptions::new().write(true).create_new(true).open(path)
 }
 
 /// Writes a file under the temporary name `.NAME.tmp` beside it and renames it, so that readers and killed runs
@@ -208,7 +235,7 @@ pub fn write_whole(
     hidden.push(name);
     hidden.push(".tmp");
     let temporary = path.with_file_name(hidden);
-    let file = File::create(&temporary).map_err(Error::io("create", path))?;
+    let file = create_anew(&temporary).map_err(Error::io("create", path))?;
     let mut out = BufWriter::with_capacity(1 << 16, file);
     // Network file systems report a full disk only when the data is synchronised.
     let written = content(&mut out).and_then(|()| out.flush()).and_then(|()| out.get_ref().sync_data());
@@ -238,21 +265,27 @@ pub struct Units {
     pub time: &'static str,
     /// Unit of energy: mass length^2 / time^2.
     pub energy: &'static str,
+    /// Unit of stress: energy / length^3.
+    pub stress: &'static str,
+    /// Unit of force: energy / length.
+    pub force: &'static str,
+    /// Unit of energy per mass.
+    pub specific: &'static str,
 }
 
 impl Units {
     /// The units that [`deck::model::Model::units`] names; an unknown name gives the dimensions themselves.
     pub fn named(name: &str) -> Self {
-        let (length, mass, time, energy) = match name {
-            "SI" => ("m", "kg", "s", "J"),
+        let (length, mass, time, energy, stress, force, specific) = match name {
+            "SI" => ("m", "kg", "s", "J", "Pa", "N", "J/kg"),
             // 1 Mbar = 1e11 Pa and 1 cm3 = 1e-6 m3: 1e5 J.
-            "cm-g-us" => ("cm", "g", "us", "Mbar*cm3"),
-            "mm-ms-kg" => ("mm", "kg", "ms", "J"),
-            "mm-s-t" => ("mm", "t", "s", "mJ"),
-            "in-s-lbf" => ("in", "lbf*s2/in", "s", "in*lbf"),
-            _ => ("length", "mass", "time", "energy"),
+            "cm-g-us" => ("cm", "g", "us", "Mbar*cm3", "Mbar", "Mbar*cm2", "Mbar*cm3/g"),
+            "mm-ms-kg" => ("mm", "kg", "ms", "J", "GPa", "kN", "J/kg"),
+            "mm-s-t" => ("mm", "t", "s", "mJ", "MPa", "N", "mJ/t"),
+            "in-s-lbf" => ("in", "lbf*s2/in", "s", "in*lbf", "psi", "lbf", "in2/s2"),
+            _ => ("length", "mass", "time", "energy", "stress", "force", "energy/mass"),
         };
-        Self { length, mass, time, energy }
+        Self { length, mass, time, energy, stress, force, specific }
     }
 }
 
@@ -261,14 +294,37 @@ mod tests {
     use super::*;
 
     #[test]
+    #[cfg(unix)]
+    fn links_in_the_folder_of_a_job_are_not_followed() {
+        let folder = tempfile::tempdir().expect("room for a folder");
+        let outside = folder.path().join("outside");
+        fs::write(&outside, "untouched").expect("room");
+        let job = folder.path().join("job-1");
+        fs::create_dir(&job).expect("room");
+        for name in [HISTORY, ".history.csv.tmp"] {
+            std::os::unix::fs::symlink(&outside, job.join(name)).expect("a link");
+        }
+        write_whole(&job.join(HISTORY), |out| out.write_all(b"row")).expect("room");
+        assert_eq!(fs::read(job.join(HISTORY)).expect("a file"), b"row");
+        assert!(job.join(HISTORY).symlink_metadata().expect("there").is_file());
+        assert_eq!(fs::read(&outside).expect("there"), b"untouched");
+    }
+
+    #[test]
     fn force_knows_the_names_of_a_run_and_no_others() {
-        for name in
-            ["results.pvd", "history.csv", "summary.json", ".state-000000.vtu.tmp", ".results.pvd.tmp"]
-        {
+        for name in [
+            "results.pvd",
+            "contact.pvd",
+            "history.csv",
+            "summary.json",
+            ".state-000000.vtu.tmp",
+            ".results.pvd.tmp",
+        ] {
             assert!(is_written_by_a_run(name), "{name}");
         }
         for index in [0, 999_999, 1_000_000, u32::MAX] {
             assert!(is_written_by_a_run(&state_name(index)), "{index}");
+            assert!(is_written_by_a_run(&contact_name(index)), "{index}");
         }
         for name in
             ["notes.txt", "state-.vtu", "state-00000a.vtu", "state-1.vtu", "history.csv.tmp", ".tmp", ""]
@@ -281,21 +337,39 @@ mod tests {
     fn energy_unit_of_every_set_is_the_one_its_base_units_give() {
         let joule = |mass_kg: f64, length_m: f64, time_s: f64| mass_kg * (length_m / time_s).powi(2);
         let size = |unit: &str| match unit {
+            "Pa" | "N" => 1.0,
+            "Mbar" => 1e11,
+            "Mbar*cm2" => 1e7,
+            "GPa" => 1e9,
+            "MPa" => 1e6,
+            "kN" => 1e3,
+            "lbf" => 4.448_221_615_260_5,
+            "psi" => 4.448_221_615_260_5 / 0.0254f64.powi(2),
             "J" => 1.0,
             "mJ" => 1e-3,
             "Mbar*cm3" => 1e11 * 1e-6,
             "in*lbf" => 0.0254 * 4.448_221_615_260_5,
             other => panic!("no size known for {other}"),
         };
-        for (name, expected) in [
-            ("SI", joule(1.0, 1.0, 1.0)),
-            ("cm-g-us", joule(1e-3, 1e-2, 1e-6)),
-            ("mm-ms-kg", joule(1.0, 1e-3, 1e-3)),
-            ("mm-s-t", joule(1e3, 1e-3, 1.0)),
-            ("in-s-lbf", joule(4.448_221_615_260_5 / 0.0254, 0.0254, 1.0)),
+        for (name, expected, metre) in [
+            ("SI", joule(1.0, 1.0, 1.0), 1.0),
+            ("cm-g-us", joule(1e-3, 1e-2, 1e-6), 1e-2),
+            ("mm-ms-kg", joule(1.0, 1e-3, 1e-3), 1e-3),
+            ("mm-s-t", joule(1e3, 1e-3, 1.0), 1e-3),
+            ("in-s-lbf", joule(4.448_221_615_260_5 / 0.0254, 0.0254, 1.0), 0.0254),
         ] {
-            let named = size(Units::named(name).energy);
-            assert!((named / expected - 1.0).abs() < 1e-12, "{name}: {named} J named, {expected} J derived");
+            let units = Units::named(name);
+            for (unit, expected) in [
+                (units.energy, expected),
+                (units.force, expected / metre),
+                (units.stress, expected / metre.powi(3)),
+            ] {
+                let named = size(unit);
+                assert!(
+                    (named / expected - 1.0).abs() < 1e-12,
+                    "{name}: {unit} is {named}, derived {expected}"
+                );
+            }
         }
     }
 }

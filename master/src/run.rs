@@ -36,6 +36,7 @@ use crate::{
         summary::{Energies, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
         trace,
         vtu::Series,
+        writer::Writer,
     },
     snapshot::{
         self, Snapshot,
@@ -140,6 +141,7 @@ pub fn options_for(asked: &JobOptions, workers: usize, all_take_peers: bool) -> 
         store: false,
         balance: asked.balance,
         waits: false,
+        replay: false,
         states: !asked.no_output,
         force_sorts: match (asked.sort_every, asked.sort_seed) {
             (Some(n), _) => ForceSorts::Every(n),
@@ -268,6 +270,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let wall = started.elapsed().as_secs_f64();
     drop(children);
     output.finish();
+    output.flush()?;
     if let (Some(keeper), true) = (&output.keeper, outcome.stopped && outcome.failure.is_none()) {
         say_how_to_resume(keeper, &output);
     }
@@ -325,7 +328,7 @@ fn resuming_command(folder: &Path) -> String {
 }
 
 /// A word as a shell takes it.
-fn quoted(word: &str) -> String {
+pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();
@@ -354,7 +357,7 @@ impl Census {
         Self {
             elements: surface.n_elements() as u64,
             faces: surface.faces.len() as u64,
-            nodes: surface.nodes.len() as u64,
+            nodes: surface.active.iter().filter(|active| **active).count() as u64,
         }
     }
 }
@@ -444,6 +447,9 @@ pub fn summarise(
         bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
         master_bytes_per_cycle: per((traffic.bytes - traffic.peer_bytes) as f64, run_cycles),
         worker_times: worker_times(&outcome.workers, &outcome.reports),
+        eroded_elements: ledger.eroded_elements,
+        eroded_mass: ledger.eroded_mass,
+        eroded_energy: ledger.eroded,
         energies: Energies {
             kinetic: ledger.last.kinetic,
             internal: ledger.last.internal,
@@ -554,7 +560,9 @@ pub struct Output {
     /// Where bases go; none where nothing is stored.
     pub keeper: Option<Keeper>,
     history: Option<History>,
-    series: Option<Series>,
+    writer: Option<Writer>,
+    /// By global element index, who computes what; none where nobody wants to know.
+    owners: Option<Arc<[u32]>>,
     bar: Option<ProgressBar>,
     started: Instant,
     last_line: Instant,
@@ -573,6 +581,7 @@ impl Output {
         let fault = |e: crate::results::Error| e.to_string();
         let history = folder.as_ref().map(|f| History::create(f, &model)).transpose().map_err(fault)?;
         let series = folder.as_ref().map(|f| Series::new(f, &model)).transpose().map_err(fault)?;
+        let writer = series.map(|series| Writer::start(series, Arc::clone(&model))).transpose()?;
         let bar = (std::io::stderr().is_terminal() && !json).then(|| {
             let bar = ProgressBar::new(1000);
             if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3}% {msg}") {
@@ -588,7 +597,8 @@ impl Output {
             history,
             row_ends,
             states: Vec::new(),
-            series,
+            writer,
+            owners: None,
             bar,
             started: Instant::now(),
             last_line: Instant::now(),
@@ -604,13 +614,36 @@ impl Output {
         for row in job.rows_before() {
             self.row(row)?;
         }
-        let Some(states) = states else { return self.state(job.start_state()) };
+        let Some(writer) = &self.writer else { return Ok(()) };
+        if let Some(probe) = job.probe().filter(|_| self.model.output.contact_surface) {
+            let on = |series: &mut Series| {
+                series.with_contact(probe);
+                Ok(())
+            };
+            writer.with(on).map_err(|e| e.to_string())?;
+        }
+        self.owners = job.owners();
+        let Some(states) = states else { return self.state(Box::new(job.start_state().clone())) };
         if let Some(folder) = &self.folder {
             folder.keep_states(states.len()).map_err(|e| e.to_string())?;
         }
         self.states = states;
+        self.roll_back()
+    }
+
+    /// Makes the index name the states that are left.
+    fn roll_back(&mut self) -> Result<(), String> {
+        let Some(writer) = &self.writer else { return Ok(()) };
         let times: Vec<f64> = self.states.iter().map(|(_, time)| *time).collect();
-        self.series.as_mut().map_or(Ok(()), |series| series.roll_back(&times)).map_err(|e| e.to_string())
+        writer.with(|series| series.roll_back(&times)).map_err(|e| e.to_string())
+    }
+
+    /// States that were handed over are on disk after this.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn flush(&self) -> Result<(), String> {
+        self.writer.as_ref().map_or(Ok(()), Writer::flush).map_err(|e| e.to_string())
     }
 
     /// Appends a row of history.
@@ -632,24 +665,22 @@ impl Output {
             history.roll_back(end).map_err(fault)?;
         }
         self.states.retain(|(written, _)| *written <= cycle);
-        let times: Vec<f64> = self.states.iter().map(|(_, time)| *time).collect();
-        self.series.as_mut().map_or(Ok(()), |series| series.roll_back(&times)).map_err(fault)
+        self.roll_back()
     }
 
-    /// Writes a state, unless one of that time was the last.
+    /// Has a state written, unless one of that time was the last.
     ///
     /// # Errors
-    /// What the disk refused.
-    pub fn state(&mut self, state: &mechanics::state::GlobalState) -> Result<(), String> {
+    /// What the disk refused, of this state or of one before.
+    pub fn state(&mut self, state: Box<mechanics::state::GlobalState>) -> Result<(), String> {
         if self.states.last().is_some_and(|(_, time)| *time == state.time) {
             return Ok(());
         }
-        let model = &self.model;
-        self.series
-            .as_mut()
-            .map_or(Ok(()), |series| series.write(model, state, None))
-            .map_err(|e| e.to_string())?;
-        self.states.push((state.cycle, state.time));
+        let moment = (state.cycle, state.time);
+        if let Some(writer) = &self.writer {
+            writer.put(state, self.owners.clone()).map_err(|e| e.to_string())?;
+        }
+        self.states.push(moment);
         Ok(())
     }
 
@@ -700,11 +731,15 @@ pub fn progress_line(model: &Model, progress: &Progress, elapsed: f64) -> (Strin
 
 impl Sink for Output {
     fn take(&mut self, action: Action) -> Result<(), String> {
+        if let Some(writer) = &self.writer {
+            writer.check().map_err(|e| e.to_string())?;
+        }
         match action {
             Action::Row(row) => self.row(&row),
-            Action::State(state) => self.state(&state),
+            Action::State(state) => self.state(state),
             Action::Snapshot(stored) => match &self.folder {
                 Some(folder) => {
+                    self.flush()?;
                     let mut stored = stored;
                     let cycle = stored.state.cycle;
                     stored.states.extend(self.states.iter().filter(|(written, _)| *written <= cycle));
@@ -714,6 +749,10 @@ impl Sink for Output {
             },
             Action::Base { mut snapshot, last } => {
                 let cycle = snapshot.state.cycle;
+                if self.keeper.as_ref().is_some_and(|keeper| last || keeper.is_due(cycle)) {
+                    // A snapshot counts on the states that it names.
+                    self.flush()?;
+                }
                 if let Some(keeper) = self.keeper.as_mut().filter(|keeper| last || keeper.is_due(cycle)) {
                     snapshot.states.extend(self.states.iter().filter(|(written, _)| *written <= cycle));
                     keeper.put(snapshot);
@@ -725,6 +764,10 @@ impl Sink for Output {
                 Ok(())
             }
             Action::Rewind { rows, cycle } => self.rewind(rows, cycle),
+            Action::Owners(owners) => {
+                self.owners = Some(owners);
+                Ok(())
+            }
             Action::Send(..)
             | Action::Sort(..)
             | Action::Timer(_)

@@ -111,7 +111,10 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
     // The others will be back.
     let workers = hands.len().max(order.crew_before.unwrap_or_default());
     let options = options_for(&order.options, workers, all_take_peers);
-    let options = Options { waits: true, keep, store: true, ..options };
+    let options = Options { waits: true, keep, store: true, replay: true, ..options };
+    if let Some(path) = order.folder.as_ref().filter(|path| path.is_symlink()) {
+        return Err(format!("{} is a link; results stay in the spool folder, remove it", path.display()));
+    }
     let (store, found) = Store::open(&order.snapshots)?;
     for why in &found.warnings {
         warn!(job = order.number, "{why}");
@@ -150,6 +153,7 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
         sheet: sheet.clone(),
     };
     let (outcome, traffic) = drive(job, first, order.number, &order.seats, line, &mut reporter, &order.stop)?;
+    reporter.output.flush()?;
     if let Some(sheet) = &sheet {
         board::lock(sheet).over(outcome.failure.is_none() && !outcome.stopped);
     }

@@ -64,6 +64,20 @@ impl Sorter {
         Self { surface, settings, exclusions, speeds, route, dealing, pair, gather }
     }
 
+    /// The same for another surface with the same nodes.
+    pub fn with_surface(&self, surface: Arc<Surface>) -> Self {
+        Self {
+            surface,
+            settings: self.settings.clone(),
+            exclusions: Arc::clone(&self.exclusions),
+            speeds: self.speeds.clone(),
+            route: self.route,
+            dealing: self.dealing,
+            pair: self.pair,
+            gather: self.gather.clone(),
+        }
+    }
+
     /// The surface it sorts.
     pub fn surface(&self) -> &Surface {
         &self.surface

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use deck::model::{Gauge, Model, Output};
+use deck::model::{ElementGauge, Gauge, Model, Output};
 use master::results::{
     self, Error, Folder,
     history::{GaugeRow, History, HistoryRow, PartEnergy, Table},
@@ -17,6 +17,7 @@ use mechanics::{
     mesh::{Mesh, Part, Topology},
     setup::{Constraint, Control, Setup},
     state::{GlobalState, field},
+    vote::PairVote,
 };
 
 /// An empty place for one test, kept after it for a look.
@@ -87,6 +88,7 @@ fn plates(cells: u32) -> Model {
         units: "cm-g-us".into(),
         mesh,
         velocity: vec![[0.0; 3]; n_nodes],
+        spin: Vec::new(),
         constraint: vec![0; n_nodes],
         join_energy: 0.0,
         setup: Setup {
@@ -110,14 +112,15 @@ fn plates(cells: u32) -> Model {
             bodies: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
+            erosion: Default::default(),
         },
         output: Output {
-            snapshot_seconds: None,
-            snapshot_cycles: None,
-            period: None,
             history_cycles: 1,
-            fields: Vec::new(),
+            compress: false,
+            contact_forces: vec![[0, 2], [2, 3]],
             gauges: vec![Gauge { name: "tip".into(), node: 0 }],
+            element_gauges: vec![ElementGauge { name: "core".into(), element: 0 }],
+            ..Output::default()
         },
     }
 }
@@ -151,6 +154,9 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         constraint: vec![0; model.mesh.n_nodes()],
         initial_volume: vec![1.0; n],
         elements,
+        eroded: Vec::new(),
+        strain: Vec::new(),
+        shells: mechanics::state::ShellState::default(),
     }
 }
 
@@ -211,6 +217,7 @@ fn summary(model: &Model) -> Summary {
         rebalances: Vec::new(),
         losses: Vec::new(),
         digest: "00ff".repeat(16),
+        ..Summary::default()
     }
 }
 
@@ -225,6 +232,9 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
         hourglass: -0.0,
         contact: 1e-7,
         friction: 1e16,
+        eroded: 0.0,
+        eroded_elements: 0,
+        eroded_mass: 0.0,
         external: 2.0,
         total: x.sqrt(),
         error: -1.0 / 7.0,
@@ -240,6 +250,12 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
             model.mesh.parts.len()
         ],
         gauges: vec![GaugeRow { x: [1.0, 2.0, x], v: [0.1, 0.2, 0.3] }; model.output.gauges.len()],
+        element_gauges: vec![std::array::from_fn(|f| 0.25 + x + f as f64); model.output.element_gauges.len()],
+        // Of two pairs the second is in contact, from cycle 2 on.
+        contacts: (cycle >= 2)
+            .then_some((1, PairVote { force: [x, -0.5, 1e-300], hits: 10 + cycle }))
+            .into_iter()
+            .collect(),
     }
 }
 
@@ -405,7 +421,17 @@ fn history_reads_back_to_the_same_bits_under_names_with_units() {
     assert_eq!(table.columns[..4], ["cycle", "time [us]", "dt [us]", "kinetic [Mbar*cm3]"]);
     assert!(table.columns.contains(&"momentum_x [g*cm/us]".to_owned()));
     assert!(table.columns.contains(&"target, lower:internal [Mbar*cm3]".to_owned()));
-    assert_eq!(table.columns.last().expect("not empty"), "tip:vz [cm/us]");
+    for name in [
+        "tip:vz [cm/us]",
+        "tip:uz [cm]",
+        "core:pressure [Mbar]",
+        "core:plastic_strain",
+        "core:energy [Mbar*cm3/g]",
+    ] {
+        assert!(table.columns.iter().any(|column| column == name), "{name} is not in {:?}", table.columns);
+    }
+    assert_eq!(table.columns[table.columns.len() - 4], "target, lower from chip:fx [Mbar*cm2]");
+    assert_eq!(table.columns.last().expect("not empty"), "target, lower from chip:contacts");
     for (cycle, read) in (0..).zip(&table.rows) {
         let row = row(&model, cycle);
         let mut expected = vec![row.cycle as f64, row.time, row.dt, row.kinetic, row.internal, row.hourglass];
@@ -414,7 +440,24 @@ fn history_reads_back_to_the_same_bits_under_names_with_units() {
         expected.extend(
             row.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity, p.external]),
         );
-        expected.extend(row.gauges.iter().flat_map(|g| g.x.into_iter().chain(g.v)));
+        for g in &row.gauges {
+            let start = model.mesh.positions[0];
+            expected.extend(g.x.into_iter().chain(g.v).chain([0, 1, 2].map(|a| g.x[a] - start[a])));
+        }
+        for state in &row.element_gauges {
+            let [xx, yy, xy, yz, zx] = [0, 1, 2, 3, 4].map(|f| state[f]);
+            let p = state[field::PRESSURE];
+            expected.extend([p, von_mises([xx, yy, xy, yz, zx]), xx - p, yy - p, -(xx + yy) - p, xy, yz, zx]);
+            let density = model.setup.materials[0].density;
+            expected.extend([state[field::PLASTIC_STRAIN], state[field::TEMPERATURE]]);
+            expected.extend([density / state[field::RELATIVE_VOLUME], state[field::ENERGY] / density]);
+            expected.push(state[field::DAMAGE]);
+        }
+        expected.extend([0.0; 4]);
+        expected.extend(row.contacts.first().map_or([0.0; 4], |(_, vote)| {
+            let [x, y, z] = vote.force;
+            [x, y, z, vote.hits as f64]
+        }));
         assert_eq!(bytes_of(read.iter().copied()), bytes_of(expected), "cycle {cycle}");
     }
     assert_eq!(table.column("tip:z"), Some(vec![0.0, 1.0, 2.0, 3.0, 4.0]));
@@ -482,7 +525,7 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
     };
     assert_eq!(
         keys(&json),
-        "bytes_per_cycle contact_share cycles digest elements end_time energies grind_ns imbalance lanes \
+        "bytes_per_cycle contact_share cycles digest elements end_time energies eroded_elements eroded_energy eroded_mass grind_ns imbalance lanes \
          linked_pairs losses master_bytes_per_cycle momentum_error nodes rebalances relayed_pairs route sorts surface_elements surface_faces surface_nodes threads title wall_s \
          work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
     );
@@ -651,6 +694,7 @@ fn body_under_a_file_size_limit() {
 fn whole_folder_of_a_run_holds_states_index_history_and_summary() {
     let mut model = plates(20);
     model.output.fields = results::FIELD_NAMES.map(String::from).to_vec();
+    model.output.compress = true;
     let worker: Vec<u32> = (0..model.mesh.n_elements() as u32).map(|e| e / 1000).collect();
     let folder = Folder::create(&scratch("whole"), false).expect("fresh folder");
     let mut series = Series::new(&folder, &model).expect("known fields");

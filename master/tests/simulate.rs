@@ -213,8 +213,10 @@ fn a_sort_that_is_late_makes_workers_wait_and_changes_no_later_sort() {
     three.costs.sort = 6.0 * 9_000.0 / calibrate::surface_nodes(&model);
     let (late, _) =
         virtual_clock::run(&model, &three, Scheme::control(), tape.as_ref()).expect("the same sorts");
-    assert!(quick.boundaries.len() > 2, "{:?}", quick.boundaries);
-    assert_eq!(quick.boundaries, late.boundaries);
+    // A sort that would act after the last cycle may or may not be done when the run ends.
+    let acted = |run: &[u64]| run.iter().copied().filter(|&cycle| cycle < 60).collect::<Vec<_>>();
+    assert!(acted(&quick.boundaries).len() > 2, "{:?}", quick.boundaries);
+    assert_eq!(acted(&quick.boundaries), acted(&late.boundaries));
     assert!(late.seconds_per_cycle() > 1.1 * quick.seconds_per_cycle());
 }
 

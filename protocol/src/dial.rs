@@ -80,8 +80,10 @@ impl Reached {
         let (sender, receiver) = match &self.certificates {
             None => link::split(stream, self.settings),
             Some(config) => {
-                let (stream, _) = tls::connect_any(stream, &self.host, config, self.roles).await?;
-                link::split(stream, self.settings)
+                let (stream, identity) = tls::connect_any(stream, &self.host, config, self.roles).await?;
+                let (sender, receiver) = link::split(stream, self.settings);
+                tls::watch(&sender, identity, None);
+                (sender, receiver)
             }
         };
         greet(sender, receiver, hello).await

@@ -12,8 +12,10 @@ use std::fmt;
 /// The version of the messages in this module and in the control messages, stated first in [`Hello`].
 ///
 /// 1: the first. 2: links between workers (`peer_port` and `member` in [`Hello`]), introductions and reports.
-/// 3: the work of loads by part and states of rigid bodies in votes; rigid bodies in assignments.
-pub const VERSION: u16 = 3;
+/// 3: the work of loads by part in votes, elements that erode; proof of arithmetic in [`Hello`], samples of cycles.
+/// 4: what is watched in assignments, and in votes what was seen.
+/// 5: states of rigid bodies and energies by pair of parts in votes; rigid bodies in assignments.
+pub const VERSION: u16 = 5;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;
@@ -21,6 +23,8 @@ pub const NAME_LIMIT: usize = 64;
 pub const LANES_LIMIT: usize = 32;
 /// Most characters of a token.
 pub const TOKEN_LIMIT: usize = 128;
+/// Most characters of a proof of arithmetic.
+pub const PROOF_LIMIT: usize = 64;
 /// Most threads that a host may claim.
 pub const THREADS_LIMIT: u32 = 4096;
 /// The largest speed: a host a million times the reference is a slip of the keyboard.
@@ -40,6 +44,8 @@ pub enum Role {
     Client,
     /// A worker that dials another worker for the direct route.
     Peer,
+    /// A host without a certificate, with a token to exchange for one.
+    Newcomer,
 }
 
 impl Role {
@@ -48,7 +54,7 @@ impl Role {
     /// A master's certificate serves for everything: `bolide run` and `simulate` start their own workers.
     pub const fn is_certified_by(self, certificate: tls::Role) -> bool {
         match certificate {
-            tls::Role::Master => true,
+            tls::Role::Master => !matches!(self, Self::Newcomer),
             tls::Role::Worker => matches!(self, Self::Worker | Self::Peer),
             tls::Role::Client => matches!(self, Self::Client),
         }
@@ -61,6 +67,7 @@ impl fmt::Display for Role {
             Self::Worker => "worker",
             Self::Client => "client",
             Self::Peer => "peer",
+            Self::Newcomer => "newcomer",
         })
     }
 }
@@ -99,6 +106,8 @@ pub struct Hello {
     pub peer_port: u16,
     /// Of a peer: its place in the job; none for other roles.
     pub member: Option<Membership>,
+    /// Of a worker: what the fixed problem of `mechanics::proof` comes to on its processor; none for other roles.
+    pub proof: Option<String>,
 }
 
 impl Hello {
@@ -123,12 +132,29 @@ impl Hello {
             token: None,
             peer_port: 0,
             member: None,
+            proof: None,
         }
     }
 
     /// Whether its token is `secret`; takes a time that does not tell where they differ.
     pub fn holds(&self, secret: &str) -> bool {
         self.token.as_ref().is_some_and(|theirs| same(secret, theirs))
+    }
+
+    /// Whether its processor computes the bits of this side's, whose proof is `ours`; a worker's must.
+    ///
+    /// # Errors
+    /// The reason to refuse it, with both proofs.
+    pub fn proves(&self, ours: &str) -> std::result::Result<(), String> {
+        match self.proof.as_deref() {
+            Some(theirs) if theirs == ours => Ok(()),
+            theirs => Err(format!(
+                "worker {}: its arithmetic gives {}, this fleet's gives {ours}; install the same release on both, and if \
+                 it is the same, keep this processor out",
+                self.name,
+                theirs.unwrap_or("no proof")
+            )),
+        }
     }
 
     /// The reason to refuse the greeting whoever sent it, naming what was found and what is expected.
@@ -151,6 +177,9 @@ impl Hello {
             && token.len() > TOKEN_LIMIT
         {
             return Err(format!("token of {} bytes, must have at most {TOKEN_LIMIT}", token.len()));
+        }
+        if let Some(proof) = &self.proof {
+            check_name("proof", proof, PROOF_LIMIT)?;
         }
         Ok(())
     }
@@ -296,6 +325,8 @@ pub struct Policy {
     pub certificate: Option<tls::Role>,
     /// The token that the greeting must hold, if any.
     pub token: Option<String>,
+    /// Why nobody is taken on this connection, whatever the greeting says: its certificate was revoked.
+    pub refusal: Option<String>,
 }
 
 /// What the listening side makes of a greeting.
@@ -375,6 +406,9 @@ impl Server {
         let hello: Hello =
             codec::decode(&frame.payload, HELLO_LIMIT as usize).map_err(|error| format!("hello: {error}"))?;
         hello.check()?;
+        if let Some(reason) = &self.policy.refusal {
+            return Err(reason.clone());
+        }
         let role = hello.role;
         if !self.policy.roles.contains(&role) {
             let taken: Vec<String> = self.policy.roles.iter().map(Role::to_string).collect();

@@ -17,7 +17,7 @@ use mechanics::{
     exact::Quantum,
     rigid,
     setup::Setup,
-    vote::{Quanta, Vote},
+    vote::{Quanta, Vote, Watched},
     wall::Pose,
 };
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,8 @@ pub enum ToWorker {
     },
     /// A new plan, sent before the cycle it acts at.
     Plan {
+        /// The cycle whose positions it was sorted from: a plan of a gathering that a later one replaced is dropped.
+        gathered_at: u64,
         /// Start of this cycle.
         acts_at: u64,
         /// Whom this worker shares nodes with and what it computes.
@@ -129,6 +131,8 @@ pub struct Assign {
     pub subdomains: Vec<Subdomain>,
     /// Global node of each gauge.
     pub gauges: Vec<u32>,
+    /// Elements and contacts that votes are to speak of.
+    pub watched: Watched,
     /// Lane width to use: `scalar`, `avx2`, `avx512`; none for the best of the machine.
     pub lanes: Option<String>,
     /// The cycle to start at.
@@ -163,10 +167,23 @@ pub struct Orders {
     /// At the start of cycle `next + 1`, the positions of surface nodes travel; the plan sorted from them acts a sort
     /// lag later.
     pub gather: bool,
+    /// With `gather`: elements have eroded. The plan sorted from these positions has the new surface and acts in the cycle
+    /// after, for which all wait; plans of earlier gatherings that would act later than cycle `next + 1` do not come any more.
+    pub blocking: bool,
     /// At the start of cycle `next + 1`, images are sent.
     pub collect: bool,
     /// The run ends at the start of cycle `next + 1`.
     pub stop: bool,
+    /// In cycle `next + 1`, a sample of what elements come to is sent.
+    pub sample: bool,
+}
+
+/// The block of a worker's `n_blocks` that a sample of `cycle` is of; as good as random, and known to both sides.
+pub const fn sampled_block(cycle: u64, n_blocks: usize) -> usize {
+    let mut x = cycle.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x ^= x >> 31;
+    if n_blocks == 0 { 0 } else { (x % n_blocks as u64) as usize }
 }
 
 /// From a worker to the master.
@@ -220,6 +237,13 @@ pub enum ToMaster {
         /// What this worker's compute threads have used so far.
         work: Work,
     },
+    /// What the elements of one block came to in a cycle, to be computed again by the master.
+    Sample {
+        /// The cycle.
+        cycle: u64,
+        /// `mechanics::cycle::Domain::sample` of the block that [`sampled_block`] names; zeros of a worker without any.
+        hash: [u8; 16],
+    },
     /// Before the last `Image`, and about once a second: how the worker's time went, from its runtime.
     Report(Box<Report>),
     /// The worker cannot go on.
@@ -245,8 +269,8 @@ impl ToMaster {
 }
 
 /// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
-/// 2: with damage and the time until an explosive is lit behind them.
-pub const IMAGE_VERSION: u32 = 2;
+/// 2: with damage and the time until an explosive is lit behind them. 3: with what has eroded.
+pub const IMAGE_VERSION: u32 = 3;
 
 /// Time that a worker has computed for (ns): of its threads in an image, of its host in the frame of a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -62,6 +62,26 @@ pub enum Request {
     },
 }
 
+/// Most bytes of [`Joining`] and [`Joined`] as they travel.
+pub const JOINING_LIMIT: u32 = 16 << 10;
+
+/// From a newcomer whose token was good, once, after Welcome: the key that it made for itself. Answered by [`Joined`], or
+/// by the end of the connection with the reason.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Joining {
+    /// A request for a certificate (PKCS#10, DER), signed with the key.
+    pub request: Vec<u8>,
+}
+
+/// From the master to a newcomer: its place in the lab.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Joined {
+    /// Its certificate (PEM).
+    pub certificate: String,
+    /// The CA's (PEM).
+    pub ca: String,
+}
+
 /// From the master to a client.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply {

@@ -5,14 +5,15 @@
 //! among its subject's alternative names, `bolide:master`, `bolide:worker` or `bolide:client`, so that a
 //! stolen client's certificate does not pass for a master. Making certificates is not done here.
 
+use crate::token::pin_of;
 use crate::{Error, Result};
 use rustls::client::WebPkiServerVerifier;
-use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
+use rustls::client::danger::ServerCertVerifier;
 use rustls::crypto::{CryptoProvider, aws_lc_rs};
 use rustls::pki_types::pem::PemObject;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
 use rustls::server::WebPkiClientVerifier;
-use rustls::{AlertDescription, CertificateError, DigitallySignedStruct, RootCertStore, SignatureScheme};
+use rustls::{AlertDescription, CertificateError, RootCertStore};
 pub use rustls::{ClientConfig, ServerConfig};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -24,6 +25,10 @@ use tokio::io::{AsyncRead, AsyncWrite, BufReader};
 use tokio_rustls::{TlsAcceptor, TlsConnector, TlsStream};
 use x509_parser::extensions::GeneralName;
 use x509_parser::prelude::{FromDer, X509Certificate};
+
+mod verify;
+mod watch;
+pub use watch::{Revoked, watch};
 
 /// The longest a TLS handshake may take: a peer that dials and says nothing holds a task no longer.
 pub const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
@@ -77,6 +82,10 @@ pub struct Identity {
     pub role: Role,
     /// Its common name, for logs.
     pub name: String,
+    /// Hash of the certificate, in hexadecimal digits: what a list of revoked ones names.
+    pub fingerprint: String,
+    /// Its last second (s since 1970).
+    pub expires: i64,
 }
 
 /// The three PEM files of a host.
@@ -116,7 +125,29 @@ pub fn loopback_only(address: SocketAddr) -> Result<()> {
 pub fn server_config(paths: &Paths) -> Result<Arc<ServerConfig>> {
     let files = Files::load(paths)?;
     files.check_dates(&paths.certificate, SystemTime::now())?;
-    files.server(paths)
+    files.server(paths, false)
+}
+
+/// As [`server_config`], for a side that also takes newcomers: callers without a certificate, who say in their greeting
+/// what they come with. [`accept_any`] tells them apart.
+///
+/// # Errors
+/// As for [`server_config`].
+pub fn open_server_config(paths: &Paths) -> Result<Arc<ServerConfig>> {
+    let files = Files::load(paths)?;
+    files.check_dates(&paths.certificate, SystemTime::now())?;
+    files.server(paths, true)
+}
+
+/// The dialling side's configuration of a host without certificates, toward whoever holds one of the CA with this pin.
+pub fn newcomer_config(pin: [u8; 16]) -> Result<Arc<ClientConfig>> {
+    let config = ClientConfig::builder_with_provider(provider())
+        .with_protocol_versions(&[&rustls::version::TLS13])
+        .map_err(|error| Error::Certificate(error.to_string()))?
+        .dangerous()
+        .with_custom_certificate_verifier(Arc::new(verify::Pinned { pin, provider: provider() }))
+        .with_no_client_auth();
+    Ok(Arc::new(config))
 }
 
 /// The configuration of a page for browsers, which hold no certificate: what they may is not decided by TLS.
@@ -142,7 +173,7 @@ pub fn page_config(paths: &Paths) -> Result<Arc<ServerConfig>> {
 pub fn client_config(paths: &Paths) -> Result<Arc<ClientConfig>> {
     let files = Files::load(paths)?;
     files.check_dates(&paths.certificate, SystemTime::now())?;
-    files.client(paths)
+    files.client(paths, false)
 }
 
 /// The dialling side's configuration toward another worker, which the master names by address and whose certificate
@@ -154,7 +185,7 @@ pub fn client_config(paths: &Paths) -> Result<Arc<ClientConfig>> {
 pub fn peer_config(paths: &Paths) -> Result<Arc<ClientConfig>> {
     let files = Files::load(paths)?;
     files.check_dates(&paths.certificate, SystemTime::now())?;
-    files.peer(paths)
+    files.client(paths, true)
 }
 
 /// Takes a connection: the TLS handshake, then the caller's identity.
@@ -166,9 +197,25 @@ pub async fn accept<S>(stream: S, config: &Arc<ServerConfig>) -> Result<(TlsStre
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
+    let (stream, identity) = accept_any(stream, config).await?;
+    Ok((stream, identity.ok_or_else(no_certificate)?))
+}
+
+/// As [`accept`] with an [`open_server_config`]: a newcomer has no identity.
+///
+/// # Errors
+/// As for [`accept`].
+pub async fn accept_any<S>(
+    stream: S,
+    config: &Arc<ServerConfig>,
+) -> Result<(TlsStream<BufReader<S>>, Option<Identity>)>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
     let stream = BufReader::with_capacity(READ_BUFFER, stream);
     let stream = in_time(TlsAcceptor::from(Arc::clone(config)).accept(stream)).await?;
-    let identity = peer_identity(stream.get_ref().1.peer_certificates())?;
+    let shown = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
+    let identity = shown.map(|certificate| identity(certificate)).transpose()?;
     Ok((TlsStream::Server(stream), identity))
 }
 
@@ -209,7 +256,8 @@ where
         .map_err(|_| Error::Certificate(format!("{host:?} is neither a host's name nor an address")))?;
     let stream = BufReader::with_capacity(READ_BUFFER, stream);
     let stream = in_time(TlsConnector::from(Arc::clone(config)).connect(name, stream)).await?;
-    let identity = peer_identity(stream.get_ref().1.peer_certificates())?;
+    let shown = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
+    let identity = identity(shown.ok_or_else(no_certificate)?)?;
     if !roles.contains(&identity.role) {
         let expected: Vec<&str> = roles.iter().map(|role| role.name()).collect();
         return Err(Error::Certificate(format!(
@@ -232,11 +280,30 @@ async fn in_time<T>(handshake: impl Future<Output = std::io::Result<T>>) -> Resu
     }
 }
 
-fn peer_identity(chain: Option<&[CertificateDer<'_>]>) -> Result<Identity> {
-    match chain.and_then(<[_]>::first) {
-        Some(certificate) => identity(certificate),
-        None => Err(Error::Certificate("the peer shows no certificate; make one with `bolide certs`".into())),
-    }
+fn no_certificate() -> Error {
+    Error::Certificate("the peer shows no certificate; make one with `bolide certs`".into())
+}
+
+/// What a list of revoked certificates knows a certificate in DER by.
+pub fn fingerprint(certificate: &[u8]) -> String {
+    crate::token::hex(&pin_of(certificate))
+}
+
+/// Who the first certificate in a PEM file is of.
+///
+/// # Errors
+/// [`Error::Certificate`] naming the file.
+pub fn identity_of_file(path: &Path) -> Result<Identity> {
+    let certificates = certificates(path)?;
+    identity(certificates.first().ok_or_else(|| unusable(path, &"no certificate in it"))?)
+}
+
+/// The pins of the certificates in a PEM file.
+///
+/// # Errors
+/// [`Error::Certificate`] naming the file.
+pub fn pins_of_file(path: &Path) -> Result<Vec<[u8; 16]>> {
+    Ok(certificates(path)?.iter().map(|certificate| pin_of(certificate)).collect())
 }
 
 /// Reads role and name from a certificate in DER; it must name exactly one role.
@@ -258,7 +325,12 @@ pub fn identity(certificate: &[u8]) -> Result<Identity> {
     });
     let (first, more) = (roles.next(), roles.next());
     match (Role::ALL.into_iter().find(|role| Some(role.name()) == first), more) {
-        (Some(role), None) => Ok(Identity { role, name }),
+        (Some(role), None) => Ok(Identity {
+            role,
+            name,
+            fingerprint: fingerprint(certificate),
+            expires: parsed.validity().not_after.timestamp(),
+        }),
         _ => Err(Error::Certificate(format!(
             "certificate of {name:?} names {} as its role, expected one of bolide:master, bolide:worker and \
              bolide:client; make it with `bolide certs`",
@@ -305,10 +377,14 @@ impl Files {
         Ok(())
     }
 
-    fn server(self, paths: &Paths) -> Result<Arc<ServerConfig>> {
-        let verifier = WebPkiClientVerifier::builder_with_provider(self.roots, provider())
-            .build()
-            .map_err(|error| unusable(&paths.ca, &error))?;
+    /// With `newcomers`, callers without a certificate are let in as well, and shown the CA that their token pins.
+    fn server(mut self, paths: &Paths, newcomers: bool) -> Result<Arc<ServerConfig>> {
+        let mut verifier = WebPkiClientVerifier::builder_with_provider(self.roots, provider());
+        if newcomers {
+            verifier = verifier.allow_unauthenticated();
+            self.chain.extend(certificates(&paths.ca)?);
+        }
+        let verifier = verifier.build().map_err(|error| unusable(&paths.ca, &error))?;
         let config = ServerConfig::builder_with_provider(provider())
             .with_protocol_versions(&[&rustls::version::TLS13])
             .and_then(|config| {
@@ -318,29 +394,19 @@ impl Files {
         Ok(Arc::new(config))
     }
 
-    fn client(self, paths: &Paths) -> Result<Arc<ClientConfig>> {
+    /// With `any_host`, whatever names the other side's certificate lists.
+    fn client(self, paths: &Paths, any_host: bool) -> Result<Arc<ClientConfig>> {
         let verifier = WebPkiServerVerifier::builder_with_provider(self.roots, provider())
             .build()
             .map_err(|error| unusable(&paths.ca, &error))?;
-        let config = ClientConfig::builder_with_provider(provider())
-            .with_protocol_versions(&[&rustls::version::TLS13])
-            .and_then(|config| {
-                config.with_webpki_verifier(verifier).with_client_auth_cert(self.chain, self.key)
-            })
-            .map_err(|error| unusable(&paths.certificate, &error))?;
-        Ok(Arc::new(config))
-    }
-
-    fn peer(self, paths: &Paths) -> Result<Arc<ClientConfig>> {
-        let verifier = WebPkiServerVerifier::builder_with_provider(self.roots, provider())
-            .build()
-            .map_err(|error| unusable(&paths.ca, &error))?;
+        let verifier: Arc<dyn ServerCertVerifier> =
+            if any_host { Arc::new(verify::AnyHost(verifier)) } else { verifier };
         let config = ClientConfig::builder_with_provider(provider())
             .with_protocol_versions(&[&rustls::version::TLS13])
             .and_then(|config| {
                 config
                     .dangerous()
-                    .with_custom_certificate_verifier(Arc::new(AnyHost(verifier)))
+                    .with_custom_certificate_verifier(verifier)
                     .with_client_auth_cert(self.chain, self.key)
             })
             .map_err(|error| unusable(&paths.certificate, &error))?;
@@ -348,50 +414,15 @@ impl Files {
     }
 }
 
-/// Accepts any host with a certificate of the CA, whatever names the certificate lists.
-#[derive(Debug)]
-struct AnyHost(Arc<WebPkiServerVerifier>);
-
-impl ServerCertVerifier for AnyHost {
-    fn verify_server_cert(
-        &self,
-        end_entity: &CertificateDer<'_>,
-        intermediates: &[CertificateDer<'_>],
-        server_name: &ServerName<'_>,
-        ocsp_response: &[u8],
-        now: UnixTime,
-    ) -> std::result::Result<ServerCertVerified, rustls::Error> {
-        let verdict = self.0.verify_server_cert(end_entity, intermediates, server_name, ocsp_response, now);
-        match verdict {
-            // The chain is verified before the name is looked at.
-            Err(rustls::Error::InvalidCertificate(
-                CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. },
-            )) => Ok(ServerCertVerified::assertion()),
-            verdict => verdict,
-        }
-    }
-
-    fn verify_tls12_signature(
-        &self,
-        message: &[u8],
-        certificate: &CertificateDer<'_>,
-        signature: &DigitallySignedStruct,
-    ) -> std::result::Result<HandshakeSignatureValid, rustls::Error> {
-        self.0.verify_tls12_signature(message, certificate, signature)
-    }
-
-    fn verify_tls13_signature(
-        &self,
-        message: &[u8],
-        certificate: &CertificateDer<'_>,
-        signature: &DigitallySignedStruct,
-    ) -> std::result::Result<HandshakeSignatureValid, rustls::Error> {
-        self.0.verify_tls13_signature(message, certificate, signature)
-    }
-
-    fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
-        self.0.supported_verify_schemes()
-    }
+/// Bytes that nobody can guess, from the source that TLS keys come from.
+///
+/// # Errors
+/// [`Error::Io`] if the system gives none.
+pub fn secret() -> Result<[u8; 16]> {
+    let mut bytes = [0; 16];
+    let none = |_| Error::io("drawing a secret", &std::io::ErrorKind::Other.into());
+    provider().secure_random.fill(&mut bytes).map_err(none)?;
+    Ok(bytes)
 }
 
 fn provider() -> Arc<CryptoProvider> {

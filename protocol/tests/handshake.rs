@@ -39,7 +39,7 @@ fn greeting_has_its_golden_bytes() {
     let (_, frame) = Client::new(&hello()).expect("a good greeting");
     #[rustfmt::skip]
     let golden = [
-        3, 0,                                            // version
+        4, 0,                                            // version
         0, 0, 0, 0,                                      // worker
         4, 0, 0, 0, 0, 0, 0, 0, b'p', b'c', b'-', b'1',  // name
         0, 0, 0, 0, 0, 0, 0xf8, 0x3f,                    // speed 1.5
@@ -49,6 +49,7 @@ fn greeting_has_its_golden_bytes() {
         0,                                               // no token
         0, 0,                                            // takes no peers
         0,                                               // no place in a job
+        0,                                               // no proof
     ];
     assert_eq!(frame.payload, golden);
     assert_eq!(frame.header, Header::new(Kind::Hello));
@@ -86,10 +87,10 @@ fn nobody_is_welcome_before_a_greeting() {
 
 #[test]
 fn another_version_is_refused_whatever_follows_it() {
-    let reason = "protocol version 4, this side speaks 3; install the same release on both";
-    assert_eq!(refused(|hello| hello.version = 4), reason);
-    assert_eq!(refusal(policy(), &Frame::new(Header::new(Kind::Hello), vec![4, 0, 0xff])), reason);
-    let error = Client::new(&Hello { version: 4, ..hello() }).expect_err("not ours");
+    let reason = "protocol version 9, this side speaks 4; install the same release on both";
+    assert_eq!(refused(|hello| hello.version = 9), reason);
+    assert_eq!(refusal(policy(), &Frame::new(Header::new(Kind::Hello), vec![9, 0, 0xff])), reason);
+    let error = Client::new(&Hello { version: 9, ..hello() }).expect_err("not ours");
     assert_eq!(error, Error::Message(reason.into()));
 }
 
@@ -118,7 +119,7 @@ fn frames_that_are_no_greeting_are_refused() {
     let (_, mut frame) = Client::new(&hello()).expect("a good greeting");
     frame.payload.push(0);
     let reason = refusal(policy(), &frame);
-    assert_eq!(reason, "hello: message of 54 bytes in a payload of 55");
+    assert_eq!(reason, "hello: message of 55 bytes in a payload of 56");
     for length in 0..frame.payload.len() - 1 {
         let cut = Frame::new(frame.header, frame.payload[..length].to_vec());
         assert!(refusal(policy(), &cut).starts_with("hello: control message: "), "{length} bytes");

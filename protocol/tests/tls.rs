@@ -3,6 +3,7 @@
 use protocol::frame::{Frame, Header, Kind};
 use protocol::link::{Settings, split};
 use protocol::tls::{self, Identity, Paths, Role};
+use protocol::token::Token;
 use protocol::{Error, Result};
 use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair, SanType, date_time_ymd};
 use rustls::pki_types::pem::PemObject;
@@ -116,7 +117,7 @@ async fn right_certificates_carry_frames_and_roles() {
     let (server, client) = (tls::server_config(&master), tls::client_config(&worker));
     let (near, far) = meet(&client.expect("usable"), "127.0.0.1", &server.expect("usable")).await;
     let ((near, theirs), (far, ours)) = (near.expect("dialled"), far.expect("accepted"));
-    assert_eq!(theirs, Identity { role: Role::Master, name: "pc-1".into() });
+    assert_eq!((theirs.role, theirs.name.as_str()), (Role::Master, "pc-1"));
     assert_eq!(ours.role, Role::Worker);
 
     // Both ways at once, with more than a socket holds.
@@ -322,5 +323,81 @@ fn without_certificates_only_loopback_is_allowed() {
         assert_eq!(error, Error::Address { address });
         assert!(error.to_string().starts_with(&format!("address {bad} is not a loopback address")));
         assert!(error.to_string().contains("make some with `bolide certs`"));
+    }
+}
+
+#[tokio::test]
+async fn a_newcomer_knows_the_master_by_its_token_alone_and_is_let_in_where_newcomers_are() {
+    let (lab, other) = (Authority::new("lab"), Authority::new("other"));
+    let (_m, master) = lab.host("bolide:master", usual);
+    let (_w, worker) = lab.host("bolide:worker", usual);
+    let pin = tls::pins_of_file(&master.ca).expect("a CA")[0];
+    let token = Token { pin, secret: [5; 16] };
+    let server = tls::open_server_config(&master).expect("usable");
+    let newcomer = tls::newcomer_config(token.pin).expect("usable");
+    let listen = |config: Arc<ServerConfig>| async move {
+        let (near, far) = tokio::io::duplex(1 << 16);
+        (near, tokio::spawn(async move { tls::accept_any(far, &config).await.map(|(_, who)| who) }))
+    };
+    // Whatever address it dials: the token says whom it trusts.
+    let (near, far) = listen(server.clone()).await;
+    let (_kept, theirs) =
+        tls::connect(near, "192.0.2.1", &newcomer, Role::Master).await.expect("the pinned CA's master");
+    assert_eq!(theirs.role, Role::Master);
+    assert_eq!(far.await.expect("no panic").expect("let in"), None, "it has no identity");
+    // One with a certificate is who it is.
+    let (near, far) = listen(server.clone()).await;
+    let client = tls::client_config(&worker).expect("usable");
+    let _kept = tls::connect(near, "127.0.0.1", &client, Role::Master).await.expect("a host of the lab");
+    let who = far.await.expect("no panic").expect("let in").expect("a worker");
+    assert_eq!(who.role, Role::Worker);
+    // Another lab's master, and a worker of this one, do not pass for its master.
+    let (_o, stranger) = other.host("bolide:master", usual);
+    // The same CA's certificate to the byte: this harness signs it anew for each host.
+    let worker = Paths { ca: master.ca.clone(), ..worker };
+    for (paths, words) in
+        [(&stranger, "from another CA than"), (&worker, "is for a worker, expected a master")]
+    {
+        let (near, _far) = listen(tls::open_server_config(paths).expect("usable")).await;
+        let text = match tls::connect(near, "127.0.0.1", &newcomer, Role::Master).await {
+            Ok(_) => panic!("{words}: trusted"),
+            Err(error) => error.to_string(),
+        };
+        assert!(text.contains(words), "{text}");
+    }
+    // Where newcomers are not let in it is turned away.
+    let (near, far) = listen(tls::server_config(&master).expect("usable")).await;
+    let _ = tls::connect(near, "127.0.0.1", &newcomer, Role::Master).await;
+    assert!(far.await.expect("no panic").is_err());
+}
+
+#[tokio::test]
+async fn a_certificate_that_expires_or_is_revoked_ends_the_link_that_it_made_with_the_reason() {
+    let lab = Authority::new("lab");
+    let (_m, master) = lab.host("bolide:master", usual);
+    let soon = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970");
+    let soon = date_time_ymd(1970, 1, 1) + Duration::from_secs(soon.as_secs() + 3);
+    let (_s, short) = lab.host("bolide:worker", |params| params.not_after = soon);
+    let (_w, worker) = lab.host("bolide:worker", usual);
+    let server = tls::server_config(&master).expect("usable");
+    for (paths, words) in [(&short, "worker \"pc-1\" has expired"), (&worker, "worker \"pc-1\" was revoked")]
+    {
+        let client = tls::client_config(paths).expect("usable");
+        let (near, far) = meet(&client, "127.0.0.1", &server).await;
+        let ((near, _), (far, identity)) = (near.expect("dialled"), far.expect("accepted"));
+        let (_kept, mut heard) = split(near, Settings::default());
+        let (sender, mut receiver) = split(far, Settings::default());
+        let (news, revoked) = tokio::sync::watch::channel(Arc::default());
+        assert_eq!(identity.fault(Some(&revoked), std::time::SystemTime::now()), None, "good so far");
+        let fingerprint = identity.fingerprint.clone();
+        tls::watch(&sender, identity, Some(revoked));
+        if words.contains("revoked") {
+            news.send_replace(Arc::new([fingerprint].into()));
+        }
+        let told = tokio::time::timeout(Duration::from_secs(30), heard.receive()).await.expect("in time");
+        let told = protocol::handshake::reason(&told.expect("a last word")).expect("a reason");
+        assert!(told.contains(words), "{told}");
+        let ended = receiver.receive().await.expect_err("ended").to_string();
+        assert!(ended.contains(words) || ended == "connection closed", "{ended}");
     }
 }

@@ -201,7 +201,7 @@ fn a_worker_that_panics_or_computes_no_numbers_is_dropped_by_name_and_the_job_go
         let dropped = cluster.master.wait_for("is dropped: cycle ");
         assert!(dropped.contains("worker bad ") && dropped.contains(words), "{dropped}");
         assert_eq!(cluster.process_mut("bad").wait().code(), Some(1), "its process ends with the reason");
-        cluster.process("bad").wait_for("this worker was dropped: cycle ");
+        cluster.process("bad").wait_for("worker bad was dropped: cycle ");
         assert_eq!(submitted.wait().code(), Some(0), "{}\n{}", submitted.text(), cluster.master.text());
         let summary = same_as_undisturbed(&cluster);
         assert_eq!((&summary["workers"], &summary["losses"][0]["worker"]), (&1.into(), &"bad".into()));

@@ -1,11 +1,13 @@
 //! The daemons as real processes: the same digest as `bolide run`, and what goes wrong stays where it is.
 
+mod add;
 mod disk;
 mod faults;
 mod links;
 mod losses;
 mod peers;
 mod runs;
+mod trust;
 
 use std::{process::Command, sync::OnceLock};
 

@@ -79,14 +79,17 @@ fn three_unequal_workers_under_tls_give_the_digest_of_run() {
 
 #[test]
 fn a_process_for_each_worker_gives_the_digest_of_one_process() {
-    let summary = run(&["--cycles", "40", "--processes", "--workers", "3", "--speeds", "1,2,0.5"]);
+    // On this route no byte depends on which links stand already.
+    let three = ["--cycles", "40", "--route", "master", "--workers", "3", "--speeds", "1,2,0.5"];
+    let summary = run(&[&three[..], &["--processes"]].concat());
     assert_eq!(digest_of(&summary), reference());
     assert_eq!((&summary["workers"], &summary["cycles"]), (&3.into(), &40.into()));
-    // Every byte that the pipe in memory counts passes a link, and heartbeats and the like are few.
-    let embedded = run(&["--cycles", "40", "--workers", "3", "--speeds", "1,2,0.5"]);
+    // Every byte that the pipe in memory counts passes a link, and heartbeats and the like are few. A plan that would act after
+    // the last cycle is sent or is not, as its sort is done in time or not: 3 % of such a short run.
+    let embedded = run(&three);
     let ratio = summary["bytes_per_cycle"].as_f64().expect("bytes")
         / embedded["bytes_per_cycle"].as_f64().expect("bytes");
-    assert!((0.99..1.01).contains(&ratio), "{ratio}");
+    assert!((0.95..1.05).contains(&ratio), "{ratio}");
 }
 
 #[test]

@@ -109,9 +109,24 @@ impl Browser {
         let features = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
         self.call("Emulation.setEmulatedMedia", features);
         self.evaluate("new Promise(done => setTimeout(done, 1500))");
-        let shot =
-            self.call("Page.captureScreenshot", json!({ "format": "png", "captureBeyondViewport": true }));
-        shot["data"].as_str().unwrap_or_default().to_owned()
+        self.shoot(json!({ "format": "png", "captureBeyondViewport": true }))
+    }
+
+    /// A picture of one element as PNG, base64, with a margin, as the page stands.
+    ///
+    /// # Panics
+    /// If there is no such element.
+    pub fn picture_of(&mut self, selector: &str) -> String {
+        let clip = self.evaluate(&format!(
+            "(() => {{ const r = document.querySelector({}).getBoundingClientRect(); return {{ x: r.x + scrollX - 6, \
+             y: r.y + scrollY - 6, width: r.width + 12, height: r.height + 12, scale: 1 }} }})()",
+            json!(selector)
+        ));
+        self.shoot(json!({ "format": "png", "captureBeyondViewport": true, "clip": clip }))
+    }
+
+    fn shoot(&mut self, params: Value) -> String {
+        self.call("Page.captureScreenshot", params)["data"].as_str().unwrap_or_default().to_owned()
     }
 }
 

@@ -1,4 +1,5 @@
-//! Looks for nodes inside elements of foreign parts; knows nothing of the contact code.
+//! Looks for nodes inside elements of foreign parts, and for shells that pass through each other; knows nothing of the
+//! contact code.
 //!
 //! A hexahedron is taken as 24 tetrahedra: its centre, the mid-point of a face, and an edge of that face. Its border is
 //! then the surface that contact sees, where a face that is not flat is split about its mid-point.
@@ -100,6 +101,87 @@ fn triple(o: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> f64 {
         + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
+/// A pair of shells that share no node, of which an edge of the first goes through the second.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Pierced {
+    /// Global index of the element whose edge goes through.
+    pub edge_of: u32,
+    /// Global index of the element that is gone through.
+    pub element: u32,
+}
+
+/// Every pair of shells of all parts that share no node and pass through each other, at positions `x` by global node
+/// index. A shell is four triangles about the mean of its corners; two of them cross where an edge of one, outer or inner,
+/// goes through a triangle of the other.
+pub fn pierced(mesh: &Mesh, x: &[[f64; 3]]) -> Vec<Pierced> {
+    let mut shells: Vec<(u32, [u32; 4])> = Vec::new();
+    for (part, first) in mesh.parts.iter().zip(mesh.element_offsets()) {
+        if part.section().is_some() {
+            let corners = |e: usize| {
+                let [a, b, c, d, ..] = part.corners(e);
+                ((first + e) as u32, [a, b, c, d])
+            };
+            shells.extend((0..part.n_elements()).map(corners));
+        }
+    }
+    let points: Vec<[[f64; 3]; 5]> = shells
+        .iter()
+        .map(|(_, nodes)| {
+            let [a, b, c, d] = nodes.map(|n| x[n as usize]);
+            [a, b, c, d, [0, 1, 2].map(|i| 0.25 * (a[i] + b[i] + c[i] + d[i]))]
+        })
+        .collect();
+    let boxes: Vec<[[f64; 3]; 2]> = points
+        .iter()
+        .map(|points| {
+            points.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
+                [[0, 1, 2].map(|a| low[a].min(p[a])), [0, 1, 2].map(|a| high[a].max(p[a]))]
+            })
+        })
+        .collect();
+    let sides = boxes.iter().flat_map(|[low, high]| (0..3).map(move |a| high[a] - low[a]));
+    let side = sides.fold(f64::MIN_POSITIVE, f64::max);
+    let cells = |[low, high]: &[[f64; 3]; 2]| {
+        let [low, high] = [low, high].map(|p| p.map(|c| (c / side).floor() as i64));
+        let along = move |a: usize| low[a]..=high[a];
+        along(0).flat_map(move |i| along(1).flat_map(move |j| along(2).map(move |k| [i, j, k])))
+    };
+    let mut bins: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    for (s, bounds) in boxes.iter().enumerate() {
+        cells(bounds).for_each(|cell| bins.entry(cell).or_default().push(s));
+    }
+    let mut found = Vec::new();
+    for (a, bounds) in boxes.iter().enumerate() {
+        for &b in cells(bounds).flat_map(|cell| bins.get(&cell)).flatten() {
+            let apart = (0..3).any(|i| bounds[1][i] < boxes[b][0][i] || boxes[b][1][i] < bounds[0][i]);
+            if apart || shells[a].1.iter().any(|n| shells[b].1.contains(n)) {
+                continue;
+            }
+            let p = &points[a];
+            let edges = (0..4).flat_map(|i| [[p[i], p[(i + 1) % 4]], [p[i], p[4]]]);
+            let q = &points[b];
+            let mut triangles = (0..4).map(|i| [q[i], q[(i + 1) % 4], q[4]]);
+            let through = |t: [[f64; 3]; 3]| edges.clone().any(|edge| goes_through(edge, t));
+            if triangles.any(through) {
+                found.push(Pierced { edge_of: shells[a].0, element: shells[b].0 });
+            }
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// Whether a segment crosses a triangle from one side to the other, inside it.
+fn goes_through([from, to]: [[f64; 3]; 2], [a, b, c]: [[f64; 3]; 3]) -> bool {
+    let (start, end) = (triple(from, a, b, c), triple(to, a, b, c));
+    if start * end >= 0.0 {
+        return false;
+    }
+    let around = [triple(from, to, a, b), triple(from, to, b, c), triple(from, to, c, a)];
+    around.iter().all(|v| *v > 0.0) || around.iter().all(|v| *v < 0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -164,5 +246,47 @@ mod tests {
         // Drawn so far, the last element of the first part has swallowed a node as well.
         let found = intruders(&mesh, &x);
         assert!(found.contains(&Intruder { node: corner, element: 27 + 7 }), "{found:?}");
+    }
+    #[test]
+    fn a_planted_crossing_of_shells_is_found_and_sheets_apart_have_none() {
+        let deck = r#"
+            title = "two sheets"
+            units = "SI"
+            [control]
+            end_cycle = 1
+            [[part]]
+            name = "lower"
+            material = "MILD_STEEL"
+            shell = { thickness = 0.1 }
+            plate = { origin = [0, 0, 0], side_i = [5, 0, 0], side_j = [0, 5, 0], cells = [5, 5] }
+            [[part]]
+            name = "upper"
+            material = "MILD_STEEL"
+            shell = { thickness = 0.1 }
+            plate = { origin = [0.3, 0.2, 0.2], side_i = [4, 0, 0], side_j = [0, 4, 0], cells = [4, 4] }
+        "#;
+        let mesh = model(deck).mesh;
+        assert_eq!(pierced(&mesh, &mesh.positions), []);
+        // A node of the upper sheet under the lower: its four elements go through.
+        let node = mesh.parts[1].nodes[12] as usize;
+        let mut x = mesh.positions.clone();
+        x[node][2] = -0.05;
+        let found = pierced(&mesh, &x);
+        let uppers: std::collections::BTreeSet<u32> =
+            found.iter().flat_map(|p| [p.edge_of, p.element]).filter(|e| *e >= 25).collect();
+        assert_eq!(uppers.into_iter().collect::<Vec<_>>(), [25 + 5, 25 + 6, 25 + 9, 25 + 10], "{found:?}");
+        // A sheet that stands upright across the other.
+        let mut x = mesh.positions.clone();
+        for n in &mesh.parts[1].nodes {
+            let x = &mut x[*n as usize];
+            *x = [2.6, x[1], x[0] - 2.35];
+        }
+        let found = pierced(&mesh, &x);
+        assert!(found.iter().any(|p| p.edge_of >= 25 && p.element < 25), "{found:?}");
+        // Within one sheet: a fold that passes through a row further on.
+        let mut x = mesh.positions.clone();
+        x[mesh.parts[0].nodes[0] as usize] = [3.5, 3.5, 0.1];
+        x[mesh.parts[0].nodes[21] as usize][2] = 0.5;
+        assert!(pierced(&mesh, &x).iter().any(|p| p.edge_of == 0 || p.element == 0));
     }
 }

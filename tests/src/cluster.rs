@@ -98,6 +98,19 @@ impl Process {
         self.child.id()
     }
 
+    /// What its threads have used of processors so far (s), as Linux counts it.
+    ///
+    /// # Panics
+    /// If it has ended, or the system has no `/proc`.
+    pub fn processor_seconds(&self) -> f64 {
+        let path = format!("/proc/{}/stat", self.id());
+        let stat = std::fs::read_to_string(&path).expect("it runs");
+        // The name of the program, in brackets, may hold spaces. A tick is 10 ms on every Linux.
+        let fields = stat.rsplit(')').next().expect("a line").split_whitespace();
+        let ticks = fields.skip(11).take(2).filter_map(|field| field.parse::<f64>().ok());
+        ticks.sum::<f64>() / 100.0
+    }
+
     /// Whether it runs.
     pub fn is_alive(&mut self) -> bool {
         self.child.try_wait().is_ok_and(|status| status.is_none())
@@ -284,9 +297,17 @@ impl Cluster {
     /// # Panics
     /// If it does not join.
     pub fn worker_with(&mut self, name: &str, speed: &str, flags: &[&str]) {
+        self.worker_as("worker", name, speed, flags);
+    }
+
+    /// The same with the certificate of a host other than `worker`.
+    ///
+    /// # Panics
+    /// If it does not join.
+    pub fn worker_as(&mut self, host: &str, name: &str, speed: &str, flags: &[&str]) {
         let mut arguments = vec!["worker", "--name", name, "--speed", speed, "--threads", "1"];
         arguments.extend(flags);
-        let mut command = self.command("worker", &arguments);
+        let mut command = self.command(host, &arguments);
         command.envs(self.variables.iter().cloned());
         let worker = Process::start(name, command.env("BOLIDE_LOG", "info"));
         worker.wait_for("joined");
@@ -316,6 +337,15 @@ impl Cluster {
         worker.wait_for("joined");
         self.master.wait_for(&format!("worker {name} joined"));
         self.workers.push((name.to_owned(), worker));
+    }
+
+    /// What master and workers have used of processors so far (s).
+    ///
+    /// # Panics
+    /// If one has ended.
+    pub fn processor_seconds(&self) -> f64 {
+        let workers = self.workers.iter().map(|(_, worker)| worker.processor_seconds());
+        self.master.processor_seconds() + workers.sum::<f64>()
     }
 
     /// The process of a worker, to wait for its end.

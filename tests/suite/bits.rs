@@ -5,11 +5,14 @@
 use mechanics::lanes::Width;
 use tests::{
     bits::{Fingerprint, forced_sorts},
-    solve::{Crew, example, keyword, model, solve},
+    solve::{Crew, example, keyword, model, solve, solve_through},
 };
 
 use deck::Model;
-use master::event::{ForceSorts, Options};
+use master::{
+    embedded::Fate,
+    event::{ForceSorts, Keep, Options},
+};
 use protocol::message::Route;
 
 fn fingerprint(model: &Model, crew: Crew) -> Fingerprint {
@@ -365,6 +368,130 @@ fn nodes_that_a_wall_names_have_the_same_bits_and_the_others_pass() {
         nodes.map(|n| solved.state.x[n][2]).fold(f64::INFINITY, f64::min)
     };
     assert!(lowest(true) > -1e-12 && lowest(false) < -0.1, "{} {}", lowest(true), lowest(false));
+}
+
+/// A tube of shells on a wall, a ball inside that its sides stop, a lid that falls on it, and a bar that the lid carries on a
+/// hinge along its edge.
+fn shells_and_solids() -> Model {
+    model(
+        r#"
+        title = "shells and solids"
+        units = "SI"
+        [control]
+        end_time = 1
+        end_cycle = 500
+        [[material]]
+        name = "steel"
+        density = 7830
+        eos = { type = "linear", bulk = 175e9 }
+        strength = { type = "von-mises", shear = 80e9, yield_stress = 250e6, hardening = 500e6, cowper_symonds = { reference = 40.4, exponent = 5 } }
+        [[part]]
+        name = "bar"
+        material = "steel"
+        velocity = [0, 0, -20]
+        box = { origin = [0.045, -0.045, 0.034], size = [0.01, 0.09, 0.01], cells = [1, 9, 1] }
+        [[part]]
+        name = "tube"
+        material = "steel"
+        velocity = [0, 0, -20]
+        shell = { thickness = 1.2e-3 }
+        prism = { axis = "z", base = [0, 0, 1e-4], radius = 0.0424, length = 0.04, sides = 4, cells = [40, 8] }
+        [[part]]
+        name = "ball"
+        material = "steel"
+        velocity = [60, 5, -20]
+        sphere = { centre = [0.012, 0, 0.023], radius = 0.015, sector = "full", cells = [1, 1] }
+        [[part]]
+        name = "lid"
+        material = "steel"
+        velocity = [0, 0, -30]
+        shell = { thickness = 2e-3, points = 5, rule = "lobatto" }
+        plate = { origin = [-0.045, -0.045, 0.044], side_i = [0.09, 0, 0], side_j = [0, 0.09, 0], cells = [9, 9] }
+        [[join]]
+        parts = ["bar", "lid"]
+        [[wall]]
+        point = [0, 0, 0]
+        normal = [0, 0, 1]
+        friction = 0.2
+        [[boundary]]
+        type = "fixed"
+        parts = ["lid"]
+        face = "i-min"
+        axes = ""
+        rotations = "y"
+        [contact]
+        gap_length = 0.6e-3
+        self_interaction = "all"
+        friction = 0.1
+        [output]
+        history_cycles = 1
+        [[gauge]]
+        name = "rim"
+        part = "lid"
+        point = [0.045, 0, 0.044]
+        "#,
+    )
+}
+
+#[test]
+fn shells_and_solids_in_contact_have_the_same_bits_on_both_routes() {
+    let model = shells_and_solids();
+    same_bits(&model);
+    let alone = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    let row = alone.rows.last().expect("rows");
+    assert!(row.error.abs() < 0.02, "energy error {}", row.error);
+    // Shells turn, layers yield, and bodies of both kinds meet: without the ball the bits are others.
+    assert!(alone.state.shells.spin.iter().flatten().any(|w| w.abs() > 1.0));
+    let one = Fingerprint::of(&alone);
+    for workers in [2, 5] {
+        let options = Options { route: Route::Direct, ..Options::default() };
+        one.assert_equal(
+            &fingerprint(&model, asked(workers, options)),
+            &format!("{workers} workers, direct"),
+        );
+    }
+    for pair in [[1, 2], [1, 3]] {
+        let mut other = model.clone();
+        let contact = other.setup.contact.as_mut().expect("the deck has contact");
+        let n = other.mesh.parts.len();
+        for [a, b] in [pair, [pair[1], pair[0]]] {
+            contact.interacts[a * n + b] = false;
+        }
+        assert_ne!(fingerprint(&other, Crew::default()).digest, one.digest, "parts {pair:?} never meet");
+    }
+}
+
+#[test]
+fn a_worker_of_shells_that_is_lost_changes_no_bit() {
+    let mut model = shells_and_solids();
+    model.setup.control.end_cycle = 120;
+    let one = fingerprint(&model, Crew::default());
+    let mut arrivals = 0;
+    let mut count = |number: u64| {
+        arrivals = number;
+        None
+    };
+    solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
+    let mut midway = 0;
+    for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(6).enumerate() {
+        let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
+        let crew = asked(3, options);
+        let at = arrivals * (seed as u64 + 1) / 10;
+        let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
+        let solved = solve_through(model.clone(), crew, &mut fate).unwrap_or_else(|e| panic!("{seed}: {e}"));
+        one.assert_equal(&Fingerprint::of(&solved), &format!("loss {seed}, {route:?}"));
+        assert_eq!(solved.outcome.losses.len(), 1, "{seed}");
+        midway += usize::from(solved.outcome.losses[0].back_to > 0);
+    }
+    assert!(midway >= 2, "{midway} of 6 went back to a state on the way");
+}
+
+#[test]
+fn a_keyword_deck_of_a_ball_on_a_shell_has_the_same_bits() {
+    let mut model = keyword("ball-on-shell");
+    model.setup.control.end_cycle = 300;
+    model.output.history_cycles = 1;
+    same_bits(&model);
 }
 
 #[test]

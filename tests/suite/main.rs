@@ -4,6 +4,8 @@
 
 mod bits;
 mod book;
+mod fuzz;
+mod seeds;
 
 /// A row that nobody computes would look like one that holds.
 #[test]
@@ -14,6 +16,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/gas.rs"),
         include_str!("../src/book/solid.rs"),
         include_str!("../src/book/structure.rs"),
+        include_str!("../src/book/shell.rs"),
         include_str!("../src/book/load.rs"),
         include_str!("../src/book/contact.rs"),
     ]

@@ -10,7 +10,7 @@ use mechanics::{
     lanes::Width,
 };
 use protocol::{
-    message::{Assign, Work},
+    message::{Assign, Work, sampled_block},
     phase::Phase,
 };
 
@@ -75,6 +75,14 @@ fn thread_cpu_ns() -> u64 {
     t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
 }
 
+/// Positions for a sort, if one is due; a blocking one replaces those under way.
+fn gathered(domain: &mut Domain, gather: bool, blocking: bool) -> Vec<f64> {
+    if blocking {
+        domain.forget_gathered();
+    }
+    if gather { domain.gather() } else { Vec::new() }
+}
+
 /// A worker's domain and clock. `run` is called by one thread at a time; blocks spread over the current rayon pool.
 #[derive(Default)]
 pub struct Machine {
@@ -122,6 +130,12 @@ impl Machine {
         std::mem::take(&mut self.laps.0).into_iter()
     }
 
+    /// See [`Domain::plant_fault`].
+    #[doc(hidden)]
+    pub fn plant_fault(&mut self) {
+        self.domain.iter_mut().for_each(Domain::plant_fault);
+    }
+
     /// Does one task. Failures are outcomes.
     pub fn run(&mut self, task: Task) -> Outcome {
         self.try_run(task).unwrap_or_else(Outcome::Failed)
@@ -148,17 +162,19 @@ impl Machine {
                 laps.time(Phase::Interior, || domain.elements(Sets::All, dt_previous, clock));
                 Outcome::Computed
             }
-            Task::Install { plan, guest_state, dt_previous, gather } => laps.time(Phase::Contact, || {
-                let gathered = if gather { domain.gather() } else { Vec::new() };
-                let mark = clock.start();
-                domain.install(&plan, &guest_state)?;
-                clock.stop(mark, true);
-                domain.contact(dt_previous, clock);
-                Ok::<_, String>(Outcome::Forces { partials: domain.partials(clock), gathered })
-            })?,
-            Task::Border { dt_previous, quantum, time, gather } => {
+            Task::Install { plan, guest_state, dt_previous, gather, blocking } => {
+                laps.time(Phase::Contact, || {
+                    let mark = clock.start();
+                    domain.install(&plan, &guest_state)?;
+                    clock.stop(mark, true);
+                    let gathered = gathered(domain, gather, blocking);
+                    domain.contact(dt_previous, clock);
+                    Ok::<_, String>(Outcome::Forces { partials: domain.partials(clock), gathered })
+                })?
+            }
+            Task::Border { dt_previous, quantum, time, gather, blocking } => {
                 let gathered = laps.time(Phase::Contact, || {
-                    let gathered = if gather { domain.gather() } else { Vec::new() };
+                    let gathered = gathered(domain, gather, blocking);
                     domain.begin(quantum, time);
                     domain.contact(dt_previous, clock);
                     gathered
@@ -177,6 +193,10 @@ impl Machine {
                     .time(Phase::Integrate, || domain.integrate(&totals, dt_previous, dt, &walls, clock))?;
                 Outcome::Integrated(Box::new(vote))
             }
+            Task::Sample { cycle } => laps.time(Phase::Other, || match domain.n_blocks() {
+                0 => Ok::<_, String>(Outcome::Sampled([0; 16])),
+                n => Ok(Outcome::Sampled(domain.sample(sampled_block(cycle, n))?)),
+            })?,
             Task::Image { .. } => {
                 laps.time(Phase::Other, || Outcome::Image { pieces: domain.pieces(), work: clock.work() })
             }
@@ -200,11 +220,12 @@ impl Machine {
             assign.setup,
             assign.n_parts as usize,
             assign.quanta,
-            assign.subdomains,
+            (assign.subdomains, assign.cycle),
             &assign.gauges,
             width,
         );
         domain.place_bodies(&assign.bodies)?;
+        domain.watch(&assign.watched);
         domain.install(&assign.plan, &assign.guest_state)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
         if !further_epoch {

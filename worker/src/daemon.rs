@@ -27,6 +27,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
 
 use crate::{
+    notify,
     peers::{Peers, links::Links},
     runner::{GOODBYE, Input, Runner},
 };
@@ -105,6 +106,9 @@ pub fn run(options: &Options) -> std::result::Result<(), String> {
     let hello = greeting(options);
     let result = runtime.block_on(async {
         let (told, leaving) = watch::channel(false);
+        tokio::spawn(notify::live());
+        // A master that is away is no fault of this service.
+        notify::say(&format!("READY=1\nSTATUS=dialling {}", options.master));
         tokio::select! {
             result = stay(options, certificates.as_ref(), &hello, &pool, leaving) => result,
             () = leave_by_and_by(&told) => Ok(()),
@@ -139,6 +143,7 @@ fn greeting(options: &Options) -> Hello {
         crate::random(),
     );
     hello.token.clone_from(&options.token);
+    hello.proof = Some(mechanics::proof::of_this_machine());
     hello
 }
 
@@ -152,6 +157,7 @@ async fn leave_by_and_by(told: &watch::Sender<bool>) {
         _ = term.recv() => {}
     }
     warn!("leaving at the next plan boundary; once more to leave at once");
+    notify::say("STOPPING=1\nSTATUS=leaving at the next plan boundary");
     told.send_replace(true);
     tokio::select! {
         _ = interrupt.recv() => {}
@@ -184,12 +190,14 @@ async fn stay(
                     "joined {}",
                     options.master
                 );
+                notify::say(&format!("STATUS=joined {} as host {}", options.master, call.welcome.host));
                 let error = serve_until(call, service.clone(), leaving.clone()).await;
                 if options.once || *leaving.borrow() {
                     return Ok(());
                 }
                 (alone_since, pause) = (Instant::now(), FIRST_PAUSE);
                 warn!("link to {} ended: {error}; dialling again", options.master);
+                notify::say(&format!("STATUS=dialling {} again", options.master));
                 error
             }
             Err(error) if is_final(&error) => return Err(error.to_string()),

@@ -44,6 +44,11 @@ pub fn at_cycle(name: &str, cycle: u64) -> bool {
     points().iter().any(|p| p.name == name && cycle == p.at)
 }
 
+/// Whether the fault of this name is due in this cycle and all later ones.
+pub fn from_cycle(name: &str, cycle: u64) -> bool {
+    points().iter().any(|p| p.name == name && cycle >= p.at)
+}
+
 /// Ends the process as `kill -9` would, if this fault is due.
 pub fn die(name: &str) {
     if passes(name) {

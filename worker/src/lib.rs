@@ -2,13 +2,14 @@
 //!
 //! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics; [`daemon`]
 //! carries bytes between a master and the compute thread of [`runner`]; [`peers`] between that and other workers.
-//! [`stopwatch`] tells where the time goes.
+//! [`stopwatch`] tells where the time goes, [`notify`] a service manager how this process does.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 
 pub mod compute;
 pub mod daemon;
 pub mod failpoint;
+pub mod notify;
 pub mod peers;
 pub mod runner;
 pub mod session;

@@ -131,10 +131,10 @@ impl Runner {
                 self.links.want(neighbours);
                 self.apply(Event::Message(ToWorker::Assign(assign)))
             }
-            ToWorker::Plan { acts_at, plan, hash } => {
+            ToWorker::Plan { gathered_at, acts_at, plan, hash } => {
                 let neighbours: Vec<u32> = plan.neighbours.iter().map(|n| n.worker).collect();
                 self.links.want(neighbours);
-                self.apply(Event::Message(ToWorker::Plan { acts_at, plan, hash }))?;
+                self.apply(Event::Message(ToWorker::Plan { gathered_at, acts_at, plan, hash }))?;
                 for step in self.links.release(&self.session) {
                     self.step(step)?;
                 }
@@ -237,6 +237,7 @@ fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
         Task::Interior { .. } => "die-in-interior",
         Task::Integrate { .. } => "die-in-integrate",
         Task::Image { .. } => "die-in-image",
+        Task::Sample { .. } => "die-in-sample",
     };
     failpoint::die(name);
     if let Task::Border { gather: true, .. } | Task::Install { gather: true, .. } = &task {
@@ -247,6 +248,7 @@ fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
     }
     let mut outcome = machine.run(task);
     match &mut outcome {
+        Outcome::Computed if failpoint::from_cycle("ulp", cycle) => machine.plant_fault(),
         Outcome::Integrated(vote) if failpoint::in_cycle("nan-vote", cycle) => {
             vote.parts.iter_mut().for_each(|part| part.internal = f64::NAN);
         }
@@ -348,8 +350,10 @@ mod tests {
             walls: Vec::new(),
             force_quantum: quantum,
             gather: false,
+            blocking: false,
             collect: false,
             stop: false,
+            sample: false,
         };
         ToWorker::Totals { cycle, orders, totals: Vec::new() }
     }

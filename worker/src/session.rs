@@ -3,7 +3,7 @@
 //! It knows no socket, clock or thread. Computation is an action whose outcome comes back as an event; at most one
 //! is under way. An assignment of a later epoch replaces the one in hand at any time: the outcome of the task under way
 //! is then thrown away, and the new domain is built when it has come. The steps of a cycle, in order: images if ordered; at a plan boundary transfer, all elements, install;
-//! else contact and border; send; interior; totals; integrate.
+//! else contact and border; send; interior; a sample if ordered; totals; integrate.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -72,8 +72,10 @@ pub enum Task {
         guest_state: Vec<f64>,
         /// The step before.
         dt_previous: f64,
-        /// Gather positions first.
+        /// Gather positions then.
         gather: bool,
+        /// This gathering replaces those whose plans have not acted.
+        blocking: bool,
     },
     /// Contact, border elements, partial forces.
     Border {
@@ -85,6 +87,8 @@ pub enum Task {
         time: f64,
         /// Gather positions first.
         gather: bool,
+        /// This gathering replaces those whose plans have not acted.
+        blocking: bool,
     },
     /// Interior elements.
     Interior {
@@ -106,6 +110,11 @@ pub enum Task {
     Image {
         /// Nothing is computed on them after that.
         last: bool,
+    },
+    /// What elements came to in this cycle, in one block.
+    Sample {
+        /// The cycle.
+        cycle: u64,
     },
 }
 
@@ -139,6 +148,8 @@ pub enum Outcome {
         /// Compute time so far.
         work: Work,
     },
+    /// Of `Sample`.
+    Sampled([u8; 16]),
     /// The task failed: a sentence for the user.
     Failed(String),
 }
@@ -166,6 +177,10 @@ enum Phase {
     Interior,
     /// Waiting for totals or orders.
     AwaitTotals,
+    /// Hashing a sample, with all elements done.
+    Sampling,
+    /// After the last image: computing the elements of the cycle that will not be, for a sample of them.
+    Proving,
     /// Integrating.
     Integrating,
     /// Failed or finished; only `Release` or `Assign` is heard.
@@ -195,13 +210,15 @@ pub struct Session {
     /// Orders by the cycle whose step they give.
     orders: BTreeMap<u64, Orders>,
     totals: VecDeque<(u64, Vec<f64>)>,
-    /// Cycles at which plans act, from gatherings, and the plans that have come.
-    boundaries: VecDeque<u64>,
+    /// Cycles of gatherings and at which their plans act, and the plans that have come: cycle at which one acts, hash, plan.
+    boundaries: VecDeque<(u64, u64)>,
     plans: VecDeque<(u64, u64, Box<Plan>)>,
     guests: Option<(u64, Vec<f64>)>,
     n_exchange: usize,
     route: Route,
     neighbours: Vec<Neighbour>,
+    /// Numbers by node of the exchange.
+    stride: usize,
     /// On route direct: own partial forces of this cycle, and what neighbours sent, by (cycle, worker).
     partials: Vec<f64>,
     heard: BTreeMap<(u64, u32), Vec<f64>>,
@@ -209,6 +226,8 @@ pub struct Session {
     vote: Option<Box<Vote>>,
     resumed: bool,
     imaged: bool,
+    /// This cycle's sample is still to be sent.
+    sample_due: bool,
     /// The interior was computed with the border: at a plan boundary.
     whole: bool,
 }
@@ -242,12 +261,14 @@ impl Session {
             n_exchange: 0,
             route: Route::Master,
             neighbours: Vec::new(),
+            stride: 3,
             partials: Vec::new(),
             heard: BTreeMap::new(),
             plan_hash: 0,
             vote: None,
             resumed: false,
             imaged: false,
+            sample_due: false,
             whole: false,
         }
     }
@@ -274,9 +295,9 @@ impl Session {
 
     /// Hash of the plan that acts at a cycle, this one or a later one; none while that plan has not come.
     pub fn plan_at(&self, cycle: u64) -> Option<u64> {
-        match self.boundaries.iter().rev().find(|acts_at| **acts_at <= cycle) {
+        match self.boundaries.iter().rev().find(|(_, acts_at)| *acts_at <= cycle) {
             None => Some(self.plan_hash),
-            Some(boundary) => {
+            Some((_, boundary)) => {
                 self.plans.iter().find(|(acts_at, ..)| acts_at == boundary).map(|(_, hash, _)| *hash)
             }
         }
@@ -363,6 +384,7 @@ impl Session {
                 self.n_exchange = assign.plan.exchange.len();
                 self.route = assign.route;
                 self.neighbours.clone_from(&assign.plan.neighbours);
+                self.stride = assign.plan.stride();
                 self.plan_hash = assign.plan_hash;
                 self.resumed = assign.cycle > 0;
                 if self.busy {
@@ -385,7 +407,13 @@ impl Session {
                     phase => Err(format!("start while {phase:?}, expected Ready")),
                 }
             }
-            ToWorker::Plan { acts_at, plan, hash } => {
+            // Its gathering was replaced while it was on its way.
+            ToWorker::Plan { gathered_at, acts_at, .. }
+                if !self.boundaries.contains(&(gathered_at, acts_at)) =>
+            {
+                Ok(())
+            }
+            ToWorker::Plan { acts_at, plan, hash, .. } => {
                 if self.plans.len() as u64 > self.sort_lag + 1 {
                     return Err(format!("plan for cycle {acts_at} while {} others wait", self.plans.len()));
                 }
@@ -460,6 +488,19 @@ impl Session {
                     last,
                     work,
                 }));
+                if stop && self.sample_due {
+                    self.phase = Phase::Proving;
+                    let (quantum, time) = self.quantum_and_time()?;
+                    let (dt_previous, gather, blocking) = (self.dt_previous, false, false);
+                    actions.push(Action::Compute(Task::Border {
+                        dt_previous,
+                        quantum,
+                        time,
+                        gather,
+                        blocking,
+                    }));
+                    return Ok(());
+                }
                 if stop {
                     self.phase = Phase::Over;
                     return Ok(());
@@ -491,7 +532,7 @@ impl Session {
                     actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered, busy }));
                 } else {
                     for neighbour in &self.neighbours {
-                        let partials = of_nodes(&partials, &neighbour.shared)?;
+                        let partials = of_nodes(&partials, &neighbour.shared, self.stride)?;
                         actions.push(Action::SendPeer(neighbour.worker, ToPeer { cycle, partials }));
                     }
                     self.partials = partials;
@@ -509,6 +550,25 @@ impl Session {
             (Phase::Interior, Outcome::Computed) => {
                 self.phase = Phase::AwaitTotals;
                 self.try_integrate(actions)
+            }
+            (Phase::Sampling, Outcome::Sampled(hash)) => {
+                actions.push(Action::Send(ToMaster::Sample { cycle: self.cycle, hash }));
+                self.sample_due = false;
+                self.phase = Phase::AwaitTotals;
+                self.try_integrate(actions)
+            }
+            (Phase::Proving, Outcome::Forces { .. }) => {
+                actions.push(Action::Compute(Task::Interior { dt_previous: self.dt_previous }));
+                Ok(())
+            }
+            (Phase::Proving, Outcome::Computed) => {
+                actions.push(Action::Compute(Task::Sample { cycle: self.cycle }));
+                Ok(())
+            }
+            (Phase::Proving, Outcome::Sampled(hash)) => {
+                actions.push(Action::Send(ToMaster::Sample { cycle: self.cycle, hash }));
+                self.phase = Phase::Over;
+                Ok(())
             }
             (Phase::Integrating, Outcome::Integrated(vote)) => {
                 self.vote = Some(vote);
@@ -536,7 +596,8 @@ impl Session {
     }
 
     fn begin_cycle(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let Orders { stop, collect, gather, .. } = *self.flags()?;
+        let Orders { stop, collect, gather, blocking, sample, .. } = *self.flags()?;
+        self.sample_due = sample;
         while let Some(entry) = self.orders.first_entry()
             && entry.key().wrapping_add(1) < self.cycle
         {
@@ -544,13 +605,19 @@ impl Session {
         }
         if (stop || collect) && !self.imaged {
             self.phase = Phase::Imaging;
-            actions.push(Action::Compute(Task::Image { last: stop }));
+            actions.push(Action::Compute(Task::Image { last: stop && !sample }));
             return Ok(());
         }
         if gather {
-            self.boundaries.push_back(self.cycle + self.sort_lag);
+            let mut acts_at = self.cycle + self.sort_lag;
+            if blocking {
+                acts_at = self.cycle + 1;
+                self.boundaries.retain(|(_, at)| *at <= self.cycle);
+                self.plans.retain(|(at, ..)| *at <= self.cycle);
+            }
+            self.boundaries.push_back((self.cycle, acts_at));
         }
-        if self.boundaries.front() == Some(&self.cycle) {
+        if self.boundaries.front().is_some_and(|(_, at)| *at == self.cycle) {
             self.phase = Phase::AwaitGuests;
             self.whole = false;
             return self.try_boundary(actions);
@@ -558,7 +625,7 @@ impl Session {
         self.phase = Phase::Border;
         let (quantum, time) = self.quantum_and_time()?;
         let dt_previous = self.dt_previous;
-        actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather }));
+        actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather, blocking }));
         Ok(())
     }
 
@@ -582,11 +649,12 @@ impl Session {
             },
             _ => return Ok(()),
         };
-        let gather = self.flags()?.gather;
+        let Orders { gather, blocking, .. } = *self.flags()?;
         if let Some((_, hash, plan)) = self.plans.pop_front() {
             self.boundaries.pop_front();
             self.n_exchange = plan.exchange.len();
             self.neighbours.clone_from(&plan.neighbours);
+            self.stride = plan.stride();
             self.plan_hash = hash;
             self.phase = Phase::Border;
             actions.push(Action::Compute(Task::Install {
@@ -594,6 +662,7 @@ impl Session {
                 guest_state,
                 dt_previous: self.dt_previous,
                 gather,
+                blocking,
             }));
         }
         Ok(())
@@ -601,6 +670,11 @@ impl Session {
 
     /// A worker that shares no node needs only the orders of the cycle before.
     fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+        if self.sample_due {
+            self.phase = Phase::Sampling;
+            actions.push(Action::Compute(Task::Sample { cycle: self.cycle }));
+            return Ok(());
+        }
         let Some(orders) = self.orders.get(&self.cycle) else { return Ok(()) };
         let (dt, walls) = (orders.dt, orders.walls.clone());
         let totals = match self.route {
@@ -635,17 +709,17 @@ impl Session {
         let mut totals = std::mem::take(&mut self.partials);
         for neighbour in &self.neighbours {
             let Some(partials) = self.heard.remove(&(self.cycle, neighbour.worker)) else { continue };
-            if partials.len() != 3 * neighbour.shared.len() {
+            if partials.len() != self.stride * neighbour.shared.len() {
                 return Err(format!(
                     "worker {} sends {} numbers in cycle {}, the plan has {}",
                     neighbour.worker,
                     partials.len(),
                     self.cycle,
-                    3 * neighbour.shared.len()
+                    self.stride * neighbour.shared.len()
                 ));
             }
-            for (&at, partial) in neighbour.shared.iter().zip(partials.chunks_exact(3)) {
-                for (total, term) in totals[3 * at as usize..].iter_mut().zip(partial) {
+            for (&at, partial) in neighbour.shared.iter().zip(partials.chunks_exact(self.stride)) {
+                for (total, term) in totals[self.stride * at as usize..].iter_mut().zip(partial) {
                     *total += term;
                 }
             }
@@ -664,13 +738,13 @@ fn all_finite(what: &str, values: &[f64]) -> Result<(), String> {
     Err(format!("{what} {} of {} is {}, must be finite", bad + 1, values.len(), values[bad]))
 }
 
-/// Three numbers of each of these nodes.
-fn of_nodes(values: &[f64], nodes: &[u32]) -> Result<Vec<f64>, String> {
-    let mut out = Vec::with_capacity(3 * nodes.len());
+/// The numbers, `stride` each, of these nodes.
+fn of_nodes(values: &[f64], nodes: &[u32], stride: usize) -> Result<Vec<f64>, String> {
+    let mut out = Vec::with_capacity(stride * nodes.len());
     for &node in nodes {
-        let at = 3 * node as usize;
+        let at = stride * node as usize;
         out.extend_from_slice(
-            values.get(at..at + 3).ok_or("a neighbour shares a node that is not in the exchange")?,
+            values.get(at..at + stride).ok_or("a neighbour shares a node that is not in the exchange")?,
         );
     }
     Ok(out)

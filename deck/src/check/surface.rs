@@ -7,6 +7,9 @@ use crate::{
     geometry::{FACES, norm, sub},
 };
 
+/// The side of a shell that stands for it, an index into [`FACES`].
+const UPPER: usize = 1;
+
 /// An outer face of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Face {
@@ -31,6 +34,10 @@ pub(crate) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
         for e in 0..part.n_elements() {
             let corners = part.corners(e);
             for (f, face) in FACES.iter().enumerate() {
+                // A shell is one face, its upper side.
+                if part.section().is_some() && f != UPPER {
+                    continue;
+                }
                 if let Topology::Structured { cells } = &part.topology
                     && !on_side(*cells, e, f)
                 {

@@ -151,8 +151,11 @@ fn worst_node(nodes: &Surface<'_>, faces: &Surface<'_>, assembly: &Assembly, gap
             }
         }
     }
+    // Nothing is inside a shell.
+    let part = faces.faces.first().map_or(0, |face| face.part as usize);
+    let solid = assembly.mesh.parts[part].section().is_none();
     let worst = (0..candidates.len())
-        .map(|c| Worst { node: candidates[c], distance: nearest[c], inside: above[c] % 2 == 1 })
+        .map(|c| Worst { node: candidates[c], distance: nearest[c], inside: solid && above[c] % 2 == 1 })
         .filter(|w| w.inside || w.distance < gap * (1.0 - ROUNDING))
         .min_by(|a, b| b.inside.cmp(&a.inside).then(a.distance.total_cmp(&b.distance)))?;
     Some(worst)

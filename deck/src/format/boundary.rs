@@ -55,10 +55,13 @@ type Prescribed = [Option<Drive>; 3];
 /// Reads boundaries, walls and loads.
 pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembly: &Assembly) -> Conditions {
     let curves = Curves::read(deck);
+    let turns = turning(assembly);
     let mut loads = load::read(deck, names, parts, assembly, &curves);
     let mut boundaries: Vec<Boundary> = Vec::new();
     // By node and axis: the boundary that prescribes it.
     let mut prescribed: BTreeMap<u32, [Option<usize>; 3]> = BTreeMap::new();
+    // By node: axes about which it does not turn.
+    let mut clamps: BTreeMap<u32, u8> = BTreeMap::new();
     // By pair of boundaries and axis: the first node both prescribe differently, and how many.
     let mut conflicts: BTreeMap<(usize, usize, usize), (u32, usize)> = BTreeMap::new();
     for table in deck.tables("boundary", MAX_ENTRIES) {
@@ -70,16 +73,24 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembl
         let Some(kind) = kind else { continue };
         if TYPES[kind] == "transmit" {
             let faces = read_faces(&table, names, parts, assembly);
+            let selected = names.of_table(&table);
+            if let Some(p) = selected.into_iter().find(|&p| assembly.mesh.parts[p].section().is_some()) {
+                let read = format!("{} on part \"{}\" of shells", table.title, parts[p].name);
+                table.faults.add(table.at, read, "parts of solids", "name them under parts");
+            }
             table.finish();
             loads.list.surfaces.push(SurfaceLoad { kind: SurfaceKind::Transmit, faces });
             continue;
         }
         let read = read_boundary(&table, TYPES[kind], names, parts, assembly, &curves);
         table.finish();
-        let Some((velocity, nodes)) = read else { continue };
+        let Some((velocity, clamped, nodes)) = read else { continue };
         let this = boundaries.len();
         boundaries.push(Boundary { at, velocity });
         for node in nodes {
+            if clamped != 0 && turns[node as usize] {
+                *clamps.entry(node).or_default() |= clamped;
+            }
             let held = prescribed.entry(node).or_default();
             for axis in 0..3 {
                 if velocity[axis].is_none() {
@@ -127,7 +138,7 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembl
     }
     let rigid = rigid::read(deck, names, &curves);
     let (constraints, constraint) =
-        number(deck, &boundaries, &prescribed, &loads.forces, &touched, assembly.mesh.n_nodes());
+        number(deck, &boundaries, &prescribed, &clamps, &loads.forces, &touched, assembly.mesh.n_nodes());
     let loads = Loads { curves: curves.list, ..loads.list };
     Conditions { constraints, constraint, walls, loads, rigid }
 }
@@ -137,21 +148,23 @@ fn number(
     deck: &Table<'_>,
     boundaries: &[Boundary],
     prescribed: &BTreeMap<u32, [Option<usize>; 3]>,
+    clamps: &BTreeMap<u32, u8>,
     forces: &BTreeMap<u32, u32>,
     touched: &BTreeMap<u32, u32>,
     n_nodes: usize,
 ) -> (Vec<Constraint>, Vec<u16>) {
     let mut list = vec![Constraint::default()];
-    let mut known: BTreeMap<([DriveBits; 3], u32, u32), u16> = BTreeMap::new();
+    let mut known: BTreeMap<([DriveBits; 3], u32, u32, u8), u16> = BTreeMap::new();
     let mut of_node = vec![0u16; n_nodes];
     let nodes: BTreeSet<u32> =
-        prescribed.keys().chain(forces.keys()).chain(touched.keys()).copied().collect();
+        prescribed.keys().chain(clamps.keys()).chain(forces.keys()).chain(touched.keys()).copied().collect();
     for node in nodes {
         let held = prescribed.get(&node).copied().unwrap_or_default();
         let forces = forces.get(&node).copied().unwrap_or_default();
         let walls = touched.get(&node).copied().unwrap_or_default();
+        let clamped = clamps.get(&node).copied().unwrap_or_default();
         let velocity = [0, 1, 2].map(|axis| held[axis].and_then(|b| boundaries[b].velocity[axis]));
-        let key = (velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve))), forces, walls);
+        let key = (velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve))), forces, walls, clamped);
         let next = list.len();
         let index = match known.get(&key) {
             Some(index) => *index,
@@ -165,7 +178,7 @@ fn number(
                     );
                     return (list, of_node);
                 };
-                list.push(Constraint { velocity, walls, forces });
+                list.push(Constraint { velocity, walls, forces, clamped });
                 known.insert(key, index);
                 index
             }
@@ -183,11 +196,11 @@ fn read_boundary(
     parts: &[PartDraft],
     assembly: &Assembly,
     curves: &Curves,
-) -> Option<(Prescribed, Vec<u32>)> {
+) -> Option<(Prescribed, u8, Vec<u32>)> {
     let selected = names.of_table(table);
     // A part that could not be read has no nodes to select; that is no second fault.
     let broken = selected.is_empty() || selected.iter().any(|&p| parts[p].block.is_none());
-    let (velocity, nodes) = match kind {
+    let (velocity, clamped, nodes) = match kind {
         "symmetry" => {
             let axis = table.require("axis", "one of x, y, z").and_then(|v| v.one_of(&AXES));
             let place = table.number_or("at", 0.0, Range::Any);
@@ -195,12 +208,21 @@ fn read_boundary(
             let mut velocity = [None; 3];
             velocity[axis] = Some(Drive::constant(0.0));
             let nodes = choose(assembly, &selected, |x, near| (x[axis] - place).abs() <= near);
-            (velocity, nodes)
+            // The plane turns only with itself.
+            (velocity, 0b111 & !(1 << axis), nodes)
         }
         kind => {
-            let velocity = if kind == "fixed" { read_axes(table) } else { read_velocity(table, curves) };
+            let clamped = match table.get("rotations") {
+                None => Some(0),
+                Some(value) => read_letters(value),
+            };
+            let velocity = if kind == "fixed" {
+                read_axes(table, clamped.is_some_and(|clamped| clamped != 0))
+            } else {
+                read_velocity(table, curves)
+            };
             let nodes = read_nodes(table, &selected, assembly);
-            (velocity?, nodes?)
+            (velocity?, clamped?, nodes?)
         }
     };
     if nodes.is_empty() && !broken {
@@ -211,11 +233,38 @@ fn read_boundary(
             "check parts, face, box, plane or axis against the mesh",
         );
     }
-    Some((velocity, nodes))
+    Some((velocity, clamped, nodes))
 }
 
-/// `axes = "xy"`: zero velocity on those; all three where it is absent.
-fn read_axes(table: &Table<'_>) -> Option<Prescribed> {
+/// Which nodes have shells and so turn, by global node.
+fn turning(assembly: &Assembly) -> Vec<bool> {
+    let mut turns = vec![false; assembly.mesh.n_nodes()];
+    for part in assembly.mesh.parts.iter().filter(|part| part.section().is_some()) {
+        for &n in &part.nodes {
+            turns[n as usize] = true;
+        }
+    }
+    turns
+}
+
+/// Bits of the axes that a text of the letters x, y, z names.
+fn read_letters(value: Value<'_>) -> Option<u8> {
+    let text = value.text()?;
+    let mut bits = 0;
+    for c in text.chars() {
+        match AXES.iter().position(|axis| axis.starts_with(c)) {
+            Some(axis) => bits |= 1 << axis,
+            None => {
+                value.fault("some of the letters x, y, z", "write for instance \"xz\"");
+                return None;
+            }
+        }
+    }
+    Some(bits)
+}
+
+/// `axes = "xy"`: zero velocity on those; all three where it is absent. It may be empty where rotations are held.
+fn read_axes(table: &Table<'_>, turns_held: bool) -> Option<Prescribed> {
     let Some(value) = table.get("axes") else { return Some([Some(Drive::constant(0.0)); 3]) };
     let text = value.text()?;
     let mut velocity = [None; 3];
@@ -228,7 +277,7 @@ fn read_axes(table: &Table<'_>) -> Option<Prescribed> {
             }
         }
     }
-    if velocity.iter().all(Option::is_none) {
+    if velocity.iter().all(Option::is_none) && !turns_held {
         value.fault("some of the letters x, y, z", "write for instance \"xz\"");
         return None;
     }

@@ -78,7 +78,8 @@ pub(crate) fn read(
     let gap = match table.get("gap_fraction").filter(|v| v.is_text()) {
         Some(value) if value.one_of(&["fit"]).is_some() => {
             let fit = |face: f64| {
-                let most = GAP_FRACTION * face;
+                // A gap of half the thickness stands for it.
+                let most = thinnest(assembly, &interacts).map_or(GAP_FRACTION * face, |h| 0.5 * h.min(face));
                 let clearance = clearance(assembly, &interacts, &faces, most);
                 clearance.map_or(most, |d| (FIT_SHARE * d).clamp(FIT_LEAST * face, most))
             };
@@ -123,6 +124,14 @@ pub(crate) fn read(
         ignores_initial: initial == Some(1),
     };
     Some(ContactDraft { settings, faces })
+}
+
+/// The least thickness of shells that interact.
+fn thinnest(assembly: &Assembly, interacts: &[bool]) -> Option<f64> {
+    let parts = &assembly.mesh.parts;
+    let meets = |p: usize| interacts[p * parts.len()..(p + 1) * parts.len()].contains(&true);
+    let of_shells = (0..parts.len()).filter(|&p| meets(p)).filter_map(|p| parts[p].section());
+    of_shells.map(|section| section.thickness).min_by(f64::total_cmp)
 }
 
 /// `[[contact.pair]]`: whether two parts interact, and their friction.

@@ -2,12 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::mesh::Topology;
+use mechanics::{
+    element::shell4::Rule,
+    erosion::Criteria,
+    mesh::{Section, Topology},
+};
 
-use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, Meshes, shape};
+use super::{MAX_ELEMENTS, MAX_NODES, MAX_PARTS, Materials, Meshes, erosion, shape};
 use crate::{
     blocks::Block,
     geometry::{norm, scaled},
+    mesh_file::Body,
     table::{Range, Table, Value},
 };
 
@@ -22,6 +27,8 @@ pub(crate) struct PartDraft {
     /// Index into the materials in use; none after a fault.
     pub(crate) material: Option<u32>,
     pub(crate) velocity: [f64; 3],
+    /// When its elements erode; none if they do not.
+    pub(crate) erosion: Option<Criteria>,
     /// None after a fault.
     pub(crate) block: Option<Block>,
     /// Numbers and places of an explicit mesh.
@@ -70,6 +77,14 @@ pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials, meshes: &M
             .require("material", "a material by name or as an inline table")
             .and_then(|v| materials.resolve(v, &name, fracture));
         let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
+        let of_material = material.map(|m| &materials.list[m as usize]);
+        let shells = table.get("shell").is_some();
+        let erosion = table.get("erosion").and_then(|v| {
+            if shells {
+                v.fault("solids: shells do not erode", "remove erosion, or make the part of solids");
+            }
+            erosion::read_criteria(v, &name, of_material)
+        });
         let (mut block, explicit) = read_mesh(&table, &name, meshes, &mut budget);
         let movable = explicit.as_ref().is_none_or(|own| own.file.is_none());
         if let Some(block) = &mut block
@@ -85,7 +100,7 @@ pub(crate) fn read_parts(deck: &Table<'_>, materials: &mut Materials, meshes: &M
             }
         }
         table.finish();
-        parts.push(PartDraft { name, at, material, velocity, block, explicit });
+        parts.push(PartDraft { name, at, material, velocity, erosion, block, explicit });
     }
     parts
 }
@@ -126,7 +141,9 @@ fn read_mesh(
     meshes: &Meshes,
     budget: &mut Budget,
 ) -> (Option<Block>, Option<Explicit>) {
-    const KINDS: [&str; 5] = ["box", "cylinder", "sphere", "tube", "mesh"];
+    const KINDS: [&str; 7] = ["box", "cylinder", "sphere", "tube", "plate", "prism", "mesh"];
+    let shell = table.get("shell");
+    let section = shell.and_then(|value| read_section(value, name));
     let present: Vec<(&'static str, Value<'_>)> =
         KINDS.iter().filter_map(|kind| table.get(kind).map(|v| (*kind, v))).collect();
     let [(kind, value)] = present[..] else {
@@ -141,18 +158,32 @@ fn read_mesh(
         return (None, None);
     };
     let Some(inner) = value.table(format!("{kind} of \"{name}\"")) else { return (None, None) };
+    let of_shells = ["plate", "prism"].contains(&kind);
+    match shell {
+        None if of_shells => {
+            let read = format!("a {kind} without a shell in {}", table.title);
+            table.faults.add(table.at, read, "its thickness", "add shell = { thickness = ... }");
+        }
+        Some(shell) if !of_shells && kind != "mesh" => {
+            shell.fault("no shell: solids fill this block", "remove it, or take plate, prism or mesh");
+        }
+        _ => {}
+    }
     if kind == "mesh" {
+        if shell.is_some() && section.is_none() {
+            return (None, None);
+        }
         let read = if inner.has("file") {
-            read_file(inner, name, meshes, budget)
+            read_file(inner, name, meshes, budget, section)
         } else {
-            read_explicit(inner, budget)
+            read_explicit(inner, budget, section)
         };
         return match read {
             Some((block, explicit)) => (Some(block), Some(explicit)),
             None => (None, None),
         };
     }
-    let shape = shape::read(kind, &inner);
+    let shape = shape::read(kind, &inner, section);
     let (at, title) = (inner.at, inner.title.clone());
     inner.finish();
     let block = shape.and_then(|shape| {
@@ -162,8 +193,24 @@ fn read_mesh(
     (block, None)
 }
 
-/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`.
-fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explicit)> {
+/// `shell = { thickness, points, rule }`.
+fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
+    let table = value.table(format!("shell of \"{name}\""))?;
+    let thickness = table.number("thickness", Range::Positive);
+    let rule = table.get("rule").map_or(Some(0), |v| v.one_of(&["gauss", "lobatto"]));
+    let (least, default) = if rule == Some(1) { (3, 5) } else { (1, 3) };
+    let points = table.integer_or("points", default, least, 5) as u32;
+    table.finish();
+    let rule = if rule? == 1 { Rule::Lobatto(points) } else { Rule::Gauss(points) };
+    Some(Section { thickness: thickness?, rule })
+}
+
+/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`, of shells `[id, n1 ... n4]`.
+fn read_explicit(
+    table: Table<'_>,
+    budget: &mut Budget,
+    section: Option<Section>,
+) -> Option<(Block, Explicit)> {
     let nodes = table.require("nodes", "a list of [id, x, y, z]").and_then(|v| v.items());
     let elements = table.require("elements", "a list of [id, n1, ..., n8]").and_then(|v| v.items());
     let (nodes, elements) = (nodes?, elements?);
@@ -198,7 +245,12 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
     let mut seen: BTreeMap<u32, usize> = BTreeMap::new();
     let mut used = vec![false; positions.len()];
     for element in &elements {
-        let Some(numbers) = element.integers::<9>("[id, n1, ..., n8]", 1, MAX_ID) else { continue };
+        let numbers = if section.is_some() {
+            element.integers::<5>("[id, n1, n2, n3, n4]", 1, MAX_ID).map(|n| n.to_vec())
+        } else {
+            element.integers::<9>("[id, n1, ..., n8]", 1, MAX_ID).map(|n| n.to_vec())
+        };
+        let Some(numbers) = numbers else { continue };
         let id = numbers[0] as u32;
         if let Some(first) = seen.insert(id, element.at) {
             let (line, _) = table.faults.place(first);
@@ -224,11 +276,15 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
                 }
             }
         }
-        let mut sorted = corners;
+        let mut sorted = corners[..numbers.len() - 1].to_vec();
         sorted.sort_unstable();
         if complete && sorted.windows(2).any(|w| w[0] == w[1]) {
             complete = false;
-            element.fault("eight different nodes", "list each corner once; wedges are not read");
+            let (expected, advice) = match section {
+                None => ("eight different nodes", "list each corner once; wedges are not read"),
+                Some(_) => ("four different nodes", "list each corner once; triangles come in mesh files"),
+            };
+            element.fault(expected, advice);
         }
         if complete {
             hexahedra.push(corners);
@@ -259,7 +315,14 @@ fn read_explicit(table: Table<'_>, budget: &mut Budget) -> Option<(Block, Explic
     }
     let clean = table.faults.count() == before;
     table.finish();
-    let block = Block { positions, topology: Topology::Explicit { hexahedra }, faces: Vec::new() };
+    let topology = match section {
+        None => Topology::Explicit { hexahedra },
+        Some(section) => {
+            let quads = hexahedra.iter().map(|&[a, b, c, d, ..]: &[u32; 8]| [a, b, c, d]).collect();
+            Topology::Shells { quads, section }
+        }
+    };
+    let block = Block { positions, topology, faces: Vec::new() };
     clean.then_some((block, explicit))
 }
 
@@ -269,6 +332,7 @@ fn read_file(
     part: &str,
     meshes: &Meshes,
     budget: &mut Budget,
+    section: Option<Section>,
 ) -> Option<(Block, Explicit)> {
     let file = table.require("file", "the name of a mesh file")?;
     let name = file.text();
@@ -281,32 +345,44 @@ fn read_file(
         table.finish();
         return None;
     };
-    let Some(found) = mesh.body(body_name).filter(|body| !body.solids.is_empty()) else {
-        let names: Vec<&str> = mesh.bodies.iter().map(|body| body.name.as_str()).take(20).collect();
+    let holds =
+        |body: &&Body| if section.is_some() { !body.shells.is_empty() } else { !body.solids.is_empty() };
+    if section.is_none() && mesh.body(body_name).is_some_and(|body| !body.shells.is_empty()) {
+        let read = format!("the shells of body \"{body_name}\" in part \"{part}\"");
+        table.faults.add(at, read, "their thickness", "add shell = { thickness = ... } to the part");
+        table.finish();
+        return None;
+    }
+    let Some(found) = mesh.body(body_name).filter(holds) else {
+        let names: Vec<&str> = mesh.bodies.iter().filter(holds).map(|b| b.name.as_str()).take(20).collect();
+        let what = if section.is_some() { "shells" } else { "solids" };
         body.unwrap_or(file).fault(
-            &format!("a body with elements of that file ({})", names.join(", ")),
+            &format!("a body with {what} of that file ({})", names.join(", ")),
             "choose one with body = \"name\"",
         );
         table.finish();
         return None;
     };
     let mut index: BTreeMap<u32, u32> = BTreeMap::new();
-    for id in found.solids.iter().flat_map(|(_, corners)| corners) {
-        index.entry(*id).or_insert(0);
+    for id in found.corners() {
+        index.entry(id).or_insert(0);
     }
-    let distinct = |corners: &[u32; 8]| (0..8).filter(|i| !corners[..*i].contains(&corners[*i])).count();
-    let odd = found.solids.iter().find(|(_, corners)| !matches!(distinct(corners), 4 | 5 | 6 | 8));
-    if let Some((id, corners)) = odd {
-        table.faults.add(
-            at,
-            format!("element {id} with {} different corners", distinct(corners)),
-            "eight, or six, five or four of a wedge, a pyramid or a tetrahedron",
-            "correct the element",
-        );
+    let n_elements = found.solids.len() + found.shells.len();
+    let all = found.solids.iter().map(|(id, corners)| (id, &corners[..]));
+    let mut all = all.chain(found.shells.iter().map(|(id, corners)| (id, &corners[..])));
+    let distinct =
+        |corners: &[u32]| (0..corners.len()).filter(|&i| !corners[..i].contains(&corners[i])).count();
+    let (kinds, expected): (&[usize], _) = match section {
+        None => (&[4, 5, 6, 8], "eight, or six, five or four of a wedge, a pyramid or a tetrahedron"),
+        Some(_) => (&[3, 4], "four, or three of a triangle"),
+    };
+    if let Some((id, corners)) = all.find(|(_, corners)| !kinds.contains(&distinct(corners))) {
+        let read = format!("element {id} with {} different corners", distinct(corners));
+        table.faults.add(at, read, expected, "correct the element");
         table.finish();
         return None;
     }
-    budget.take(Some((index.len() as u64, found.solids.len() as u64)), at, &title, &table)?;
+    budget.take(Some((index.len() as u64, n_elements as u64)), at, &title, &table)?;
     let mut positions = Vec::with_capacity(index.len());
     let mut node_ids = Vec::with_capacity(index.len());
     // Nodes in the order of the file.
@@ -317,8 +393,17 @@ fn read_file(
             node_ids.push(*id);
         }
     }
-    let hexahedra = found.solids.iter().map(|(_, corners)| corners.map(|id| index[&id])).collect();
-    let element_ids: Vec<u32> = found.solids.iter().map(|(id, _)| *id).collect();
+    let topology = match section {
+        None => Topology::Explicit {
+            hexahedra: found.solids.iter().map(|(_, corners)| corners.map(|id| index[&id])).collect(),
+        },
+        Some(section) => Topology::Shells {
+            quads: found.shells.iter().map(|(_, corners)| corners.map(|id| index[&id])).collect(),
+            section,
+        },
+    };
+    let ids = found.solids.iter().map(|(id, _)| id).chain(found.shells.iter().map(|(id, _)| id));
+    let element_ids: Vec<u32> = ids.copied().collect();
     table.finish();
     let explicit = Explicit {
         node_places: vec![at; node_ids.len()],
@@ -327,7 +412,7 @@ fn read_file(
         element_ids,
         file: Some(name.to_string()),
     };
-    Some((Block { positions, topology: Topology::Explicit { hexahedra }, faces: Vec::new() }, explicit))
+    Some((Block { positions, topology, faces: Vec::new() }, explicit))
 }
 
 /// `rotate`, then `translate`.

@@ -1,8 +1,11 @@
-//! The blocks of a part: `box`, `cylinder`, `sphere`, `tube`.
+//! The blocks of a part: `box`, `cylinder`, `sphere`, `tube`; of shells `plate`, `prism`.
+
+use mechanics::mesh::Section;
 
 use super::MAX_NODES;
 use crate::{
     blocks::{Sector, Shape, graded},
+    geometry::{cross, norm},
     table::{Range, Table},
 };
 
@@ -10,11 +13,13 @@ use crate::{
 const MAX_CELLS: u64 = 10_000_000;
 
 /// Reads a block of that kind; `None` after reporting what is wrong.
-pub(super) fn read(kind: &str, table: &Table<'_>) -> Option<Shape> {
+pub(super) fn read(kind: &str, table: &Table<'_>, section: Option<Section>) -> Option<Shape> {
     match kind {
         "box" => read_box(table),
         "cylinder" => read_cylinder(table),
         "sphere" => read_sphere(table),
+        "plate" => read_plate(table, section),
+        "prism" => read_prism(table, section),
         _ => read_tube(table),
     }
 }
@@ -163,5 +168,60 @@ fn read_tube(table: &Table<'_>) -> Option<Shape> {
         length: length?,
         degrees: [start, angle],
         cells: cells.map(|c| c as u32),
+    })
+}
+
+const SHELL_CELLS: &str = "two whole numbers [I, J] of at least 1";
+
+fn read_plate(table: &Table<'_>, section: Option<Section>) -> Option<Shape> {
+    let origin = table.vector("origin");
+    let sides = [table.vector("side_i"), table.vector("side_j")];
+    let cells = table.require("cells", SHELL_CELLS).and_then(|v| v.integers::<2>(SHELL_CELLS, 1, MAX_CELLS));
+    let [Some(i), Some(j)] = sides else { return None };
+    let area = norm(cross(i, j));
+    if !(area > 1e-9 * norm(i) * norm(j) && area.is_finite()) {
+        table.faults.add(
+            table.at,
+            format!("{} with side_i = {i:?} and side_j = {j:?}", table.title),
+            "two sides that span a parallelogram",
+            "give sides in different directions",
+        );
+        return None;
+    }
+    Some(Shape::Plate { origin: origin?, sides: [i, j], cells: cells?.map(|c| c as u32), section: section? })
+}
+
+fn read_prism(table: &Table<'_>, section: Option<Section>) -> Option<Shape> {
+    let axis = read_axis(table);
+    let base = table.vector("base");
+    let radius = table.number("radius", Range::Positive);
+    let length = table.number("length", Range::Positive);
+    let sides = table.get("sides").map(|v| v.integer(3, 1000));
+    let cells = table.require("cells", SHELL_CELLS).and_then(|v| v.integers::<2>(SHELL_CELLS, 1, MAX_CELLS));
+    let cells = cells?.map(|c| c as u32);
+    let sides = match sides {
+        None => None,
+        Some(sides) => Some(sides? as u32),
+    };
+    if cells[0] < 3 || sides.is_some_and(|sides| cells[0] % sides != 0) {
+        table.faults.add(
+            table.at,
+            format!("{} with {} cells round it", table.title, cells[0]),
+            match sides {
+                Some(sides) => format!("a multiple of its {sides} sides"),
+                None => "at least 3".to_string(),
+            },
+            "change the first number of cells",
+        );
+        return None;
+    }
+    Some(Shape::Prism {
+        axis: axis?,
+        base: base?,
+        radius: radius?,
+        length: length?,
+        sides,
+        cells,
+        section: section?,
     })
 }

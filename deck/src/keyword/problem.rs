@@ -20,8 +20,8 @@ use super::{
 pub(super) struct Node {
     pub(super) id: u32,
     pub(super) x: [f64; 3],
-    /// Translations that are held: 1 x, 2 y, 3 z, 4 xy, 5 yz, 6 zx, 7 all.
-    pub(super) held: u8,
+    /// Translations that are held: 1 x, 2 y, 3 z, 4 xy, 5 yz, 6 zx, 7 all; and rotations.
+    pub(super) held: [u8; 2],
     pub(super) at: Place,
 }
 
@@ -38,6 +38,8 @@ pub(super) struct Shell {
     pub(super) id: u32,
     pub(super) part: u32,
     pub(super) nodes: [u32; 4],
+    /// Of its own, the mean of its corners.
+    pub(super) thickness: Option<f64>,
     pub(super) at: Place,
 }
 
@@ -52,9 +54,21 @@ pub(super) struct PartCard {
 }
 
 /// `*SECTION_`.
+#[derive(Clone, Copy)]
 pub(super) enum Section {
     Solid,
-    Shell,
+    Shell(ShellSection),
+}
+
+/// `*SECTION_SHELL`.
+#[derive(Clone, Copy)]
+pub(super) struct ShellSection {
+    /// Mean of its corners; 0 where elements give theirs.
+    pub(super) thickness: f64,
+    /// Points through it.
+    pub(super) points: u32,
+    /// Whether they are Lobatto's, else Gauss's.
+    pub(super) lobatto: bool,
 }
 
 /// `*HOURGLASS`.
@@ -194,13 +208,13 @@ impl Problem {
                 f.fault(0, "a node number above 0", "give the node a number");
                 continue;
             }
-            let held = match f.integer(4) {
+            let held = [4, 5].map(|i| match f.integer(i) {
                 code @ 0..=7 => code as u8,
                 _ => {
-                    f.fault(4, "a code from 0 to 7 of what is held", "correct it, or use *BOUNDARY_SPC_NODE");
+                    f.fault(i, "a code from 0 to 7 of what is held", "correct it, or use *BOUNDARY_SPC_NODE");
                     0
                 }
-            };
+            });
             let next = self.nodes.len() as u32;
             if let Some(first) = self.node_index.insert(id, next) {
                 let node = &self.nodes[first as usize];
@@ -265,11 +279,18 @@ impl Problem {
                 f.fault(6, "at most four nodes", "mesh with four-node shells");
                 continue;
             }
-            // What its card of thicknesses says matters where shells are computed.
+            let mut thickness = None;
             if thick {
-                let _ = cards.next();
+                let Some(second) = cards.next() else {
+                    f.fault(0, "a second card with the thicknesses", "complete the element");
+                    return;
+                };
+                let g = context.fields(second, block.width, &[16; 5]);
+                let corners = if nodes[3] == nodes[2] { 3 } else { 4 };
+                let mean = (0..corners).map(|i| g.real(i, 0.0)).sum::<f64>() / corners as f64;
+                thickness = Some(mean).filter(|mean| *mean > 0.0);
             }
-            self.shells.push(Shell { id: f.id(0), part: f.id(1), nodes, at: card.at });
+            self.shells.push(Shell { id: f.id(0), part: f.id(1), nodes, thickness, at: card.at });
         }
     }
 
@@ -337,9 +358,48 @@ impl Problem {
     }
 
     fn read_shell_sections(&mut self, block: &Block<'_>, context: &Context<'_>) {
-        for cards in block.cards.chunks(2) {
-            let f = context.fields(&cards[0], block.width, &TENS);
-            self.sections.insert(f.id(0), (cards[0].at, Section::Shell));
+        let mut cards = block.cards.iter();
+        while let Some(card) = cards.next() {
+            let f = context.fields(card, block.width, &TENS);
+            match f.integer(1) {
+                0 | 2 => {}
+                form @ (-16 | 1 | 3 | 4 | 6..=8 | 10 | 11 | 16..=18 | 20 | 21 | 25..=27) => context.log.warn(
+                    card.at,
+                    format!(
+                        "ELFORM {form}: shells are computed with one point and hourglass control, as ELFORM 2 with \
+                         warping"
+                    ),
+                ),
+                _ => f.fault(1, "ELFORM 2", "take the shell of Belytschko, Lin and Tsay"),
+            }
+            let (points, rule) = (f.integer(3), f.real(5, 0.0));
+            if rule < 0.0 {
+                f.fault(5, "QR 0, 1 or 2", "take a rule of points that is built in");
+            }
+            let lobatto = rule == 1.0;
+            if rule > 1.0 {
+                context.log.warn(card.at, "QR: points through the thickness are those of Gauss");
+            }
+            let asked = if points == 0 { 2 } else { points };
+            let points = asked.clamp(if lobatto { 3 } else { 1 }, 5);
+            if points != asked {
+                context.log.warn(card.at, format!("NIP {asked}: {points} points through the thickness"));
+            }
+            if f.integer(6) != 0 {
+                f.fault(6, "one material through the thickness", "leave ICOMP blank");
+            }
+            let second = cards.next();
+            let thickness = second.map_or(0.0, |second| {
+                let g = context.fields(second, block.width, &TENS);
+                if g.real(4, 0.0) != 0.0 {
+                    g.fault(4, "nodes in the middle of the thickness", "leave NLOC blank");
+                }
+                let corners = [0, 1, 2, 3].map(|i| g.real(i, 0.0));
+                let all = corners[1..].iter().all(|t| *t > 0.0);
+                if all { corners.iter().sum::<f64>() / 4.0 } else { corners[0] }
+            });
+            let section = ShellSection { thickness, points: points as u32, lobatto };
+            self.sections.insert(f.id(0), (card.at, Section::Shell(section)));
         }
     }
 

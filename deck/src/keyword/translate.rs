@@ -9,12 +9,12 @@ use super::{
     draft::{Draft, quoted, vector},
     log::{Log, Place},
     material::{self, Law},
-    problem::{Problem, Section},
+    problem::{Problem, Section, Shell},
     unit,
 };
 use crate::{
     fault::short,
-    geometry::volume,
+    geometry::{cross, norm, sub, volume},
     mesh_file::{Body, MeshFile},
     table::MAX_NAME,
 };
@@ -45,7 +45,9 @@ pub(super) fn translate(
         draft: Draft::default(),
         mesh: MeshFile::default(),
         used: BTreeSet::new(),
+        turns: BTreeSet::new(),
         names: BTreeMap::new(),
+        thicknesses: BTreeMap::new(),
         curves: BTreeMap::new(),
     };
     t.elements();
@@ -72,8 +74,12 @@ struct Translation<'p> {
     mesh: MeshFile,
     /// Nodes that elements have.
     used: BTreeSet<u32>,
+    /// Nodes that shells have.
+    turns: BTreeSet<u32>,
     /// Names of the parts that have elements, by number.
     names: BTreeMap<u32, String>,
+    /// Thickness of the shells of each part that has any.
+    thicknesses: BTreeMap<u32, f64>,
     /// Curves that were referred to: name and points.
     curves: BTreeMap<String, (Place, Vec<[f64; 2]>)>,
 }
@@ -134,7 +140,7 @@ impl Translation<'_> {
             self.used.extend(solid.nodes);
             let body = bodies
                 .entry(solid.part)
-                .or_insert_with(|| Body { name: format!("part {}", solid.part), solids: Vec::new() });
+                .or_insert_with(|| Body { name: format!("part {}", solid.part), ..Body::default() });
             body.solids.push((id, nodes));
         }
         if let Some((at, count)) = collapsed {
@@ -145,29 +151,25 @@ impl Translation<'_> {
                 ),
             );
         }
-        if let Some(shell) = problem.shells.first() {
-            log.fault(
-                shell.at,
-                format!("shell element {} and {} more", shell.id, problem.shells.len() - 1),
-                "solids: shells are not computed",
-                "mesh the part with solids",
-            );
-        }
+        let shells = self.shells(&mut bodies);
         for (id, part) in &problem.parts {
             let Some(body) = bodies.remove(id) else {
-                if !problem.shells.iter().any(|shell| shell.part == *id) {
+                if !shells.contains(id) {
                     log.warn(part.at, format!("part {id} has no elements and is left out"));
                 }
                 continue;
             };
             match problem.sections.get(&part.section) {
-                Some((_, Section::Solid)) => {}
-                Some((at, Section::Shell)) => log.fault(
-                    part.at,
-                    format!("part {id} of solids with the section at line {}", at.line),
-                    "a *SECTION_SOLID",
-                    "correct SECID",
-                ),
+                Some((_, Section::Solid)) if body.shells.is_empty() => {}
+                Some((_, Section::Shell(_))) if body.solids.is_empty() => {}
+                Some((at, section)) => {
+                    let (expected, other) = match section {
+                        Section::Solid => ("a *SECTION_SHELL", "shells"),
+                        Section::Shell(_) => ("a *SECTION_SOLID", "solids"),
+                    };
+                    let read = format!("part {id} with {other} and the section at line {}", at.line);
+                    log.fault(part.at, read, expected, "correct SECID; a part has elements of one kind");
+                }
                 None => {
                     log.fault(part.at, format!("section {}", part.section), "a section of the deck", "add it")
                 }
@@ -180,7 +182,91 @@ impl Translation<'_> {
             self.mesh.nodes.push((node.id, node.x));
         }
         if self.mesh.bodies.is_empty() && log.count() == 0 {
-            log.fault(Place { file: 0, line: 1 }, "a deck without elements", "*ELEMENT_SOLID", "add a mesh");
+            let expected = "*ELEMENT_SOLID or *ELEMENT_SHELL";
+            log.fault(Place { file: 0, line: 1 }, "a deck without elements", expected, "add a mesh");
+        }
+    }
+
+    /// Shells by part, and the parts that have any.
+    fn shells(&mut self, bodies: &mut BTreeMap<u32, Body>) -> BTreeSet<u32> {
+        let (problem, log) = (self.problem, self.log);
+        let mut parts = BTreeSet::new();
+        let mut seen: HashMap<u32, Place> = HashMap::with_capacity(problem.shells.len());
+        let mut triangles: Option<(Place, usize)> = None;
+        for shell in &problem.shells {
+            let Shell { id, part, nodes, thickness, at } = *shell;
+            parts.insert(part);
+            if let Some(first) = seen.insert(id, at) {
+                let expected = format!("a number other than {id}, which line {} has", first.line);
+                log.fault(at, format!("shell {id}"), expected, "renumber one");
+                continue;
+            }
+            if let Some(node) = nodes.iter().find(|node| problem.position(**node).is_none()) {
+                log.fault(at, format!("shell {id} with node {node}"), "nodes of the deck", "add the node");
+                continue;
+            }
+            let Some(card) = problem.parts.get(&part) else {
+                log.fault(at, format!("shell {id} of part {part}"), "a part of the deck", "add the *PART");
+                continue;
+            };
+            let distinct = nodes.iter().collect::<BTreeSet<_>>().len();
+            if distinct < 3 || (distinct == 3 && nodes[3] != nodes[2]) {
+                let read = format!("shell {id} with nodes {nodes:?}");
+                log.fault(
+                    at,
+                    read,
+                    "four different ones, or a triangle that repeats the third",
+                    "correct them",
+                );
+                continue;
+            }
+            if distinct == 3 {
+                triangles.get_or_insert((at, 0)).1 += 1;
+            }
+            let [a, b, c, d] = nodes.map(|node| problem.position(node).unwrap_or_default());
+            let area = 0.5 * norm(cross(sub(c, a), sub(d, b)));
+            if !(area > 0.0 && area.is_finite()) {
+                let read = format!("shell {id} with area {}", short(area));
+                log.fault(at, read, "an area above 0", "order its corners around it");
+                continue;
+            }
+            let Some(thickness) = thickness.or(self.section_thickness(card.section)) else {
+                let read = format!("shell {id} without a thickness");
+                log.fault(at, read, "T1 of its *SECTION_SHELL, or its own", "give one");
+                continue;
+            };
+            // Elements of a part differ by no more than rounding, or the part says so.
+            let common = *self.thicknesses.entry(part).or_insert(thickness);
+            if (thickness - common).abs() > 1e-6 * common {
+                log.fault(
+                    at,
+                    format!("shell {id} of thickness {}", short(thickness)),
+                    format!("{}, that of the elements before it in part {part}", short(common)),
+                    "make one part of the shells of each thickness",
+                );
+                continue;
+            }
+            self.used.extend(nodes);
+            self.turns.extend(nodes);
+            let body = bodies
+                .entry(part)
+                .or_insert_with(|| Body { name: format!("part {part}"), ..Body::default() });
+            body.shells.push((id, nodes));
+        }
+        if let Some((at, count)) = triangles {
+            log.warn(
+                at,
+                format!("{count} triangles: computed as quadrilaterals with two corners in one node"),
+            );
+        }
+        parts
+    }
+
+    /// The thickness that a section gives.
+    fn section_thickness(&self, section: u32) -> Option<f64> {
+        match self.problem.sections.get(&section) {
+            Some((_, Section::Shell(shell))) => Some(shell.thickness).filter(|thickness| *thickness > 0.0),
+            _ => None,
         }
     }
 
@@ -319,16 +405,19 @@ impl Translation<'_> {
 
     /// Parts with their velocities; those of single nodes go into the mesh.
     fn parts(&mut self) {
-        let velocity = self.velocities();
+        let (velocity, spin) = self.velocities();
         let problem = self.problem;
+        let mut turning: BTreeSet<u32> = BTreeSet::new();
         let of = |node: &u32| velocity.get(node).copied().unwrap_or_default();
         let mut apart: BTreeSet<u32> = BTreeSet::new();
         for body in 0..self.mesh.bodies.len() {
-            let nodes: BTreeSet<u32> =
-                self.mesh.bodies[body].solids.iter().flat_map(|(_, nodes)| *nodes).collect();
+            let nodes: BTreeSet<u32> = self.mesh.bodies[body].corners().collect();
             let Some((id, name)) = self.names.iter().nth(body).map(|(id, name)| (*id, name.clone())) else {
                 continue;
             };
+            if !self.mesh.bodies[body].shells.is_empty() {
+                turning.extend(nodes.iter().filter(|node| spin.contains_key(node)));
+            }
             let part = &problem.parts[&id];
             let common = nodes.first().map(of).unwrap_or_default();
             let common = if nodes.iter().all(|node| of(node) == common) { common } else { [0.0; 3] };
@@ -339,6 +428,14 @@ impl Translation<'_> {
             self.draft.line(at, format!("material = \"{}\"", material_name(part.material, part.eos)));
             if common != [0.0; 3] {
                 self.draft.line(at, format!("velocity = {}", vector(common)));
+            }
+            if let (Some(thickness), Some((_, Section::Shell(shell)))) =
+                (self.thicknesses.get(&id), problem.sections.get(&part.section))
+            {
+                let (points, rule) = (shell.points, if shell.lobatto { "lobatto" } else { "gauss" });
+                let words =
+                    format!("shell = {{ thickness = {thickness:?}, points = {points}, rule = \"{rule}\" }}");
+                self.draft.line(at, words);
             }
             let (file, body) = (quoted(self.mesh_name), format!("part {id}"));
             self.draft.line(at, format!("mesh = {{ file = {file}, body = \"{body}\" }}"));
@@ -360,6 +457,7 @@ impl Translation<'_> {
         }
         // Nodes of several parts get theirs from the mesh wherever one part would give them another.
         self.mesh.velocities = apart.iter().map(|node| (*node, of(node))).collect();
+        self.mesh.spins = turning.iter().map(|node| (*node, spin[node])).collect();
     }
 
     fn contact(&mut self) {

@@ -75,6 +75,26 @@ const LAWS: [(&str, &str); 4] = [
     ),
 ];
 
+/// A sheet of about as many shells with five points, half of which runs against the other and yields.
+fn shells(side: u32) -> String {
+    let along = f64::from(side).powf(1.5).round() as u32;
+    let half = (along / 2).max(1);
+    let part = |name: &str, origin: u32, speed: i32| {
+        format!(
+            "[[part]]\nname = \"{name}\"\nmaterial = \"own\"\nvelocity = [{speed}, 0, 5]\n\
+             shell = {{ thickness = 0.2, points = 5 }}\n\
+             plate = {{ origin = [{origin}, 0, 0], side_i = [{half}, 0, 0], side_j = [0, {along}, 0], cells = [{half}, {along}] }}\n"
+        )
+    };
+    format!(
+        "title = \"bench\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[material]]\nname = \"own\"\n{}\n{}{}\
+         [[join]]\nparts = [\"one\", \"other\"]\n",
+        LAWS[0].1,
+        part("one", 0, 50),
+        part("other", half, -50)
+    )
+}
+
 fn model(text: &str, explicit: bool) -> Result<Arc<Model>, String> {
     let mut model = deck::read(text, "bench")
         .map_err(|faults| list_of_faults(&faults.iter().map(ToString::to_string).collect::<Vec<_>>()))?;
@@ -225,6 +245,7 @@ fn measured(rounds: u32, side: u32, lanes: Option<Width>) -> Result<Report, Stri
     for (name, laws) in LAWS {
         cases.push((name.to_owned(), model(&plates(side, Some(laws), 0.0), false)?));
     }
+    cases.push(("shells of five points, von Mises".to_owned(), model(&shells(side), false)?));
     let touching = model(&plates(side, None, 0.1), false)?;
     let mut times = vec![Vec::new(); cases.len()];
     let (mut contact, mut two) = (Vec::new(), Vec::new());
@@ -319,6 +340,9 @@ mod tests {
             let taken = once(&model(&plates(6, Some(laws), 0.0), false).expect("a sound deck"), 1, None);
             assert!(taken.expect("a run to its end").element_ns > 0.0);
         }
+        let sheet = model(&shells(6), false).expect("a sound deck");
+        assert_eq!(sheet.mesh.n_elements(), 7 * 2 * 15);
+        assert!(once(&sheet, 1, None).expect("a run to its end").element_ns > 0.0);
         let [grid, list] = [false, true].map(|explicit| {
             let model = model(&plates(6, None, 0.1), explicit).expect("a sound deck");
             let parts = &model.mesh.parts;

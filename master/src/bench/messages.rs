@@ -203,7 +203,7 @@ async fn answer(stream: TcpStream, config: Option<&Arc<ServerConfig>>) -> Result
             (Some(identity.role), link::split(stream, Settings::default()))
         }
     };
-    let policy = Policy { roles: vec![Role::Client], certificate, token: None };
+    let policy = Policy { roles: vec![Role::Client], certificate, ..Policy::default() };
     let (server, _) = link::hear(&sender, &mut receiver, policy).await?;
     let welcome = Welcome { incarnation: 1, host: 0, heartbeat_ms: HEARTBEAT_MS };
     link::admit(server, &sender, &mut receiver, welcome)?;

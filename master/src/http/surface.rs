@@ -125,4 +125,19 @@ mod tests {
         assert_eq!(bytes.len(), 36 + 6 * 8 + 12 * nodes + faces * (16 + 12 + 2));
         assert_eq!(skin.parts(), ["target", "projectile"]);
     }
+
+    #[test]
+    fn a_shell_is_one_face_of_the_surface() {
+        let text = include_str!("../../../deck/examples/girder-crush.toml");
+        let model = deck::read(text, "girder").expect("without faults");
+        let state = GlobalState {
+            x: model.mesh.positions.clone(),
+            v: model.velocity.clone(),
+            elements: std::array::from_fn(|_| vec![0.0; model.mesh.n_elements()]),
+            ..GlobalState::default()
+        };
+        let bytes = Skin::new(&model).pack(&model, &state);
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+        assert_eq!((word(4), word(8)), (32 * 129, 32 * 128));
+    }
 }

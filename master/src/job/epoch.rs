@@ -16,11 +16,12 @@ use std::{
     sync::Arc,
 };
 
-use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
+use mechanics::{exact::Quantum, piece::Region, state::GlobalState, vote::Vote, wall::Pose};
 use protocol::message::ToWorker;
 
-use super::{Arrivals, Bench, Job, images::Collecting, measure::Meter};
+use super::{Arrivals, Bench, Job, erosion::Eroded, images::Collecting, measure::Meter};
 use crate::{
+    decompose::Subdomain,
     event::{Action, Hand, Loss},
     exchange::Exchange,
     ledger::Ledger,
@@ -84,7 +85,22 @@ pub(super) struct Step {
 /// An exchange and where it begins to act.
 pub(super) struct Acting {
     pub(super) at: u64,
+    /// The cycle whose positions it was sorted from.
+    pub(super) gathered: u64,
     pub(super) exchange: Arc<Exchange>,
+}
+
+/// A sort that was ordered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct SortUnderWay {
+    /// The cycle at whose start positions travel.
+    pub(super) gathered: u64,
+    /// The cycle from which its plan acts.
+    pub(super) acts_at: u64,
+    /// All wait for it, because the surface changes.
+    pub(super) blocking: bool,
+    /// Such a one has replaced it since it was begun: what comes of it is thrown away.
+    pub(super) replaced: bool,
 }
 
 /// All that is fixed for one epoch or counted in it. *Positions* are indices into its crew.
@@ -97,6 +113,8 @@ pub(super) struct Epoch {
     pub(super) speeds: Vec<f64>,
     /// By position.
     pub(super) elements: Vec<f64>,
+    /// The worker of every element, where the deck wants states to say it.
+    pub(super) owners: Option<Arc<[u32]>>,
     pub(super) bench: Option<Arc<Bench>>,
     pub(super) ready: Vec<bool>,
     pub(super) running: bool,
@@ -112,12 +130,20 @@ pub(super) struct Epoch {
     pub(super) exchanges: VecDeque<Acting>,
     /// The last complete cycle plus one.
     pub(super) completed: u64,
-    /// Cycles whose positions a sort works on, oldest first.
-    pub(super) sorts_under_way: VecDeque<u64>,
+    /// Sorts that were ordered and are not done, oldest first.
+    pub(super) sorts_under_way: VecDeque<SortUnderWay>,
+    /// What has eroded; none where nothing can.
+    pub(super) eroded: Option<Eroded>,
+    /// Which worker has which elements.
+    pub(super) layout: Vec<Subdomain>,
     pub(super) transfers: BTreeMap<u64, Vec<Option<Vec<f64>>>>,
     pub(super) collecting: BTreeMap<u64, Collecting>,
     /// Time of each image that was ordered and is not complete, and whether it is for the user.
     pub(super) image_times: BTreeMap<u64, (f64, bool)>,
+    /// By position: part and elements of each block, where samples are computed again.
+    pub(super) blocks: Vec<Vec<(usize, Region)>>,
+    /// Samples by cycle, then by position.
+    pub(super) samples: BTreeMap<u64, Vec<Option<[u8; 16]>>>,
     /// Bases on their way.
     pub(super) halves: BTreeMap<u64, Halves>,
     /// The cycle of the newest base, whole or on its way.
@@ -131,6 +157,10 @@ pub(super) struct Epoch {
     pub(super) spread_rate: f64,
     /// All stop at the start of this cycle.
     pub(super) stop_at: Option<u64>,
+    /// Samples come with that stop.
+    pub(super) stop_sampled: bool,
+    /// All have stopped, and their images are here: state, last vote, whether the state is for the user.
+    pub(super) stopped: Option<(GlobalState, Vote, bool)>,
     /// They stop for the next epoch, not for the end.
     pub(super) pauses: bool,
     pub(super) meter: Meter,
@@ -186,7 +216,7 @@ impl Job {
     }
 
     /// Everything that was booked after the base is forgotten, here and in the results.
-    fn go_back(&mut self, actions: &mut Vec<Action>) {
+    pub(super) fn go_back(&mut self, actions: &mut Vec<Action>) {
         let rest = &self.base.rest;
         self.ledger = rest.ledger.clone();
         self.walls.clone_from(&rest.walls);
@@ -234,7 +264,7 @@ impl Job {
     }
 
     /// Deals the base out to all that are alive; with nobody, the job waits.
-    fn next_epoch(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
+    pub(super) fn next_epoch(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
         let number = self.epoch.number.checked_add(1).ok_or("2^32 epochs of one job")?;
         let crew: Vec<usize> = (0..self.members.len()).filter(|&m| self.members[m].alive).collect();
         let nobody = crew.is_empty();

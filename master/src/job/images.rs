@@ -57,31 +57,43 @@ impl Job {
         })?;
         state.time = time;
         match collected.vote {
-            Some(vote) if self.epoch.pauses => {
-                self.book_last(cycle, &vote, actions);
-                if self.failure.is_some() {
-                    return self.end_with(state, actions);
-                }
-                if due {
-                    actions.push(Action::State(Box::new(state.clone())));
-                }
-                self.paused(state, vote, actions)
+            Some(vote) if self.epoch.stop_sampled => {
+                self.epoch.stopped = Some((state, vote, due));
+                self.prove_stop(cycle, actions)
             }
-            Some(vote) => {
-                self.book_last(cycle, &vote, actions);
-                self.stopped(state, vote, actions)
-            }
+            Some(vote) => self.all_stopped(state, vote, due, actions),
             None => {
                 if due {
                     actions.push(Action::State(Box::new(state.clone())));
                 }
                 if let Some(halves) = self.epoch.halves.get_mut(&cycle) {
                     halves.state = Some(state);
-                    self.complete_base(cycle, actions);
+                    return self.complete_base(cycle, actions);
                 }
                 Ok(())
             }
         }
+    }
+
+    /// All have stopped: the epoch is over, or the run.
+    pub(super) fn all_stopped(
+        &mut self,
+        state: GlobalState,
+        vote: Vote,
+        due: bool,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), String> {
+        self.book_last(state.cycle, &vote, actions);
+        if !self.epoch.pauses {
+            return self.stopped(state, vote, due, actions);
+        }
+        if self.failure.is_some() {
+            return self.end_with(state, actions);
+        }
+        if due {
+            actions.push(Action::State(Box::new(state.clone())));
+        }
+        self.paused(state, vote, actions)
     }
 
     /// Books the vote of the cycle before a stop.
@@ -104,14 +116,26 @@ impl Job {
         Ok(())
     }
 
-    /// The newest base, once both halves of it are here; and to the disk where that is asked for.
-    pub(super) fn complete_base(&mut self, cycle: u64, actions: &mut Vec<Action>) {
-        let Some(Halves { state: Some(_), rest: Some(_) }) = self.epoch.halves.get(&cycle) else { return };
-        let Some(Halves { state: Some(state), rest: Some(rest) }) = self.epoch.halves.remove(&cycle) else {
-            return;
+    /// The newest base, once both halves of it are here, and samples from it that agree where those are asked for; and
+    /// to the disk where that is asked for.
+    pub(super) fn complete_base(&mut self, cycle: u64, actions: &mut Vec<Action>) -> Result<(), String> {
+        let Some(Halves { state: Some(_), rest: Some(_) }) = self.epoch.halves.get(&cycle) else {
+            return Ok(());
         };
-        self.base = Arc::new(Base { state: Arc::new(state), rest });
+        // The last sample comes after the last frame of its cycle, so what follows such a frame is not cut short.
+        if self.options.replay && !self.has_samples(cycle) {
+            return Ok(());
+        }
+        let Some(Halves { state: Some(state), rest: Some(rest) }) = self.epoch.halves.remove(&cycle) else {
+            return Ok(());
+        };
+        let base = Arc::new(Base { state: Arc::new(state), rest });
+        if self.options.replay && !self.prove(&base, actions)? {
+            return Ok(());
+        }
+        self.base = base;
         self.store(cycle, actions);
+        Ok(())
     }
 
     /// Gives the base to the sink, where that is asked for.

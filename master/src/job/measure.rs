@@ -4,7 +4,7 @@
 //! its elements over the time that they took; contact is taken to go at the same speed. Speeds that users gave, or that
 //! were measured before, stand as long as measurement agrees with them; corrected are those that are off by more than
 //! [`AGREES`]. Work is dealt out anew when the slowest worker takes more than [`THRESHOLD`] longer than the slowest would
-//! with the new cut; and after a change that brought nothing the next has to wait, each time twice as long. So noise
+//! with the new cut, also where speeds stand but elements have eroded; and after a change that brought nothing the next has to wait, each time twice as long. So noise
 //! does not make elements wander.
 
 use std::collections::VecDeque;
@@ -13,7 +13,7 @@ use protocol::message::Work;
 
 use super::Job;
 use crate::{
-    decompose::decompose,
+    decompose::{Living, decompose, work},
     event::{Balance, Rebalance},
 };
 
@@ -107,10 +107,14 @@ impl Job {
     fn propose(&self, medians: &[[f64; 2]], slowest: f64) -> Option<Proposal> {
         let epoch = &self.epoch;
         let n = epoch.n();
+        // Those that have eroded since work was dealt out take no time.
+        let alive = self.alive();
+        let living = Living::new(&self.model.mesh, alive.as_deref());
+        let held = work(&epoch.layout, n, 0.0, &living);
         // Elements over time, by position; none for workers without any.
         let measured: Vec<Option<f64>> = medians
             .iter()
-            .zip(&epoch.elements)
+            .zip(&held)
             .map(|([all, contact], &elements)| {
                 (elements > 0.0 && all > contact).then(|| elements / (all - contact))
             })
@@ -127,13 +131,11 @@ impl Job {
                 _ => speed,
             })
             .collect();
-        if speeds == epoch.speeds {
+        if speeds == epoch.speeds && held == epoch.elements {
             return None;
         }
-        let mut elements = vec![0.0; n];
-        for subdomain in decompose(&self.model.mesh, &speeds, self.options.costs.node) {
-            elements[subdomain.worker] += subdomain.region.n_elements() as f64;
-        }
+        let layout = decompose(&self.model.mesh, &speeds, self.options.costs.node, alive.as_deref());
+        let elements = work(&layout, n, 0.0, &living);
         // Contact in elements, dealt out by speed.
         let truly: Vec<f64> = (0..n).map(|w| measured[w].unwrap_or(speeds[w] * usual)).collect();
         let contact: f64 = medians.iter().zip(&truly).map(|([_, contact], speed)| contact * speed).sum();

@@ -53,22 +53,23 @@ impl Job {
         if collect {
             self.epoch.image_times.insert(after, (time_after, due));
         }
-        let gather = !stop && self.sort_due(after, vote);
+        let blocking = !stop && self.surface_changes_at(after);
+        let gather = blocking || (!stop && self.sort_due(after, vote));
         if gather {
-            self.epoch.sorts_under_way.push_back(after);
-            self.epoch.last_gather = after;
+            self.gather_at(after, blocking);
         }
         let (walls, force_quantum) = (self.walls.clone(), self.epoch.quantum);
-        Orders { next, dt, time, walls, force_quantum, gather, collect, stop }
+        let sample = (keep || stop) && self.options.replay;
+        self.epoch.stop_sampled |= stop && sample;
+        Orders { next, dt, time, walls, force_quantum, gather, blocking, collect, stop, sample }
     }
 
     /// Plan boundaries are the cycles at which plans begin to act, and at latest every so many.
     fn is_boundary(&self, cycle: u64) -> bool {
         let control = self.model.setup.control;
-        let lag = u64::from(control.sort_lag);
         let epoch = &self.epoch;
         cycle.is_multiple_of(u64::from(control.plan_interval.max(1)))
-            || epoch.sorts_under_way.iter().any(|gathered| gathered + lag == cycle)
+            || epoch.sorts_under_way.iter().any(|sort| sort.acts_at == cycle && !sort.replaced)
             || epoch.exchanges.iter().any(|acting| acting.at == cycle)
     }
 

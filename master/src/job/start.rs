@@ -12,9 +12,9 @@ use mechanics::{
     cycle::Subdomain,
     initial,
     mesh::Mesh,
-    piece,
+    piece::{self, Region},
     state::GlobalState,
-    vote::Quanta,
+    vote::{Quanta, Watched},
     wall,
 };
 use protocol::{
@@ -25,11 +25,12 @@ use protocol::{
 use super::{
     Bench, Job,
     epoch::{Acting, Base, Epoch, Member, Rest, Step},
+    erosion::{self, Eroded},
     measure::{Meter, Patience},
 };
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
-    decompose::{self, decompose, work},
+    decompose::{self, Living, decompose, work},
     event::{Action, Deal, Hand, Options},
     exchange::Exchange,
     holdings::Holdings,
@@ -42,6 +43,13 @@ use crate::{
 pub(super) struct Touching {
     surface: Arc<Surface>,
     exclusions: Arc<Exclusions>,
+}
+
+impl Touching {
+    /// Surface and exclusions.
+    pub(super) fn parts(&self) -> (Arc<Surface>, Arc<Exclusions>) {
+        (Arc::clone(&self.surface), Arc::clone(&self.exclusions))
+    }
 }
 
 impl Job {
@@ -61,7 +69,8 @@ impl Job {
         let mut setup = model.setup.clone();
         let mut constraint = model.constraint.clone();
         initial::bind_walls(&model.mesh, &mut setup, &mut constraint)?;
-        let start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
+        let mut start = initial::state(&model.mesh, &setup, &model.velocity, &constraint)?;
+        initial::spin(&mut start, &setup.constraints, &model.spin);
         let quanta = initial::quanta(&model.mesh, &setup, &start);
         let (base, rows) = match resume {
             None => {
@@ -109,9 +118,7 @@ impl Job {
             model = Arc::new(with_walls);
         }
         let touching = model.setup.contact.as_ref().map(|settings| {
-            let speed = initial::closing_speeds(&model.mesh, settings, &model.velocity);
-            let mut surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
-            surface.stiffen(&model.mesh, &model.setup.materials, settings, &speed);
+            let surface = erosion::surface(&model, &|_| true);
             let at_start: Vec<[f64; 3]> =
                 surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
             let inside = initial_pairs(&surface, &at_start, settings);
@@ -122,7 +129,7 @@ impl Job {
                 Exclusions::new(&surface, &inside)
             };
             let exclusions = Arc::new(exclusions);
-            Ok::<_, String>(Touching { surface: Arc::new(surface), exclusions })
+            Ok::<_, String>(Touching { surface, exclusions })
         });
         let first_cycle = base.state.cycle;
         let keep = options.keep;
@@ -156,6 +163,7 @@ impl Job {
             rebalances: Vec::new(),
             losses: Vec::new(),
             over: false,
+            unfenced: false,
             model,
             options,
         };
@@ -204,18 +212,27 @@ impl Job {
         let hands: Vec<&Hand> = crew.iter().map(|&member| &self.members[member].hand).collect();
         let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
         let costs = self.options.costs;
-        let layout = decompose(&model.mesh, &speeds, costs.node);
+        let alive = self.alive_at_base();
+        let layout = decompose(&model.mesh, &speeds, costs.node, alive.as_deref());
+        if model.output.workers {
+            let owners: Arc<[u32]> = decompose::owners(&model.mesh, &layout).into();
+            actions.push(Action::Owners(Arc::clone(&owners)));
+            epoch.owners = Some(owners);
+        }
         let threads: Vec<u32> = hands.iter().map(|hand| hand.threads).collect();
-        let held = work(&layout, n, costs.node);
+        let held = work(&layout, n, costs.node, &Living::new(&model.mesh, alive.as_deref()));
         let cut = Cut::new(model, state, (&layout, held), &threads, self.touching.as_ref());
-        let mut elements = vec![0.0; n];
-        for s in &layout {
-            elements[s.worker] += s.region.n_elements() as f64;
+        let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
+        let dropped =
+            epoch.eroded.as_ref().map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
+        if self.options.replay {
+            epoch.blocks = blocks_of(&layout, &threads);
         }
         let (exchange, interactions) = match (&self.touching, &model.setup.contact) {
             (Some(touching), Some(settings)) => {
+                let surface = epoch.eroded.as_ref().map(|eroded| eroded.surface(model, state.cycle));
                 let sorter = Sorter::new(
-                    Arc::clone(&touching.surface),
+                    surface.unwrap_or_else(|| Arc::clone(&touching.surface)),
                     settings.clone(),
                     Arc::clone(&touching.exclusions),
                     speeds.clone(),
@@ -225,9 +242,15 @@ impl Job {
                     &cut.gather,
                 );
                 let x = sorter.positions_of(state);
-                let bench = Bench { epoch: number, sorter, holdings: cut.holdings, state: Arc::clone(state) };
+                let bench = Bench {
+                    epoch: number,
+                    sorter,
+                    holdings: Arc::new(cut.holdings),
+                    state: Arc::clone(state),
+                    dropped,
+                };
                 let sorted = bench.sort(&x);
-                epoch.bench = Some(Arc::new(bench));
+                epoch.bench = Some(Arc::new(Bench { dropped: Vec::new(), ..bench }));
                 self.census = sorted.census;
                 (sorted.exchange, sorted.interactions)
             }
@@ -240,6 +263,10 @@ impl Job {
             None => model.setup.bodies.iter().map(|body| body.start).collect(),
         };
         let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
+        let watched = Watched {
+            elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
+            contacts: model.output.contact_forces.clone(),
+        };
         for (position, subdomains) in cut.by_worker.into_iter().enumerate() {
             let assign = Assign {
                 epoch: number,
@@ -248,6 +275,7 @@ impl Job {
                 quanta: Quanta { force: base.rest.quanta[0], ..self.quanta },
                 subdomains,
                 gauges: gauges.clone(),
+                watched: watched.clone(),
                 lanes: self.options.lanes.clone(),
                 cycle: state.cycle,
                 dt_previous: base.rest.dt_previous,
@@ -266,13 +294,20 @@ impl Job {
                 .map(|(hand, &e)| Deal { name: hand.name.clone(), speed: hand.speed, elements: e as u64 })
                 .collect(),
         ));
-        epoch.exchanges = VecDeque::from([Acting { at: state.cycle, exchange }]);
+        epoch.exchanges = VecDeque::from([Acting { at: state.cycle, gathered: state.cycle, exchange }]);
         epoch.ready = vec![false; n];
         epoch.meter = Meter::new(n);
         epoch.crew = crew;
         epoch.speeds = speeds;
         epoch.elements = elements;
+        epoch.layout = layout;
         Ok(epoch)
+    }
+
+    /// Which elements are alive at the start of the next epoch; none where nothing can erode.
+    fn alive_at_base(&self) -> Option<Vec<bool>> {
+        let state = &self.base.state;
+        (!state.eroded.is_empty()).then(|| (0..state.eroded.len()).map(|e| !state.is_eroded(e)).collect())
     }
 }
 
@@ -295,6 +330,7 @@ impl Epoch {
             crew: Vec::new(),
             speeds: Vec::new(),
             elements: Vec::new(),
+            owners: None,
             bench: None,
             ready: Vec::new(),
             running: false,
@@ -306,9 +342,13 @@ impl Epoch {
             exchanges: VecDeque::new(),
             completed: first,
             sorts_under_way: VecDeque::new(),
+            eroded: Eroded::new(state),
+            layout: Vec::new(),
             transfers: BTreeMap::new(),
             collecting: BTreeMap::new(),
             image_times: BTreeMap::new(),
+            blocks: Vec::new(),
+            samples: BTreeMap::new(),
             halves: BTreeMap::new(),
             last_base: first,
             next_state_time: model.output.period.map(|period| output_after(time, period)),
@@ -317,6 +357,8 @@ impl Epoch {
             last_spread: 0.0,
             spread_rate: rest.spread_rate,
             stop_at: None,
+            stop_sampled: false,
+            stopped: None,
             pauses: false,
             meter: Meter::new(0),
         }
@@ -356,9 +398,7 @@ impl Cut {
         let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
         let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
         for (id, subdomain) in layout.iter().enumerate() {
-            let pieces: Vec<Piece> = subdomain
-                .region
-                .split(threads[subdomain.worker].max(1) as usize)
+            let pieces: Vec<Piece> = blocks(subdomain, threads)
                 .iter()
                 .map(|region| piece::cut(&model.mesh, state, subdomain.part, region))
                 .collect();
@@ -387,6 +427,21 @@ impl Cut {
         }
         Self { by_worker, holdings, gather }
     }
+}
+
+/// The blocks of a sub-domain, one for each thread of its worker.
+fn blocks(subdomain: &decompose::Subdomain, threads: &[u32]) -> Vec<Region> {
+    subdomain.region.split(threads[subdomain.worker].max(1) as usize)
+}
+
+/// By worker: part and elements of each of its blocks, in the worker's order.
+fn blocks_of(layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<(usize, Region)>> {
+    let mut by_worker = vec![Vec::new(); threads.len()];
+    for subdomain in layout {
+        let regions = blocks(subdomain, threads);
+        by_worker[subdomain.worker].extend(regions.into_iter().map(|region| (subdomain.part, region)));
+    }
+    by_worker
 }
 
 /// Largest over mean of cost over speed, workers without a speed aside.

@@ -11,11 +11,13 @@ use crate::event::Action;
 const SAME_FAULT: u64 = 2;
 
 impl Job {
-    /// All have stopped at the start of a cycle, the last one of this session.
+    /// All have stopped at the start of a cycle, the last one of this session; `due` says that the user is to have the
+    /// state in any case.
     pub(super) fn stopped(
         &mut self,
         state: GlobalState,
         vote: Vote,
+        due: bool,
         actions: &mut Vec<Action>,
     ) -> Result<(), String> {
         let control = self.model.setup.control;
@@ -31,6 +33,10 @@ impl Job {
         let rest = self.rest_at(state.cycle, vote)?;
         self.base = Arc::new(Base { state: Arc::new(state), rest });
         if self.leaves {
+            if due {
+                // The next session begins behind it.
+                actions.push(Action::State(Box::new(GlobalState::clone(&self.base.state))));
+            }
             self.suspend_at_base(actions);
             return Ok(());
         }
@@ -84,16 +90,28 @@ impl Job {
     }
 }
 
-/// What of a worker's vote is no number. A run that has blown up says so by its forces.
-pub(super) fn not_a_number(vote: &Vote) -> Option<String> {
-    if !vote.force_bound.is_finite() && !vote.force_bound.is_nan() {
-        return None;
+/// What of a worker's frame is no number. A run that has blown up says so by the forces of its vote.
+pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<String> {
+    if let Some(vote) = vote {
+        if !vote.force_bound.is_finite() && !vote.force_bound.is_nan() {
+            return None;
+        }
+        if vote.bodies.iter().any(|body| !body.is_finite()) {
+            return Some("the state of a rigid body in its vote is no number".to_owned());
+        }
+        let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
+        let numbers = energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external]);
+        let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);
+        let mut numbers = numbers
+            .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| *state)))
+            .chain([vote.force_bound, vote.contact_speed_squared]);
+        let bad = numbers.find(|v| !v.is_finite());
+        if let Some(value) = bad.or(Some(vote.courant).filter(|courant| courant.is_nan())) {
+            return Some(format!(
+                "an energy, momentum, force or limit of its vote is {value}, must be finite"
+            ));
+        }
     }
-    if vote.bodies.iter().any(|body| !body.is_finite()) {
-        return Some("the state of a rigid body in its vote is no number".to_owned());
-    }
-    let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
-    let numbers = energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external]);
-    let bad = numbers.chain([vote.force_bound, vote.contact_speed_squared]).find(|value| !value.is_finite());
-    bad.map(|value| format!("an energy, momentum or force of its vote is {value}, must be finite"))
+    let bad = partials.iter().find(|value| !value.is_finite());
+    bad.map(|value| format!("a partial force of its frame is {value}, must be finite"))
 }

@@ -11,10 +11,13 @@ use std::{
 };
 
 use deck::model::Model;
-
+use mechanics::{
+    state::{N_FIELDS, field},
+    vote::PairVote,
+};
 use serde::{Deserialize, Serialize};
 
-use super::{Error, Folder, HISTORY, Units, write_whole};
+use super::{Error, Folder, HISTORY, Units, vtu::von_mises, write_whole};
 
 /// One row of the table. Energies and momentum of the whole problem, in the deck's units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -35,9 +38,15 @@ pub struct HistoryRow {
     pub contact: f64,
     /// Energy taken by friction.
     pub friction: f64,
+    /// Energy that left with eroded elements and dropped nodes.
+    pub eroded: f64,
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass.
+    pub eroded_mass: f64,
     /// Work done on the bodies from outside, by prescribed velocities and walls.
     pub external: f64,
-    /// Sum of kinetic, internal, hourglass, contact and friction energy.
+    /// Sum of kinetic, internal, hourglass, contact, friction and eroded energy.
     pub total: f64,
     /// Energy error, relative, as in the summary.
     pub error: f64,
@@ -47,6 +56,10 @@ pub struct HistoryRow {
     pub parts: Vec<PartEnergy>,
     /// One entry per gauge, in deck order.
     pub gauges: Vec<GaugeRow>,
+    /// State of the element of each element gauge, one number per entry of [`mechanics::state::FIELDS`].
+    pub element_gauges: Vec<[f64; N_FIELDS]>,
+    /// The pairs of parts that are watched and in contact: index of the pair in the deck, force and hits.
+    pub contacts: Vec<(u32, PairVote)>,
 }
 
 /// Energies of one part.
@@ -98,7 +111,14 @@ pub struct History {
     /// Bytes of header and whole rows.
     length: u64,
     n_parts: usize,
-    n_gauges: usize,
+    /// Where the nodes of gauges were at first.
+    gauges: Vec<[f64; 3]>,
+    /// Density of the material of each watched element.
+    densities: Vec<f64>,
+    /// Pairs of parts that are watched.
+    n_contacts: u32,
+    /// Whether anything can erode: then rows say what has.
+    erodes: bool,
     row: String,
 }
 
@@ -133,7 +153,10 @@ impl History {
             file,
             length,
             n_parts: model.mesh.parts.len(),
-            n_gauges: model.output.gauges.len(),
+            gauges: model.output.gauges.iter().map(|g| model.mesh.positions[g.node as usize]).collect(),
+            densities: model.output.element_gauges.iter().map(|g| density(model, g.element)).collect(),
+            n_contacts: model.output.contact_forces.len() as u32,
+            erodes: model.setup.erosion.is_on(),
             row: String::new(),
         };
         history.cut()?;
@@ -167,7 +190,12 @@ impl History {
     /// If the row has not one entry per part and per gauge of the model.
     pub fn append(&mut self, row: &HistoryRow) -> Result<(), Error> {
         assert_eq!(row.parts.len(), self.n_parts, "parts of the row and of the model");
-        assert_eq!(row.gauges.len(), self.n_gauges, "gauges of the row and of the model");
+        assert_eq!(row.gauges.len(), self.gauges.len(), "gauges of the row and of the model");
+        assert_eq!(
+            row.element_gauges.len(),
+            self.densities.len(),
+            "element gauges of the row and of the model"
+        );
         self.row.clear();
         // Writing into a string cannot fail.
         let _ = write!(self.row, "{}", row.cycle);
@@ -175,10 +203,30 @@ impl History {
             .into_iter()
             .chain([row.external, row.total, row.error])
             .chain(row.momentum)
+            .chain([row.eroded, row.eroded_mass].into_iter().filter(|_| self.erodes))
             .chain(row.parts.iter().flat_map(PartEnergy::numbers))
-            .chain(row.gauges.iter().flat_map(|gauge| gauge.x.into_iter().chain(gauge.v)));
+            .chain(row.gauges.iter().zip(&self.gauges).flat_map(|(gauge, start)| {
+                let moved: [f64; 3] = std::array::from_fn(|axis| gauge.x[axis] - start[axis]);
+                gauge.x.into_iter().chain(gauge.v).chain(moved)
+            }))
+            .chain(
+                row.element_gauges
+                    .iter()
+                    .zip(&self.densities)
+                    .flat_map(|(state, density)| reading(state, *density)),
+            );
         for number in numbers {
             let _ = write!(self.row, ",{number:?}");
+        }
+        let mut contacts = row.contacts.iter().peekable();
+        for pair in 0..self.n_contacts {
+            let vote =
+                contacts.next_if(|(index, _)| *index == pair).map(|(_, vote)| *vote).unwrap_or_default();
+            let [x, y, z] = vote.force;
+            let _ = write!(self.row, ",{x:?},{y:?},{z:?},{}", vote.hits);
+        }
+        if self.erodes {
+            let _ = write!(self.row, ",{}", row.eroded_elements);
         }
         self.row.push('\n');
         if let Err(source) = self.file.write_all(self.row.as_bytes()) {
@@ -200,14 +248,63 @@ impl History {
     }
 }
 
+/// What an element gauge reads, in the order of its columns; stresses are Cauchy's, positive in tension.
+const READINGS: [&str; 13] = [
+    "pressure",
+    "von_mises",
+    "stress_xx",
+    "stress_yy",
+    "stress_zz",
+    "stress_xy",
+    "stress_yz",
+    "stress_zx",
+    "plastic_strain",
+    "temperature",
+    "density",
+    "energy",
+    "damage",
+];
+
+/// The numbers of [`READINGS`] from the state of an element of this initial density.
+fn reading(state: &[f64; N_FIELDS], density: f64) -> [f64; READINGS.len()] {
+    let deviator = [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX].map(|index| state[index]);
+    let ([xx, yy, xy, yz, zx], p) = (deviator, state[field::PRESSURE]);
+    [
+        p,
+        von_mises(deviator),
+        xx - p,
+        yy - p,
+        -(xx + yy) - p,
+        xy,
+        yz,
+        zx,
+        state[field::PLASTIC_STRAIN],
+        state[field::TEMPERATURE],
+        density / state[field::RELATIVE_VOLUME],
+        // Energy is held per initial volume.
+        state[field::ENERGY] / density,
+        state[field::DAMAGE],
+    ]
+}
+
+/// Density of the undeformed material of an element.
+fn density(model: &Model, element: u32) -> f64 {
+    let part = model.mesh.element_offsets().partition_point(|&first| first <= element as usize) - 1;
+    model.setup.materials[model.mesh.parts[part].material as usize].density
+}
+
 /// The header row, with its line end.
 fn header(model: &Model) -> String {
-    let Units { length, mass, time, energy } = Units::named(&model.units);
+    let Units { length, mass, time, energy, stress, force, specific } = Units::named(&model.units);
     let mut columns = vec!["cycle".to_owned(), format!("time [{time}]"), format!("dt [{time}]")];
     let energies = ["kinetic", "internal", "hourglass", "contact", "friction", "external", "total"];
     columns.extend(energies.iter().map(|name| format!("{name} [{energy}]")));
     columns.push("error".to_owned());
     columns.extend(["x", "y", "z"].iter().map(|axis| format!("momentum_{axis} [{mass}*{length}/{time}]")));
+    if model.setup.erosion.is_on() {
+        columns.push(format!("eroded [{energy}]"));
+        columns.push(format!("eroded mass [{mass}]"));
+    }
     for part in &model.mesh.parts {
         columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
     }
@@ -215,6 +312,23 @@ fn header(model: &Model) -> String {
         columns.extend(["x", "y", "z"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));
         columns
             .extend(["vx", "vy", "vz"].iter().map(|axis| format!("{}:{axis} [{length}/{time}]", gauge.name)));
+        columns.extend(["ux", "uy", "uz"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));
+    }
+    let density = format!("{mass}/{length}3");
+    let units = [stress; 8].into_iter().chain(["", "K", &density, specific, ""]);
+    for gauge in &model.output.element_gauges {
+        columns.extend(READINGS.iter().zip(units.clone()).map(|(what, unit)| match unit {
+            "" => format!("{}:{what}", gauge.name),
+            unit => format!("{}:{what} [{unit}]", gauge.name),
+        }));
+    }
+    for pair in &model.output.contact_forces {
+        let [a, b] = pair.map(|part| &model.mesh.parts[part as usize].name);
+        columns.extend(["fx", "fy", "fz"].iter().map(|axis| format!("{a} from {b}:{axis} [{force}]")));
+        columns.push(format!("{a} from {b}:contacts"));
+    }
+    if model.setup.erosion.is_on() {
+        columns.push("eroded elements".to_owned());
     }
     let mut header = columns.iter().map(|column| cell(column)).collect::<Vec<_>>().join(",");
     header.push('\n');

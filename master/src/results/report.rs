@@ -32,7 +32,7 @@ pub fn write(folder: &Folder, summary: &Summary, units: &str) -> Result<(), Erro
 }
 
 fn page(history: &Table, summary: &Summary, units: &str) -> String {
-    let Units { time, energy, length, .. } = Units::named(units);
+    let Units { time, energy, length, stress, force, .. } = Units::named(units);
     let title = escaped(&summary.title);
     let mut body = format!("<h1>{title}</h1>\n<pre>{}</pre>\n", escaped(&summary.table(units)));
     let at = history.column("time").unwrap_or_default();
@@ -58,6 +58,10 @@ fn page(history: &Table, summary: &Summary, units: &str) -> String {
         ("vx", "Velocity of gauges, x", format!("{length}/{time}")),
         ("vy", "Velocity of gauges, y", format!("{length}/{time}")),
         ("vz", "Velocity of gauges, z", format!("{length}/{time}")),
+        ("pressure", "Pressure at gauges", stress.to_owned()),
+        ("fx", "Contact force, x", force.to_owned()),
+        ("fy", "Contact force, y", force.to_owned()),
+        ("fz", "Contact force, z", force.to_owned()),
     ] {
         let of_owner = |column: &String| {
             let (owner, found) = quantity(column)?;

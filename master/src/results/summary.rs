@@ -64,6 +64,12 @@ pub struct Summary {
     pub worker_times: Vec<WorkerTimes>,
     /// Energies at the end.
     pub energies: Energies,
+    /// Elements that have eroded.
+    pub eroded_elements: u64,
+    /// Their mass, which stays at the nodes as long as those do.
+    pub eroded_mass: f64,
+    /// Energy that left with them, and with nodes that were dropped.
+    pub eroded_energy: f64,
     /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
     pub momentum_error: f64,
     /// Largest time step over the true Courant limit; below 1 is stable.
@@ -287,6 +293,16 @@ impl Summary {
             ("external", external),
         ] {
             writeln!(out, "             {name:<10} {:>14}", significant(value))?;
+        }
+        if self.eroded_elements > 0 {
+            writeln!(
+                out,
+                "             {:<10} {:>14}   {} elements, mass {}",
+                "eroded",
+                significant(self.eroded_energy),
+                grouped(self.eroded_elements),
+                significant(self.eroded_mass)
+            )?;
         }
         writeln!(
             out,

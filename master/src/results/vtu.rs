@@ -1,18 +1,28 @@
 //! States as VTK unstructured grids, and the index of them.
 //!
-//! A file holds one piece: points, hexahedra and raw appended arrays, little-endian with 64-bit sizes, each
-//! streamed from the state as it is written. The corner order of [`mechanics`] is that of VTK's cell type 12.
-//! Format: the VTK file format documentation, section "XML file formats".
+//! A file holds one piece: points, hexahedra and appended arrays, little-endian with 64-bit sizes, each taken from
+//! the state as it is written, raw or compressed ([`appended`]). The corner order of [`mechanics`] is that of VTK's
+//! cell type 12. Format: the VTK file format documentation, section "XML file formats". [`read`] reads the files back.
 
 use std::{io, io::Write, path::Path};
 
-use deck::model::Model;
-use mechanics::state::{GlobalState, field};
+mod appended;
+pub mod read;
 
-use super::{Error, FIELD_NAMES, Folder, PVD, state_name, write_whole};
+use deck::model::Model;
+use mechanics::{
+    element::shell4,
+    state::{GlobalState, field},
+};
+
+use super::{Error, FIELD_NAMES, Folder, PVD, state_name, surface::Probe, write_whole};
+use appended::Appended;
 
 /// Cell type of the eight-node hexahedron.
 const VTK_HEXAHEDRON: u8 = 12;
+
+/// Cell type of the four-node quadrilateral: shells.
+const VTK_QUAD: u8 = 9;
 
 /// Fields whose numbers identify rather than measure: written whatever the deck selects.
 const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
@@ -29,6 +39,9 @@ const ON_REQUEST: [&str; 9] = [
     "mass",
     "time_to_light",
 ];
+
+/// Arrays that are written wherever they exist: the worker, and what shells have.
+const ALWAYS: [&str; 3] = ["worker", "thickness", "von_mises_max"];
 
 /// Which fields a state file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,7 +78,7 @@ impl Fields {
 type Put<'a> = Box<dyn Fn(usize, &mut Vec<u8>) + 'a>;
 
 /// One array of the file: its description and where its numbers come from.
-struct Array<'a> {
+pub(super) struct Array<'a> {
     name: &'static str,
     /// VTK's name of the type.
     kind: &'static str,
@@ -80,22 +93,36 @@ struct Array<'a> {
 }
 
 impl<'a> Array<'a> {
-    fn f64<const N: usize>(name: &'static str, tuples: usize, of: impl Fn(usize) -> [f64; N] + 'a) -> Self {
+    pub(super) fn f64<const N: usize>(
+        name: &'static str,
+        tuples: usize,
+        of: impl Fn(usize) -> [f64; N] + 'a,
+    ) -> Self {
         let put: Put =
             Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
         Self { name, kind: "Float64", width: 8, components: N, tuples, grouped: true, put }
     }
 
     /// A list of indices, `N` per tuple; VTK refuses grouped ones.
-    fn i64<const N: usize>(name: &'static str, tuples: usize, of: impl Fn(usize) -> [i64; N] + 'a) -> Self {
+    pub(super) fn i64<const N: usize>(
+        name: &'static str,
+        tuples: usize,
+        of: impl Fn(usize) -> [i64; N] + 'a,
+    ) -> Self {
         let put: Put =
             Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
         Self { name, kind: "Int64", width: 8, components: N, tuples, grouped: false, put }
     }
 
-    fn u32(name: &'static str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
+    pub(super) fn u32(name: &'static str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
         let put: Put = Box::new(move |i, out| out.extend_from_slice(&of(i).to_le_bytes()));
         Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
+    }
+
+    /// The tuples of some elements alone.
+    fn only(self, kept: &'a [usize]) -> Self {
+        let put = self.put;
+        Self { tuples: kept.len(), put: Box::new(move |i, out| put(kept[i], out)), ..self }
     }
 
     /// Size of the numbers, without the header that precedes them.
@@ -116,21 +143,6 @@ impl<'a> Array<'a> {
         }
         writeln!(out, r#" format="appended" offset="{offset}"/>"#)
     }
-
-    /// The size header and the numbers, through a buffer of bounded size.
-    fn append(&self, out: &mut impl Write) -> io::Result<()> {
-        const CHUNK: usize = 1 << 16;
-        out.write_all(&self.n_bytes().to_le_bytes())?;
-        let mut buffer = Vec::with_capacity(CHUNK + self.components * self.width);
-        for tuple in 0..self.tuples {
-            (self.put)(tuple, &mut buffer);
-            if buffer.len() >= CHUNK {
-                out.write_all(&buffer)?;
-                buffer.clear();
-            }
-        }
-        out.write_all(&buffer)
-    }
 }
 
 /// Where the elements of a model are: part and material by global element index.
@@ -150,6 +162,10 @@ impl Elements<'_> {
     fn corners(&self, element: usize) -> [i64; 8] {
         let (part, local) = self.locate(element);
         self.model.mesh.parts[part].corners(local).map(i64::from)
+    }
+
+    fn is_shell(&self, element: usize) -> bool {
+        self.model.mesh.parts[self.locate(element).0].section().is_some()
     }
 
     fn element_id(&self, element: usize) -> u32 {
@@ -173,14 +189,21 @@ pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
     (1.5 * (xx * xx + yy * yy + zz * zz) + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
 }
 
-/// Writes one state as a `.vtu` file, whole or not at all.
+/// Von Mises stress of a layer of a shell, given by xx, yy, xy, yz, zx; its normal stress is zero.
+fn plane_von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
+    (xx * xx + yy * yy - xx * yy + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
+}
+
+/// Writes one state as a `.vtu` file, whole or not at all. With shells, which are quadrilaterals in it, there are two
+/// more element fields: `thickness` (zero for solids) and `von_mises_max`, the greatest of their layers; other stresses of
+/// shells are means through the thickness in the frame of the element.
 ///
 /// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`,
 /// `mass`. Element fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
 /// `temperature` (K), `damage`, `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
 /// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric), `time_to_light`.
 /// `worker` gives, by global element index, the worker that computes the element, and becomes the element
-/// field of that name. Units are the deck's.
+/// field of that name. Eroded elements are left out. Units are the deck's.
 ///
 /// # Errors
 /// [`Error::Io`] if the disk refuses.
@@ -218,57 +241,95 @@ fn stream(
 
     let elements = Elements { model, offsets: model.mesh.element_offsets() };
     let [point, cell] = data_arrays(&elements, state, worker).map(|mut arrays: Vec<Array>| {
-        arrays.retain(|array| array.name == "worker" || fields.contains(array.name));
+        arrays.retain(|array| ALWAYS.contains(&array.name) || fields.contains(array.name));
         arrays
     });
+    // Eroded elements are left out, their nodes are not.
+    let kept: Vec<usize> = (0..n_elements).filter(|&e| !state.is_eroded(e)).collect();
+    let n_cells = kept.len();
+    let cell: Vec<Array> =
+        if n_cells < n_elements { cell.into_iter().map(|array| array.only(&kept)).collect() } else { cell };
     let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
+    // A shell has four corners, so with shells the lists are made first.
+    let with_shells = model.mesh.parts.iter().any(|part| part.section().is_some());
+    let (mut corners, mut ends) = (Vec::new(), Vec::new());
+    if with_shells {
+        for &e in &kept {
+            corners.extend_from_slice(&elements.corners(e)[..if elements.is_shell(e) { 4 } else { 8 }]);
+            ends.push(corners.len() as i64);
+        }
+    }
+    let connectivity = if with_shells {
+        Array::i64("connectivity", corners.len(), |i| [corners[i]])
+    } else {
+        Array::i64("connectivity", n_cells, |cell| elements.corners(kept[cell]))
+    };
     let cells = [
-        Array::i64("connectivity", n_elements, |e| elements.corners(e)),
-        Array::i64("offsets", n_elements, |e| [8 * (e as i64 + 1)]),
+        connectivity,
+        Array::i64("offsets", n_cells, |cell| [if with_shells { ends[cell] } else { 8 * (cell as i64 + 1) }]),
         Array {
             name: "types",
             kind: "UInt8",
             width: 1,
             components: 1,
-            tuples: n_elements,
+            tuples: n_cells,
             grouped: true,
-            put: Box::new(|_, out| out.push(VTK_HEXAHEDRON)),
+            put: Box::new(|cell, out| {
+                let quad = with_shells && elements.is_shell(kept[cell]);
+                out.push(if quad { VTK_QUAD } else { VTK_HEXAHEDRON });
+            }),
         },
     ];
     let sections: [(&str, &[Array]); 4] =
         [("PointData", &point), ("CellData", &cell), ("Points", &points), ("Cells", &cells)];
+    let sizes = format!(r#"NumberOfPoints="{n_nodes}" NumberOfCells="{n_cells}""#);
+    let moment = (state.time, state.cycle);
+    write_piece(out, "UnstructuredGrid", &sizes, moment, &sections, model.output.compress)
+}
 
+/// A VTK file of one piece: `grid` is the kind of its data, `sizes` the attributes of the piece, `moment` time and cycle.
+pub(super) fn write_piece(
+    out: &mut impl Write,
+    grid: &str,
+    sizes: &str,
+    (time, cycle): (f64, u64),
+    sections: &[(&str, &[Array])],
+    compress: bool,
+) -> io::Result<()> {
+    let compressor = if compress { r#" compressor="vtkZLibDataCompressor""# } else { "" };
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(
         out,
-        r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
+        r#"<VTKFile type="{grid}" version="1.0" byte_order="LittleEndian" header_type="UInt64"{compressor}>"#
     )?;
-    writeln!(out, "  <UnstructuredGrid>\n    <FieldData>")?;
+    writeln!(out, "  <{grid}>\n    <FieldData>")?;
     writeln!(
         out,
-        r#"      <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{:?}</DataArray>"#,
-        state.time
+        r#"      <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{time:?}</DataArray>"#
     )?;
     writeln!(
         out,
-        r#"      <DataArray type="Int64" Name="cycle" NumberOfTuples="1" format="ascii">{}</DataArray>"#,
-        state.cycle
+        r#"      <DataArray type="Int64" Name="cycle" NumberOfTuples="1" format="ascii">{cycle}</DataArray>"#
     )?;
     writeln!(out, "    </FieldData>")?;
-    writeln!(out, r#"    <Piece NumberOfPoints="{n_nodes}" NumberOfCells="{n_elements}">"#)?;
+    writeln!(out, "    <Piece {sizes}>")?;
+    // Where an array begins is said before it comes, so what is compressed is compressed first.
+    let arrays = || sections.iter().flat_map(|(_, arrays)| *arrays);
+    let data: Vec<Appended> = arrays().map(|array| Appended::of(array, compress)).collect();
+    let mut sized = data.iter();
     let mut offset = 0;
     for (section, arrays) in sections {
         writeln!(out, "      <{section}>")?;
-        for array in arrays {
+        for array in *arrays {
             array.describe(out, offset)?;
-            offset += 8 + array.n_bytes();
+            offset += sized.next().map_or(0, Appended::n_bytes);
         }
         writeln!(out, "      </{section}>")?;
     }
-    writeln!(out, "    </Piece>\n  </UnstructuredGrid>")?;
+    writeln!(out, "    </Piece>\n  </{grid}>")?;
     write!(out, "  <AppendedData encoding=\"raw\">\n_")?;
-    for array in sections.iter().flat_map(|(_, arrays)| *arrays) {
-        array.append(out)?;
+    for (array, data) in arrays().zip(data) {
+        data.write(array, out)?;
     }
     // Some readers look for the closing tag at the start of a line.
     writeln!(out, "\n  </AppendedData>\n</VTKFile>")
@@ -327,6 +388,16 @@ fn data_arrays<'a>(
         ]
         .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
     );
+    if !state.shells.fields.is_empty() {
+        cell.push(Array::f64("thickness", n_elements, move |e| [state.shells.fields[shell4::THICKNESS][e]]));
+        cell.push(Array::f64("von_mises_max", n_elements, move |e| {
+            let layers = state.shells.fields[shell4::ELEMENT..].chunks(shell4::LAYER);
+            let largest = |layer: &[Vec<f64>]| plane_von_mises([0, 1, 2, 3, 4].map(|i| layer[i][e]));
+            [layers
+                .map(largest)
+                .fold(if elements.is_shell(e) { 0.0 } else { von_mises(deviator(e)) }, f64::max)]
+        }));
+    }
     if let Some(worker) = worker {
         cell.push(Array::u32("worker", n_elements, move |e| worker[e]));
     }
@@ -336,10 +407,11 @@ fn data_arrays<'a>(
 /// The states of a run in order, and their index `results.pvd`.
 ///
 /// The index is written anew, whole, after each state, so it names only files that exist.
-#[derive(Debug)]
 pub struct Series {
     folder: Folder,
     fields: Fields,
+    /// What computes contact again, where its surface is wanted.
+    probe: Option<Probe>,
     /// Time of each state written.
     times: Vec<f64>,
 }
@@ -350,7 +422,17 @@ impl Series {
     /// # Errors
     /// [`Error::UnknownField`].
     pub fn new(folder: &Folder, model: &Model) -> Result<Self, Error> {
-        Ok(Self { folder: folder.clone(), fields: Fields::select(&model.output.fields)?, times: Vec::new() })
+        Ok(Self {
+            folder: folder.clone(),
+            fields: Fields::select(&model.output.fields)?,
+            probe: None,
+            times: Vec::new(),
+        })
+    }
+
+    /// From now on the contact surface is written beside every state.
+    pub fn with_contact(&mut self, probe: Probe) {
+        self.probe = Some(probe);
     }
 
     /// Writes a state under the next number, then the index. `worker` is as in [`write_vtu`].
@@ -362,6 +444,9 @@ impl Series {
     /// As [`write_vtu`].
     pub fn write(&mut self, model: &Model, state: &GlobalState, worker: Option<&[u32]>) -> Result<(), Error> {
         let index = u32::try_from(self.times.len()).expect("a run writes fewer than 2^32 states");
+        if let Some(probe) = &self.probe {
+            probe.write(&self.folder, index, model, state)?;
+        }
         write_vtu(&self.folder.file(&state_name(index)), model, state, &self.fields, worker)?;
         self.times.push(state.time);
         let indexed = self.write_index();
@@ -387,18 +472,22 @@ impl Series {
     }
 
     fn write_index(&self) -> Result<(), Error> {
-        write_whole(&self.folder.file(PVD), |out| {
-            writeln!(out, r#"<?xml version="1.0"?>"#)?;
-            writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">"#)?;
-            writeln!(out, "  <Collection>")?;
-            for (index, time) in (0..).zip(&self.times) {
-                writeln!(
-                    out,
-                    r#"    <DataSet timestep="{time:?}" group="" part="0" file="{}"/>"#,
-                    state_name(index)
-                )?;
-            }
-            writeln!(out, "  </Collection>\n</VTKFile>")
-        })
+        if self.probe.is_some() {
+            Probe::write_index(&self.folder, &self.times)?;
+        }
+        write_index(&self.folder.file(PVD), &self.times, state_name)
     }
+}
+
+/// Writes an index of files by time; `name` gives the file of each.
+pub(super) fn write_index(path: &Path, times: &[f64], name: impl Fn(u32) -> String) -> Result<(), Error> {
+    write_whole(path, |out| {
+        writeln!(out, r#"<?xml version="1.0"?>"#)?;
+        writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">"#)?;
+        writeln!(out, "  <Collection>")?;
+        for (index, time) in (0..).zip(times) {
+            writeln!(out, r#"    <DataSet timestep="{time:?}" group="" part="0" file="{}"/>"#, name(index))?;
+        }
+        writeln!(out, "  </Collection>\n</VTKFile>")
+    })
 }

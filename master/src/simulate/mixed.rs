@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use crate::{
     balance::{self, Costs},
-    decompose::{Subdomain, decompose, work},
+    decompose::{Living, Subdomain, decompose, work},
 };
 
 /// Edges of the problems (elements), and the goal of each: time over the bound.
@@ -118,16 +118,17 @@ impl Sorted {
     pub fn row(&self, edge: u32, seed: u64, speeds: &[f64], costs: Costs) -> Row {
         let Costs { node, pair } = costs;
         let mesh = &self.model.mesh;
-        let layout = decompose(mesh, speeds, node);
+        let layout = decompose(mesh, speeds, node, None);
+        let living = Living::new(mesh, None);
         let elements = elements_of(&layout, speeds.len());
         let owner = owners(mesh, &layout);
         let owner = |node: u32| owner[self.surface.nodes[node as usize] as usize] as usize;
-        let held = work(&layout, speeds.len(), node);
+        let held = work(&layout, speeds.len(), node, &living);
         let chosen = balance::assign(&self.units, (&self.weights, pair), speeds, &held, &owner);
         let pairs = self.pairs(&chosen, speeds.len());
 
         let slabs = slabs(mesh, speeds);
-        let whole = decompose(mesh, &[1.0], node);
+        let whole = decompose(mesh, &[1.0], node, None);
         let slab_owner = owners(mesh, &slabs);
         let slab_owner = |node: u32| slab_owner[self.surface.nodes[node as usize] as usize] as usize;
         let slab_chosen = balance::assign_to_owners(&self.units, speeds.len(), &slab_owner);
@@ -140,8 +141,13 @@ impl Sorted {
             speeds: speeds.to_vec(),
             elements_over_bound: over_bound(&elements, &vec![0; speeds.len()], pair, speeds),
             time_over_bound: over_bound(&held, &pairs, pair, speeds),
-            slabs_over_bound: over_bound(&work(&slabs, speeds.len(), node), &slab_pairs, pair, speeds),
-            copies: held.iter().sum::<f64>() / work(&whole, 1, node)[0],
+            slabs_over_bound: over_bound(
+                &work(&slabs, speeds.len(), node, &living),
+                &slab_pairs,
+                pair,
+                speeds,
+            ),
+            copies: held.iter().sum::<f64>() / work(&whole, 1, node, &living)[0],
             pairs: pairs.iter().sum(),
             interactions: self.units.iter().map(|unit| unit.interactions).sum(),
         }
@@ -205,7 +211,7 @@ fn owners(mesh: &Mesh, layout: &[Subdomain]) -> Vec<u32> {
                 }
             }
             (_, Region::List(elements)) => elements.iter().for_each(|&e| take(e as usize)),
-            (Topology::Explicit { .. }, Region::Cells { .. }) => {}
+            (Topology::Explicit { .. } | Topology::Shells { .. }, Region::Cells { .. }) => {}
         }
     }
     owner

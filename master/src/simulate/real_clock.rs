@@ -588,6 +588,7 @@ impl Clock<'_> {
                 | Action::Dismiss(..)
                 | Action::Progress(_)
                 | Action::Dealt(_)
+                | Action::Owners(_)
                 | Action::Rewind { .. }
                 | Action::Timer(_) => {}
             }

@@ -65,6 +65,7 @@ enum Kept {
     Forces(usize, usize),
     Integrated(Box<Vote>),
     Image,
+    Sampled([u8; 16]),
 }
 
 impl Kept {
@@ -78,6 +79,7 @@ impl Kept {
                 | (Self::Forces(..), Task::Install { .. } | Task::Border { .. })
                 | (Self::Integrated(_), Task::Integrate { .. })
                 | (Self::Image, Task::Image { .. })
+                | (Self::Sampled(_), Task::Sample { .. })
         )
     }
 }
@@ -143,6 +145,7 @@ fn keep(outcome: &Outcome) -> Result<Kept, String> {
         Outcome::Forces { partials, gathered } => Kept::Forces(partials.len(), gathered.len()),
         Outcome::Integrated(vote) => Kept::Integrated(vote.clone()),
         Outcome::Image { .. } => Kept::Image,
+        Outcome::Sampled(hash) => Kept::Sampled(*hash),
         Outcome::Failed(reason) => return Err(reason.clone()),
     })
 }
@@ -156,6 +159,7 @@ fn give(kept: Kept) -> Outcome {
             Outcome::Forces { partials: vec![0.0; partials], gathered: vec![0.0; gathered] }
         }
         Kept::Integrated(vote) => Outcome::Integrated(vote),
+        Kept::Sampled(hash) => Outcome::Sampled(hash),
         Kept::Image => Outcome::Image { pieces: Vec::new(), work: Work::default() },
     }
 }

@@ -46,7 +46,7 @@ pub enum Kind {
     Interior,
     /// Integrating.
     Integrate,
-    /// An image.
+    /// An image, or a sample of what elements came to.
     Image,
     /// The master sorts.
     Sort,
@@ -67,7 +67,7 @@ impl Kind {
             Task::Border { .. } => Kind::Border,
             Task::Interior { .. } => Kind::Interior,
             Task::Integrate { .. } => Kind::Integrate,
-            Task::Image { .. } => Kind::Image,
+            Task::Image { .. } | Task::Sample { .. } => Kind::Image,
         }
     }
 }

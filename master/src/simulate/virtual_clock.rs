@@ -537,6 +537,7 @@ impl Clock<'_> {
                 | Action::Dismiss(..)
                 | Action::Progress(_)
                 | Action::Dealt(_)
+                | Action::Owners(_)
                 | Action::Rewind { .. } => {}
                 Action::Timer(seconds) => self.at(self.now + seconds, What::Timer),
             }

@@ -166,6 +166,13 @@ impl Sender {
         self.shared.fail(error);
     }
 
+    /// Waits until the link has ended, for whatever reason.
+    pub async fn ended(&self) {
+        let mut end = self.shared.end.subscribe();
+        // The sender of this channel lives in `shared`, which `self` holds.
+        let _ = end.wait_for(Option::is_some).await;
+    }
+
     /// Sends heartbeats after `interval` without another frame, from now on.
     pub fn set_heartbeat(&self, interval: Duration) {
         self.shared.heartbeat_us.store(micros(interval), Relaxed);

@@ -163,7 +163,7 @@ fn damaged(scene: &Scene, k: u64, happen: fn(&Proxy), words: &str) -> Seen {
     Seen { note, ..seen }
 }
 
-fn frame(header: Header, payload: Vec<u8>) -> Vec<u8> {
+pub(super) fn frame(header: Header, payload: Vec<u8>) -> Vec<u8> {
     let mut frame = Frame::new(header, payload);
     frame.seal().expect("within its limit");
     let mut bytes = encode_header(&frame.header).to_vec();
@@ -172,7 +172,7 @@ fn frame(header: Header, payload: Vec<u8>) -> Vec<u8> {
 }
 
 /// Sends bytes and waits until the master has hung up.
-fn knock(master: &str, bytes: &[u8]) {
+pub(super) fn knock(master: &str, bytes: &[u8]) {
     let mut stream = TcpStream::connect(master).expect("the master listens");
     // A master that has closed already refuses the rest, or resets.
     let _ = stream.write_all(bytes);

@@ -156,7 +156,8 @@ fn damage(running: &Running, harm: impl Fn(&mut Vec<u8>)) {
     fs::write(&newest, bytes).expect("room");
 }
 
-/// A library whose wall clock is an hour late once the file `BOLIDE_CLOCK_BACK` is there.
+/// A library whose wall clock is an hour late once the file `BOLIDE_CLOCK_BACK` is there, and always by
+/// `BOLIDE_CLOCK_SHIFT` (s).
 const CLOCK: &str = r#"
 #define _GNU_SOURCE
 #include <stdlib.h>
@@ -166,12 +167,15 @@ const CLOCK: &str = r#"
 int clock_gettime(clockid_t id, struct timespec *t) {
     int result = (int)syscall(SYS_clock_gettime, id, t);
     const char *file = getenv("BOLIDE_CLOCK_BACK");
+    const char *shift = getenv("BOLIDE_CLOCK_SHIFT");
     if (id == CLOCK_REALTIME && file && access(file, F_OK) == 0) t->tv_sec -= 3600;
+    if (id == CLOCK_REALTIME && shift) t->tv_sec += atol(shift);
     return result;
 }
 "#;
 
-fn clock_library() -> Option<tempfile::TempDir> {
+/// A folder with `clock.so` in it; none where there is no C compiler.
+pub(super) fn clock_library() -> Option<tempfile::TempDir> {
     let folder = tempfile::tempdir().expect("a folder");
     let (source, library) = (folder.path().join("clock.c"), folder.path().join("clock.so"));
     fs::write(&source, CLOCK).expect("room");

@@ -76,6 +76,8 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         constraint: vec![0; n_nodes],
         initial_volume,
         fields,
+        erosion: None,
+        shells: mechanics::state::ShellState::default(),
     }
 }
 
@@ -97,6 +99,7 @@ fn grind(material: &Material, explicit: bool, width: Width) -> [f64; 2] {
         hourglass: 0.1,
         force_quantum: Quantum::for_reference(2e8, 42),
         energy_quantum: Quantum::for_reference(1e9, 40),
+        arm: 1.0,
     };
     let sets = 0..block.n_sets();
     let mut times: Vec<f64> = (0..60)
@@ -184,6 +187,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         bodies: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
+        erosion: Default::default(),
     };
     let falls = |n: u32| [0.0, 0.0, if n / plane > below { -500.0 } else { 0.0 }];
     let velocity: Vec<[f64; 3]> = mesh.node_ids.iter().map(|&n| falls(n)).collect();
@@ -205,7 +209,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         })
         .collect();
     let n_elements = mesh.n_elements();
-    let mut domain = Domain::new(setup, 2, quanta, subdomains, &[], width);
+    let mut domain = Domain::new(setup, 2, quanta, (subdomains, 0), &[], width);
     domain.install(&Default::default(), &[]).expect("a plan without other workers");
     (domain, n_elements)
 }

@@ -17,16 +17,18 @@ use crate::{
     element::{
         ElementVote, Step,
         hex8::{self, Laws, Layout, View},
+        shell4::{Core, ShellStep},
     },
     eos::{EquationOfState, IdealGas, Jwl, Linear, Polynomial, Shock},
+    erosion::PieceErosion,
     failure::{
         Failing, FailureLaw, Unfailing, hydrostatic::Hydrostatic, johnson_cook::JohnsonCookDamage,
         plastic_strain::PlasticStrain, principal_stress::PrincipalStress,
     },
     lanes::{SET, Width, scalar::Scalar},
     material::{Eos, Failure, Material, Strength},
-    mesh::Topology,
-    state::{N_FIELDS, sparse, write_changed},
+    mesh::{Topology, quad_area, twice},
+    state::{N_FIELDS, ShellState, field::ENERGY, sparse, write_changed},
     strength::{Elastic, Hydro, JohnsonCook, RateFactor, StrengthLaw, Tabulated, VonMises},
 };
 
@@ -59,6 +61,10 @@ pub struct Piece {
     pub initial_volume: Vec<f64>,
     /// One array per entry of [`crate::state::FIELDS`].
     pub fields: [Vec<f64>; N_FIELDS],
+    /// In runs where anything erodes.
+    pub erosion: Option<PieceErosion>,
+    /// What shells have beside that; empty of solids.
+    pub shells: ShellState,
 }
 
 /// Elements of one kind and one material, laid out for the kernels. The first `nodes.len()` entries of the node
@@ -82,6 +88,8 @@ pub struct Block {
     pub mass: Vec<f64>,
     /// Index into [`crate::setup::Setup::constraints`].
     pub constraint: Vec<u16>,
+    /// Rotations, moments and layers of shells; none of solids.
+    pub shells: Option<Box<Core>>,
     topology: Topology,
     layout: Layout,
     /// Slot of each local element.
@@ -98,19 +106,21 @@ pub struct Block {
 }
 
 impl Block {
-    /// Lays out a piece. Forces are zero.
+    /// Lays out a piece of solids. Forces are zero.
     ///
     /// # Panics
-    /// If the arrays of the piece do not fit its topology, which whoever decoded it has checked.
+    /// As [`Block::of`], and if the piece is of shells.
     pub fn new(piece: &Piece) -> Block {
-        Self::take(piece.clone())
+        Self::of(piece.clone(), &[])
     }
 
-    /// As [`Block::new`], of a piece that goes array by array, so that there need not be room for all of both.
+    /// Lays out a piece of one of `materials`. Its arrays go one by one, so that there need not be room for all of both.
+    /// Forces are zero.
     ///
     /// # Panics
-    /// As there.
-    pub fn take(mut piece: Piece) -> Block {
+    /// If the arrays of the piece do not fit its topology or shells cannot be of its material, which whoever made or
+    /// decoded it has checked.
+    pub fn of(mut piece: Piece, materials: &[Material]) -> Block {
         let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
         let by_node = [piece.x.len(), piece.v.len(), piece.mass.len(), piece.constraint.len()];
         assert!(by_node == [n_nodes; 4], "node arrays of {by_node:?} entries for {n_nodes} nodes");
@@ -119,6 +129,18 @@ impl Block {
         let (layout, slots, reach) = match &piece.topology {
             Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
             Topology::Explicit { hexahedra } => explicit(hexahedra, n_nodes),
+            Topology::Shells { quads, .. } => {
+                explicit(&quads.iter().map(|&quad| twice(quad)).collect::<Vec<_>>(), n_nodes)
+            }
+        };
+        let shells = match &piece.topology {
+            Topology::Shells { quads, section } => {
+                let material = materials.get(piece.material as usize).expect("shells need their material");
+                let volume = &piece.initial_volume;
+                let core = Core::new(quads, &piece.elements, volume, &piece.shells, section, material);
+                Some(Box::new(core.expect("the deck has checked section and material")))
+            }
+            _ => None,
         };
         assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
         let n_slots = match &layout {
@@ -151,6 +173,7 @@ impl Block {
             v: by_axis(take(&mut piece.v)),
             f: std::array::from_fn(|_| vec![0.0; n_padded]),
             mass: piece.mass.iter().copied().chain(std::iter::repeat_n(1.0, n_padded - n_nodes)).collect(),
+            shells,
             fields: std::array::from_fn(|field| by_slot(take(&mut piece.fields[field]), 0.0)),
             initial_volume: by_slot(take(&mut piece.initial_volume), 1.0),
             constraint: piece.constraint,
@@ -172,7 +195,8 @@ impl Block {
         }
     }
 
-    /// The state image: what [`Block::new`] was given, to the bit, with the state of now.
+    /// The state image: what [`Block::new`] was given, to the bit, with the state of now. Which elements have eroded is not in
+    /// it: whoever watches them adds that.
     pub fn piece(&self) -> Piece {
         let by_element = |array: &[f64]| sparse(self.slots.iter().map(|&slot| array[slot as usize]));
         let by_node = |arrays: &[Vec<f64>; 3]| by_node(self.nodes.len(), arrays);
@@ -187,12 +211,31 @@ impl Block {
             mass: self.mass[..self.nodes.len()].to_vec(),
             constraint: self.constraint.clone(),
             initial_volume: by_element(&self.initial_volume),
-            fields: std::array::from_fn(|field| by_element(&self.fields[field])),
+            fields: match &self.shells {
+                None => std::array::from_fn(|field| by_element(&self.fields[field])),
+                Some(core) => {
+                    let summary = |e: usize| {
+                        let [a, b, c, d, ..] = self.corners(e);
+                        let x = [a, b, c, d].map(|n| std::array::from_fn(|axis| self.x[axis][n as usize]));
+                        core.summary(e, self.initial_volume[e], quad_area(&x))
+                    };
+                    let all: Vec<_> = (0..self.elements.len()).map(summary).collect();
+                    std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect())
+                }
+            },
+            shells: self
+                .shells
+                .as_ref()
+                .map_or_else(ShellState::default, |core| core.image(self.nodes.len(), self.elements.len())),
+            erosion: None,
         }
     }
 
     /// [`Block::piece`] of a block that goes array by array, so that there need not be room for all of both.
     pub fn into_piece(mut self) -> Piece {
+        if self.shells.is_some() {
+            return self.piece();
+        }
         let (n, slots) = (self.nodes.len(), take(&mut self.slots));
         let by_element = |array: Vec<f64>| sparse(slots.iter().map(|&slot| array[slot as usize]));
         drop((take(&mut self.f), take(&mut self.slot_elements)));
@@ -209,7 +252,47 @@ impl Block {
             elements: self.elements,
             mass: self.mass,
             constraint: self.constraint,
+            erosion: None,
+            shells: ShellState::default(),
         }
+    }
+
+    /// Number of slots, phantoms included.
+    pub(crate) fn n_slots(&self) -> usize {
+        self.slot_elements.len()
+    }
+
+    /// The slot of a local element.
+    pub(crate) fn slot(&self, element: usize) -> usize {
+        self.slots[element] as usize
+    }
+
+    /// Where corners are, and the entries of a node array that a pass over all slots may touch.
+    pub(crate) fn layout(&self) -> (&Layout, usize) {
+        (&self.layout, self.reach)
+    }
+
+    /// Bits of the slots of each set whose elements take part.
+    pub(crate) fn alive(&self) -> &[u8] {
+        &self.alive
+    }
+
+    /// Whether a local element takes part.
+    pub(crate) fn is_alive(&self, element: usize) -> bool {
+        let slot = self.slot(element);
+        self.alive[slot / SET] >> (slot % SET) & 1 == 1
+    }
+
+    /// One state field by slot.
+    pub(crate) fn field_slots(&self, field: usize) -> &[f64] {
+        &self.fields[field]
+    }
+
+    /// Takes the element of a slot out: it gives no force and no vote any more and keeps its state. Gives its global index and
+    /// internal energy.
+    pub(crate) fn take_out(&mut self, slot: usize) -> (u32, f64) {
+        self.alive[slot / SET] &= !(1 << (slot % SET));
+        (self.slot_elements[slot], self.fields[ENERGY][slot] * self.initial_volume[slot])
     }
 
     /// Number of lane sets.
@@ -217,18 +300,24 @@ impl Block {
         self.alive.len() as u32
     }
 
-    /// Number of elements in a range of lane sets.
+    /// Number of elements that take part in a range of lane sets.
     ///
     /// # Panics
     /// If there are no such sets.
     pub fn n_elements_of(&self, sets: &Range<u32>) -> u64 {
-        let slots = sets.start as usize * SET..sets.end as usize * SET;
-        self.slot_elements[slots].iter().filter(|&&element| element != PHANTOM).count() as u64
+        let alive = &self.alive[sets.start as usize..sets.end as usize];
+        alive.iter().map(|bits| u64::from(bits.count_ones())).sum()
     }
 
     /// One state field of a local element.
     pub fn field(&self, element: usize, field: usize) -> f64 {
         self.fields[field][self.slots[element] as usize]
+    }
+
+    /// The state of a local element, one number per entry of [`crate::state::FIELDS`].
+    pub fn element(&self, element: usize) -> [f64; N_FIELDS] {
+        let slot = self.slots[element] as usize;
+        self.fields.each_ref().map(|values| values[slot])
     }
 
     /// The lane set of a local element.
@@ -276,9 +365,22 @@ impl Block {
         (0..self.n_sets()).map(touches).collect()
     }
 
+    /// See [`crate::cycle::Domain::plant_fault`].
+    pub(crate) fn plant_fault(&mut self) {
+        if let Some(core) = &mut self.shells {
+            core.plant_fault();
+            return;
+        }
+        if let Some(&slot) = self.slots.first() {
+            let pressure = &mut self.fields[crate::state::field::PRESSURE][slot as usize];
+            *pressure = pressure.next_up();
+        }
+    }
+
     /// Sets all forces to zero.
     pub fn clear_forces(&mut self) {
-        for f in &mut self.f {
+        let moments = self.shells.iter_mut().flat_map(|core| &mut core.m);
+        for f in self.f.iter_mut().chain(moments) {
             f.fill(0.0);
         }
     }
@@ -298,6 +400,16 @@ impl Block {
         width: Width,
         vote: &mut ElementVote,
     ) {
+        if let Some(core) = &mut self.shells {
+            let step = ShellStep {
+                dt: step.dt,
+                force_quantum: step.force_quantum,
+                moment_quantum: step.force_quantum.times(step.arm),
+                energy_quantum: step.energy_quantum,
+            };
+            core.compute(&self.x, &self.v, &mut self.f, sets, &step, width, vote);
+            return;
+        }
         match material.eos {
             Eos::Linear { bulk } => {
                 self.compute_with(Linear { bulk }, material, sets, step, width, vote);

@@ -22,12 +22,14 @@ use crate::{
     block::{Block, Piece},
     contact::{Batch, Contact},
     element::{ElementVote, Step},
+    erosion::{Eroding, PieceErosion},
     home::Home,
     lanes::{SET, Width},
     load::face::{self, FaceVote, LoadedFace},
     nodes::{Advance, Booked, NodeSet, Nodes},
     setup::Setup,
-    vote::{Quanta, Vote},
+    spin,
+    vote::{Gone, Quanta, Vote, Watched},
     wall::{self, Pose, WallVote},
 };
 
@@ -65,8 +67,20 @@ pub struct Plan {
     pub guests: Vec<Guest>,
     /// Global nodes whose state this worker sends to others when the plan starts to act.
     pub send: Vec<u32>,
+    /// Whether moments travel behind the forces of each node: six numbers instead of three.
+    pub moments: bool,
     /// On route direct: the workers that hold nodes of `exchange` too.
     pub neighbours: Vec<Neighbour>,
+    /// Nodes held here that have no element left and leave the run with this plan; in the first plan of an epoch, all that
+    /// have left before.
+    pub dropped: Vec<u32>,
+}
+
+impl Plan {
+    /// Numbers that travel for each node of the exchange.
+    pub fn stride(&self) -> usize {
+        if self.moments { 6 } else { 3 }
+    }
 }
 
 /// Another worker that holds nodes of the exchange.
@@ -140,6 +154,8 @@ struct Room {
     face_vote: FaceVote,
     /// What booked nodes gave each wall.
     walls: Vec<WallVote>,
+    /// Where the part erodes.
+    eroding: Option<Eroding>,
 }
 
 impl Room {
@@ -149,6 +165,30 @@ impl Room {
         std::array::from_fn(|a| {
             touched().flat_map(|(set, _)| &self.block.x[a][set * SET..(set + 1) * SET]).copied().collect()
         })
+    }
+
+    /// Takes a copy of a node out of the sums and off the surface; true if it was the one that is booked. Reference positions
+    /// of its set go with its last node on the surface.
+    fn drop_node(&mut self, local: u32) -> bool {
+        let (set, bit) = (local as usize / SET, 1 << (local as usize % SET));
+        let booked = self.sets[set].booked & bit != 0;
+        self.sets[set].booked &= !bit;
+        let before = self.sets[set].surface;
+        self.sets[set].surface &= !bit;
+        if before != 0 && self.sets[set].surface == 0 {
+            let at = SET * self.sets[..set].iter().filter(|set| set.surface != 0).count();
+            for positions in std::iter::once(&mut self.reference).chain(&mut self.gathered) {
+                for along in positions {
+                    along.drain(at..at + SET);
+                }
+            }
+        }
+        booked
+    }
+
+    /// Which elements have eroded and how far the others are, where they can.
+    fn erosion(&self) -> Option<PieceErosion> {
+        self.eroding.as_ref().map(|eroding| eroding.state(&self.block))
     }
 
     fn is_booked(&self, local: u32) -> bool {
@@ -194,6 +234,8 @@ pub struct Domain {
     rooms: Vec<Room>,
     guests: Guests,
     contact: Option<ContactRoom>,
+    /// Whether there are shells anywhere in the run.
+    moments: bool,
     exchange: Vec<Shared>,
     local: Vec<Shared>,
     copies: Vec<(u32, u32)>,
@@ -203,9 +245,19 @@ pub struct Domain {
     home: Home,
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
+    /// Element gauges: gauge, room, local element.
+    element_gauges: Vec<(u32, u32, u32)>,
+    /// Pairs of parts whose contact force is wanted.
+    watched_pairs: Vec<[u32; 2]>,
     vote: Vote,
+    /// `n`.
+    cycle: u64,
     /// `t_n`.
     time: f64,
+    /// Whether the first plan is installed.
+    installed: bool,
+    /// What left with dropped nodes in this cycle.
+    gone: Gone,
     /// Where the walls are and how they move in this step.
     poses: Vec<Pose>,
     /// Takes what guests give walls, which their owners book.
@@ -213,12 +265,12 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Builds the blocks of the sub-domains. `gauges` are global node indices by gauge.
+    /// Builds the blocks of the sub-domains at the start of a cycle. `gauges` are global node indices by gauge.
     pub fn new(
         setup: Setup,
         n_parts: usize,
         quanta: Quanta,
-        subdomains: Vec<Subdomain>,
+        (subdomains, cycle): (Vec<Subdomain>, u64),
         gauges: &[u32],
         width: Width,
     ) -> Self {
@@ -228,10 +280,20 @@ impl Domain {
         let mut gather = Vec::new();
         for Subdomain { pieces, unowned, surface, .. } in subdomains {
             let first = rooms.len();
-            for piece in pieces {
-                let block = Block::take(piece);
+            for mut piece in pieces {
+                let erosion = piece.erosion.take();
+                let mut block = Block::of(piece, &setup.materials);
                 let all = 0..block.n_sets();
                 let material = &setup.materials[block.material as usize];
+                let eroding = setup.erosion.of_part(block.part as usize).map(|criteria| {
+                    Eroding::new(
+                        criteria,
+                        erosion.as_ref(),
+                        &mut block,
+                        material,
+                        setup.control.safety_factor,
+                    )
+                });
                 let faces = face::faces_of(&block, &setup.loads, material);
                 let part = block.part;
                 let is_rigid = setup.bodies.iter().any(|body| body.parts.binary_search(&part).is_ok());
@@ -248,6 +310,7 @@ impl Domain {
                     faces,
                     face_vote: NO_FACES,
                     walls: vec![WallVote::default(); setup.walls.len()],
+                    eroding,
                 });
             }
             let own = first as u32..rooms.len() as u32;
@@ -286,7 +349,10 @@ impl Domain {
         let bodies = Held::all(&setup, &home, &mut rooms);
         Self {
             vote: Vote::empty(n_parts),
+            cycle,
             time: 0.0,
+            installed: false,
+            gone: Gone::default(),
             poses: Vec::with_capacity(setup.walls.len()),
             unbooked: vec![WallVote::default(); setup.walls.len()],
             setup,
@@ -296,6 +362,7 @@ impl Domain {
             rooms,
             guests: Guests::default(),
             contact: None,
+            moments: false,
             exchange: Vec::new(),
             local: Vec::new(),
             copies: Vec::new(),
@@ -304,7 +371,23 @@ impl Domain {
             home,
             gather,
             gauges,
+            element_gauges: Vec::new(),
+            watched_pairs: Vec::new(),
         }
+    }
+
+    /// From now on votes say how these elements and contacts are; before the first plan is installed.
+    pub fn watch(&mut self, watched: &Watched) {
+        self.watched_pairs.clone_from(&watched.contacts);
+        let place = |element: &u32| {
+            let found = |room: &Room| room.block.elements.iter().position(|e| e == element);
+            let mut rooms = (0..).zip(&self.rooms);
+            rooms.find_map(|(index, room)| found(room).map(|local| (index, local as u32)))
+        };
+        let places = (0..).zip(&watched.elements);
+        self.element_gauges = places
+            .filter_map(|(gauge, element)| place(element).map(|(room, local)| (gauge, room, local)))
+            .collect();
     }
 
     /// Number of elements held.
@@ -316,10 +399,9 @@ impl Domain {
     pub fn load(&self) -> Load {
         let mut load = Load::default();
         for room in &self.rooms {
-            let n = room.block.elements.len() as u64;
-            let interior: u64 = room.interior.iter().map(|sets| room.block.n_elements_of(sets)).sum();
-            load.border += n - interior;
-            load.interior += interior;
+            let count = |sets: &[Range<u32>]| sets.iter().map(|s| room.block.n_elements_of(s)).sum::<u64>();
+            load.border += count(&room.border);
+            load.interior += count(&room.interior);
             load.nodes += room.block.nodes.len() as u64;
         }
         load.nodes += self.guests.node.len() as u64;
@@ -396,10 +478,12 @@ impl Domain {
             let zeros = || std::array::from_fn(|_| vec![0.0; n]);
             let (mut x, mut v) = (zeros(), zeros());
             pack(&self.rooms, &self.guests, &sources, &mut x, &mut v);
-            let contact = Contact::new(batch, settings, &x);
+            let mut contact = Contact::new(batch, settings, &x);
+            contact.watch_pairs(&self.watched_pairs);
             self.contact = Some(ContactRoom { contact, sources, x, v, f: zeros() });
         }
         // Every node with more than one copy, here or elsewhere, and every contact node.
+        self.moments = plan.moments;
         self.copies.clear();
         self.exchange.clear();
         self.local.clear();
@@ -440,11 +524,49 @@ impl Domain {
                 let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
                 split(&room.block.sets_touching(&touched))
             };
+            if room.eroding.is_some() {
+                let alive = room.block.alive();
+                room.border = living(&room.border, alive);
+                room.interior = living(&room.interior, alive);
+            }
             if let Some(gathered) = room.gathered.pop_front() {
                 room.reference = gathered;
             }
         }
+        self.drop_nodes(&plan.dropped);
+        self.installed = true;
         Ok(())
+    }
+
+    /// Takes freed nodes out of the run: they stand still from now on, and nothing feels them. Those that the first plan names
+    /// were booked before.
+    fn drop_nodes(&mut self, nodes: &[u32]) {
+        for &node in nodes {
+            for &(room, local) in self.home.get(node) {
+                let room = &mut self.rooms[room as usize];
+                let booked = room.drop_node(local);
+                if !self.installed {
+                    continue;
+                }
+                let (v, mass) = (&mut room.block.v, room.block.mass[local as usize]);
+                let velocity: [f64; 3] = std::array::from_fn(|a| std::mem::take(&mut v[a][local as usize]));
+                if booked {
+                    let [x, y, z] = velocity;
+                    let square = x.mul_add(x, y.mul_add(y, z * z));
+                    self.gone.kinetic += self.quanta.energy.round(0.5 * mass * square);
+                    for (sum, v) in self.gone.momentum.iter_mut().zip(velocity) {
+                        *sum += self.quanta.momentum.round(mass * v);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Forgets gatherings whose plans will not come: that of this cycle replaces them.
+    pub fn forget_gathered(&mut self) {
+        for room in &mut self.rooms {
+            room.gathered.clear();
+        }
     }
 
     /// Books the copies of a held node that is not exchanged.
@@ -520,7 +642,10 @@ impl Domain {
             let vote =
                 room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
             self.vote.add_contact(&vote);
-            self.vote.contacts.merge(room.contact.by_pair());
+            self.vote.contact_energies.merge(room.contact.energies());
+            if !self.watched_pairs.is_empty() {
+                self.vote.add_contacts(&room.contact.pair_votes());
+            }
         }
         meter.stop(mark, true);
         self.load_faces(meter);
@@ -550,14 +675,23 @@ impl Domain {
             hourglass: control.hourglass,
             force_quantum: self.quanta.force,
             energy_quantum: self.quanta.energy,
+            arm: self.quanta.arm,
         };
-        let (materials, width) = (&self.setup.materials, self.width);
+        let (materials, width, cycle) = (&self.setup.materials, self.width, self.cycle);
         let work = |room: &mut Room| {
             if room.is_rigid {
                 return;
             }
             let mark = meter.start();
             let material = &materials[room.block.material as usize];
+            if let Some(eroding) = room.eroding.as_mut().filter(|_| dt > 0.0) {
+                if sets != Sets::Interior {
+                    eroding.watch(&mut room.block, &room.border, &step, cycle, width);
+                }
+                if sets != Sets::Border {
+                    eroding.watch(&mut room.block, &room.interior, &step, cycle, width);
+                }
+            }
             if sets != Sets::Interior {
                 room.vote = ElementVote::default();
                 room.block.compute(material, &room.border, &step, width, &mut room.vote);
@@ -570,13 +704,16 @@ impl Domain {
         each(&mut self.rooms, work);
     }
 
-    /// Partial forces of the nodes of the exchange, three numbers each, and behind them pushes on rigid bodies.
+    /// Partial forces of the nodes of the exchange, three numbers each, with moments six, and behind them pushes on rigid bodies.
     pub fn partials(&mut self, meter: &dyn Meter) -> Vec<f64> {
         let mark = meter.start();
         self.push_bodies();
-        let mut out = Vec::with_capacity(3 * self.exchange.len() + self.n_pushes());
+        let mut out = Vec::with_capacity(self.stride() * self.exchange.len() + self.n_pushes());
         for shared in &self.exchange {
             out.extend(self.sum(shared));
+            if self.moments {
+                out.extend(self.moment(shared));
+            }
         }
         self.pack_pushes(&mut out);
         meter.stop(mark, false);
@@ -601,11 +738,34 @@ impl Domain {
         total
     }
 
-    fn set(&mut self, index: usize, of_exchange: bool, total: [f64; 3]) {
+    /// Numbers that travel for each node of the exchange.
+    fn stride(&self) -> usize {
+        if self.moments { 6 } else { 3 }
+    }
+
+    fn moment(&self, shared: &Shared) -> [f64; 3] {
+        let mut total = [0.0; 3];
+        for &(room, local) in &self.copies[shared.copies.start as usize..shared.copies.end as usize] {
+            if let Some(core) = &self.rooms[room as usize].block.shells {
+                for a in 0..3 {
+                    total[a] += core.m[a][local as usize];
+                }
+            }
+        }
+        total
+    }
+
+    fn set(&mut self, index: usize, of_exchange: bool, total: [f64; 3], moment: [f64; 3]) {
         let shared = if of_exchange { &self.exchange[index] } else { &self.local[index] };
         for &(room, local) in &self.copies[shared.copies.start as usize..shared.copies.end as usize] {
+            let block = &mut self.rooms[room as usize].block;
             for a in 0..3 {
-                self.rooms[room as usize].block.f[a][local as usize] = total[a];
+                block.f[a][local as usize] = total[a];
+            }
+            if let Some(core) = &mut block.shells {
+                for a in 0..3 {
+                    core.m[a][local as usize] = moment[a];
+                }
             }
         }
         if shared.guest != NONE {
@@ -628,22 +788,24 @@ impl Domain {
         free_walls: &[Pose],
         meter: &dyn Meter,
     ) -> Result<Vote, String> {
-        let n_pushes = self.n_pushes();
-        if totals.len() != 3 * self.exchange.len() + n_pushes {
+        let (stride, n_pushes) = (self.stride(), self.n_pushes());
+        if totals.len() != stride * self.exchange.len() + n_pushes {
             return Err(format!(
-                "{} numbers of total forces for {} shared nodes, expected 3 each, and {n_pushes} for rigid bodies",
+                "{} numbers of total forces for {} shared nodes, expected {stride} each, and {n_pushes} for rigid bodies",
                 totals.len(),
                 self.exchange.len()
             ));
         }
         let mark = meter.start();
         let (totals, pushes) = totals.split_at(totals.len() - n_pushes);
-        for (i, total) in totals.chunks_exact(3).enumerate() {
-            self.set(i, true, [total[0], total[1], total[2]]);
+        for (i, total) in totals.chunks_exact(stride).enumerate() {
+            let moment = if self.moments { [total[3], total[4], total[5]] } else { [0.0; 3] };
+            self.set(i, true, [total[0], total[1], total[2]], moment);
         }
         for i in 0..self.local.len() {
             let total = self.sum(&self.local[i]);
-            self.set(i, false, total);
+            let moment = if self.moments { self.moment(&self.local[i]) } else { [0.0; 3] };
+            self.set(i, false, total, moment);
         }
         meter.stop(mark, false);
         self.move_bodies(pushes, dt_previous, dt);
@@ -674,9 +836,19 @@ impl Domain {
                 walls: &mut room.walls,
             };
             room.booked = advance.run(&mut nodes, width);
+            if let Some(core) = &mut block.shells {
+                let (kinetic, external) = spin::advance(&advance, core, &block.constraint, &room.sets);
+                room.booked.kinetic += kinetic;
+                room.booked.external += external;
+            }
             if !room.faces.is_empty() {
                 let half_steps = 0.5 * (dt_previous + dt);
                 room.booked.external += face::work(&room.faces, block, half_steps, advance.quanta.energy);
+            }
+            // Loads leave with the faces of eroded elements.
+            if room.eroding.as_mut().is_some_and(Eroding::take_change) && !room.faces.is_empty() {
+                let material = &setup.materials[block.material as usize];
+                room.faces = face::faces_of(block, &setup.loads, material);
             }
             meter.stop(mark, false);
         });
@@ -692,6 +864,7 @@ impl Domain {
             walls: &mut self.unbooked,
         };
         advance.run(&mut nodes, width);
+        self.cycle += 1;
         Ok(self.finish_vote())
     }
 
@@ -713,25 +886,59 @@ impl Domain {
             vote.extents[part].merge(&room.booked.extent);
             vote.contact_speed_squared = vote.contact_speed_squared.max(room.booked.speed_squared);
             vote.contact_speed_ahead = vote.contact_speed_ahead.max(room.booked.speed_ahead);
+            if let Some(eroding) = &mut room.eroding {
+                let casualties = eroding.take_casualties();
+                vote.add_eroded(&casualties.elements);
+                vote.gone.internal += casualties.internal;
+            }
         }
         self.vote_on_bodies(&mut vote);
+        vote.gone.merge(&std::mem::take(&mut self.gone));
         for &(gauge, room, local) in &self.gauges {
             let (block, i) = (&self.rooms[room as usize].block, local as usize);
             let values =
                 [block.x[0][i], block.x[1][i], block.x[2][i], block.v[0][i], block.v[1][i], block.v[2][i]];
             vote.gauges.push((gauge, values));
         }
+        for &(gauge, room, local) in &self.element_gauges {
+            vote.element_gauges.push((gauge, self.rooms[room as usize].block.element(local as usize)));
+        }
         vote
     }
 
     /// The state of all blocks, to be put back into a global state.
     pub fn pieces(&self) -> Vec<Piece> {
-        self.rooms.iter().map(|room| room.block.piece()).collect()
+        self.rooms.iter().map(|room| Piece { erosion: room.erosion(), ..room.block.piece() }).collect()
+    }
+
+    /// Number of blocks.
+    pub fn n_blocks(&self) -> usize {
+        self.rooms.len()
+    }
+
+    /// What the elements of a block made of `x_n`, between all its elements and integration: forces of its elements and
+    /// of the loads on its faces by node, state by element, and its vote, hashed. It depends on the state of this block
+    /// at the start of the cycle and on nothing else of the domain, so that whoever has that state can compute it again.
+    ///
+    /// # Errors
+    /// If there is no such block.
+    pub fn sample(&self, block: usize) -> Result<[u8; 16], String> {
+        let n = self.rooms.len();
+        let room = self.rooms.get(block).ok_or_else(|| format!("block {block} of {n} to sample"))?;
+        Ok(crate::proof::of_block(&room.block, &room.vote))
+    }
+
+    /// Makes the pressure (of shells a stress) of the first element of every block wrong by one unit in the last place: what a faulty
+    /// processor might do. For tests of who finds it.
+    #[doc(hidden)]
+    pub fn plant_fault(&mut self) {
+        self.rooms.iter_mut().for_each(|room| room.block.plant_fault());
     }
 
     /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
     pub fn into_pieces(self) -> Vec<Piece> {
-        self.rooms.into_iter().map(|room| room.block.into_piece()).collect()
+        let image = |room: Room| Piece { erosion: room.erosion(), ..room.block.into_piece() };
+        self.rooms.into_iter().map(image).collect()
     }
 }
 
@@ -765,6 +972,18 @@ fn pack(
             v[a][i] = from_v[a][local];
         }
     }
+}
+
+/// The sets among these in which an element is alive, as ranges.
+fn living(ranges: &[Range<u32>], alive: &[u8]) -> Vec<Range<u32>> {
+    let mut living: Vec<Range<u32>> = Vec::new();
+    for set in ranges.iter().cloned().flatten().filter(|&set| alive[set as usize] != 0) {
+        match living.last_mut() {
+            Some(last) if last.end == set => last.end += 1,
+            _ => living.push(set..set + 1),
+        }
+    }
+    living
 }
 
 /// Sets that touch marked nodes and the others, as ranges.

@@ -7,7 +7,7 @@ use crate::state::{FIELDS, GlobalState};
 const LAW_FIELDS: [&str; 2] = ["damage", "time_to_light"];
 
 /// BLAKE3 over cycle, time, positions, velocities (by global node index) and element fields (field by field, by global
-/// element index; [`LAW_FIELDS`] after their names, if anything is in them), each number as its eight little-endian
+/// element index; `LAW_FIELDS` after their names, if anything is in them), each number as its eight little-endian
 /// bytes; the first 32 hexadecimal digits.
 pub fn digest(state: &GlobalState) -> String {
     let mut hasher = blake3::Hasher::new();
@@ -30,6 +30,26 @@ pub fn digest(state: &GlobalState) -> String {
         for value in field {
             hasher.update(&value.to_le_bytes());
         }
+    }
+    // Likewise erosion: a run in which nothing eroded has the digest of one in which nothing could.
+    if state.n_eroded() > 0 {
+        hasher.update(b"eroded");
+        for cycle in &state.eroded {
+            hasher.update(&cycle.to_le_bytes());
+        }
+    }
+    if state.strain.iter().any(|strain| *strain != 0.0) {
+        hasher.update(b"strain");
+        for strain in &state.strain {
+            hasher.update(&strain.to_le_bytes());
+        }
+    }
+    // A run without shells has nothing here, and the digest that it had before there were shells.
+    for spin in state.shells.spin.iter().flatten() {
+        hasher.update(&spin.to_le_bytes());
+    }
+    for value in state.shells.fields.iter().flatten() {
+        hasher.update(&value.to_le_bytes());
     }
     hasher.finalize().to_hex()[..32].to_owned()
 }

@@ -12,6 +12,7 @@ pub mod hex8;
 pub(crate) mod hourglass;
 pub(crate) mod modes;
 pub(crate) mod rotation;
+pub mod shell4;
 pub(crate) mod vector;
 pub(crate) mod viscosity;
 
@@ -31,6 +32,8 @@ pub struct Step {
     pub force_quantum: Quantum,
     /// Energies are rounded to it (energy).
     pub energy_quantum: Quantum,
+    /// Quantum of moments over that of forces, a power of two (length).
+    pub arm: f64,
 }
 
 /// What the elements answer: sums that are exact, minima and maxima, so that the order of elements cannot show.

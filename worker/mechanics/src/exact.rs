@@ -30,9 +30,20 @@ impl Quantum {
         Self { q: power_of_two(exponent) }
     }
 
+    /// This quantum times a power of two.
+    pub fn times(self, power_of_two: f64) -> Self {
+        Self { q: self.q * power_of_two }
+    }
+
     /// The quantum itself.
     pub fn value(self) -> f64 {
         self.q
+    }
+
+    /// The quantum that is `2^bits` times as large: sums of so many more terms stay exact.
+    #[must_use]
+    pub fn coarser(self, bits: u32) -> Self {
+        Self { q: self.q * power_of_two(bits as i32) }
     }
 
     /// The number `M` that rounds when added and taken away.

@@ -4,13 +4,14 @@
 use crate::{
     burn::lighting_time,
     contact::Extent,
-    element::hex8,
+    element::shell4,
+    erosion::ALIVE,
     exact::Quantum,
     load::{Drive, SurfaceKind},
-    mesh::Mesh,
+    mesh::{Mesh, Part},
     rigid::{Body, dot},
     setup::{Constraint, MAX_WALLS, Setup},
-    state::{GlobalState, N_FIELDS, field},
+    state::{GlobalState, N_FIELDS, ShellState, field},
     vote::Quanta,
     wall::{Motion, RigidWall},
 };
@@ -37,6 +38,9 @@ pub fn state(
         constraint: constraint.to_vec(),
         initial_volume: Vec::with_capacity(n_elements),
         elements: std::array::from_fn(|_: usize| vec![0.0; n_elements]),
+        eroded: vec![ALIVE; if setup.erosion.is_on() { n_elements } else { 0 }],
+        strain: vec![0.0; if setup.erosion.counts_strain() { n_elements } else { 0 }],
+        shells: ShellState::default(),
     };
     let mut mass_of = Vec::with_capacity(n_elements);
     for (p, part) in (0..).zip(&mesh.parts) {
@@ -45,7 +49,7 @@ pub fn state(
         let density = material.density * body.map_or(1.0, |body| body.nodal_scale);
         for e in 0..part.n_elements() {
             let corners = part.corners(e).map(|n| mesh.positions[n as usize]);
-            let v = hex8::volume(&corners);
+            let v = part.volume(&corners);
             if v <= 0.0 || !v.is_finite() {
                 return Err(format!(
                     "element {} of part `{}`: volume {v:e}, must be positive",
@@ -80,7 +84,60 @@ pub fn state(
             index += 1;
         }
     }
+    shells(mesh, setup, &mut state);
     Ok(state)
+}
+
+/// Gives nodes of shells their rotation rates at the start, about the axes about which they may turn; `given` is by node,
+/// or empty.
+pub fn spin(state: &mut GlobalState, constraints: &[Constraint], given: &[[f64; 3]]) {
+    for (n, (spin, given)) in state.shells.spin.iter_mut().zip(given).enumerate() {
+        let clamped = constraints[state.constraint[n] as usize].clamped;
+        if state.shells.inertia[n] > 0.0 {
+            *spin = std::array::from_fn(|axis| if clamped >> axis & 1 == 1 { 0.0 } else { given[axis] });
+        }
+    }
+}
+
+/// The state of shells at time zero. A node has the rotational inertia of a quarter of each of its elements, about any axis:
+/// `mass max(h^2 / 12, A / 8)`, so that bending and transverse shear never ask for a smaller step than the membrane.
+fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
+    let Some(n_fields) = mesh.parts.iter().filter_map(Part::section).map(|s| s.n_fields()).max() else {
+        return;
+    };
+    let n_elements = mesh.n_elements();
+    let mut inertia_of = vec![0.0; n_elements];
+    let mut fields = vec![vec![0.0; n_elements]; n_fields];
+    for (part, first) in mesh.parts.iter().zip(mesh.element_offsets()) {
+        let Some(section) = part.section() else { continue };
+        let material = &setup.materials[part.material as usize];
+        for e in first..first + part.n_elements() {
+            fields[shell4::THICKNESS][e] = section.thickness;
+            for layer in fields[shell4::ELEMENT..section.n_fields()].chunks_mut(shell4::LAYER) {
+                layer[shell4::LAYER - 1][e] = material.initial_temperature();
+            }
+            let volume = state.initial_volume[e];
+            let area = volume / section.thickness;
+            let radius2 = (section.thickness * section.thickness / 12.0).max(area / 8.0);
+            inertia_of[e] = material.density * volume * radius2;
+        }
+    }
+    let largest = inertia_of.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let quantum = Quantum::for_reference(largest, 50);
+    let mut inertia = vec![0.0; mesh.n_nodes()];
+    for (part, first) in mesh.parts.iter().zip(mesh.element_offsets()) {
+        if part.section().is_none() {
+            continue;
+        }
+        for e in 0..part.n_elements() {
+            let eighth = quantum.round(inertia_of[first + e] * 0.125);
+            // A shell has each corner twice.
+            for n in part.corners(e) {
+                inertia[n as usize] += eighth;
+            }
+        }
+    }
+    state.shells = ShellState { spin: vec![[0.0; 3]; mesh.n_nodes()], inertia, fields };
 }
 
 /// The quanta of a run's sums, from the deck's data alone.
@@ -122,6 +179,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
             SurfaceKind::Transmit => 0.0,
         })
         .fold(0.0, f64::max);
+    let mut arm = 0.0_f64;
     let (mut force, mut stored, mut sound, mut driven2) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
     let mut index = 0;
     for part in &mesh.parts {
@@ -132,7 +190,15 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         let strength = modulus.max(material.density * top_speed2).max(pressure);
         for e in 0..part.n_elements() {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
-            force = force.max(largest_face(&x) * strength);
+            force = force.max(match part.section() {
+                None => largest_face(&x) * strength,
+                // A shell pulls with its section; only loads act on its face.
+                Some(section) => {
+                    let area = largest_face(&x);
+                    arm = arm.max(area.sqrt());
+                    (area.sqrt() * section.thickness * strength).max(area * pressure)
+                }
+            });
             stored += (1e-3 * material.bulk()).max(material.initial_energy()) * state.initial_volume[index];
             index += 1;
         }
@@ -145,6 +211,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         force: Quantum::for_reference(force, 42),
         energy: Quantum::for_reference(kinetic + spinning + stored, 46),
         momentum: Quantum::for_reference(total_mass * top_speed2.max(driven2).sqrt().max(1e-3 * sound), 50),
+        arm: if arm > 0.0 { Quantum::for_reference(arm, 0).value() } else { 1.0 },
     }
 }
 

@@ -2,6 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::element::{
+    hex8,
+    shell4::{self, Rule},
+};
+
 /// The whole mesh of a problem. Owned by the master; workers get pieces of it.
 ///
 /// Elements are numbered through all parts in order: the global element index of element `e` of part `p`
@@ -45,6 +50,29 @@ pub enum Topology {
         /// Corner nodes, in the order of the crate's documentation.
         hexahedra: Vec<[u32; 8]>,
     },
+    /// Four-node shells of one section: four indices into [`Part::nodes`] each.
+    Shells {
+        /// Corner nodes, to the left around the element seen from its upper side.
+        quads: Vec<[u32; 4]>,
+        /// What stands through the thickness.
+        section: Section,
+    },
+}
+
+/// Thickness of shells and the points through it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Section {
+    /// Initial thickness (length).
+    pub thickness: f64,
+    /// Points of integration.
+    pub rule: Rule,
+}
+
+impl Section {
+    /// Number of arrays that the state of such shells has ([`crate::state::ShellState::fields`]).
+    pub fn n_fields(&self) -> usize {
+        shell4::ELEMENT + shell4::LAYER * self.rule.points().map_or(0, |points| points.len())
+    }
 }
 
 impl Part {
@@ -53,10 +81,12 @@ impl Part {
         match &self.topology {
             Topology::Structured { cells } => cells.iter().map(|&c| c as usize).product(),
             Topology::Explicit { hexahedra } => hexahedra.len(),
+            Topology::Shells { quads, .. } => quads.len(),
         }
     }
 
-    /// Corners of element `e` of this part as global node indices.
+    /// Corners of element `e` of this part as global node indices. A shell is a hexahedron without height: its four
+    /// corners twice, so that its first two faces are its lower and its upper side and the others vanish.
     pub fn corners(&self, e: usize) -> [u32; 8] {
         match &self.topology {
             Topology::Structured { cells } => {
@@ -78,6 +108,24 @@ impl Part {
                 .map(|local| self.nodes[local])
             }
             Topology::Explicit { hexahedra } => hexahedra[e].map(|local| self.nodes[local as usize]),
+            Topology::Shells { quads, .. } => twice(quads[e]).map(|local| self.nodes[local as usize]),
+        }
+    }
+
+    /// The section of its shells; none of solids.
+    pub fn section(&self) -> Option<Section> {
+        match &self.topology {
+            Topology::Shells { section, .. } => Some(*section),
+            _ => None,
+        }
+    }
+
+    /// Volume of an element of this part whose [`Part::corners`] stand at `x`; of a shell, area times initial
+    /// thickness.
+    pub fn volume(&self, x: &[[f64; 3]; 8]) -> f64 {
+        match self.section() {
+            None => hex8::volume(x),
+            Some(section) => quad_area(&[x[0], x[1], x[2], x[3]]) * section.thickness,
         }
     }
 }
@@ -106,3 +154,19 @@ impl Mesh {
 /// Corners of the six faces of a hexahedron, outward by the right-hand rule.
 pub const FACES: [[usize; 4]; 6] =
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
+/// The corners of a shell as those of a hexahedron without height.
+pub fn twice([a, b, c, d]: [u32; 4]) -> [u32; 8] {
+    [a, b, c, d, a, b, c, d]
+}
+
+/// Area of a quadrilateral: half the cross product of its diagonals.
+pub fn quad_area(x: &[[f64; 3]; 4]) -> f64 {
+    let along = |a: usize, b: usize| -> [f64; 3] { std::array::from_fn(|axis| x[b][axis] - x[a][axis]) };
+    let (p, q) = (along(0, 2), along(1, 3));
+    let cross: [f64; 3] = std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        p[j] * q[k] - p[k] * q[j]
+    });
+    0.5 * cross.iter().map(|c| c * c).sum::<f64>().sqrt()
+}

@@ -492,7 +492,7 @@ mod tests {
             walls,
             poses: &vec![Pose::default(); walls.len()],
             loads,
-            quanta: Quanta { force: q, energy: q, momentum: q },
+            quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
         };
         let mut nodes = Nodes {
             x: &mut x,
@@ -625,7 +625,7 @@ mod tests {
             walls: &[wall],
             poses: &[Pose::default()],
             loads: &loads,
-            quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
+            quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
         };
         let run = |width: Width| {
             let (mut x, mut v, mut f) = (x.clone(), v.clone(), f.clone());

@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     block::Piece,
+    erosion::PieceErosion,
     mesh::{Mesh, Topology},
-    state::{GlobalState, N_FIELDS, sparse, write_changed},
+    state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},
 };
 
 /// Which elements of a part.
@@ -109,12 +110,39 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
                 .collect();
             (Topology::Explicit { hexahedra: corners }, nodes, list.clone())
         }
+        (Topology::Shells { quads, section }, Region::List(list)) => {
+            let mut local_of = std::collections::BTreeMap::new();
+            let mut nodes = Vec::new();
+            let corners = list
+                .iter()
+                .map(|&e| {
+                    quads[e as usize].map(|n| {
+                        *local_of.entry(n).or_insert_with(|| {
+                            nodes.push(n);
+                            (nodes.len() - 1) as u32
+                        })
+                    })
+                })
+                .collect();
+            (Topology::Shells { quads: corners, section: *section }, nodes, list.clone())
+        }
         (topology, region) => {
             panic!("region {region:?} does not fit part `{}` ({topology:?})", mesh_part.name)
         }
     };
     let nodes: Vec<u32> = local_nodes.iter().map(|&n| mesh_part.nodes[n as usize]).collect();
     let elements: Vec<u32> = local_elements.iter().map(|&e| e + offset as u32).collect();
+    let shells = match mesh_part.section() {
+        None => ShellState::default(),
+        Some(section) => ShellState {
+            spin: nodes.iter().map(|&n| state.shells.spin[n as usize]).collect(),
+            inertia: nodes.iter().map(|&n| state.shells.inertia[n as usize]).collect(),
+            fields: state.shells.fields[..section.n_fields()]
+                .iter()
+                .map(|field| elements.iter().map(|&e| field[e as usize]).collect())
+                .collect(),
+        },
+    };
     Piece {
         part: part as u32,
         material: mesh_part.material,
@@ -127,8 +155,18 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         fields: std::array::from_fn(|k: usize| {
             sparse(elements.iter().map(|&e| state.elements[k][e as usize]))
         }),
+        erosion: (!state.eroded.is_empty()).then(|| PieceErosion {
+            eroded: elements.iter().map(|&e| state.eroded[e as usize]).collect(),
+            strain: if state.strain.is_empty() {
+                Vec::new()
+            } else {
+                elements.iter().map(|&e| state.strain[e as usize]).collect()
+            },
+            initial: nodes.iter().map(|&n| mesh.positions[n as usize]).collect(),
+        }),
         nodes,
         elements,
+        shells,
     }
 }
 
@@ -141,7 +179,15 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
     let (n_nodes, n_elements) = (state.x.len(), state.initial_volume.len());
     let lengths_fit = piece.x.len() == piece.nodes.len()
         && piece.v.len() == piece.nodes.len()
-        && (0..N_FIELDS).all(|k| piece.fields[k].len() == piece.elements.len());
+        && (0..N_FIELDS).all(|k| piece.fields[k].len() == piece.elements.len())
+        && piece.erosion.as_ref().is_none_or(|erosion| {
+            let n = piece.elements.len();
+            erosion.eroded.len() == n && (erosion.strain.is_empty() || erosion.strain.len() == n)
+        })
+        && (piece.shells.spin.is_empty()
+            || (piece.shells.spin.len() == piece.nodes.len() && state.shells.spin.len() == n_nodes))
+        && piece.shells.fields.iter().all(|field| field.len() == piece.elements.len())
+        && piece.shells.fields.len() <= state.shells.fields.len();
     if !lengths_fit {
         return Err(format!(
             "image of part {}: array lengths do not fit its {} nodes and {} elements",
@@ -162,6 +208,24 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
     for (from, to) in [(&mut piece.x, &mut state.x), (&mut piece.v, &mut state.v)] {
         for (&n, value) in piece.nodes.iter().zip(std::mem::take(from)) {
             to[n as usize] = value;
+        }
+    }
+    if let Some(erosion) = &piece.erosion {
+        for (i, e) in piece.elements.iter().map(|&e| e as usize).enumerate() {
+            if let Some(eroded) = state.eroded.get_mut(e) {
+                *eroded = erosion.eroded[i];
+            }
+            if let (Some(to), Some(from)) = (state.strain.get_mut(e), erosion.strain.get(i)) {
+                *to = *from;
+            }
+        }
+    }
+    for (&n, &spin) in piece.nodes.iter().zip(&piece.shells.spin) {
+        state.shells.spin[n as usize] = spin;
+    }
+    for (field, values) in state.shells.fields.iter_mut().zip(&piece.shells.fields) {
+        for (&e, &value) in piece.elements.iter().zip(values) {
+            field[e as usize] = value;
         }
     }
     for (values, to) in piece.fields.iter_mut().zip(&mut state.elements) {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     burn::Detonation,
     contact,
+    erosion::Erosion,
     load::{Drive, Loads},
     material::Material,
     rigid::Body,
@@ -30,6 +31,8 @@ pub struct Setup {
     pub detonations: Vec<Detonation>,
     /// Curves, forces, gravity, loads on faces, relaxation.
     pub loads: Loads,
+    /// Which parts erode and when.
+    pub erosion: Erosion,
 }
 
 /// What acts on a node alone: prescribed velocities, walls, forces. A node's constraint is the same on every holder.
@@ -43,6 +46,8 @@ pub struct Constraint {
     pub walls: u32,
     /// Forces on the node, one bit per entry of [`Loads::forces`].
     pub forces: u32,
+    /// Axes about which a node of shells does not turn: bit 0 is x.
+    pub clamped: u8,
 }
 
 /// Most walls in a run: one bit each in [`Constraint::walls`].

@@ -91,9 +91,38 @@ pub struct GlobalState {
     pub initial_volume: Vec<f64>,
     /// One array per entry of [`FIELDS`], each by global element index.
     pub elements: [Vec<f64>; N_FIELDS],
+    /// Cycle in which each element eroded, or [`crate::erosion::ALIVE`]; empty where nothing can.
+    pub eroded: Vec<u64>,
+    /// Incremental geometric strain by element; empty where none erodes by it.
+    pub strain: Vec<f64>,
+    /// What shells have beside that; empty arrays in a run without shells.
+    pub shells: ShellState,
+}
+
+/// What shells have beside the state of solids.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ShellState {
+    /// Rotation rate `w_{n-1/2}` by node (1/time); zero at nodes without shells.
+    pub spin: Vec<[f64; 3]>,
+    /// Rotational inertia about any axis by node (mass times length squared); zero at nodes without shells.
+    pub inertia: Vec<f64>,
+    /// By element: six hourglass forces, thickness, internal energy, energy of hourglass control; then for each point
+    /// through the thickness, from below, stress xx, yy, xy, yz, zx in the frame of the element, plastic strain,
+    /// temperature.
+    pub fields: Vec<Vec<f64>>,
 }
 
 impl GlobalState {
+    /// Whether an element has eroded.
+    pub fn is_eroded(&self, element: usize) -> bool {
+        self.eroded.get(element).is_some_and(|&cycle| cycle != crate::erosion::ALIVE)
+    }
+
+    /// Number of elements that have eroded.
+    pub fn n_eroded(&self) -> usize {
+        (0..self.eroded.len()).filter(|&e| self.is_eroded(e)).count()
+    }
+
     /// What of the state no cycle changes, with the time; the rest is empty.
     pub fn statics(&self) -> Self {
         Self {
@@ -102,6 +131,14 @@ impl GlobalState {
             mass: self.mass.clone(),
             constraint: self.constraint.clone(),
             initial_volume: self.initial_volume.clone(),
+            // Kept in length alone: the images of parts that do not erode have nothing of this.
+            eroded: vec![crate::erosion::ALIVE; self.eroded.len()],
+            strain: vec![0.0; self.strain.len()],
+            shells: ShellState {
+                spin: Vec::new(),
+                inertia: self.shells.inertia.clone(),
+                fields: vec![Vec::new(); self.shells.fields.len()],
+            },
             ..Self::default()
         }
     }
@@ -118,6 +155,13 @@ impl GlobalState {
             x: vec![[0.0; 3]; n_nodes],
             v: vec![[0.0; 3]; n_nodes],
             elements: std::array::from_fn(|_| vec![0.0; n_elements]),
+            eroded: vec![crate::erosion::ALIVE; self.eroded.len()],
+            strain: vec![0.0; self.strain.len()],
+            shells: ShellState {
+                spin: vec![[0.0; 3]; self.shells.inertia.len()],
+                inertia: self.shells.inertia.clone(),
+                fields: vec![vec![0.0; n_elements]; self.shells.fields.len()],
+            },
             ..self.statics()
         }
     }

@@ -10,6 +10,7 @@ use crate::lanes::Lane;
 pub(crate) mod cowper_symonds;
 pub(crate) mod elastic;
 pub(crate) mod johnson_cook;
+pub(crate) mod plane_stress;
 pub(crate) mod tabulated;
 pub(crate) mod von_mises;
 

@@ -9,6 +9,7 @@ use crate::{
     contact::{ContactVote, Extent, PairEnergies},
     element::ElementVote,
     rigid,
+    state::N_FIELDS,
     wall::WallVote,
 };
 
@@ -42,7 +43,7 @@ pub struct Vote {
     /// Energy lost to friction in this cycle.
     pub friction: f64,
     /// The last two by pair of parts.
-    pub contacts: PairEnergies,
+    pub contact_energies: PairEnergies,
     /// Work of prescribed velocities, walls and loads in this cycle.
     pub external: f64,
     /// Momentum of all nodes, `m v_{n+1/2}`.
@@ -57,8 +58,66 @@ pub struct Vote {
     pub extents: Vec<Extent>,
     /// Position and velocity of gauge nodes: gauge index, then x, y, z, vx, vy, vz.
     pub gauges: Vec<(u32, [f64; 6])>,
+    /// State of the elements that are watched: gauge index, and one number per entry of [`crate::state::FIELDS`].
+    pub element_gauges: Vec<(u32, [f64; N_FIELDS])>,
+    /// Contact between the pairs of parts that are watched: index of the pair, ascending; pairs without force are left out.
+    pub contacts: Vec<(u32, PairVote)>,
     /// The first element that went wrong, if any: global index and its volume.
     pub fault: Option<(u32, f64)>,
+    /// Global indices of the elements that eroded in this cycle, ascending.
+    pub eroded: Vec<u32>,
+    /// What left the run with them, and with nodes that were dropped.
+    pub gone: Gone,
+}
+
+/// What left the run in a cycle through erosion: exact sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Gone {
+    /// Internal energy of eroded elements.
+    pub internal: f64,
+    /// Kinetic energy of freed nodes that were dropped.
+    pub kinetic: f64,
+    /// Their momentum.
+    pub momentum: [f64; 3],
+}
+
+impl Gone {
+    /// Adds what left with others.
+    pub fn merge(&mut self, other: &Self) {
+        self.internal += other.internal;
+        self.kinetic += other.kinetic;
+        for a in 0..3 {
+            self.momentum[a] += other.momentum[a];
+        }
+    }
+}
+
+/// What of a run is watched beside its energies, because a deck asks for it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Watched {
+    /// Global element of each element gauge.
+    pub elements: Vec<u32>,
+    /// Pairs of parts.
+    pub contacts: Vec<[u32; 2]>,
+}
+
+/// Contact of one pair of parts in one cycle: exact sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PairVote {
+    /// Force on the first part from the second.
+    pub force: [f64; 3],
+    /// Contacts in force: nodes of either in zones of the other.
+    pub hits: u64,
+}
+
+impl PairVote {
+    /// Adds what other contacts of the same pair give.
+    pub fn merge(&mut self, other: &Self) {
+        for axis in 0..3 {
+            self.force[axis] += other.force[axis];
+        }
+        self.hits += other.hits;
+    }
 }
 
 /// Energies of one part in one cycle.
@@ -93,7 +152,7 @@ impl Vote {
             hits: 0,
             contact: 0.0,
             friction: 0.0,
-            contacts: PairEnergies::default(),
+            contact_energies: PairEnergies::default(),
             external: 0.0,
             momentum: [0.0; 3],
             parts: vec![PartVote::default(); n_parts],
@@ -101,7 +160,11 @@ impl Vote {
             bodies: Vec::new(),
             extents: vec![Extent::NONE; n_parts],
             gauges: Vec::new(),
+            element_gauges: Vec::new(),
+            contacts: Vec::new(),
             fault: None,
+            eroded: Vec::new(),
+            gone: Gone::default(),
         }
     }
 
@@ -120,7 +183,7 @@ impl Vote {
         self.hits += other.hits;
         self.contact += other.contact;
         self.friction += other.friction;
-        self.contacts.merge(&other.contacts);
+        self.contact_energies.merge(&other.contact_energies);
         self.external += other.external;
         for axis in 0..3 {
             self.momentum[axis] += other.momentum[axis];
@@ -141,7 +204,20 @@ impl Vote {
         }
         self.gauges.extend_from_slice(&other.gauges);
         self.gauges.sort_by_key(|g| g.0);
+        self.element_gauges.extend_from_slice(&other.element_gauges);
+        self.element_gauges.sort_by_key(|g| g.0);
+        self.add_contacts(&other.contacts);
         self.note_fault(other.fault);
+        self.add_eroded(&other.eroded);
+        self.gone.merge(&other.gone);
+    }
+
+    /// Joins elements that eroded elsewhere.
+    pub fn add_eroded(&mut self, eroded: &[u32]) {
+        if !eroded.is_empty() {
+            self.eroded.extend_from_slice(eroded);
+            self.eroded.sort_unstable();
+        }
     }
 
     /// Joins what the elements of one block of part `part` said.
@@ -166,6 +242,16 @@ impl Vote {
         self.hits += vote.hits;
         self.contact += vote.energy;
         self.friction += vote.friction;
+    }
+
+    /// Joins contacts of the pairs of parts that are watched.
+    pub fn add_contacts(&mut self, others: &[(u32, PairVote)]) {
+        for (pair, vote) in others {
+            match self.contacts.binary_search_by_key(pair, |(pair, _)| *pair) {
+                Ok(at) => self.contacts[at].1.merge(vote),
+                Err(at) => self.contacts.insert(at, (*pair, *vote)),
+            }
+        }
     }
 
     /// Joins what other nodes gave the walls.
@@ -205,4 +291,6 @@ pub struct Quanta {
     pub energy: crate::exact::Quantum,
     /// Momenta.
     pub momentum: crate::exact::Quantum,
+    /// Quantum of moments over that of forces, a power of two (length).
+    pub arm: f64,
 }

@@ -116,6 +116,7 @@ fn domain() -> Domain {
         bodies: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
+        erosion: Default::default(),
     };
     let base = (cells[0] + 1) * (cells[1] + 1);
     let held: Vec<u16> = (0..n_nodes).map(|n| u16::from(n < base)).collect();
@@ -125,7 +126,7 @@ fn domain() -> Domain {
     let whole = Region::Cells { low: [0; 3], high: cells };
     let pieces = whole.split(4).iter().map(|region| cut(&mesh, &state, 0, region)).collect();
     let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: (0..base).collect() };
-    let mut domain = Domain::new(setup, 1, quanta, vec![subdomain], &[], Width::best());
+    let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], Width::best());
     let plan = Plan { exchange: (n_nodes / 2..n_nodes).collect(), ..Plan::default() };
     domain.install(&plan, &[]).expect("all nodes are held");
     domain

@@ -56,7 +56,9 @@ async fn take(shared: &Shared, stream: TcpStream) -> Result<()> {
         Some((config, _)) => {
             let (stream, identity) = tls::accept(stream, config).await?;
             let (sender, receiver) = link::split(stream, settings());
-            admit(shared, sender, receiver, Some(identity.role)).await
+            let role = identity.role;
+            tls::watch(&sender, identity, None);
+            admit(shared, sender, receiver, Some(role)).await
         }
     }
 }
@@ -67,7 +69,7 @@ async fn admit(
     mut receiver: Receiver,
     certificate: Option<tls::Role>,
 ) -> Result<()> {
-    let policy = Policy { roles: vec![Role::Peer], certificate, token: None };
+    let policy = Policy { roles: vec![Role::Peer], certificate, ..Policy::default() };
     let (mut server, hello) = link::hear(&sender, &mut receiver, policy).await?;
     let (circle, index, news) = match judge(shared, &hello).await {
         Ok(judged) => judged,

@@ -28,11 +28,13 @@ fn assign(cycle: u64) -> Box<Assign> {
             bodies: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
+            erosion: Default::default(),
         },
         n_parts: 1,
-        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum },
+        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
         subdomains: Vec::new(),
         gauges: Vec::new(),
+        watched: Default::default(),
         lanes: None,
         cycle,
         dt_previous: 0.0,
@@ -47,7 +49,18 @@ fn assign(cycle: u64) -> Box<Assign> {
 fn orders(next: u64) -> Orders {
     let force_quantum = Quantum::for_reference(1.0, 42);
     let (dt, time, walls) = (1e-3, 1e-3 * next as f64, Vec::new());
-    Orders { next, dt, time, walls, force_quantum, gather: false, collect: false, stop: false }
+    Orders {
+        next,
+        dt,
+        time,
+        walls,
+        force_quantum,
+        gather: false,
+        blocking: false,
+        collect: false,
+        stop: false,
+        sample: false,
+    }
 }
 
 fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
@@ -97,6 +110,51 @@ fn totals_may_come_before_the_interior_is_done() {
 }
 
 #[test]
+fn a_sample_is_taken_once_between_the_elements_and_integration() {
+    let mut session = in_first_cycle(Orders { sample: true, ..orders(0) });
+    done(&mut session, Outcome::Computed);
+    hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+    done(&mut session, vote());
+    done(&mut session, forces());
+    hear(&mut session, ToWorker::Totals { cycle: 1, orders: orders(2), totals: vec![0.0; 3] });
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Sample { cycle: 1 })]));
+    let actions = done(&mut session, Outcome::Sampled([7; 16]));
+    assert!(matches!(
+        actions[..],
+        [Action::Send(ToMaster::Sample { cycle: 1, hash: [7, ..] }), Action::Compute(Task::Integrate { .. })]
+    ));
+    done(&mut session, vote());
+    done(&mut session, forces());
+    hear(&mut session, ToWorker::Totals { cycle: 2, orders: orders(3), totals: vec![0.0; 3] });
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Integrate { .. })]), "{actions:?}");
+}
+
+#[test]
+fn after_the_last_image_a_sample_is_computed_of_the_cycle_that_will_not_be() {
+    let mut session = in_first_cycle(Orders { stop: true, sample: true, ..orders(0) });
+    done(&mut session, Outcome::Computed);
+    hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
+    let actions = done(&mut session, vote());
+    assert!(matches!(actions[..], [Action::Compute(Task::Image { last: false })]));
+    let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
+    assert!(matches!(
+        actions[..],
+        [
+            Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. }),
+            Action::Compute(Task::Border { gather: false, .. })
+        ]
+    ));
+    let actions = done(&mut session, forces());
+    assert!(matches!(actions[..], [Action::Compute(Task::Interior { .. })]));
+    let actions = done(&mut session, Outcome::Computed);
+    assert!(matches!(actions[..], [Action::Compute(Task::Sample { cycle: 1 })]));
+    let actions = done(&mut session, Outcome::Sampled([9; 16]));
+    assert!(matches!(actions[..], [Action::Send(ToMaster::Sample { cycle: 1, .. })]));
+}
+
+#[test]
 fn a_plan_is_installed_when_it_and_the_guests_are_there() {
     let mut session = in_first_cycle(Orders { gather: true, ..orders(0) });
     done(&mut session, Outcome::Computed);
@@ -116,7 +174,7 @@ fn a_plan_is_installed_when_it_and_the_guests_are_there() {
     let plan =
         Box::new(Plan { guests: vec![Guest { node: 9, mass: 1.0, constraint: 0 }], ..Plan::default() });
     assert_eq!((session.plan_at(2), session.plan_at(3)), (Some(7), None), "that of cycle 3 is still to come");
-    let actions = hear(&mut session, ToWorker::Plan { acts_at: 3, plan, hash: 8 });
+    let actions = hear(&mut session, ToWorker::Plan { gathered_at: 1, acts_at: 3, plan, hash: 8 });
     assert_eq!((session.plan_at(3), session.plan_at(4)), (Some(8), Some(8)));
     assert!(matches!(actions[..], [Action::Compute(Task::Transfer { .. })]));
     let actions = done(&mut session, Outcome::Transferred(vec![0.0; 6]));

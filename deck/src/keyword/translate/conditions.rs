@@ -14,19 +14,17 @@ use super::{
 };
 
 impl Translation<'_> {
-    /// Initial velocities by node; later ones replace earlier ones.
-    pub(super) fn velocities(&self) -> BTreeMap<u32, [f64; 3]> {
+    /// Initial velocities by node, and rotation rates that are not zero; later ones replace earlier ones.
+    pub(super) fn velocities(&self) -> (BTreeMap<u32, [f64; 3]>, BTreeMap<u32, [f64; 3]>) {
         let (problem, log) = (self.problem, self.log);
-        let mut list = BTreeMap::new();
+        let (mut list, mut spins) = (BTreeMap::new(), BTreeMap::new());
         for given in &problem.conditions.velocities {
             let turned = |v| self.turned(v, given.system, given.at);
             let (v, spin) = (turned(given.velocity), turned(given.spin));
+            let own = turned(given.own_turn);
             let inside = (given.inside != 0).then(|| problem.within(given.inside, given.at, log));
             let except =
                 if given.except != 0 { problem.node_set(given.except, given.at, log) } else { Vec::new() };
-            if given.own_turn != [0.0; 3] {
-                log.warn(given.at, "VXR, VYR, VZR: nodes of solids do not turn");
-            }
             for node in self.nodes(given.target, given.at) {
                 let Some(x) = problem.position(node) else { continue };
                 if except.binary_search(&node).is_ok() || inside.as_ref().is_some_and(|inside| !inside(x)) {
@@ -34,9 +32,15 @@ impl Translation<'_> {
                 }
                 let round = cross(spin, minus(x, given.point));
                 list.insert(node, [0, 1, 2].map(|a| v[a] + round[a]));
+                let turn = [0, 1, 2].map(|a| spin[a] + own[a]);
+                if turn == [0.0; 3] {
+                    spins.remove(&node);
+                } else {
+                    spins.insert(node, turn);
+                }
             }
         }
-        list
+        (list, spins)
     }
 
     /// A vector of a coordinate system in global components.
@@ -104,21 +108,23 @@ impl Translation<'_> {
             [true, false, true],
             [true, true, true],
         ];
-        let mut of_node: BTreeMap<u32, ([bool; 3], Place)> = BTreeMap::new();
-        let mut hold = |node: u32, axes: [bool; 3], at: Place| {
-            let entry = of_node.entry(node).or_insert(([false; 3], at));
-            (0..3).for_each(|a| entry.0[a] |= axes[a]);
+        // By node: translations, then rotations.
+        let mut of_node: BTreeMap<u32, ([[bool; 3]; 2], Place)> = BTreeMap::new();
+        let mut hold = |node: u32, axes: [[bool; 3]; 2], at: Place| {
+            let entry = of_node.entry(node).or_insert(([[false; 3]; 2], at));
+            for (all, new) in entry.0.iter_mut().flatten().zip(axes.iter().flatten()) {
+                *all |= new;
+            }
         };
-        for node in problem.nodes.iter().filter(|node| node.held > 0 && self.used.contains(&node.id)) {
-            hold(node.id, CODES[usize::from(node.held)], node.at);
+        for node in problem.nodes.iter().filter(|node| node.held != [0; 2] && self.used.contains(&node.id)) {
+            hold(node.id, node.held.map(|code| CODES[usize::from(code)]), node.at);
         }
         for given in &problem.conditions.held {
-            let local = [given.axes[0], given.axes[1], given.axes[2]];
-            let mut axes = local;
-            if let Some(directions) = self.directions(given.system, given.at)
-                && local != [true; 3]
-            {
-                axes = [false; 3];
+            let [x, y, z, turn_x, turn_y, turn_z] = given.axes;
+            let directions = self.directions(given.system, given.at);
+            let axes = [[x, y, z], [turn_x, turn_y, turn_z]].map(|local| {
+                let Some(directions) = directions.filter(|_| local != [true; 3]) else { return local };
+                let mut axes = [false; 3];
                 for (direction, _) in directions.iter().zip(local).filter(|(_, held)| *held) {
                     match (0..3).find(|a| direction[*a].abs() > 1.0 - 1e-9) {
                         Some(axis) => axes[axis] = true,
@@ -130,23 +136,37 @@ impl Translation<'_> {
                         ),
                     }
                 }
-            }
+                axes
+            });
             for node in self.nodes(given.target, given.at) {
                 hold(node, axes, given.at);
             }
         }
-        let mut groups: BTreeMap<[bool; 3], (Place, Vec<u32>)> = BTreeMap::new();
-        for (node, (axes, at)) in of_node.into_iter().filter(|(_, (axes, _))| *axes != [false; 3]) {
+        let mut groups: BTreeMap<[[bool; 3]; 2], (Place, Vec<u32>)> = BTreeMap::new();
+        for (node, (axes, at)) in of_node {
+            // Only nodes of shells turn.
+            let axes = [axes[0], if self.turns.contains(&node) { axes[1] } else { [false; 3] }];
+            if axes == [[false; 3]; 2] {
+                continue;
+            }
             let group = groups.entry(axes).or_insert((at, Vec::new()));
             group.0 = group.0.min(at);
             group.1.push(node);
         }
         for (axes, (at, nodes)) in groups {
-            let letters: String = (0..3).filter(|a| axes[*a]).map(|a| AXES[a]).collect();
-            let set = self.set(&format!("held {letters}"), nodes);
+            let [letters, turns] =
+                axes.map(|axes| (0..3).filter(|a| axes[*a]).map(|a| AXES[a]).collect::<String>());
+            let name = match (letters.as_str(), turns.as_str()) {
+                (letters, "") => format!("held {letters}"),
+                (letters, turns) => format!("held {letters} turned {turns}"),
+            };
+            let set = self.set(&name, nodes);
             self.draft.heading(at, "[[boundary]]");
             self.draft.line(at, "type = \"fixed\"");
             self.draft.line(at, format!("axes = \"{letters}\""));
+            if !turns.is_empty() {
+                self.draft.line(at, format!("rotations = \"{turns}\""));
+            }
             self.draft.line(at, format!("nodes = \"{set}\""));
         }
     }

@@ -11,11 +11,12 @@ use super::{
         lanes::{Pushes, Statics, Terms},
     },
     joint::{self, Hit, Near},
-    pair_energy::PairEnergies,
+    pair_energy::{ByPair, PairEnergies},
     pairs::Pairs,
     search::{self, Bounds, Candidates},
     sort::sort,
     surface::Surface,
+    tally::Tally,
     watch::Watch,
     work_unit::Batch,
     zone::{
@@ -23,7 +24,7 @@ use super::{
         lanes::{self, Approach, Closest},
     },
 };
-use crate::{exact::Quantum, lanes::Width};
+use crate::{exact::Quantum, lanes::Width, vote::PairVote};
 
 /// A pair at exactly one gap is outside the zone, rounding or not: only nearer ones by this fraction are
 /// inside it at time zero.
@@ -69,6 +70,8 @@ pub struct Contact {
     corners: Vec<[u32; 4]>,
     ids: Vec<u32>,
     parts: Vec<u32>,
+    /// By active face, whether it is a shell; empty if none is.
+    shells: Vec<bool>,
     /// By batch node.
     global: Vec<u32>,
     part: Vec<u32>,
@@ -78,8 +81,8 @@ pub struct Contact {
     smooth: bool,
     /// The only pair of parts that may meet, if there is but one: it has all energy.
     only_pair: Option<[u32; 2]>,
-    /// Energies of the cycle by pair of parts.
-    by_pair: PairEnergies,
+    /// Sums of the cycle by pair of parts.
+    by_pair: ByPair,
     width: Width,
     /// The candidates that can be near before nodes have moved much further.
     watch: Watch,
@@ -139,6 +142,7 @@ impl Contact {
             corners: Vec::new(),
             ids: Vec::new(),
             parts: Vec::new(),
+            shells: Vec::new(),
             global: batch.nodes.iter().map(|n| n.global).collect(),
             part: batch.nodes.iter().map(|n| n.part).collect(),
             statics: Statics {
@@ -148,7 +152,7 @@ impl Contact {
                 face_stiffness: Vec::new(),
             },
             only_pair: settings.only_pair(),
-            by_pair: PairEnergies::default(),
+            by_pair: ByPair::default(),
             smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
             width: Width::best(),
             watch: Watch::default(),
@@ -159,8 +163,12 @@ impl Contact {
             contact.faces.push(face.nodes);
             contact.corners.push(face.nodes.map(|n| batch.nodes[n as usize].global));
             contact.ids.push(face.id);
+            contact.shells.push(super::surface::Face::is_shell(&face.corners));
             contact.parts.push(face.part);
             contact.statics.face_stiffness.push(face.stiffness);
+        }
+        if !contact.shells.contains(&true) {
+            contact.shells.clear();
         }
         for f in &mut candidates.faces {
             *f = index[*f as usize];
@@ -175,8 +183,23 @@ impl Contact {
     }
 
     /// Energies of the last cycle by pair of parts.
-    pub fn by_pair(&self) -> &PairEnergies {
-        &self.by_pair
+    pub fn energies(&self) -> &PairEnergies {
+        &self.by_pair.energies
+    }
+
+    /// From now on the forces between these pairs of parts are summed; none of them for none.
+    pub fn watch_pairs(&mut self, pairs: &[[u32; 2]]) {
+        self.by_pair.forces = (!pairs.is_empty()).then(|| Tally::new(self.n_parts, pairs));
+    }
+
+    /// What [`Contact::forces`] found last between each watched pair that is in contact, by index of the pair.
+    pub fn pair_votes(&self) -> Vec<(u32, PairVote)> {
+        self.by_pair.forces.as_ref().map(Tally::votes).unwrap_or_default()
+    }
+
+    /// The same on lanes of another width, which the machine must have; the forces do not depend on it.
+    pub(crate) fn on(self, width: Width) -> Self {
+        Self { width, ..self }
     }
 
     /// Number of node-face pairs that a cycle looks at.
@@ -229,7 +252,7 @@ impl Contact {
         let mut watch = std::mem::take(&mut self.watch);
         let mut vote = ContactVote { pairs: self.candidates.faces.len() as u64, ..ContactVote::default() };
         let mut by_pair = std::mem::take(&mut self.by_pair);
-        by_pair.clear();
+        by_pair.clear(cycle.force_quantum);
         let mut frequency2 = 0.0;
         if watch.is_stale(cycle.x, &self.settings) {
             self.look(&mut watch, &mut work, cycle.x);
@@ -253,7 +276,7 @@ impl Contact {
         ((first, first_pair), (end, end_pair)): ((u32, u32), (u32, u32)),
         work: &mut Work,
         cycle: &mut Cycle,
-        (vote, by_pair): (&mut ContactVote, &mut PairEnergies),
+        (vote, by_pair): (&mut ContactVote, &mut ByPair),
     ) -> f64 {
         let range = first_pair as usize..end_pair as usize;
         let warning = WARNING * self.settings.gap;
@@ -295,6 +318,12 @@ impl Contact {
         }
     }
 
+    /// Whether an active face is a shell: nodes are outside of it wherever they are.
+    #[inline(always)]
+    fn is_shell(&self, face: u32) -> bool {
+        !self.shells.is_empty() && self.shells[face as usize]
+    }
+
     /// Takes the near features of one node, whose pairs are `start..end` of the block, into the lists; `listed` are the
     /// faces of the block.
     #[inline(always)]
@@ -326,6 +355,9 @@ impl Contact {
                 sides |= if shared { closest.sides(start + i) } else { 0 };
             }
         }
+        if self.is_shell(held[nearest]) {
+            sides = OUTER;
+        }
         // Nodes on the feature, whose line has no direction, and some that are only very near it.
         let touches = least <= 1e-17 * gap * gap;
         if alone && (sides == OUTER || sides == INNER) && !touches {
@@ -348,7 +380,11 @@ impl Contact {
             if closest.distance2[i] < warning * warning {
                 let face = listed[i] as usize;
                 let (id, corners) = (self.ids[face], self.corners[face]);
-                near.push(Near { face: i as u32, id, corners, nearest: closest.nearest(i) });
+                let mut nearest = closest.nearest(i);
+                if self.is_shell(listed[i]) {
+                    nearest.sides = OUTER;
+                }
+                near.push(Near { face: i as u32, id, corners, nearest });
             }
         }
         let frame = |i: u32| {
@@ -379,7 +415,7 @@ impl Contact {
         n: usize,
         work: &mut Work,
         cycle: &mut Cycle,
-        (vote, by_pair): (&mut ContactVote, &mut PairEnergies),
+        (vote, by_pair): (&mut ContactVote, &mut ByPair),
     ) -> f64 {
         let approach = &work.approach;
         let pushes = Pushes {
@@ -401,7 +437,13 @@ impl Contact {
             }
         }
         if sums.deepest > 0.0 {
-            self.share_out(sums.energy, n, work, cycle.energy_quantum, by_pair);
+            self.share_out(sums.energy, n, work, cycle.energy_quantum, &mut by_pair.energies);
+        }
+        if let Some(tally) = &mut by_pair.forces {
+            for (i, _) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+                let parts = (self.part[pairs.node()[i] as usize], self.parts[work.face[i] as usize]);
+                tally.add(parts, [0, 1, 2].map(|a| work.terms[a][i]));
+            }
         }
         vote.energy += sums.energy;
         vote.force_bound =
@@ -443,7 +485,7 @@ impl Contact {
         n: usize,
         work: &mut Work,
         cycle: &mut Cycle,
-        (vote, by_pair): (&mut ContactVote, &mut PairEnergies),
+        (vote, by_pair): (&mut ContactVote, &mut ByPair),
     ) -> f64 {
         let (approach, statics) = (&work.approach, &self.statics);
         let mut frequency2 = 0.0_f64;
@@ -480,7 +522,11 @@ impl Contact {
             });
             let reaction = force::react(&push, sliding.as_ref(), cycle.force_quantum, cycle.energy_quantum);
             vote.count(&reaction);
-            by_pair.add(self.part[node], self.parts[face], reaction.energy, reaction.friction);
+            let parts = (self.part[node], self.parts[face]);
+            by_pair.energies.add(parts.0, parts.1, reaction.energy, reaction.friction);
+            if let Some(tally) = &mut by_pair.forces {
+                tally.add(parts, reaction.node);
+            }
             for a in 0..3 {
                 let f = &mut cycle.f[a];
                 f[node] += reaction.node[a];

@@ -1,6 +1,26 @@
-//! Energies of contact by pair of parts.
+//! What contact books by pair of parts.
 
 use serde::{Deserialize, Serialize};
+
+use super::tally::Tally;
+use crate::exact::Quantum;
+
+/// Sums of one cycle by pair of parts: energies of all pairs that touch, forces of those that are watched.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ByPair {
+    pub(super) energies: PairEnergies,
+    pub(super) forces: Option<Tally>,
+}
+
+impl ByPair {
+    /// Empty sums of a cycle whose forces are multiples of a quantum.
+    pub(super) fn clear(&mut self, force_quantum: Quantum) {
+        self.energies.clear();
+        if let Some(forces) = &mut self.forces {
+            forces.clear(force_quantum);
+        }
+    }
+}
 
 /// Energies of one pair of parts, exact sums.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -67,7 +67,9 @@ impl Sides {
             }
         };
         let mut parts = vec![nothing; n_parts];
-        for (&p, &part) in x.iter().zip(&surface.node_part) {
+        for ((&p, &part), _) in
+            x.iter().zip(&surface.node_part).zip(&surface.active).filter(|(_, active)| **active)
+        {
             grow(&mut parts[part as usize], p, p);
         }
         for &(node, part) in &surface.joined {
@@ -83,8 +85,10 @@ impl Sides {
                 [around[0].map(|low| low - reach), around[1].map(|high| high + reach)]
             })
             .collect();
-        let outside: Vec<u8> =
-            x.iter().zip(&surface.node_part).map(|(&p, &part)| side(&boxes[part as usize], p)).collect();
+        let of_node = |((&p, &part), &active): ((&[f64; 3], &u32), &bool)| {
+            if active { side(&boxes[part as usize], p) } else { INACTIVE }
+        };
+        let outside: Vec<u8> = x.iter().zip(&surface.node_part).zip(&surface.active).map(of_node).collect();
         let beside = |face: &Face, n: u32| {
             if surface.node_part[n as usize] == face.part {
                 outside[n as usize]
@@ -97,6 +101,9 @@ impl Sides {
         Self { outside, faces }
     }
 }
+
+/// What stands for a node that takes no part in contact.
+const INACTIVE: u8 = 1 << 6;
 
 /// A bit for each side of a box on which a point lies outside.
 #[inline(always)]

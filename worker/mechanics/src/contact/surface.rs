@@ -3,14 +3,21 @@
 //! A face is outside if no second element that is alive has the same corner nodes; faces between joined parts
 //! are therefore inside. A face of a degenerate element counts with its distinct nodes and vanishes with fewer
 //! than three. The surface holds static data only; positions come from the caller, by surface node.
+//!
+//! Where elements erode the surface is collected anew without them. All nodes of parts that can erode are then among its nodes
+//! from the start, so that the nodes whose positions and votes travel stay the same; [`Surface::active`] says which of them
+//! can meet anything: those on faces, and those that have no element left.
 
-use crate::{element::hex8, material::Material, mesh::Mesh};
+use crate::{material::Material, mesh::Mesh};
 
 pub use crate::mesh::FACES as SIDES;
 
 /// Depth (gaps) within which the penalty stops a node at the closing speed of its part; the rest of 0.9 is for the bodies
 /// behind it.
 const STOPPING_DEPTH: f64 = 0.75;
+
+/// The side of a shell that stands for it, an index into [`SIDES`].
+const UPPER: usize = 1;
 
 /// The outer faces of a mesh and their nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,6 +33,8 @@ pub struct Surface {
     /// edge, 1/4 at a corner. The penalty takes this share, as the node carries that share of the pressure; otherwise
     /// the light nodes of edges and corners would rule the time step.
     pub node_share: Vec<f64>,
+    /// Whether each surface node takes part in contact. Not those inside a part that can erode, nor those that were dropped.
+    pub active: Vec<bool>,
     /// Faces by element, then side.
     pub faces: Vec<Face>,
     /// Nodes that joined parts share, with each part of theirs beside that of `node_part`: such a node interacts as one of the
@@ -53,6 +62,11 @@ pub struct Face {
 }
 
 impl Face {
+    /// Whether it is a shell, which pushes nodes away on both its sides.
+    pub fn is_shell(corners: &[u32; 8]) -> bool {
+        corners[..4] == corners[4..] && corners[0] != corners[1]
+    }
+
     /// A number that stays with this face when the surface is redefined.
     pub fn key(&self) -> u64 {
         u64::from(self.element) * 6 + u64::from(self.side)
@@ -73,6 +87,22 @@ impl Surface {
     /// # Panics
     /// If a part names a material or a node that does not exist: the deck has checked both.
     pub fn new(mesh: &Mesh, materials: &[Material], alive: &dyn Fn(u32) -> bool) -> Self {
+        Self::eroded(mesh, materials, alive, &[], true)
+    }
+
+    /// The same with all nodes of the parts that can erode, whose flags are `erodes` (none for no part). Nodes of theirs without
+    /// an element that is alive take part if inertia is retained. Nodal masses and shares are those of all elements, for
+    /// mass stays at the nodes.
+    ///
+    /// # Panics
+    /// As [`Surface::new`].
+    pub fn eroded(
+        mesh: &Mesh,
+        materials: &[Material],
+        alive: &dyn Fn(u32) -> bool,
+        erodes: &[bool],
+        retain_inertia: bool,
+    ) -> Self {
         let mut outer = outer_sides(mesh, alive);
         outer.sort_unstable();
         let offsets = mesh.element_offsets();
@@ -87,13 +117,24 @@ impl Surface {
             let bulk = materials[mesh.parts[part].material as usize].bulk();
             let nodes = SIDES[side as usize].map(|c| corners[c]);
             let area = area(nodes.map(|n| mesh.positions[n as usize]));
-            let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
+            let volume = mesh.parts[part].volume(&corners.map(|n| mesh.positions[n as usize]));
             for n in nodes {
                 index[n as usize] = 0;
             }
-            let stiffness = if volume > 0.0 { bulk * area * area / volume } else { 0.0 };
+            let stiffness = match mesh.parts[part].section() {
+                // As the shell itself resists in its plane: across its thickness it would rule the time step.
+                Some(section) => bulk * section.thickness,
+                None if volume > 0.0 => bulk * area * area / volume,
+                None => 0.0,
+            };
             let part = part as u32;
             faces.push(Face { nodes, element, side, part, stiffness, corners, own: [u32::MAX; 8] });
+        }
+        let on_faces = index.clone();
+        for (part, _) in mesh.parts.iter().zip(erodes).filter(|(_, erodes)| **erodes) {
+            for &n in &part.nodes {
+                index[n as usize] = 0;
+            }
         }
         let nodes: Vec<u32> = (0..mesh.n_nodes() as u32).filter(|&n| index[n as usize] == 0).collect();
         for (i, &n) in nodes.iter().enumerate() {
@@ -104,21 +145,42 @@ impl Surface {
         let mut node_share = vec![0.0; nodes.len()];
         let mut count = vec![0_u32; nodes.len()];
         let mut around = vec![0.0; nodes.len()];
-        let mut element = 0;
-        for part in &mesh.parts {
+        let freed = freed(mesh, alive, erodes, &nodes);
+        let active: Vec<bool> = (0..)
+            .zip(&nodes)
+            .map(|(i, &n)| on_faces[n as usize] == 0 || (retain_inertia && freed.get(i) == Some(&true)))
+            .collect();
+        for (p, part) in (0..).zip(&mesh.parts) {
+            let bulk = materials[part.material as usize].bulk();
             for e in 0..part.n_elements() {
                 let corners = part.corners(e);
-                if alive(element) && corners.iter().any(|&n| index[n as usize] != u32::MAX) {
-                    let volume = hex8::volume(&corners.map(|n| mesh.positions[n as usize]));
-                    for n in corners.map(|n| index[n as usize]).into_iter().filter(|&n| n != u32::MAX) {
-                        around[n as usize] += 0.125 * volume;
+                if corners.iter().all(|&n| index[n as usize] == u32::MAX) {
+                    continue;
+                }
+                let positions = corners.map(|n| mesh.positions[n as usize]);
+                let volume = part.volume(&positions);
+                for (corner, n) in corners.iter().map(|&n| index[n as usize] as usize).enumerate() {
+                    if n == u32::MAX as usize {
+                        continue;
+                    }
+                    around[n] += 0.125 * volume;
+                    if on_faces[nodes[n] as usize] == 0 {
+                        continue;
+                    }
+                    // A node without faces is as stiff as the sides that it was a corner of.
+                    node_part[n] = node_part[n].min(p);
+                    for side in SIDES.iter().filter(|side| active[n] && side.contains(&corner)) {
+                        let area = area(side.map(|c| positions[c]));
+                        node_stiffness[n] += if volume > 0.0 { bulk * area * area / volume } else { 0.0 };
+                        node_share[n] += volume;
+                        count[n] += 1;
                     }
                 }
-                element += 1;
             }
         }
         for face in &mut faces {
-            let face_volume = hex8::volume(&face.corners.map(|n| mesh.positions[n as usize]));
+            let x = face.corners.map(|n| mesh.positions[n as usize]);
+            let face_volume = mesh.parts[face.part as usize].volume(&x);
             face.nodes = face.nodes.map(|n| index[n as usize]);
             for (i, n) in face.corners.into_iter().enumerate() {
                 if !face.corners[..i].contains(&n) {
@@ -132,7 +194,7 @@ impl Surface {
                 count[n] += 1;
             }
         }
-        for n in 0..nodes.len() {
+        for n in (0..nodes.len()).filter(|&n| count[n] > 0) {
             node_stiffness[n] /= f64::from(count[n]);
             let half_mean = 0.5 * node_share[n] / f64::from(count[n]);
             node_share[n] = if half_mean > 0.0 { (around[n] / half_mean).min(1.0) } else { 1.0 };
@@ -144,7 +206,7 @@ impl Surface {
             .collect();
         joined.sort_unstable();
         joined.dedup();
-        Self { nodes, node_part, node_stiffness, node_share, faces, joined }
+        Self { nodes, node_part, node_stiffness, node_share, active, faces, joined }
     }
 
     /// Raises stiffness where bodies close in so fast that `K A^2 / V` could not stop them inside the gap.
@@ -162,11 +224,13 @@ impl Surface {
         let depth = STOPPING_DEPTH * settings.gap;
         let mut sum = vec![0.0; self.nodes.len()];
         let mut count = vec![0_u32; self.nodes.len()];
-        for face in &mut self.faces {
-            let part = face.part as usize;
+        let least = |part: usize, corners: &[u32; 8]| {
             let density = materials[mesh.parts[part].material as usize].density;
-            let mass = density * hex8::volume(&face.corners.map(|n| mesh.positions[n as usize]));
-            let least = 0.5 * mass * speed[part] * speed[part] / (depth * depth * settings.stiffness);
+            let mass = density * mesh.parts[part].volume(&corners.map(|n| mesh.positions[n as usize]));
+            0.5 * mass * speed[part] * speed[part] / (depth * depth * settings.stiffness)
+        };
+        for face in &mut self.faces {
+            let least = least(face.part as usize, &face.corners);
             face.stiffness = face.stiffness.max(least);
             for n in face.nodes {
                 sum[n as usize] += face.stiffness;
@@ -174,7 +238,24 @@ impl Surface {
             }
         }
         for (n, stiffness) in self.node_stiffness.iter_mut().enumerate() {
-            *stiffness = sum[n] / f64::from(count[n].max(1));
+            if count[n] > 0 {
+                *stiffness = sum[n] / f64::from(count[n]);
+            }
+        }
+        let freed = |n: usize| self.active[n] && count[n] == 0;
+        if !(0..self.nodes.len()).any(freed) {
+            return;
+        }
+        for (p, part) in mesh.parts.iter().enumerate() {
+            for e in 0..part.n_elements() {
+                let corners = part.corners(e);
+                for node in corners {
+                    let Ok(n) = self.nodes.binary_search(&node) else { continue };
+                    if self.active[n] && count[n] == 0 {
+                        self.node_stiffness[n] = self.node_stiffness[n].max(least(p, &corners));
+                    }
+                }
+            }
         }
     }
 
@@ -220,6 +301,24 @@ impl Surface {
     }
 }
 
+/// Whether each of `nodes` (ascending) is of parts that can erode and has no element that is alive; empty if no part can.
+fn freed(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, erodes: &[bool], nodes: &[u32]) -> Vec<bool> {
+    if !erodes.contains(&true) {
+        return Vec::new();
+    }
+    let mut held = vec![false; mesh.n_nodes()];
+    let mut element = 0;
+    for part in &mesh.parts {
+        for e in 0..part.n_elements() {
+            if alive(element) {
+                part.corners(e).into_iter().for_each(|n| held[n as usize] = true);
+            }
+            element += 1;
+        }
+    }
+    nodes.iter().map(|&n| !held[n as usize]).collect()
+}
+
 /// Element and side of every outer face, in no order. Sides are bucketed by their lowest node, so that each
 /// is compared with a few others only.
 fn outer_sides(mesh: &Mesh, alive: &dyn Fn(u32) -> bool) -> Vec<(u32, u32)> {
@@ -254,7 +353,10 @@ fn for_each_side(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, visit: &mut dyn FnMut
         for e in 0..part.n_elements() {
             if alive(element) {
                 let corners = part.corners(e);
-                for (side, local) in SIDES.iter().enumerate() {
+                // A shell is one face, whose zone acts on both its sides: the upper.
+                let of_shell = part.section().is_some();
+                for (side, local) in SIDES.iter().enumerate().filter(|(side, _)| !of_shell || *side == UPPER)
+                {
                     let mut key = local.map(|c| corners[c]);
                     key.sort_unstable();
                     for i in 1..4 {

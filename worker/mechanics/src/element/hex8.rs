@@ -442,7 +442,7 @@ fn balanced<L: Lane>(forces: [L; 8], active: L::Mask, magic: L, largest: &mut L)
 /// # Safety
 /// As [`compute`].
 #[inline(always)]
-unsafe fn corners<L: Lane>(layout: &Layout, from: &[f64], slot: usize) -> [L; 8] {
+pub(crate) unsafe fn corners<L: Lane>(layout: &Layout, from: &[f64], slot: usize) -> [L; 8] {
     // SAFETY: the caller's promise covers every access here.
     unsafe {
         match layout {

@@ -33,6 +33,16 @@ impl<L: Lane> Spread<L> {
         s
     }
 
+    /// `sum a a^T` over three vectors.
+    #[inline(always)]
+    pub fn gram([a, b, c]: [&Vector<L>; 3]) -> Self {
+        let mut s =
+            Self { xx: a.x * a.x, yy: a.y * a.y, zz: a.z * a.z, xy: a.x * a.y, yz: a.y * a.z, zx: a.z * a.x };
+        s.add(b);
+        s.add(c);
+        s
+    }
+
     #[inline(always)]
     fn add(&mut self, g: &Vector<L>) {
         self.xx = g.x.mul_add(g.x, self.xx);

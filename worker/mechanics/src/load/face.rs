@@ -36,7 +36,7 @@ pub(crate) struct FaceVote {
     pub limit: f64,
 }
 
-/// The loaded faces of a block.
+/// The loaded faces of a block: those of elements that take part.
 pub(crate) fn faces_of(block: &Block, loads: &Loads, material: &Material) -> Vec<LoadedFace> {
     let mut local: Vec<(u32, usize)> = block.elements.iter().copied().zip(0..).collect();
     local.sort_unstable();
@@ -48,7 +48,7 @@ pub(crate) fn faces_of(block: &Block, loads: &Loads, material: &Material) -> Vec
     let mut found: Vec<(usize, LoadedFace)> = Vec::new();
     for (load, surface) in (0..).zip(&loads.surfaces) {
         for &(element, side) in &surface.faces {
-            if let Some(e) = find(element) {
+            if let Some(e) = find(element).filter(|&e| block.is_alive(e)) {
                 let corners = block.corners(e);
                 let (force, power) = ([[0.0; 3]; 4], 0.0);
                 found.push((e, LoadedFace { load, side, corners, together: 0.0, impedance, force, power }));

@@ -45,7 +45,13 @@ fn spinning(size: [f64; 3], spin: [f64; 3]) -> Body {
 
 fn advance(loads: &Loads, time: f64, dt: f64) -> Advance<'_> {
     let q = Quantum::for_reference(1e6, 46);
-    Advance { dt_previous: dt, dt, time, loads, quanta: Quanta { force: q, energy: q, momentum: q } }
+    Advance {
+        dt_previous: dt,
+        dt,
+        time,
+        loads,
+        quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
+    }
 }
 
 #[test]

@@ -163,6 +163,8 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
         mass,
         initial_volume,
         fields,
+        erosion: None,
+        shells: mechanics::state::ShellState::default(),
     }
 }
 
@@ -234,6 +236,7 @@ pub fn bare_step(dt: f64, force: f64, energy: f64) -> Step {
         hourglass: 0.0,
         force_quantum: Quantum::for_reference(force, 49),
         energy_quantum: Quantum::for_reference(energy, 49),
+        arm: 1.0,
     }
 }
 
@@ -246,6 +249,7 @@ pub fn full_step(dt: f64) -> Step {
         hourglass: 0.1,
         force_quantum: Quantum::for_reference(3e7, 42),
         energy_quantum: Quantum::for_reference(1e6, 42),
+        arm: 1.0,
     }
 }
 

@@ -1,0 +1,175 @@
+//! Erosion as the master sees it: who eroded when, and the cycles at which the surface changes for it.
+//!
+//! The vote of cycle `n` names the elements that eroded in it. Positions travel at the start of cycle `n + 3`, all wait for the
+//! sort of them, and from cycle `n + 4` on its plan acts, with a surface without those elements. That is counted from the
+//! cycle of erosion alone, so an epoch that begins in between goes on with it.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use deck::model::Model;
+use mechanics::{
+    contact::Surface,
+    erosion::{ALIVE, SURFACE_LAG},
+    initial,
+    state::GlobalState,
+};
+
+use super::{Bench, Job, epoch::SortUnderWay};
+
+/// What has eroded, in one epoch.
+pub(super) struct Eroded {
+    /// Cycle of erosion by global element, or [`ALIVE`].
+    cycles: Vec<u64>,
+    /// Elements whose faces are still on the surface, by the cycle in which they eroded.
+    pending: BTreeMap<u64, Vec<u32>>,
+}
+
+impl Eroded {
+    /// What has eroded before the cycle that `state` begins; none where nothing can erode.
+    pub(super) fn new(state: &GlobalState) -> Option<Self> {
+        if state.eroded.is_empty() {
+            return None;
+        }
+        let mut eroded = Self { cycles: state.eroded.clone(), pending: BTreeMap::new() };
+        for (element, &cycle) in (0..).zip(&state.eroded) {
+            if cycle != ALIVE && !leaves_before(cycle, state.cycle) {
+                eroded.pending.entry(cycle).or_default().push(element);
+            }
+        }
+        Some(eroded)
+    }
+
+    /// Takes what a vote of `cycle` says.
+    ///
+    /// # Errors
+    /// If it names an element that there is not.
+    pub(super) fn note(&mut self, cycle: u64, elements: &[u32]) -> Result<(), String> {
+        for &element in elements {
+            let n = self.cycles.len();
+            let known = self
+                .cycles
+                .get_mut(element as usize)
+                .ok_or_else(|| format!("element index {element} eroded, the problem has {n} elements"))?;
+            if *known == ALIVE {
+                *known = cycle;
+                self.pending.entry(cycle).or_default().push(element);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether positions travel at the start of `cycle` for a surface that changes in the cycle after.
+    pub(super) fn changes_surface(&self, cycle: u64) -> bool {
+        (cycle + 1).checked_sub(SURFACE_LAG).is_some_and(|eroded| self.pending.contains_key(&eroded))
+    }
+
+    /// The elements whose faces leave the surface in the cycle after `cycle` are on their way.
+    pub(super) fn settle(&mut self, cycle: u64) {
+        self.pending.retain(|&eroded, _| !leaves_before(eroded, cycle + 1));
+    }
+
+    /// Whether an element has a share in the surface at `cycle`.
+    pub(super) fn is_on_surface(&self, element: u32, cycle: u64) -> bool {
+        self.cycles.get(element as usize).is_none_or(|&eroded| !leaves_before(eroded, cycle))
+    }
+
+    /// Which elements are alive, by global index.
+    pub(super) fn alive(&self) -> Vec<bool> {
+        self.cycles.iter().map(|&cycle| cycle == ALIVE).collect()
+    }
+
+    /// The surface in force at `cycle`.
+    pub(super) fn surface(&self, model: &Model, cycle: u64) -> Arc<Surface> {
+        surface(model, &|element| self.is_on_surface(element, cycle))
+    }
+
+    /// Nodes that have no element left at `cycle` (global indices, ascending), where those are dropped.
+    pub(super) fn dropped(&self, model: &Model, cycle: u64) -> Vec<u32> {
+        let erosion = &model.setup.erosion;
+        if erosion.retain_inertia {
+            return Vec::new();
+        }
+        let mut held = vec![false; model.mesh.n_nodes()];
+        let mut element = 0;
+        for part in &model.mesh.parts {
+            for e in 0..part.n_elements() {
+                if self.is_on_surface(element, cycle) {
+                    part.corners(e).into_iter().for_each(|n| held[n as usize] = true);
+                }
+                element += 1;
+            }
+        }
+        (0..held.len() as u32).filter(|&n| !held[n as usize]).collect()
+    }
+}
+
+impl Job {
+    /// Whether positions travel at the start of `cycle` because elements have eroded.
+    pub(super) fn surface_changes_at(&self, cycle: u64) -> bool {
+        self.epoch.bench.is_some()
+            && self.epoch.eroded.as_ref().is_some_and(|eroded| eroded.changes_surface(cycle))
+    }
+
+    /// Enters a gathering at the start of `cycle`. A blocking one takes the place of sorts and plans that would act later than
+    /// it does: they know the old surface.
+    pub(super) fn gather_at(&mut self, cycle: u64, blocking: bool) {
+        let epoch = &mut self.epoch;
+        let lag = if blocking { 1 } else { u64::from(self.model.setup.control.sort_lag) };
+        if blocking {
+            // Frames of the newest complete cycles have come and their sorts are begun; the others are not asked for.
+            let begun = epoch.completed;
+            epoch.sorts_under_way.retain(|sort| sort.acts_at <= cycle || sort.gathered < begun);
+            for sort in epoch.sorts_under_way.iter_mut().filter(|sort| sort.acts_at > cycle) {
+                sort.replaced = true;
+            }
+            while epoch.exchanges.back().is_some_and(|acting| acting.at > cycle) {
+                epoch.exchanges.pop_back();
+            }
+        }
+        let sort = SortUnderWay { gathered: cycle, acts_at: cycle + lag, blocking, replaced: false };
+        epoch.sorts_under_way.push_back(sort);
+        epoch.last_gather = cycle;
+    }
+
+    /// What the sort of the positions of `cycle` works on. The surface changes with a blocking one, for good.
+    pub(super) fn bench_for(&mut self, cycle: u64, blocking: bool) -> Option<Arc<Bench>> {
+        let bench = self.epoch.bench.clone()?;
+        let Some(eroded) = self.epoch.eroded.as_mut().filter(|_| blocking) else { return Some(bench) };
+        let surface = eroded.surface(&self.model, cycle + 1);
+        let mut dropped = eroded.dropped(&self.model, cycle + 1);
+        let before = eroded.dropped(&self.model, cycle);
+        dropped.retain(|node| before.binary_search(node).is_err());
+        eroded.settle(cycle);
+        self.epoch.bench = Some(Arc::new(bench.with_surface(Arc::clone(&surface), Vec::new())));
+        Some(Arc::new(bench.with_surface(surface, dropped)))
+    }
+
+    /// Which elements are alive by what is known in this epoch; none where nothing can erode.
+    pub(super) fn alive(&self) -> Option<Vec<bool>> {
+        self.epoch.eroded.as_ref().map(Eroded::alive)
+    }
+}
+
+/// Whether the faces of an element that eroded in cycle `eroded` have left the surface at `cycle`.
+fn leaves_before(eroded: u64, cycle: u64) -> bool {
+    eroded.saturating_add(SURFACE_LAG) <= cycle
+}
+
+/// The contact surface in force in the cycle of a state, where elements have eroded; none where it is still the first.
+pub(crate) fn surface_of(model: &Model, state: &GlobalState) -> Option<Arc<Surface>> {
+    let eroded = Eroded::new(state).filter(|_| state.n_eroded() > 0)?;
+    Some(eroded.surface(model, state.cycle))
+}
+
+/// The surface of the elements for which `stands` holds, with the nodes of all parts that can erode.
+pub(super) fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Arc<Surface> {
+    let setup = &model.setup;
+    let erodes: Vec<bool> = setup.erosion.parts.iter().map(Option::is_some).collect();
+    let retain_inertia = setup.erosion.retain_inertia;
+    let mut surface = Surface::eroded(&model.mesh, &setup.materials, stands, &erodes, retain_inertia);
+    if let Some(settings) = &setup.contact {
+        let speed = initial::closing_speeds(&model.mesh, settings, &model.velocity);
+        surface.stiffen(&model.mesh, &setup.materials, settings, &speed);
+    }
+    Arc::new(surface)
+}

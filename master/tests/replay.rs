@@ -1,0 +1,96 @@
+//! Workers whose numbers are wrong, in one process: found by name, and the run has the bits of one without them.
+
+use master::{
+    embedded::Fate,
+    event::{Hand, Keep, Options},
+};
+use protocol::message::Route;
+use tests::{
+    bits::Fingerprint,
+    solve::{Crew, Solved, model, solve, solve_through},
+};
+
+const PLATES: &str = r#"
+    title = "small plates"
+    units = "cm-g-us"
+    [control]
+    end_cycle = 90
+    end_time = 1e3
+    plan_interval = 7
+    sort_lag = 4
+    [[part]]
+    name = "target"
+    material = "AL_2024_T351"
+    box = { origin = [0, 0, 0], size = [6, 5, 3], cells = [6, 5, 3] }
+    [[part]]
+    name = "projectile"
+    material = "STEEL_1006"
+    velocity = [0.02, 0.01, -0.05]
+    box = { origin = [1.3, 0.7, 3.2], size = [3, 3, 2], cells = [3, 3, 2] }
+    [contact]
+    gap_length = 0.15
+    [[load]]
+    type = "pressure"
+    parts = ["target"]
+    face = "k-min"
+    pressure = 1e-4
+    [output]
+    history_cycles = 3
+"#;
+
+fn crew(workers: usize, replay: bool, route: Route) -> Crew {
+    let options = Options { keep: Keep::Cycles(10), replay, route, ..Options::default() };
+    Crew { options, ..Crew::of(workers) }
+}
+
+fn run(crew: Crew, fate: &mut (dyn FnMut(u64) -> Option<Fate> + Send)) -> Result<Solved, String> {
+    solve_through(model(PLATES), crew, fate)
+}
+
+#[test]
+fn samples_of_right_numbers_agree_on_any_workers_and_threads_and_change_no_bit() {
+    let plain = Fingerprint::of(&solve(model(PLATES), crew(1, false, Route::Master)).expect("a good run"));
+    for (workers, threads) in [(1, 1), (2, 3), (5, 1)] {
+        for route in [Route::Master, Route::Direct] {
+            let solved = solve(model(PLATES), Crew { threads, ..crew(workers, true, route) });
+            let solved = solved.unwrap_or_else(|e| panic!("{workers} workers: {e}"));
+            plain.assert_equal(&Fingerprint::of(&solved), &format!("{workers} workers, {route:?}"));
+            assert!(solved.outcome.losses.is_empty(), "{:?}", solved.outcome.losses);
+        }
+    }
+}
+
+#[test]
+fn one_unit_in_the_last_place_of_one_worker_is_found_by_name_and_leaves_no_trace() {
+    let plain = Fingerprint::of(&solve(model(PLATES), crew(3, false, Route::Master)).expect("a good run"));
+    for at in [0, 40, 333, 700, 1100] {
+        for route in [Route::Master, Route::Direct] {
+            // One joins as well: the run is dealt out anew from a state that nobody has proved yet.
+            let mut fate = |number: u64| match number.checked_sub(at) {
+                Some(0) => Some(Fate::Spoil(1)),
+                Some(25) => Some(Fate::Join(Hand { name: "late".into(), speed: 1.0, threads: 1 })),
+                _ => None,
+            };
+            let solved = run(crew(3, true, route), &mut fate).unwrap_or_else(|e| panic!("at {at}: {e}"));
+            plain.assert_equal(&Fingerprint::of(&solved), &format!("spoilt at {at}, {route:?}"));
+            let [loss] = &solved.outcome.losses[..] else { panic!("{:?}", solved.outcome.losses) };
+            assert_eq!(loss.worker, "worker-1");
+            assert!(loss.why.contains("computed again to") && loss.why.contains("block"), "{}", loss.why);
+        }
+    }
+}
+
+#[test]
+fn without_samples_the_same_fault_changes_the_bits() {
+    let plain = solve(model(PLATES), crew(3, false, Route::Master)).expect("a good run");
+    let mut fate = |number: u64| (number == 333).then_some(Fate::Spoil(1));
+    let spoilt = run(crew(3, false, Route::Master), &mut fate).expect("nobody looks");
+    assert_ne!(plain.outcome.digest, spoilt.outcome.digest);
+}
+
+#[test]
+fn when_all_workers_differ_the_master_is_suspected() {
+    let mut fate = |number: u64| (number < 2).then_some(Fate::Spoil(number as usize));
+    let why = run(crew(2, true, Route::Master), &mut fate).err().expect("nobody agrees");
+    assert!(why.contains("all 2 workers differ") && why.contains("look at its host"), "{why}");
+}

@@ -1,0 +1,235 @@
+//! What goes wrong in the world of one seed, and when.
+
+use std::sync::Arc;
+
+use deck::Model;
+use master::event::{ForceSorts, Keep, Options};
+use protocol::message::Route;
+
+use super::{Draws, Played, play, seen};
+use crate::{bits::Fingerprint, solve::model};
+
+/// One thing that goes wrong. Hosts are picked among those alive by a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A process is gone with all that it knew; another may start on its host.
+    Crash {
+        /// Which.
+        host: u64,
+        /// Whether it is started again.
+        returns: bool,
+    },
+    /// Nothing passes between master and worker for a while; if long, the master gives the worker up and it calls anew.
+    Cut {
+        /// Which.
+        host: u64,
+        /// Longer than the master waits.
+        long: bool,
+    },
+    /// The link between two workers ends with what is on it.
+    PairCut {
+        /// One.
+        host: u64,
+        /// The other, or the same: then nothing happens.
+        other: u64,
+    },
+    /// A host becomes so many times as slow.
+    Slow {
+        /// Which.
+        host: u64,
+        /// How many times.
+        factor: u64,
+    },
+    /// From now on a host's elements are wrong by one unit in the last place.
+    Spoil {
+        /// Which.
+        host: u64,
+    },
+    /// A worker comes.
+    Join,
+    /// The master is gone, and starts anew from the disk.
+    Master,
+    /// The master is told to leave: it stores the run, and another one goes on with it.
+    Leave,
+}
+
+/// What goes wrong, by the number of the happening before which it does.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Plot {
+    /// Workers at the start.
+    pub workers: usize,
+    /// The cycle at which the disk gets a snapshot.
+    pub snapshot_at: Option<u64>,
+    /// Latest first.
+    faults: Vec<(u64, Fault)>,
+    /// Sessions with a planted fault: the master takes messages of epochs that are over.
+    pub(super) unfenced: bool,
+    /// Members that the job has had.
+    pub(super) members: usize,
+}
+
+impl Plot {
+    /// Nothing goes wrong.
+    pub fn quiet(workers: usize) -> Self {
+        Self { workers, members: workers, ..Self::default() }
+    }
+
+    /// The fault that is due, if one is.
+    pub(super) fn due(&mut self, count: u64) -> Option<Fault> {
+        if self.faults.last().is_some_and(|(at, _)| *at <= count) {
+            self.faults.pop().map(|(_, fault)| fault)
+        } else {
+            None
+        }
+    }
+}
+
+/// The problem, the answer, and how many things happen on the way to it.
+pub struct Stage {
+    model: Arc<Model>,
+    answer: (Fingerprint, Vec<(u64, u64)>),
+    length: u64,
+}
+
+/// Two small blocks that collide askew on a wall of finite mass, a plate of shells behind them, with friction and a gauge: a
+/// few cells, many cycles.
+const DECK: &str = r#"
+    title = "two small blocks"
+    units = "cm-g-us"
+    [control]
+    end_cycle = 60
+    end_time = 1e3
+    plan_interval = 7
+    sort_lag = 4
+    [[part]]
+    name = "target"
+    material = "AL_2024_T351"
+    box = { origin = [0, 0, 0], size = [4, 3, 2], cells = [4, 3, 2] }
+    [[part]]
+    name = "projectile"
+    material = "STEEL_1006"
+    velocity = [0.03, 0.01, -0.08]
+    box = { origin = [1.3, 0.7, 2.2], size = [2, 2, 1], cells = [2, 2, 1] }
+    [[part]]
+    name = "plate"
+    material = "AL_2024_T351"
+    velocity = [0, 0, -0.14]
+    shell = { thickness = 0.3 }
+    plate = { origin = [1.2, 0.8, 3.4], side_i = [2, 0.1, 0], side_j = [0, 2, 0.1], cells = [2, 3] }
+    [contact]
+    gap_length = 0.15
+    friction = 0.1
+    [[wall]]
+    point = [0, 0, -0.02]
+    normal = [0, 0, 1]
+    mass = 5000
+    velocity = { z = 0.001 }
+    parts = ["target"]
+    [output]
+    history_cycles = 3
+    period = 2
+    [[gauge]]
+    name = "struck face"
+    part = "target"
+    point = [2, 1, 2]
+"#;
+
+fn options() -> Options {
+    Options {
+        waits: true,
+        states: true,
+        force_sorts: ForceSorts::Seeded(11),
+        replay: true,
+        ..Options::default()
+    }
+}
+
+impl Stage {
+    /// Plays it undisturbed.
+    ///
+    /// # Panics
+    /// If that fails, or has no contact.
+    pub fn new() -> Self {
+        let model = Arc::new(model(DECK));
+        let Played { solved, count } = match play(&model, &options(), 0, Plot::quiet(3)) {
+            Ok(played) => played,
+            Err(why) => panic!("the undisturbed run: {why}"),
+        };
+        assert!(solved.outcome.ledger.worst_penetration > 0.0, "no contact");
+        assert!(solved.states.len() > 3 && solved.rows.len() > 15, "{} states", solved.states.len());
+        Self { model, answer: seen(&solved), length: count }
+    }
+
+    /// The plot of a seed.
+    pub fn plot(&self, seed: u64) -> (Plot, Options) {
+        let mut draws = Draws::new(seed);
+        let workers = 1 + draws.below(4) as usize;
+        let route = [Route::Master, Route::Direct][draws.below(2) as usize];
+        let keep = match draws.below(4) {
+            0 => Keep::Never,
+            1 => Keep::Cycles(1),
+            2 => Keep::Cycles(10),
+            _ => Keep::Seconds(0.002),
+        };
+        let snapshot_at = (draws.below(2) == 0).then(|| 1 + draws.below(50));
+        let length = self.length;
+        let mut at = 0;
+        let mut faults: Vec<(u64, Fault)> = (0..draws.below(7))
+            .map(|_| {
+                // In one case of three close behind the one before: in its rollback.
+                at = if draws.below(3) == 0 { at + draws.below(40) } else { draws.below(length) };
+                let (host, other) = (draws.below(64), draws.below(64));
+                let fault = match draws.below(16) {
+                    0..=3 => Fault::Crash { host, returns: true },
+                    4 | 5 => Fault::Crash { host, returns: false },
+                    6 => Fault::Cut { host, long: false },
+                    7 | 8 => Fault::Cut { host, long: true },
+                    9 | 10 => Fault::PairCut { host, other },
+                    11 => Fault::Slow { host, factor: 2 + draws.below(30) },
+                    12 => Fault::Spoil { host },
+                    13 | 14 => Fault::Join,
+                    _ if host < 32 => Fault::Master,
+                    _ => Fault::Leave,
+                };
+                (at, fault)
+            })
+            .collect();
+        faults.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
+        let store = draws.below(2) == 0;
+        (Plot { snapshot_at, faults, ..Plot::quiet(workers) }, Options { route, keep, store, ..options() })
+    }
+
+    /// Plays a seed; gives what it took, or how it went wrong, with the seed and its plot.
+    ///
+    /// # Errors
+    /// As said.
+    pub fn play(&self, seed: u64) -> Result<Played, String> {
+        self.perform(seed, false)
+    }
+
+    /// The same with a bug in the sessions: the master hears messages of epochs that are over.
+    ///
+    /// # Errors
+    /// Where the bug shows.
+    pub fn play_unfenced(&self, seed: u64) -> Result<Played, String> {
+        self.perform(seed, true)
+    }
+
+    fn perform(&self, seed: u64, unfenced: bool) -> Result<Played, String> {
+        let (plot, options) = self.plot(seed);
+        let plot = Plot { unfenced, ..plot };
+        let told = format!("seed {seed}: {plot:?}, {:?}, {:?}", options.route, options.keep);
+        let played = play(&self.model, &options, seed, plot).map_err(|why| format!("{told}: {why}"))?;
+        if seen(&played.solved) != self.answer {
+            let (ours, theirs) = (&self.answer.0.digest, &played.solved.outcome.digest);
+            return Err(format!("{told}: another result than undisturbed, digest {theirs}, not {ours}"));
+        }
+        Ok(played)
+    }
+}
+
+impl Default for Stage {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,17 @@
+//! 200 seeds of the world that goes wrong, and a bug that they find.
+
+use tests::seeds::Stage;
+
+#[test]
+fn whatever_goes_wrong_in_200_worlds_the_bits_are_those_of_a_quiet_one() {
+    let stage = Stage::new();
+    let wrong: Vec<String> = (0..200).filter_map(|seed| stage.play(seed).err()).collect();
+    assert!(wrong.is_empty(), "{} seeds:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn a_master_that_hears_messages_of_epochs_that_are_over_is_found() {
+    let stage = Stage::new();
+    let found = (0..200).find_map(|seed| stage.play_unfenced(seed).err()).expect("one seed of 200 shows it");
+    assert!(found.starts_with("seed "), "{found}");
+}

@@ -1,0 +1,407 @@
+//! A block of shells: the elements, their own copies of their nodes, and their state.
+
+use std::{fmt, ops::Range};
+
+use super::{Rule, kernel};
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{avx2::Avx2, avx512::Avx512};
+use crate::{
+    element::ElementVote,
+    exact::Quantum,
+    lanes::{SET, Width, scalar::Scalar},
+    material::Material,
+    mesh::{Section, quad_area},
+    state::ShellState,
+    strength::plane_stress::PlaneLaw,
+};
+
+/// What one cycle tells the shells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShellStep {
+    /// The step that led from `x_{n-1}` to `x_n` (time).
+    pub dt: f64,
+    /// Corner forces are rounded to it (force).
+    pub force_quantum: Quantum,
+    /// Corner moments are rounded to it (force times length).
+    pub moment_quantum: Quantum,
+    /// Energies are rounded to it (energy).
+    pub energy_quantum: Quantum,
+}
+
+/// Why shells cannot be built.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SectionError {
+    /// The thickness is not a positive finite number.
+    Thickness {
+        /// What was given (length).
+        thickness: f64,
+    },
+    /// There is no such rule of points.
+    Points {
+        /// What was asked for.
+        rule: Rule,
+    },
+    /// Layers do not know the law.
+    Law {
+        /// Name of the material.
+        material: String,
+        /// What it is.
+        law: &'static str,
+    },
+}
+
+impl fmt::Display for SectionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SectionError::Thickness { thickness } => {
+                write!(f, "shell thickness {thickness}, expected a positive length; give one")
+            }
+            SectionError::Points { rule } => {
+                write!(
+                    f,
+                    "no rule {rule:?} through the thickness; take Gauss with 1 to 5 points or Lobatto with 3 to 5"
+                )
+            }
+            SectionError::Law { material, law } => write!(
+                f,
+                "shells of {material:?}: {law} has no plane-stress form; take elastic, von Mises, tabulated or \
+                 Johnson-Cook strength"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for SectionError {}
+
+/// What shells have beside positions, velocities and forces of their nodes: a cycle keeps those in a block.
+pub struct Core {
+    /// Rotation rate by axis (1/time) by node, the same in space for all elements of a node.
+    pub w: [Vec<f64>; 3],
+    /// Nodal moment by axis (force times length).
+    pub m: [Vec<f64>; 3],
+    /// Rotational inertia of each node, see [`crate::state::ShellState::inertia`].
+    pub inertia: Vec<f64>,
+    corners: [Vec<u32>; 4],
+    state: Vec<Vec<f64>>,
+    layers: Vec<Vec<f64>>,
+    element_mass: Vec<f64>,
+    alive: Vec<u8>,
+    elements: Vec<u32>,
+    points: Vec<(f64, f64)>,
+    law: PlaneLaw,
+}
+
+/// Whether shells can be built of this: the points through the thickness and the law of the layers.
+fn section_of(section: &Section, material: &Material) -> Result<(Vec<(f64, f64)>, PlaneLaw), SectionError> {
+    let Section { thickness, rule } = *section;
+    if !(thickness.is_finite() && thickness > 0.0) {
+        return Err(SectionError::Thickness { thickness });
+    }
+    let points = rule.points().ok_or(SectionError::Points { rule })?;
+    let law =
+        PlaneLaw::of(material).map_err(|law| SectionError::Law { material: material.name.clone(), law })?;
+    Ok((points, law))
+}
+
+impl Section {
+    /// Whether shells of this section and material can be computed.
+    ///
+    /// # Errors
+    /// [`SectionError`].
+    pub fn check(&self, material: &Material) -> Result<(), SectionError> {
+        section_of(self, material).map(|_| ())
+    }
+}
+
+impl Core {
+    /// Lays out the state of `quads.len()` elements in slots, eight to a set. `elements` are their global indices,
+    /// `volume` their area times thickness at the start.
+    ///
+    /// # Errors
+    /// [`SectionError`].
+    ///
+    /// # Panics
+    /// If there is no element, or arrays of the state are not by node and element.
+    pub fn new(
+        quads: &[[u32; 4]],
+        elements: &[u32],
+        volume: &[f64],
+        state: &ShellState,
+        section: &Section,
+        material: &Material,
+    ) -> Result<Core, SectionError> {
+        let (points, law) = section_of(section, material)?;
+        assert!(!quads.is_empty(), "a block without elements");
+        let (n_nodes, n_elements) = (state.spin.len(), quads.len());
+        assert!(quads.iter().flatten().all(|&n| (n as usize) < n_nodes), "corners beyond {n_nodes} nodes");
+        assert!(state.inertia.len() == n_nodes, "{} inertias, {n_nodes} nodes", state.inertia.len());
+        assert!(state.fields.len() == section.n_fields(), "{} fields of shells", state.fields.len());
+        assert!(elements.len() == n_elements && volume.len() == n_elements, "{n_elements} elements");
+        assert!(state.fields.iter().all(|f| f.len() == n_elements), "fields of {n_elements} elements");
+        let n_slots = n_elements.next_multiple_of(SET);
+        // Phantoms stand on the first element.
+        let of_slot = |slot: usize| if slot < n_elements { slot } else { 0 };
+        let by_slot = |array: &[f64]| -> Vec<f64> { (0..n_slots).map(|slot| array[of_slot(slot)]).collect() };
+        let n_padded = n_nodes.next_multiple_of(SET);
+        let (own, layers) = state.fields.split_at(kernel::ELEMENT);
+        let mut inertia = state.inertia.clone();
+        inertia.resize(n_padded, 1.0);
+        Ok(Core {
+            w: std::array::from_fn(|axis| {
+                let mut w: Vec<f64> = state.spin.iter().map(|w| w[axis]).collect();
+                w.resize(n_padded, 0.0);
+                w
+            }),
+            m: std::array::from_fn(|_| vec![0.0; n_padded]),
+            inertia,
+            corners: std::array::from_fn(|i| (0..n_slots).map(|slot| quads[of_slot(slot)][i]).collect()),
+            state: own.iter().map(|field| by_slot(field)).collect(),
+            layers: layers.iter().map(|field| by_slot(field)).collect(),
+            element_mass: by_slot(&volume.iter().map(|v| material.density * v).collect::<Vec<f64>>()),
+            alive: (0..n_slots / SET)
+                .map(|set| (0..SET).map(|i| u8::from(set * SET + i < n_elements) << i).sum())
+                .collect(),
+            elements: (0..n_slots).map(|slot| elements.get(slot).copied().unwrap_or(u32::MAX)).collect(),
+            points,
+            law,
+        })
+    }
+
+    /// The state image of the first `n_nodes` nodes and `n_elements` elements.
+    pub fn image(&self, n_nodes: usize, n_elements: usize) -> ShellState {
+        ShellState {
+            spin: (0..n_nodes).map(|n| std::array::from_fn(|axis| self.w[axis][n])).collect(),
+            inertia: self.inertia[..n_nodes].to_vec(),
+            fields: self.state.iter().chain(&self.layers).map(|field| field[..n_elements].to_vec()).collect(),
+        }
+    }
+
+    /// Makes a stress of the first element wrong by one unit in the last place, see [`crate::cycle::Domain::plant_fault`].
+    pub(crate) fn plant_fault(&mut self) {
+        if let Some(stress) = self.layers.first_mut().and_then(|layer| layer.first_mut()) {
+            *stress = stress.next_up();
+        }
+    }
+
+    /// What an element says of itself in the fields of solids: greatest plastic strain and temperature of its layers,
+    /// energy, pressure and deviator of the mean stress in its own frame. `volume` is that of the start, `area` of now.
+    pub fn summary(&self, element: usize, volume: f64, area: f64) -> [f64; crate::state::N_FIELDS] {
+        use crate::state::field;
+        let layer = |point: usize, i: usize| self.layers[point * kernel::LAYER + i][element];
+        let mean = |i: usize| (0..self.points.len()).map(|p| self.points[p].1 * layer(p, i)).sum::<f64>();
+        let most = |i: usize| (0..self.points.len()).map(|p| layer(p, i)).fold(f64::MIN, f64::max);
+        let (xx, yy) = (mean(0), mean(1));
+        let pressure = -(xx + yy) / 3.0;
+        let mut fields = [0.0; crate::state::N_FIELDS];
+        fields[field::SXX] = xx + pressure;
+        fields[field::SYY] = yy + pressure;
+        (fields[field::SXY], fields[field::SYZ], fields[field::SZX]) = (mean(2), mean(3), mean(4));
+        fields[field::PRESSURE] = pressure;
+        fields[field::ENERGY] = self.state[kernel::INTERNAL][element] / volume;
+        fields[field::PLASTIC_STRAIN] = most(5);
+        fields[field::TEMPERATURE] = most(6);
+        fields[field::RELATIVE_VOLUME] = area * self.state[kernel::THICKNESS][element] / volume;
+        fields
+    }
+
+    /// Adds forces and moments of the elements of `sets` at `x`, brings their state from `n-1` to `n` and adds their
+    /// votes. The result does not depend on `width`.
+    ///
+    /// # Panics
+    /// If node arrays are shorter than the core's, a set is out of range or the machine lacks the width.
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "positions, velocities and forces stand in the caller's arrays"
+    )]
+    pub fn compute(
+        &mut self,
+        x: &[Vec<f64>; 3],
+        v: &[Vec<f64>; 3],
+        f: &mut [Vec<f64>; 3],
+        sets: &[Range<u32>],
+        step: &ShellStep,
+        width: Width,
+        vote: &mut ElementVote,
+    ) {
+        assert!(width.available(), "lane width {width} is not on this machine");
+        let n_nodes = self.inertia.len();
+        let arrays = [x, v, &*f, &self.w, &self.m];
+        assert!(arrays.into_iter().flatten().all(|a| a.len() >= n_nodes), "node arrays not of {n_nodes}");
+        let n_sets = self.alive.len() as u32;
+        assert!(sets.iter().all(|r| r.end <= n_sets), "sets {sets:?} of a block of {n_sets}");
+        let constants = kernel::Constants {
+            law: self.law,
+            points: &self.points,
+            dt: step.dt,
+            force_magic: step.force_quantum.magic(),
+            moment_magic: step.moment_quantum.magic(),
+            inverse_arm: step.force_quantum.value() / step.moment_quantum.value(),
+            energy_magic: step.energy_quantum.magic(),
+        };
+        let mut view = kernel::View {
+            corners: &self.corners,
+            x: x.each_ref().map(Vec::as_slice),
+            v: v.each_ref().map(Vec::as_slice),
+            w: self.w.each_ref().map(Vec::as_slice),
+            f: f.each_mut().map(Vec::as_mut_slice),
+            m: self.m.each_mut().map(Vec::as_mut_slice),
+            state: &mut self.state,
+            layers: &mut self.layers,
+            mass: &self.element_mass,
+            alive: &self.alive,
+            elements: &self.elements,
+        };
+        // SAFETY: the machine has the width, node arrays and sets were checked just now, corners when they were taken
+        // in, and arrays by slot were built in whole sets.
+        unsafe {
+            match width {
+                #[cfg(target_arch = "x86_64")]
+                Width::Avx2 => on_avx2(&mut view, &constants, sets, vote),
+                #[cfg(target_arch = "x86_64")]
+                Width::Avx512 => on_avx512(&mut view, &constants, sets, vote),
+                _ => kernel::compute::<Scalar>(&mut view, &constants, sets, vote),
+            }
+        }
+    }
+}
+
+/// Shells of one material and thickness with nodes of their own, for whoever drives them without a cycle. Node arrays are
+/// by local node.
+pub struct Shells {
+    /// Position `x_n` by axis.
+    pub x: [Vec<f64>; 3],
+    /// Velocity `v_{n-1/2}` by axis.
+    pub v: [Vec<f64>; 3],
+    /// Nodal force by axis.
+    pub f: [Vec<f64>; 3],
+    /// Nodal mass: a quarter of each element's.
+    pub mass: Vec<f64>,
+    /// The rest.
+    pub core: Core,
+    n_elements: usize,
+}
+
+impl Shells {
+    /// Shells at rest and free of stress; corners run around the element, seen from its upper side to the left.
+    ///
+    /// # Errors
+    /// [`SectionError`].
+    ///
+    /// # Panics
+    /// If there is no element or a corner is no node.
+    pub fn new(
+        x: &[[f64; 3]],
+        corners: &[[u32; 4]],
+        thickness: f64,
+        rule: Rule,
+        material: &Material,
+    ) -> Result<Shells, SectionError> {
+        let section = Section { thickness, rule };
+        section.check(material)?;
+        let (n_nodes, n_elements) = (x.len(), corners.len());
+        let n_padded = n_nodes.next_multiple_of(SET);
+        let mut state = ShellState {
+            spin: vec![[0.0; 3]; n_nodes],
+            inertia: vec![0.0; n_nodes],
+            fields: vec![vec![0.0; n_elements]; section.n_fields()],
+        };
+        state.fields[kernel::THICKNESS].fill(thickness);
+        for layer in state.fields[kernel::ELEMENT..].chunks_mut(kernel::LAYER) {
+            layer[kernel::LAYER - 1].fill(material.initial_temperature());
+        }
+        let mut masses = vec![0.0; n_padded];
+        masses[n_nodes..].fill(1.0);
+        let mut volumes = Vec::with_capacity(n_elements);
+        for corners in corners {
+            let area = quad_area(&corners.map(|n| x[n as usize]));
+            let mass = material.density * area * thickness;
+            volumes.push(area * thickness);
+            for &node in corners {
+                masses[node as usize] += 0.25 * mass;
+                state.inertia[node as usize] += 0.25 * mass * (thickness * thickness / 12.0).max(area / 8.0);
+            }
+        }
+        let elements: Vec<u32> = (0..n_elements as u32).collect();
+        let zeros = || std::array::from_fn(|_| vec![0.0; n_padded]);
+        Ok(Shells {
+            x: std::array::from_fn(|axis| {
+                let mut x: Vec<f64> = x.iter().map(|x| x[axis]).collect();
+                x.resize(n_padded, 0.0);
+                x
+            }),
+            v: zeros(),
+            f: zeros(),
+            mass: masses,
+            core: Core::new(corners, &elements, &volumes, &state, &section, material)?,
+            n_elements,
+        })
+    }
+
+    /// Number of elements.
+    pub fn n_elements(&self) -> usize {
+        self.n_elements
+    }
+
+    /// Thickness of an element now (length).
+    pub fn thickness(&self, element: usize) -> f64 {
+        self.core.state[kernel::THICKNESS][element]
+    }
+
+    /// Energy that hourglass control has taken from an element since the start.
+    pub fn hourglass_energy(&self, element: usize) -> f64 {
+        self.core.state[kernel::HOURGLASS][element]
+    }
+
+    /// Stress of a layer in the frame of its element, xx, yy, xy, yz, zx, counted from below.
+    pub fn stress(&self, element: usize, layer: usize) -> [f64; 5] {
+        std::array::from_fn(|i| self.core.layers[layer * kernel::LAYER + i][element])
+    }
+
+    /// Effective plastic strain of a layer.
+    pub fn plastic_strain(&self, element: usize, layer: usize) -> f64 {
+        self.core.layers[layer * kernel::LAYER + 5][element]
+    }
+
+    /// Sets forces and moments to zero, adds those of all elements at `x_n`, brings their state from `n-1` to `n` and
+    /// answers their votes. The result does not depend on `width`.
+    ///
+    /// # Panics
+    /// If node arrays changed their length or the machine lacks the width.
+    pub fn compute(&mut self, step: &ShellStep, width: Width) -> ElementVote {
+        for array in self.f.iter_mut().chain(&mut self.core.m) {
+            array.fill(0.0);
+        }
+        let mut vote = ElementVote::default();
+        let all = 0..self.core.alive.len() as u32;
+        self.core.compute(&self.x, &self.v, &mut self.f, &[all], step, width, &mut vote);
+        vote
+    }
+}
+
+/// # Safety
+/// As [`kernel::compute`], on a machine with AVX2 and FMA.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn on_avx2(
+    view: &mut kernel::View<'_>,
+    c: &kernel::Constants<'_>,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
+    // SAFETY: handed on from the caller.
+    unsafe { kernel::compute::<Avx2>(view, c, sets, vote) }
+}
+
+/// # Safety
+/// As [`kernel::compute`], on a machine with AVX-512 F and DQ.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+unsafe fn on_avx512(
+    view: &mut kernel::View<'_>,
+    c: &kernel::Constants<'_>,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
+    // SAFETY: handed on from the caller.
+    unsafe { kernel::compute::<Avx512>(view, c, sets, vote) }
+}

@@ -1,0 +1,236 @@
+//! Erosion: which elements leave a run, and what is left of them.
+//!
+//! [`Criteria`] say by part when an element is taken out. An element that meets one at the start of its pass of cycle `n` gives
+//! no force in that cycle nor in any after it, has no vote, and keeps its last state; its internal energy is booked as
+//! eroded in the vote of `n`. Its faces stay on the contact surface until that vote has been answered: from cycle
+//! `n + `[`SURFACE_LAG`] on they are gone and the faces that they hid are outside. So neither cycle depends on how a run is cut,
+//! sorted or timed.
+//!
+//! Mass stays at the nodes. A node without any element left is *freed*: it flies on and keeps colliding, or it leaves the
+//! run too, with its mass, momentum and kinetic energy booked, as [`Erosion::retain_inertia`] says.
+//!
+//! Strains are those of the middle of an element, and effective ones: `sqrt(2/3 e:e)`, which is 1 where a bar of constant
+//! volume is `e` = 2.718 times as long as at first.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    block::Block,
+    element::{Step, modes::modes_of},
+    lanes::{Width, scalar::Scalar},
+    material::Material,
+    state::field,
+};
+
+mod scan;
+
+use scan::Scan;
+
+/// Limit of a geometric strain where the deck gives none.
+pub const GEOMETRIC_STRAIN: f64 = 1.5;
+
+/// Cycles from that in which an element erodes to the first on the new surface: its vote comes with the next frame, the orders
+/// that answer it act two cycles later, where positions travel, and the sort of those acts in the cycle after.
+pub const SURFACE_LAG: u64 = 4;
+
+/// Stands for the cycle of erosion of an element that is alive.
+pub const ALIVE: u64 = u64::MAX;
+
+/// What erodes in a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Erosion {
+    /// Whether nodes that have lost all their elements keep their inertia and stay in the run.
+    pub retain_inertia: bool,
+    /// Criteria by part; none for a part that does not erode. Empty if nothing does.
+    pub parts: Vec<Option<Criteria>>,
+}
+
+impl Default for Erosion {
+    fn default() -> Self {
+        Self { retain_inertia: true, parts: Vec::new() }
+    }
+}
+
+impl Erosion {
+    /// Whether any part erodes.
+    pub fn is_on(&self) -> bool {
+        self.parts.iter().any(Option::is_some)
+    }
+
+    /// Whether any part erodes by its incremental strain, which is then part of the state.
+    pub fn counts_strain(&self) -> bool {
+        self.parts.iter().flatten().any(|criteria| criteria.incremental_strain.is_some())
+    }
+
+    /// The criteria of a part.
+    pub fn of_part(&self, part: usize) -> Option<&Criteria> {
+        self.parts.get(part).and_then(Option::as_ref)
+    }
+}
+
+/// When elements of a part erode: as soon as they meet one of these. At least one is given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Criteria {
+    /// Instantaneous geometric strain: `sqrt(2/3 h:h)` with the logarithmic strain `h` from the initial shape to that of now.
+    /// An element that is turned inside out has met it.
+    pub geometric_strain: Option<f64>,
+    /// Incremental geometric strain: `sqrt(2/3 D:D)` over time, with the rate of deformation `D`. It never falls. An element
+    /// that is turned inside out has met it.
+    pub incremental_strain: Option<f64>,
+    /// Effective plastic strain.
+    pub plastic_strain: Option<f64>,
+    /// The failure law of the material: damage has reached 1.
+    pub failure: bool,
+    /// The time step that the element allows, by the wave speed of its material at rest and with the safety factor, is below
+    /// this (time).
+    pub time_step: Option<f64>,
+}
+
+impl Criteria {
+    /// Whether there is any.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// What a piece carries of erosion, in runs where anything erodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PieceErosion {
+    /// Cycle in which each local element eroded, or [`ALIVE`].
+    pub eroded: Vec<u64>,
+    /// Incremental geometric strain by local element; empty if no part of the run erodes by it.
+    pub strain: Vec<f64>,
+    /// Position at time zero by local node (length); empty in images, which it does not change.
+    pub initial: Vec<[f64; 3]>,
+}
+
+/// What the elements of a block answer to erosion in a cycle.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Casualties {
+    /// Global indices of the elements that eroded.
+    pub elements: Vec<u32>,
+    /// Their internal energy, an exact sum.
+    pub internal: f64,
+}
+
+/// The erosion of one block. Arrays are by slot.
+pub(crate) struct Eroding {
+    criteria: Criteria,
+    /// Square of the sound speed of the material at rest.
+    sound_square: f64,
+    /// Safety factor over the limit of the time step: the frequency above which an element erodes.
+    frequency: f64,
+    eroded: Vec<u64>,
+    strain: Vec<f64>,
+    /// Inverse of the Jacobian at time zero, by rows, in units of the modes; empty without an instantaneous strain.
+    inverse: [Vec<f64>; 9],
+    /// Of this cycle.
+    casualties: Casualties,
+    /// Whether any element has eroded since [`Eroding::take_change`].
+    changed: bool,
+}
+
+impl Eroding {
+    /// The erosion of a block whose piece carried `state`; elements that have eroded are taken out of the block. A part without
+    /// criteria has nothing to watch, and none of its elements has eroded.
+    pub(crate) fn new(
+        criteria: &Criteria,
+        state: Option<&PieceErosion>,
+        block: &mut Block,
+        material: &Material,
+        safety_factor: f64,
+    ) -> Self {
+        let n_slots = block.n_slots();
+        let mut eroding = Self {
+            criteria: *criteria,
+            sound_square: (material.bulk() + 4.0 / 3.0 * material.shear()) / material.density,
+            frequency: criteria.time_step.map_or(f64::INFINITY, |limit| safety_factor / limit),
+            eroded: vec![ALIVE; n_slots],
+            strain: vec![0.0; if criteria.incremental_strain.is_some() { n_slots } else { 0 }],
+            inverse: std::array::from_fn(|_| {
+                vec![0.0; if criteria.geometric_strain.is_some() { n_slots } else { 0 }]
+            }),
+            casualties: Casualties::default(),
+            changed: false,
+        };
+        let Some(state) = state else { return eroding };
+        for (e, &cycle) in state.eroded.iter().enumerate().take(block.elements.len()) {
+            let slot = block.slot(e);
+            eroding.eroded[slot] = cycle;
+            if cycle != ALIVE {
+                block.take_out(slot);
+            }
+            if let (Some(to), Some(from)) = (eroding.strain.get_mut(slot), state.strain.get(e)) {
+                *to = *from;
+            }
+            if criteria.geometric_strain.is_some() && state.initial.len() == block.nodes.len() {
+                let corners = block.corners(e).map(|n| state.initial[n as usize]);
+                let axis = |a: usize| modes_of(corners.map(|x| Scalar(x[a]))).map(|mode| mode.0);
+                let [x, y, z] = [axis(0), axis(1), axis(2)];
+                let jacobian = nalgebra::Matrix3::from_fn(|row, column| [x, y, z][row][column]);
+                // An element without volume does not pass the checks of a run.
+                let inverse = jacobian.try_inverse().unwrap_or_else(nalgebra::Matrix3::zeros);
+                for (i, row) in eroding.inverse.iter_mut().enumerate() {
+                    row[slot] = inverse[(i / 3, i % 3)];
+                }
+            }
+        }
+        eroding
+    }
+
+    /// Takes the elements of `sets` that meet a criterion out of the block, before their forces of `cycle`.
+    pub(crate) fn watch(
+        &mut self,
+        block: &mut Block,
+        sets: &[Range<u32>],
+        step: &Step,
+        cycle: u64,
+        width: Width,
+    ) {
+        let Self { criteria, strain, inverse, .. } = self;
+        let (layout, reach) = block.layout();
+        let mut scan = Scan {
+            layout,
+            x: block.x.each_ref().map(Vec::as_slice),
+            v: block.v.each_ref().map(Vec::as_slice),
+            alive: block.alive(),
+            plastic: criteria.plastic_strain.map(|limit| (block.field_slots(field::PLASTIC_STRAIN), limit)),
+            damage: criteria.failure.then(|| block.field_slots(field::DAMAGE)),
+            shape: criteria.geometric_strain.map(|limit| (&*inverse, limit)),
+            strain: criteria.incremental_strain.map(|limit| (strain.as_mut_slice(), limit)),
+            step: criteria.time_step.map(|_| (self.sound_square, self.frequency)),
+            dt: step.dt,
+        };
+        let found = scan::run(&mut scan, sets, reach, width);
+        for slot in found.into_iter().map(|slot| slot as usize) {
+            let (element, internal) = block.take_out(slot);
+            self.eroded[slot] = cycle;
+            self.casualties.elements.push(element);
+            self.casualties.internal += step.energy_quantum.round(internal);
+            self.changed = true;
+        }
+    }
+
+    /// What eroded since the last call.
+    pub(crate) fn take_casualties(&mut self) -> Casualties {
+        std::mem::take(&mut self.casualties)
+    }
+
+    /// Whether anything has eroded since the last call.
+    pub(crate) fn take_change(&mut self) -> bool {
+        std::mem::take(&mut self.changed)
+    }
+
+    /// The state, by local element, for an image.
+    pub(crate) fn state(&self, block: &Block) -> PieceErosion {
+        let n = block.elements.len();
+        let strain = if self.strain.is_empty() { 0 } else { n };
+        PieceErosion {
+            eroded: (0..n).map(|e| self.eroded[block.slot(e)]).collect(),
+            strain: (0..strain).map(|e| self.strain[block.slot(e)]).collect(),
+            initial: Vec::new(),
+        }
+    }
+}

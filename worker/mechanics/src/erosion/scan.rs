@@ -1,0 +1,302 @@
+//! The pass that finds the elements of a block which erode: one look at each element that is alive, before its forces.
+//!
+//! It goes over lane sets like the element kernel, and lanes never mix: which elements erode depends on no lane width.
+
+use std::ops::Range;
+
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{avx2::Avx2, avx512::Avx512};
+use crate::{
+    element::{
+        hex8::{Layout, corners},
+        modes::{Gradient, Modes, modes_of},
+        vector::{Tensor, Vector},
+        viscosity::{Spread, frequency},
+    },
+    lanes::{Lane, SET, Width, functions::ln, scalar::Scalar},
+};
+
+/// What the pass goes by. State arrays are by slot.
+pub(super) struct Scan<'a> {
+    pub layout: &'a Layout,
+    pub x: [&'a [f64]; 3],
+    pub v: [&'a [f64]; 3],
+    /// Bits of the slots of each set whose elements are alive.
+    pub alive: &'a [u8],
+    /// Plastic strain and its limit.
+    pub plastic: Option<(&'a [f64], f64)>,
+    /// Damage, if failed elements erode.
+    pub damage: Option<&'a [f64]>,
+    /// Inverse of the Jacobian at time zero by rows, and the limit of the instantaneous strain.
+    pub shape: Option<(&'a [Vec<f64>; 9], f64)>,
+    /// Incremental strain and its limit.
+    pub strain: Option<(&'a mut [f64], f64)>,
+    /// Square of the sound speed, and the frequency above which an element erodes.
+    pub step: Option<(f64, f64)>,
+    /// The step that led to `x` (time).
+    pub dt: f64,
+}
+
+/// The slots of the sets whose elements erode, ascending within each range.
+///
+/// # Panics
+/// If the machine lacks the width or the arrays do not hold the sets.
+pub(super) fn run(scan: &mut Scan<'_>, sets: &[Range<u32>], reach: usize, width: Width) -> Vec<u32> {
+    let n_sets = scan.alive.len();
+    let n_slots = n_sets * SET;
+    assert!(sets.iter().all(|range| range.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
+    assert!(scan.x.iter().chain(&scan.v).all(|a| a.len() >= reach), "node arrays shrunk below {reach}");
+    assert!(
+        scan.plastic.is_none_or(|(values, _)| values.len() >= n_slots),
+        "plastic strain of {n_slots} slots"
+    );
+    assert!(scan.damage.is_none_or(|values| values.len() >= n_slots), "damage of {n_slots} slots");
+    assert!(
+        scan.shape.is_none_or(|(rows, _)| rows.iter().all(|row| row.len() >= n_slots)),
+        "initial shapes of {n_slots} slots"
+    );
+    assert!(
+        scan.strain.as_ref().is_none_or(|(values, _)| values.len() >= n_slots),
+        "incremental strain of {n_slots} slots"
+    );
+    assert!(width.available(), "lane width {width} is not on this machine");
+    let mut found = Vec::new();
+    // SAFETY: the machine has the width; sets and arrays were checked just now, and every corner of every slot is below
+    // the reach of the block, lanes behind it included.
+    unsafe {
+        match width {
+            Width::Scalar => on_scalar(scan, sets, &mut found),
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 => on_avx2(scan, sets, &mut found),
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx512 => on_avx512(scan, sets, &mut found),
+            #[cfg(not(target_arch = "x86_64"))]
+            Width::Avx2 | Width::Avx512 => on_scalar(scan, sets, &mut found),
+        }
+    }
+    found
+}
+
+/// # Safety
+/// As [`all`].
+unsafe fn on_scalar(scan: &mut Scan<'_>, sets: &[Range<u32>], found: &mut Vec<u32>) {
+    // SAFETY: the caller's promise.
+    unsafe { all::<Scalar>(scan, sets, found) };
+}
+
+/// # Safety
+/// As [`all`], on a machine with [`Width::Avx2`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn on_avx2(scan: &mut Scan<'_>, sets: &[Range<u32>], found: &mut Vec<u32>) {
+    // SAFETY: the caller's promise.
+    unsafe { all::<Avx2>(scan, sets, found) };
+}
+
+/// # Safety
+/// As [`all`], on a machine with [`Width::Avx512`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+unsafe fn on_avx512(scan: &mut Scan<'_>, sets: &[Range<u32>], found: &mut Vec<u32>) {
+    // SAFETY: the caller's promise.
+    unsafe { all::<Avx512>(scan, sets, found) };
+}
+
+/// # Safety
+/// Sets are below the number of sets of the block; state arrays hold all slots; corners of all slots, phantoms included,
+/// are inside the node arrays with [`SET`] lanes behind them in a structured layout.
+#[inline(always)]
+unsafe fn all<L: Lane>(scan: &mut Scan<'_>, sets: &[Range<u32>], found: &mut Vec<u32>) {
+    for range in sets {
+        for set in range.clone() {
+            let alive = scan.alive[set as usize];
+            if alive == 0 {
+                continue;
+            }
+            let mut lane = 0;
+            while lane < SET {
+                let slot = set as usize * SET + lane;
+                let alive = L::mask(u32::from(alive) >> lane);
+                // SAFETY: handed on from the caller.
+                let mut bits = unsafe { slots::<L>(scan, slot, alive) };
+                while bits != 0 {
+                    found.push(slot as u32 + bits.trailing_zeros());
+                    bits &= bits - 1;
+                }
+                lane += L::N;
+            }
+        }
+    }
+}
+
+/// Bits of the slots `slot..slot + N` that erode.
+///
+/// # Safety
+/// As [`all`].
+#[inline(always)]
+unsafe fn slots<L: Lane>(scan: &mut Scan<'_>, slot: usize, alive: L::Mask) -> u32 {
+    let mut bits = 0;
+    if let Some((plastic, limit)) = scan.plastic {
+        // SAFETY: the slot is inside the state arrays.
+        bits |= L::bits(L::splat(limit).less_equal(unsafe { L::load(plastic, slot) }));
+    }
+    if let Some(damage) = scan.damage {
+        // SAFETY: as above.
+        bits |= L::bits(L::splat(1.0).less_equal(unsafe { L::load(damage, slot) }));
+    }
+    if scan.shape.is_none() && scan.strain.is_none() && scan.step.is_none() {
+        return bits & L::bits(alive);
+    }
+    let zero = L::splat(0.0);
+    // SAFETY: corners are inside the node arrays.
+    let x = unsafe { modes(scan.layout, scan.x, slot) };
+    let at_end = Gradient::of(&x);
+    if scan.shape.is_some() || scan.strain.is_some() {
+        // SAFETY: as above.
+        let v = unsafe { modes(scan.layout, scan.v, slot) };
+        let at_mid = Gradient::of(&Modes::before(&x, &v, L::splat(0.5 * scan.dt)));
+        let upright = L::both(zero.less(at_mid.volume_times_64), zero.less(at_end.volume_times_64));
+        bits |= !L::bits(upright);
+        if let Some((strain, limit)) = &mut scan.strain {
+            let rate = at_mid.against(&v).scaled(L::splat(1.0) / at_mid.volume_times_64);
+            // SAFETY: the slot is inside the state arrays.
+            unsafe {
+                let before = L::load(strain, slot);
+                let after = effective(&rate).mul_add(L::splat(scan.dt), before);
+                L::select(L::both(alive, upright), after, before).store(strain, slot);
+                bits |= L::bits(L::splat(*limit).less_equal(after));
+            }
+        }
+    }
+    if let Some((rows, limit)) = scan.shape {
+        // SAFETY: as above.
+        let row = |i: usize| unsafe {
+            Vector {
+                x: L::load(&rows[i], slot),
+                y: L::load(&rows[i + 1], slot),
+                z: L::load(&rows[i + 2], slot),
+            }
+        };
+        let gradient = Tensor::outer(&x.a, &row(0)).outer_add(&x.b, &row(3)).outer_add(&x.c, &row(6));
+        bits |= L::bits(beyond(&gradient, limit));
+    }
+    if let Some((sound_square, most)) = scan.step {
+        let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
+        let volume = at_end.volume();
+        let scale = L::splat(2.0 / 512.0) / (volume * volume);
+        let (sound_square, most) = (L::splat(sound_square), L::splat(most));
+        let bound = frequency(spread.eigenvalue_bound() * scale, zero, sound_square);
+        if L::any(most.less(bound)) {
+            bits |= L::bits(most.less(frequency(spread.largest_eigenvalue() * scale, zero, sound_square)));
+        }
+    }
+    bits & L::bits(alive)
+}
+
+/// # Safety
+/// As [`all`].
+#[inline(always)]
+unsafe fn modes<L: Lane>(layout: &Layout, from: [&[f64]; 3], slot: usize) -> Modes<L> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        Modes::of(
+            modes_of(corners(layout, from[0], slot)),
+            modes_of(corners(layout, from[1], slot)),
+            modes_of(corners(layout, from[2], slot)),
+        )
+    }
+}
+
+/// `sqrt(2/3 D:D)` of the symmetric part D of a velocity gradient.
+#[inline(always)]
+fn effective<L: Lane>(gradient: &Tensor<L>) -> L {
+    let (xy, yz, zx) =
+        (gradient.x.y + gradient.y.x, gradient.y.z + gradient.z.y, gradient.z.x + gradient.x.z);
+    let straight =
+        gradient.x.x.mul_add(gradient.x.x, gradient.y.y.mul_add(gradient.y.y, gradient.z.z * gradient.z.z));
+    let across = xy.mul_add(xy, yz.mul_add(yz, zx * zx));
+    (L::splat(2.0 / 3.0) * L::splat(0.5).mul_add(across, straight)).sqrt()
+}
+
+/// Lanes whose deformation gradient F turns the element inside out or stretches it to a logarithmic strain h with
+/// `sqrt(2/3 h:h)` of the limit or more.
+///
+/// No stretch is above `sqrt(tr C)`, `C = F^T F`, nor below `det F / sqrt(tr cof C)`; most elements are far below the limit by
+/// these bounds, for `sqrt(2/3 h:h)` is at most `sqrt(2)` times the greatest magnitude of h.
+#[inline(always)]
+fn beyond<L: Lane>(f: &Tensor<L>, limit: f64) -> L::Mask {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let cofactor = [f.y.cross(&f.z), f.z.cross(&f.x), f.x.cross(&f.y)];
+    let determinant = f.x.dot(&cofactor[0]);
+    let square = determinant * determinant;
+    let stretch = Spread::gram([&f.x, &f.y, &f.z]);
+    let shrink = Spread::gram([&cofactor[0], &cofactor[1], &cofactor[2]]);
+    let most = L::splat((std::f64::consts::SQRT_2 * limit).exp());
+    let within = L::both(stretch.trace().less(most), shrink.trace().less(most * square));
+    let upright = zero.less(determinant);
+    let whole = L::both(within, upright);
+    if !L::any(not::<L>(whole)) {
+        return L::mask(0);
+    }
+    // Of those that are inside out the logarithms mean nothing.
+    let largest = L::select(upright, stretch.largest_eigenvalue(), one);
+    let two_largest = L::select(upright, shrink.largest_eigenvalue(), one);
+    let logarithm = |eigenvalue: L| ln(eigenvalue.max(L::splat(f64::MIN_POSITIVE)));
+    let (of_square, of_largest, of_two) =
+        (logarithm(L::select(upright, square, one)), logarithm(largest), logarithm(two_largest));
+    let (first, second, third) = (of_largest, of_two - of_largest, of_square - of_two);
+    let sum = first.mul_add(first, second.mul_add(second, third * third));
+    // Logarithms of squared stretches are twice the strains.
+    let met = L::splat(limit * limit).less_equal(L::splat(1.0 / 6.0) * sum);
+    L::mask(L::bits(met) | !L::bits(upright))
+}
+
+/// The lanes that a mask leaves out.
+#[inline(always)]
+fn not<L: Lane>(mask: L::Mask) -> L::Mask {
+    L::mask(!L::bits(mask) & ((1 << L::N) - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether a deformation gradient, by rows, is beyond a limit.
+    fn erodes(f: [[f64; 3]; 3], limit: f64) -> bool {
+        let [x, y, z] = f.map(|[x, y, z]| Vector { x: Scalar(x), y: Scalar(y), z: Scalar(z) });
+        Scalar::bits(beyond(&Tensor { x, y, z }, limit)) & 1 == 1
+    }
+
+    #[test]
+    fn a_bar_drawn_out_at_constant_volume_has_the_logarithm_of_its_length_as_strain() {
+        for length in [0.2_f64, 0.5, 1.5, 4.0, 20.0] {
+            let thin = 1.0 / length.sqrt();
+            let f = [[length, 0.0, 0.0], [0.0, thin, 0.0], [0.0, 0.0, thin]];
+            let strain = length.ln().abs();
+            assert!(erodes(f, strain * (1.0 - 1e-9)) && !erodes(f, strain * (1.0 + 1e-9)), "{length}");
+        }
+    }
+
+    #[test]
+    fn strain_is_that_of_the_singular_values_and_turning_adds_none() {
+        let mut seed = 0x1234_5678_9abc_def1_u64;
+        let mut draw = || {
+            seed ^= seed << 13;
+            seed ^= seed >> 7;
+            seed ^= seed << 17;
+            seed as f64 / u64::MAX as f64 - 0.5
+        };
+        for _ in 0..500 {
+            let m = nalgebra::Matrix3::from_fn(|r, c| f64::from(u8::from(r == c)) + 1.2 * draw());
+            let rows = [0, 1, 2].map(|r| [m[(r, 0)], m[(r, 1)], m[(r, 2)]]);
+            if m.determinant() <= 0.0 {
+                assert!(erodes(rows, 50.0), "an element inside out erodes at any limit");
+                continue;
+            }
+            let logarithms = m.singular_values().map(f64::ln);
+            let strain = (2.0 / 3.0 * logarithms.norm_squared()).sqrt();
+            assert!(erodes(rows, strain * (1.0 - 1e-7)), "{strain}: {m}");
+            assert!(!erodes(rows, strain * (1.0 + 1e-7)), "{strain}: {m}");
+        }
+    }
+}

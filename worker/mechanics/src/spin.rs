@@ -1,0 +1,48 @@
+//! Rotation of the nodes of shells: `w_{n+1/2} = w_{n-1/2} + m/I (dt_{n-1} + dt_n)/2`.
+//!
+//! As for the rest of a node, every block that has a copy does this with the same total moment and inertia and gets the
+//! same bits; the booked copy alone counts. Nodes are few beside the work of their elements, so this is plain code.
+
+use crate::{element::shell4::Core, lanes::SET, nodes::Advance, nodes::NodeSet};
+
+/// Advances the rotation rates of the nodes of a block and clears the moments; gives the kinetic energy of rotation
+/// `sum 1/2 I w_{n-1/2} . w_{n+1/2}` of the booked nodes, and the work that relaxation does on them. What clamps a
+/// node does no work: it does not turn.
+pub(crate) fn advance(
+    advance: &Advance<'_>,
+    core: &mut Core,
+    constraint: &[u16],
+    sets: &[NodeSet],
+) -> (f64, f64) {
+    let half_steps = 0.5 * (advance.dt_previous + advance.dt);
+    let relaxation = advance.loads.relaxation.filter(|r| advance.time < r.until);
+    let loss = relaxation.map_or(0.0, |r| 1.0 - r.factor);
+    let energy = advance.quanta.energy;
+    let (mut kinetic, mut external) = (0.0, 0.0);
+    for (i, &held) in constraint.iter().enumerate() {
+        let clamped = advance.constraints[held as usize].clamped;
+        let inertia = core.inertia[i];
+        let scale = half_steps / inertia;
+        let (mut product, mut work) = (0.0, 0.0);
+        for axis in 0..3 {
+            let old = core.w[axis][i];
+            let mut new = core.m[axis][i].mul_add(scale, old);
+            if loss > 0.0 {
+                let change = -loss * old;
+                new += change;
+                work = (change * 0.5).mul_add(old + new, work);
+            }
+            if clamped >> axis & 1 == 1 {
+                new = 0.0;
+            }
+            core.w[axis][i] = new;
+            core.m[axis][i] = 0.0;
+            product = old.mul_add(new, product);
+        }
+        if sets[i / SET].booked >> (i % SET) & 1 == 1 {
+            kinetic += energy.round(0.5 * inertia * product);
+            external += energy.round(inertia * work);
+        }
+    }
+    (kinetic, external)
+}
