@@ -40,7 +40,7 @@ pub(crate) fn spans(
     // Elements that a join folds together were reported with the join.
     let volumes_fit = !assembly.collapsed && volumes(parts, assembly, faults);
     // Inside and outside mean nothing for inverted elements.
-    if volumes_fit && let Some(contact) = contact {
+    if volumes_fit && let Some(contact) = contact.filter(|contact| !contact.settings.ignores_initial) {
         zones::overlaps(parts, assembly, contact, faults);
     }
 }

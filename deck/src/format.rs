@@ -15,6 +15,7 @@ mod erosion;
 mod load;
 mod output;
 mod part;
+mod rigid;
 mod shape;
 mod wall;
 
@@ -109,9 +110,11 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
     let parts = part::read_parts(&deck, &mut materials, meshes);
     let names = Names::of(&parts);
     let joins = assembly::read_joins(&deck, &names);
-    let assembly = assembly::assemble(&parts, &joins, &materials.list, meshes, faults);
-    let conditions = boundary::read(&deck, &names, &parts, &assembly);
-    let contact = contact::read(&deck, &names, &assembly, &materials.list, &conditions);
+    let mut assembly = assembly::assemble(&parts, &joins, &materials.list, meshes, faults);
+    let mut conditions = boundary::read(&deck, &names, &parts, &assembly);
+    let drafts = std::mem::take(&mut conditions.rigid);
+    let bodies = rigid::make(drafts, &materials.list, &mut assembly, &mut conditions, faults);
+    let contact = contact::read(&deck, &names, &assembly, &materials.list, &conditions, &bodies);
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = control
         .map(|control| Control { sort_lag: sort_lag(&deck, control.sort_lag, settings, faults), ..control });
@@ -145,6 +148,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
             contact,
             constraints: conditions.constraints,
             walls: conditions.walls,
+            bodies,
             detonations,
             loads: conditions.loads,
             erosion,

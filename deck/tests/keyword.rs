@@ -386,6 +386,23 @@ fn a_wall_stops_the_nodes_that_it_names() {
 }
 
 #[test]
+fn a_rigid_material_makes_a_body_of_its_part() {
+    let rigid = |card: &str| {
+        let elastic = "*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n";
+        let text = cube("").replace(elastic, &format!("*MAT_RIGID\n1,7.85e-9,2.1e5,0.3\n{card}\n"));
+        assert!(text.contains("MAT_RIGID"));
+        read(&text).map_err(|faults| faults[0].to_string())
+    };
+    let model = rigid("1,4,7").expect("a good deck");
+    let body = &model.setup.bodies[0];
+    assert_eq!(body.parts, [0]);
+    assert_eq!(body.velocity.map(|v| v.map(|v| v.factor)), [Some(0.0), Some(0.0), None]);
+    assert_eq!(body.spin.map(|v| v.map(|v| v.factor)), [Some(0.0); 3]);
+    assert!(rigid("-1,4,7").expect_err("a frame").contains("expected constraints along the axes"));
+    assert!(rigid("1,8,7").expect_err("a code").contains("expected a number from 0 to 7"));
+}
+
+#[test]
 fn what_cannot_be_honoured_is_refused_where_it_stands() {
     let refused = [
         ("*MAT_ADD_EROSION\n1,,-0.5\n", "a.k:23:4: read -0.5; expected MXPRES above 0"),

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use mechanics::cycle::Neighbour;
+use mechanics::{cycle::Neighbour, rigid};
 
 use crate::decompose::Subdomain;
 
@@ -16,7 +16,7 @@ pub struct Holdings {
     pub work: Vec<f64>,
     /// Other workers that hold a node, ascending; most nodes have none and no entry.
     others: HashMap<u32, Vec<u32>>,
-    /// Nodes that several workers hold, ascending.
+    /// Nodes that several workers hold, ascending, and behind them the entries of rigid bodies.
     shared: Vec<u32>,
     /// By worker: what of the exchange stays the same in all plans.
     pub standing: Vec<Standing>,
@@ -25,7 +25,7 @@ pub struct Holdings {
 /// The nodes that a worker's sub-domains share with others.
 #[derive(Clone, Default)]
 pub struct Standing {
-    /// Global node indices, ascending.
+    /// Global node indices, ascending, and behind them the entries of rigid bodies.
     pub nodes: Vec<u32>,
     /// Place of each among the nodes that several workers hold.
     pub slots: Vec<u32>,
@@ -61,6 +61,31 @@ impl Holdings {
         holdings
     }
 
+    /// The same with the pushes on `n` rigid bodies in the exchange of every worker, where there are several.
+    #[must_use]
+    pub fn with_bodies(mut self, n: usize) -> Self {
+        let n_workers = self.n_workers() as u32;
+        if n_workers < 2 {
+            return self;
+        }
+        for entry in rigid::entries(n) {
+            let slot = self.shared.len() as u32;
+            self.shared.push(entry);
+            for (worker, stand) in (0..).zip(&mut self.standing) {
+                let at = stand.nodes.len() as u32;
+                stand.nodes.push(entry);
+                stand.slots.push(slot);
+                for other in (0..n_workers).filter(|&other| other != worker) {
+                    share(&mut stand.neighbours, other, at);
+                }
+            }
+        }
+        for stand in &mut self.standing {
+            stand.neighbours.sort_unstable_by_key(|neighbour| neighbour.worker);
+        }
+        self
+    }
+
     fn stand(&self) -> Vec<Standing> {
         let mut standing = vec![Standing::default(); self.work.len()];
         for (slot, &node) in self.shared.iter().enumerate() {
@@ -85,7 +110,7 @@ impl Holdings {
         self.work.len()
     }
 
-    /// Number of nodes that several workers hold.
+    /// Number of nodes that several workers hold, and of entries of rigid bodies.
     pub fn n_shared(&self) -> usize {
         self.shared.len()
     }

@@ -2,7 +2,9 @@
 
 use deck::model::Model;
 use mechanics::{
+    contact::{PairEnergies, PairEnergy},
     element::hex8,
+    rigid,
     vote::{PartVote, Vote},
 };
 use serde::{Deserialize, Serialize};
@@ -48,6 +50,10 @@ pub struct Ledger {
     pub worst_gap_travel: f64,
     /// Deepest contact, in gaps.
     pub worst_penetration: f64,
+    /// Energies of contact by pair of parts: in springs now, taken by friction so far.
+    pub contacts: Vec<PairEnergy>,
+    /// Rigid bodies as the last vote had them.
+    pub bodies: Vec<rigid::State>,
     /// The last row.
     pub last: HistoryRow,
 }
@@ -70,6 +76,14 @@ impl Ledger {
             .iter()
             .map(|part| norm(momentum_of(&mut part.nodes.iter().map(|&n| n as usize))))
             .fold(0.0, f64::max);
+        let mut initial_momentum = momentum_of(&mut (0..model.mesh.n_nodes()));
+        // Nodes of a distorted mesh that turns have a little more or less than their body.
+        for body in &model.setup.bodies {
+            let of_nodes = momentum_of(&mut body.nodes.iter().map(|&n| n as usize));
+            for a in 0..3 {
+                initial_momentum[a] += body.mass * body.start.velocity[a] - of_nodes[a];
+            }
+        }
         Self {
             hourglass: 0.0,
             viscosity: 0.0,
@@ -84,11 +98,13 @@ impl Ledger {
             greatest_external: 0.0,
             parts: Default::default(),
             first_step: None,
-            initial_momentum: momentum_of(&mut (0..model.mesh.n_nodes())),
+            initial_momentum,
             part_momentum,
             worst_courant: 0.0,
             worst_gap_travel: 0.0,
             worst_penetration: 0.0,
+            contacts: Vec::new(),
+            bodies: Vec::new(),
             last: HistoryRow::default(),
         }
     }
@@ -112,6 +128,8 @@ impl Ledger {
         self.greatest_external = self.greatest_external.max(self.external.abs());
         self.first_step.get_or_insert(dt);
         self.book_parts(&vote.parts);
+        self.bodies.clone_from(&vote.bodies);
+        self.book_pairs(&vote.contact_energies);
         let scale = initial.abs().max(self.greatest_kinetic);
         let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
         self.worst_courant = self.worst_courant.max(dt / vote.courant);
@@ -144,6 +162,19 @@ impl Ledger {
             element_gauges: vote.element_gauges.iter().map(|(_, state)| *state).collect(),
             contacts: vote.contacts.clone(),
         };
+    }
+
+    fn book_pairs(&mut self, votes: &PairEnergies) {
+        self.contacts.iter_mut().for_each(|pair| pair.contact = 0.0);
+        for vote in votes.pairs() {
+            match self.contacts.binary_search_by_key(&vote.parts, |pair| pair.parts) {
+                Ok(at) => {
+                    self.contacts[at].contact = vote.contact;
+                    self.contacts[at].friction += vote.friction;
+                }
+                Err(at) => self.contacts.insert(at, *vote),
+            }
+        }
     }
 
     /// Books the number and mass of the elements that eroded in the cycle booked last. Their mass is that of the deck: it stays at

@@ -33,7 +33,7 @@ use crate::{
         Folder,
         history::{History, HistoryRow, PartEnergy},
         report,
-        summary::{Energies, NamedPart, Summary, WorkUnits, WorkerTimes},
+        summary::{Energies, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
         trace,
         vtu::Series,
         writer::Writer,
@@ -460,6 +460,7 @@ pub fn summarise(
             external: ledger.external,
             error: ledger.last.error,
             parts: named_parts(model, &ledger.last.parts),
+            contacts: ledger.contacts.iter().map(|pair| named_pair(model, pair)).collect(),
         },
         momentum_error: ledger.momentum_error(),
         worst_courant: ledger.worst_courant,
@@ -482,6 +483,12 @@ fn named_parts(model: &Model, parts: &[PartEnergy]) -> Vec<NamedPart> {
         external: e.external,
     };
     model.mesh.parts.iter().zip(parts).map(of).collect()
+}
+
+/// Energies of a pair beside the names of its parts.
+fn named_pair(model: &Model, pair: &mechanics::contact::PairEnergy) -> NamedPair {
+    let name = |p: u32| model.mesh.parts.get(p as usize).map_or_else(String::new, |part| part.name.clone());
+    NamedPair { parts: pair.parts.map(name), contact: pair.contact + pair.friction, friction: pair.friction }
 }
 
 /// Pairs of workers that exchange over a link of their own, and those that the master relays for.

@@ -87,7 +87,39 @@ fn an_energy_error_above_the_limit_of_the_deck_ends_the_run_with_the_part() {
         let of = |part: &str| history.column(&format!("{part}:{kind}")).expect("a column");
         of("striker").into_iter().zip(of("struck")).map(|(a, b)| a + b).collect::<Vec<f64>>()
     };
+    let summary = std::fs::read_to_string(folder.path().join("out").join(SUMMARY)).expect("a summary");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    let energies = &summary["energies"];
+    assert_eq!(energies["contacts"][0]["parts"], serde_json::json!(["striker", "struck"]));
+    assert_eq!(energies["contacts"][0]["contact"], energies["contact"], "one pair has all of it");
     for kind in ["kinetic", "internal", "hourglass", "external"] {
         assert_eq!(history.column(kind).expect("a column"), sum(kind), "{kind} of the parts adds up exactly");
+    }
+}
+
+#[test]
+fn a_start_inside_another_part_is_refused_or_ignored_pair_by_pair() {
+    // Two plates of two cubes each, the upper a tenth of a gap into the zone of the lower and sliding off.
+    let deck = |more: &str| {
+        format!(
+            "title = \"inside\"\nunits = \"SI\"\n[control]\nend_time = 2e-5\n[[part]]\nname = \"below\"\n{SOLID}\
+             box = {{ origin = [0, 0, 0], size = [0.08, 0.01, 0.01], cells = [8, 1, 1] }}\n\
+             [[part]]\nname = \"above\"\nvelocity = [10, 0, -1]\n{SOLID}\
+             box = {{ origin = [0.0031, 0.002, 0.0105], size = [0.01, 0.006, 0.01], cells = [1, 1, 1] }}\n\
+             [contact]\ngap_length = 0.001\n{more}"
+        )
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let (code, err) = run(folder.path(), &deck(""), &["--threads", "1"]);
+    assert_eq!(code, Some(1), "{err}");
+    assert!(err.contains("parts at least one gap"), "{err}");
+    for workers in ["1", "2"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let ignored = deck("initial_penetration = \"ignore\"\n");
+        let (code, err) = run(folder.path(), &ignored, &["--workers", workers, "--threads", "1"]);
+        assert_eq!(code, Some(0), "{err}");
+        let history = Table::read(&folder.path().join("out").join(HISTORY)).expect("a history");
+        let pushed = history.column("contact").expect("a column").into_iter().fold(0.0, f64::max);
+        assert_eq!(pushed, 0.0, "nothing that starts there is pushed");
     }
 }

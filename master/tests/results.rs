@@ -9,7 +9,7 @@ use deck::model::{ElementGauge, Gauge, Model, Output};
 use master::results::{
     self, Error, Folder,
     history::{GaugeRow, History, HistoryRow, PartEnergy, Table},
-    summary::{Energies, NamedPart, Summary, WorkUnits, WorkerTimes},
+    summary::{Energies, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
     vtu::{Fields, Series, von_mises, write_vtu},
 };
 use mechanics::{
@@ -109,6 +109,7 @@ fn plates(cells: u32) -> Model {
             contact: None,
             constraints: vec![Constraint::default()],
             walls: Vec::new(),
+            bodies: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
             erosion: Default::default(),
@@ -202,6 +203,11 @@ fn summary(model: &Model) -> Summary {
             friction: 3e-9,
             external: -0.0,
             error: -3.2e-5,
+            contacts: vec![NamedPair {
+                parts: ["target".into(), "rod".into()],
+                contact: 5e-324,
+                friction: 0.0,
+            }],
             parts: vec![NamedPart { name: "target".into(), kinetic: 0.7, ..NamedPart::default() }],
         },
         momentum_error: 1.6e-15,
@@ -525,7 +531,7 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
     );
     assert_eq!(
         keys(&json["energies"]),
-        "contact error external friction hourglass internal kinetic parts viscosity"
+        "contact contacts error external friction hourglass internal kinetic parts viscosity"
     );
     assert_eq!(
         keys(&json["work_units"]),

@@ -14,7 +14,8 @@ use std::fmt;
 /// 1: the first. 2: links between workers (`peer_port` and `member` in [`Hello`]), introductions and reports.
 /// 3: the work of loads by part in votes, elements that erode; proof of arithmetic in [`Hello`], samples of cycles.
 /// 4: what is watched in assignments, and in votes what was seen.
-pub const VERSION: u16 = 4;
+/// 5: states of rigid bodies and energies by pair of parts in votes; rigid bodies in assignments.
+pub const VERSION: u16 = 5;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

@@ -15,6 +15,7 @@ use mechanics::{
     block::Piece,
     cycle::{Plan, Subdomain},
     exact::Quantum,
+    rigid,
     setup::Setup,
     vote::{Quanta, Vote, Watched},
     wall::Pose,
@@ -51,7 +52,7 @@ pub enum ToWorker {
         cycle: u64,
         /// What comes next.
         orders: Orders,
-        /// Total forces of this worker's exchange nodes, three numbers each.
+        /// Total forces of this worker's exchange nodes, three numbers each, and of its entries for rigid bodies.
         totals: Vec<f64>,
     },
     /// State of the guests of a plan that starts to act, six numbers each.
@@ -146,6 +147,8 @@ pub struct Assign {
     pub plan_hash: u64,
     /// State of its guests.
     pub guest_state: Vec<f64>,
+    /// Where the rigid bodies are and how they move: all of them, on every worker.
+    pub bodies: Vec<rigid::State>,
 }
 
 /// What the next cycles do; the same on every worker.
@@ -199,7 +202,7 @@ pub enum ToMaster {
         cycle: u64,
         /// The vote of the whole of the cycle before; none in the first cycle.
         vote: Option<Box<Vote>>,
-        /// Partial forces of the exchange nodes, three numbers each.
+        /// Partial forces of the exchange nodes, three numbers each, and of its entries for rigid bodies.
         partials: Vec<f64>,
         /// Positions of owned surface nodes where this cycle gathers; else empty.
         gathered: Vec<f64>,

@@ -10,6 +10,7 @@ mod element;
 mod erosion;
 mod gas;
 mod load;
+mod rigid;
 mod shell;
 mod solid;
 mod structure;
@@ -65,6 +66,9 @@ macro_rules! each_case_of_the_book {
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
             erosion: a_rod_goes_through_a_plate_and_the_ledger_closes quick;
             erosion: a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked quick;
+            rigid: a_free_top_precesses_after_euler quick;
+            rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
+            rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;
             contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
             contact: struck_plates_conserve_keep_apart_and_move_together quick;
             contact: strengthless_plates_reach_the_impedance_match_on_the_axis quick;

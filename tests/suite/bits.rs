@@ -495,6 +495,102 @@ fn a_keyword_deck_of_a_ball_on_a_shell_has_the_same_bits() {
 }
 
 #[test]
+fn rigid_bodies_have_the_same_bits_on_both_routes() {
+    let model = model(
+        r#"
+        title = "rigid bodies"
+        units = "cm-g-us"
+        [control]
+        end_cycle = 300
+        end_time = 1e3
+        [[curve]]
+        name = "pulse"
+        points = [[0, 0], [5, 1], [30, 0.5]]
+        [[part]]
+        name = "target"
+        material = "AL_2024_T351"
+        box = { origin = [0, 0, 0], size = [9, 8, 4], cells = [9, 8, 4] }
+        [[part]]
+        name = "under"
+        material = "STEEL_1006"
+        box = { origin = [0, 0, -2], size = [9, 8, 2], cells = [9, 8, 2] }
+        [[part]]
+        name = "ball"
+        material = "STEEL_1006"
+        velocity = [0.02, 0.01, -0.05]
+        sphere = { centre = [3, 4, 6.2], radius = 2, cells = [3, 3] }
+        [[part]]
+        name = "punch"
+        material = "STEEL_1006"
+        box = { origin = [6.2, 2, 4.2], size = [2, 3, 2], cells = [2, 3, 2] }
+        [[part]]
+        name = "handle"
+        material = "STEEL_1006"
+        box = { origin = [6.2, 2, 6.2], size = [2, 3, 2], cells = [2, 3, 2] }
+        [[join]]
+        parts = ["target", "under"]
+        [[join]]
+        parts = ["punch", "handle"]
+        [[rigid]]
+        parts = ["under"]
+        mass = 2000
+        [[rigid]]
+        parts = ["ball"]
+        start_spin = [0.01, 0, 0.03]
+        [[rigid]]
+        parts = ["handle", "punch"]
+        velocity = { x = 0, y = 0, z = { curve = "pulse", factor = -0.03 } }
+        spin = { x = 0, y = { curve = "pulse", factor = 1e-3 } }
+        [contact]
+        gap_length = 0.15
+        friction = 0.1
+        [[load]]
+        type = "pressure"
+        parts = ["under"]
+        face = "k-min"
+        pressure = { curve = "pulse", factor = 2e-3 }
+        [[load]]
+        type = "force"
+        parts = ["under"]
+        face = "i-min"
+        force = [1e-4, 0, 2e-4]
+        curve = "pulse"
+        [gravity]
+        acceleration = [0, 0, -1e-5]
+        [relaxation]
+        factor = 0.9999
+        until = 40
+        [output]
+        history_cycles = 1
+        [[gauge]]
+        name = "ball"
+        part = "ball"
+        point = [3, 4, 8.2]
+        "#,
+    );
+    same_bits(&model);
+    let one = Fingerprint::of(&solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}")));
+    for workers in [2, 5] {
+        let options = Options { route: Route::Direct, ..Options::default() };
+        one.assert_equal(
+            &fingerprint(&model, asked(workers, options)),
+            &format!("{workers} workers, direct"),
+        );
+    }
+    let without = |change: &dyn Fn(&mut Model)| {
+        let mut other = model.clone();
+        change(&mut other);
+        fingerprint(&other, Crew::default()).digest
+    };
+    for body in 0..2 {
+        assert_ne!(without(&|m| m.setup.bodies[body].mass *= 1.001), one.digest, "mass of body {body}");
+    }
+    assert_ne!(without(&|m| m.setup.bodies[0].forces.clear()), one.digest);
+    assert_ne!(without(&|m| m.setup.bodies[1].start.momentum[2] *= 1.001), one.digest);
+    assert_ne!(without(&|m| m.setup.bodies[2].spin[1] = None), one.digest);
+}
+
+#[test]
 fn another_problem_has_other_bits() {
     let mut model = example("two-bars");
     model.setup.control.end_cycle = 20;

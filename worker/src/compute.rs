@@ -224,6 +224,7 @@ impl Machine {
             &assign.gauges,
             width,
         );
+        domain.place_bodies(&assign.bodies)?;
         domain.watch(&assign.watched);
         domain.install(&assign.plan, &assign.guest_state)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));

@@ -8,7 +8,13 @@ use mechanics::{
     wall::RigidWall,
 };
 
-use super::{MAX_ENTRIES, Names, PartDraft, curve::Curves, load, wall};
+use super::{
+    MAX_ENTRIES, Names, PartDraft,
+    curve::Curves,
+    load,
+    rigid::{self, RigidDraft},
+    wall,
+};
 use crate::{
     assembly::Assembly,
     check::{Face, outer_faces},
@@ -30,6 +36,8 @@ pub(crate) struct Conditions {
     pub(crate) constraint: Vec<u16>,
     pub(crate) walls: Vec<RigidWall>,
     pub(crate) loads: Loads,
+    /// Rigid bodies, to be made of the mesh.
+    pub(crate) rigid: Vec<RigidDraft>,
 }
 
 /// One `[[boundary]]`: what it prescribes and where it stands.
@@ -128,10 +136,11 @@ pub(crate) fn read(deck: &Table<'_>, names: &Names, parts: &[PartDraft], assembl
         }
         walls.push(wall);
     }
+    let rigid = rigid::read(deck, names, &curves);
     let (constraints, constraint) =
         number(deck, &boundaries, &prescribed, &clamps, &loads.forces, &touched, assembly.mesh.n_nodes());
     let loads = Loads { curves: curves.list, ..loads.list };
-    Conditions { constraints, constraint, walls, loads }
+    Conditions { constraints, constraint, walls, loads, rigid }
 }
 
 /// Numbers the different constraints; entry 0 is free.
@@ -277,8 +286,13 @@ fn read_axes(table: &Table<'_>, turns_held: bool) -> Option<Prescribed> {
 
 /// `velocity = { x = 1.0, z = { curve = "name" } }`: the axes not named stay free.
 pub(super) fn read_velocity(table: &Table<'_>, curves: &Curves) -> Option<Prescribed> {
-    let value = table.require("velocity", "a table of components such as { x = 1.0 }")?;
-    let components = value.table(format!("velocity of {}", table.title))?;
+    read_components(table, "velocity", curves)
+}
+
+/// The same of any key.
+pub(super) fn read_components(table: &Table<'_>, key: &'static str, curves: &Curves) -> Option<Prescribed> {
+    let value = table.require(key, "a table of components such as { x = 1.0 }")?;
+    let components = value.table(format!("{key} of {}", table.title))?;
     let mut velocity = [None; 3];
     let mut faulty = false;
     for (axis, name) in AXES.into_iter().enumerate() {

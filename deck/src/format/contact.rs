@@ -1,6 +1,8 @@
 //! `[contact]`: gap, slack, which parts meet, friction.
 
-use mechanics::{contact::Settings, load::Drive, material::Material, setup::Constraint, wall::Motion};
+use mechanics::{
+    contact::Settings, load::Drive, material::Material, rigid::Body, setup::Constraint, wall::Motion,
+};
 
 use super::{MAX_CONTACT_PARTS, MAX_ENTRIES, Names, boundary::Conditions};
 use crate::{
@@ -42,6 +44,7 @@ pub(crate) fn read(
     assembly: &Assembly,
     materials: &[Material],
     conditions: &Conditions,
+    bodies: &[Body],
 ) -> Option<ContactDraft> {
     let table = deck.get("contact")?.table("[contact]".to_string())?;
     let n = names.len();
@@ -64,6 +67,12 @@ pub(crate) fn read(
         }
     }
     read_pairs(&table, names, &mut interacts, &mut frictions);
+    // A rigid body does not meet itself.
+    for body in bodies {
+        for (a, b) in body.parts.iter().flat_map(|&a| body.parts.iter().map(move |&b| (a, b))) {
+            interacts[a as usize * n + b as usize] = false;
+        }
+    }
     let faces = outer_faces(assembly);
     let smallest = smallest_face_dimension(assembly, &faces, &interacts);
     let gap = match table.get("gap_fraction").filter(|v| v.is_text()) {
@@ -94,6 +103,7 @@ pub(crate) fn read(
         Some(value) => value.number(Range::Positive),
         None => Some(default_friction_velocity(assembly, materials, conditions)),
     };
+    let initial = table.get("initial_penetration").and_then(|v| v.one_of(&["refuse", "ignore"]));
     let at = table.at;
     if n > 0 && !interacts.contains(&true) {
         table.faults.add(
@@ -111,6 +121,7 @@ pub(crate) fn read(
         interacts,
         stiffness,
         friction_velocity: friction_velocity?,
+        ignores_initial: initial == Some(1),
     };
     Some(ContactDraft { settings, faces })
 }

@@ -49,7 +49,10 @@ pub(super) enum Law {
     Null {
         cut_off: f64,
     },
-    Rigid,
+    /// Axes along which and about which the part does not move.
+    Rigid {
+        held: [[bool; 3]; 2],
+    },
 }
 
 /// An equation of state of a deck.
@@ -221,7 +224,30 @@ impl Problem {
                 if f[0].real(4, 0.0) != 0.0 {
                     f[0].fault(4, "no coupling with another program", "leave N blank");
                 }
-                (moduli(2), Some(Law::Rigid))
+                let frame = f[1].real(0, 0.0);
+                if frame < 0.0 {
+                    f[1].fault(0, "constraints along the axes of space", "give CMO 1 or 0");
+                }
+                // x, y, z, xy, yz, zx, all.
+                const HELD: [[bool; 3]; 8] = [
+                    [false, false, false],
+                    [true, false, false],
+                    [false, true, false],
+                    [false, false, true],
+                    [true, true, false],
+                    [false, true, true],
+                    [true, false, true],
+                    [true, true, true],
+                ];
+                let mut held = [[false; 3]; 2];
+                for (i, axes) in held.iter_mut().enumerate().filter(|_| frame > 0.0) {
+                    let code = f[1].integer(1 + i);
+                    match usize::try_from(code).ok().and_then(|code| HELD.get(code)) {
+                        Some(known) => *axes = *known,
+                        None => f[1].fault(1 + i, "a number from 0 to 7", "correct it"),
+                    }
+                }
+                (moduli(2), Some(Law::Rigid { held }))
             }
             _ => {
                 log.fault(
@@ -414,7 +440,7 @@ pub(super) fn strength_words(
         })
     };
     match &material.law {
-        Law::Elastic | Law::Rigid => Some(format!("{{ type = \"elastic\", shear = {shear:?} }}")),
+        Law::Elastic | Law::Rigid { .. } => Some(format!("{{ type = \"elastic\", shear = {shear:?} }}")),
         Law::Null { .. } => Some("{ type = \"hydro\" }".to_string()),
         Law::Bilinear { yield_stress, tangent, rate } => {
             if !(0.0 <= *tangent && *tangent < young) {

@@ -170,7 +170,7 @@ impl Problem {
             "DEFORMABLE_TO_RIGID" => log.fault(
                 block.at,
                 "*DEFORMABLE_TO_RIGID",
-                "parts that deform: rigid bodies are not computed",
+                "parts that deform: none becomes rigid on the way",
                 "take it out; the parts then deform by their materials",
             ),
             word if word.starts_with("SET_") => self.sets.read(block, context),

@@ -372,15 +372,6 @@ impl Translation<'_> {
                 continue;
             }
             let at = material.at;
-            if let Law::Rigid = material.law {
-                log.fault(
-                    at,
-                    "a rigid part",
-                    "parts that deform: rigid bodies are not computed",
-                    "give it an elastic material",
-                );
-                continue;
-            }
             let curve_of = |id: u32| {
                 let curve = problem.curves.get(&id);
                 if curve.is_none() {
@@ -441,6 +432,21 @@ impl Translation<'_> {
             }
             let (file, body) = (quoted(self.mesh_name), format!("part {id}"));
             self.draft.line(at, format!("mesh = {{ file = {file}, body = \"{body}\" }}"));
+            if let Some(Law::Rigid { held }) = problem.materials.get(&part.material).map(|m| &m.law) {
+                self.draft.heading(at, "[[rigid]]");
+                self.draft.line(at, format!("parts = [{}]", quoted(&name)));
+                for (key, axes) in ["velocity", "spin"].into_iter().zip(held) {
+                    let zeros: Vec<String> = AXES
+                        .iter()
+                        .zip(axes)
+                        .filter(|(_, held)| **held)
+                        .map(|(a, _)| format!("{a} = 0"))
+                        .collect();
+                    if !zeros.is_empty() {
+                        self.draft.line(at, format!("{key} = {{ {} }}", zeros.join(", ")));
+                    }
+                }
+            }
         }
         // Nodes of several parts get theirs from the mesh wherever one part would give them another.
         self.mesh.velocities = apart.iter().map(|node| (*node, of(node))).collect();

@@ -91,9 +91,10 @@ impl Job {
                 if snapshot.state.x.len() != start.x.len()
                     || snapshot.state.initial_volume != start.initial_volume
                     || snapshot.walls.len() != wall::first_poses(&setup.walls).len()
+                    || snapshot.vote.bodies.len() != setup.bodies.len()
                 {
                     return Err(
-                        "the snapshot is of another problem: its mesh or its walls are not this deck's"
+                        "the snapshot is of another problem: its mesh, its walls or its rigid bodies are not this deck's"
                             .to_owned(),
                     );
                 }
@@ -121,8 +122,13 @@ impl Job {
             let at_start: Vec<[f64; 3]> =
                 surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
             let inside = initial_pairs(&surface, &at_start, settings);
-            refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
-            let exclusions = Arc::new(Exclusions::new(&surface, &inside));
+            let exclusions = if settings.ignores_initial {
+                Exclusions::around(&surface, &inside)
+            } else {
+                refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
+                Exclusions::new(&surface, &inside)
+            };
+            let exclusions = Arc::new(exclusions);
             Ok::<_, String>(Touching { surface, exclusions })
         });
         let first_cycle = base.state.cycle;
@@ -252,6 +258,10 @@ impl Job {
         };
         self.imbalance = imbalance(&elements, &interactions, &speeds);
         let exchange = Arc::new(exchange);
+        let bodies = match &base.rest.vote {
+            Some(vote) => vote.bodies.clone(),
+            None => model.setup.bodies.iter().map(|body| body.start).collect(),
+        };
         let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
         let watched = Watched {
             elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
@@ -273,6 +283,7 @@ impl Job {
                 plan: exchange.plans[position].clone(),
                 plan_hash: exchange.hash,
                 guest_state: exchange.guest_state_from(position, state),
+                bodies: bodies.clone(),
             };
             actions.push(Action::Send(crew[position], ToWorker::Assign(Box::new(assign))));
         }
@@ -397,7 +408,8 @@ impl Cut {
             nodes_of.push(nodes);
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
         }
-        let holdings = Holdings::new(model.mesh.n_nodes(), work, layout, &nodes_of);
+        let holdings = Holdings::new(model.mesh.n_nodes(), work, layout, &nodes_of)
+            .with_bodies(model.setup.bodies.len());
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
         for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {
@@ -457,7 +469,7 @@ fn refuse_overlap(
     match foreign {
         None => Ok(()),
         Some(&(node, face, distance)) => Err(format!(
-            "node {} of part `{}` starts {distance:e} from part `{}`, inside the contact gap {gap:e}; move the parts apart by at least the gap, or join them",
+            "node {} of part `{}` starts {distance:e} from part `{}`, inside the contact gap {gap:e}; move the parts apart by at least the gap, join them, or write contact.initial_penetration = \"ignore\"",
             mesh.node_ids[surface.nodes[node as usize] as usize],
             mesh.parts[surface.node_part[node as usize] as usize].name,
             mesh.parts[surface.faces[face as usize].part as usize].name,

@@ -96,6 +96,9 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<Stri
         if !vote.force_bound.is_finite() && !vote.force_bound.is_nan() {
             return None;
         }
+        if vote.bodies.iter().any(|body| !body.is_finite()) {
+            return Some("the state of a rigid body in its vote is no number".to_owned());
+        }
         let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
         let numbers = energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external]);
         let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);

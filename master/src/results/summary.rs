@@ -147,6 +147,17 @@ pub struct NamedPart {
     pub external: f64,
 }
 
+/// Energies of the contact of two parts in the deck's unit of energy.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NamedPair {
+    /// Their names; twice the same for a part that meets itself.
+    pub parts: [String; 2],
+    /// Energy held by springs and taken by friction.
+    pub contact: f64,
+    /// Part of `contact` that friction took.
+    pub friction: f64,
+}
+
 /// Energies of the whole problem in the deck's unit of energy; `error` is relative.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energies {
@@ -168,6 +179,8 @@ pub struct Energies {
     pub error: f64,
     /// By part, in deck order.
     pub parts: Vec<NamedPart>,
+    /// By pair of parts that touched, in deck order.
+    pub contacts: Vec<NamedPair>,
 }
 
 impl Summary {

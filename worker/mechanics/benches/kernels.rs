@@ -184,6 +184,7 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         contact: None,
         constraints: vec![Constraint::default()],
         walls: Vec::new(),
+        bodies: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
         erosion: Default::default(),

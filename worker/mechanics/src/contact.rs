@@ -22,6 +22,7 @@ pub mod cycle;
 pub mod force;
 pub mod joint;
 pub mod map;
+mod pair_energy;
 mod pairs;
 pub mod reach;
 pub mod search;
@@ -35,6 +36,7 @@ pub mod zone;
 pub use cycle::{Contact, initial_pairs};
 pub use force::ContactVote;
 pub use map::Map;
+pub use pair_energy::{PairEnergies, PairEnergy};
 pub use reach::Extent;
 pub use search::{Exclusions, cull};
 pub use sort::sort;
@@ -63,6 +65,8 @@ pub struct Settings {
     /// Velocity over which friction is regularised (length per time): below it the force is proportional to
     /// the sliding velocity, so bodies creep instead of sticking.
     pub friction_velocity: f64,
+    /// Nodes that start inside the zone of another part never meet the faces there; without it such a start is refused.
+    pub ignores_initial: bool,
 }
 
 impl Settings {
@@ -75,6 +79,14 @@ impl Settings {
     #[inline(always)]
     pub fn permits(&self, a: u32, b: u32) -> bool {
         self.interacts[a as usize * self.n_parts() + b as usize]
+    }
+
+    /// The pair of parts that may meet, if there is only one.
+    pub fn only_pair(&self) -> Option<[u32; 2]> {
+        let n = self.n_parts();
+        let mut pairs = (0..n * n).filter(|&i| self.interacts[i] && i / n <= i % n);
+        let pair = pairs.next().map(|i| [(i / n) as u32, (i % n) as u32]);
+        pair.filter(|_| pairs.next().is_none())
     }
 
     /// Cycles between trigger and sort after which nodes cannot have left the slack at the speeds that votes allow, where

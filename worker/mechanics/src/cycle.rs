@@ -8,6 +8,8 @@
 //! Between two plans a cycle is, in this order: [`Domain::begin`], [`Domain::contact`] (with the loads on faces), [`Domain::elements`] (border),
 //! [`Domain::partials`], [`Domain::elements`] (interior), [`Domain::integrate`].
 
+mod bodies;
+
 use std::{
     collections::{HashMap, HashSet, VecDeque},
     ops::Range,
@@ -30,6 +32,8 @@ use crate::{
     vote::{Gone, Quanta, Vote, Watched},
     wall::{self, Pose, WallVote},
 };
+
+use bodies::Held;
 
 /// Measures the work of compute threads; the physics knows no clock of its own.
 pub trait Meter: Sync {
@@ -133,6 +137,8 @@ const NONE: u32 = u32::MAX;
 /// A block and what the domain keeps beside it.
 struct Room {
     block: Block,
+    /// Its elements are those of a rigid body: they are not computed.
+    is_rigid: bool,
     border: Vec<Range<u32>>,
     interior: Vec<Range<u32>>,
     /// Which nodes are held, booked and on the contact surface.
@@ -233,6 +239,9 @@ pub struct Domain {
     exchange: Vec<Shared>,
     local: Vec<Shared>,
     copies: Vec<(u32, u32)>,
+    bodies: Vec<Held>,
+    /// Pushes on bodies travel: there are other workers.
+    sends_pushes: bool,
     home: Home,
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
@@ -286,7 +295,10 @@ impl Domain {
                     )
                 });
                 let faces = face::faces_of(&block, &setup.loads, material);
+                let part = block.part;
+                let is_rigid = setup.bodies.iter().any(|body| body.parts.binary_search(&part).is_ok());
                 rooms.push(Room {
+                    is_rigid,
                     sets: NodeSet::all(&block.constraint),
                     block,
                     border: Vec::new(),
@@ -334,6 +346,7 @@ impl Domain {
                 Some((g as u32, room, local))
             })
             .collect();
+        let bodies = Held::all(&setup, &home, &mut rooms);
         Self {
             vote: Vote::empty(n_parts),
             cycle,
@@ -353,6 +366,8 @@ impl Domain {
             exchange: Vec::new(),
             local: Vec::new(),
             copies: Vec::new(),
+            bodies,
+            sends_pushes: false,
             home,
             gather,
             gauges,
@@ -473,7 +488,9 @@ impl Domain {
         self.exchange.clear();
         self.local.clear();
         let mut exchanged = HashSet::with_capacity(plan.exchange.len());
-        for &node in &plan.exchange {
+        let n_entries = bodies::entries_of(&plan.exchange, self.bodies.len())?;
+        self.sends_pushes = n_entries > 0;
+        for &node in &plan.exchange[..plan.exchange.len() - n_entries] {
             exchanged.insert(node);
             let contact = contact_nodes.binary_search_by_key(&node, |n| n.global);
             let shared = self.shared(node, contact.map_or(NONE, |i| i as u32), &guest_of);
@@ -481,6 +498,10 @@ impl Domain {
                 return Err(format!("node {node} of the exchange is neither held nor a guest"));
             }
             self.exchange.push(shared);
+        }
+        if !self.bodies.is_empty() {
+            let nodes: Vec<u32> = contact_nodes.iter().map(|node| node.global).collect();
+            self.find_bodies(&guest_of, &nodes, &mut exchanged);
         }
         // Both lists ascend, so one walk over them finds the contact node of each.
         let (mut next, n_several) = (0, self.home.several().len());
@@ -621,6 +642,7 @@ impl Domain {
             let vote =
                 room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
             self.vote.add_contact(&vote);
+            self.vote.contact_energies.merge(room.contact.energies());
             if !self.watched_pairs.is_empty() {
                 self.vote.add_contacts(&room.contact.pair_votes());
             }
@@ -657,6 +679,9 @@ impl Domain {
         };
         let (materials, width, cycle) = (&self.setup.materials, self.width, self.cycle);
         let work = |room: &mut Room| {
+            if room.is_rigid {
+                return;
+            }
             let mark = meter.start();
             let material = &materials[room.block.material as usize];
             if let Some(eroding) = room.eroding.as_mut().filter(|_| dt > 0.0) {
@@ -679,16 +704,18 @@ impl Domain {
         each(&mut self.rooms, work);
     }
 
-    /// Partial forces of the nodes of the exchange, three numbers each, with moments six.
-    pub fn partials(&self, meter: &dyn Meter) -> Vec<f64> {
+    /// Partial forces of the nodes of the exchange, three numbers each, with moments six, and behind them pushes on rigid bodies.
+    pub fn partials(&mut self, meter: &dyn Meter) -> Vec<f64> {
         let mark = meter.start();
-        let mut out = Vec::with_capacity(self.stride() * self.exchange.len());
+        self.push_bodies();
+        let mut out = Vec::with_capacity(self.stride() * self.exchange.len() + self.n_pushes());
         for shared in &self.exchange {
             out.extend(self.sum(shared));
             if self.moments {
                 out.extend(self.moment(shared));
             }
         }
+        self.pack_pushes(&mut out);
         meter.stop(mark, false);
         out
     }
@@ -752,7 +779,7 @@ impl Domain {
     /// `free_walls` are the poses of the walls of finite mass.
     ///
     /// # Errors
-    /// If `totals` has not three numbers for each node of the exchange.
+    /// If `totals` has not three numbers for each node of the exchange, and those of the pushes on rigid bodies.
     pub fn integrate(
         &mut self,
         totals: &[f64],
@@ -761,15 +788,16 @@ impl Domain {
         free_walls: &[Pose],
         meter: &dyn Meter,
     ) -> Result<Vote, String> {
-        let stride = self.stride();
-        if totals.len() != stride * self.exchange.len() {
+        let (stride, n_pushes) = (self.stride(), self.n_pushes());
+        if totals.len() != stride * self.exchange.len() + n_pushes {
             return Err(format!(
-                "{} numbers of total forces for {} shared nodes, expected {stride} each",
+                "{} numbers of total forces for {} shared nodes, expected {stride} each, and {n_pushes} for rigid bodies",
                 totals.len(),
                 self.exchange.len()
             ));
         }
         let mark = meter.start();
+        let (totals, pushes) = totals.split_at(totals.len() - n_pushes);
         for (i, total) in totals.chunks_exact(stride).enumerate() {
             let moment = if self.moments { [total[3], total[4], total[5]] } else { [0.0; 3] };
             self.set(i, true, [total[0], total[1], total[2]], moment);
@@ -780,6 +808,7 @@ impl Domain {
             self.set(i, false, total, moment);
         }
         meter.stop(mark, false);
+        self.move_bodies(pushes, dt_previous, dt);
         let setup = &self.setup;
         wall::poses(&setup.walls, &setup.loads.curves, self.time, dt, free_walls, &mut self.poses);
         let advance = Advance {
@@ -863,6 +892,7 @@ impl Domain {
                 vote.gone.internal += casualties.internal;
             }
         }
+        self.vote_on_bodies(&mut vote);
         vote.gone.merge(&std::mem::take(&mut self.gone));
         for &(gauge, room, local) in &self.gauges {
             let (block, i) = (&self.rooms[room as usize].block, local as usize);

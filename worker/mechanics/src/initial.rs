@@ -7,8 +7,9 @@ use crate::{
     element::shell4,
     erosion::ALIVE,
     exact::Quantum,
-    load::SurfaceKind,
+    load::{Drive, SurfaceKind},
     mesh::{Mesh, Part},
+    rigid::{Body, dot},
     setup::{Constraint, MAX_WALLS, Setup},
     state::{GlobalState, N_FIELDS, ShellState, field},
     vote::Quanta,
@@ -42,8 +43,10 @@ pub fn state(
         shells: ShellState::default(),
     };
     let mut mass_of = Vec::with_capacity(n_elements);
-    for part in &mesh.parts {
+    for (p, part) in (0..).zip(&mesh.parts) {
         let material = &setup.materials[part.material as usize];
+        let body = setup.bodies.iter().find(|body| body.parts.binary_search(&p).is_ok());
+        let density = material.density * body.map_or(1.0, |body| body.nodal_scale);
         for e in 0..part.n_elements() {
             let corners = part.corners(e).map(|n| mesh.positions[n as usize]);
             let v = part.volume(&corners);
@@ -64,7 +67,7 @@ pub fn state(
                 state.elements[field::TIME_TO_LIGHT][index] =
                     lighting_time(&setup.detonations, centre, speed);
             }
-            mass_of.push(material.density * v);
+            mass_of.push(density * v);
         }
     }
     debug_assert_eq!(state.elements.len(), N_FIELDS);
@@ -158,7 +161,15 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         Motion::Free { velocity, .. } => velocity.iter().map(|v| v * v).sum::<f64>(),
     };
     let walls2 = setup.walls.iter().map(of_wall).fold(0.0, f64::max);
-    let top_speed2 = speed2.max(prescribed2).max(walls2);
+    let of_body = |body: &Body| {
+        let size = |drives: &[Option<Drive>; 3]| {
+            drives.iter().flatten().map(|v| v.greatest(curves).powi(2)).sum::<f64>().sqrt()
+        };
+        let reach = body.places.iter().map(|x| dot(*x, *x)).fold(0.0, f64::max).sqrt();
+        size(&body.spin).mul_add(reach, size(&body.velocity)).powi(2)
+    };
+    let bodies2 = setup.bodies.iter().map(of_body).fold(0.0, f64::max);
+    let top_speed2 = speed2.max(prescribed2).max(walls2).max(bodies2);
     let pressure = setup
         .loads
         .surfaces
@@ -194,17 +205,18 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     }
     let kinetic: f64 =
         state.v.iter().zip(&state.mass).map(|(v, m)| 0.5 * m * v.iter().map(|c| c * c).sum::<f64>()).sum();
+    let spinning: f64 = setup.bodies.iter().map(|body| 0.5 * dot(body.start.spin, body.start.momentum)).sum();
     let total_mass: f64 = state.mass.iter().sum();
     Quanta {
         force: Quantum::for_reference(force, 42),
-        energy: Quantum::for_reference(kinetic + stored, 46),
+        energy: Quantum::for_reference(kinetic + spinning + stored, 46),
         momentum: Quantum::for_reference(total_mass * top_speed2.max(driven2).sqrt().max(1e-3 * sound), 50),
         arm: if arm > 0.0 { Quantum::for_reference(arm, 0).value() } else { 1.0 },
     }
 }
 
 /// Area of the largest face of a hexahedron.
-fn largest_face(x: &[[f64; 3]; 8]) -> f64 {
+pub(crate) fn largest_face(x: &[[f64; 3]; 8]) -> f64 {
     use nalgebra::Vector3;
     crate::mesh::FACES
         .iter()

@@ -37,6 +37,7 @@ pub mod mesh;
 pub mod nodes;
 pub mod piece;
 pub mod proof;
+pub mod rigid;
 pub mod setup;
 pub(crate) mod spin;
 pub mod state;

@@ -171,6 +171,19 @@ impl Advance<'_> {
         Some(Body { gain, loss: relaxation.map_or(0.0, |r| 1.0 - r.factor) })
     }
 
+    /// The force on a node that brings it to `target` in this step, whatever gravity and relaxation do.
+    pub(crate) fn leading(&self, x: [f64; 3], v: [f64; 3], mass: f64, target: [f64; 3]) -> [f64; 3] {
+        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        if self.dt == 0.0 || half_steps == 0.0 {
+            return [0.0; 3];
+        }
+        let Body { gain, loss } = self.body().unwrap_or(Body { gain: [0.0; 3], loss: 0.0 });
+        std::array::from_fn(|a| {
+            let change = (target[a] - x[a]) / self.dt - v[a];
+            mass / half_steps * (change - (gain[a] - loss * v[a]))
+        })
+    }
+
     /// Integrates all sets of nodes, books the owned nodes, votes on the surface, and clears the forces.
     ///
     /// `v_{n+1/2} = v_{n-1/2} + f/m (dt_{n-1} + dt_n)/2`, `x_{n+1} = x_n + v_{n+1/2} dt_n`, with gravity and relaxation

@@ -280,6 +280,7 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
         detonations: Vec::new(),
         loads: Loads::default(),
         erosion: Erosion::default(),
+        bodies: Vec::new(),
     };
     let (force, energy) = (Quantum::for_reference(3e7, 42), Quantum::for_reference(1e6, 42));
     let quanta = Quanta { force, energy, momentum: energy, arm: 1.0 };
@@ -332,6 +333,7 @@ fn of_contact(friction: f64, width: Width, hasher: &mut blake3::Hasher) {
         interacts: vec![false, true, true, false],
         stiffness: 0.5,
         friction_velocity: 1e-3,
+        ignores_initial: false,
     };
     let mut contact = Contact::new(&batch, &settings, &x).on(width);
     let v = [x[1].clone(), x[2].clone(), x[0].clone()];

@@ -8,6 +8,7 @@ use crate::{
     erosion::Erosion,
     load::{Drive, Loads},
     material::Material,
+    rigid::Body,
     wall::RigidWall,
 };
 
@@ -24,6 +25,8 @@ pub struct Setup {
     pub constraints: Vec<Constraint>,
     /// Rigid walls.
     pub walls: Vec<RigidWall>,
+    /// Rigid bodies.
+    pub bodies: Vec<Body>,
     /// Where explosives are lit.
     pub detonations: Vec<Detonation>,
     /// Curves, forces, gravity, loads on faces, relaxation.

@@ -6,8 +6,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    contact::{ContactVote, Extent},
+    contact::{ContactVote, Extent, PairEnergies},
     element::ElementVote,
+    rigid,
     state::N_FIELDS,
     wall::WallVote,
 };
@@ -41,6 +42,8 @@ pub struct Vote {
     pub contact: f64,
     /// Energy lost to friction in this cycle.
     pub friction: f64,
+    /// The last two by pair of parts.
+    pub contact_energies: PairEnergies,
     /// Work of prescribed velocities, walls and loads in this cycle.
     pub external: f64,
     /// Momentum of all nodes, `m v_{n+1/2}`.
@@ -49,6 +52,8 @@ pub struct Vote {
     pub parts: Vec<PartVote>,
     /// What nodes gave each wall; empty if none was touched.
     pub walls: Vec<WallVote>,
+    /// States of the rigid bodies after the cycle; the same from every worker.
+    pub bodies: Vec<rigid::State>,
     /// Displacement extents of surface nodes since the sorted positions, by part.
     pub extents: Vec<Extent>,
     /// Position and velocity of gauge nodes: gauge index, then x, y, z, vx, vy, vz.
@@ -147,10 +152,12 @@ impl Vote {
             hits: 0,
             contact: 0.0,
             friction: 0.0,
+            contact_energies: PairEnergies::default(),
             external: 0.0,
             momentum: [0.0; 3],
             parts: vec![PartVote::default(); n_parts],
             walls: Vec::new(),
+            bodies: Vec::new(),
             extents: vec![Extent::NONE; n_parts],
             gauges: Vec::new(),
             element_gauges: Vec::new(),
@@ -176,6 +183,7 @@ impl Vote {
         self.hits += other.hits;
         self.contact += other.contact;
         self.friction += other.friction;
+        self.contact_energies.merge(&other.contact_energies);
         self.external += other.external;
         for axis in 0..3 {
             self.momentum[axis] += other.momentum[axis];
@@ -191,6 +199,9 @@ impl Vote {
             mine.merge(theirs);
         }
         self.add_walls(&other.walls);
+        if self.bodies.is_empty() {
+            self.bodies.clone_from(&other.bodies);
+        }
         self.gauges.extend_from_slice(&other.gauges);
         self.gauges.sort_by_key(|g| g.0);
         self.element_gauges.extend_from_slice(&other.element_gauges);

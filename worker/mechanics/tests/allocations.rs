@@ -113,6 +113,7 @@ fn domain() -> Domain {
             Constraint { velocity: [None, None, Some(Drive::constant(0.0))], ..Constraint::default() },
         ],
         walls: Vec::new(),
+        bodies: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
         erosion: Default::default(),

@@ -25,6 +25,7 @@ fn assign(cycle: u64) -> Box<Assign> {
             contact: None,
             constraints: Vec::new(),
             walls: Vec::new(),
+            bodies: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
             erosion: Default::default(),
@@ -41,6 +42,7 @@ fn assign(cycle: u64) -> Box<Assign> {
         plan: Plan { exchange: vec![4], ..Plan::default() },
         plan_hash: 7,
         guest_state: Vec::new(),
+        bodies: Vec::new(),
     })
 }
 

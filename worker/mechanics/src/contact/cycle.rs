@@ -11,6 +11,7 @@ use super::{
         lanes::{Pushes, Statics, Terms},
     },
     joint::{self, Hit, Near},
+    pair_energy::{ByPair, PairEnergies},
     pairs::Pairs,
     search::{self, Bounds, Candidates},
     sort::sort,
@@ -78,12 +79,14 @@ pub struct Contact {
     statics: Statics,
     /// Whether no pair has friction.
     smooth: bool,
+    /// The only pair of parts that may meet, if there is but one: it has all energy.
+    only_pair: Option<[u32; 2]>,
+    /// Sums of the cycle by pair of parts.
+    by_pair: ByPair,
     width: Width,
     /// The candidates that can be near before nodes have moved much further.
     watch: Watch,
     work: Work,
-    /// Sums by pair of parts, where somebody wants them.
-    tally: Option<Tally>,
 }
 
 /// Work space of one block of nodes.
@@ -148,11 +151,12 @@ impl Contact {
                 inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
                 face_stiffness: Vec::new(),
             },
+            only_pair: settings.only_pair(),
+            by_pair: ByPair::default(),
             smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
             width: Width::best(),
             watch: Watch::default(),
             work: Work::default(),
-            tally: None,
         };
         for (index, face) in index.iter_mut().zip(&batch.faces).filter(|(index, _)| **index == 0) {
             *index = contact.faces.len() as u32;
@@ -178,14 +182,19 @@ impl Contact {
         contact
     }
 
+    /// Energies of the last cycle by pair of parts.
+    pub fn energies(&self) -> &PairEnergies {
+        &self.by_pair.energies
+    }
+
     /// From now on the forces between these pairs of parts are summed; none of them for none.
     pub fn watch_pairs(&mut self, pairs: &[[u32; 2]]) {
-        self.tally = (!pairs.is_empty()).then(|| Tally::new(self.n_parts, pairs));
+        self.by_pair.forces = (!pairs.is_empty()).then(|| Tally::new(self.n_parts, pairs));
     }
 
     /// What [`Contact::forces`] found last between each watched pair that is in contact, by index of the pair.
     pub fn pair_votes(&self) -> Vec<(u32, PairVote)> {
-        self.tally.as_ref().map(Tally::votes).unwrap_or_default()
+        self.by_pair.forces.as_ref().map(Tally::votes).unwrap_or_default()
     }
 
     /// The same on lanes of another width, which the machine must have; the forces do not depend on it.
@@ -242,20 +251,18 @@ impl Contact {
         let mut work = std::mem::take(&mut self.work);
         let mut watch = std::mem::take(&mut self.watch);
         let mut vote = ContactVote { pairs: self.candidates.faces.len() as u64, ..ContactVote::default() };
+        let mut by_pair = std::mem::take(&mut self.by_pair);
+        by_pair.clear(cycle.force_quantum);
         let mut frequency2 = 0.0;
-        if let Some(tally) = &mut self.tally {
-            tally.clear(cycle.force_quantum);
-        }
         if watch.is_stale(cycle.x, &self.settings) {
             self.look(&mut watch, &mut work, cycle.x);
         }
-        let mut tally = self.tally.take();
         for bounds in watch.blocks.windows(2) {
             let voted =
-                self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, &mut vote, &mut tally);
+                self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, (&mut vote, &mut by_pair));
             frequency2 = if voted > frequency2 { voted } else { frequency2 };
         }
-        (self.work, self.watch, self.tally) = (work, watch, tally);
+        (self.work, self.watch, self.by_pair) = (work, watch, by_pair);
         vote.dt = force::time_step(frequency2);
         vote
     }
@@ -269,8 +276,7 @@ impl Contact {
         ((first, first_pair), (end, end_pair)): ((u32, u32), (u32, u32)),
         work: &mut Work,
         cycle: &mut Cycle,
-        vote: &mut ContactVote,
-        tally: &mut Option<Tally>,
+        (vote, by_pair): (&mut ContactVote, &mut ByPair),
     ) -> f64 {
         let range = first_pair as usize..end_pair as usize;
         let warning = WARNING * self.settings.gap;
@@ -305,11 +311,10 @@ impl Contact {
             (0..3).for_each(|a| approach.direction[a][i] = direction[a]);
         }
         approach.depth[n..].fill(0.0);
-        let tally = tally.as_mut();
         if self.smooth {
-            self.push(n, work, cycle, vote, tally)
+            self.push(n, work, cycle, (vote, by_pair))
         } else {
-            self.rub(n, work, cycle, vote, tally)
+            self.rub(n, work, cycle, (vote, by_pair))
         }
     }
 
@@ -410,8 +415,7 @@ impl Contact {
         n: usize,
         work: &mut Work,
         cycle: &mut Cycle,
-        vote: &mut ContactVote,
-        tally: Option<&mut Tally>,
+        (vote, by_pair): (&mut ContactVote, &mut ByPair),
     ) -> f64 {
         let approach = &work.approach;
         let pushes = Pushes {
@@ -432,7 +436,10 @@ impl Contact {
                 vote.deepest(depth / self.settings.gap, pair);
             }
         }
-        if let Some(tally) = tally {
+        if sums.deepest > 0.0 {
+            self.share_out(sums.energy, n, work, cycle.energy_quantum, &mut by_pair.energies);
+        }
+        if let Some(tally) = &mut by_pair.forces {
             for (i, _) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
                 let parts = (self.part[pairs.node()[i] as usize], self.parts[work.face[i] as usize]);
                 tally.add(parts, [0, 1, 2].map(|a| work.terms[a][i]));
@@ -454,6 +461,23 @@ impl Contact {
         sums.frequency2
     }
 
+    /// Books the energy of the first `n` pushes, of which some are in the zone, by pair of parts.
+    fn share_out(&self, energy: f64, n: usize, work: &Work, quantum: Quantum, by_pair: &mut PairEnergies) {
+        if let Some([a, b]) = self.only_pair {
+            by_pair.add(a, b, energy, 0.0);
+            return;
+        }
+        let (statics, nodes) = (&self.statics, work.near_pairs.node());
+        let depths = work.approach.depth[..n].iter().enumerate();
+        for (i, &depth) in depths.filter(|(_, depth)| **depth > 0.0) {
+            let (node, face) = (nodes[i] as usize, work.face[i] as usize);
+            let (factor, of_node) = (statics.factor[node], statics.stiffness[node]);
+            let normal =
+                force::stiffness(factor, of_node, statics.face_stiffness[face]) * work.share[i] * depth;
+            by_pair.add(self.part[node], self.parts[face], quantum.round(0.5 * normal * depth), 0.0);
+        }
+    }
+
     /// Forces with friction of the first `n` pushes. Gives the greatest squared frequency.
     #[inline(always)]
     fn rub(
@@ -461,8 +485,7 @@ impl Contact {
         n: usize,
         work: &mut Work,
         cycle: &mut Cycle,
-        vote: &mut ContactVote,
-        mut tally: Option<&mut Tally>,
+        (vote, by_pair): (&mut ContactVote, &mut ByPair),
     ) -> f64 {
         let (approach, statics) = (&work.approach, &self.statics);
         let mut frequency2 = 0.0_f64;
@@ -499,8 +522,10 @@ impl Contact {
             });
             let reaction = force::react(&push, sliding.as_ref(), cycle.force_quantum, cycle.energy_quantum);
             vote.count(&reaction);
-            if let Some(tally) = &mut tally {
-                tally.add((self.part[node], self.parts[face]), reaction.node);
+            let parts = (self.part[node], self.parts[face]);
+            by_pair.energies.add(parts.0, parts.1, reaction.energy, reaction.friction);
+            if let Some(tally) = &mut by_pair.forces {
+                tally.add(parts, reaction.node);
             }
             for a in 0..3 {
                 let f = &mut cycle.f[a];

@@ -39,6 +39,38 @@ impl Exclusions {
         Self { pairs }
     }
 
+    /// Excludes pairs that start in contact on request: each node with its faces in `pairs` and, of their parts, with the
+    /// faces around these, onto which it may slide; pairs of one part as [`Exclusions::new`] does.
+    pub fn around(surface: &Surface, pairs: &[(u32, u32, f64)]) -> Self {
+        let foreign =
+            |&(n, f, _): &(u32, u32, f64)| surface.node_part[n as usize] != surface.faces[f as usize].part;
+        let mut touched: Vec<u32> = pairs
+            .iter()
+            .filter(|pair| foreign(pair))
+            .flat_map(|p| surface.faces[p.1 as usize].nodes)
+            .collect();
+        touched.sort_unstable();
+        touched.dedup();
+        let mut faces_at: Vec<Vec<u32>> = vec![Vec::new(); touched.len()];
+        for (f, face) in (0..).zip(&surface.faces) {
+            for node in face.nodes {
+                if let Ok(at) = touched.binary_search(&node) {
+                    faces_at[at].push(f);
+                }
+            }
+        }
+        let mut all = pairs.to_vec();
+        for &(n, f, distance) in pairs.iter().filter(|pair| foreign(pair)) {
+            let face = &surface.faces[f as usize];
+            for node in face.nodes {
+                let around = touched.binary_search(&node).map_or(&[][..], |at| &faces_at[at][..]);
+                let near = around.iter().filter(|&&g| surface.faces[g as usize].part == face.part);
+                all.extend(near.map(|&g| (n, g, distance)));
+            }
+        }
+        Self::new(surface, &all)
+    }
+
     /// The excluded pairs (surface node, surface face) of which both are on the surface.
     pub fn on<'a>(&'a self, surface: &'a Surface) -> impl Iterator<Item = (u32, u32)> + 'a {
         self.pairs

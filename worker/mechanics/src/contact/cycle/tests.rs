@@ -64,6 +64,7 @@ fn settings(friction: f64) -> Settings {
         interacts: vec![false, true, true, false],
         stiffness: 0.5,
         friction_velocity: 1e-3,
+        ignores_initial: false,
     }
 }
 

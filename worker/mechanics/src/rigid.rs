@@ -1,0 +1,377 @@
+//! Rigid bodies: parts whose nodes move as one.
+//!
+//! A body is a mass, an inertia and a [`State`]: centre, velocity, attitude, angular momentum. Its nodes sit at fixed
+//! places in its frame, which at the start of a run is that of the deck moved to the centre. What pushes nodes - contact,
+//! elements that share them, loads on faces - is added up as a [`Push`], an exact sum of integers, so that the order of
+//! nodes, blocks and workers does not matter. Every worker holds every body and moves it by the same push; nodes follow.
+//!
+//! Angular momentum is kept in axes that do not turn, so torque alone changes it. The angular velocity of a step is that
+//! of the attitude in its middle, `I(R_{n+1/2}) omega = L_{n+1/2}`, which is symmetric in time: energy does not drift.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    exact::Quantum,
+    load::{Drive, Loads},
+    vote::Quanta,
+};
+
+pub mod shape;
+
+/// A rigid body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Body {
+    /// Its parts, by index, ascending.
+    pub parts: Vec<u32>,
+    /// Mass, that of elements which share nodes with it included as far as they hang on these.
+    pub mass: f64,
+    /// Inertia about the centre in the frame of the body: xx, yy, zz, xy, yz, zx.
+    pub inertia: [f64; 6],
+    /// Prescribed velocity of the centre by axis (length per time).
+    pub velocity: [Option<Drive>; 3],
+    /// Prescribed angular velocity about axes through the centre that do not turn (radians per time).
+    pub spin: [Option<Drive>; 3],
+    /// As it begins.
+    pub start: State,
+    /// Global node indices of its nodes, ascending.
+    pub nodes: Vec<u32>,
+    /// Where each of them is in the frame of the body (length).
+    pub places: Vec<[f64; 3]>,
+    /// What its nodes weigh over what its elements say: 1 unless the deck gives the mass.
+    pub nodal_scale: f64,
+    /// The quantum of arms: `2^-50` of the longest.
+    pub length: Quantum,
+    /// Least Courant limit of its elements at rest (time) and the global index of the element that has it: of a body of a
+    /// problem in which nothing deforms; else none.
+    pub courant: Option<(f64, u32)>,
+    /// Nodal forces: index into `places` and into [`Loads::forces`].
+    pub forces: Vec<(u32, u32)>,
+}
+
+/// Where a body is and how it moves, at the start of cycle `n`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Centre of mass at `t_n` (length).
+    pub centre: [f64; 3],
+    /// Its velocity at `n - 1/2` (length per time).
+    pub velocity: [f64; 3],
+    /// Attitude at `t_n`: unit quaternion w, x, y, z that turns the frame of the body into the axes of space.
+    pub attitude: [f64; 4],
+    /// Angular momentum about the centre at `n - 1/2`, in the axes of space.
+    pub momentum: [f64; 3],
+    /// Angular velocity at `n - 1/2`, in the axes of space (radians per time).
+    pub spin: [f64; 3],
+}
+
+impl State {
+    /// Whether all its numbers are such.
+    pub fn is_finite(&self) -> bool {
+        [self.centre, self.velocity, self.momentum, self.spin].iter().flatten().all(|c| c.is_finite())
+            && self.attitude.iter().all(|c| c.is_finite())
+    }
+
+    /// From the centre to a place of the body.
+    pub fn arm(&self, place: [f64; 3]) -> [f64; 3] {
+        turned(&self.attitude, place)
+    }
+
+    /// Where a place of the body is now.
+    pub fn at(&self, place: [f64; 3]) -> [f64; 3] {
+        let arm = self.arm(place);
+        std::array::from_fn(|a| self.centre[a] + arm[a])
+    }
+}
+
+/// Numbers of one body in a packed array of pushes: limbs of force and torque.
+pub const PUSH: usize = 18;
+/// Entries of an exchange, of three numbers each, that carry the push on a body.
+pub const ENTRIES: u32 = PUSH as u32 / 3;
+
+/// The entries of an exchange that stand for the pushes on `n` bodies: numbers above those of all nodes, in the order of
+/// the bodies.
+pub fn entries(n: usize) -> std::ops::Range<u32> {
+    u32::MAX - ENTRIES * n as u32..u32::MAX
+}
+
+/// Force on a body and torque about its centre, in integers: multiples of the quantum of forces, and of that times the
+/// body's quantum of lengths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Push {
+    /// Force.
+    pub force: [i128; 3],
+    /// Torque.
+    pub torque: [i128; 3],
+}
+
+/// Bits of the lower limbs of an integer that travels.
+const LIMB: u32 = 40;
+
+impl Push {
+    /// Adds a force, a sum of multiples of `force`, at `arm` from the centre.
+    pub fn add(&mut self, f: [f64; 3], arm: [f64; 3], force: Quantum, length: Quantum) {
+        let f = f.map(|c| (c / force.value()) as i128);
+        let r = arm.map(|c| (c / length.value()).round() as i128);
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            self.force[a] += f[a];
+            self.torque[a] += r[b] * f[c] - r[c] * f[b];
+        }
+    }
+
+    /// As numbers that add up exactly whatever their order, if no more than 64 are added.
+    pub fn pack(&self) -> [f64; PUSH] {
+        let mut out = [0.0; PUSH];
+        let low = (1_i128 << LIMB) - 1;
+        for (value, limbs) in self.force.iter().chain(&self.torque).zip(out.chunks_exact_mut(3)) {
+            limbs[0] = (value & low) as f64;
+            limbs[1] = (value >> LIMB & low) as f64;
+            limbs[2] = (value >> (2 * LIMB)) as f64;
+        }
+        out
+    }
+
+    /// What was packed, or a sum of such.
+    ///
+    /// # Panics
+    /// If there are fewer than [`PUSH`] numbers.
+    pub fn unpack(limbs: &[f64]) -> Self {
+        let value = |i: usize| {
+            let limb = |k: usize| limbs[3 * i + k] as i128;
+            limb(0).wrapping_add(limb(1) << LIMB).wrapping_add(limb(2).wrapping_shl(2 * LIMB))
+        };
+        Self { force: std::array::from_fn(value), torque: std::array::from_fn(|a| value(3 + a)) }
+    }
+}
+
+/// One step of time for bodies.
+pub struct Advance<'a> {
+    /// `dt_{n-1}` (time).
+    pub dt_previous: f64,
+    /// `dt_n` (time).
+    pub dt: f64,
+    /// `t_n` (time).
+    pub time: f64,
+    /// Curves, nodal forces, gravity, relaxation.
+    pub loads: &'a Loads,
+    /// Quanta of the sums.
+    pub quanta: Quanta,
+}
+
+/// What a body says of a step, each number rounded to its quantum.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Booked {
+    /// Kinetic energy at `t_n`: `1/2 m v_{n-1/2} . v_{n+1/2}` and the same of the turning.
+    pub kinetic: f64,
+    /// Work of gravity, relaxation, nodal forces and whatever prescribes its motion.
+    pub external: f64,
+    /// `m v_{n+1/2}`.
+    pub momentum: [f64; 3],
+}
+
+impl Advance<'_> {
+    /// Moves a body from `t_n` to `t_{n+1}`.
+    pub fn run(&self, body: &Body, push: &Push, state: &mut State) -> Booked {
+        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        let middle = 0.5 * self.dt + self.time;
+        let curves = &self.loads.curves;
+        let force_quantum = self.quanta.force.value();
+        let torque_quantum = force_quantum * body.length.value();
+        let pushed: [f64; 3] = std::array::from_fn(|a| {
+            state.velocity[a] + push.force[a] as f64 * force_quantum / body.mass * half_steps
+        });
+        let twisted: [f64; 3] =
+            std::array::from_fn(|a| state.momentum[a] + push.torque[a] as f64 * torque_quantum * half_steps);
+        let (mut velocity, mut momentum) = (pushed, twisted);
+        for &(node, load) in &body.forces {
+            let load = &self.loads.forces[load as usize];
+            let scale = half_steps * load.drive.at(curves, self.time);
+            let impulse = load.force.map(|f| f * scale);
+            let moment = cross(turned(&state.attitude, body.places[node as usize]), impulse);
+            for a in 0..3 {
+                velocity[a] += impulse[a] / body.mass;
+                momentum[a] += moment[a];
+            }
+        }
+        if let Some(gravity) = self.loads.gravity {
+            let scale = half_steps * gravity.drive.at(curves, self.time);
+            (0..3).for_each(|a| velocity[a] += gravity.acceleration[a] * scale);
+        }
+        if let Some(relaxation) = self.loads.relaxation.filter(|r| self.time < r.until) {
+            let loss = 1.0 - relaxation.factor;
+            for a in 0..3 {
+                velocity[a] -= loss * state.velocity[a];
+                momentum[a] -= loss * state.momentum[a];
+            }
+        }
+        for (component, prescribed) in velocity.iter_mut().zip(body.velocity) {
+            if let Some(drive) = prescribed {
+                *component = drive.at(curves, middle);
+            }
+        }
+        let prescribed = body.spin.map(|drive| drive.map(|drive| drive.at(curves, middle)));
+        let (spin, momentum) = body.spin_of(&state.attitude, momentum, prescribed, state.spin, self.dt);
+        let old = *state;
+        state.velocity = velocity;
+        state.momentum = momentum;
+        state.spin = spin;
+        state.attitude = turn(&old.attitude, spin, self.dt);
+        (0..3).for_each(|a| state.centre[a] += velocity[a] * self.dt);
+        let Quanta { energy, momentum: of_momentum, .. } = self.quanta;
+        let translation = 0.5 * body.mass * dot(old.velocity, velocity);
+        let rotation = 0.25 * (dot(old.spin, momentum) + dot(spin, old.momentum));
+        let mut work = 0.0;
+        for a in 0..3 {
+            work += 0.5 * body.mass * (velocity[a] - pushed[a]) * (old.velocity[a] + velocity[a]);
+            work += 0.5 * (momentum[a] - twisted[a]) * (old.spin[a] + spin[a]);
+        }
+        Booked {
+            kinetic: energy.round(translation + rotation),
+            external: energy.round(work),
+            momentum: velocity.map(|v| of_momentum.round(body.mass * v)),
+        }
+    }
+}
+
+/// Most rounds of the search for the angular velocity; each gains as many digits as the body turns little in a step.
+const ROUNDS: usize = 30;
+
+impl Body {
+    /// Angular velocity and momentum in the middle of a step. Of both, one is given for each axis: `prescribed`, or
+    /// `momentum`; the search begins at `guess`.
+    fn spin_of(
+        &self,
+        attitude: &[f64; 4],
+        momentum: [f64; 3],
+        prescribed: [Option<f64>; 3],
+        guess: [f64; 3],
+        dt: f64,
+    ) -> ([f64; 3], [f64; 3]) {
+        let mut spin = guess;
+        let mut inertia = [[0.0; 3]; 3];
+        for _ in 0..ROUNDS {
+            inertia = self.inertia_at(&turn(attitude, spin, 0.5 * dt));
+            let mut rows = inertia;
+            let mut right = momentum;
+            for (axis, given) in prescribed.iter().enumerate() {
+                if let Some(given) = *given {
+                    rows[axis] = std::array::from_fn(|b| if b == axis { 1.0 } else { 0.0 });
+                    right[axis] = given;
+                }
+            }
+            let next = solve(rows, right);
+            if next == spin {
+                break;
+            }
+            spin = next;
+        }
+        let mut momentum = momentum;
+        for axis in (0..3).filter(|&axis| prescribed[axis].is_some()) {
+            momentum[axis] = dot(inertia[axis], spin);
+        }
+        (spin, momentum)
+    }
+
+    /// Inertia about the centre in the axes of space.
+    fn inertia_at(&self, attitude: &[f64; 4]) -> [[f64; 3]; 3] {
+        // Rows are the axes of the body.
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turned(attitude, axis));
+        let own = full(&self.inertia);
+        let mut out = [[0.0; 3]; 3];
+        for (i, row) in out.iter_mut().enumerate() {
+            for (j, cell) in row.iter_mut().enumerate() {
+                for k in 0..3 {
+                    for l in 0..3 {
+                        *cell += axes[k][i] * own[k][l] * axes[l][j];
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+/// The whole matrix of xx, yy, zz, xy, yz, zx.
+fn full(&[xx, yy, zz, xy, yz, zx]: &[f64; 6]) -> [[f64; 3]; 3] {
+    [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]
+}
+
+/// Solves three equations without exchanging rows: those of an inertia are dominated by their diagonal minors, those of
+/// prescribed components are rows of unity.
+fn solve(mut rows: [[f64; 3]; 3], mut right: [f64; 3]) -> [f64; 3] {
+    for i in 0..3 {
+        for j in i + 1..3 {
+            let factor = rows[j][i] / rows[i][i];
+            let above = rows[i];
+            (i..3).for_each(|k| rows[j][k] -= factor * above[k]);
+            right[j] -= factor * right[i];
+        }
+    }
+    let mut x = [0.0; 3];
+    for i in (0..3).rev() {
+        let known: f64 = (i + 1..3).map(|k| rows[i][k] * x[k]).sum();
+        x[i] = (right[i] - known) / rows[i][i];
+    }
+    x
+}
+
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        a[j] * b[k] - a[k] * b[j]
+    })
+}
+
+/// A vector of the body in the axes of space: `v + 2 w (u x v) + 2 u x (u x v)`.
+pub fn turned(&[w, x, y, z]: &[f64; 4], v: [f64; 3]) -> [f64; 3] {
+    let u = [x, y, z];
+    let once = cross(u, v);
+    let twice = cross(u, once);
+    std::array::from_fn(|a| v[a] + 2.0 * (w * once[a] + twice[a]))
+}
+
+/// Product of two turns, the right one first.
+fn product(a: &[f64; 4], b: &[f64; 4]) -> [f64; 4] {
+    [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    ]
+}
+
+fn unit(q: [f64; 4]) -> [f64; 4] {
+    let size = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+    q.map(|c| c / size)
+}
+
+/// Largest square of half the angle that the series of the tangent is asked for: its error is then below 1e-16.
+const SMALL: f64 = 1e-3;
+
+/// An attitude after a turn by `spin` for `dt`; any other is made of doubled smaller ones. Library functions of angles
+/// would differ between machines.
+fn turn(attitude: &[f64; 4], spin: [f64; 3], dt: f64) -> [f64; 4] {
+    if spin == [0.0; 3] {
+        return *attitude;
+    }
+    let mut half = spin.map(|s| 0.5 * dt * s);
+    let mut doubled = 0;
+    while dot(half, half) > SMALL && doubled < 60 {
+        half = half.map(|h| 0.5 * h);
+        doubled += 1;
+    }
+    let s = dot(half, half);
+    // tan(y) / y by s = y^2.
+    let tangent = 1.0 + s * (1.0 / 3.0 + s * (2.0 / 15.0 + s * (17.0 / 315.0 + s * (62.0 / 2835.0))));
+    let mut turn = unit([1.0, tangent * half[0], tangent * half[1], tangent * half[2]]);
+    for _ in 0..doubled {
+        turn = product(&turn, &turn);
+    }
+    unit(product(&turn, attitude))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,298 @@
+//! Mass, centre and inertia of rigid bodies, from their elements or as given.
+//!
+//! Integrals over hexahedra are those of their trilinear shape: products of two coordinates and the Jacobian are of degree
+//! four along each axis, for which three Gauss points are exact.
+
+use super::{Body, State, cross, dot, full};
+use crate::{
+    element::hex8,
+    exact::Quantum,
+    initial::largest_face,
+    load::{Curve, Drive},
+    material::Material,
+    mesh::Mesh,
+    setup::Constraint,
+};
+
+/// What a deck says of a body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Given {
+    /// Its parts, by index, ascending.
+    pub parts: Vec<u32>,
+    /// Mass of the parts; none for that of the elements.
+    pub mass: Option<f64>,
+    /// Their centre of mass and inertia about it, xx, yy, zz, xy, yz, zx; none for those of the elements.
+    pub inertia: Option<([f64; 3], [f64; 6])>,
+    /// Angular velocity at the start (radians per time); none for that of the nodes.
+    pub start_spin: Option<[f64; 3]>,
+    /// Prescribed velocity by axis.
+    pub velocity: [Option<Drive>; 3],
+    /// Prescribed angular velocity by axis.
+    pub spin: [Option<Drive>; 3],
+}
+
+/// Least share of the inertia of its nodes that a body may have: contact finds its time step by the masses of nodes.
+const LEAST_INERTIA: f64 = 0.1;
+
+/// Makes a body: its nodes move from then on as `velocity` (by global node) is left here.
+///
+/// Elements of other parts that share nodes with it hang an eighth of their mass on each. The motion at the start is that
+/// of the nodes: the same for all of them, or the rigid motion of the same momentum and angular momentum.
+///
+/// # Errors
+/// If a part has no mass, or the inertia is none that a body can have.
+pub fn body(
+    mesh: &Mesh,
+    materials: &[Material],
+    constraints: (&[Constraint], &[u16]),
+    curves: &[Curve],
+    given: Given,
+    velocity: &mut [[f64; 3]],
+) -> Result<Body, String> {
+    let mut nodes: Vec<u32> =
+        given.parts.iter().flat_map(|&p| mesh.parts[p as usize].nodes.iter().copied()).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let first = nodes.first().map_or([0.0; 3], |&n| mesh.positions[n as usize]);
+    let mut own = Moments::default();
+    // Mass of each node: that of the body's elements, and what hangs on it.
+    let mut nodal = vec![[0.0; 2]; nodes.len()];
+    for (p, part) in (0..).zip(&mesh.parts) {
+        let inside = given.parts.binary_search(&p).is_ok();
+        let density = materials[part.material as usize].density;
+        for e in 0..part.n_elements() {
+            let corners = part.corners(e);
+            let places = corners.map(|n| nodes.binary_search(&n).ok());
+            if places.iter().all(Option::is_none) {
+                continue;
+            }
+            let x = corners.map(|n| mesh.positions[n as usize]);
+            if inside {
+                own.add_hexahedron(&x.map(|x| minus(x, first)), density);
+            }
+            let eighth = density * hex8::volume(&x) * 0.125;
+            for place in places.into_iter().flatten() {
+                nodal[place][usize::from(!inside)] += eighth;
+            }
+        }
+    }
+    if !(own.mass > 0.0 && own.mass.is_finite()) {
+        return Err(format!("mass {:e} of its elements, must be positive", own.mass));
+    }
+    let scale = given.mass.map_or(1.0, |mass| mass / own.mass);
+    let mut all = own.scaled(scale);
+    if let Some((centre, inertia)) = &given.inertia {
+        all = Moments::about(all.mass, minus(*centre, first), inertia);
+    }
+    for (&n, [_, hung]) in nodes.iter().zip(&nodal) {
+        all.add(*hung, minus(mesh.positions[n as usize], first));
+    }
+    let (centre, inertia) = all.central();
+    let centre: [f64; 3] = std::array::from_fn(|a| first[a] + centre[a]);
+    let places: Vec<[f64; 3]> = nodes.iter().map(|&n| minus(mesh.positions[n as usize], centre)).collect();
+    let mass_of = |i: usize| scale * nodal[i][0] + nodal[i][1];
+    let mut lumped = Moments::default();
+    (0..nodes.len()).for_each(|i| lumped.add(mass_of(i), places[i]));
+    let lumped_inertia = lumped.inertia();
+    let spare: [f64; 6] = std::array::from_fn(|i| inertia[i] - LEAST_INERTIA * lumped_inertia[i]);
+    if !is_positive(&inertia) || !is_positive(&spare) {
+        return Err(format!(
+            "inertia {inertia:?} about the centre of mass, its nodes have {lumped_inertia:?}; it must be positive and about no axis less than a tenth of theirs"
+        ));
+    }
+    let (mut speed, mut spin) = motion(&nodes, &places, &mass_of, &lumped, velocity);
+    spin = given.start_spin.unwrap_or(spin);
+    for axis in 0..3 {
+        speed[axis] = given.velocity[axis].map_or(speed[axis], |drive| drive.at(curves, 0.0));
+        spin[axis] = given.spin[axis].map_or(spin[axis], |drive| drive.at(curves, 0.0));
+    }
+    for (&n, &place) in nodes.iter().zip(&places) {
+        let turning = cross(spin, place);
+        velocity[n as usize] = std::array::from_fn(|a| speed[a] + turning[a]);
+    }
+    let radius = places.iter().flatten().fold(0.0_f64, |r, c| r.max(c.abs()));
+    let (constraints, of_node) = constraints;
+    let mut forces = Vec::new();
+    for (i, &n) in (0..).zip(&nodes) {
+        let mut bits = constraints[of_node[n as usize] as usize].forces;
+        while bits != 0 {
+            forces.push((i, bits.trailing_zeros()));
+            bits &= bits - 1;
+        }
+    }
+    Ok(Body {
+        parts: given.parts,
+        mass: all.mass,
+        start: starting(&inertia, centre, speed, spin),
+        inertia,
+        velocity: given.velocity,
+        spin: given.spin,
+        nodes,
+        places,
+        nodal_scale: scale,
+        length: Quantum::for_reference(2.0 * radius, 50),
+        courant: None,
+        forces,
+    })
+}
+
+/// The least Courant limit of the elements of some parts (ascending) at rest, and its element: what they would have if
+/// they deformed, by their least heights. None without elements.
+pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f64, u32)> {
+    let mut least: Option<(f64, u32)> = None;
+    let mut element = 0;
+    for (p, part) in (0..).zip(&mesh.parts) {
+        let material = &materials[part.material as usize];
+        let sound = ((material.bulk() + 4.0 / 3.0 * material.shear()) / material.density).sqrt();
+        for e in 0..part.n_elements() {
+            if parts.binary_search(&p).is_ok() {
+                let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+                let limit = hex8::volume(&x) / largest_face(&x) / sound;
+                if least.is_none_or(|(other, _)| limit < other) {
+                    least = Some((limit, element));
+                }
+            }
+            element += 1;
+        }
+    }
+    least
+}
+
+/// The state of a body that begins at `centre` with this velocity and angular velocity.
+fn starting(inertia: &[f64; 6], centre: [f64; 3], velocity: [f64; 3], spin: [f64; 3]) -> State {
+    let momentum = full(inertia).map(|row| dot(row, spin));
+    State { centre, velocity, attitude: [1.0, 0.0, 0.0, 0.0], momentum, spin }
+}
+
+/// Velocity of the centre and angular velocity of nodes that move as they do at the start.
+fn motion(
+    nodes: &[u32],
+    places: &[[f64; 3]],
+    mass_of: &dyn Fn(usize) -> f64,
+    lumped: &Moments,
+    velocity: &[[f64; 3]],
+) -> ([f64; 3], [f64; 3]) {
+    let first = nodes.first().map_or([0.0; 3], |&n| velocity[n as usize]);
+    if nodes.iter().all(|&n| velocity[n as usize] == first) {
+        return (first, [0.0; 3]);
+    }
+    // About the centre of the nodes' masses, which for distorted elements is not quite that of the body.
+    let (centre, inertia) = lumped.central();
+    let (mut momentum, mut angular) = ([0.0; 3], [0.0; 3]);
+    for (i, (&n, &place)) in nodes.iter().zip(places).enumerate() {
+        let carried = velocity[n as usize].map(|v| mass_of(i) * v);
+        let moment = cross(minus(place, centre), carried);
+        for a in 0..3 {
+            momentum[a] += carried[a];
+            angular[a] += moment[a];
+        }
+    }
+    let spin = super::solve(full(&inertia), angular);
+    let offset = cross(spin, centre);
+    (std::array::from_fn(|a| momentum[a] / lumped.mass - offset[a]), spin)
+}
+
+/// Mass, first moments and second moments xx, yy, zz, xy, yz, zx.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    mass: f64,
+    first: [f64; 3],
+    second: [f64; 6],
+}
+
+/// Factors of the second moments.
+const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]];
+
+impl Moments {
+    fn add(&mut self, mass: f64, x: [f64; 3]) {
+        self.mass += mass;
+        (0..3).for_each(|a| self.first[a] += mass * x[a]);
+        for (sum, [a, b]) in self.second.iter_mut().zip(PAIRS) {
+            *sum += mass * x[a] * x[b];
+        }
+    }
+
+    fn add_hexahedron(&mut self, x: &[[f64; 3]; 8], density: f64) {
+        let end = 0.6_f64.sqrt();
+        let points = [(-end, 5.0 / 9.0), (0.0, 8.0 / 9.0), (end, 5.0 / 9.0)];
+        for (r, weight_r) in points {
+            for (s, weight_s) in points {
+                for (t, weight_t) in points {
+                    let (at, jacobian) = mapped(x, [r, s, t]);
+                    self.add(density * jacobian * weight_r * weight_s * weight_t, at);
+                }
+            }
+        }
+    }
+
+    fn scaled(&self, factor: f64) -> Self {
+        Self {
+            mass: self.mass * factor,
+            first: self.first.map(|c| c * factor),
+            second: self.second.map(|c| c * factor),
+        }
+    }
+
+    /// Of a body with this inertia about its centre.
+    fn about(mass: f64, centre: [f64; 3], inertia: &[f64; 6]) -> Self {
+        let mut moments = Self::default();
+        moments.add(mass, centre);
+        let half = 0.5 * (inertia[0] + inertia[1] + inertia[2]);
+        for a in 0..3 {
+            moments.second[a] += half - inertia[a];
+            moments.second[3 + a] -= inertia[3 + a];
+        }
+        moments
+    }
+
+    /// Inertia about the origin.
+    fn inertia(&self) -> [f64; 6] {
+        let [xx, yy, zz, xy, yz, zx] = self.second;
+        [yy + zz, zz + xx, xx + yy, -xy, -yz, -zx]
+    }
+
+    /// Centre and inertia about it.
+    fn central(&self) -> ([f64; 3], [f64; 6]) {
+        let centre = self.first.map(|c| c / self.mass);
+        let mut moved = *self;
+        for (sum, [a, b]) in moved.second.iter_mut().zip(PAIRS) {
+            *sum -= self.mass * centre[a] * centre[b];
+        }
+        (centre, moved.inertia())
+    }
+}
+
+/// Place and Jacobian of a point of the unit cube from -1 to 1.
+fn mapped(x: &[[f64; 3]; 8], at: [f64; 3]) -> ([f64; 3], f64) {
+    const SIGNS: [[f64; 3]; 8] = [
+        [-1.0, -1.0, -1.0],
+        [1.0, -1.0, -1.0],
+        [1.0, 1.0, -1.0],
+        [-1.0, 1.0, -1.0],
+        [-1.0, -1.0, 1.0],
+        [1.0, -1.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [-1.0, 1.0, 1.0],
+    ];
+    let (mut place, mut rows) = ([0.0; 3], [[0.0; 3]; 3]);
+    for (x, sign) in x.iter().zip(SIGNS) {
+        let f: [f64; 3] = std::array::from_fn(|a| 0.5 * (1.0 + sign[a] * at[a]));
+        let slopes = [0.5 * sign[0] * f[1] * f[2], 0.5 * sign[1] * f[2] * f[0], 0.5 * sign[2] * f[0] * f[1]];
+        for a in 0..3 {
+            place[a] += f[0] * f[1] * f[2] * x[a];
+            (0..3).for_each(|d| rows[d][a] += slopes[d] * x[a]);
+        }
+    }
+    (place, dot(rows[0], cross(rows[1], rows[2])))
+}
+
+/// Whether a symmetric matrix is positive definite.
+fn is_positive(m: &[f64; 6]) -> bool {
+    let [xx, yy, _, xy, _, _] = *m;
+    let rows = full(m);
+    xx > 0.0 && xx * yy > xy * xy && dot(rows[0], cross(rows[1], rows[2])) > 0.0
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}

@@ -1,0 +1,249 @@
+use super::*;
+use crate::{
+    load::{Curve, Gravity},
+    material::{Eos, Failure, Material, Strength},
+    mesh::{Mesh, Part, Topology},
+    setup::Constraint,
+};
+
+fn steel() -> Material {
+    Material {
+        name: "steel".into(),
+        density: 8000.0,
+        eos: Eos::Linear { bulk: 1.6e11 },
+        strength: Strength::Hydro,
+        failure: Failure::None,
+    }
+}
+
+/// A box of one hexahedron with its low corner at `low`, each place put through `shape`.
+fn brick(low: [f64; 3], size: [f64; 3], shape: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
+    let corner = |i: usize| {
+        let steps = [i & 1, i >> 1 & 1, i >> 2];
+        shape(std::array::from_fn(|a| low[a] + size[a] * steps[a] as f64))
+    };
+    let part = Part {
+        name: "brick".into(),
+        material: 0,
+        topology: Topology::Structured { cells: [1; 3] },
+        nodes: (0..8).collect(),
+        element_ids: vec![1],
+    };
+    Mesh { positions: (0..8).map(corner).collect(), node_ids: (1..9).collect(), parts: vec![part] }
+}
+
+fn made(mesh: &Mesh, given: shape::Given, velocity: &mut [[f64; 3]]) -> Result<Body, String> {
+    let of_node = vec![0; mesh.n_nodes()];
+    shape::body(mesh, &[steel()], (&[Constraint::default()], &of_node), &[], given, velocity)
+}
+
+fn spinning(size: [f64; 3], spin: [f64; 3]) -> Body {
+    let mesh = brick([1.0, -2.0, 0.5], size, |x| x);
+    let given = shape::Given { parts: vec![0], start_spin: Some(spin), ..shape::Given::default() };
+    made(&mesh, given, &mut [[0.0; 3]; 8]).expect("a body")
+}
+
+fn advance(loads: &Loads, time: f64, dt: f64) -> Advance<'_> {
+    let q = Quantum::for_reference(1e6, 46);
+    Advance {
+        dt_previous: dt,
+        dt,
+        time,
+        loads,
+        quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
+    }
+}
+
+#[test]
+fn a_brick_has_its_mass_its_centre_and_its_inertia() {
+    let size = [0.2, 0.3, 0.5];
+    let body = spinning(size, [0.0; 3]);
+    let mass = 8000.0 * size.iter().product::<f64>();
+    assert!((body.mass / mass - 1.0).abs() < 1e-14);
+    for a in 0..3 {
+        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+        let expected = mass / 12.0 * (size[b] * size[b] + size[c] * size[c]);
+        assert!((body.inertia[a] / expected - 1.0).abs() < 1e-13, "{:?}", body.inertia);
+        assert!(body.inertia[3 + a].abs() < 1e-13 * expected);
+        assert!((body.start.centre[a] - ([1.0, -2.0, 0.5][a] + 0.5 * size[a])).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn a_frustum_has_the_moments_of_its_integrals() {
+    // Section (2 - z)^2 over 0 < z < 1: mass 7/3, height 11/28, of density one.
+    let mesh =
+        brick([-1.0, -1.0, 0.0], [2.0, 2.0, 1.0], |[x, y, z]| [x * (1.0 - 0.5 * z), y * (1.0 - 0.5 * z), z]);
+    let given = shape::Given { parts: vec![0], ..shape::Given::default() };
+    let body = made(&mesh, given, &mut [[0.0; 3]; 8]).expect("a body");
+    let mass = 8000.0 * 7.0 / 3.0;
+    assert!((body.mass / mass - 1.0).abs() < 1e-14, "{}", body.mass);
+    assert!((body.start.centre[2] - 11.0 / 28.0).abs() < 1e-14, "{:?}", body.start.centre);
+    // About the axis: integral of s^4 / 6 with s = 2 - z, which is 31/30.
+    assert!((body.inertia[2] / (8000.0 * 31.0 / 30.0) - 1.0).abs() < 1e-13, "{:?}", body.inertia);
+}
+
+#[test]
+fn the_rigid_part_of_the_motion_of_the_nodes_is_taken_up() {
+    let mesh = brick([1.0, -2.0, 0.5], [0.2, 0.3, 0.5], |[x, y, z]| [x + 0.1 * y * z, y, z]);
+    let (v, spin) = ([3.0, -1.0, 2.0], [10.0, 20.0, -5.0]);
+    let given = shape::Given { parts: vec![0], ..shape::Given::default() };
+    let still = made(&mesh, given.clone(), &mut [[0.0; 3]; 8]).expect("a body");
+    let mut velocity = still.places.iter().map(|&r| cross(spin, r)).collect::<Vec<_>>();
+    velocity.iter_mut().for_each(|at| (0..3).for_each(|a| at[a] += v[a]));
+    let body = made(&mesh, given, &mut velocity).expect("a body");
+    for a in 0..3 {
+        assert!((body.start.velocity[a] - v[a]).abs() < 1e-12, "{:?}", body.start);
+        assert!((body.start.spin[a] - spin[a]).abs() < 1e-11, "{:?}", body.start);
+    }
+}
+
+#[test]
+fn what_is_given_stands_and_too_little_inertia_is_refused() {
+    let mesh = brick([0.0; 3], [1.0; 3], |x| x);
+    let given = |inertia: f64| shape::Given {
+        parts: vec![0],
+        mass: Some(16_000.0),
+        inertia: Some(([0.5, 0.5, 0.6], [inertia, inertia, inertia, 0.0, 0.0, 0.0])),
+        ..shape::Given::default()
+    };
+    let body = made(&mesh, given(5000.0), &mut [[0.0; 3]; 8]).expect("a body");
+    assert_eq!((body.mass, body.start.centre), (16_000.0, [0.5, 0.5, 0.6]));
+    assert!((body.nodal_scale - 2.0).abs() < 1e-14, "{}", body.nodal_scale);
+    assert!((body.inertia[1] - 5000.0).abs() < 1e-9, "{:?}", body.inertia);
+    let error = made(&mesh, given(500.0), &mut [[0.0; 3]; 8]).expect_err("too little");
+    assert!(error.contains("less than a tenth"), "{error}");
+}
+
+#[test]
+fn a_push_is_the_same_however_it_is_cut_and_packed() {
+    let (force, length) = (Quantum::for_reference(1e9, 42), Quantum::for_reference(0.3, 50));
+    let mut seed = 9_u64;
+    let mut draw = |size: f64| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        size * ((seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0)
+    };
+    let terms: Vec<([f64; 3], [f64; 3])> =
+        (0..300).map(|_| ([0; 3].map(|_| force.round(draw(1e10))), [0; 3].map(|_| draw(0.15)))).collect();
+    let mut whole = Push::default();
+    terms.iter().for_each(|(f, r)| whole.add(*f, *r, force, length));
+    for workers in [1, 2, 5] {
+        let mut sum = [0.0; PUSH];
+        for w in 0..workers {
+            let mut own = Push::default();
+            terms.iter().skip(w).step_by(workers).for_each(|(f, r)| own.add(*f, *r, force, length));
+            sum.iter_mut().zip(own.pack()).for_each(|(s, limb)| *s += limb);
+        }
+        assert_eq!(Push::unpack(&sum), whole, "{workers} workers");
+    }
+    // The force of a node may be split among workers, too.
+    let mut split = Push::default();
+    for (f, r) in &terms {
+        let half = f.map(|c| force.round(0.37 * c));
+        split.add(half, *r, force, length);
+        split.add(std::array::from_fn(|a| f[a] - half[a]), *r, force, length);
+    }
+    assert_eq!(split, whole);
+    let torque: f64 = terms.iter().map(|(f, r)| r[1] * f[2] - r[2] * f[1]).sum();
+    let found = whole.torque[0] as f64 * force.value() * length.value();
+    assert!((found / torque - 1.0).abs() < 1e-9, "{found} {torque}");
+}
+
+#[test]
+fn a_round_top_precesses_as_eulers_equations_say_and_keeps_energy_and_momentum() {
+    // Square in section: inertia about z, and another about x and y.
+    let spin = [30.0, 0.0, 200.0];
+    let body = spinning([0.2, 0.2, 0.5], spin);
+    let (size, rate) = {
+        let l = body.start.momentum;
+        let size = dot(l, l).sqrt();
+        (size, size / body.inertia[0])
+    };
+    let (loads, dt, steps) = (Loads::default(), 1e-5, 40_000);
+    let mut state = body.start;
+    let mut error = 0.0_f64;
+    let mut energies = [f64::INFINITY, 0.0];
+    for n in 0..steps {
+        let booked = advance(&loads, 0.0, dt).run(&body, &Push::default(), &mut state);
+        energies = [energies[0].min(booked.kinetic), energies[1].max(booked.kinetic)];
+        assert_eq!(state.momentum, body.start.momentum, "angular momentum, to the bit");
+        // The axis of the body turns about the momentum at the rate |L| / I.
+        let angle = rate * dt * f64::from(n + 1);
+        let unit = state.momentum.map(|l| l / size);
+        let axis = [0.0, 0.0, 1.0];
+        let (along, side) = (dot(unit, axis), cross(unit, axis));
+        let expected: [f64; 3] = std::array::from_fn(|a| {
+            axis[a] * angle.cos() + side[a] * angle.sin() + unit[a] * along * (1.0 - angle.cos())
+        });
+        let found = turned(&state.attitude, axis);
+        error = (0..3).map(|a| (found[a] - expected[a]).abs()).fold(error, f64::max);
+    }
+    println!(
+        "axis off by {error:e} after {} turns, energy {energies:?}",
+        rate * dt * 4e4 / std::f64::consts::TAU
+    );
+    assert!(error < 2e-6, "{error}");
+    assert!(energies[1] / energies[0] - 1.0 < 1e-7, "{energies:?}");
+    assert!(state.attitude.iter().map(|q| q * q).sum::<f64>() - 1.0 < 1e-15);
+}
+
+#[test]
+fn a_book_that_turns_over_does_not_gain_energy() {
+    // About the middle axis: unstable, it flips for ever.
+    let body = spinning([0.3, 0.05, 0.2], [0.1, 0.1, 100.0]);
+    let (loads, dt) = (Loads::default(), 1e-4);
+    let mut state = body.start;
+    let mut energies = [f64::INFINITY, 0.0];
+    let mut flips = 0;
+    let mut up = true;
+    for _ in 0..100_000 {
+        let booked = advance(&loads, 0.0, dt).run(&body, &Push::default(), &mut state);
+        energies = [energies[0].min(booked.kinetic), energies[1].max(booked.kinetic)];
+        let now = turned(&state.attitude, [0.0, 0.0, 1.0])[2] > 0.0;
+        flips += u32::from(now != up);
+        up = now;
+    }
+    println!("{flips} flips, energy {energies:?}");
+    assert!(flips > 10, "{flips}");
+    assert!(energies[1] / energies[0] - 1.0 < 1e-4, "{energies:?}");
+}
+
+#[test]
+fn a_prescribed_turn_has_its_angle_and_its_support_does_the_work() {
+    let mut body = spinning([0.2, 0.3, 0.5], [0.0; 3]);
+    let zero = Some(Drive::constant(0.0));
+    body.spin = [zero, zero, Some(Drive { factor: 1.0, curve: Some(0) })];
+    body.velocity[0] = Some(Drive::constant(5.0));
+    let loads = Loads {
+        curves: vec![Curve { points: vec![[0.0, 0.0], [1.0, 2.0]] }],
+        gravity: Some(Gravity { acceleration: [0.0, 0.0, -10.0], drive: Drive::constant(1.0) }),
+        ..Loads::default()
+    };
+    body.start.velocity[0] = 5.0;
+    let mut state = body.start;
+    let (dt, mut work) = (1e-3, 0.0);
+    let first =
+        Advance { dt_previous: 0.0, ..advance(&loads, 0.0, dt) }.run(&body, &Push::default(), &mut state);
+    work += first.external;
+    let mut last = first;
+    for n in 1..1000 {
+        last = advance(&loads, f64::from(n) * dt, dt).run(&body, &Push::default(), &mut state);
+        work += last.external;
+    }
+    // Angle 1 about z after one second; five metres along x, and half g t^2 down.
+    let turned_by = 2.0 * (state.attitude[3] / state.attitude[0]).atan();
+    assert!((turned_by - 1.0).abs() < 1e-12, "{turned_by}");
+    assert!((state.centre[0] - body.start.centre[0] - 5.0).abs() < 1e-12);
+    assert!((state.centre[2] - body.start.centre[2] + 5.0).abs() < 1e-2);
+    let gained = last.kinetic - first.kinetic;
+    assert!((work / gained - 1.0).abs() < 3e-3, "{work} {gained}");
+}
+
+#[test]
+fn a_turn_by_a_large_angle_is_that_of_its_sine() {
+    for angle in [1e-6, 0.01, 0.06, 0.3, 2.0, 40.0_f64] {
+        let q = turn(&[1.0, 0.0, 0.0, 0.0], [0.0, angle, 0.0], 1.0);
+        assert!((q[2] - (0.5 * angle).sin()).abs() < 1e-14, "{angle}: {q:?}");
+        assert!((q[0] - (0.5 * angle).cos()).abs() < 1e-14, "{angle}: {q:?}");
+    }
+}
