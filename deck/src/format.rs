@@ -118,7 +118,7 @@ fn read_document(document: &DeTable<'_>, meshes: &Meshes, faults: &Faults<'_>) -
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = control
         .map(|control| Control { sort_lag: sort_lag(&deck, control.sort_lag, settings, faults), ..control });
-    let erosion = erosion::read(&deck, &parts, settings.is_some());
+    let erosion = erosion::read(&deck, &parts, deck.has("contact"), &bodies);
     let output = output::read(&deck, &names, &assembly);
     let detonations = burn::read(&deck, &materials.list, &parts);
     deck.finish();

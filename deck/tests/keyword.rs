@@ -280,8 +280,12 @@ fn materials_with_a_failure_strain_a_failure_law_or_a_least_step_erode_by_it() {
 
 #[test]
 fn a_converted_deck_is_the_same_problem() {
-    for (name, case) in [("block-on-plate.k", None), ("bar-on-wall.k", Some(102)), ("ball-on-shell.k", None)]
-    {
+    for (name, case) in [
+        ("block-on-plate.k", None),
+        ("bar-on-wall.k", Some(102)),
+        ("ball-on-shell.k", None),
+        ("punch-through-plate.k", None),
+    ] {
         let options = Options { units: None, case };
         let text = gathered(&folder("examples"), name, &options);
         let converted = deck::convert(&text, name, "out.mesh").unwrap_or_else(|f| panic!("{}", lines(&f)));

@@ -3,6 +3,7 @@
 use mechanics::{
     erosion::{Criteria, Erosion, GEOMETRIC_STRAIN},
     material::{Failure, Material, Strength},
+    rigid::Body,
 };
 
 use super::PartDraft;
@@ -70,9 +71,20 @@ pub(super) fn read_criteria(value: Value<'_>, part: &str, material: Option<&Mate
     Some(criteria)
 }
 
-/// Reads `[erosion]` and gathers the criteria of all parts. `contact` says whether the deck has it.
-pub(super) fn read(deck: &Table<'_>, parts: &[PartDraft], contact: bool) -> Erosion {
+/// Reads `[erosion]` and gathers the criteria of all parts. `contact` says whether the deck has it; of the rigid `bodies` no
+/// part erodes.
+pub(super) fn read(deck: &Table<'_>, parts: &[PartDraft], contact: bool, bodies: &[Body]) -> Erosion {
     let mut erosion = Erosion::default();
+    for part in bodies.iter().flat_map(|body| &body.parts).map(|&p| &parts[p as usize]) {
+        if part.erosion.is_some() {
+            deck.faults.add(
+                part.at,
+                format!("erosion of part \"{}\", which is rigid", part.name),
+                "parts that deform: elements of a rigid body do not leave",
+                "remove erosion, or take the part out of [[rigid]]",
+            );
+        }
+    }
     if parts.iter().any(|part| part.erosion.is_some()) {
         erosion.parts = parts.iter().map(|part| part.erosion).collect();
     }

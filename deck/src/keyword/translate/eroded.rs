@@ -1,13 +1,17 @@
 //! What erodes, and what becomes of nodes that have lost all their elements.
 
 use super::Translation;
-use crate::keyword::log::Place;
+use crate::keyword::{log::Place, material::Law};
 
 impl Translation<'_> {
     /// When elements of a material leave, by its own card and by `*MAT_ADD_EROSION`: the line that first says so and the words
-    /// of a part.
+    /// of a part. Rigid ones do not erode.
     pub(super) fn erosion_of(&self, material: u32) -> Option<(Place, String)> {
-        let mut limits = self.problem.materials.get(&material)?.erosion.clone();
+        let card = self.problem.materials.get(&material)?;
+        if matches!(card.law, Law::Rigid { .. }) {
+            return None;
+        }
+        let mut limits = card.erosion.clone();
         if let Some(added) = self.problem.erosions.get(&material) {
             limits.merge(added);
         }
