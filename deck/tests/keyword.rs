@@ -192,7 +192,7 @@ fn punch_through_plate_erodes_by_failure_strain_and_mat_add_erosion_and_drops_fr
     assert!(!model.setup.erosion.retain_inertia);
     assert!(model.setup.contact.is_some());
     let words: Vec<&str> = warnings.iter().map(|w| w.words.as_str()).collect();
-    assert_eq!(words, ["ignored, nothing here depends on it: *CONTROL_CONTACT (line 7)"]);
+    assert_eq!(words, ["ignored, nothing here depends on it: *CONTROL_CONTACT (line 8)"]);
     // ENMASS 1 keeps them.
     let text = gathered(&folder("examples"), "punch-through-plate.k", &Options::default());
     let blank = format!("{:>10}{:>70}", "1.0", "0");
@@ -410,7 +410,7 @@ fn a_rigid_material_makes_a_body_of_its_part() {
 fn what_cannot_be_honoured_is_refused_where_it_stands() {
     let refused = [
         ("*MAT_ADD_EROSION\n1,,-0.5\n", "a.k:23:4: read -0.5; expected MXPRES above 0"),
-        ("*MAT_ADD_EROSION\n1,,,,-0.5\n", "a.k:23:1: read plastic_strain of erosion"),
+        ("*MAT_ADD_EROSION\n1,,,,-0.5\n", "a.k:23:1: read plastic_strain = 0.5; expected a material whose strength law yields"),
         ("*MAT_ADD_EROSION\n1\n,,,,,1.0,2.0\n", "a.k:24:6: read 1.0; expected SIGTH blank: the impulse"),
         (
             "*MAT_ADD_EROSION\n1\n,,,,,,,3.0\n",

@@ -17,6 +17,7 @@ use deck::{
     model::Model,
 };
 use indicatif::{ProgressBar, ProgressStyle};
+use mechanics::state::GlobalState;
 use protocol::{
     phase::{Phase, Report},
     request::JobOptions,
@@ -459,7 +460,7 @@ pub fn summarise(
             friction: ledger.friction,
             external: ledger.external,
             error: ledger.last.error,
-            parts: named_parts(model, &ledger.last.parts),
+            parts: named_parts(model, &ledger.last.parts, outcome.state.as_ref()),
             contacts: ledger.contacts.iter().map(|pair| named_pair(model, pair)).collect(),
         },
         momentum_error: ledger.momentum_error(),
@@ -472,9 +473,15 @@ pub fn summarise(
     }
 }
 
-/// Energies of the parts beside their names.
-fn named_parts(model: &Model, parts: &[PartEnergy]) -> Vec<NamedPart> {
-    let of = |(part, e): (&mechanics::mesh::Part, &PartEnergy)| NamedPart {
+/// Energies of the parts beside their names, and what each has lost to erosion.
+fn named_parts(model: &Model, parts: &[PartEnergy], state: Option<&GlobalState>) -> Vec<NamedPart> {
+    let offsets = model.mesh.element_offsets();
+    let eroded = |p: usize| {
+        let elements = offsets[p]..offsets[p] + model.mesh.parts[p].n_elements();
+        state.map_or(0, |state| elements.filter(|&e| state.is_eroded(e)).count() as u64)
+    };
+    let of = |(p, (part, e)): (usize, (&mechanics::mesh::Part, &PartEnergy))| NamedPart {
+        eroded_elements: eroded(p),
         name: part.name.clone(),
         kinetic: e.kinetic,
         internal: e.internal,
@@ -482,7 +489,7 @@ fn named_parts(model: &Model, parts: &[PartEnergy]) -> Vec<NamedPart> {
         viscosity: e.viscosity,
         external: e.external,
     };
-    model.mesh.parts.iter().zip(parts).map(of).collect()
+    model.mesh.parts.iter().zip(parts).enumerate().map(of).collect()
 }
 
 /// Energies of a pair beside the names of its parts.
@@ -672,7 +679,7 @@ impl Output {
     ///
     /// # Errors
     /// What the disk refused, of this state or of one before.
-    pub fn state(&mut self, state: Box<mechanics::state::GlobalState>) -> Result<(), String> {
+    pub fn state(&mut self, state: Box<GlobalState>) -> Result<(), String> {
         if self.states.last().is_some_and(|(_, time)| *time == state.time) {
             return Ok(());
         }

@@ -130,6 +130,9 @@ pub struct WorkUnits {
     pub interactions: u64,
 }
 
+/// Parts that the table names of those that eroded.
+const NAMED_PARTS: usize = 4;
+
 /// Energies of one part in the deck's unit of energy, sums over the run but for kinetic and internal.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NamedPart {
@@ -145,6 +148,9 @@ pub struct NamedPart {
     pub viscosity: f64,
     /// Work done on it from outside.
     pub external: f64,
+    /// Elements of it that have eroded.
+    #[serde(default)]
+    pub eroded_elements: u64,
 }
 
 /// Energies of the contact of two parts in the deck's unit of energy.
@@ -295,9 +301,19 @@ impl Summary {
             writeln!(out, "             {name:<10} {:>14}", significant(value))?;
         }
         if self.eroded_elements > 0 {
+            let eroded = self.energies.parts.iter().filter(|part| part.eroded_elements > 0);
+            let parts: Vec<String> = eroded
+                .map(|part| format!("{} of {}", grouped(part.eroded_elements), part.name))
+                .take(NAMED_PARTS + 1)
+                .collect();
+            let parts = match parts.len() {
+                0 => String::new(),
+                n if n > NAMED_PARTS => format!(" ({}, ...)", parts[..NAMED_PARTS].join(", ")),
+                _ => format!(" ({})", parts.join(", ")),
+            };
             writeln!(
                 out,
-                "             {:<10} {:>14}   {} elements, mass {}",
+                "             {:<10} {:>14}   {} elements{parts}, mass {}",
                 "eroded",
                 significant(self.eroded_energy),
                 grouped(self.eroded_elements),
