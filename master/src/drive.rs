@@ -31,7 +31,7 @@ use crate::{
     event::{Action, Event, Hand, Outcome},
     job::{Bench, Job},
     peers,
-    sort::Sorted,
+    sort::{Gathered, Sorted},
 };
 
 /// Messages of one worker that may wait for the job's thread.
@@ -367,7 +367,7 @@ impl Driver {
         Ok(())
     }
 
-    fn sort(&self, bench: Arc<Bench>, x: Vec<[f64; 3]>) {
+    fn sort(&self, bench: Arc<Bench>, x: Gathered) {
         let (send, failed) = (self.send.clone(), self.send.clone());
         // On a thread of the lowest priority: a worker on this host computes first, the sort takes what is idle.
         let work = move || {

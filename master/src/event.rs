@@ -16,7 +16,7 @@ use crate::{
     ledger::Ledger,
     results::history::HistoryRow,
     snapshot::Snapshot,
-    sort::Sorted,
+    sort::{Gathered, Sorted},
 };
 
 /// A worker as the job sees it.
@@ -172,7 +172,7 @@ pub enum Action {
     /// Send to a worker.
     Send(usize, ToWorker),
     /// Sort; exactly one [`Event::Sorted`] answers it. Positions by surface node.
-    Sort(Arc<Bench>, Vec<[f64; 3]>),
+    Sort(Arc<Bench>, Gathered),
     /// Send [`Event::Timer`] in so many seconds.
     Timer(f64),
     /// Append a row of history.

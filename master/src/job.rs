@@ -36,7 +36,7 @@ use crate::{
     holdings::Holdings,
     ledger::Ledger,
     results::{history::HistoryRow, surface::Probe},
-    sort::{Sorted, Sorter},
+    sort::{Gathered, Sorted, Sorter},
 };
 use epoch::{Acting, Base, Epoch, Member, SortUnderWay, Step};
 pub use erosion::surface_of;
@@ -60,7 +60,7 @@ pub struct Bench {
 
 impl Bench {
     /// Does the sort that [`Action::Sort`] asks for.
-    pub fn sort(&self, x: &[[f64; 3]]) -> Sorted {
+    pub fn sort(&self, x: &Gathered) -> Sorted {
         worker::failpoint::die("die-in-sort");
         let mut sorted = self.sorter.run(self.epoch, x, &self.holdings, &self.state);
         if !self.dropped.is_empty() {
@@ -551,7 +551,7 @@ impl Job {
                 }
             }
             let x = bench.sorter.positions(&arrivals.gathered);
-            actions.push(Action::Sort(bench, x));
+            actions.push(Action::Sort(bench, Gathered { cycle, x }));
         }
         actions.push(Action::Progress(Progress { cycle, time: now.time, dt: now.dt, element, limit }));
         Ok(())
@@ -563,11 +563,26 @@ impl Job {
         if sorted.epoch < self.epoch.number {
             return Ok(());
         }
-        let sort = self.epoch.sorts_under_way.pop_front().ok_or("a sort that nobody asked for")?;
-        if sort.replaced {
-            return Ok(());
+        let gathered = sorted.gathered;
+        match self.epoch.sorts_under_way.iter_mut().find(|sort| sort.gathered == gathered) {
+            Some(sort) if sort.done.is_none() => sort.done = Some(sorted),
+            // A blocking one has taken its place since it was begun.
+            None if gathered < self.epoch.last_gather => return Ok(()),
+            _ => return Err(format!("a sort of cycle {gathered} that nobody asked for")),
         }
-        let SortUnderWay { gathered: gathered_at, acts_at, .. } = sort;
+        // Plans act in the order of their gatherings, whichever sort is done first.
+        while self.epoch.sorts_under_way.front().is_some_and(|sort| sort.done.is_some()) {
+            if let Some(sort) = self.epoch.sorts_under_way.pop_front() {
+                self.plan(sort, actions);
+            }
+        }
+        Ok(())
+    }
+
+    /// The plan of a sort that is done goes out.
+    fn plan(&mut self, sort: SortUnderWay, actions: &mut Vec<Action>) {
+        let SortUnderWay { gathered: gathered_at, acts_at, done, .. } = sort;
+        let Some(sorted) = done else { return };
         self.census = sorted.census;
         let exchange = Arc::new(sorted.exchange);
         self.send_all(actions, |worker| {
@@ -580,7 +595,6 @@ impl Job {
         if acts_at <= self.epoch.completed {
             self.retire(self.epoch.completed - 1);
         }
-        Ok(())
     }
 
     fn transfer(

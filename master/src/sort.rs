@@ -31,11 +31,28 @@ pub struct Sorter {
     gather: Vec<Vec<u32>>,
 }
 
+/// Positions that a sort works on.
+pub struct Gathered {
+    /// The cycle at whose start they are.
+    pub cycle: u64,
+    /// By surface node (length).
+    pub x: Vec<[f64; 3]>,
+}
+
+impl Gathered {
+    /// Number of surface nodes.
+    pub fn n_nodes(&self) -> usize {
+        self.x.len()
+    }
+}
+
 /// What came of a sort.
 #[derive(Clone)]
 pub struct Sorted {
     /// The epoch that it was done for.
     pub epoch: u32,
+    /// The cycle of its positions: sorts that are done at the same time end in any order.
+    pub gathered: u64,
     /// The next plan of every worker.
     pub exchange: Exchange,
     /// The census of the work units.
@@ -105,7 +122,8 @@ impl Sorter {
     }
 
     /// Sorts, balances, plans. `x` by surface node; of `state` only masses and constraints are read.
-    pub fn run(&self, epoch: u32, x: &[[f64; 3]], holdings: &Holdings, state: &GlobalState) -> Sorted {
+    pub fn run(&self, epoch: u32, of: &Gathered, holdings: &Holdings, state: &GlobalState) -> Sorted {
+        let x = &of.x;
         let mut units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
         let census = Census::of(&units);
         let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
@@ -131,6 +149,6 @@ impl Sorter {
             })
             .collect();
         let exchange = Exchange::new(holdings, batches, state, self.route);
-        Sorted { epoch, exchange, census, interactions }
+        Sorted { epoch, gathered: of.cycle, exchange, census, interactions }
     }
 }

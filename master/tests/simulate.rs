@@ -376,7 +376,7 @@ fn half_a_bar_erodes() -> Model {
     )
     .unwrap_or_else(|faults| panic!("{}", faults[0]));
     for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
-        v[0] = -0.03 * x[0].min(16.0);
+        v[0] = -0.1 * x[0].min(16.0);
     }
     model
 }

@@ -25,6 +25,7 @@ use crate::{
     event::{Action, Hand, Loss},
     exchange::Exchange,
     ledger::Ledger,
+    sort::Sorted,
 };
 
 /// A worker that was ever given to the job.
@@ -91,7 +92,6 @@ pub(super) struct Acting {
 }
 
 /// A sort that was ordered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct SortUnderWay {
     /// The cycle at whose start positions travel.
     pub(super) gathered: u64,
@@ -99,8 +99,8 @@ pub(super) struct SortUnderWay {
     pub(super) acts_at: u64,
     /// All wait for it, because the surface changes.
     pub(super) blocking: bool,
-    /// Such a one has replaced it since it was begun: what comes of it is thrown away.
-    pub(super) replaced: bool,
+    /// What came of it, until those before it are done.
+    pub(super) done: Option<Sorted>,
 }
 
 /// All that is fixed for one epoch or counted in it. *Positions* are indices into its crew.

@@ -116,17 +116,13 @@ impl Job {
         let epoch = &mut self.epoch;
         let lag = if blocking { 1 } else { u64::from(self.model.setup.control.sort_lag) };
         if blocking {
-            // Frames of the newest complete cycles have come and their sorts are begun; the others are not asked for.
-            let begun = epoch.completed;
-            epoch.sorts_under_way.retain(|sort| sort.acts_at <= cycle || sort.gathered < begun);
-            for sort in epoch.sorts_under_way.iter_mut().filter(|sort| sort.acts_at > cycle) {
-                sort.replaced = true;
-            }
+            // What comes of those that are begun is thrown away; the others are not asked for.
+            epoch.sorts_under_way.retain(|sort| sort.acts_at <= cycle);
             while epoch.exchanges.back().is_some_and(|acting| acting.at > cycle) {
                 epoch.exchanges.pop_back();
             }
         }
-        let sort = SortUnderWay { gathered: cycle, acts_at: cycle + lag, blocking, replaced: false };
+        let sort = SortUnderWay { gathered: cycle, acts_at: cycle + lag, blocking, done: None };
         epoch.sorts_under_way.push_back(sort);
         epoch.last_gather = cycle;
     }

@@ -69,7 +69,7 @@ impl Job {
         let control = self.model.setup.control;
         let epoch = &self.epoch;
         cycle.is_multiple_of(u64::from(control.plan_interval.max(1)))
-            || epoch.sorts_under_way.iter().any(|sort| sort.acts_at == cycle && !sort.replaced)
+            || epoch.sorts_under_way.iter().any(|sort| sort.acts_at == cycle)
             || epoch.exchanges.iter().any(|acting| acting.at == cycle)
     }
 

@@ -36,7 +36,7 @@ use crate::{
     holdings::Holdings,
     ledger::Ledger,
     snapshot::Snapshot,
-    sort::Sorter,
+    sort::{Gathered, Sorter},
 };
 
 /// What of the contact stays the same in all epochs.
@@ -241,7 +241,7 @@ impl Job {
                     costs.pair,
                     &cut.gather,
                 );
-                let x = sorter.positions_of(state);
+                let x = Gathered { cycle: state.cycle, x: sorter.positions_of(state) };
                 let bench = Bench {
                     epoch: number,
                     sorter,

@@ -6,7 +6,10 @@ use mechanics::vote::Vote;
 use protocol::message::{IMAGE_VERSION, ToMaster, ToWorker, Work};
 
 use super::Job;
-use crate::event::{Action, Balance, Event, Hand, Options};
+use crate::{
+    event::{Action, Balance, Event, Hand, Options},
+    sort::Gathered,
+};
 
 const DECK: &str = r#"
     title = "two cubes"
@@ -185,7 +188,7 @@ fn a_job_without_workers_that_is_stopped_ends_with_the_state_it_went_back_to() {
 fn a_job_that_keeps_no_state_sorts_all_the_same_and_says_so_when_a_worker_is_lost() {
     let (mut job, _) = job(2);
     let bench = job.epoch.bench.clone().expect("the cubes may meet");
-    let x = bench.sorter.positions_of(job.start_state());
+    let x = Gathered { cycle: 0, x: bench.sorter.positions_of(job.start_state()) };
     let interactions = bench.sort(&x).interactions;
     drop(bench);
     job.keep_no_state();
@@ -200,7 +203,7 @@ fn a_job_that_keeps_no_state_sorts_all_the_same_and_says_so_when_a_worker_is_los
 fn a_sort_of_an_epoch_that_is_over_is_of_no_use() {
     let (mut job, _) = job(2);
     let bench = job.epoch.bench.clone().expect("the cubes may meet");
-    let x = bench.sorter.positions_of(job.start_state());
+    let x = Gathered { cycle: 0, x: bench.sorter.positions_of(job.start_state()) };
     let sorted = Box::new(bench.sort(&x));
     job.apply(Event::Lost(0, "cable".into()));
     assert!(job.apply(Event::Sorted(sorted)).is_empty() && !job.is_over());

@@ -562,8 +562,8 @@ impl Clock<'_> {
                 }
                 Action::Sort(bench, x) => {
                     let cycle = (self.timeline.counts.len() as u64).saturating_sub(1);
-                    counts_at(&mut self.timeline.counts, cycle).sorted += x.len() as u64;
-                    let seconds = self.machines.costs.sort * x.len() as f64;
+                    counts_at(&mut self.timeline.counts, cycle).sorted += x.n_nodes() as u64;
+                    let seconds = self.machines.costs.sort * x.n_nodes() as f64;
                     let number = self.first_sort + self.sorts.len() as u64;
                     self.sorts.push_back(UnderWay::new(Kind::Sort, seconds, self.now));
                     self.processors[0].add(self.now, Rank::Idle, seconds, Begun(self.now, Work::Sort));

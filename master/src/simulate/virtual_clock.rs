@@ -509,14 +509,14 @@ impl Clock<'_> {
                     let sorted = if self.live {
                         let (sorted, ns) = timed_sort(&bench, &x);
                         self.sorts_kept.push((*sorted).clone());
-                        self.sort_ns.push(ns as f64 / x.len().max(1) as f64);
+                        self.sort_ns.push(ns as f64 / x.n_nodes().max(1) as f64);
                         *sorted
                     } else {
                         self.sorts.pop_front().ok_or("the tape of a run has fewer sorts than the run")?
                     };
                     let cycle = self.timeline.counts.len() as u64 - 1;
-                    counts_at(&mut self.timeline.counts, cycle).sorted += x.len() as u64;
-                    let seconds = self.machines.costs.sort * x.len() as f64;
+                    counts_at(&mut self.timeline.counts, cycle).sorted += x.n_nodes() as u64;
+                    let seconds = self.machines.costs.sort * x.n_nodes() as f64;
                     let work = Begun(self.now, Work::Sort(Box::new(sorted)));
                     self.processors[0].add(self.now, Rank::Idle, seconds, work);
                     self.foresee(0);

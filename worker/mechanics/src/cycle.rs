@@ -254,8 +254,6 @@ pub struct Domain {
     cycle: u64,
     /// `t_n`.
     time: f64,
-    /// Whether the first plan is installed.
-    installed: bool,
     /// What left with dropped nodes in this cycle.
     gone: Gone,
     /// Where the walls are and how they move in this step.
@@ -351,7 +349,6 @@ impl Domain {
             vote: Vote::empty(n_parts),
             cycle,
             time: 0.0,
-            installed: false,
             gone: Gone::default(),
             poses: Vec::with_capacity(setup.walls.len()),
             unbooked: vec![WallVote::default(); setup.walls.len()],
@@ -534,20 +531,16 @@ impl Domain {
             }
         }
         self.drop_nodes(&plan.dropped);
-        self.installed = true;
         Ok(())
     }
 
-    /// Takes freed nodes out of the run: they stand still from now on, and nothing feels them. Those that the first plan names
-    /// were booked before.
+    /// Takes freed nodes out of the run: they stand still from now on, and nothing feels them. A first plan names those of
+    /// earlier cycles too, which stand still already: what left with them was booked then, and nothing is booked here.
     fn drop_nodes(&mut self, nodes: &[u32]) {
         for &node in nodes {
             for &(room, local) in self.home.get(node) {
                 let room = &mut self.rooms[room as usize];
                 let booked = room.drop_node(local);
-                if !self.installed {
-                    continue;
-                }
                 let (v, mass) = (&mut room.block.v, room.block.mass[local as usize]);
                 let velocity: [f64; 3] = std::array::from_fn(|a| std::mem::take(&mut v[a][local as usize]));
                 if booked {
