@@ -2,13 +2,14 @@
 
 mod conditions;
 mod motion;
+mod rigid;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::{
     draft::{Draft, quoted, vector},
     log::{Log, Place},
-    material::{self, Law},
+    material,
     problem::{Problem, Section, Shell},
     unit,
 };
@@ -49,11 +50,14 @@ pub(super) fn translate(
         names: BTreeMap::new(),
         thicknesses: BTreeMap::new(),
         curves: BTreeMap::new(),
+        bodies: rigid::Bodies::default(),
     };
     t.elements();
+    t.find_bodies();
     t.control(units);
     t.materials();
     t.parts();
+    t.rigid();
     t.held();
     t.motions();
     t.forces();
@@ -82,6 +86,8 @@ struct Translation<'p> {
     thicknesses: BTreeMap<u32, f64>,
     /// Curves that were referred to: name and points.
     curves: BTreeMap<String, (Place, Vec<[f64; 2]>)>,
+    /// Parts that are rigid.
+    bodies: rigid::Bodies,
 }
 
 impl Translation<'_> {
@@ -405,7 +411,8 @@ impl Translation<'_> {
 
     /// Parts with their velocities; those of single nodes go into the mesh.
     fn parts(&mut self) {
-        let (velocity, spin) = self.velocities();
+        let (mut velocity, mut spin) = self.velocities();
+        self.start_bodies(&mut velocity, &mut spin);
         let problem = self.problem;
         let mut turning: BTreeSet<u32> = BTreeSet::new();
         let of = |node: &u32| velocity.get(node).copied().unwrap_or_default();
@@ -439,21 +446,6 @@ impl Translation<'_> {
             }
             let (file, body) = (quoted(self.mesh_name), format!("part {id}"));
             self.draft.line(at, format!("mesh = {{ file = {file}, body = \"{body}\" }}"));
-            if let Some(Law::Rigid { held }) = problem.materials.get(&part.material).map(|m| &m.law) {
-                self.draft.heading(at, "[[rigid]]");
-                self.draft.line(at, format!("parts = [{}]", quoted(&name)));
-                for (key, axes) in ["velocity", "spin"].into_iter().zip(held) {
-                    let zeros: Vec<String> = AXES
-                        .iter()
-                        .zip(axes)
-                        .filter(|(_, held)| **held)
-                        .map(|(a, _)| format!("{a} = 0"))
-                        .collect();
-                    if !zeros.is_empty() {
-                        self.draft.line(at, format!("{key} = {{ {} }}", zeros.join(", ")));
-                    }
-                }
-            }
         }
         // Nodes of several parts get theirs from the mesh wherever one part would give them another.
         self.mesh.velocities = apart.iter().map(|node| (*node, of(node))).collect();
@@ -465,7 +457,8 @@ impl Translation<'_> {
         let mut pairs: BTreeMap<(u32, u32), (Place, f64)> = BTreeMap::new();
         for contact in &problem.contacts {
             for (a, b) in contact.pairs(problem, log) {
-                if self.names.contains_key(&a) && self.names.contains_key(&b) {
+                let known = self.names.contains_key(&a) && self.names.contains_key(&b);
+                if known && !self.bodies.same(a, b) {
                     pairs.entry((a, b)).or_insert((contact.at, contact.friction));
                 }
             }

@@ -2,7 +2,8 @@
 //!
 //! Every worker holds the state of every body. What its blocks and work units push a body with travels as integers at the
 //! end of the exchange, so all move it alike. A node of a body is then given the force that brings it to its place: it is
-//! integrated, watched and voted on like any other, but books nothing, which the body does for it.
+//! integrated, watched and voted on like any other, but books nothing, which the body does for it. Nodes of shells get a
+//! moment too, which turns them as the body turns.
 
 use std::collections::{HashMap, HashSet};
 
@@ -104,8 +105,11 @@ impl Domain {
             held.push = Push::default();
             let state = &held.state;
             for &[room, local, place] in &held.copies {
-                let f = at(&self.rooms[room as usize].block.f, local);
-                push(&mut held.push, f, body, state, place, force);
+                let block = &self.rooms[room as usize].block;
+                push(&mut held.push, at(&block.f, local), body, state, place, force);
+                if let Some(core) = &block.shells {
+                    held.push.add_moment(at(&core.m, local), force, body.length);
+                }
             }
             if let Some(contact) = &self.contact {
                 for &[node, place] in &held.contact {
@@ -149,6 +153,11 @@ impl Domain {
                 let (x, v) = (at(&block.x, local), at(&block.v, local));
                 let force = of_nodes.leading(x, v, block.mass[local as usize], target);
                 (0..3).for_each(|a| block.f[a][local as usize] = force[a]);
+                if let Some(core) = &mut block.shells {
+                    let (spin, inertia) = (at(&core.w, local), core.inertia[local as usize]);
+                    let moment = of_nodes.turning(spin, inertia, held.state.spin);
+                    (0..3).for_each(|a| core.m[a][local as usize] = moment[a]);
+                }
             }
             for &[guest, place] in &held.guests {
                 let target = held.state.at(body.places[place as usize]);
