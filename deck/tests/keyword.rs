@@ -304,12 +304,7 @@ fn a_rigid_material_makes_a_body_of_its_part() {
 #[test]
 fn what_cannot_be_honoured_is_refused_where_it_stands() {
     let refused = [
-        ("*DEFORMABLE_TO_RIGID\n1\n", "a.k:22:1: read *DEFORMABLE_TO_RIGID; expected parts that deform"),
         ("*MAT_ADD_EROSION\n1\n", "a.k:22:1: read *MAT_ADD_EROSION; expected no erosion"),
-        (
-            "*INITIAL_VELOCITY_RIGID_BODY\n1,1.0\n",
-            "a.k:22:1: read *INITIAL_VELOCITY_RIGID_BODY; expected a keyword",
-        ),
         ("*MAT_VISCOELASTIC\n2,1.0\n", "a.k:22:1: read *MAT_VISCOELASTIC; expected a material of the table"),
         ("*ELEMENT_BEAM\n1,1,1,2,3\n", "a.k:22:1: read *ELEMENT_BEAM; expected a keyword of the table"),
         (

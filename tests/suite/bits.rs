@@ -42,7 +42,7 @@ fn crews() -> Vec<(String, Crew)> {
 }
 
 /// Compares runs of a problem on all crews, with sorts forced, and over a snapshot.
-fn same_bits(model: &Model) {
+pub(crate) fn same_bits(model: &Model) {
     let cycles = model.setup.control.end_cycle;
     let alone = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
     let one = Fingerprint::of(&alone);

@@ -259,7 +259,9 @@ impl Moments {
         for (i, share) in shares.iter_mut().enumerate() {
             let ((r, weight_r), (s, weight_s)) = (points[i / 3], points[i % 3]);
             let [low_r, high_r, low_s, high_s] = [1.0 - r, 1.0 + r, 1.0 - s, 1.0 + s].map(|f| 0.5 * f);
-            let at = |a: usize| low_r * (low_s * x[0][a] + high_s * x[3][a]) + high_r * (low_s * x[1][a] + high_s * x[2][a]);
+            let at = |a: usize| {
+                low_r * (low_s * x[0][a] + high_s * x[3][a]) + high_r * (low_s * x[1][a] + high_s * x[2][a])
+            };
             let along_r = |a: usize| low_s * (x[1][a] - x[0][a]) + high_s * (x[2][a] - x[3][a]);
             let along_s = |a: usize| low_r * (x[3][a] - x[0][a]) + high_r * (x[2][a] - x[1][a]);
             let normal = cross(std::array::from_fn(along_r), std::array::from_fn(along_s));
