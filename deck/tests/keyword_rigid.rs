@@ -111,12 +111,11 @@ fn parts_become_rigid_and_join_a_body_by_card_by_set_and_by_the_nodes_they_share
 
 #[test]
 fn bodies_begin_as_their_cards_or_their_nodes_say() {
-    let spun = "*INITIAL_VELOCITY_GENERATION\n1,2,3.0\n5,5,0,0,0,1\n";
+    let spun = "*INITIAL_VELOCITY_GENERATION\n1,2,3.0\n5,0,0,1,0,0\n";
     let model = good(ELASTIC, spun);
     let root = &model.setup.bodies[0].start;
-    assert!((root.spin[2] - 3.0).abs() < 1e-12, "{root:?}");
-    let expected = 3.0 * (root.centre[0] - 5.0);
-    assert!((root.velocity[1] - expected).abs() < 1e-9, "{root:?}");
+    assert!((root.spin[0] - 3.0).abs() < 1e-12, "{root:?}");
+    assert!((root.velocity[2] - 3.0 * 5.0).abs() < 1e-9, "{root:?}");
     // Nodes of its shells turn as it does, whatever they were given.
     assert_eq!(model.spin[0], root.spin);
     let card = format!("{spun}*INITIAL_VELOCITY_RIGID_BODY\n1,1.0,2.0,3.0,4.0\n4,0,0,-7\n");
@@ -185,7 +184,7 @@ fn what_cannot_be_honoured_of_rigid_bodies_is_refused_at_its_line() {
             "read part 2, which deforms or has no elements; expected parts of rigid",
         ),
         ("*CONSTRAINED_RIGID_BODIES\n1,3\n", 1, "read part 3, which deforms or has no elements"),
-        ("*CONSTRAINED_RIGID_BODIES\n,1\n", 1, "read a blank card; expected the part that leads"),
+        ("*CONSTRAINED_RIGID_BODIES\n,1\n", 1, "read a blank field; expected the part that leads"),
         ("*INITIAL_VELOCITY_RIGID_BODY\n2,1.0\n", 1, "read part 2; expected a part of a rigid body"),
         ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n2,1,0,3\n", 1, "read part 2; expected a part of a rigid body"),
         (
