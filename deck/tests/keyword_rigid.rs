@@ -238,3 +238,27 @@ fn a_converted_pipe_whip_is_the_same_problem() {
     let again = deck::read(&again, "a.toml").unwrap_or_else(|f| panic!("{}", lines(&f)));
     assert_eq!(again, model);
 }
+
+#[test]
+fn force_transducers_ask_for_the_contact_of_their_parts() {
+    let single = "*CONTACT_AUTOMATIC_SINGLE_SURFACE\n0\n\n\n";
+    let asked = |cards: &str| whole(ELASTIC, &format!("{single}{cards}"));
+    let pairs = |cards: &str| asked(cards).model.output.contact_forces;
+    assert_eq!(pairs("*CONTACT_FORCE_TRANSDUCER_PENALTY\n4,0,3,0\n\n\n"), [[3, 0], [3, 1], [3, 2]]);
+    assert_eq!(pairs("*CONTACT_FORCE_TRANSDUCER_PENALTY_ID\n5,on the ram\n4,2,3,3\n\n\n"), [[3, 1]]);
+    // Each pair once, as the first transducer has it.
+    let both = "*CONTACT_FORCE_TRANSDUCER\n2,4,3,3\n\n\n*CONTACT_FORCE_TRANSDUCER\n4,2,3,3\n\n\n";
+    assert_eq!(pairs(both), [[1, 3]]);
+    // Parts of one body do not meet.
+    let alone = "*CONSTRAINED_RIGID_BODIES\n4,1\n*CONTACT_FORCE_TRANSDUCER\n1,4,3,3\n\n\n";
+    let reading = asked(alone);
+    assert!(reading.model.output.contact_forces.is_empty());
+    assert!(
+        reading
+            .warnings
+            .iter()
+            .any(|w| w.words.starts_with("a force transducer of parts that meet no other"))
+    );
+    let found = faults(ELASTIC, "*CONTACT_FORCE_TRANSDUCER\n4,0,1,0\n");
+    assert!(found[0].contains("read 1; expected a kind of surface"), "{found:?}");
+}

@@ -141,11 +141,17 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 #[test]
 fn a_free_body_takes_the_moments_of_the_shells_on_it() {
-    let mut model = strip("[[rigid]]\nparts = [\"root\"]");
-    model.setup.loads.forces.iter_mut().for_each(|force| force.force = [0.0, 0.0, 40.0]);
+    let pushed = |root: &str| {
+        let mut model = strip(root);
+        model.setup.loads.forces.iter_mut().for_each(|force| force.force = [0.0, 0.0, 40.0]);
+        model
+    };
+    let model = pushed("[[rigid]]\nparts = [\"root\"]");
     let solved = run(&model, Crew::default());
     let row = solved.rows.last().expect("rows");
-    assert!(row.external > 0.0 && row.error.abs() < 1e-3, "energy error {}", row.error);
+    // A force that sets in at once costs shells 0.3 % with or without a body among them.
+    let without = run(&pushed(""), Crew::default()).rows.last().expect("rows").error;
+    assert!(row.external > 0.0 && (row.error - without).abs() < 2e-4, "{} and {without}", row.error);
     // Angular momentum is the moment of the impulse: three forces of 40 N push the tip for the time that was run.
     let state = &solved.state;
     let body = &model.setup.bodies[0];

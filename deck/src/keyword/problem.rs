@@ -110,6 +110,8 @@ pub(super) struct Problem {
     pub(super) conditions: Conditions,
     pub(super) rigid: RigidCards,
     pub(super) contacts: Vec<ContactCard>,
+    /// Contacts whose forces the history is to hold.
+    pub(super) transducers: Vec<ContactCard>,
     pub(super) control: ControlCards,
 }
 
@@ -172,6 +174,9 @@ impl Problem {
             word if word.starts_with("SET_") => self.sets.read(block, context),
             word if word.starts_with("MAT_") => self.read_material(block, context),
             word if word.starts_with("EOS_") => self.read_eos(block, context),
+            word if word.starts_with("CONTACT_FORCE_TRANSDUCER") => {
+                self.transducers.extend(ContactCard::read_transducer(block, context));
+            }
             word if word.starts_with("CONTACT_") => {
                 if let Some(card) = ContactCard::read(block, context) {
                     self.contacts.push(card);

@@ -3,6 +3,7 @@
 mod conditions;
 mod motion;
 mod rigid;
+mod transducer;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -51,6 +52,7 @@ pub(super) fn translate(
         thicknesses: BTreeMap::new(),
         curves: BTreeMap::new(),
         bodies: rigid::Bodies::default(),
+        met: BTreeSet::new(),
     };
     t.elements();
     t.find_bodies();
@@ -88,6 +90,8 @@ struct Translation<'p> {
     curves: BTreeMap<String, (Place, Vec<[f64; 2]>)>,
     /// Parts that are rigid.
     bodies: rigid::Bodies,
+    /// Pairs of parts that meet, lower number first.
+    met: BTreeSet<(u32, u32)>,
 }
 
 impl Translation<'_> {
@@ -467,6 +471,7 @@ impl Translation<'_> {
         else {
             return;
         };
+        self.met = pairs.keys().copied().collect();
         self.draft.heading(at, "[contact]");
         self.draft.line(at, "gap_fraction = \"fit\"");
         self.draft.line(at, "default_interacts = false");
@@ -483,9 +488,15 @@ impl Translation<'_> {
     fn output(&mut self) {
         let (problem, log) = (self.problem, self.log);
         let control = &problem.control;
-        if let Some((at, period)) = control.period {
+        let forces = self.watched();
+        if let Some(at) = control.period.map(|(at, _)| at).or(forces.as_ref().map(|(at, _)| *at)) {
             self.draft.heading(at, "[output]");
+        }
+        if let Some((at, period)) = control.period {
             self.draft.line(at, format!("period = {period:?}"));
+        }
+        if let Some((at, pairs)) = forces {
+            self.draft.line(at, format!("contact_forces = [{pairs}]"));
         }
         let mut gauges: BTreeMap<u32, Place> = control.gauges.iter().map(|(at, id)| (*id, *at)).collect();
         for (at, set) in &control.gauge_sets {
