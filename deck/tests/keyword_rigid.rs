@@ -222,6 +222,7 @@ fn a_converted_pipe_whip_is_the_same_problem() {
     let names: Vec<&str> = model.mesh.parts.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["hinge", "whip", "clamp left", "clamp right", "target"]);
     assert_eq!((model.mesh.n_elements(), bodies(&model)), (672, vec![vec![0], vec![2, 3]]));
+    assert_eq!(model.output.contact_forces, [[1, 4]]);
     let hinge = &model.setup.bodies[0];
     assert_eq!((hinge.start.velocity, hinge.start.spin), ([0.0; 3], [-0.15, 0.0, 0.0]));
     let converted =

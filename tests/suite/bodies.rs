@@ -4,6 +4,7 @@ use deck::Model;
 use master::{
     embedded::Fate,
     event::{Keep, Options},
+    snapshot::file,
 };
 use protocol::message::Route;
 use tests::{
@@ -69,6 +70,23 @@ fn a_worker_of_rigid_shells_that_is_lost_changes_no_bit() {
         midway += usize::from(solved.outcome.losses[0].back_to > 0);
     }
     assert!(midway >= 2, "{midway} of 6 went back to a state on the way");
+}
+
+#[test]
+fn a_snapshot_of_rigid_shells_goes_on_from_its_file_with_the_same_bits() {
+    let mut model = whip();
+    model.setup.control.end_cycle = 120;
+    let one = Fingerprint::of(&run(&model, Crew::default()));
+    let options = Options { snapshot_at: Some(70), ..Options::default() };
+    let taken = run(&model, Crew { options, ..Crew::of(2) }).snapshot.expect("a snapshot was asked for");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("snapshot.bolide");
+    file::write(&path, &taken).expect("a disk with room");
+    for workers in [1, 3, 5] {
+        let resume = Some(file::read(&path).expect("a whole file"));
+        let crew = Crew { resume, ..Crew::of(workers) };
+        one.assert_equal(&Fingerprint::of(&run(&model, crew)), &format!("resumed on {workers} workers"));
+    }
 }
 
 /// A strip of shells that bends: 10 by 2 elements with one row more at its root, which `root` holds.
