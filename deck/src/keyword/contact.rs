@@ -103,13 +103,18 @@ impl ContactCard {
         Some(Self { at: f.at, first: side(0)?, second, friction })
     }
 
-    /// Reads `*CONTACT_FORCE_TRANSDUCER_`; none after a fault.
+    /// Reads `*CONTACT_FORCE_TRANSDUCER_`; none where its surfaces are of a kind that is not known.
     pub(super) fn read_transducer(block: &mut Block<'_>, context: &Context<'_>) -> Option<Self> {
         let extra = usize::from(block.take("_ID") || block.take("_TITLE"));
         let card = block.card(extra);
         let f = context.fields(&card, block.width, &TENS);
-        for i in [4, 5].into_iter().filter(|i| f.integer(*i) != 0) {
-            f.fault(i, "forces wherever its parts are", "leave the boxes blank");
+        if [4, 5].iter().any(|i| f.integer(*i) != 0) {
+            context.log.warn(f.at, "a force transducer with boxes: the forces are those of its whole parts");
+        }
+        let kinds = [2, 3].map(|i| f.integer(i));
+        if kinds.iter().any(|kind| !matches!(kind, 0 | 2..=6)) {
+            context.log.warn(f.at, format!("a force transducer of surfaces of kinds {kinds:?} is left out"));
+            return None;
         }
         let second = if f.id(1) == 0 { None } else { Some(Side::read(&f, 1, false)?) };
         Some(Self { at: f.at, first: Side::read(&f, 0, true)?, second, friction: 0.0 })
