@@ -20,6 +20,7 @@ mod shape;
 mod wall;
 
 pub(crate) use contact::ContactDraft;
+pub(crate) use output::MAX_CONTACT_FORCES;
 pub(crate) use part::{Explicit, PartDraft};
 
 use std::collections::BTreeMap;

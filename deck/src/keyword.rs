@@ -20,6 +20,7 @@ mod log;
 mod material;
 mod parameter;
 mod problem;
+mod rigid;
 mod set;
 mod translate;
 mod unit;

@@ -423,11 +423,6 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
             "a.k:24:3: read -0.8; expected a failure strain of 0 or above",
         ),
         ("*CONTROL_CONTACT\n,,,,,,,3\n", "a.k:23:8: read 3; expected ENMASS 0, 1 or 2"),
-        ("*DEFORMABLE_TO_RIGID\n1\n", "a.k:22:1: read *DEFORMABLE_TO_RIGID; expected parts that deform"),
-        (
-            "*INITIAL_VELOCITY_RIGID_BODY\n1,1.0\n",
-            "a.k:22:1: read *INITIAL_VELOCITY_RIGID_BODY; expected a keyword",
-        ),
         ("*MAT_VISCOELASTIC\n2,1.0\n", "a.k:22:1: read *MAT_VISCOELASTIC; expected a material of the table"),
         ("*ELEMENT_BEAM\n1,1,1,2,3\n", "a.k:22:1: read *ELEMENT_BEAM; expected a keyword of the table"),
         (
@@ -548,8 +543,11 @@ fn mutated(text: &str, stream: &mut Stream) -> String {
 #[test]
 fn mutated_keyword_decks_never_panic_and_faults_always_have_a_place() {
     let conditions = "*SET_NODE_LIST\n1\n1,2,3\n*SET_SEGMENT\n2\n5,6,7,8\n*DEFINE_CURVE\n3\n0,1\n1,2\n*LOAD_SEGMENT_SET\n2,3\n*LOAD_NODE_SET\n1,1,3\n*BOUNDARY_PRESCRIBED_MOTION_SET\n1,2,2,3\n*BOUNDARY_SPC_SET\n1,0,0,0,1\n*RIGIDWALL_PLANAR_MOVING\n1\n0,0,-1,0,0,2\n1e-3,0\n*HOURGLASS\n1,1,0.1\n*EOS_GRUNEISEN\n1,3e6,1.4\n*CONTROL_BULK_VISCOSITY\n1.4,0.05\n";
+    let rigid = "*DEFINE_CURVE\n3\n0,1\n1,2\n*DEFORMABLE_TO_RIGID\n1,0,PART\n*CONSTRAINED_RIGID_BODIES\n1,1\n*INITIAL_VELOCITY_RIGID_BODY\n1,1.0,2.0,3.0,4.0\n*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,1,2,3,2.0\n1,6,0,3\n*CONTACT_FORCE_TRANSDUCER_PENALTY\n1,0,3\n";
     let (mut read, mut refused) = (0, 0);
-    for text in [cube(conditions), gathered(&folder("examples"), "bar-on-wall.k", &Options::default())] {
+    for text in
+        [cube(conditions), cube(rigid), gathered(&folder("examples"), "bar-on-wall.k", &Options::default())]
+    {
         for seed in 1..=800 {
             let deck = mutated(&text, &mut Stream(seed));
             match deck::read(&deck, "a.k") {

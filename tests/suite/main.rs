@@ -3,6 +3,7 @@
 //! `cargo test --release -p tests --test suite -- --nocapture` prints every figure of the book.
 
 mod bits;
+mod bodies;
 mod book;
 mod erosion;
 mod fuzz;

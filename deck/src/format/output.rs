@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Most pairs of parts whose contact force is written: each has four columns.
-const MAX_CONTACT_FORCES: usize = 64;
+pub(crate) const MAX_CONTACT_FORCES: usize = 64;
 
 /// Reads `[output]` and every `[[gauge]]`.
 pub(crate) fn read(deck: &Table<'_>, names: &Names, assembly: &Assembly) -> Output {

@@ -108,7 +108,7 @@ pub(crate) fn make(
         for &n in given.parts.iter().flat_map(|&p| &assembly.mesh.parts[p as usize].nodes) {
             let id = assembly.mesh.node_ids[n as usize];
             let held = conditions.constraints[conditions.constraint[n as usize] as usize];
-            if held.velocity.iter().any(Option::is_some) || held.walls != 0 {
+            if held.velocity.iter().any(Option::is_some) || held.clamped != 0 || held.walls != 0 {
                 faults.add(
                     *at,
                     format!("{title} with node {id}, which a boundary or a wall holds"),
@@ -139,7 +139,10 @@ pub(crate) fn make(
             &mut assembly.velocity,
         );
         match made {
-            Ok(body) => bodies.push(body),
+            Ok(body) => {
+                turn(assembly, &body);
+                bodies.push(body);
+            }
             Err(words) => faults.add(
                 *at,
                 format!("{title} with {words}"),
@@ -156,4 +159,13 @@ pub(crate) fn make(
         }
     }
     bodies
+}
+
+/// Lets the nodes of a body turn at the start as it does; only those of shells ever use it.
+fn turn(assembly: &mut Assembly, body: &Body) {
+    let has_shells = assembly.mesh.parts.iter().any(|part| part.section().is_some());
+    if has_shells && (body.start.spin != [0.0; 3] || !assembly.spin.is_empty()) {
+        assembly.spin.resize(assembly.velocity.len(), [0.0; 3]);
+        body.nodes.iter().for_each(|&n| assembly.spin[n as usize] = body.start.spin);
+    }
 }

@@ -50,6 +50,21 @@ pub(super) enum Meaning {
     Displacement,
 }
 
+impl Meaning {
+    /// VAD, in field `i`; another is reported.
+    pub(super) fn read(f: &Fields<'_>, i: usize) -> Option<Self> {
+        match f.integer(i) {
+            0 => Some(Self::Velocity),
+            1 => Some(Self::Acceleration),
+            2 => Some(Self::Displacement),
+            _ => {
+                f.fault(i, "VAD 0, 1 or 2", "give a velocity, an acceleration or a displacement by time");
+                None
+            }
+        }
+    }
+}
+
 /// A motion by curve along one axis.
 pub(super) struct Motion {
     pub(super) at: Place,
@@ -248,19 +263,7 @@ impl Conditions {
             _ => {
                 let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
                 let Some(axis) = axis_of(f, 1) else { return };
-                let meaning = match f.integer(2) {
-                    0 => Meaning::Velocity,
-                    1 => Meaning::Acceleration,
-                    2 => Meaning::Displacement,
-                    _ => {
-                        f.fault(
-                            2,
-                            "VAD 0, 1 or 2",
-                            "give a velocity, an acceleration or a displacement by time",
-                        );
-                        return;
-                    }
-                };
+                let Some(meaning) = Meaning::read(f, 2) else { return };
                 all_along(f, 7, 6);
                 self.motions.push(Motion { at, target, axis, meaning, curve: f.id(3), factor: scale(f, 4) });
             }
@@ -391,7 +394,7 @@ fn axis_of(f: &Fields<'_>, i: usize) -> Option<usize> {
 }
 
 /// A scale factor, where 0 stands for 1.
-fn scale(f: &Fields<'_>, i: usize) -> f64 {
+pub(super) fn scale(f: &Fields<'_>, i: usize) -> f64 {
     match f.real(i, 1.0) {
         0.0 => 1.0,
         factor => factor,

@@ -1,9 +1,11 @@
 //! `*CONTACT_`: which parts meet.
 
+use std::collections::BTreeSet;
+
 use super::{
     cards::Block,
     condition::all_along,
-    fields::{Context, TENS},
+    fields::{Context, Fields, TENS},
     log::{Log, Place},
     problem::Problem,
 };
@@ -21,7 +23,28 @@ pub(super) enum Side {
     SegmentSet(u32),
 }
 
-/// A contact that is honoured.
+impl Side {
+    /// The side whose number stands in field `i` and its kind two fields behind; the first may be every part, where
+    /// `all` says so by a blank number.
+    fn read(f: &Fields<'_>, i: usize, all: bool) -> Option<Self> {
+        let id = f.id(i);
+        match f.integer(i + 2) {
+            _ if id == 0 && i == 0 && all => Some(Self::All),
+            5 if i == 0 => Some(Self::All),
+            0 => Some(Self::SegmentSet(id)),
+            2 => Some(Self::PartSet(id)),
+            3 => Some(Self::Part(id)),
+            4 => Some(Self::NodeSet(id)),
+            6 => Some(Self::NotPartSet(id)),
+            _ => {
+                f.fault(i + 2, "a kind of surface from 0 to 6 without 1", "name parts");
+                None
+            }
+        }
+    }
+}
+
+/// A contact that is honoured, or a force transducer.
 pub(super) struct ContactCard {
     pub(super) at: Place,
     pub(super) first: Side,
@@ -33,7 +56,7 @@ pub(super) struct ContactCard {
 }
 
 impl ContactCard {
-    /// Reads a `*CONTACT_` keyword; none after a fault, and for force transducers.
+    /// Reads a `*CONTACT_` keyword other than force transducers; none after a fault.
     pub(super) fn read(block: &mut Block<'_>, context: &Context<'_>) -> Option<Self> {
         let log = context.log;
         let whole = block.keyword.clone();
@@ -41,10 +64,6 @@ impl ContactCard {
         extra += usize::from(block.take("_MPP"));
         extra += usize::from(extra == 0 && (block.take("_ID") || block.take("_TITLE")));
         let word = block.keyword["CONTACT_".len()..].to_string();
-        if word.starts_with("FORCE_TRANSDUCER") {
-            log.ignore(block.at, &whole);
-            return None;
-        }
         let single = match word.as_str() {
             "AUTOMATIC_SINGLE_SURFACE" | "AUTOMATIC_GENERAL" | "ERODING_SINGLE_SURFACE" => true,
             "AUTOMATIC_SURFACE_TO_SURFACE"
@@ -74,22 +93,7 @@ impl ContactCard {
             f.fault(i, "contact wherever its parts are", "leave the boxes blank");
         }
         all_along(&g, 6, 7);
-        let side = |i: usize| {
-            let id = f.id(i);
-            match f.integer(i + 2) {
-                _ if id == 0 && i == 0 && single => Some(Side::All),
-                5 if i == 0 => Some(Side::All),
-                0 => Some(Side::SegmentSet(id)),
-                2 => Some(Side::PartSet(id)),
-                3 => Some(Side::Part(id)),
-                4 => Some(Side::NodeSet(id)),
-                6 => Some(Side::NotPartSet(id)),
-                _ => {
-                    f.fault(i + 2, "a kind of surface from 0 to 6 without 1", "name parts");
-                    None
-                }
-            }
-        };
+        let side = |i: usize| Side::read(&f, i, single);
         let (fixed, moving, decay) = (g.real(0, 0.0), g.real(1, 0.0), g.real(2, 0.0));
         if fixed < 0.0 {
             g.fault(0, "a coefficient of friction of 0 or above", "give the contact its own");
@@ -105,6 +109,40 @@ impl ContactCard {
         let second = if single { None } else { Some(side(1)?) };
         let friction = if decays { moving } else { fixed };
         Some(Self { at: f.at, first: side(0)?, second, friction, erodes })
+    }
+
+    /// Reads `*CONTACT_FORCE_TRANSDUCER_`; none where its surfaces are of a kind that is not known.
+    pub(super) fn read_transducer(block: &mut Block<'_>, context: &Context<'_>) -> Option<Self> {
+        let extra = usize::from(block.take("_ID") || block.take("_TITLE"));
+        let card = block.card(extra);
+        let f = context.fields(&card, block.width, &TENS);
+        if [4, 5].iter().any(|i| f.integer(*i) != 0) {
+            context.log.warn(f.at, "a force transducer with boxes: the forces are those of its whole parts");
+        }
+        let kinds = [2, 3].map(|i| f.integer(i));
+        if kinds.iter().any(|kind| !matches!(kind, 0 | 2..=6)) {
+            context.log.warn(f.at, format!("a force transducer of surfaces of kinds {kinds:?} is left out"));
+            return None;
+        }
+        let second = if f.id(1) == 0 { None } else { Some(Side::read(&f, 1, false)?) };
+        Some(Self { at: f.at, first: Side::read(&f, 0, true)?, second, friction: 0.0 })
+    }
+
+    /// Pairs of different parts of a transducer among those that meet: one of its own, then the other.
+    pub(super) fn watched(&self, met: &BTreeSet<(u32, u32)>, problem: &Problem, log: &Log) -> Vec<[u32; 2]> {
+        let first: BTreeSet<u32> = self.parts(self.first, problem, log).into_iter().collect();
+        let second: Option<BTreeSet<u32>> =
+            self.second.map(|side| self.parts(side, problem, log).into_iter().collect());
+        let from = |part: &u32| second.as_ref().is_none_or(|second| second.contains(part));
+        let mut pairs = Vec::new();
+        for &(a, b) in met.iter().filter(|(a, b)| a != b) {
+            if first.contains(&a) && from(&b) {
+                pairs.push([a, b]);
+            } else if first.contains(&b) && from(&a) {
+                pairs.push([b, a]);
+            }
+        }
+        pairs
     }
 
     /// Pairs of parts that meet, lower number first, in order.

@@ -14,6 +14,7 @@ use super::{
     fields::{Context, EIGHTS, TENS},
     log::{Log, Place},
     material::{EosCard, MaterialCard},
+    rigid::RigidCards,
     set::Sets,
 };
 
@@ -108,7 +109,10 @@ pub(super) struct Problem {
     /// Directions of x, y, z of each coordinate system.
     pub(super) systems: BTreeMap<u32, [[f64; 3]; 3]>,
     pub(super) conditions: Conditions,
+    pub(super) rigid: RigidCards,
     pub(super) contacts: Vec<ContactCard>,
+    /// Contacts whose forces the history is to hold.
+    pub(super) transducers: Vec<ContactCard>,
     pub(super) control: ControlCards,
 }
 
@@ -167,15 +171,13 @@ impl Problem {
             "DEFINE_COORDINATE_SYSTEM" | "DEFINE_COORDINATE_NODES" | "DEFINE_COORDINATE_VECTOR" => {
                 self.read_system(block, context);
             }
-            "DEFORMABLE_TO_RIGID" => log.fault(
-                block.at,
-                "*DEFORMABLE_TO_RIGID",
-                "parts that deform: none becomes rigid on the way",
-                "take it out; the parts then deform by their materials",
-            ),
+            word if RigidCards::knows(word) => self.rigid.read(block, context),
             word if word.starts_with("SET_") => self.sets.read(block, context),
             word if word.starts_with("MAT_") => self.read_material(block, context),
             word if word.starts_with("EOS_") => self.read_eos(block, context),
+            word if word.starts_with("CONTACT_FORCE_TRANSDUCER") => {
+                self.transducers.extend(ContactCard::read_transducer(block, context));
+            }
             word if word.starts_with("CONTACT_") => {
                 if let Some(card) = ContactCard::read(block, context) {
                     self.contacts.push(card);

@@ -3,13 +3,15 @@
 mod conditions;
 mod eroded;
 mod motion;
+mod rigid;
+mod transducer;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::{
     draft::{Draft, quoted, vector},
     log::{Log, Place},
-    material::{self, Law},
+    material,
     problem::{Problem, Section, Shell},
     unit,
 };
@@ -50,11 +52,15 @@ pub(super) fn translate(
         names: BTreeMap::new(),
         thicknesses: BTreeMap::new(),
         curves: BTreeMap::new(),
+        bodies: rigid::Bodies::default(),
+        met: BTreeSet::new(),
     };
     t.elements();
+    t.find_bodies();
     t.control(units);
     t.materials();
     t.parts();
+    t.rigid();
     t.held();
     t.motions();
     t.forces();
@@ -83,6 +89,10 @@ struct Translation<'p> {
     thicknesses: BTreeMap<u32, f64>,
     /// Curves that were referred to: name and points.
     curves: BTreeMap<String, (Place, Vec<[f64; 2]>)>,
+    /// Parts that are rigid.
+    bodies: rigid::Bodies,
+    /// Pairs of parts that meet, lower number first.
+    met: BTreeSet<(u32, u32)>,
 }
 
 impl Translation<'_> {
@@ -395,7 +405,8 @@ impl Translation<'_> {
 
     /// Parts with their velocities; those of single nodes go into the mesh.
     fn parts(&mut self) {
-        let (velocity, spin) = self.velocities();
+        let (mut velocity, mut spin) = self.velocities();
+        self.start_bodies(&mut velocity, &mut spin);
         let problem = self.problem;
         let mut turning: BTreeSet<u32> = BTreeSet::new();
         let of = |node: &u32| velocity.get(node).copied().unwrap_or_default();
@@ -432,21 +443,6 @@ impl Translation<'_> {
             }
             let (file, body) = (quoted(self.mesh_name), format!("part {id}"));
             self.draft.line(at, format!("mesh = {{ file = {file}, body = \"{body}\" }}"));
-            if let Some(Law::Rigid { held }) = problem.materials.get(&part.material).map(|m| &m.law) {
-                self.draft.heading(at, "[[rigid]]");
-                self.draft.line(at, format!("parts = [{}]", quoted(&name)));
-                for (key, axes) in ["velocity", "spin"].into_iter().zip(held) {
-                    let zeros: Vec<String> = AXES
-                        .iter()
-                        .zip(axes)
-                        .filter(|(_, held)| **held)
-                        .map(|(a, _)| format!("{a} = 0"))
-                        .collect();
-                    if !zeros.is_empty() {
-                        self.draft.line(at, format!("{key} = {{ {} }}", zeros.join(", ")));
-                    }
-                }
-            }
         }
         // Nodes of several parts get theirs from the mesh wherever one part would give them another.
         self.mesh.velocities = apart.iter().map(|node| (*node, of(node))).collect();
@@ -458,7 +454,8 @@ impl Translation<'_> {
         let mut pairs: BTreeMap<(u32, u32), (Place, f64)> = BTreeMap::new();
         for contact in &problem.contacts {
             for (a, b) in contact.pairs(problem, log) {
-                if self.names.contains_key(&a) && self.names.contains_key(&b) {
+                let known = self.names.contains_key(&a) && self.names.contains_key(&b);
+                if known && !self.bodies.same(a, b) {
                     pairs.entry((a, b)).or_insert((contact.at, contact.friction));
                 }
             }
@@ -468,6 +465,7 @@ impl Translation<'_> {
             return;
         };
         self.freed_nodes();
+        self.met = pairs.keys().copied().collect();
         self.draft.heading(at, "[contact]");
         self.draft.line(at, "gap_fraction = \"fit\"");
         self.draft.line(at, "default_interacts = false");
@@ -484,9 +482,15 @@ impl Translation<'_> {
     fn output(&mut self) {
         let (problem, log) = (self.problem, self.log);
         let control = &problem.control;
-        if let Some((at, period)) = control.period {
+        let forces = self.watched();
+        if let Some(at) = control.period.map(|(at, _)| at).or(forces.as_ref().map(|(at, _)| *at)) {
             self.draft.heading(at, "[output]");
+        }
+        if let Some((at, period)) = control.period {
             self.draft.line(at, format!("period = {period:?}"));
+        }
+        if let Some((at, pairs)) = forces {
+            self.draft.line(at, format!("contact_forces = [{pairs}]"));
         }
         let mut gauges: BTreeMap<u32, Place> = control.gauges.iter().map(|(at, id)| (*id, *at)).collect();
         for (at, set) in &control.gauge_sets {

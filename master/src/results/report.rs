@@ -34,7 +34,7 @@ pub fn write(folder: &Folder, summary: &Summary, units: &str) -> Result<(), Erro
 fn page(history: &Table, summary: &Summary, units: &str) -> String {
     let Units { time, energy, length, stress, force, .. } = Units::named(units);
     let title = escaped(&summary.title);
-    let mut body = format!("<h1>{title}</h1>\n<pre>{}</pre>\n", escaped(&summary.table(units)));
+    let mut body = format!("<h1>{title}</h1>\n<pre>{}</pre>\n", lines(&summary.table(units)));
     let at = history.column("time").unwrap_or_default();
     let curve = |name: &str| -> Option<Curve> {
         let values = history.column(name)?;
@@ -81,12 +81,18 @@ fn page(history: &Table, summary: &Summary, units: &str) -> String {
     )
 }
 
+/// A table of lines, each of which goes on below where its label ends if the page is narrower.
+fn lines(table: &str) -> String {
+    table.lines().map(|line| format!("<span>{}</span>", escaped(line))).collect()
+}
+
 const STYLE: &str = "
 :root{color-scheme:light dark;--ink:#1b1f24;--paper:#fff;--line:#d5d9de;--c0:#0b62c4;--c1:#b8450f;--c2:#0a7a4b;--c3:#8a3fb0;--c4:#8c6d00;--c5:#b0214f;--c6:#4b5563}
 @media(prefers-color-scheme:dark){:root{--ink:#e6e8eb;--paper:#14171a;--line:#3a4047;--c0:#6cb0ff;--c1:#ff9d66;--c2:#5fd3a0;--c3:#d09bf0;--c4:#e2c04c;--c5:#ff86a8;--c6:#aab3bd}}
 body{font:15px/1.45 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:760px;margin:2rem auto;padding:0 1rem}
 h1{font-size:1.25rem}h2{font-size:1rem;margin:1.6rem 0 .3rem}small{font-weight:normal;opacity:.75}
-pre{overflow-x:auto;font-size:13px;border:1px solid var(--line);border-radius:4px;padding:.7rem}
+pre{white-space:pre-wrap;overflow-wrap:anywhere;font-size:13px;border:1px solid var(--line);border-radius:4px;padding:.7rem}
+pre span{display:block;padding-left:13ch;text-indent:-13ch;min-height:1lh}
 svg{width:100%;height:auto;font:12px system-ui,sans-serif}svg text{fill:var(--ink)}
 table{border-collapse:collapse;width:100%;font-size:13px}td,th{text-align:right;padding:.15rem .4rem;border-bottom:1px solid var(--line)}td:first-child,th:first-child{text-align:left}
 .scroll{overflow-x:auto}";

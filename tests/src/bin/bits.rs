@@ -5,7 +5,7 @@
 //! With `--clusters deploy/clusters`, every cluster file there is emulated on both routes as well.
 //!
 //! Without `--bolide`, the binary beside this one; build it first with `cargo build --release -p master`. Without
-//! `--deck`, both benchmarks of 27,000 elements. Every run of a deck must have the digest, the history and the energies
+//! `--deck`, both benchmarks of 27,000 elements and the pipe whip, shells between rigid bodies. Every run of a deck must have the digest, the history and the energies
 //! of the first, which is one worker of one thread; the program ends with failure if one has not.
 
 use std::{
@@ -51,8 +51,8 @@ fn asked() -> Result<Asked, String> {
         }
     }
     if asked.decks.is_empty() {
-        asked.decks =
-            ["plates-joined.toml", "plates-free-slip.toml"].map(|name| examples.join(name)).to_vec();
+        let decks = ["plates-joined.toml", "plates-free-slip.toml", "pipe-whip.k"];
+        asked.decks = decks.map(|name| examples.join(name)).to_vec();
     }
     Ok(asked)
 }

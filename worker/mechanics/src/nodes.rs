@@ -184,6 +184,16 @@ impl Advance<'_> {
         })
     }
 
+    /// The moment on a node of shells that turns it at `target` after this step, whatever relaxation does.
+    pub(crate) fn turning(&self, spin: [f64; 3], inertia: f64, target: [f64; 3]) -> [f64; 3] {
+        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        if half_steps == 0.0 {
+            return [0.0; 3];
+        }
+        let loss = self.body().map_or(0.0, |body| body.loss);
+        std::array::from_fn(|a| inertia / half_steps * (target[a] - spin[a] + loss * spin[a]))
+    }
+
     /// Integrates all sets of nodes, books the owned nodes, votes on the surface, and clears the forces.
     ///
     /// `v_{n+1/2} = v_{n-1/2} + f/m (dt_{n-1} + dt_n)/2`, `x_{n+1} = x_n + v_{n+1/2} dt_n`, with gravity and relaxation

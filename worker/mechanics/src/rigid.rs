@@ -118,6 +118,13 @@ impl Push {
         }
     }
 
+    /// Adds a moment, a sum of multiples of `force` times a power of two that is more than `length`.
+    pub fn add_moment(&mut self, m: [f64; 3], force: Quantum, length: Quantum) {
+        for a in 0..3 {
+            self.torque[a] += (m[a] / force.value() / length.value()) as i128;
+        }
+    }
+
     /// As numbers that add up exactly whatever their order, if no more than 64 are added.
     pub fn pack(&self) -> [f64; PUSH] {
         let mut out = [0.0; PUSH];

@@ -44,7 +44,7 @@ impl Translation<'_> {
     }
 
     /// A vector of a coordinate system in global components.
-    fn turned(&self, v: [f64; 3], system: u32, at: Place) -> [f64; 3] {
+    pub(super) fn turned(&self, v: [f64; 3], system: u32, at: Place) -> [f64; 3] {
         match self.directions(system, at) {
             Some(axes) => [0, 1, 2].map(|a| (0..3).map(|i| v[i] * axes[i][a]).sum()),
             None => v,
@@ -191,7 +191,7 @@ impl Translation<'_> {
     }
 
     /// The name of a curve of the deck, which is then written; as a velocity where it means something else.
-    fn curve(&mut self, id: u32, meaning: Meaning, at: Place) -> Option<String> {
+    pub(super) fn curve(&mut self, id: u32, meaning: Meaning, at: Place) -> Option<String> {
         let Some(curve) = self.problem.curves.get(&id) else {
             self.log.fault(at, format!("curve {id}"), "a *DEFINE_CURVE of the deck", "define it");
             return None;

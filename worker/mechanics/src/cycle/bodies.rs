@@ -2,7 +2,8 @@
 //!
 //! Every worker holds the state of every body. What its blocks and work units push a body with travels as integers at the
 //! end of the exchange, so all move it alike. A node of a body is then given the force that brings it to its place: it is
-//! integrated, watched and voted on like any other, but books nothing, which the body does for it.
+//! integrated, watched and voted on like any other, but books nothing, which the body does for it. Nodes of shells get a
+//! moment too, which turns them as the body turns.
 
 use std::collections::{HashMap, HashSet};
 
@@ -12,7 +13,7 @@ use crate::{
     home::Home,
     lanes::SET,
     nodes,
-    rigid::{self, Body, Booked, PUSH, Push, State},
+    rigid::{self, Body, Booked, ENTRIES, PUSH, Push, State},
     setup::Setup,
     vote::Vote,
 };
@@ -104,8 +105,11 @@ impl Domain {
             held.push = Push::default();
             let state = &held.state;
             for &[room, local, place] in &held.copies {
-                let f = at(&self.rooms[room as usize].block.f, local);
-                push(&mut held.push, f, body, state, place, force);
+                let block = &self.rooms[room as usize].block;
+                push(&mut held.push, at(&block.f, local), body, state, place, force);
+                if let Some(core) = &block.shells {
+                    held.push.add_moment(at(&core.m, local), force, body.length);
+                }
             }
             if let Some(contact) = &self.contact {
                 for &[node, place] in &held.contact {
@@ -115,16 +119,22 @@ impl Domain {
         }
     }
 
-    /// What pushes the bodies here, to travel; numbers that are none where a force is none.
+    /// What pushes the bodies here, to travel: three numbers in each entry, which may have room for more.
     pub(super) fn pack_pushes(&self, out: &mut Vec<f64>) {
-        if self.sends_pushes {
-            self.bodies.iter().for_each(|held| out.extend(held.push.pack()));
+        if !self.sends_pushes {
+            return;
+        }
+        for held in &self.bodies {
+            for limbs in held.push.pack().chunks_exact(3) {
+                out.extend(limbs);
+                out.resize(out.len() + self.stride() - 3, 0.0);
+            }
         }
     }
 
     /// Numbers of totals that are pushes on bodies.
     pub(super) fn n_pushes(&self) -> usize {
-        if self.sends_pushes { PUSH * self.bodies.len() } else { 0 }
+        if self.sends_pushes { ENTRIES as usize * self.stride() * self.bodies.len() } else { 0 }
     }
 
     /// Moves the bodies to `t_{n+1}` by the totals of their pushes (those here, if they do not travel), and gives their
@@ -133,6 +143,7 @@ impl Domain {
         if self.bodies.is_empty() {
             return;
         }
+        let stride = self.stride();
         let (time, loads, quanta) = (self.time, &self.setup.loads, self.quanta);
         let advance = rigid::Advance { dt_previous, dt, time, loads, quanta };
         let of_nodes =
@@ -140,7 +151,10 @@ impl Domain {
         let Guests { x, v, f, mass, .. } = &mut self.guests;
         for (b, (held, body)) in self.bodies.iter_mut().zip(&self.setup.bodies).enumerate() {
             if self.sends_pushes {
-                held.push = Push::unpack(&totals[PUSH * b..]);
+                let first = ENTRIES as usize * b * stride;
+                held.push = Push::unpack(&std::array::from_fn::<f64, PUSH, _>(|i| {
+                    totals[first + i / 3 * stride + i % 3]
+                }));
             }
             held.booked = advance.run(body, &held.push, &mut held.state);
             for &[room, local, place] in &held.copies {
@@ -149,6 +163,11 @@ impl Domain {
                 let (x, v) = (at(&block.x, local), at(&block.v, local));
                 let force = of_nodes.leading(x, v, block.mass[local as usize], target);
                 (0..3).for_each(|a| block.f[a][local as usize] = force[a]);
+                if let Some(core) = &mut block.shells {
+                    let (spin, inertia) = (at(&core.w, local), core.inertia[local as usize]);
+                    let moment = of_nodes.turning(spin, inertia, held.state.spin);
+                    (0..3).for_each(|a| core.m[a][local as usize] = moment[a]);
+                }
             }
             for &[guest, place] in &held.guests {
                 let target = held.state.at(body.places[place as usize]);

@@ -1,7 +1,9 @@
 //! Mass, centre and inertia of rigid bodies, from their elements or as given.
 //!
 //! Integrals over hexahedra are those of their trilinear shape: products of two coordinates and the Jacobian are of degree
-//! four along each axis, for which three Gauss points are exact.
+//! four along each axis, for which three Gauss points are exact. Those over shells are of the bilinear shape of their middle,
+//! three points along each axis, and of their thickness: `h^2 / 12` along the normal. A warped shell has the mass that its
+//! nodes have, half the cross product of its diagonals.
 
 use super::{Body, State, cross, dot, full};
 use crate::{
@@ -10,7 +12,7 @@ use crate::{
     initial::largest_face,
     load::{Curve, Drive},
     material::Material,
-    mesh::Mesh,
+    mesh::{Mesh, Part, quad_area},
     setup::Constraint,
 };
 
@@ -68,9 +70,10 @@ pub fn body(
             }
             let x = corners.map(|n| mesh.positions[n as usize]);
             if inside {
-                own.add_hexahedron(&x.map(|x| minus(x, first)), density);
+                own.add_element(part, &x.map(|x| minus(x, first)), density);
             }
-            let eighth = density * hex8::volume(&x) * 0.125;
+            // A shell has each corner twice.
+            let eighth = density * part.volume(&x) * 0.125;
             for place in places.into_iter().flatten() {
                 nodal[place][usize::from(!inside)] += eighth;
             }
@@ -147,7 +150,7 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
         for e in 0..part.n_elements() {
             if parts.binary_search(&p).is_ok() {
                 let x = part.corners(e).map(|n| mesh.positions[n as usize]);
-                let limit = hex8::volume(&x) / largest_face(&x) / sound;
+                let limit = least_height(part, &x) / sound;
                 if least.is_none_or(|(other, _)| limit < other) {
                     least = Some((limit, element));
                 }
@@ -156,6 +159,19 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
         }
     }
     least
+}
+
+/// Volume over the largest face; of a shell, area over the longest side.
+fn least_height(part: &Part, x: &[[f64; 3]; 8]) -> f64 {
+    if part.section().is_none() {
+        return hex8::volume(x) / largest_face(x);
+    }
+    let corners = [x[0], x[1], x[2], x[3]];
+    let side = |i: usize| {
+        let along = minus(corners[(i + 1) % 4], corners[i]);
+        dot(along, along).sqrt()
+    };
+    quad_area(&corners) / (0..4).map(side).fold(0.0, f64::max)
 }
 
 /// The state of a body that begins at `centre` with this velocity and angular velocity.
@@ -212,6 +228,16 @@ impl Moments {
         }
     }
 
+    fn add_element(&mut self, part: &Part, x: &[[f64; 3]; 8], density: f64) {
+        match part.section() {
+            None => self.add_hexahedron(x, density),
+            Some(section) => {
+                let mass = density * part.volume(x);
+                self.add_shell(&[x[0], x[1], x[2], x[3]], mass, section.thickness);
+            }
+        }
+    }
+
     fn add_hexahedron(&mut self, x: &[[f64; 3]; 8], density: f64) {
         let end = 0.6_f64.sqrt();
         let points = [(-end, 5.0 / 9.0), (0.0, 8.0 / 9.0), (end, 5.0 / 9.0)];
@@ -221,6 +247,35 @@ impl Moments {
                     let (at, jacobian) = mapped(x, [r, s, t]);
                     self.add(density * jacobian * weight_r * weight_s * weight_t, at);
                 }
+            }
+        }
+    }
+
+    /// A shell: its middle is bilinear between the corners, its mass spread evenly over that.
+    fn add_shell(&mut self, x: &[[f64; 3]; 4], mass: f64, thickness: f64) {
+        let end = 0.6_f64.sqrt();
+        let points = [(-end, 5.0 / 9.0), (0.0, 8.0 / 9.0), (end, 5.0 / 9.0)];
+        let mut shares = [([0.0; 3], [0.0; 3], 0.0); 9];
+        for (i, share) in shares.iter_mut().enumerate() {
+            let ((r, weight_r), (s, weight_s)) = (points[i / 3], points[i % 3]);
+            let [low_r, high_r, low_s, high_s] = [1.0 - r, 1.0 + r, 1.0 - s, 1.0 + s].map(|f| 0.5 * f);
+            let at = |a: usize| {
+                low_r * (low_s * x[0][a] + high_s * x[3][a]) + high_r * (low_s * x[1][a] + high_s * x[2][a])
+            };
+            let along_r = |a: usize| low_s * (x[1][a] - x[0][a]) + high_s * (x[2][a] - x[3][a]);
+            let along_s = |a: usize| low_r * (x[3][a] - x[0][a]) + high_r * (x[2][a] - x[1][a]);
+            let normal = cross(std::array::from_fn(along_r), std::array::from_fn(along_s));
+            let size = dot(normal, normal).sqrt();
+            // Where a triangle's corners coincide there is no area and no normal.
+            let normal = if size > 0.0 { normal.map(|c| c / size) } else { [0.0; 3] };
+            *share = (std::array::from_fn(at), normal, weight_r * weight_s * size);
+        }
+        let whole: f64 = shares.iter().map(|(_, _, area)| area).sum();
+        for (at, normal, area) in shares {
+            let mass = mass * area / whole;
+            self.add(mass, at);
+            for (sum, [a, b]) in self.second.iter_mut().zip(PAIRS) {
+                *sum += mass * thickness * thickness / 12.0 * normal[a] * normal[b];
             }
         }
     }

@@ -1,8 +1,9 @@
 use super::*;
 use crate::{
+    element::shell4::Rule,
     load::{Curve, Gravity},
     material::{Eos, Failure, Material, Strength},
-    mesh::{Mesh, Part, Topology},
+    mesh::{Mesh, Part, Section, Topology},
     setup::Constraint,
 };
 
@@ -81,6 +82,73 @@ fn a_frustum_has_the_moments_of_its_integrals() {
     assert!((body.start.centre[2] - 11.0 / 28.0).abs() < 1e-14, "{:?}", body.start.centre);
     // About the axis: integral of s^4 / 6 with s = 2 - z, which is 31/30.
     assert!((body.inertia[2] / (8000.0 * 31.0 / 30.0) - 1.0).abs() < 1e-13, "{:?}", body.inertia);
+}
+
+/// A tube of shells, open at both ends, of `n` by `n` elements along z.
+fn tube(radius: f64, length: f64, thickness: f64, n: u32) -> Mesh {
+    let place = |i: u32| {
+        let angle = f64::from(i % n) / f64::from(n) * std::f64::consts::TAU;
+        [radius * angle.cos(), radius * angle.sin(), length * f64::from(i / n) / f64::from(n)]
+    };
+    let quad = |i: u32| {
+        let (low, next) = (i / n * n, (i + 1) % n);
+        [i, low + next, low + n + next, i + n]
+    };
+    let part = Part {
+        name: "tube".into(),
+        material: 0,
+        topology: Topology::Shells {
+            quads: (0..n * n).map(quad).collect(),
+            section: Section { thickness, rule: Rule::Gauss(2) },
+        },
+        nodes: (0..n * (n + 1)).collect(),
+        element_ids: (1..=n * n).collect(),
+    };
+    let positions: Vec<[f64; 3]> = (0..n * (n + 1)).map(place).collect();
+    Mesh { node_ids: (1..=positions.len() as u32).collect(), positions, parts: vec![part] }
+}
+
+#[test]
+fn a_tube_of_shells_has_its_mass_its_centre_and_its_inertia_with_its_thickness() {
+    let (radius, length, thickness) = (0.4, 1.0, 0.2);
+    let mesh = tube(radius, length, thickness, 120);
+    let given = shape::Given { parts: vec![0], ..shape::Given::default() };
+    let body = made(&mesh, given, &mut vec![[0.0; 3]; mesh.n_nodes()]).expect("a body");
+    let mass = 8000.0 * std::f64::consts::TAU * radius * length * thickness;
+    // Facets are inside the circle: by 1 - pi^2 / 6 n^2 in length, and twice that more in the square of the radius.
+    assert!((body.mass / mass - 1.0).abs() < 2e-4, "{} of {mass}", body.mass);
+    assert!((body.start.centre[2] - 0.5).abs() < 1e-11, "{:?}", body.start.centre);
+    // Of a tube with radii r - h/2 and r + h/2, spread evenly over its middle: r^2 + h^2 / 12 about the axis.
+    let across = thickness * thickness / 12.0;
+    let about_axis = mass * (radius * radius + across);
+    let beside = mass * (0.5 * radius * radius + length * length / 12.0 + 0.5 * across);
+    assert!((body.inertia[2] / about_axis - 1.0).abs() < 6e-4, "{:?}", body.inertia);
+    assert!((body.inertia[0] / beside - 1.0).abs() < 6e-4, "{:?}, expected {beside}", body.inertia);
+    let thin = made(
+        &tube(radius, length, 1e-3, 120),
+        shape::Given { parts: vec![0], ..shape::Given::default() },
+        &mut vec![[0.0; 3]; mesh.n_nodes()],
+    )
+    .expect("a body");
+    // Without its thickness it would be 2 % less.
+    let share = body.inertia[2] / body.mass / (thin.inertia[2] / thin.mass) - 1.0;
+    assert!((share / (across / (radius * radius)) - 1.0).abs() < 1e-3, "{share}");
+}
+
+#[test]
+fn a_moment_is_added_to_the_torque_alone() {
+    let (force, length) = (Quantum::for_reference(1e9, 42), Quantum::for_reference(0.3, 50));
+    let arm = Quantum::for_reference(0.01, 0).value();
+    let m = [3.0, -7.0, 2e15].map(|c| c * force.value() * arm);
+    let (mut once, mut twice) = (Push::default(), Push::default());
+    once.add_moment(m.map(|c| 2.0 * c), force, length);
+    (0..2).for_each(|_| twice.add_moment(m, force, length));
+    assert_eq!(once, twice);
+    assert_eq!(once.force, [0; 3]);
+    for a in 0..3 {
+        let torque = once.torque[a] as f64 * length.value() * force.value();
+        assert_eq!(torque.to_bits(), (2.0 * m[a]).to_bits());
+    }
 }
 
 #[test]

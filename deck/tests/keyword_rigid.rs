@@ -1,0 +1,269 @@
+//! Rigid bodies in keyword decks: which parts are one body, how it begins, what holds and moves it, and what is refused.
+
+use std::fs;
+
+use deck::{
+    Fault, Model, Reading,
+    bundle::{self, Options},
+};
+
+fn lines(faults: &[Fault]) -> String {
+    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+/// Three shells of 10 by 10 in a row, of parts 1 to 3 that share nodes, and a cube of 10 above them, part 4; parts 1 and
+/// 4 are rigid, 2 is elastic, and 3 what `third` says. The cards of the conditions begin at line 41.
+fn deck_of(third: &str, more: &str) -> String {
+    let mut nodes = String::new();
+    for i in 0..4 {
+        nodes += &format!("{},{},0,0\n{},{},10,0\n", 2 * i + 1, 10 * i, 2 * i + 2, 10 * i);
+    }
+    for k in 0..2 {
+        for (n, [x, y]) in [[0, 0], [10, 0], [10, 10], [0, 10]].into_iter().enumerate() {
+            nodes += &format!("{},{x},{y},{}\n", 11 + 4 * k + n, 20 + 10 * k);
+        }
+    }
+    let parts: String = [("root", 1, 1), ("strip", 1, 2), ("tip", 1, 3), ("ram", 2, 1)]
+        .into_iter()
+        .zip(1..)
+        .map(|((name, section, material), id)| format!("{name}\n{id},{section},{material}\n"))
+        .collect();
+    format!(
+        "*KEYWORD\n*CONTROL_TERMINATION\n1e-6\n*PART\n{parts}*SECTION_SHELL\n1,2\n2,2,2,2\n*SECTION_SOLID\n2,1\n\
+         *MAT_RIGID\n1,7.85e-9,2.1e5,0.3\n1,0,5\n*MAT_ELASTIC\n2,7.85e-9,2.1e5,0.3\n{third}\n*NODE\n{nodes}\
+         *ELEMENT_SHELL\n1,1,1,3,4,2\n2,2,3,5,6,4\n3,3,5,7,8,6\n*ELEMENT_SOLID\n1,4,11,12,13,14,15,16,17,18\n{more}*END\n"
+    )
+}
+
+const ELASTIC: &str = "*MAT_ELASTIC\n3,7.85e-9,2.1e5,0.3";
+const RIGID: &str = "*MAT_RIGID\n3,7.85e-9,2.1e5,0.3\n1,7,5";
+
+fn whole(third: &str, more: &str) -> Reading {
+    deck::read_whole(&deck_of(third, more), "a.k").unwrap_or_else(|f| panic!("{}", lines(&f)))
+}
+
+fn good(third: &str, more: &str) -> Model {
+    whole(third, more).model
+}
+
+/// The faults, with the line of each as an offset from the first line of `more`.
+fn faults(third: &str, more: &str) -> Vec<String> {
+    let text = deck_of(third, more);
+    let first = text[..text.len() - more.len() - "*END\n".len()].lines().count() as u32 + 1;
+    let faults = deck::read(&text, "a.k").expect_err("a fault");
+    let told = |f: &Fault| format!("{}: {}", i64::from(f.line) - i64::from(first), f);
+    faults.iter().map(told).collect()
+}
+
+/// The parts of each body.
+fn bodies(model: &Model) -> Vec<Vec<u32>> {
+    model.setup.bodies.iter().map(|body| body.parts.clone()).collect()
+}
+
+#[test]
+fn each_part_of_rigid_material_is_a_body_of_its_own() {
+    let model = good(ELASTIC, "");
+    assert_eq!(bodies(&model), [[0], [3]]);
+    let [root, ram] = &model.setup.bodies[..] else { panic!("two bodies") };
+    // A shell of 10 by 10 by 2, and a quarter of that of the strip on each of two nodes.
+    assert!((root.mass / (7.85e-9 * 200.0 * 1.5) - 1.0).abs() < 1e-12, "{}", root.mass);
+    assert!((root.start.centre[0] - (5.0 + 0.5 * 10.0) / 1.5).abs() < 1e-12, "{:?}", root.start);
+    assert!((ram.mass / 7.85e-6 - 1.0).abs() < 1e-12, "{}", ram.mass);
+    let free = |body: &mechanics::rigid::Body| body.spin.map(|drive| drive.is_none());
+    assert_eq!((free(root), free(ram)), ([true, false, false], [true, false, false]));
+}
+
+#[test]
+fn parts_become_rigid_and_join_a_body_by_card_by_set_and_by_the_nodes_they_share() {
+    // Alone; with the ram; with the strip between, which joins all three shells.
+    assert_eq!(bodies(&good(ELASTIC, "*DEFORMABLE_TO_RIGID\n3\n")), [vec![0], vec![2], vec![3]]);
+    assert_eq!(bodies(&good(ELASTIC, "*DEFORMABLE_TO_RIGID\n3,4,PART\n")), [vec![0], vec![2, 3]]);
+    let reading = whole(ELASTIC, "*SET_PART_LIST\n7\n2,3\n*DEFORMABLE_TO_RIGID\n7,0,PSET\n");
+    assert_eq!(bodies(&reading.model), [vec![0, 1, 2], vec![3]]);
+    let words: Vec<&str> = reading.warnings.iter().map(|w| w.words.as_str()).collect();
+    assert!(words.contains(&"rigid parts 1 and 2 share nodes, such as 3: they are one body"), "{words:?}");
+    assert!(words.contains(&"rigid parts 2 and 3 share nodes, such as 5: they are one body"), "{words:?}");
+    let merged = "*CONSTRAINED_RIGID_BODIES\n4,1\n4,3\n";
+    assert_eq!(bodies(&good(RIGID, merged)), [[0, 2, 3]]);
+    assert_eq!(
+        bodies(&good(RIGID, "*SET_PART_LIST\n7\n3\n*CONSTRAINED_RIGID_BODIES_SET\n1,7\n")),
+        [vec![0, 2], vec![3]]
+    );
+    // The constraints are those of the part that leads; a warning says that another has others.
+    let reading = whole(RIGID, merged);
+    let held = reading.model.setup.bodies[0].velocity.map(|drive| drive.is_some());
+    assert_eq!(held, [false; 3]);
+    assert!(reading.warnings.iter().any(|w| w.words.contains("part 3 is of the body that part 4 leads")));
+    let led = good(RIGID, "*CONSTRAINED_RIGID_BODIES\n3,4\n");
+    assert_eq!(led.setup.bodies[1].velocity.map(|drive| drive.is_some()), [true; 3]);
+    // What the whole problem is made of may be rigid: then its elements give the time step.
+    let all = good(RIGID, "*DEFORMABLE_TO_RIGID\n2\n");
+    let step = all
+        .setup
+        .bodies
+        .iter()
+        .filter_map(|body| body.courant)
+        .map(|(dt, _)| dt)
+        .fold(f64::INFINITY, f64::min);
+    let sound = (2.1e5 / 7.85e-9 * (0.7 / (1.3 * 0.4)) as f64).sqrt();
+    assert!((step / (10.0 / sound) - 1.0).abs() < 1e-9, "{step}");
+}
+
+#[test]
+fn bodies_begin_as_their_cards_or_their_nodes_say() {
+    let spun = "*INITIAL_VELOCITY_GENERATION\n1,2,3.0\n5,0,0,1,0,0\n";
+    let model = good(ELASTIC, spun);
+    let root = &model.setup.bodies[0].start;
+    assert!((root.spin[0] - 3.0).abs() < 1e-12, "{root:?}");
+    assert!((root.velocity[2] - 3.0 * 5.0).abs() < 1e-9, "{root:?}");
+    // Nodes of its shells turn as it does, whatever they were given.
+    assert_eq!(model.spin[0], root.spin);
+    let card = format!("{spun}*INITIAL_VELOCITY_RIGID_BODY\n1,1.0,2.0,3.0,4.0\n4,0,0,-7\n");
+    let model = good(ELASTIC, &card);
+    let [root, ram] = [0, 1].map(|b| &model.setup.bodies[b].start);
+    assert_eq!((root.velocity, root.spin[0]), ([1.0, 2.0, 3.0], 4.0));
+    assert_eq!((ram.velocity, ram.spin), ([0.0, 0.0, -7.0], [0.0; 3]));
+    assert_eq!(model.spin[0], [4.0, 0.0, 0.0]);
+    assert!(model.velocity.iter().filter(|v| **v == [0.0, 0.0, -7.0]).count() == 8);
+    let turned =
+        "*DEFINE_COORDINATE_SYSTEM\n9,0,0,0,0,1,0\n-1,0,0\n*INITIAL_VELOCITY_RIGID_BODY\n4,5.0,0,0,0,0,0,9\n";
+    assert_eq!(good(ELASTIC, turned).setup.bodies[1].start.velocity, [0.0, 5.0, 0.0]);
+}
+
+#[test]
+fn bodies_are_moved_along_and_about_axes_by_curves() {
+    let curve = "*DEFINE_CURVE\n3\n0,0\n1,10\n";
+    let moved = format!(
+        "{curve}*BOUNDARY_PRESCRIBED_MOTION_RIGID\n4,3,0,3,-2.0\n4,5,2,3\n*BOUNDARY_PRESCRIBED_MOTION_RIGID_ID\n8,heading\n1,1,1,3\n"
+    );
+    let model = good(ELASTIC, &moved);
+    let curves = &model.setup.loads.curves;
+    let [root, ram] = &model.setup.bodies[..] else { panic!("two bodies") };
+    let at = |drive: Option<mechanics::load::Drive>, t: f64| drive.map(|drive| drive.at(curves, t));
+    assert_eq!((at(ram.velocity[2], 0.5), at(ram.velocity[0], 0.5)), (Some(-10.0), None));
+    // An angle of 10 t, held about y and z by the material.
+    assert_eq!([0, 1, 2].map(|a| at(ram.spin[a], 0.25)), [Some(10.0), Some(0.0), Some(0.0)]);
+    // An acceleration of 10 t.
+    let v = at(root.velocity[0], 1.0).expect("it is moved");
+    assert!((v - 5.0).abs() < 1e-9, "{v}");
+}
+
+#[test]
+fn parts_of_one_body_do_not_meet_and_others_do() {
+    let single = "*CONTACT_AUTOMATIC_SINGLE_SURFACE\n0\n\n\n";
+    let model = good(RIGID, &format!("*CONSTRAINED_RIGID_BODIES\n1,3\n{single}"));
+    let contact = model.setup.contact.expect("parts meet");
+    let meet = |a: usize, b: usize| contact.interacts[4 * a + b];
+    assert!(!meet(0, 0) && !meet(0, 2) && meet(0, 3) && meet(1, 1) && meet(0, 1));
+    // Where nothing is left there is no contact.
+    let alone = "*SET_PART_LIST\n7\n1,3\n*CONSTRAINED_RIGID_BODIES\n1,3\n*CONTACT_AUTOMATIC_SINGLE_SURFACE\n7,0,2\n\n\n";
+    assert!(good(RIGID, alone).setup.contact.is_none());
+}
+
+#[test]
+fn what_cannot_be_honoured_of_rigid_bodies_is_refused_at_its_line() {
+    let curve = "*DEFINE_CURVE\n3\n0,0\n1,10\n";
+    let second = format!("{curve}*BOUNDARY_PRESCRIBED_MOTION_RIGID\n4,3,0,3\n4,3,0,3\n");
+    let held = format!("{curve}*BOUNDARY_PRESCRIBED_MOTION_RIGID\n4,6,0,3\n");
+    let refused = [
+        (
+            "*DEFORMABLE_TO_RIGID_AUTOMATIC\n1\n",
+            0,
+            "read *DEFORMABLE_TO_RIGID_AUTOMATIC; expected parts that are rigid all along",
+        ),
+        (
+            "*DEFORMABLE_TO_RIGID_INERTIA\n1\n",
+            0,
+            "read *DEFORMABLE_TO_RIGID_INERTIA; expected mass and inertia",
+        ),
+        ("*DEFORMABLE_TO_RIGID\n9\n", 1, "read part 9; expected a part of the deck"),
+        ("*DEFORMABLE_TO_RIGID\n3,0,SHELL\n", 1, "read SHELL; expected PTYPE PART or PSET"),
+        (
+            "*DEFORMABLE_TO_RIGID\n3,2\n",
+            1,
+            "read part 2, which deforms or has no elements; expected parts of rigid",
+        ),
+        ("*CONSTRAINED_RIGID_BODIES\n1,3\n", 1, "read part 3, which deforms or has no elements"),
+        ("*CONSTRAINED_RIGID_BODIES\n,1\n", 1, "read a blank field; expected the part that leads"),
+        ("*INITIAL_VELOCITY_RIGID_BODY\n2,1.0\n", 1, "read part 2; expected a part of a rigid body"),
+        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n2,1,0,3\n", 1, "read part 2; expected a part of a rigid body"),
+        (
+            "*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,4,0,3\n",
+            1,
+            "read 4; expected DOF 1 to 3 along, or 5 to 7 about",
+        ),
+        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,1,4,3\n", 1, "read 4; expected VAD 0, 1 or 2"),
+        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,1,0,3\n", 1, "read curve 3; expected a *DEFINE_CURVE"),
+        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,1,0,3,1.0,0,0.5\n", 1, "read 0.5; expected no death time"),
+        (second.as_str(), 6, "read a second motion of the body of part 4; expected one by axis, which line"),
+        (held.as_str(), 5, "read a motion of part 4 along or about y; expected an axis that CON1 or CON2"),
+        ("*CONSTRAINED_EXTRA_NODES_SET\n1,2\n", 0, "read *CONSTRAINED_EXTRA_NODES_SET; expected a keyword"),
+    ];
+    for (more, line, expected) in refused {
+        let found = faults(ELASTIC, more);
+        let told = found.iter().any(|f| f.starts_with(&format!("{line}: ")) && f.contains(expected));
+        assert!(told, "{more}{found:?}");
+    }
+    // The nodes of a body are not held one by one.
+    let found = faults(ELASTIC, "*BOUNDARY_SPC_NODE\n11,0,1\n");
+    assert!(found[0].contains("with node 11, which a boundary or a wall holds"), "{found:?}");
+}
+
+#[test]
+fn a_converted_pipe_whip_is_the_same_problem() {
+    let folder = format!("{}/examples", env!("CARGO_MANIFEST_DIR"));
+    let name = "pipe-whip.k";
+    let text = fs::read_to_string(format!("{folder}/{name}")).expect("the deck is in the repository");
+    let mut open = |path: &str| fs::read_to_string(format!("{folder}/{path}")).ok();
+    let gathered = bundle::gather(name, text, &Options::default(), &mut open).expect("few files");
+    let Reading { model, warnings } =
+        deck::read_whole(&gathered, name).unwrap_or_else(|f| panic!("{}", lines(&f)));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let names: Vec<&str> = model.mesh.parts.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names, ["hinge", "whip", "clamp left", "clamp right", "target"]);
+    assert_eq!((model.mesh.n_elements(), bodies(&model)), (672, vec![vec![0], vec![2, 3]]));
+    assert_eq!(model.output.contact_forces, [[1, 4]]);
+    let hinge = &model.setup.bodies[0];
+    assert_eq!((hinge.start.velocity, hinge.start.spin), ([0.0; 3], [-0.15, 0.0, 0.0]));
+    let converted =
+        deck::convert(&gathered, name, "pipe-whip.mesh").unwrap_or_else(|f| panic!("{}", lines(&f)));
+    assert!(
+        converted.deck.contains("[[rigid]]\nparts = [\"clamp left\", \"clamp right\"]"),
+        "{}",
+        converted.deck
+    );
+    let mesh = converted.mesh;
+    let mut open = |path: &str| (path == "pipe-whip.mesh").then(|| mesh.clone());
+    let again =
+        bundle::gather("a.toml", converted.deck.clone(), &Options::default(), &mut open).expect("few files");
+    let again = deck::read(&again, "a.toml").unwrap_or_else(|f| panic!("{}", lines(&f)));
+    assert_eq!(again, model);
+}
+
+#[test]
+fn force_transducers_ask_for_the_contact_of_their_parts() {
+    let single = "*CONTACT_AUTOMATIC_SINGLE_SURFACE\n0\n\n\n";
+    let asked = |cards: &str| whole(ELASTIC, &format!("{single}{cards}"));
+    let pairs = |cards: &str| asked(cards).model.output.contact_forces;
+    assert_eq!(pairs("*CONTACT_FORCE_TRANSDUCER_PENALTY\n4,0,3,0\n\n\n"), [[3, 0], [3, 1], [3, 2]]);
+    assert_eq!(pairs("*CONTACT_FORCE_TRANSDUCER_PENALTY_ID\n5,on the ram\n4,2,3,3\n\n\n"), [[3, 1]]);
+    // Each pair once, as the first transducer has it.
+    let both = "*CONTACT_FORCE_TRANSDUCER\n2,4,3,3\n\n\n*CONTACT_FORCE_TRANSDUCER\n4,2,3,3\n\n\n";
+    assert_eq!(pairs(both), [[1, 3]]);
+    // Parts of one body do not meet.
+    let alone = "*CONSTRAINED_RIGID_BODIES\n4,1\n*CONTACT_FORCE_TRANSDUCER\n1,4,3,3\n\n\n";
+    let reading = asked(alone);
+    assert!(reading.model.output.contact_forces.is_empty());
+    assert!(
+        reading
+            .warnings
+            .iter()
+            .any(|w| w.words.starts_with("a force transducer of parts that meet no other"))
+    );
+    // What cannot be written is no reason to refuse a deck.
+    for (card, expected) in [("4,0,1,0", "surfaces of kinds [1, 0] is left out"), ("4,0,3,0,1", "with boxes")]
+    {
+        let reading = asked(&format!("*DEFINE_BOX\n1\n*CONTACT_FORCE_TRANSDUCER\n{card}\n"));
+        assert!(reading.warnings.iter().any(|w| w.words.contains(expected)), "{:?}", reading.warnings);
+    }
+}

@@ -1,0 +1,191 @@
+//! Rigid bodies of shells: the same bits on any crew, what is joined to them feels them as it should, nothing is lost.
+
+use deck::Model;
+use master::{
+    embedded::Fate,
+    event::{Keep, Options},
+    snapshot::file,
+};
+use protocol::message::Route;
+use tests::{
+    bits::Fingerprint,
+    solve::{Crew, Solved, keyword, model, solve, solve_through},
+};
+
+use crate::bits::same_bits;
+
+fn run(model: &Model, crew: Crew) -> Solved {
+    solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The pipe whip from shortly before the pipes meet.
+fn whip() -> Model {
+    let mut model = keyword("pipe-whip");
+    for velocity in &mut model.velocity {
+        velocity.iter_mut().for_each(|v| *v *= 4.0);
+    }
+    let start = &mut model.setup.bodies[0].start;
+    (0..3).for_each(|a| {
+        start.spin[a] *= 4.0;
+        start.momentum[a] *= 4.0;
+    });
+    model.spin.iter_mut().flatten().for_each(|w| *w *= 4.0);
+    model.setup.control.end_cycle = 200;
+    model.output.history_cycles = 1;
+    model
+}
+
+#[test]
+fn a_pipe_between_rigid_shells_has_the_same_bits_on_both_routes() {
+    let model = whip();
+    same_bits(&model);
+    let one = Fingerprint::of(&run(&model, Crew::default()));
+    for workers in [2, 3, 5] {
+        let options = Options { route: Route::Direct, ..Options::default() };
+        let crew = Crew { options, ..Crew::of(workers) };
+        one.assert_equal(&Fingerprint::of(&run(&model, crew)), &format!("{workers} workers, direct"));
+    }
+}
+
+#[test]
+fn a_worker_of_rigid_shells_that_is_lost_changes_no_bit() {
+    let mut model = whip();
+    model.setup.control.end_cycle = 120;
+    let one = Fingerprint::of(&run(&model, Crew::default()));
+    let mut arrivals = 0;
+    let mut count = |number: u64| {
+        arrivals = number;
+        None
+    };
+    solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
+    let mut midway = 0;
+    for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(6).enumerate() {
+        let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
+        let crew = Crew { options, ..Crew::of(3) };
+        let at = arrivals * (seed as u64 + 1) / 10;
+        let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
+        let solved = solve_through(model.clone(), crew, &mut fate).unwrap_or_else(|e| panic!("{seed}: {e}"));
+        one.assert_equal(&Fingerprint::of(&solved), &format!("loss {seed}, {route:?}"));
+        assert_eq!(solved.outcome.losses.len(), 1, "{seed}");
+        midway += usize::from(solved.outcome.losses[0].back_to > 0);
+    }
+    assert!(midway >= 2, "{midway} of 6 went back to a state on the way");
+}
+
+#[test]
+fn a_snapshot_of_rigid_shells_goes_on_from_its_file_with_the_same_bits() {
+    let mut model = whip();
+    model.setup.control.end_cycle = 120;
+    let one = Fingerprint::of(&run(&model, Crew::default()));
+    let options = Options { snapshot_at: Some(70), ..Options::default() };
+    let taken = run(&model, Crew { options, ..Crew::of(2) }).snapshot.expect("a snapshot was asked for");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("snapshot.bolide");
+    file::write(&path, &taken).expect("a disk with room");
+    for workers in [1, 3, 5] {
+        let resume = Some(file::read(&path).expect("a whole file"));
+        let crew = Crew { resume, ..Crew::of(workers) };
+        one.assert_equal(&Fingerprint::of(&run(&model, crew)), &format!("resumed on {workers} workers"));
+    }
+}
+
+/// A strip of shells that bends: 10 by 2 elements with one row more at its root, which `root` holds.
+fn strip(root: &str) -> Model {
+    model(&format!(
+        r#"
+        title = "strip"
+        units = "SI"
+        [control]
+        end_time = 1
+        end_cycle = 400
+        [[material]]
+        name = "steel"
+        density = 7830
+        eos = {{ type = "linear", bulk = 175e9 }}
+        strength = {{ type = "elastic", shear = 80e9 }}
+        [[part]]
+        name = "root"
+        material = "steel"
+        shell = {{ thickness = 2e-3 }}
+        plate = {{ origin = [-0.01, 0, 0], side_i = [0.01, 0, 0], side_j = [0, 0.02, 0], cells = [1, 2] }}
+        [[part]]
+        name = "strip"
+        material = "steel"
+        shell = {{ thickness = 2e-3 }}
+        plate = {{ origin = [0, 0, 0], side_i = [0.1, 0, 0], side_j = [0, 0.02, 0], cells = [10, 2] }}
+        [[join]]
+        parts = ["root", "strip"]
+        [[load]]
+        type = "force"
+        parts = ["strip"]
+        face = "i-max"
+        force = [0, 10, 40]
+        {root}
+        [output]
+        history_cycles = 1
+        [[gauge]]
+        name = "tip"
+        part = "strip"
+        point = [0.1, 0.01, 0]
+        "#
+    ))
+}
+
+#[test]
+fn a_strip_on_a_body_that_is_held_bends_as_one_that_is_clamped() {
+    let held = run(
+        &strip(
+            "[[rigid]]\nparts = [\"root\"]\nvelocity = { x = 0, y = 0, z = 0 }\nspin = { x = 0, y = 0, z = 0 }",
+        ),
+        Crew::default(),
+    );
+    let clamped = run(
+        &strip("[[boundary]]\ntype = \"fixed\"\nparts = [\"root\"]\naxes = \"xyz\"\nrotations = \"xyz\""),
+        Crew::default(),
+    );
+    let tips = held.gauge(0).zip(clamped.gauge(0));
+    let most = clamped.gauge(0).map(|(_, row)| row.x[2].abs()).fold(0.0, f64::max);
+    assert!(most > 1e-4, "the strip hardly bends: {most}");
+    for ((_, a), (_, b)) in tips {
+        for axis in 0..3 {
+            assert!((a.x[axis] - b.x[axis]).abs() < 1e-9 * most, "{:?} {:?}", a.x, b.x);
+        }
+    }
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[test]
+fn a_free_body_takes_the_moments_of_the_shells_on_it() {
+    let pushed = |root: &str| {
+        let mut model = strip(root);
+        model.setup.loads.forces.iter_mut().for_each(|force| force.force = [0.0, 0.0, 40.0]);
+        model
+    };
+    let model = pushed("[[rigid]]\nparts = [\"root\"]");
+    let solved = run(&model, Crew::default());
+    let row = solved.rows.last().expect("rows");
+    // A force that sets in at once costs shells 0.3 % with or without a body among them.
+    let without = run(&pushed(""), Crew::default()).rows.last().expect("rows").error;
+    assert!(row.external > 0.0 && (row.error - without).abs() < 2e-4, "{} and {without}", row.error);
+    // Angular momentum is the moment of the impulse: three forces of 40 N push the tip for the time that was run.
+    let state = &solved.state;
+    let body = &model.setup.bodies[0];
+    let moved = solved.outcome.ledger.bodies[0];
+    let mut total = cross(moved.centre, moved.velocity.map(|v| body.mass * v));
+    (0..3).for_each(|a| total[a] += moved.momentum[a]);
+    for n in (0..state.x.len()).filter(|n| body.nodes.binary_search(&(*n as u32)).is_err()) {
+        let of_node = cross(state.x[n], state.v[n].map(|v| state.mass[n] * v));
+        (0..3).for_each(|a| total[a] += of_node[a] + state.shells.inertia[n] * state.shells.spin[n][a]);
+    }
+    let tips: Vec<usize> =
+        (0..state.x.len()).filter(|n| (model.mesh.positions[*n][0] - 0.1).abs() < 1e-9).collect();
+    assert_eq!(tips.len(), 3);
+    // The arm of the tip about the origin hardly changes in x.
+    let impulse = 3.0 * 40.0 * (state.time - 0.5 * row.dt);
+    assert!((total[1] / (-0.1 * impulse) - 1.0).abs() < 1e-3, "{total:?}, impulse {impulse}");
+    // The strip turns its root by the moments in it: in the sense in which the force turns the tip.
+    assert!(moved.spin[1] < 0.0, "{moved:?}");
+}
