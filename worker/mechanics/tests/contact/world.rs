@@ -78,6 +78,7 @@ pub fn settings(n_parts: usize, gap: f64, slack: f64) -> Settings {
         stiffness: 0.5,
         friction_velocity: 1e-3,
         ignores_initial: false,
+        edges: false,
     }
 }
 
