@@ -101,7 +101,8 @@ impl Edges {
                 continue;
             }
             let inverse_mass = self.inverse_mass(&closest, sides);
-            let voted = force::frequency2(pair.stiffness, 1.0, inverse_mass);
+            let stiffness = pair.stiffness * closest.weight_ahead(self.gap);
+            let voted = force::frequency2(stiffness, 1.0, inverse_mass);
             frequency2 = if voted > frequency2 { voted } else { frequency2 };
             if closest.crosses && closest.distance2 < self.gap * self.gap {
                 self.push(pair, sides, nodes, &closest, motion, vote, by_pair);

@@ -91,6 +91,15 @@ fn step(offset: f64, gap: f64) -> (f64, f64) {
 }
 
 impl Closest {
+    /// The greatest weight that the pair is likely to have when its vote acts, in which time ends move by about half a gap.
+    #[inline(always)]
+    pub(super) fn weight_ahead(&self, gap: f64) -> f64 {
+        let ([s, t], [lu, lv]) = (self.at, self.lengths);
+        let (h1, h2) = (self.area / lv, self.area / lu);
+        let ahead = |offset: f64| step(0.5_f64.mul_add(gap, offset), gap).0;
+        (ahead(s * h1) * ahead((1.0 - s) * h1)) * (ahead(t * h2) * ahead((1.0 - t) * h2))
+    }
+
     /// The weight of a pair that crosses.
     ///
     /// With `m1`, `m2` the unit vectors in the plane of both, across `u` and `v`, and `e` the displacement of the
