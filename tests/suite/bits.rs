@@ -658,7 +658,8 @@ fn edges_that_meet_edges_have_the_same_bits_on_both_routes() {
     let row = alone.rows.last().expect("rows");
     assert!(row.error.abs() < 0.02, "energy error {}", row.error);
     for pair in 0..2 {
-        let met = alone.rows.iter().any(|row| row.contacts.iter().any(|(p, vote)| *p == pair && vote.hits > 0));
+        let met =
+            alone.rows.iter().any(|row| row.contacts.iter().any(|(p, vote)| *p == pair && vote.hits > 0));
         assert!(met, "pair {pair} never met");
     }
     println!("{} eroded, energy error {}", alone.outcome.ledger.eroded_elements, row.error);

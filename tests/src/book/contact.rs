@@ -89,8 +89,8 @@ pub(super) fn eight_bodies_that_hit_each_other_keep_both_momenta(sheet: &mut She
 }
 
 /// A debris box: bodies of one to three elements an edge, of any size, orientation, velocity and spin, all on their way to
-/// the middle; elastic, so that what they lose as bodies stays in them as waves. Edges meet edges.
-fn debris(n_bodies: usize, cycles: u64) -> Model {
+/// the middle at some 25 `pace` m/s; elastic, so that what they lose as bodies stays in them as waves. Edges meet edges.
+fn debris(n_bodies: usize, cycles: u64, pace: f64) -> Model {
     let mut deck = format!(
         "title = \"debris box\"\nunits = \"mm-ms-kg\"\n[control]\nend_cycle = {cycles}\nend_time = 1e3\n\
          [contact]\ngap_fraction = 0.1\nedges = true\n[output]\nperiod = 0.01\n\
@@ -124,9 +124,9 @@ fn debris(n_bodies: usize, cycles: u64) -> Model {
     for (part, centre) in model.mesh.parts.iter().zip(&centres) {
         let way = centre.iter().map(|c| c * c).sum::<f64>().sqrt();
         // Inwards by distance, so that all would be in the middle at one time; and some of their own.
-        let own = [0; 3].map(|_| 15.0 * draws.next());
-        let turn = [0; 3].map(|_| 5.0 * draws.next());
-        let speed = 25.0 + 15.0 * draws.next();
+        let own = [0; 3].map(|_| pace * 15.0 * draws.next());
+        let turn = [0; 3].map(|_| pace * 5.0 * draws.next());
+        let speed = pace * (25.0 + 15.0 * draws.next());
         for &n in &part.nodes {
             let r = [0, 1, 2].map(|a| model.mesh.positions[n as usize][a] - centre[a]);
             let spin = [
@@ -143,8 +143,8 @@ fn debris(n_bodies: usize, cycles: u64) -> Model {
 
 /// Both momenta, energy and penetrations of a debris box. Momenta are those of the nodes at `v(n-1/2)` and `x(n)`: as
 /// `x(n+1) - x(n)` is along `v(n+1/2)`, their sum changes by the moments of forces alone.
-fn box_of(name: &str, n_bodies: usize, cycles: u64, sheet: &mut Sheet) {
-    let solved = run_with_states(debris(n_bodies, cycles));
+fn box_of(name: &str, (n_bodies, cycles, pace): (usize, u64, f64), sheet: &mut Sheet) {
+    let solved = run_with_states(debris(n_bodies, cycles, pace));
     let (state, ledger) = (&solved.state, &solved.outcome.ledger);
     let (before, scales) = momenta(&state.mass, &solved.model.mesh.positions, &solved.model.velocity);
     let (after, _) = momenta(&state.mass, &state.x, &state.v);
@@ -172,11 +172,11 @@ fn box_of(name: &str, n_bodies: usize, cycles: u64, sheet: &mut Sheet) {
 }
 
 pub(super) fn a_debris_box_of_ten_bodies_keeps_both_momenta_and_its_energy(sheet: &mut Sheet) {
-    box_of("debris box of 10", 10, 1500, sheet);
+    box_of("debris box of 10", (10, 2000, 4.0), sheet);
 }
 
 pub(super) fn a_debris_box_of_fifty_bodies_keeps_both_momenta_and_its_energy(sheet: &mut Sheet) {
-    box_of("debris box of 50", 50, 10_000, sheet);
+    box_of("debris box of 50", (50, 10_000, 1.5), sheet);
 }
 
 /// One of the struck plates, to `end` us, with gauges on both sides of the interface at the axis.
@@ -525,9 +525,18 @@ pub(super) fn ridges_that_meet_at_right_angles_do_not_pass_through_each_other(sh
             let solved = ridges(fraction, speed, true).unwrap_or_else(|e| panic!("{named}: {e}"));
             let ledger = &solved.outcome.ledger;
             assert!(ledger.worst_penetration > 0.0, "{named}: they did not meet");
-            through += crossed(&solved.model.mesh, &solved.state.x).len();
+            // Faces of one body are not compared: at 3 km/s the struck ridges fold, and bodies do not meet themselves.
+            let first = solved.model.mesh.element_offsets()[1] as u32;
+            let pairs = crossed(&solved.model.mesh, &solved.state.x);
+            let foreign = pairs.iter().filter(|p| (p.edge_of < first) != (p.element < first)).count();
+            through += foreign;
             inside += intruders(&solved.model.mesh, &solved.state.x).len();
-            println!("{named}: depth {}, energy {:e}", ledger.worst_penetration, worst_energy(&solved));
+            println!(
+                "{named}: depth {}, energy {:e}, {foreign} of {} crossings foreign",
+                ledger.worst_penetration,
+                worst_energy(&solved),
+                pairs.len()
+            );
             deepest = deepest.max(ledger.worst_penetration);
             energy = energy.max(worst_energy(&solved));
         }

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use mechanics::{
     contact::{
-        Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, edges::EDGE, initial_edges, sort,
+        Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, edges::EDGE, initial_edges,
+        sort,
     },
     mesh::Mesh,
 };
@@ -190,7 +191,10 @@ fn forces_are_the_gradient_of_the_energy_and_keep_both_momenta() {
         crossing += 1;
         let (force, moment, size) = sums(&world);
         assert_eq!(force, [0.0; 3], "case {case}");
-        assert!(moment.iter().all(|m| m.abs() <= 1e-12 * (1.0 + 10.0 * size)), "case {case}: {moment:?} of {size}");
+        assert!(
+            moment.iter().all(|m| m.abs() <= 1e-12 * (1.0 + 10.0 * size)),
+            "case {case}: {moment:?} of {size}"
+        );
         let forces: Vec<[f64; 3]> = (0..world.batch.nodes.len()).map(|n| world.force_on(n)).collect();
         let by = 1e-5;
         let mut largest = 0.0_f64;
@@ -215,9 +219,13 @@ fn forces_are_the_gradient_of_the_energy_and_keep_both_momenta() {
 fn a_bounce_of_two_edges_has_the_energy_error_of_the_table() {
     // BOOK 4.3: omega dt, greatest error of the kinetic energy, greatest depth in v / omega; 20 % beyond.
     let mut random = Random(5);
-    for (omega_dt, error, depth) in
-        [(0.05, 3.6e-4, 1.0), (0.1, 2.4e-3, 1.001), (0.2, 8.8e-3, 1.005), (0.4, 2.6e-2, 1.02), (0.8, 0.111, 1.088)]
-    {
+    for (omega_dt, error, depth) in [
+        (0.05, 3.6e-4, 1.0),
+        (0.1, 2.4e-3, 1.001),
+        (0.2, 8.8e-3, 1.005),
+        (0.4, 2.6e-2, 1.02),
+        (0.8, 0.111, 1.088),
+    ] {
         let gap = 0.3;
         let mut worst = [0.0_f64; 2];
         for _ in 0..40 {

@@ -2,7 +2,8 @@
 
 use mechanics::{
     contact::{
-        Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, initial_edges, initial_pairs, sort,
+        Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, initial_edges, initial_pairs,
+        sort,
     },
     exact::Quantum,
     material::{Eos, Failure, Material, Strength},
