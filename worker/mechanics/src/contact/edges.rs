@@ -1,7 +1,8 @@
 //! Edges against edges, where the deck asks for it: what crosses without a node in any zone.
 //!
-//! Only edges that stick out can cross so: those at which two faces meet at a convex angle, and the rims of shells
-//! ([`features`]). The master pairs them up with the sort ([`mod@sort`]); a worker computes the pairs of its units each
+//! Of two bodies that cross so, one does it with an edge that sticks out: one at which two faces meet at a convex angle, or
+//! the rim of a shell ([`features`]). The other edge may have been flat at the start, as a mesh line of a face into which the
+//! first is pressed; only hollow ones are left out. The master pairs them up with the sort ([`mod@sort`]); a worker computes the pairs of its units each
 //! cycle ([`cycle`]) from the closest points of the two lines and a weight that hands over to the nodes at the ends
 //! ([`zone`]).
 //!
@@ -32,6 +33,8 @@ pub struct Edge {
     pub part: u32,
     /// Two of its faces; the second is `u32::MAX` at a rim.
     pub faces: [u32; 2],
+    /// Whether it sticks out: of two edges that meet, one at least does.
+    pub sharp: bool,
 }
 
 /// One edge of a batch.

@@ -1,4 +1,4 @@
-//! Which edges stick out: a rule on the initial geometry and on which elements are alive, so that it is static data like
+//! Which edges there are and which stick out: a rule on the initial geometry and on which elements are alive, so that it is static data like
 //! stiffness, and the same whenever the surface is collected.
 
 use super::{
@@ -11,8 +11,19 @@ use crate::mesh::Mesh;
 /// flatter one unseen is `L tan(7.5 degrees) / 2` deep at most, 7 % of an element, when the zones of nodes see it.
 const SHARP: f64 = 0.965_925_826_289_068_3;
 
-/// The edges of a surface that can meet others, by their nodes: where two faces of solids meet at a convex angle, two shells
-/// at any, rims, and where more than two faces meet. Angles are those of the initial geometry.
+/// How the faces at an edge meet.
+#[derive(PartialEq)]
+enum Shape {
+    /// At a convex angle; shells at any; more or fewer than two faces.
+    Sharp,
+    /// In a plane, or nearly.
+    Flat,
+    /// At a hollow angle: nothing gets there before it meets the faces.
+    Hollow,
+}
+
+/// The edges of a surface that can meet others, by their nodes: all but hollow ones. Angles are those of the initial
+/// geometry.
 pub(in super::super) fn features(surface: &Surface, mesh: &Mesh) -> Vec<Edge> {
     let mut sides: Vec<([u32; 2], u32)> = Vec::with_capacity(4 * surface.faces.len());
     for (f, face) in (0..).zip(&surface.faces) {
@@ -28,21 +39,22 @@ pub(in super::super) fn features(surface: &Surface, mesh: &Mesh) -> Vec<Edge> {
     let mut found = Vec::new();
     for same in sides.chunk_by(|a, b| a.0 == b.0) {
         let faces = [same[0].1, same.get(1).map_or(u32::MAX, |side| side.1)];
-        let sticks_out = match same {
+        let shape = match same {
             [(nodes, a), (_, b)] => {
                 let [a, b] = [a, b].map(|&f| &surface.faces[f as usize]);
-                let shells = [a, b].map(|face| Face::is_shell(&face.corners));
-                match shells {
-                    [true, true] => is_sharp(a, b, &at),
-                    [false, false] => is_sharp(a, b, &at) && is_convex(a, b, nodes[0], &at),
-                    _ => true,
+                match [a, b].map(|face| Face::is_shell(&face.corners)) {
+                    [true, true] if is_sharp(a, b, &at) => Shape::Sharp,
+                    [true, true] => Shape::Flat,
+                    [false, false] if !is_sharp(a, b, &at) => Shape::Flat,
+                    [false, false] if !is_convex(a, b, nodes[0], &at) => Shape::Hollow,
+                    _ => Shape::Sharp,
                 }
             }
-            _ => true,
+            _ => Shape::Sharp,
         };
-        if sticks_out {
+        if shape != Shape::Hollow {
             let part = same.iter().map(|side| surface.faces[side.1 as usize].part).min().unwrap_or(0);
-            found.push(Edge { nodes: same[0].0, part, faces });
+            found.push(Edge { nodes: same[0].0, part, faces, sharp: shape == Shape::Sharp });
         }
     }
     found

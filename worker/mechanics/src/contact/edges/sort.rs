@@ -1,13 +1,13 @@
 //! Which edges may meet before the next sort.
 //!
-//! A pair is kept if the parts interact, if the edges share no node and are not of one element, if the pair was not
+//! A pair is kept if one of the edges sticks out, if the parts interact, if the edges share no node and are not of one element, if the pair was not
 //! excluded at the start, and if the boxes of the two edges come within the reach: then it is on the list for as long as
 //! the lists of nodes and faces are good, by the same rule on displacements. Edges are put into cubes that their boxes
 //! touch; a pair belongs to the one cube that holds the lowest corner of what both boxes share.
 
 use super::{
     super::{Settings, search::Exclusions, surface::Surface, work_unit::WorkUnit},
-    zone,
+    Edge, zone,
 };
 
 /// A pair at exactly one gap is outside, rounding or not: as for nodes.
@@ -78,29 +78,34 @@ fn for_each_near(
     let n_parts = settings.n_parts();
     let meets: Vec<bool> =
         (0..n_parts).map(|p| settings.interacts[p * n_parts..][..n_parts].contains(&true)).collect();
-    let edges: Vec<u32> = (0..)
-        .zip(&surface.edges)
-        .filter(|(_, edge)| meets[edge.part as usize])
-        .map(|(index, _)| index)
-        .collect();
     // Half the reach on either side.
-    let bounds: Vec<Bounds> = edges
+    let bounds: Vec<Bounds> = surface
+        .edges
         .iter()
-        .map(|&edge| {
-            let [p, q] = surface.edges[edge as usize].nodes.map(|n| x[n as usize]);
+        .map(|edge| {
+            let [p, q] = edge.nodes.map(|n| x[n as usize]);
             [[0, 1, 2].map(|a| p[a].min(q[a]) - 0.5 * reach), [0, 1, 2].map(|a| p[a].max(q[a]) + 0.5 * reach)]
         })
         .collect();
-    let Some(grid) = Grid::new(&bounds, reach) else { return };
-    // Each edge in every cube that its box touches.
-    let mut held: Vec<([i32; 3], u32)> = Vec::with_capacity(4 * edges.len());
-    for (i, [low, high]) in (0..).zip(&bounds) {
-        let (low, high) = (grid.cube(*low), grid.cube(*high));
-        for k in low[2]..=high[2] {
-            for j in low[1]..=high[1] {
-                held.extend((low[0]..=high[0]).map(|at| ([at, j, k], i)));
+    let of = |sharp: bool| {
+        let wanted = move |edge: &Edge| edge.sharp == sharp;
+        (0..).zip(&surface.edges).filter(move |(_, edge)| wanted(edge)).map(|(index, _)| index)
+    };
+    let some =
+        |sharp: bool| of(sharp).filter(|&edge: &u32| meets[surface.edges[edge as usize].part as usize]);
+    let Some(grid) = Grid::new(some(true).map(|edge| &bounds[edge as usize]), reach) else { return };
+    // Each edge in every cube that its box touches; flat ones where there are sharp ones.
+    let mut held: Vec<([i32; 3], u32)> = Vec::new();
+    some(true).for_each(|edge| grid.for_each_cube(&bounds[edge as usize], |cube| held.push((cube, edge))));
+    held.sort_unstable();
+    let mut cubes: Vec<[i32; 3]> = held.iter().map(|(cube, _)| *cube).collect();
+    cubes.dedup();
+    for edge in some(false) {
+        grid.for_each_cube(&bounds[edge as usize], |cube| {
+            if cubes.binary_search(&cube).is_ok() {
+                held.push((cube, edge));
             }
-        }
+        });
     }
     held.sort_unstable();
     for same in held.chunk_by(|a, b| a.0 == b.0) {
@@ -110,7 +115,7 @@ fn for_each_near(
             for &(_, j) in &same[n + 1..] {
                 let second = &bounds[j as usize];
                 let apart = (0..3).any(|a| first[0][a] > second[1][a] || second[0][a] > first[1][a]);
-                let pair = [edges[i as usize], edges[j as usize]];
+                let pair = [i, j];
                 if !apart
                     && grid.cube([0, 1, 2].map(|a| first[0][a].max(second[0][a]))) == cube
                     && may_meet(surface, settings, pair)
@@ -122,10 +127,13 @@ fn for_each_near(
     }
 }
 
-/// Whether two edges interact by their parts, share no node, and are not of one element.
+/// Whether one of two edges sticks out, they interact by their parts, share no node, and are not of one element.
 fn may_meet(surface: &Surface, settings: &Settings, pair: [u32; 2]) -> bool {
     let [a, b] = pair.map(|edge| &surface.edges[edge as usize]);
-    if !settings.permits(a.part, b.part) || a.nodes.iter().any(|n| b.nodes.contains(n)) {
+    if !(a.sharp || b.sharp)
+        || !settings.permits(a.part, b.part)
+        || a.nodes.iter().any(|n| b.nodes.contains(n))
+    {
         return false;
     }
     let has = |faces: [u32; 2], nodes: [u32; 2]| {
@@ -143,9 +151,9 @@ struct Grid {
 
 impl Grid {
     /// Cubes about as large as an edge, so that few hold many edges and few edges touch many; none without edges.
-    fn new(bounds: &[Bounds], reach: f64) -> Option<Self> {
+    fn new<'a>(bounds: impl Iterator<Item = &'a Bounds>, reach: f64) -> Option<Self> {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        let (mut sum, mut longest) = (0.0, 0.0_f64);
+        let (mut sum, mut longest, mut n) = (0.0, 0.0_f64, 0_u32);
         for [from, to] in bounds {
             let mut length = 0.0_f64;
             for a in 0..3 {
@@ -154,15 +162,26 @@ impl Grid {
                 length = length.max(to[a] - from[a]);
             }
             sum += length;
+            n += 1;
             longest = longest.max(length);
         }
-        if bounds.is_empty() {
+        if n == 0 {
             return None;
         }
-        let mean = sum / bounds.len() as f64;
+        let mean = sum / f64::from(n);
         let side = (0..3).map(|a| (high[a] - low[a]) / MAX_CUBE).fold(2.0 * reach, f64::max);
         let side = side.max(mean).max(longest / 8.0);
         Some(Self { origin: low, inverse_side: if side > 0.0 { 1.0 / side } else { 1.0 } })
+    }
+
+    /// Calls `visit` with every cube that a box touches.
+    fn for_each_cube(&self, [low, high]: &Bounds, mut visit: impl FnMut([i32; 3])) {
+        let (low, high) = (self.cube(*low), self.cube(*high));
+        for k in low[2]..=high[2] {
+            for j in low[1]..=high[1] {
+                (low[0]..=high[0]).for_each(|i| visit([i, j, k]));
+            }
+        }
     }
 
     /// Cube of a point, monotonic in each coordinate.
