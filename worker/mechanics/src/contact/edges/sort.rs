@@ -93,7 +93,11 @@ fn for_each_near(
     };
     let some =
         |sharp: bool| of(sharp).filter(|&edge: &u32| meets[surface.edges[edge as usize].part as usize]);
-    let Some(grid) = Grid::new(some(true).map(|edge| &bounds[edge as usize]), reach) else { return };
+    if some(true).next().is_none() {
+        return;
+    }
+    let all = some(true).chain(some(false)).map(|edge| &bounds[edge as usize]);
+    let Some(grid) = Grid::new(all, reach) else { return };
     // Each edge in every cube that its box touches; flat ones where there are sharp ones.
     let mut held: Vec<([i32; 3], u32)> = Vec::new();
     some(true).for_each(|edge| grid.for_each_cube(&bounds[edge as usize], |cube| held.push((cube, edge))));
@@ -113,6 +117,9 @@ fn for_each_near(
         for (n, &(_, i)) in same.iter().enumerate() {
             let first = &bounds[i as usize];
             for &(_, j) in &same[n + 1..] {
+                if !surface.edges[i as usize].sharp && !surface.edges[j as usize].sharp {
+                    continue;
+                }
                 let second = &bounds[j as usize];
                 let apart = (0..3).any(|a| first[0][a] > second[1][a] || second[0][a] > first[1][a]);
                 let pair = [i, j];
@@ -127,13 +134,10 @@ fn for_each_near(
     }
 }
 
-/// Whether one of two edges sticks out, they interact by their parts, share no node, and are not of one element.
+/// Whether two edges interact by their parts, share no node, and are not of one element.
 fn may_meet(surface: &Surface, settings: &Settings, pair: [u32; 2]) -> bool {
     let [a, b] = pair.map(|edge| &surface.edges[edge as usize]);
-    if !(a.sharp || b.sharp)
-        || !settings.permits(a.part, b.part)
-        || a.nodes.iter().any(|n| b.nodes.contains(n))
-    {
+    if !settings.permits(a.part, b.part) || a.nodes.iter().any(|n| b.nodes.contains(n)) {
         return false;
     }
     let has = |faces: [u32; 2], nodes: [u32; 2]| {
