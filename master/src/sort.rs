@@ -137,7 +137,7 @@ impl Sorter {
         let n = self.speeds.len();
         let mut mine: Vec<Vec<&contact::WorkUnit>> = vec![Vec::new(); n];
         let mut interactions = vec![0; n];
-        for (unit, &worker) in units.iter().zip(&worker_of).filter(|(unit, _)| !unit.faces.is_empty()) {
+        for (unit, &worker) in units.iter().zip(&worker_of).filter(|(unit, _)| !unit.is_empty()) {
             mine[worker].push(unit);
             interactions[worker] += unit.interactions;
         }

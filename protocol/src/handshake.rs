@@ -15,7 +15,7 @@ use std::fmt;
 /// 3: the work of loads by part in votes, elements that erode; proof of arithmetic in [`Hello`], samples of cycles.
 /// 4: what is watched in assignments, and in votes what was seen.
 /// 5: states of rigid bodies and energies by pair of parts in votes; rigid bodies in assignments.
-/// 6: criteria of erosion by stress, volume and principal strains in assignments.
+/// 6: criteria of erosion by stress, volume and principal strains in assignments; pairs of edges in plans.
 pub const VERSION: u16 = 6;
 
 /// Most characters of a host's name.

@@ -70,12 +70,16 @@ macro_rules! each_case_of_the_book {
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
             rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;
             contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
+            contact: a_debris_box_of_ten_bodies_keeps_both_momenta_and_its_energy quick;
+            contact: a_debris_box_of_fifty_bodies_keeps_both_momenta_and_its_energy long;
             contact: struck_plates_conserve_keep_apart_and_move_together quick;
             contact: strengthless_plates_reach_the_impedance_match_on_the_axis quick;
             contact: no_node_of_a_body_thrown_at_another_ends_inside_it quick;
             contact: bodies_that_close_in_from_both_sides_are_sorted_in_time quick;
             contact: meshes_of_three_and_five_faces_press_on_each_other_evenly quick;
             contact: a_cube_stacked_at_45_degrees_is_stopped_by_the_zones_of_edges_if_the_gap_reaches_them quick;
+            contact: a_cube_stacked_at_45_degrees_is_stopped_by_its_edges quick;
+            contact: ridges_that_meet_at_right_angles_do_not_pass_through_each_other quick;
         }
     };
 }

@@ -1,12 +1,12 @@
-//! Looks for nodes inside elements of foreign parts, and for shells that pass through each other; knows nothing of the
-//! contact code.
+//! Looks for nodes inside elements of foreign parts, and for shells and outer faces that pass through each other; knows
+//! nothing of the contact code.
 //!
 //! A hexahedron is taken as 24 tetrahedra: its centre, the mid-point of a face, and an edge of that face. Its border is
 //! then the surface that contact sees, where a face that is not flat is split about its mid-point.
 
 use std::collections::HashMap;
 
-use mechanics::mesh::{FACES, Mesh};
+use mechanics::mesh::{FACES, Mesh, Part};
 
 /// A node inside an element of a part that it does not belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,16 +114,41 @@ pub struct Pierced {
 /// index. A shell is four triangles about the mean of its corners; two of them cross where an edge of one, outer or inner,
 /// goes through a triangle of the other.
 pub fn pierced(mesh: &Mesh, x: &[[f64; 3]]) -> Vec<Pierced> {
-    let mut shells: Vec<(u32, [u32; 4])> = Vec::new();
-    for (part, first) in mesh.parts.iter().zip(mesh.element_offsets()) {
-        if part.section().is_some() {
-            let corners = |e: usize| {
-                let [a, b, c, d, ..] = part.corners(e);
-                ((first + e) as u32, [a, b, c, d])
-            };
-            shells.extend((0..part.n_elements()).map(corners));
+    among(&faces_of(mesh, &|part| part.section().is_some()), x)
+}
+
+/// The same of the outer faces of all parts, solids and shells.
+pub fn crossed(mesh: &Mesh, x: &[[f64; 3]]) -> Vec<Pierced> {
+    among(&faces_of(mesh, &|_| true), x)
+}
+
+/// Element and corners of the outer faces of some parts: of a shell its one face, of solids those that one element of the
+/// part has.
+fn faces_of(mesh: &Mesh, wanted: &dyn Fn(&Part) -> bool) -> Vec<(u32, [u32; 4])> {
+    let mut faces: Vec<(u32, [u32; 4])> = Vec::new();
+    for (part, first) in mesh.parts.iter().zip(mesh.element_offsets()).filter(|(part, _)| wanted(part)) {
+        let mut outer: HashMap<[u32; 4], Option<(u32, [u32; 4])>> = HashMap::new();
+        for e in 0..part.n_elements() {
+            let (corners, element) = (part.corners(e), (first + e) as u32);
+            if part.section().is_some() {
+                let [a, b, c, d, ..] = corners;
+                faces.push((element, [a, b, c, d]));
+                continue;
+            }
+            for nodes in FACES.map(|face| face.map(|c| corners[c])) {
+                let mut key = nodes;
+                key.sort_unstable();
+                outer.entry(key).and_modify(|seen| *seen = None).or_insert(Some((element, nodes)));
+            }
         }
+        faces.extend(outer.into_values().flatten());
     }
+    faces.sort_unstable();
+    faces
+}
+
+/// Pairs of faces that share no node and pass through each other.
+fn among(shells: &[(u32, [u32; 4])], x: &[[f64; 3]]) -> Vec<Pierced> {
     let points: Vec<[[f64; 3]; 5]> = shells
         .iter()
         .map(|(_, nodes)| {
@@ -247,6 +272,36 @@ mod tests {
         let found = intruders(&mesh, &x);
         assert!(found.contains(&Intruder { node: corner, element: 27 + 7 }), "{found:?}");
     }
+
+    #[test]
+    fn planted_bars_that_cross_without_a_node_inside_either_are_found() {
+        let deck = r#"
+            title = "two bars"
+            units = "SI"
+            [control]
+            end_cycle = 1
+            [[part]]
+            name = "along x"
+            material = "CU_OFHC"
+            box = { origin = [-5, -1, -1], size = [10, 2, 2], cells = [2, 1, 1] }
+            [[part]]
+            name = "along y"
+            material = "CU_OFHC"
+            box = { origin = [-0.9, -5, 1.1], size = [2, 10, 2], cells = [1, 2, 1] }
+        "#;
+        let mesh = model(deck).mesh;
+        assert_eq!(crossed(&mesh, &mesh.positions), []);
+        let mut x = mesh.positions.clone();
+        for n in &mesh.parts[1].nodes {
+            x[*n as usize][2] -= 0.3;
+        }
+        assert_eq!(intruders(&mesh, &x), [], "no node is inside the other bar");
+        let found = crossed(&mesh, &x);
+        assert!(found.iter().any(|p| p.edge_of < 2 && p.element >= 2), "{found:?}");
+        assert!(found.iter().any(|p| p.edge_of >= 2 && p.element < 2), "{found:?}");
+        assert_eq!(pierced(&mesh, &x), [], "there are no shells");
+    }
+
     #[test]
     fn a_planted_crossing_of_shells_is_found_and_sheets_apart_have_none() {
         let deck = r#"

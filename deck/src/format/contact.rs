@@ -103,6 +103,7 @@ pub(crate) fn read(
         Some(value) => value.number(Range::Positive),
         None => Some(default_friction_velocity(assembly, materials, conditions)),
     };
+    let edges = table.get("edges").and_then(|v| v.boolean()).unwrap_or(false);
     let initial = table.get("initial_penetration").and_then(|v| v.one_of(&["refuse", "ignore"]));
     let at = table.at;
     if n > 0 && !interacts.contains(&true) {
@@ -122,6 +123,7 @@ pub(crate) fn read(
         stiffness,
         friction_velocity: friction_velocity?,
         ignores_initial: initial == Some(1),
+        edges,
     };
     Some(ContactDraft { settings, faces })
 }

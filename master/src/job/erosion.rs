@@ -166,6 +166,9 @@ pub(super) fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Arc<Surfac
     if let Some(settings) = &setup.contact {
         let speed = initial::closing_speeds(&model.mesh, settings, &model.velocity);
         surface.stiffen(&model.mesh, &setup.materials, settings, &speed);
+        if settings.edges {
+            surface.find_edges(&model.mesh);
+        }
     }
     Arc::new(surface)
 }

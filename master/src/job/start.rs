@@ -8,7 +8,7 @@ use std::{
 use deck::model::Model;
 use mechanics::{
     block::Piece,
-    contact::{Census, Exclusions, Surface, initial_pairs},
+    contact::{Census, Exclusions, Surface, initial_edges, initial_pairs},
     cycle::Subdomain,
     initial,
     mesh::Mesh,
@@ -128,7 +128,12 @@ impl Job {
                 refuse_overlap(&model.mesh, &surface, &inside, settings.gap)?;
                 Exclusions::new(&surface, &inside)
             };
-            let exclusions = Arc::new(exclusions);
+            let crossing =
+                if settings.edges { initial_edges(&surface, &at_start, settings) } else { Vec::new() };
+            if !settings.ignores_initial {
+                refuse_crossing(&model.mesh, &surface, &crossing, settings.gap)?;
+            }
+            let exclusions = Arc::new(exclusions.with_edges(&surface, &crossing));
             Ok::<_, String>(Touching { surface, exclusions })
         });
         let first_cycle = base.state.cycle;
@@ -475,4 +480,28 @@ fn refuse_overlap(
             mesh.parts[surface.faces[face as usize].part as usize].name,
         )),
     }
+}
+
+/// Refuses edges of two parts that start nearer to each other than the gap.
+fn refuse_crossing(
+    mesh: &Mesh,
+    surface: &Surface,
+    crossing: &[([u32; 2], f64)],
+    gap: f64,
+) -> Result<(), String> {
+    let edges = |pair: [u32; 2]| pair.map(|edge| &surface.edges[edge as usize]);
+    let foreign = crossing.iter().map(|&(pair, distance)| (edges(pair), distance));
+    let Some(([a, b], distance)) = foreign.into_iter().find(|([a, b], _)| a.part != b.part) else {
+        return Ok(());
+    };
+    let id = |n: u32| mesh.node_ids[surface.nodes[n as usize] as usize];
+    Err(format!(
+        "the edge from node {} to {} of part `{}` starts {distance:e} from the edge from node {} to {} of part `{}`, inside the contact gap {gap:e}; move the parts apart by at least the gap, join them, or write contact.initial_penetration = \"ignore\"",
+        id(a.nodes[0]),
+        id(a.nodes[1]),
+        mesh.parts[a.part as usize].name,
+        id(b.nodes[0]),
+        id(b.nodes[1]),
+        mesh.parts[b.part as usize].name,
+    ))
 }

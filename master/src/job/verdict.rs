@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use mechanics::{contact::reach, vote::Vote};
+use mechanics::{
+    contact::{edges::EDGE, reach},
+    vote::Vote,
+};
 
 use super::{Job, epoch::Step};
 use crate::event::{Action, Limit};
@@ -32,12 +35,7 @@ impl Job {
         self.failure = if let Some((element, volume)) = vote.fault {
             Some(self.element_fault(element, volume, cycle))
         } else if vote.worst_depth >= DEEPEST && !self.model.setup.erosion.is_on() {
-            let (node, face) = vote.worst_pair;
-            Some(format!(
-                "node {} is {:.2} gaps into the contact zone of surface face {face} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap",
-                self.model.mesh.node_ids.get(node as usize).copied().unwrap_or(node),
-                vote.worst_depth
-            ))
+            Some(self.contact_fault(vote, cycle))
         } else if self.ledger.worst_courant > 1.0 {
             Some(format!(
                 "cycle {cycle}: time step {dt:e} above the Courant limit {:e} of element {}; lower control.safety_factor",
@@ -55,6 +53,22 @@ impl Job {
         if self.failure.is_some() && !written {
             self.row(actions);
         }
+    }
+
+    /// What a contact that is too deep says.
+    fn contact_fault(&self, vote: &Vote, cycle: u64) -> String {
+        let (node, other) = vote.worst_pair;
+        let id = |node: u32| self.model.mesh.node_ids.get(node as usize).copied().unwrap_or(node);
+        let (what, whose) = if other & EDGE == 0 {
+            ("node", format!("surface face {other}"))
+        } else {
+            ("an edge at node", format!("an edge at node {}", id(other & !EDGE)))
+        };
+        format!(
+            "{what} {} is {:.2} gaps into the contact zone of {whose} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap",
+            id(node),
+            vote.worst_depth
+        )
     }
 
     /// Whether more energy appeared or vanished than the deck allows.

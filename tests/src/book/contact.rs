@@ -2,7 +2,7 @@
 
 use crate::{
     case::Sheet,
-    checker::intruders,
+    checker::{crossed, intruders},
     solve::{Crew, Solved, example, mean, model, run, run_with_states, solve},
 };
 use deck::model::{Gauge, Model};
@@ -86,6 +86,103 @@ pub(super) fn eight_bodies_that_hit_each_other_keep_both_momenta(sheet: &mut She
     sheet.add("debris: penetration (gaps)", ledger.worst_penetration);
     sheet.add("debris: nodes in foreign bodies", intruders(&solved.model.mesh, &state.x).len() as f64);
     assert!(ledger.worst_penetration > 0.0, "nothing met");
+}
+
+/// A debris box: bodies of one to three elements an edge, of any size, orientation, velocity and spin, all on their way to
+/// the middle at some 25 `pace` m/s; elastic, so that what they lose as bodies stays in them as waves. Edges meet edges.
+fn debris(n_bodies: usize, cycles: u64, pace: f64) -> Model {
+    let mut deck = format!(
+        "title = \"debris box\"\nunits = \"mm-ms-kg\"\n[control]\nend_cycle = {cycles}\nend_time = 1e3\n\
+         [contact]\ngap_fraction = 0.1\nedges = true\n[output]\nperiod = 0.01\n\
+         [[material]]\nname = \"elastic\"\ndensity = 7.85e-6\neos = {{ type = \"linear\", bulk = 160 }}\n\
+         strength = {{ type = \"elastic\", shear = 80 }}\n"
+    );
+    let mut draws = Draws(11);
+    (0..20).for_each(|_| {
+        draws.next();
+    });
+    let mut centres: Vec<[f64; 3]> = Vec::new();
+    // As many cells of a lattice as there are bodies, the nearest to the middle first; 9 mm hold the longest diagonal.
+    let mut cells: Vec<[i32; 3]> = (0..343).map(|i| [i % 7 - 3, i / 7 % 7 - 3, i / 49 - 3]).collect();
+    cells.sort_by_key(|c| c.iter().map(|i| i * i).sum::<i32>());
+    for (body, cell) in cells.into_iter().take(n_bodies).enumerate() {
+        let counts = [0; 3].map(|_| 2 + (1.4999 * draws.next()).round() as i32);
+        let counts = counts.map(|n| n.clamp(1, 3));
+        let size = counts.map(|n| f64::from(n) * (1.4 + 0.2 * draws.next()));
+        let axis = [draws.next(), draws.next(), draws.next()];
+        let turned = 180.0 * draws.next();
+        let centre = cell.map(|i| 9.0 * f64::from(i));
+        centres.push(centre);
+        let origin = size.map(|s| -0.5 * s);
+        deck += &format!(
+            "[[part]]\nname = \"body {body}\"\nmaterial = \"elastic\"\n\
+             box = {{ origin = {origin:?}, size = {size:?}, cells = {counts:?} }}\n\
+             rotate = {{ axis = {axis:?}, degrees = {turned:?} }}\ntranslate = {centre:?}\n"
+        );
+    }
+    let mut model = model(&deck);
+    for (part, centre) in model.mesh.parts.iter().zip(&centres) {
+        let way = centre.iter().map(|c| c * c).sum::<f64>().sqrt();
+        // Inwards by distance, so that all would be in the middle at one time; and some of their own.
+        let own = [0; 3].map(|_| pace * 15.0 * draws.next());
+        let turn = [0; 3].map(|_| pace * 5.0 * draws.next());
+        let speed = pace * (25.0 + 15.0 * draws.next());
+        for &n in &part.nodes {
+            let r = [0, 1, 2].map(|a| model.mesh.positions[n as usize][a] - centre[a]);
+            let spin = [
+                turn[1] * r[2] - turn[2] * r[1],
+                turn[2] * r[0] - turn[0] * r[2],
+                turn[0] * r[1] - turn[1] * r[0],
+            ];
+            let inwards = if way > 0.0 { speed / way } else { 0.0 };
+            model.velocity[n as usize] = [0, 1, 2].map(|a| spin[a] + own[a] - inwards * centre[a]);
+        }
+    }
+    model
+}
+
+/// Both momenta, energy and penetrations of a debris box. Momenta are those of the nodes at `v(n-1/2)` and `x(n)`: as
+/// `x(n+1) - x(n)` is along `v(n+1/2)`, their sum changes by the moments of forces alone.
+fn box_of(name: &str, (n_bodies, cycles, pace): (usize, u64, f64), sheet: &mut Sheet) {
+    let solved = run_with_states(debris(n_bodies, cycles, pace));
+    let (state, ledger) = (&solved.state, &solved.outcome.ledger);
+    let (before, scales) = momenta(&state.mass, &solved.model.mesh.positions, &solved.model.velocity);
+    let (after, _) = momenta(&state.mass, &state.x, &state.v);
+    let change = |from: usize| (from..from + 3).map(|a| (after[a] - before[a]).powi(2)).sum::<f64>().sqrt();
+    println!(
+        "{} cycles, {:e} ms, {} states, {} pairs of bodies met, kinetic {} of {}, greatest error {:e}",
+        state.cycle,
+        state.time,
+        solved.states.len(),
+        ledger.contacts.len(),
+        ledger.last.kinetic,
+        ledger.greatest_kinetic,
+        worst_energy(&solved)
+    );
+    assert_eq!(state.cycle, cycles);
+    let mesh = &solved.model.mesh;
+    sheet.add(&format!("{name}: momentum"), change(0) / scales[0]);
+    sheet.add(&format!("{name}: angular momentum"), change(3) / scales[1]);
+    sheet.add(&format!("{name}: greatest energy error"), worst_energy(&solved));
+    sheet.add(&format!("{name}: penetration (gaps)"), ledger.worst_penetration);
+    let inside: usize = solved.states.iter().map(|state| intruders(mesh, &state.x).len()).sum();
+    sheet.add(&format!("{name}: nodes in foreign bodies, all states"), inside as f64);
+    let through: usize = solved.states.iter().map(|state| crossed(mesh, &state.x).len()).sum();
+    sheet.add(&format!("{name}: faces gone through, all states"), through as f64);
+}
+
+pub(super) fn a_debris_box_of_ten_bodies_keeps_both_momenta_and_its_energy(sheet: &mut Sheet) {
+    box_of("debris box of 10", (10, 2000, 1.5), sheet);
+}
+
+pub(super) fn a_debris_box_of_fifty_bodies_keeps_both_momenta_and_its_energy(sheet: &mut Sheet) {
+    box_of("debris box of 50", (50, 10_000, 1.5), sheet);
+    let mut off = debris(50, 10_000, 1.5);
+    off.setup.contact.as_mut().expect("the deck has contact").edges = false;
+    let off = run_with_states(off);
+    let through = off.states.iter().filter(|state| !crossed(&off.model.mesh, &state.x).is_empty()).count();
+    println!("without edges: bodies in each other in {through} of {} states", off.states.len());
+    assert!(through > 0, "nothing crosses without edges: they were not needed");
 }
 
 /// One of the struck plates, to `end` us, with gauges on both sides of the interface at the axis.
@@ -354,7 +451,7 @@ pub(super) fn meshes_of_three_and_five_faces_press_on_each_other_evenly(sheet: &
 
 /// A cube of one element falls at 100 m/s on one that is turned by 45 degrees against it: no node of either is above the
 /// other, the nearest are 2.07 mm beside its edges.
-fn stacked(gap_fraction: f64) -> Solved {
+fn stacked(gap_fraction: f64, edges: bool) -> Solved {
     run(model(&format!(
         r#"
         title = "stacked cubes"
@@ -363,6 +460,7 @@ fn stacked(gap_fraction: f64) -> Solved {
         end_time = 0.1
         [contact]
         gap_fraction = {gap_fraction:?}
+        edges = {edges}
         [[part]]
         name = "lower"
         material = "STEEL_4340"
@@ -380,15 +478,79 @@ fn stacked(gap_fraction: f64) -> Solved {
 pub(super) fn a_cube_stacked_at_45_degrees_is_stopped_by_the_zones_of_edges_if_the_gap_reaches_them(
     sheet: &mut Sheet,
 ) {
-    let solved = stacked(0.3);
+    let solved = stacked(0.3, false);
     sheet.add("stacked cubes: velocity of the lower one (m/s)", solved.part_velocity(0)[2]);
     sheet.add(
         "stacked cubes: nodes inside the other",
         intruders(&solved.model.mesh, &solved.state.x).len() as f64,
     );
     sheet.add("stacked cubes: penetration (gaps)", solved.outcome.ledger.worst_penetration);
-    // Edges that cross without a node in any zone are not seen: contact is of nodes and faces.
-    let unseen = stacked(0.1);
+    // Edges that cross without a node in any zone are not seen where they are not asked for.
+    let unseen = stacked(0.1, false);
     assert_eq!(unseen.outcome.ledger.worst_penetration.to_bits(), 0.0_f64.to_bits());
     assert_eq!(unseen.part_velocity(0), [0.0; 3]);
+    assert!(!crossed(&unseen.model.mesh, &unseen.state.x).is_empty(), "they have gone through each other");
+}
+
+pub(super) fn a_cube_stacked_at_45_degrees_is_stopped_by_its_edges(sheet: &mut Sheet) {
+    let solved = stacked(0.1, true);
+    let ledger = &solved.outcome.ledger;
+    let (lower, upper) = (solved.part_velocity(0)[2], solved.part_velocity(1)[2]);
+    sheet.add("stacked cubes with edges: velocity of the lower one (m/s)", lower);
+    sheet.add("stacked cubes with edges: momentum", (lower + upper) / -100.0 - 1.0);
+    sheet.add("stacked cubes with edges: greatest energy error", worst_energy(&solved));
+    sheet.add("stacked cubes with edges: penetration (gaps)", ledger.worst_penetration);
+    let through = crossed(&solved.model.mesh, &solved.state.x).len();
+    sheet.add("stacked cubes with edges: faces gone through", through as f64);
+}
+
+/// Two cubes of three elements an edge, ridge against ridge at right angles, at `speed` (m/s) with a gap of this fraction
+/// of the face: the nearest nodes are half a face beside the point where they cross.
+fn ridges(fraction: f64, speed: f64, edges: bool) -> Result<Solved, String> {
+    let height = 6.0 * 2.0_f64.sqrt() + 1.05 * fraction * 2.0;
+    let deck = format!(
+        "title = \"ridges\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = {:?}\n\
+         [contact]\ngap_fraction = {fraction:?}\nstiffness = 1\nedges = {edges}\n\
+         [[part]]\nname = \"lower\"\nmaterial = \"STEEL_4340\"\n\
+         box = {{ origin = [-3, -3, -3], size = [6, 6, 6], cells = [3, 3, 3] }}\n\
+         rotate = {{ axis = [1, 0, 0], degrees = 45 }}\n\
+         [[part]]\nname = \"upper\"\nmaterial = \"STEEL_4340\"\nvelocity = [0, 0, {:?}]\n\
+         box = {{ origin = [-3, -3, -3], size = [6, 6, 6], cells = [3, 3, 3] }}\n\
+         rotate = {{ axis = [0, 1, 0], degrees = 45 }}\ntranslate = [0, 0, {height:?}]\n",
+        4.0 / speed,
+        -speed,
+    );
+    solve(model(&deck), Crew::default())
+}
+
+pub(super) fn ridges_that_meet_at_right_angles_do_not_pass_through_each_other(sheet: &mut Sheet) {
+    let (mut through, mut inside, mut deepest, mut energy) = (0, 0, 0.0_f64, 0.0_f64);
+    for fraction in [0.1, 0.3, 0.5] {
+        for speed in [100.0, 1000.0, 3000.0] {
+            let named = format!("ridges at {speed} m/s, gap {fraction}");
+            let solved = ridges(fraction, speed, true).unwrap_or_else(|e| panic!("{named}: {e}"));
+            let ledger = &solved.outcome.ledger;
+            assert!(ledger.worst_penetration > 0.0, "{named}: they did not meet");
+            // Faces of one body are not compared: at 3 km/s the struck ridges fold, and bodies do not meet themselves.
+            let first = solved.model.mesh.element_offsets()[1] as u32;
+            let pairs = crossed(&solved.model.mesh, &solved.state.x);
+            let foreign = pairs.iter().filter(|p| (p.edge_of < first) != (p.element < first)).count();
+            through += foreign;
+            inside += intruders(&solved.model.mesh, &solved.state.x).len();
+            println!(
+                "{named}: depth {}, energy {:e}, {foreign} of {} crossings foreign",
+                ledger.worst_penetration,
+                worst_energy(&solved),
+                pairs.len()
+            );
+            deepest = deepest.max(ledger.worst_penetration);
+            energy = energy.max(worst_energy(&solved));
+        }
+    }
+    sheet.add("ridges: faces gone through", through as f64);
+    sheet.add("ridges: nodes inside another", inside as f64);
+    sheet.add("ridges: greatest penetration (gaps)", deepest);
+    sheet.add("ridges: greatest energy error", energy);
+    let unseen = ridges(0.1, 100.0, false).unwrap_or_else(|e| panic!("{e}"));
+    assert!(!crossed(&unseen.model.mesh, &unseen.state.x).is_empty(), "without edges they pass");
 }

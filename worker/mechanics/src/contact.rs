@@ -11,7 +11,8 @@
 //! 4. reduces the hits of a node to distinct closest features with a side ([`joint`]);
 //! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
 //!
-//! Nodes meet faces: two edges that cross while no node is in a zone are not seen.
+//! Nodes meet faces: two edges that cross while no node is in a zone are not seen, unless the deck has them meet too
+//! ([`edges`]).
 //!
 //! Search, geometry (zone and joint) and force know nothing of each other; only [`cycle`] knows all three.
 
@@ -19,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 mod boxes;
 pub mod cycle;
+pub mod edges;
 pub mod force;
 pub mod joint;
 pub mod map;
@@ -34,6 +36,7 @@ pub mod work_unit;
 pub mod zone;
 
 pub use cycle::{Contact, initial_pairs};
+pub use edges::{BatchEdge, BatchEdges, Edge, initial_edges};
 pub use force::ContactVote;
 pub use map::Map;
 pub use pair_energy::{PairEnergies, PairEnergy};
@@ -67,6 +70,8 @@ pub struct Settings {
     pub friction_velocity: f64,
     /// Nodes that start inside the zone of another part never meet the faces there; without it such a start is refused.
     pub ignores_initial: bool,
+    /// Whether edges meet edges ([`edges`]).
+    pub edges: bool,
 }
 
 impl Settings {

@@ -334,6 +334,7 @@ fn of_contact(friction: f64, width: Width, hasher: &mut blake3::Hasher) {
         stiffness: 0.5,
         friction_velocity: 1e-3,
         ignores_initial: false,
+        edges: false,
     };
     let mut contact = Contact::new(&batch, &settings, &x).on(width);
     let v = [x[1].clone(), x[2].clone(), x[0].clone()];

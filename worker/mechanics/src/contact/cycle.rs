@@ -6,6 +6,7 @@
 use super::{
     ContactVote, Exclusions, Settings, WARNING,
     boxes::Boxes,
+    edges::cycle::{Edges, Motion},
     force::{
         self,
         lanes::{Pushes, Statics, Terms},
@@ -86,6 +87,8 @@ pub struct Contact {
     width: Width,
     /// The candidates that can be near before nodes have moved much further.
     watch: Watch,
+    /// Pairs of edges.
+    edges: Edges,
     work: Work,
 }
 
@@ -156,6 +159,7 @@ impl Contact {
             smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
             width: Width::best(),
             watch: Watch::default(),
+            edges: Edges::new(batch, settings),
             work: Work::default(),
         };
         for (index, face) in index.iter_mut().zip(&batch.faces).filter(|(index, _)| **index == 0) {
@@ -202,9 +206,9 @@ impl Contact {
         Self { width, ..self }
     }
 
-    /// Number of node-face pairs that a cycle looks at.
+    /// Number of pairs that a cycle looks at, of nodes and faces and of edges.
     pub fn n_pairs(&self) -> usize {
-        self.watch.candidates.faces.len()
+        self.watch.candidates.faces.len() + self.edges.n_pairs()
     }
 
     /// Lists the candidates that can be near before nodes have moved much further.
@@ -219,7 +223,7 @@ impl Contact {
 
     /// Adds the contact forces at positions `x` into `f`, and says what they mean for the cycle.
     ///
-    /// `v` is the velocity of half a step ago and serves friction only. Arrays by batch node.
+    /// `v` is the velocity of half a step ago; it serves friction, and tells edges that have crossed. Arrays by batch node.
     pub fn forces(
         &mut self,
         x: &[Vec<f64>; 3],
@@ -260,6 +264,13 @@ impl Contact {
         for bounds in watch.blocks.windows(2) {
             let voted =
                 self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, (&mut vote, &mut by_pair));
+            frequency2 = if voted > frequency2 { voted } else { frequency2 };
+        }
+        if self.edges.n_pairs() > 0 {
+            let Cycle { x, v, dt, force_quantum, energy_quantum, f } = cycle;
+            let mut motion = Motion { x, v, dt, force_quantum, energy_quantum, f };
+            vote.pairs += self.edges.n_pairs() as u64;
+            let voted = self.edges.forces(&mut motion, &mut vote, &mut by_pair);
             frequency2 = if voted > frequency2 { voted } else { frequency2 };
         }
         (self.work, self.watch, self.by_pair) = (work, watch, by_pair);

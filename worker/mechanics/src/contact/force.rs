@@ -45,6 +45,27 @@ pub struct Sliding {
     pub dt: f64,
 }
 
+impl Sliding {
+    /// What friction does where the node is pushed with `normal` along `n`: drag (force over velocity), the velocity that
+    /// it acts against, and the energy that it takes in the step; none where nothing slides.
+    #[inline(always)]
+    pub(super) fn drag(&self, normal: f64, n: [f64; 3]) -> Option<(f64, [f64; 3], f64)> {
+        let u = self.velocity;
+        let across = n[2].mul_add(u[2], n[1].mul_add(u[1], n[0] * u[0]));
+        let v = [(-across).mul_add(n[0], u[0]), (-across).mul_add(n[1], u[1]), (-across).mul_add(n[2], u[2])];
+        let speed2 = v[2].mul_add(v[2], v[1].mul_add(v[1], v[0] * v[0]));
+        let limit = self.coefficient * normal;
+        let least = self.regular.max(BOTH_SIDES * limit * self.dt * self.inverse_mass);
+        let divisor = speed2.sqrt().max(least);
+        if divisor > 0.0 {
+            let drag = limit / divisor;
+            Some((drag, v, drag * speed2 * self.dt))
+        } else {
+            None
+        }
+    }
+}
+
 /// Forces of one hit, and the energies to book.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reaction {
@@ -103,21 +124,11 @@ pub fn react(
     let n = push.direction;
     let mut force = [normal * n[0], normal * n[1], normal * n[2]];
     let mut friction = 0.0;
-    if let Some(s) = sliding {
-        let u = s.velocity;
-        let across = n[2].mul_add(u[2], n[1].mul_add(u[1], n[0] * u[0]));
-        let v = [(-across).mul_add(n[0], u[0]), (-across).mul_add(n[1], u[1]), (-across).mul_add(n[2], u[2])];
-        let speed2 = v[2].mul_add(v[2], v[1].mul_add(v[1], v[0] * v[0]));
-        let limit = s.coefficient * normal;
-        let least = s.regular.max(BOTH_SIDES * limit * s.dt * s.inverse_mass);
-        let divisor = speed2.sqrt().max(least);
-        if divisor > 0.0 {
-            let drag = limit / divisor;
-            for a in 0..3 {
-                force[a] = (-drag).mul_add(v[a], force[a]);
-            }
-            friction = energy_quantum.round(drag * speed2 * s.dt);
+    if let Some((drag, v, taken)) = sliding.and_then(|sliding| sliding.drag(normal, n)) {
+        for a in 0..3 {
+            force[a] = (-drag).mul_add(v[a], force[a]);
         }
+        friction = energy_quantum.round(taken);
     }
     let mut corners = [[0.0; 3]; 4];
     let mut node = [0.0; 3];

@@ -39,7 +39,7 @@ impl Map {
         let mut settings = settings.clone();
         settings.friction.fill(0.0);
         let units: Vec<WorkUnit> = sort(surface, x, &settings, exclusions);
-        let units: Vec<&WorkUnit> = units.iter().filter(|unit| !unit.faces.is_empty()).collect();
+        let units: Vec<&WorkUnit> = units.iter().filter(|unit| !unit.is_empty()).collect();
         let batch = Batch::gather(surface, &units, mass, exclusions);
         let index: Vec<usize> = batch
             .nodes

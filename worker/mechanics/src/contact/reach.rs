@@ -97,6 +97,7 @@ mod tests {
             stiffness: 0.5,
             friction_velocity: 1.0,
             ignores_initial: false,
+            edges: false,
         }
     }
 

@@ -25,6 +25,8 @@ use super::{
 pub struct Exclusions {
     /// (face key, global node), ascending.
     pairs: Vec<(u64, u32)>,
+    /// Pairs of edges by their global nodes, each ascending.
+    edges: Vec<[[u32; 2]; 2]>,
 }
 
 impl Exclusions {
@@ -36,7 +38,7 @@ impl Exclusions {
             .collect();
         pairs.sort_unstable();
         pairs.dedup();
-        Self { pairs }
+        Self { pairs, edges: Vec::new() }
     }
 
     /// Excludes pairs that start in contact on request: each node with its faces in `pairs` and, of their parts, with the
@@ -69,6 +71,29 @@ impl Exclusions {
             }
         }
         Self::new(surface, &all)
+    }
+
+    /// The same, and pairs of edges given as [`super::initial_edges`] gives them.
+    #[must_use]
+    pub fn with_edges(mut self, surface: &Surface, pairs: &[([u32; 2], f64)]) -> Self {
+        let nodes = |edge: u32| surface.edges[edge as usize].nodes.map(|n| surface.nodes[n as usize]);
+        self.edges = pairs.iter().map(|(pair, _)| pair.map(nodes)).collect();
+        self.edges.sort_unstable();
+        self.edges.dedup();
+        self
+    }
+
+    /// The excluded pairs of edges of the surface, ascending.
+    pub(super) fn edges_on(&self, surface: &Surface) -> Vec<[u32; 2]> {
+        let index = |nodes: [u32; 2]| {
+            let [a, b] = nodes.map(|n| surface.node_index(n));
+            let key = [a?, b?];
+            surface.edges.binary_search_by_key(&key, |edge| edge.nodes).ok().map(|at| at as u32)
+        };
+        let mut found: Vec<[u32; 2]> =
+            self.edges.iter().filter_map(|&[a, b]| Some([index(a)?, index(b)?])).collect();
+        found.sort_unstable();
+        found
     }
 
     /// The excluded pairs (surface node, surface face) of which both are on the surface.
@@ -150,6 +175,9 @@ pub fn cull(
     let mut boxes: Vec<Bounds> = Vec::new();
     let (mut at, mut met) = (Vec::new(), Vec::new());
     let of_unit = |unit: &mut WorkUnit| {
+        if !unit.edges.is_empty() {
+            return unit.edges.len() as u64;
+        }
         let WorkUnit { nodes, faces, .. } = unit;
         at.clear();
         at.extend(nodes.iter().map(|&n| x[n as usize]));

@@ -8,6 +8,7 @@
 //! from the start, so that the nodes whose positions and votes travel stay the same; [`Surface::active`] says which of them
 //! can meet anything: those on faces, and those that have no element left.
 
+use super::edges::{Edge, features::features};
 use crate::{material::Material, mesh::Mesh};
 
 pub use crate::mesh::FACES as SIDES;
@@ -40,6 +41,8 @@ pub struct Surface {
     /// Nodes that joined parts share, with each part of theirs beside that of `node_part`: such a node interacts as one of the
     /// lowest part alone, but is a corner of faces of all.
     pub joined: Vec<(u32, u32)>,
+    /// Edges that can meet others, by their nodes; empty unless they were asked for ([`Surface::find_edges`]).
+    pub edges: Vec<Edge>,
 }
 
 /// One outer face.
@@ -206,7 +209,12 @@ impl Surface {
             .collect();
         joined.sort_unstable();
         joined.dedup();
-        Self { nodes, node_part, node_stiffness, node_share, active, faces, joined }
+        Self { nodes, node_part, node_stiffness, node_share, active, faces, joined, edges: Vec::new() }
+    }
+
+    /// Collects the edges that stick out, for contact of edges.
+    pub fn find_edges(&mut self, mesh: &Mesh) {
+        self.edges = features(self, mesh);
     }
 
     /// Raises stiffness where bodies close in so fast that `K A^2 / V` could not stop them inside the gap.

@@ -5,10 +5,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{search::Exclusions, surface::Surface};
+use super::{
+    edges::{BatchEdge, BatchEdges},
+    search::Exclusions,
+    surface::Surface,
+};
 
-/// One cube that holds nodes, and what is to be tested in it. Every interacting node is in exactly one unit.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// One cube that holds nodes, and what is to be tested in it. Every interacting node is in exactly one unit of nodes and faces,
+/// every pair of edges in exactly one of edges.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WorkUnit {
     /// Cube along each axis, counted from the lowest corner of all interacting nodes.
     pub cube: [i32; 3],
@@ -16,8 +21,17 @@ pub struct WorkUnit {
     pub nodes: Vec<u32>,
     /// Surface face indices, ascending.
     pub faces: Vec<u32>,
-    /// Node-face pairs to be tested: the unit's weight in the balance.
+    /// Pairs of surface edges to be tested; a unit has these or faces.
+    pub edges: Vec<[u32; 2]>,
+    /// Pairs to be tested: the unit's weight in the balance.
     pub interactions: u64,
+}
+
+impl WorkUnit {
+    /// Whether there is nothing to be tested.
+    pub fn is_empty(&self) -> bool {
+        self.faces.is_empty() && self.edges.is_empty()
+    }
 }
 
 /// How units came out of a sort.
@@ -62,6 +76,8 @@ pub struct Batch {
     pub units: Vec<BatchUnit>,
     /// Pairs (global node, face id) that never interact, ascending.
     pub excluded: Vec<(u32, u32)>,
+    /// Pairs of edges, where the deck asks for them.
+    pub edges: BatchEdges,
 }
 
 /// One node of a batch.
@@ -166,14 +182,17 @@ impl Batch {
             .map(|(node, face)| (surface.nodes[node as usize], face))
             .collect();
         excluded.sort_unstable();
+        let units_of = units;
         let units = units
             .iter()
+            .filter(|unit| unit.edges.is_empty())
             .map(|unit| BatchUnit {
                 nodes: unit.nodes.iter().map(|&n| node_index[n as usize]).collect(),
                 faces: unit.faces.iter().map(|&f| face_index[f as usize]).collect(),
             })
             .collect();
-        Self { nodes, faces, units, excluded }
+        let edges = edges_of(surface, units_of, &node_index);
+        Self { nodes, faces, units, excluded, edges }
     }
 
     /// Whether every index is in range, parts among `n_parts` and masses positive: what a batch from outside
@@ -185,5 +204,26 @@ impl Batch {
             && self.faces.iter().all(|f| (f.part as usize) < n_parts && below(&f.nodes, n_nodes))
             && self.units.iter().all(|u| below(&u.nodes, n_nodes) && below(&u.faces, n_faces))
             && self.excluded.is_sorted()
+            && self.edges.is_sound(n_nodes, n_parts)
     }
+}
+
+/// Edges of units and their pairs. `node_index` gives the batch node of a surface node.
+fn edges_of(surface: &Surface, units: &[&WorkUnit], node_index: &[u32]) -> BatchEdges {
+    let mut used: Vec<u32> = units.iter().flat_map(|unit| &unit.edges).flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let place = |edge: u32| used.partition_point(|&other| other < edge) as u32;
+    let pairs = units.iter().flat_map(|unit| &unit.edges).map(|pair| pair.map(place)).collect();
+    let edge = |&edge: &u32| {
+        let edge = &surface.edges[edge as usize];
+        let [a, b] = edge.nodes.map(|n| n as usize);
+        BatchEdge {
+            nodes: [a, b].map(|n| node_index[n]),
+            part: edge.part,
+            stiffness: 0.5 * (surface.node_stiffness[a] + surface.node_stiffness[b]),
+            share: (surface.node_share[a] + surface.node_share[b]).min(1.0),
+        }
+    };
+    BatchEdges { edges: used.iter().map(edge).collect(), pairs }
 }

@@ -83,7 +83,7 @@ pub struct Frame {
 }
 
 #[inline(always)]
-fn sub(a: Vector, b: Vector) -> Vector {
+pub(super) fn sub(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
@@ -93,7 +93,7 @@ pub(super) fn dot(a: Vector, b: Vector) -> f64 {
 }
 
 #[inline(always)]
-fn cross(a: Vector, b: Vector) -> Vector {
+pub(super) fn cross(a: Vector, b: Vector) -> Vector {
     [
         a[1].mul_add(b[2], -(a[2] * b[1])),
         a[2].mul_add(b[0], -(a[0] * b[2])),
@@ -108,7 +108,7 @@ fn along(a: Vector, s: f64, b: Vector) -> Vector {
 }
 
 #[inline(always)]
-fn scale(s: f64, a: Vector) -> Vector {
+pub(super) fn scale(s: f64, a: Vector) -> Vector {
     [s * a[0], s * a[1], s * a[2]]
 }
 

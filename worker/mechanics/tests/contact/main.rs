@@ -1,6 +1,7 @@
-//! Contact against the verification figures: zone, joints, forces, bounces, surface and sort.
+//! Contact against the verification figures: zone, joints, forces, bounces, edges, surface and sort.
 
 mod bounce;
+mod edges;
 mod force;
 mod patch;
 mod sort;

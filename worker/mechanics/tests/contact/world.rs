@@ -1,7 +1,10 @@
 //! Small worlds: meshes of blocks, and a whole contact on one worker.
 
 use mechanics::{
-    contact::{Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, initial_pairs, sort},
+    contact::{
+        Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, initial_edges, initial_pairs,
+        sort,
+    },
     exact::Quantum,
     material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
@@ -78,6 +81,7 @@ pub fn settings(n_parts: usize, gap: f64, slack: f64) -> Settings {
         stiffness: 0.5,
         friction_velocity: 1e-3,
         ignores_initial: false,
+        edges: false,
     }
 }
 
@@ -112,9 +116,13 @@ impl World {
         // corners has a test of its own.
         let mut surface = Surface::new(mesh, &materials(), alive);
         surface.node_share.fill(1.0);
+        if settings.edges {
+            surface.find_edges(mesh);
+        }
         let x = on_surface(&surface, &mesh.positions);
         let pairs = initial_pairs(&surface, &x, &settings);
-        let exclusions = Exclusions::new(&surface, &pairs);
+        let crossing = initial_edges(&surface, &x, &settings);
+        let exclusions = Exclusions::new(&surface, &pairs).with_edges(&surface, &crossing);
         let units = sort(&surface, &x, &settings, &exclusions);
         let all: Vec<&WorkUnit> = units.iter().collect();
         let batch = Batch::gather(&surface, &all, &|_| 1.0, &exclusions);

@@ -65,6 +65,7 @@ fn settings(friction: f64) -> Settings {
         stiffness: 0.5,
         friction_velocity: 1e-3,
         ignores_initial: false,
+        edges: false,
     }
 }
 

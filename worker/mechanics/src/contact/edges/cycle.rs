@@ -1,0 +1,266 @@
+//! Edge pairs of a batch in one cycle: from positions to forces, votes and energies.
+
+use super::{
+    super::{ContactVote, Settings, WARNING, force, pair_energy::ByPair, work_unit::Batch, zone::Vector},
+    EDGE,
+    zone::{self, Closest},
+};
+use crate::exact::Quantum;
+
+/// An edge with what its pairs need.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    nodes: [u32; 2],
+    /// Global number of its first node.
+    name: u32,
+    part: u32,
+    inverse_mass: [f64; 2],
+}
+
+/// Two edges that may meet.
+#[derive(Clone, Copy, Debug)]
+struct Pair {
+    sides: [u32; 2],
+    /// Penalty stiffness (force per length).
+    stiffness: f64,
+    friction: f64,
+}
+
+/// The edge pairs of one batch.
+#[derive(Clone, Debug, Default)]
+pub(in super::super) struct Edges {
+    sides: Vec<Side>,
+    pairs: Vec<Pair>,
+    gap: f64,
+    friction_velocity: f64,
+}
+
+/// Arrays of one cycle, by batch node.
+pub(in super::super) struct Motion<'a> {
+    pub(in super::super) x: &'a [Vec<f64>; 3],
+    /// Half a step ago, with the step `dt` that led to `x`.
+    pub(in super::super) v: &'a [Vec<f64>; 3],
+    pub(in super::super) dt: f64,
+    pub(in super::super) force_quantum: Quantum,
+    pub(in super::super) energy_quantum: Quantum,
+    pub(in super::super) f: &'a mut [Vec<f64>; 3],
+}
+
+impl Edges {
+    /// Those of a batch, which must be sound.
+    pub(in super::super) fn new(batch: &Batch, settings: &Settings) -> Self {
+        let sides: Vec<Side> = batch
+            .edges
+            .edges
+            .iter()
+            .map(|edge| Side {
+                nodes: edge.nodes,
+                name: batch.nodes[edge.nodes[0] as usize].global,
+                part: edge.part,
+                inverse_mass: edge.nodes.map(|n| 1.0 / batch.nodes[n as usize].mass),
+            })
+            .collect();
+        let n_parts = settings.n_parts();
+        let pair = |&sides: &[u32; 2]| {
+            let [a, b] = sides.map(|side| &batch.edges.edges[side as usize]);
+            let factor = settings.stiffness * a.share.min(b.share);
+            Pair {
+                sides,
+                stiffness: force::stiffness(factor, a.stiffness, b.stiffness),
+                friction: settings.friction[a.part as usize * n_parts + b.part as usize],
+            }
+        };
+        let pairs = batch.edges.pairs.iter().map(pair).collect();
+        Self { sides, pairs, gap: settings.gap, friction_velocity: settings.friction_velocity }
+    }
+
+    pub(in super::super) fn n_pairs(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// Adds forces; gives the greatest squared frequency of the springs that act or soon may.
+    #[inline(always)]
+    pub(in super::super) fn forces(
+        &self,
+        motion: &mut Motion,
+        vote: &mut ContactVote,
+        by_pair: &mut ByPair,
+    ) -> f64 {
+        let warning = WARNING * self.gap;
+        let mut frequency2 = 0.0_f64;
+        for pair in &self.pairs {
+            let sides = [&self.sides[pair.sides[0] as usize], &self.sides[pair.sides[1] as usize]];
+            let [[a, b], [c, d]] = [sides[0].nodes, sides[1].nodes];
+            let nodes = [a as usize, b as usize, c as usize, d as usize];
+            if are_apart(motion.x, nodes, warning) {
+                continue;
+            }
+            let x = nodes.map(|n| at(motion.x, n));
+            let Some(closest) = zone::closest(&x) else { continue };
+            if closest.distance2 >= warning * warning {
+                continue;
+            }
+            let inverse_mass = self.inverse_mass(&closest, sides);
+            let stiffness = pair.stiffness * closest.weight_ahead(self.gap);
+            let voted = force::frequency2(stiffness, 1.0, inverse_mass);
+            frequency2 = if voted > frequency2 { voted } else { frequency2 };
+            if closest.crosses && closest.distance2 < self.gap * self.gap {
+                self.push(pair, sides, nodes, &closest, motion, vote, by_pair);
+            }
+        }
+        frequency2
+    }
+
+    /// Inverse of the mass that a pair moves, where the closest points may be soon: a gap nearer to the ends.
+    #[inline(always)]
+    fn inverse_mass(&self, closest: &Closest, sides: [&Side; 2]) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..2 {
+            let margin = self.gap / closest.lengths[i];
+            let s = closest.at[i];
+            let s = if s < 0.5 { (s - margin).max(0.0) } else { (s + margin).min(1.0) };
+            let [a, b] = sides[i].inverse_mass;
+            sum += (s * s).mul_add(b, (1.0 - s) * (1.0 - s) * a);
+        }
+        sum
+    }
+
+    /// Force, energy and depth of a pair in its zone.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "one pair with all that it touches")]
+    fn push(
+        &self,
+        pair: &Pair,
+        sides: [&Side; 2],
+        nodes: [usize; 4],
+        closest: &Closest,
+        motion: &mut Motion,
+        vote: &mut ContactVote,
+        by_pair: &mut ByPair,
+    ) {
+        let weight = closest.weight(self.gap);
+        if weight.value <= 0.0 {
+            return;
+        }
+        let ([s, t], distance) = (closest.at, closest.distance2.sqrt());
+        let shares = [1.0 - s, s, -(1.0 - t), -t];
+        let names = (sides[0].name, EDGE | sides[1].name);
+        if distance <= 1e-9 * self.gap {
+            // The line has no direction: no force, and a depth at which the run ends.
+            vote.deepest(1.0, names);
+            return;
+        }
+        let n = closest.vector.map(|c| c / distance);
+        let velocity = relative(motion.v, nodes, shares);
+        let closing = dot(n, velocity) * motion.dt;
+        let mut depth = self.gap - distance;
+        if closing > distance && crossed(motion, nodes) {
+            depth = self.gap + distance;
+        }
+        vote.hits += 1;
+        vote.deepest(depth / self.gap, names);
+        let depth = self.gap - distance;
+        let normal = pair.stiffness * weight.value * depth;
+        let mut force = [normal * n[0], normal * n[1], normal * n[2]];
+        let mut friction = 0.0;
+        if pair.friction > 0.0 {
+            let inverse_mass = sides[0].inverse_mass.iter().chain(&sides[1].inverse_mass);
+            let inverse_mass: f64 = inverse_mass.zip(shares).map(|(m, share)| m * (share * share)).sum();
+            let sliding = force::Sliding {
+                coefficient: pair.friction,
+                regular: self.friction_velocity,
+                velocity,
+                inverse_mass,
+                dt: motion.dt,
+            };
+            if let Some((drag, v, taken)) = sliding.drag(normal, n) {
+                for a in 0..3 {
+                    force[a] = (-drag).mul_add(v[a], force[a]);
+                }
+                friction = motion.energy_quantum.round(taken);
+            }
+        }
+        let half = 0.5 * pair.stiffness * depth * depth;
+        let [mut of_u, mut of_v] = [[0.0; 3]; 2];
+        if let Some([along, by_u, by_v]) = weight.slopes {
+            for a in 0..3 {
+                force[a] = (-half).mul_add(along[a], force[a]);
+                of_u[a] = -(half * by_u[a]);
+                of_v[a] = -(half * by_v[a]);
+            }
+        }
+        let quantum = motion.force_quantum;
+        let mut on_first = [0.0; 3];
+        for a in 0..3 {
+            let terms = [
+                quantum.round(shares[0].mul_add(force[a], -of_u[a])),
+                quantum.round(shares[1].mul_add(force[a], of_u[a])),
+                quantum.round(shares[2].mul_add(force[a], -of_v[a])),
+            ];
+            let last = -((terms[0] + terms[1]) + terms[2]);
+            on_first[a] = terms[0] + terms[1];
+            let f = &mut motion.f[a];
+            f[nodes[0]] += terms[0];
+            f[nodes[1]] += terms[1];
+            f[nodes[2]] += terms[2];
+            f[nodes[3]] += last;
+            for term in [terms[0], terms[1], terms[2], last] {
+                let magnitude = term.abs();
+                vote.force_bound = if magnitude > vote.force_bound { magnitude } else { vote.force_bound };
+            }
+        }
+        let energy = motion.energy_quantum.round(weight.value * half);
+        vote.energy += energy;
+        vote.friction += friction;
+        by_pair.energies.add(sides[0].part, sides[1].part, energy, friction);
+        if let Some(tally) = &mut by_pair.forces {
+            tally.add((sides[0].part, sides[1].part), on_first);
+        }
+    }
+}
+
+#[inline(always)]
+fn at(x: &[Vec<f64>; 3], n: usize) -> Vector {
+    [x[0][n], x[1][n], x[2][n]]
+}
+
+#[inline(always)]
+fn dot(a: Vector, b: Vector) -> f64 {
+    super::super::zone::dot(a, b)
+}
+
+/// Whether the boxes of two edges are more than `within` apart along some axis.
+#[inline(always)]
+fn are_apart(x: &[Vec<f64>; 3], [a, b, c, d]: [usize; 4], within: f64) -> bool {
+    let least = |p: f64, q: f64| if p < q { p } else { q };
+    let most = |p: f64, q: f64| if p > q { p } else { q };
+    let mut apart = false;
+    for x in x {
+        let (p, q, r, s) = (x[a], x[b], x[c], x[d]);
+        apart |= (least(r, s) - most(p, q) > within) | (least(p, q) - most(r, s) > within);
+    }
+    apart
+}
+
+/// Velocity of the first closest point against the second: shares of the four nodes.
+#[inline(always)]
+fn relative(v: &[Vec<f64>; 3], nodes: [usize; 4], shares: [f64; 4]) -> Vector {
+    let mut sum = [0.0; 3];
+    for a in 0..3 {
+        for i in 0..4 {
+            sum[a] = shares[i].mul_add(v[a][nodes[i]], sum[a]);
+        }
+    }
+    sum
+}
+
+/// Whether two edges whose closest points have passed each other in the last step crossed before it too: then one has gone
+/// through the other. The motion before may have been beside the ends of one.
+#[inline(never)]
+fn crossed(motion: &Motion, nodes: [usize; 4]) -> bool {
+    let before = nodes.map(|n| {
+        let (x, v) = (at(motion.x, n), at(motion.v, n));
+        [0, 1, 2].map(|a| (-motion.dt).mul_add(v[a], x[a]))
+    });
+    zone::closest(&before).is_some_and(|closest| closest.crosses)
+}
