@@ -8,12 +8,29 @@
 mod contact;
 mod element;
 mod gas;
+mod hexahedron;
+mod law;
 mod load;
+mod modes;
 mod rigid;
 mod shell;
 mod solid;
 mod structure;
 mod wave;
+mod zone;
+
+/// Single elements and what carries them, as the tests of the mechanics have them.
+#[path = "../../worker/mechanics/tests/elements/bodies.rs"]
+#[expect(dead_code, reason = "those tests use more of it")]
+mod bodies;
+/// Clouds of boxes, likewise.
+#[path = "../../worker/mechanics/tests/contact/clouds.rs"]
+#[expect(dead_code, reason = "those tests use more of it")]
+mod clouds;
+/// Worlds of contact, likewise.
+#[path = "../../worker/mechanics/tests/contact/world.rs"]
+#[expect(dead_code, reason = "those tests use more of it")]
+mod world;
 
 use crate::case::Sheet;
 
@@ -22,6 +39,15 @@ use crate::case::Sheet;
 macro_rules! each_case_of_the_book {
     ($then:ident) => {
         $then! {
+            hexahedron: volumes_and_their_gradients_are_exact quick;
+            hexahedron: the_patch_has_one_stress_and_no_force_inside quick;
+            hexahedron: moving_and_turning_leave_the_stress_what_it_is quick;
+            hexahedron: simple_shear_follows_the_jaumann_rate quick;
+            law: uniaxial_strain_yields_hardens_by_volume_and_unloads quick;
+            modes: a_free_cube_has_six_strain_modes_and_control_resists_the_twelve_others quick;
+            modes: each_hourglass_pattern_is_resisted_without_resultant_and_decays quick;
+            modes: time_steps_are_those_of_the_thinnest_way_through quick;
+            modes: an_isolated_cube_is_stable_to_its_own_limit_only quick;
             element: mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_for_ten_thousand_cycles quick;
             wave: a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages quick;
             wave: of_two_equal_bars_the_first_stops_and_the_second_flies_on quick;
@@ -37,6 +63,9 @@ macro_rules! each_case_of_the_book {
             gas: sods_tube_has_its_plateaus_and_its_shock_in_place quick;
             gas: gas_that_runs_together_is_compressed_as_noh_says long;
             gas: the_blast_of_lulesh_reaches_sedovs_radius quick;
+            law: products_have_their_chapman_jouguet_state_and_follow_its_isentrope quick;
+            law: a_detonation_runs_at_its_speed_with_its_pressure_behind quick;
+            law: johnson_cook_has_its_point_values_in_an_element quick;
             solid: the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find quick;
             solid: finer_copper_bars_come_nearer_to_what_others_converge_to long;
             solid: the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds quick;
@@ -66,6 +95,12 @@ macro_rules! each_case_of_the_book {
             rigid: a_free_top_precesses_after_euler quick;
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
             rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;
+            zone: points_about_a_face_have_their_region_distance_and_weights quick;
+            zone: a_node_swept_over_joints_feels_one_steady_force quick;
+            zone: every_pair_keeps_force_and_moment quick;
+            zone: a_bounce_keeps_its_energy_as_central_differences_allow quick;
+            zone: no_node_shot_at_a_faceted_body_gets_in quick;
+            zone: the_sort_of_a_cloud_finds_what_brute_force_finds quick;
             contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
             contact: struck_plates_conserve_keep_apart_and_move_together quick;
             contact: strengthless_plates_reach_the_impedance_match_on_the_axis quick;
