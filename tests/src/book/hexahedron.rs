@@ -105,8 +105,8 @@ fn patch() -> (Vec<[f64; 3]>, Vec<[u32; 8]>) {
     (x, hexahedra)
 }
 
-/// Displacements of 1e-6 (2x + y + z)/2 and so on, a thousandth of the published ones: strains are finite here, and the small
-/// ones of the closed form are met to their first order. Stresses are said a thousandfold.
+/// Displacements of 1e-5 (2x + y + z)/2 and so on, a hundredth of the published ones: strains are finite here, and the small
+/// ones of the closed form are met to their first order. Stresses are said a hundredfold.
 pub(super) fn the_patch_has_one_stress_and_no_force_inside(sheet: &mut Sheet) {
     let (young, poisson) = (1e6, 0.25);
     let (bulk, shear) = (young / 3.0 / (1.0 - 2.0 * poisson), young / 2.0 / (1.0 + poisson));
@@ -114,16 +114,16 @@ pub(super) fn the_patch_has_one_stress_and_no_force_inside(sheet: &mut Sheet) {
     let (x, hexahedra) = patch();
     let mut block = Block::new(&piece(&material, x, Topology::Explicit { hexahedra }));
     let dt = 1e-3;
-    let mut step = bare_step(dt, 1.0, 1e-5);
+    let mut step = bare_step(dt, 10.0, 1e-3);
     step.hourglass = 0.1;
-    let h = Matrix3::from_fn(|i, j| if i == j { 1e-6 } else { 0.5e-6 });
+    let h = Matrix3::from_fn(|i, j| if i == j { 1e-5 } else { 0.5e-5 });
     let vote = carry(&mut block, &material, &step, |x| (h / dt * Vector3::from(x)).into());
     assert!(vote.fault.is_none(), "{:?}", vote.fault);
     for element in 0..7 {
         let found = stress(&block, element);
         for axis in 0..3 {
-            sheet.add("patch test: normal stress", 1e3 * found[axis][axis]);
-            sheet.add("patch test: shear stress", 1e3 * found[axis][(axis + 1) % 3]);
+            sheet.add("patch test: normal stress", 1e2 * found[axis][axis]);
+            sheet.add("patch test: shear stress", 1e2 * found[axis][(axis + 1) % 3]);
         }
     }
     let inside = (8..16).flat_map(|node| force(&block, node));
