@@ -339,8 +339,13 @@ impl Tube {
         let mut material = plastic(7830.0, 2.1e11, 0.3, self.yield_stress);
         if self.rate {
             let end = material.len() - 3;
-            material.insert_str(end, ", rate = { reference = 6844, exponent = 3.91 }");
+            material.insert_str(end, ", cowper_symonds = { reference = 6844, exponent = 3.91 }");
         }
+        let contact = if self.meets_itself {
+            format!("[contact]\ngap_length = {:e}\nself_interaction = \"all\"\n", 0.5 * self.thickness)
+        } else {
+            String::new()
+        };
         let deck = format!(
             "title = \"tube\"\nunits = \"SI\"\n[control]\nend_time = {:e}\n[output]\nhistory_cycles = 100\n\
              [[part]]\nname = \"tube\"\nmaterial = {material}\nshell = {{ thickness = {:e}, points = 5 }}\n\
@@ -348,13 +353,12 @@ impl Tube {
              cells = [{}, 72] }}\n\
              [[wall]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\nfriction = 0.3\n\
              [[wall]]\npoint = [0, 0, {length:?}]\nnormal = [0, 0, -1]\nfriction = 0.3\nvelocity = {{ z = {:?} }}\n\
-             [contact]\ngap_length = {:e}\nself_interaction = \"{}\"\n",
+             {}",
             stroke / self.speed,
             self.thickness,
             12 * around,
             -self.speed,
-            0.5 * self.thickness,
-            if self.meets_itself { "all" } else { "none" }
+            contact
         );
         let mut model = model(&deck);
         // Sides are even and odd from the corner on the axis x on.

@@ -159,19 +159,24 @@ pub(super) fn steel_spheres_bounce_off_a_wall_as_hertz_says(sheet: &mut Sheet) {
 pub(super) fn two_steel_spheres_bounce_off_each_other_as_hertz_says(sheet: &mut Sheet) {
     let (cells, finer) = ([14, 8], 5.0);
     let gap = 1e-5;
-    let sphere = |name: &str, speed: f64| {
-        format!("[[part]]\nname = \"{name}\"\nvelocity = [{speed:?}, 0, 0]\n{STEEL_SPHERE}{cells:?} }}\n")
+    let sphere = |name: &str, speed: f64, at: f64| {
+        format!(
+            "[[part]]\nname = \"{name}\"\nvelocity = [{speed:?}, 0, 0]\n{STEEL_SPHERE}{cells:?} }}\ntranslate = [{at:?}, 0, 0]\n"
+        )
     };
     let mut model = model(&format!(
         "title = \"steel spheres\"\nunits = \"SI\"\n[control]\nend_time = 74e-6\nlinear_viscosity = 0.06\n\
-         [output]\nhistory_cycles = 1\ncontact_forces = [[\"right\", \"left\"]]\n[contact]\ngap_length = {gap:e}\nstiffness = 1\n{}{}\
+         [output]\nhistory_cycles = 1\ncontact_forces = [[\"right\", \"left\"]]\n[contact]\nstiffness = 1\n{}{}\
          [[boundary]]\ntype = \"symmetry\"\naxis = \"y\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"z\"\n",
-        sphere("right", -0.5),
-        sphere("left", 0.5)
+        sphere("right", -0.5, 0.0),
+        sphere("left", 0.5, -0.03)
     ));
     let right = model.mesh.parts[0].nodes.len();
     assert!(model.mesh.parts[0].nodes.iter().all(|n| (*n as usize) < right), "nodes are numbered by parts");
     for (n, x) in model.mesh.positions.iter_mut().enumerate() {
+        if n >= right {
+            x[0] += 0.03;
+        }
         refine_pole(x, finer);
         x[0] += 0.01 + 0.5 * gap;
         if n >= right {
@@ -179,6 +184,9 @@ pub(super) fn two_steel_spheres_bounce_off_each_other_as_hertz_says(sheet: &mut 
         }
     }
     mirror(&mut model, 1);
+    // A tenth of the faces at the poles, which the deck does not know.
+    let contact = model.setup.contact.as_mut().expect("spheres that meet");
+    (contact.gap, contact.slack) = (gap, 0.5 * gap);
     let solved = run(model);
     let mass: f64 = solved.state.mass[..right].iter().sum();
     let mut now = -0.5 * 4.0 * mass;

@@ -111,18 +111,18 @@ pub(super) fn the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds(shee
     );
 }
 
-/// A beam clamped at both ends, thrown at 30 m/s all over: half of its length and of its width. Jones takes it as rigid and
-/// perfectly plastic.
+/// A beam clamped at both ends, thrown at 30 m/s all over: half of its length and of its width. Theory takes it as rigid and
+/// perfectly plastic, so it is ten times as stiff here as aluminium, whose elastic bending would take half of the energy.
 pub(super) fn a_beam_thrown_all_over_is_bent_about_as_a_rigid_plastic_one(sheet: &mut Sheet) {
     let (height, length) = (3.175e-3, 0.127);
     let deck = format!(
-        "title = \"clamped beam\"\nunits = \"SI\"\n[control]\nend_time = 1.2e-3\nlinear_viscosity = 0.06\nhourglass = 0.03\n\
+        "title = \"clamped beam\"\nunits = \"SI\"\n[control]\nend_time = 0.8e-3\nlinear_viscosity = 0.06\nhourglass = 0.03\n\
          [[part]]\nname = \"beam\"\nmaterial = {}\n\
-         box = {{ origin = [0, 0, 0], size = [{length}, 0.015, {height}], cells = [80, 6, 4] }}\n\
+         box = {{ origin = [0, 0, 0], size = [{length}, 0.015, {height}], cells = [60, 4, 4] }}\n\
          [[boundary]]\ntype = \"fixed\"\nparts = [\"beam\"]\nface = \"i-max\"\n\
          [[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"y\"\n\
          [[gauge]]\nname = \"middle\"\npoint = [0, 0, {:e}]\n",
-        perfectly_plastic(2.61e-4 * DENSITY, 10.4e6 * PSI, 0.3, 285.4e6),
+        perfectly_plastic(2.61e-4 * DENSITY, 10.4e7 * PSI, 0.3, 285.4e6),
         0.5 * height
     );
     let mut model = model(&deck);
