@@ -140,14 +140,14 @@ pub(super) fn gas_that_runs_together_is_compressed_as_noh_says(sheet: &mut Sheet
     for (directions, name) in [(1, "plane"), (2, "cylinder"), (3, "sphere")] {
         let solved = noh(directions, cells_of(directions));
         let cells = profile(&solved, &[1.0]);
-        // Along the axis x, where the density passes half of that behind the shock from above.
+        // Along the axis x from outside, where the density passes the middle between those before and behind the shock.
         let side = 1.0 / f64::from(cells_of(directions));
         let mut axis: Vec<(f64, f64)> = cells
             .iter()
             .filter(|(x, ..)| x[1] < side && x[2] < side && x[0] > 0.1)
             .map(|(x, rho, _)| (x[0], *rho))
             .collect();
-        axis.sort_by(|a, b| a.0.total_cmp(&b.0));
+        axis.sort_by(|a, b| b.0.total_cmp(&a.0));
         let ahead = (1.0 + 0.6 / 0.2_f64).powi(directions as i32 - 1);
         let half = 0.5 * (4.0_f64.powi(directions as i32) + ahead);
         let front = crossing(axis.into_iter(), half).expect("the shock has left the origin");

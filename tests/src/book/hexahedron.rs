@@ -178,11 +178,11 @@ pub(super) fn simple_shear_follows_the_jaumann_rate(sheet: &mut Sheet) {
     for cycle in 1..=1000 {
         carry(&mut block, &material, &step, |x| [x[1], 0.0, 0.0]);
         if cycle == 100 || cycle == 1000 {
-            let of = format!("simple shear of {}", f64::from(cycle) * 1e-3);
+            let of = format!("simple shear @ {}", f64::from(cycle) * 1e-3);
             let s = stress(&block, 0);
-            sheet.add(&format!("{of} @ stress xy over G"), s[0][1]);
-            sheet.add(&format!("{of} @ stress xx over G"), s[0][0]);
-            sheet.add(&format!("{of} @ stress yy over G"), s[1][1]);
+            sheet.add(&format!("{of}, stress xy over G"), s[0][1]);
+            sheet.add(&format!("{of}, stress xx over G"), s[0][0]);
+            sheet.add(&format!("{of}, stress yy over G"), s[1][1]);
         }
     }
 }

@@ -209,7 +209,7 @@ pub(super) fn time_steps_are_those_of_the_thinnest_way_through(sheet: &mut Sheet
             STEEL.2
         )));
         let last = solved.rows.last().expect("rows");
-        sheet.add(&format!("steel cube of 1 mm: step of a run at safety {safety} (s)"), last.dt);
+        sheet.add(&format!("steel cube of 1 mm @ step of a run at safety {safety} (s)"), last.dt);
     }
 }
 
@@ -230,7 +230,7 @@ pub(super) fn an_isolated_cube_is_stable_to_its_own_limit_only(sheet: &mut Sheet
             kick(&mut block, dt);
             largest = block.v.iter().flatten().fold(largest, |l, v| l.max(v.abs()));
         }
-        let of = format!("isolated cube at {ratio} of its crossing time");
-        sheet.add(&format!("{of}: greatest velocity over the first"), largest / 0.5e-6);
+        let of = format!("isolated cube @ {ratio} of its crossing time");
+        sheet.add(&format!("{of}, greatest velocity over the first"), largest / 0.5e-6);
     }
 }

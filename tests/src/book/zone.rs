@@ -338,7 +338,7 @@ pub(super) fn no_node_shot_at_a_faceted_body_gets_in(sheet: &mut Sheet) {
         // Bent faces add jumps of stiffness and direction at joints; with every hit of a concave joint pushing in full it
         // would be 0.08 to 0.17.
         let faces = if jitter == 0.0 { "flat" } else { "bent" };
-        let of = format!("shots at a faceted body: change of energy, {faces} faces, root mean square");
+        let of = format!("shots at a faceted body @ {faces} faces, root mean square of the change of energy");
         sheet.add(&of, shots.energy);
     }
 }
