@@ -410,7 +410,10 @@ fn a_rigid_material_makes_a_body_of_its_part() {
 fn what_cannot_be_honoured_is_refused_where_it_stands() {
     let refused = [
         ("*MAT_ADD_EROSION\n1,,-0.5\n", "a.k:23:4: read -0.5; expected MXPRES above 0"),
-        ("*MAT_ADD_EROSION\n1,,,,-0.5\n", "a.k:23:1: read plastic_strain = 0.5; expected a material whose strength law yields"),
+        (
+            "*MAT_ADD_EROSION\n1,,,,-0.5\n",
+            "a.k:23:1: read plastic_strain = 0.5; expected a material whose strength law yields",
+        ),
         ("*MAT_ADD_EROSION\n1\n,,,,,1.0,2.0\n", "a.k:24:6: read 1.0; expected SIGTH blank: the impulse"),
         (
             "*MAT_ADD_EROSION\n1\n,,,,,,,3.0\n",

@@ -9,12 +9,29 @@ mod contact;
 mod element;
 mod erosion;
 mod gas;
+mod hexahedron;
+mod law;
 mod load;
+mod modes;
 mod rigid;
 mod shell;
 mod solid;
 mod structure;
 mod wave;
+mod zone;
+
+/// Single elements and what carries them, as the tests of the mechanics have them.
+#[path = "../../worker/mechanics/tests/elements/bodies.rs"]
+#[expect(dead_code, reason = "those tests use more of it")]
+mod bodies;
+/// Clouds of boxes, likewise.
+#[path = "../../worker/mechanics/tests/contact/clouds.rs"]
+#[expect(dead_code, reason = "those tests use more of it")]
+mod clouds;
+/// Worlds of contact, likewise.
+#[path = "../../worker/mechanics/tests/contact/world.rs"]
+#[expect(dead_code, reason = "those tests use more of it")]
+mod world;
 
 use crate::case::Sheet;
 
@@ -23,6 +40,15 @@ use crate::case::Sheet;
 macro_rules! each_case_of_the_book {
     ($then:ident) => {
         $then! {
+            hexahedron: volumes_and_their_gradients_are_exact quick;
+            hexahedron: the_patch_has_one_stress_and_no_force_inside quick;
+            hexahedron: moving_and_turning_leave_the_stress_what_it_is quick;
+            hexahedron: simple_shear_follows_the_jaumann_rate quick;
+            law: uniaxial_strain_yields_hardens_by_volume_and_unloads quick;
+            modes: a_free_cube_has_six_strain_modes_and_control_resists_the_twelve_others quick;
+            modes: each_hourglass_pattern_is_resisted_without_resultant_and_decays quick;
+            modes: time_steps_are_those_of_the_thinnest_way_through quick;
+            modes: an_isolated_cube_is_stable_to_its_own_limit_only quick;
             element: mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_for_ten_thousand_cycles quick;
             wave: a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages quick;
             wave: of_two_equal_bars_the_first_stops_and_the_second_flies_on quick;
@@ -38,21 +64,31 @@ macro_rules! each_case_of_the_book {
             gas: sods_tube_has_its_plateaus_and_its_shock_in_place quick;
             gas: gas_that_runs_together_is_compressed_as_noh_says long;
             gas: the_blast_of_lulesh_reaches_sedovs_radius quick;
+            law: products_have_their_chapman_jouguet_state_and_follow_its_isentrope quick;
+            law: a_detonation_runs_at_its_speed_with_its_pressure_behind quick;
+            law: johnson_cook_has_its_point_values_in_an_element quick;
             solid: the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find quick;
             solid: finer_copper_bars_come_nearer_to_what_others_converge_to long;
             solid: the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds quick;
             solid: a_soft_sphere_bounces_off_a_wall_as_hertz_says long;
+            solid: steel_spheres_bounce_off_a_wall_as_hertz_says long;
+            solid: two_steel_spheres_bounce_off_each_other_as_hertz_says long;
             solid: a_rigid_wall_gives_its_impulse_along_its_normal_and_coulombs_share_beside_it quick;
             structure: the_impulsive_panel_is_dented_as_deep_as_measured long;
             structure: the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds quick;
+            structure: a_beam_thrown_all_over_is_bent_about_as_a_rigid_plastic_one quick;
             structure: a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness quick;
             shell: the_twisted_beam_bends_as_published quick;
             shell: the_roof_sags_as_published quick;
             shell: the_cylinder_is_pinched_as_published quick;
             shell: the_hemisphere_opens_as_published long;
+            shell: a_cantilever_of_shells_bends_as_a_beam quick;
+            shell: a_square_plate_sags_under_pressure quick;
+            shell: a_strip_of_shells_rings_as_a_beam quick;
             shell: a_square_plate_rings_at_its_frequencies quick;
             shell: the_impulsive_panel_of_shells_is_dented_about_as_deep quick;
             shell: a_square_tube_folds_at_its_mean_crush_force long;
+            shell: other_tubes_fold_at_their_mean_crush_forces long;
             shell: the_girder_folds_without_passing_through_itself long;
             load: a_pressure_by_curve_drives_a_wave_of_its_shape quick;
             load: a_velocity_by_curve_arrives_as_it_was_prescribed quick;
@@ -61,6 +97,7 @@ macro_rules! each_case_of_the_book {
             load: a_force_by_curve_gives_its_impulse_and_gravity_its_fall quick;
             load: a_hanging_bar_relaxes_to_its_length_under_its_weight quick;
             load: a_wall_of_finite_mass_is_slowed_by_the_bar_it_strikes quick;
+            load: what_bodies_lose_a_wall_of_finite_mass_has quick;
             load: a_driven_wall_pushes_as_a_bar_that_strikes_it_is_pushed quick;
             load: a_wall_gives_the_impulse_that_bodies_lack_and_rubs_after_coulomb quick;
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
@@ -69,6 +106,12 @@ macro_rules! each_case_of_the_book {
             rigid: a_free_top_precesses_after_euler quick;
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
             rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;
+            zone: points_about_a_face_have_their_region_distance_and_weights quick;
+            zone: a_node_swept_over_joints_feels_one_steady_force quick;
+            zone: every_pair_keeps_force_and_moment quick;
+            zone: a_bounce_keeps_its_energy_as_central_differences_allow quick;
+            zone: no_node_shot_at_a_faceted_body_gets_in quick;
+            zone: the_sort_of_a_cloud_finds_what_brute_force_finds quick;
             contact: eight_bodies_that_hit_each_other_keep_both_momenta quick;
             contact: a_debris_box_of_ten_bodies_keeps_both_momenta_and_its_energy quick;
             contact: a_debris_box_of_fifty_bodies_keeps_both_momenta_and_its_energy long;

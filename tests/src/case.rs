@@ -50,8 +50,11 @@ struct Row {
     miss: Option<String>,
 }
 
+/// Read when it is first asked for: its words are no part of the program, which knows figures that it has kept by that.
 static TABLE: LazyLock<BTreeMap<String, Row>> = LazyLock::new(|| {
-    toml::from_str(include_str!("../reference.toml")).expect("reference.toml holds rows of cases only")
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/reference.toml");
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{path}: {e}"));
+    toml::from_str(&text).expect("reference.toml holds rows of cases only")
 });
 
 /// Names of all cases of `reference.toml`.
@@ -155,6 +158,19 @@ impl Sheet {
         let case = Case::new(name, ours);
         println!("{case}");
         self.cases.push(case);
+    }
+
+    /// Figures by name, as they were added: what [`Sheet::of`] takes back.
+    pub fn figures(&self) -> Vec<(String, f64)> {
+        self.cases.iter().map(|case| (case.name.clone(), case.ours)).collect()
+    }
+
+    /// Figures that were computed before, compared with the rows as they are now.
+    ///
+    /// # Panics
+    /// If one has no row.
+    pub fn of(figures: &[(String, f64)]) -> Self {
+        Self { cases: figures.iter().map(|(name, ours)| Case::new(name, *ours)).collect() }
     }
 
     /// Whether every case holds, or misses for the reason that its row gives.

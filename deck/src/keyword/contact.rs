@@ -125,7 +125,7 @@ impl ContactCard {
             return None;
         }
         let second = if f.id(1) == 0 { None } else { Some(Side::read(&f, 1, false)?) };
-        Some(Self { at: f.at, first: Side::read(&f, 0, true)?, second, friction: 0.0 })
+        Some(Self { at: f.at, first: Side::read(&f, 0, true)?, second, friction: 0.0, erodes: false })
     }
 
     /// Pairs of different parts of a transducer among those that meet: one of its own, then the other.

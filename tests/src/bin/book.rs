@@ -2,14 +2,16 @@
 //!
 //! `cargo run --release -p tests --bin book -- [--quick] [WORD]...`
 //!
-//! With words, only cases whose name contains one of them; with `--quick`, only those of the suite. The file is written
-//! when all cases were computed. The program fails if a figure missed whose row does not give the reason.
+//! With words, only cases whose name contains one of them; with `--quick`, only those of the suite. Figures are kept beside
+//! the program, by the digest of its own bytes: without words, what this very program has computed before is not computed
+//! again, so that long cases may be computed on their own before. The file is written as soon as the program has figures of
+//! all cases. The program fails if a figure missed whose row does not give the reason, or did not though its row does.
 
 use std::{
     collections::BTreeMap,
     fmt::Write as _,
     panic::catch_unwind,
-    path::Path,
+    path::{Path, PathBuf},
     process::ExitCode,
     sync::{
         Mutex, PoisonError,
@@ -42,17 +44,33 @@ fn main() -> ExitCode {
         eprintln!("no case is called so; they are\n{}", names.join("\n"));
         return ExitCode::from(2);
     }
-    let done = compute(&chosen);
+    let shelf = match Shelf::of_this_program() {
+        Ok(shelf) => shelf,
+        Err(error) => {
+            eprintln!("no place beside the program to keep figures: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    let missing: Vec<&Entry> =
+        chosen.iter().filter(|entry| !words.is_empty() || shelf.take(entry).is_none()).copied().collect();
+    let computed = compute(&missing, &shelf);
+    let of = |entry: &Entry| match missing.iter().position(|other| other.name == entry.name) {
+        Some(at) => computed[at].clone(),
+        None => shelf.take(entry).ok_or_else(|| "not computed".to_owned()),
+    };
     let mut fine = true;
-    for (entry, done) in chosen.iter().zip(&done) {
-        if let Err(words) = done {
+    for entry in &chosen {
+        let done = of(entry);
+        if let Err(words) = &done {
             println!("{}: broke off: {words}", entry.name);
         }
-        fine &= done.as_ref().is_ok_and(Sheet::is_as_stated);
+        fine &= done.is_ok_and(|sheet| sheet.is_as_stated());
     }
-    if chosen.len() == ENTRIES.len() {
+    let all: Vec<&Entry> = ENTRIES.iter().collect();
+    let done: Vec<Done> = all.iter().map(|entry| of(entry)).collect();
+    if chosen.len() == ENTRIES.len() || done.iter().all(Result::is_ok) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("VERIFICATION.md");
-        if let Err(error) = std::fs::write(&path, table(&chosen, &done)) {
+        if let Err(error) = std::fs::write(&path, table(&all, &done)) {
             eprintln!("{}: {error}", path.display());
             return ExitCode::FAILURE;
         }
@@ -61,8 +79,46 @@ fn main() -> ExitCode {
     if fine { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
+/// Figures that this program has computed, one file for each case.
+struct Shelf(PathBuf);
+
+impl Shelf {
+    /// The folder beside the program that is named after the digest of its bytes.
+    fn of_this_program() -> std::io::Result<Self> {
+        let program = std::env::current_exe()?;
+        let digest = blake3::hash(&std::fs::read(&program)?).to_hex();
+        let folder = program.with_file_name(format!("book-{}", &digest[..16]));
+        std::fs::create_dir_all(&folder)?;
+        Ok(Self(folder))
+    }
+
+    fn path(&self, entry: &Entry) -> PathBuf {
+        self.0.join(entry.name.replace(": ", "-")).with_extension("json")
+    }
+
+    /// What was kept of a case.
+    fn take(&self, entry: &Entry) -> Option<Sheet> {
+        let text = std::fs::read(self.path(entry)).ok()?;
+        // Bits, because a figure may be no number.
+        let kept: Vec<(String, u64)> = serde_json::from_slice(&text).ok()?;
+        Some(Sheet::of(
+            &kept.into_iter().map(|(name, bits)| (name, f64::from_bits(bits))).collect::<Vec<_>>(),
+        ))
+    }
+
+    /// Keeps the figures of a case. A disk that does not take them costs computing them again.
+    fn keep(&self, entry: &Entry, sheet: &Sheet) {
+        let bits: Vec<(String, u64)> =
+            sheet.figures().into_iter().map(|(name, ours)| (name, ours.to_bits())).collect();
+        let text = serde_json::to_vec(&bits).expect("names and numbers");
+        if let Err(error) = std::fs::write(self.path(entry), text) {
+            eprintln!("{}: {error}", self.path(entry).display());
+        }
+    }
+}
+
 /// Computes entries on as many threads as there are cores, each entry on one.
-fn compute(entries: &[&Entry]) -> Vec<Done> {
+fn compute(entries: &[&Entry], shelf: &Shelf) -> Vec<Done> {
     let next = AtomicUsize::new(0);
     let done: Vec<Mutex<Done>> = entries.iter().map(|_| Mutex::new(Err("not begun".to_owned()))).collect();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -78,6 +134,9 @@ fn compute(entries: &[&Entry]) -> Vec<Done> {
                             .unwrap_or("no words")
                             .to_owned()
                     });
+                    if let Ok(sheet) = &result {
+                        shelf.keep(entry, sheet);
+                    }
                     *done[at].lock().unwrap_or_else(PoisonError::into_inner) = result;
                 }
             });

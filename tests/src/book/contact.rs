@@ -439,7 +439,7 @@ pub(super) fn meshes_of_three_and_five_faces_press_on_each_other_evenly(sheet: &
         assert_eq!(pressure.len(), [9, 25][part]);
         let all = mean(pressure.iter().copied());
         let off = pressure.iter().map(|p| (p / all - 1.0).abs()).fold(0.0, f64::max);
-        println!("{name}: greatest deviation of a single element {:.1} %", 100.0 * off);
+        sheet.add(&format!("mismatch @ {name} side, greatest deviation of a single element"), off);
         sheet.add(&format!("mismatch @ {name} side, pressure (GPa)"), all);
         let variation = mean(pressure.iter().map(|p| (p / all - 1.0).powi(2))).sqrt();
         sheet.add(&format!("mismatch @ {name} side, variation of pressure"), variation);

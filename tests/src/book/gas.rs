@@ -4,7 +4,7 @@ use mechanics::state::field;
 
 use crate::{
     case::Sheet,
-    solve::{Solved, mean, model, run},
+    solve::{Solved, crossing, mean, model, run},
 };
 
 fn gas(gamma: f64, density: f64, energy: f64) -> String {
@@ -90,6 +90,11 @@ pub(super) fn sods_tube_has_its_plateaus_and_its_shock_in_place(sheet: &mut Shee
         .filter(|n| (0.70..0.81).contains(&solved.state.x[**n as usize][0]))
         .map(|n| solved.state.v[*n as usize][0]);
     sheet.add("Sod: velocity between rarefaction and shock", mean(speed));
+    let front = crossing(
+        cells.iter().filter(|c| c.0[0] > 0.75).map(|(x, rho, _)| (x[0], *rho)),
+        0.5 * (0.265_574 + 0.125),
+    );
+    sheet.add("Sod: place of the shock", front.expect("the shock is in the tube"));
     // Energy by mass is E over density at first; at the contact the start leaves an overshoot that stays.
     let energy = |e: usize, first: f64| solved.state.elements[field::ENERGY][e] / first;
     let beside =
@@ -126,10 +131,28 @@ fn noh(directions: usize, cells: u32) -> Solved {
     run(model)
 }
 
+/// Cells along an edge for so many directions.
+fn cells_of(directions: usize) -> u32 {
+    if directions == 1 { 200 } else { 60 }
+}
+
 pub(super) fn gas_that_runs_together_is_compressed_as_noh_says(sheet: &mut Sheet) {
-    for (directions, cells, name) in [(1, 200, "plane"), (2, 60, "cylinder"), (3, 60, "sphere")] {
-        let solved = noh(directions, cells);
-        let shocked: Vec<(f64, usize)> = profile(&solved, &[1.0])
+    for (directions, name) in [(1, "plane"), (2, "cylinder"), (3, "sphere")] {
+        let solved = noh(directions, cells_of(directions));
+        let cells = profile(&solved, &[1.0]);
+        // Along the axis x from outside, where the density passes the middle between those before and behind the shock.
+        let side = 1.0 / f64::from(cells_of(directions));
+        let mut axis: Vec<(f64, f64)> = cells
+            .iter()
+            .filter(|(x, ..)| x[1] < side && x[2] < side && x[0] > 0.1)
+            .map(|(x, rho, _)| (x[0], *rho))
+            .collect();
+        axis.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let ahead = (1.0 + 0.6 / 0.2_f64).powi(directions as i32 - 1);
+        let half = 0.5 * (4.0_f64.powi(directions as i32) + ahead);
+        let front = crossing(axis.into_iter(), half).expect("the shock has left the origin");
+        sheet.add(&format!("Noh @ {name}, radius of the shock"), front);
+        let shocked: Vec<(f64, usize)> = cells
             .into_iter()
             .filter(|(x, ..)| {
                 let r = x[..directions].iter().map(|c| c * c).sum::<f64>().sqrt();

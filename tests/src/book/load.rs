@@ -3,9 +3,11 @@
 //!
 //! Bars are columns of cubes without Poisson's ratio, 200 GPa and 8000 kg/m3: waves of 5000 m/s, 40 MPa s/m.
 
+use master::event::Options;
+
 use crate::{
     case::Sheet,
-    solve::{Solved, mean, model, run},
+    solve::{Crew, Solved, mean, model, run, solve},
 };
 
 const IMPEDANCE: f64 = 4e7;
@@ -139,6 +141,28 @@ pub(super) fn a_wall_of_finite_mass_is_slowed_by_the_bar_it_strikes(sheet: &mut 
     sheet.add("wall of finite mass: momentum that it gave", last.momentum[0] / given);
     let work = 0.5 * heavy * 100.0 * (1.0 - (-2.0 * decay * (last.time + 0.5 * last.dt)).exp());
     sheet.add("wall of finite mass: work that it did", last.external / work);
+}
+
+pub(super) fn what_bodies_lose_a_wall_of_finite_mass_has(sheet: &mut Sheet) {
+    // A cube of copper strikes it askew and leaves it; the state is looked at in free flight.
+    let deck = "title = \"impulse\"\nunits = \"SI\"\n[control]\nend_cycle = 500\nend_time = 1\n\
+        [[part]]\nname = \"cube\"\nmaterial = \"CU_OFHC\"\nvelocity = [60, 0, -80]\n\
+        box = { origin = [0, 0, 1e-5], size = [0.01, 0.01, 0.01], cells = [5, 5, 5] }\n\
+        [[wall]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\nmass = 0.05\nfriction = 0.2\n";
+    let options = Options { snapshot_at: Some(490), ..Options::default() };
+    let solved = solve(model(deck), Crew { options, ..Crew::default() }).expect("a cube bounces");
+    let snapshot = solved.snapshot.as_ref().expect("it was asked for");
+    let [_, wall] = snapshot.walls[0];
+    let momentum =
+        |v: &[[f64; 3]], a: usize| -> f64 { v.iter().zip(&snapshot.state.mass).map(|(v, m)| m * v[a]).sum() };
+    for (axis, name) in [(2, "along its normal"), (0, "across it")] {
+        let lost = momentum(&solved.model.velocity, axis) - momentum(&snapshot.state.v, axis);
+        assert!(lost.abs() > 0.01, "it has met the wall: {lost}");
+        sheet.add(
+            &format!("wall of finite mass @ impulse {name}, over what the cube lost"),
+            0.05 * wall[axis] / lost,
+        );
+    }
 }
 
 pub(super) fn a_driven_wall_pushes_as_a_bar_that_strikes_it_is_pushed(sheet: &mut Sheet) {

@@ -240,6 +240,7 @@ const AL_2024: [f64; 4] = [2785.0, 5328.0, 1.338, 2.0];
 const STEEL_1006: [f64; 4] = [7896.0, 4569.0, 1.49, 2.17];
 const STEEL_4340: [f64; 4] = [7830.0, 4569.0, 1.49, 2.17];
 const TUNGSTEN: [f64; 4] = [17000.0, 4029.0, 1.237, 1.54];
+const LEAD: [f64; 4] = [11340.0, 2006.0, 1.429, 2.74];
 
 fn shocked([density, c0, s, gamma]: [f64; 4], strength: &str) -> String {
     format!(
@@ -381,6 +382,7 @@ pub(super) fn an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longit
         ("steel 1006", STEEL_1006, 81.8e9, 350e6, 200.0, 400),
         ("steel 4340", STEEL_4340, 77e9, 792e6, 300.0, 400),
         ("tungsten alloy", TUNGSTEN, 160e9, 1506e6, 300.0, 400),
+        ("lead", LEAD, 8.6e9, 8e6, 20.0, 1000),
     ] {
         let strength =
             format!("{{ type = \"von-mises\", shear = {shear:e}, yield_stress = {yield_stress:e} }}");

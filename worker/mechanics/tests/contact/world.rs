@@ -193,3 +193,16 @@ pub fn block(cells: [u32; 3], h: f64) -> Mesh {
     add_block(&mut mesh, cells, [0.0; 3], h);
     mesh
 }
+
+/// A world's total force and moment about the origin, over all batch nodes.
+pub fn totals(world: &World) -> ([f64; 3], [f64; 3]) {
+    let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
+    for n in 0..world.batch.nodes.len() {
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            force[a] += world.f[a][n];
+            moment[a] += world.x[b][n] * world.f[c][n] - world.x[c][n] * world.f[b][n];
+        }
+    }
+    (force, moment)
+}

@@ -302,6 +302,20 @@ pub fn carry(
     compute(block, material, step, Width::best())
 }
 
+/// Swells a cube evenly to `v` in 1000 steps without viscosity; calls `see` with volume and pressure after each.
+pub fn swell(material: &Material, piece: &Piece, v: f64, mut see: impl FnMut(f64, f64)) {
+    let mut block = Block::new(piece);
+    let before = block.field(0, field::RELATIVE_VOLUME);
+    let side = (v / before).powf(1.0 / 3e3);
+    // v = g x with the end positions x (1 + g dt): the sides grow by the same ratio in every step.
+    let step = bare_step(1e-6, 1e12, 1e12);
+    for _ in 0..1000 {
+        let g = (side - 1.0) / step.dt;
+        carry(&mut block, material, &step, |x| x.map(|c| g * c));
+        see(block.field(0, field::RELATIVE_VOLUME), block.field(0, field::PRESSURE));
+    }
+}
+
 /// Cauchy stress of an element, by rows.
 pub fn stress(block: &Block, element: usize) -> [[f64; 3]; 3] {
     let s = |field: usize| block.field(element, field);

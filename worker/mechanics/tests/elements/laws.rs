@@ -9,20 +9,6 @@ use mechanics::{
 
 use crate::bodies::*;
 
-/// Swells a cube evenly to `v` in 1000 steps without viscosity; calls `see` with volume and pressure after each.
-fn swell(material: &Material, piece: &Piece, v: f64, mut see: impl FnMut(f64, f64)) {
-    let mut block = Block::new(piece);
-    let before = block.field(0, field::RELATIVE_VOLUME);
-    let side = (v / before).powf(1.0 / 3e3);
-    // v = g x with the end positions x (1 + g dt): the sides grow by the same ratio in every step.
-    let step = bare_step(1e-6, 1e12, 1e12);
-    for _ in 0..1000 {
-        let g = (side - 1.0) / step.dt;
-        carry(&mut block, material, &step, |x| x.map(|c| g * c));
-        see(block.field(0, field::RELATIVE_VOLUME), block.field(0, field::PRESSURE));
-    }
-}
-
 #[test]
 fn a_gas_keeps_p_v_gamma_in_compression_and_expansion() {
     for gamma in [1.4, 5.0 / 3.0] {
