@@ -420,7 +420,7 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
             "a.k:24:8: read 3.0; expected FAILTM blank: elements do not leave",
         ),
         ("*MAT_ADD_EROSION\n1\n\n1\n", "a.k:25:1: read 1; expected IDAM blank: damage models"),
-        ("*MAT_ADD_EROSION\n1,,1.0,,,,,2\n", "a.k:23:13: read 2; expected NCS 0 or 1"),
+        ("*MAT_ADD_EROSION\n1,,1.0,,,,,2\n", "a.k:23:12: read 2; expected NCS 0 or 1"),
         (
             "*MAT_PLASTIC_KINEMATIC\n2,7.85e-9,2.1e5,0.3,300.\n,,-0.8\n",
             "a.k:24:3: read -0.8; expected a failure strain of 0 or above",
