@@ -105,7 +105,7 @@ fn parts_become_rigid_and_join_a_body_by_card_by_set_and_by_the_nodes_they_share
         .filter_map(|body| body.courant)
         .map(|(dt, _)| dt)
         .fold(f64::INFINITY, f64::min);
-    let sound = (2.1e5 / 7.85e-9 * (0.7 / (1.3 * 0.4)) as f64).sqrt();
+    let sound = f64::sqrt(2.1e5 / 7.85e-9 * 0.7 / (1.3 * 0.4));
     assert!((step / (10.0 / sound) - 1.0).abs() < 1e-9, "{step}");
 }
 
