@@ -135,7 +135,7 @@ pub(super) fn a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant(she
     };
     for (name, time) in [("early", 1e-5), ("late", 3e-5)] {
         let (v, t) = at(time);
-        sheet.add(&format!("mass on bar: velocity over that of the formula, {name}"), v / formula(t));
+        sheet.add(&format!("mass on bar: velocity over that of the formula @ {name}"), v / formula(t));
     }
     sheet.add("mass on bar: energy error", solved.outcome.ledger.last.error);
 }
