@@ -115,16 +115,19 @@ impl Domain {
         }
     }
 
-    /// What pushes the bodies here, to travel; numbers that are none where a force is none.
+    /// What pushes the bodies here, to travel, and zeros to the end of the entries that stand for it: with moments an entry
+    /// has twice the numbers.
     pub(super) fn pack_pushes(&self, out: &mut Vec<f64>) {
         if self.sends_pushes {
+            let filled = out.len() + self.n_pushes();
             self.bodies.iter().for_each(|held| out.extend(held.push.pack()));
+            out.resize(filled, 0.0);
         }
     }
 
-    /// Numbers of totals that are pushes on bodies.
+    /// Numbers of totals that stand for pushes on bodies.
     pub(super) fn n_pushes(&self) -> usize {
-        if self.sends_pushes { PUSH * self.bodies.len() } else { 0 }
+        if self.sends_pushes { self.stride() * rigid::entries(self.bodies.len()).len() } else { 0 }
     }
 
     /// Moves the bodies to `t_{n+1}` by the totals of their pushes (those here, if they do not travel), and gives their
