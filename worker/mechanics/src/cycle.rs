@@ -731,7 +731,7 @@ impl Domain {
         total
     }
 
-    /// Numbers that travel for each node of the exchange.
+    /// Numbers that travel for each entry of the exchange.
     fn stride(&self) -> usize {
         if self.moments { 6 } else { 3 }
     }

@@ -132,7 +132,7 @@ impl Domain {
         }
     }
 
-    /// Numbers of totals that are pushes on bodies.
+    /// Numbers of totals that stand for pushes on bodies.
     pub(super) fn n_pushes(&self) -> usize {
         if self.sends_pushes { ENTRIES as usize * self.stride() * self.bodies.len() } else { 0 }
     }
