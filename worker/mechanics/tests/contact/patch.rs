@@ -2,7 +2,7 @@
 
 use mechanics::mesh::Mesh;
 
-use crate::world::{Random, World, add_block, block, deform, with_probe};
+use crate::world::{Random, add_block, block, deform, with_probe};
 
 /// Half the harmonic mean of `K A^2/V = 1` on both sides.
 const K: f64 = 0.5;

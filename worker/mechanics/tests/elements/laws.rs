@@ -1,7 +1,7 @@
 //! Laws in an element: adiabats, failure.
 
 use mechanics::{
-    block::{Block, Piece},
+    block::Block,
     element::Step,
     material::{Eos, Failure, Material, Strength},
     state::field,
