@@ -92,6 +92,19 @@ impl Limits {
     }
 }
 
+/// Card and field of a criterion, its name, and our keys for a limit above 0 and for one below. Strains are logarithmic.
+const CRITERIA: [((usize, usize), &str, [Option<&str>; 2]); 9] = [
+    ((0, 2), "MXPRES", [Some("pressure"), None]),
+    ((0, 3), "MNEPS", [None, Some("compressive_strain")]),
+    ((0, 4), "EFFEPS", [Some("geometric_strain"), Some("plastic_strain")]),
+    ((0, 5), "VOLEPS", [Some("expansion"), Some("compaction")]),
+    ((1, 0), "MNPRES", [None, Some("tension")]),
+    ((1, 1), "SIGP1", [Some("principal_stress"), None]),
+    ((1, 2), "SIGVM", [Some("von_mises"), None]),
+    ((1, 3), "MXEPS", [Some("principal_strain"), None]),
+    ((1, 4), "EPSSH", [Some("shear_strain"), None]),
+];
+
 /// Reads `*MAT_ADD_EROSION`: the number of its material, and its limits. Every criterion that is not one of ours is a fault at
 /// its field.
 pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
@@ -104,19 +117,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
         let value = f[card].real(i, 0.0);
         (value != 0.0 && value != excluded && value.abs() < NEVER).then_some(value)
     };
-    // Card, field, name; keys for what is above 0 and for what is below. Strains are logarithmic.
-    const CRITERIA: [(usize, usize, &str, Option<&str>, Option<&str>); 9] = [
-        (0, 2, "MXPRES", Some("pressure"), None),
-        (0, 3, "MNEPS", None, Some("compressive_strain")),
-        (0, 4, "EFFEPS", Some("geometric_strain"), Some("plastic_strain")),
-        (0, 5, "VOLEPS", Some("expansion"), Some("compaction")),
-        (1, 0, "MNPRES", None, Some("tension")),
-        (1, 1, "SIGP1", Some("principal_stress"), None),
-        (1, 2, "SIGVM", Some("von_mises"), None),
-        (1, 3, "MXEPS", Some("principal_strain"), None),
-        (1, 4, "EPSSH", Some("shear_strain"), None),
-    ];
-    for (card, i, name, above, below) in CRITERIA {
+    for ((card, i), name, [above, below]) in CRITERIA {
         let Some(value) = given(card, i) else { continue };
         let (key, sign) = if value > 0.0 { (above, "above") } else { (below, "below") };
         match key {
