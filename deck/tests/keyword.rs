@@ -264,14 +264,10 @@ fn materials_with_a_failure_strain_a_failure_law_or_a_least_step_erode_by_it() {
     assert!(!of("*MAT_024\n1,7.85e-9,2.1e5,0.3,300.,,1e21\n").erosion.is_on());
     // Johnson and Cook: D1 to D5, and EROD in the card of D5.
     let cook = |last: &str| {
-        let deck = cube(&format!("*EOS_GRUNEISEN\n1,3.9e6,1.49,,,2.0\n"))
-            .replace("\n1,1,1\n", "\n1,1,1,1\n")
-            .replace(
-                "*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n",
-                &format!(
-                    "*MAT_JOHNSON_COOK\n1,7.85e-9,8e4\n300.,200.,0.3,0.01\n,,,,0.1,0.2,-1.5,0.0\n{last}\n"
-                ),
-            );
+        let deck = cube("*EOS_GRUNEISEN\n1,3.9e6,1.49,,,2.0\n").replace("\n1,1,1\n", "\n1,1,1,1\n").replace(
+            "*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n",
+            &format!("*MAT_JOHNSON_COOK\n1,7.85e-9,8e4\n300.,200.,0.3,0.01\n,,,,0.1,0.2,-1.5,0.0\n{last}\n"),
+        );
         read(&deck).unwrap_or_else(|f| panic!("{}", lines(&f))).setup
     };
     assert_eq!(cook("0.0").erosion.parts, [Some(Criteria { failure: true, ..none })]);

@@ -216,10 +216,8 @@ fn eigenvalues(mut a: [[f64; 3]; 3]) -> [f64; 3] {
                 (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
             }
             let (rp, rq) = (a[p], a[q]);
-            for k in 0..3 {
-                a[p][k] = c * rp[k] - s * rq[k];
-                a[q][k] = s * rp[k] + c * rq[k];
-            }
+            a[p] = [0, 1, 2].map(|k| c * rp[k] - s * rq[k]);
+            a[q] = [0, 1, 2].map(|k| s * rp[k] + c * rq[k]);
         }
     }
     let mut values = [a[0][0], a[1][1], a[2][2]];
