@@ -88,7 +88,10 @@ macro_rules! each_case_of_the_book {
             shell: a_square_plate_rings_at_its_frequencies quick;
             shell: the_impulsive_panel_of_shells_is_dented_about_as_deep quick;
             shell: a_square_tube_folds_at_its_mean_crush_force long;
-            shell: other_tubes_fold_at_their_mean_crush_forces long;
+            shell: a_tube_that_feels_the_rate_folds_at_a_greater_force long;
+            shell: a_hexagonal_tube_folds_at_its_mean_crush_force long;
+            shell: a_thin_tube_that_was_tested_folds_at_its_mean_crush_force long;
+            shell: a_wide_tube_that_was_tested_folds_at_its_mean_crush_force long;
             shell: the_girder_folds_without_passing_through_itself long;
             load: a_pressure_by_curve_drives_a_wave_of_its_shape quick;
             load: a_velocity_by_curve_arrives_as_it_was_prescribed quick;

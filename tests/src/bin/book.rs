@@ -1,11 +1,11 @@
 //! The verification book: computes its cases, prints every figure, and writes the table of `tests/VERIFICATION.md`.
 //!
-//! `cargo run --release -p tests --bin book -- [--quick] [WORD]...`
+//! `cargo run --release -p tests --bin book -- [--quick | --kept] [WORD]...`
 //!
 //! With words, only cases whose name contains one of them; with `--quick`, only those of the suite. Figures are kept beside
 //! the program, by the digest of its own bytes: without words, what this very program has computed before is not computed
 //! again, so that long cases may be computed on their own before. The file is written as soon as the program has figures of
-//! all cases. The program fails if a figure missed whose row does not give the reason, or did not though its row does.
+//! all cases; `--kept` computes nothing and writes it of what there is, naming the cases that are not computed. The program fails if a figure missed whose row does not give the reason, or did not though its row does.
 
 use std::{
     collections::BTreeMap,
@@ -24,19 +24,23 @@ use tests::{
     case::{Case, Sheet, number},
 };
 
+/// What is said of a case of which there are no figures.
+const NOT_COMPUTED: &str = "it was not computed when this file was written";
+
 /// What came of an entry: its figures, or what it said when it broke off.
 type Done = Result<Sheet, String>;
 
 fn main() -> ExitCode {
     let (flags, words): (Vec<String>, Vec<String>) =
         std::env::args().skip(1).partition(|argument| argument.starts_with("--"));
-    if let Some(flag) = flags.iter().find(|flag| *flag != "--quick") {
-        eprintln!("{flag}: read --quick, or words of the names of cases");
+    if let Some(flag) = flags.iter().find(|flag| !["--quick", "--kept"].contains(&flag.as_str())) {
+        eprintln!("{flag}: read --quick, --kept, or words of the names of cases");
         return ExitCode::from(2);
     }
+    let has = |flag: &str| flags.iter().any(|other| other == flag);
     let chosen: Vec<&Entry> = ENTRIES
         .iter()
-        .filter(|entry| flags.is_empty() || entry.quick)
+        .filter(|entry| !has("--quick") || entry.quick)
         .filter(|entry| words.is_empty() || words.iter().any(|word| entry.name.contains(word)))
         .collect();
     if chosen.is_empty() {
@@ -51,18 +55,18 @@ fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
-    let missing: Vec<&Entry> =
-        chosen.iter().filter(|entry| !words.is_empty() || shelf.take(entry).is_none()).copied().collect();
+    let wanted = |entry: &&&Entry| !has("--kept") && (!words.is_empty() || shelf.take(entry).is_none());
+    let missing: Vec<&Entry> = chosen.iter().filter(wanted).copied().collect();
     let computed = compute(&missing, &shelf);
     let of = |entry: &Entry| match missing.iter().position(|other| other.name == entry.name) {
         Some(at) => computed[at].clone(),
-        None => shelf.take(entry).ok_or_else(|| "not computed".to_owned()),
+        None => shelf.take(entry).ok_or_else(|| NOT_COMPUTED.to_owned()),
     };
     let mut fine = true;
     for entry in &chosen {
         let done = of(entry);
         if let Err(words) = &done {
-            println!("{}: broke off: {words}", entry.name);
+            println!("{}: no figures: {words}", entry.name);
         }
         fine &= done.is_ok_and(|sheet| sheet.is_as_stated());
     }
@@ -174,7 +178,7 @@ fn table(entries: &[&Entry], done: &[Done]) -> String {
     for ((entry, done), rows) in entries.iter().zip(done).zip(&rows) {
         let _ = write!(out, "\n## {}\n\n", entry.name.replace('_', " "));
         if let Err(words) = done {
-            let _ = writeln!(out, "Broke off: {words}\n");
+            let _ = writeln!(out, "No figures: {words}.");
             continue;
         }
         out += "| case | reference | source | ours | difference | tolerance | verdict |\n|---|---|---|---|---|---|---|\n";
