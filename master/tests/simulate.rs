@@ -368,7 +368,7 @@ fn half_a_bar_erodes() -> Model {
         name = "bar"
         material = "STEEL_1006"
         box = { origin = [0, 0, 0], size = [32, 8, 8], cells = [32, 8, 8] }
-        erosion = { compressive_strain = 0.1 }
+        erosion = { compressive_strain = 0.2 }
         [output]
         history_cycles = 1
         "#,
@@ -405,7 +405,7 @@ fn elements_lost_to_erosion_are_followed_within_two_boundaries() {
         cycles.last()
     );
     assert!((n / 4..n * 3 / 4).contains(&cycles.len()), "{} of {n}", cycles.len());
-    assert!(from > 25 && to < 120, "{from} to {to}");
+    assert!(from > 25 && to < 140, "{from} to {to}");
     for route in [Route::Direct, Route::Master] {
         let measured = Scheme { balance: Balance::Measured, ..Scheme::bolide(route) };
         let given = run(&model, &eight(Vec::new()), Scheme::bolide(route));
@@ -430,7 +430,8 @@ fn elements_lost_to_erosion_are_followed_within_two_boundaries() {
         ];
         println!("{route:?}: rebalanced at {at:?}; time over the bound {figures:.3?}");
         assert!(at.iter().all(|&cycle| (from..=settled).contains(&cycle)) && !at.is_empty(), "{at:?}");
-        assert!(figures[1] <= 1.0 / 0.95, "{route:?}: {figures:?}");
+        // The last twentieth leaves while this is taken, of the 128 elements that a host has.
+        assert!(figures[1] <= 1.15, "{route:?}: {figures:?}");
         assert!(figures[2] > 1.5, "{route:?}: without it some hosts have nothing to do: {figures:?}");
     }
 }

@@ -92,17 +92,34 @@ impl Limits {
     }
 }
 
-/// Card and field of a criterion, its name, and our keys for a limit above 0 and for one below. Strains are logarithmic.
-const CRITERIA: [((usize, usize), &str, [Option<&str>; 2]); 9] = [
-    ((0, 2), "MXPRES", [Some("pressure"), None]),
-    ((0, 3), "MNEPS", [None, Some("compressive_strain")]),
-    ((0, 4), "EFFEPS", [Some("geometric_strain"), Some("plastic_strain")]),
-    ((0, 5), "VOLEPS", [Some("expansion"), Some("compaction")]),
-    ((1, 0), "MNPRES", [None, Some("tension")]),
-    ((1, 1), "SIGP1", [Some("principal_stress"), None]),
-    ((1, 2), "SIGVM", [Some("von_mises"), None]),
-    ((1, 3), "MXEPS", [Some("principal_strain"), None]),
-    ((1, 4), "EPSSH", [Some("shear_strain"), None]),
+/// A limit of a card: its field, its name, and our keys for a value above 0 and for one below. Strains are logarithmic.
+struct Criterion {
+    /// Card and field.
+    at: [usize; 2],
+    name: &'static str,
+    above: Option<&'static str>,
+    below: Option<&'static str>,
+}
+
+const fn criterion(
+    at: [usize; 2],
+    name: &'static str,
+    above: Option<&'static str>,
+    below: Option<&'static str>,
+) -> Criterion {
+    Criterion { at, name, above, below }
+}
+
+const CRITERIA: [Criterion; 9] = [
+    criterion([0, 2], "MXPRES", Some("pressure"), None),
+    criterion([0, 3], "MNEPS", None, Some("compressive_strain")),
+    criterion([0, 4], "EFFEPS", Some("geometric_strain"), Some("plastic_strain")),
+    criterion([0, 5], "VOLEPS", Some("expansion"), Some("compaction")),
+    criterion([1, 0], "MNPRES", None, Some("tension")),
+    criterion([1, 1], "SIGP1", Some("principal_stress"), None),
+    criterion([1, 2], "SIGVM", Some("von_mises"), None),
+    criterion([1, 3], "MXEPS", Some("principal_strain"), None),
+    criterion([1, 4], "EPSSH", Some("shear_strain"), None),
 ];
 
 /// Reads `*MAT_ADD_EROSION`: the number of its material, and its limits. Every criterion that is not one of ours is a fault at
@@ -117,7 +134,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
         let value = f[card].real(i, 0.0);
         (value != 0.0 && value != excluded && value.abs() < NEVER).then_some(value)
     };
-    for ((card, i), name, [above, below]) in CRITERIA {
+    for Criterion { at: [card, i], name, above, below } in CRITERIA {
         let Some(value) = given(card, i) else { continue };
         let (key, sign) = if value > 0.0 { (above, "above") } else { (below, "below") };
         match key {

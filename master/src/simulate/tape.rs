@@ -112,7 +112,9 @@ impl Player {
     pub fn run(&mut self, task: Task) -> Result<(Outcome, Load), String> {
         match self {
             Self::Live { machine, load, kept } => {
-                let builds = matches!(task, Task::Load { .. } | Task::Install { .. });
+                // Elements erode where it integrates.
+                let builds =
+                    matches!(task, Task::Load { .. } | Task::Install { .. } | Task::Integrate { .. });
                 let kind = Kind::of(&task);
                 let clock = ThreadClock::default();
                 let mark = clock.start();

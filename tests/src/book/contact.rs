@@ -161,14 +161,14 @@ fn box_of(name: &str, (n_bodies, cycles, pace): (usize, u64, f64), sheet: &mut S
     );
     assert_eq!(state.cycle, cycles);
     let mesh = &solved.model.mesh;
-    sheet.add(&format!("{name}: momentum"), change(0) / scales[0]);
-    sheet.add(&format!("{name}: angular momentum"), change(3) / scales[1]);
-    sheet.add(&format!("{name}: greatest energy error"), worst_energy(&solved));
-    sheet.add(&format!("{name}: penetration (gaps)"), ledger.worst_penetration);
+    sheet.add(&format!("{name} @ momentum"), change(0) / scales[0]);
+    sheet.add(&format!("{name} @ angular momentum"), change(3) / scales[1]);
+    sheet.add(&format!("{name} @ greatest energy error"), worst_energy(&solved));
+    sheet.add(&format!("{name} @ penetration (gaps)"), ledger.worst_penetration);
     let inside: usize = solved.states.iter().map(|state| intruders(mesh, &state.x).len()).sum();
-    sheet.add(&format!("{name}: nodes in foreign bodies, all states"), inside as f64);
+    sheet.add(&format!("{name} @ nodes in foreign bodies, all states"), inside as f64);
     let through: usize = solved.states.iter().map(|state| crossed(mesh, &state.x).len()).sum();
-    sheet.add(&format!("{name}: faces gone through, all states"), through as f64);
+    sheet.add(&format!("{name} @ faces gone through, all states"), through as f64);
 }
 
 pub(super) fn a_debris_box_of_ten_bodies_keeps_both_momenta_and_its_energy(sheet: &mut Sheet) {

@@ -372,7 +372,7 @@ impl Tube {
             if below < self.fold {
                 let turns = y.atan2(*x).rem_euclid(2.0 * PI) / sector;
                 let (side, along) = ((turns + 1e-9).floor(), (turns + 1e-9).fract());
-                let sign = if side as u32 % 2 == 0 { 1.0 } else { -1.0 };
+                let sign = if (side as u32).is_multiple_of(2) { 1.0 } else { -1.0 };
                 let outward = (side + 0.5) * sector;
                 let by = 0.01 * self.width * sign * (PI * along).sin() * (PI * below / self.fold).sin();
                 (*x, *y) = (by.mul_add(outward.cos(), *x), by.mul_add(outward.sin(), *y));

@@ -27,8 +27,11 @@ fn difference(a: [f64; 3], b: [f64; 3]) -> f64 {
 const SQUARE: [[f64; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
 const WARPED: [[f64; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.2], [0., 1., 0.]];
 
+/// Point, nearest feature, distance, direction, weights of the corners.
+type Region = ([f64; 3], Feature, f64, [f64; 3], [f64; 4]);
+
 /// Points about the unit square: nearest feature, distance, direction from it, weights of the corners.
-const REGIONS: [([f64; 3], Feature, f64, [f64; 3], [f64; 4]); 12] = {
+const REGIONS: [Region; 12] = {
     const S3: f64 = 0.577_350_269_189_625_8;
     [
         ([0.5, 0.5, 0.05], Feature::Face, 0.05, [0., 0., 1.], [0.25; 4]),

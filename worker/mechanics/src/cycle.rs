@@ -838,10 +838,14 @@ impl Domain {
                 let half_steps = 0.5 * (dt_previous + dt);
                 room.booked.external += face::work(&room.faces, block, half_steps, advance.quanta.energy);
             }
-            // Loads leave with the faces of eroded elements.
-            if room.eroding.as_mut().is_some_and(Eroding::take_change) && !room.faces.is_empty() {
-                let material = &setup.materials[block.material as usize];
-                room.faces = face::faces_of(block, &setup.loads, material);
+            if room.eroding.as_mut().is_some_and(Eroding::take_change) {
+                // Sets without a living element are not computed any more, and loads leave with the faces of eroded elements.
+                room.border = living(&room.border, block.alive());
+                room.interior = living(&room.interior, block.alive());
+                if !room.faces.is_empty() {
+                    let material = &setup.materials[block.material as usize];
+                    room.faces = face::faces_of(block, &setup.loads, material);
+                }
             }
             meter.stop(mark, false);
         });

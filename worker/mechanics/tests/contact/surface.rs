@@ -64,7 +64,8 @@ fn whatever_elements_erode_the_surface_is_the_faces_that_one_living_element_has(
             for retain_inertia in [true, false] {
                 let erodes = vec![true; mesh.parts.len()];
                 let surface = Surface::eroded(&mesh, &materials(), &alive, &erodes, retain_inertia);
-                let mut found: Vec<[u32; 4]> = surface.faces.iter().map(|face| face.nodes).collect();
+                let mut found: Vec<[u32; 4]> =
+                    surface.faces.iter().map(|face| face.nodes.map(|n| surface.nodes[n as usize])).collect();
                 found.iter_mut().for_each(|nodes| nodes.sort_unstable());
                 found.sort_unstable();
                 assert_eq!(found, lone_faces(&mesh, &alive), "round {round}");
