@@ -1,7 +1,7 @@
 //! CONNECTION: one task per connection, from its first byte to its end. It carries, and decides nothing.
 //!
 //! TLS if there are certificates, the greeting, then messages of a worker to its job's thread, or requests of a client
-//! to the [`desk`](crate::desk). Every fault ends this connection with one line in the log, and nothing else.
+//! to the [`crate::desk`]. Every fault ends this connection with one line in the log, and nothing else.
 
 use std::{
     net::SocketAddr,

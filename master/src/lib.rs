@@ -4,7 +4,7 @@
 //! workers over links. [`daemon`] owns [`hosts`] and [`queue`]: each [`connection`] is one task that carries messages,
 //! the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
 //! [`lab`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`processes`] starts workers as
-//! children for one run, [`add`] over ssh. [`bench`] measures. [`simulate`] drives the sessions on an emulated cluster.
+//! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster.
 
 pub mod add;
 pub mod balance;

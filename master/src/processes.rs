@@ -86,7 +86,7 @@ impl Processes {
     /// Runs a job on them to its end.
     ///
     /// # Errors
-    /// As for [`drive`].
+    /// As for [`drive()`].
     pub fn run(
         &self,
         job: Job,

@@ -193,7 +193,7 @@ pub fn speeds_for(n: usize, given: &[f64]) -> Result<Vec<f64>, String> {
     Ok((0..n).map(|i| given.get(i).copied().unwrap_or(1.0)).collect())
 }
 
-/// Where a run writes: `--out`, or the folder it resumes from, or results/<deck name>.
+/// Where a run writes: `--out`, or the folder it resumes from, or `results/<deck name>`.
 pub fn folder_for(args: &RunArgs) -> PathBuf {
     let resumed = args.resume.clone().filter(|path| path.is_dir());
     args.out.clone().or(resumed).unwrap_or_else(|| {

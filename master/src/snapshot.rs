@@ -1,6 +1,6 @@
 //! Snapshots: the whole run at the start of a cycle, and how it gets to the disk and back.
 //!
-//! [`file`] is the form of one on disk, [`store`] a folder of two generations, [`keeper`] the thread that writes beside
+//! [`mod@file`] is the form of one on disk, [`store`] a folder of two generations, [`keeper`] the thread that writes beside
 //! the run. What a snapshot holds is decided by the job: it is one of its bases.
 
 pub mod file;

@@ -1,7 +1,7 @@
 //! PEERS: links between workers, on route direct.
 //!
 //! A worker listens for others ([`Peers`]) and tells the master the port. The master tells the workers of a job and
-//! epoch where they find each other and a secret that only they know ([`Circle`]); of two, the one with the higher
+//! epoch where they find each other and a secret that only they know (`Circle`); of two, the one with the higher
 //! index dials. Whoever calls shows a certificate of a worker where certificates are in use, then the secret and its
 //! index. A bad caller costs one line in the log. From then on both sides send cycle frames only, whose header must
 //! name job, epoch and the sender's incarnation.

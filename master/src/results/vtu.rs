@@ -1,7 +1,7 @@
 //! States as VTK unstructured grids, and the index of them.
 //!
 //! A file holds one piece: points, hexahedra and appended arrays, little-endian with 64-bit sizes, each taken from
-//! the state as it is written, raw or compressed ([`appended`]). The corner order of [`mechanics`] is that of VTK's
+//! the state as it is written, raw or compressed (`appended`). The corner order of [`mechanics`] is that of VTK's
 //! cell type 12. Format: the VTK file format documentation, section "XML file formats". [`read`] reads the files back.
 
 use std::{io, io::Write, path::Path};

@@ -4,7 +4,7 @@
 //! Emulated time is time since the start over the *dilation*. Every worker computes on a thread of this machine; then it
 //! waits until what the task is charged on its host, by the same [`Costs`](super::machines::Costs) as under the
 //! virtual clock, has gone by since the task's start, times the dilation. Messages are frames over loopback TCP that
-//! pass shaped [`wires`]; what they cost a processor is charged to the hosts at both ends, and the master shares host 1,
+//! pass shaped `wires`; what they cost a processor is charged to the hosts at both ends, and the master shares host 1,
 //! in the ranks of [`Processor`]. A task that is not done when its charge is over is an *overrun*: it makes its host
 //! slower than it should be. Where more than [`OVERRUN_LIMIT`] of the tasks are, the figure is of no use.
 //!

@@ -1,10 +1,10 @@
 //! Edges against edges, where the deck asks for it: what crosses without a node in any zone.
 //!
 //! Of two bodies that cross so, one does it with an edge that sticks out: one at which two faces meet at a convex angle, or
-//! the rim of a shell ([`features`]). The other edge may have been flat at the start, as a mesh line of a face into which the
-//! first is pressed; only hollow ones are left out. The master pairs them up with the sort ([`mod@sort`]); a worker computes the pairs of its units each
-//! cycle ([`cycle`]) from the closest points of the two lines and a weight that hands over to the nodes at the ends
-//! ([`zone`]).
+//! the rim of a shell (`features`). The other edge may have been flat at the start, as a mesh line of a face into which the
+//! first is pressed; only hollow ones are left out. The master pairs them up with the sort (`sort`); a worker computes the pairs of its units each
+//! cycle (`cycle`) from the closest points of the two lines and a weight that hands over to the nodes at the ends
+//! (`zone`).
 //!
 //! The spring of a pair has the energy `W k (gap - d)^2 / 2`, where `d` is the distance of the closest points and `W` is 1
 //! where all four end nodes are farther than a gap from the other edge, seen along the line of the closest points, and
