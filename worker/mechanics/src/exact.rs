@@ -7,6 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::lanes::Lane;
+
 /// A power of two to whose multiples terms of one kind are rounded before they are added.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quantum {
@@ -67,6 +69,15 @@ impl Quantum {
     pub fn rescale_bound(self) -> f64 {
         self.q * 17_592_186_044_416.0
     }
+}
+
+/// Whether sums are exact: always, but in builds that measure what that costs (feature `plain-sums`).
+pub(crate) const EXACT: bool = !cfg!(feature = "plain-sums");
+
+/// Each lane rounded to the nearest multiple of the quantum whose [`Quantum::magic`] this is, as [`Quantum::round`] does it.
+#[inline(always)]
+pub(crate) fn rounded<L: Lane>(x: L, magic: L) -> L {
+    if EXACT { (x + magic) - magic } else { x }
 }
 
 /// `2^exponent` for exponents of normal numbers.

@@ -10,6 +10,7 @@ use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     contact::Extent,
     element::vector::Vector,
+    exact::rounded,
     lanes::{Lane, SET, Width, scalar::Scalar},
     load::Loads,
     setup::Constraint,
@@ -300,15 +301,15 @@ impl Advance<'_> {
         if body.is_some() {
             let mean = Vector { x: old.x + new.x, y: old.y + new.y, z: old.z + new.z };
             let work = L::splat(0.5) * mass * change.dot(&mean);
-            tally.body_work = tally.body_work + L::select(booked, (work + energy) - energy, zero);
+            tally.body_work = tally.body_work + L::select(booked, rounded(work, energy), zero);
         }
         let kinetic = L::splat(0.5) * mass * old.dot(&new);
-        tally.kinetic = tally.kinetic + L::select(booked, (kinetic + energy) - energy, zero);
+        tally.kinetic = tally.kinetic + L::select(booked, rounded(kinetic, energy), zero);
         let momentum = L::splat(self.quanta.momentum.magic());
         let carried = new.scaled(mass);
-        tally.momentum.x = tally.momentum.x + L::select(booked, (carried.x + momentum) - momentum, zero);
-        tally.momentum.y = tally.momentum.y + L::select(booked, (carried.y + momentum) - momentum, zero);
-        tally.momentum.z = tally.momentum.z + L::select(booked, (carried.z + momentum) - momentum, zero);
+        tally.momentum.x = tally.momentum.x + L::select(booked, rounded(carried.x, momentum), zero);
+        tally.momentum.y = tally.momentum.y + L::select(booked, rounded(carried.y, momentum), zero);
+        tally.momentum.z = tally.momentum.z + L::select(booked, rounded(carried.z, momentum), zero);
 
         if set.surface != 0 {
             // SAFETY: the caller's promise.

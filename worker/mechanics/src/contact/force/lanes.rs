@@ -5,7 +5,7 @@ use super::BOTH_SIDES;
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     contact::pairs::Pairs,
-    exact::Quantum,
+    exact::{Quantum, rounded},
     lanes::{Lane, SET, Width, scalar::Scalar},
 };
 
@@ -163,10 +163,10 @@ unsafe fn kernel<L: Lane>(
             while a < 3 {
                 let force = normal * L::load(&pushes.direction[a], at);
                 let corners = [
-                    (-(weights[0] * force) + force_magic) - force_magic,
-                    (-(weights[1] * force) + force_magic) - force_magic,
-                    (-(weights[2] * force) + force_magic) - force_magic,
-                    (-(weights[3] * force) + force_magic) - force_magic,
+                    rounded(-(weights[0] * force), force_magic),
+                    rounded(-(weights[1] * force), force_magic),
+                    rounded(-(weights[2] * force), force_magic),
+                    rounded(-(weights[3] * force), force_magic),
                 ];
                 let node = -((corners[0] + corners[1]) + (corners[2] + corners[3]));
                 bound = node.abs().max(bound);
@@ -178,7 +178,7 @@ unsafe fn kernel<L: Lane>(
                 a += 1;
             }
             let stored = L::splat(0.5) * normal * depth;
-            energy = energy + ((stored + energy_magic) - energy_magic);
+            energy = energy + rounded(stored, energy_magic);
         }
         at += L::N;
     }

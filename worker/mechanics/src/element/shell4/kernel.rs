@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::geometry::{Geometry, dot};
 use crate::{
     element::{ElementVote, Fault, vector::Vector},
+    exact,
     lanes::{Lane, SET},
     strength::plane_stress::{Layer, Plane, PlaneLaw},
 };
@@ -330,10 +331,10 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         while axis < 3 {
             let f = L::select(computed, f[axis], zero);
             bound = bound.max_magnitude(f);
-            rounded[axis] = (f + force_magic) - force_magic;
+            rounded[axis] = exact::rounded(f, force_magic);
             let m = L::select(computed, m[axis], zero);
             bound = bound.max_magnitude(m * L::splat(c.inverse_arm));
-            turned[axis] = (m + moment_magic) - moment_magic;
+            turned[axis] = exact::rounded(m, moment_magic);
             axis += 1;
         }
         forces[i] = Vector { x: rounded[0], y: rounded[1], z: rounded[2] };
@@ -375,9 +376,9 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
     let courant = (mass / (L::splat(plate) * volume * largest)).sqrt().to_array();
     let energy_magic = L::splat(c.energy_magic);
     let internal = L::select(computed, state[INTERNAL], zero);
-    let internal = ((internal + energy_magic) - energy_magic).to_array();
+    let internal = exact::rounded(internal, energy_magic).to_array();
     let spent = L::select(computed, spent, zero);
-    let spent = ((spent + energy_magic) - energy_magic).to_array();
+    let spent = exact::rounded(spent, energy_magic).to_array();
     let (bound, volume) = (bound.to_array(), volume.to_array());
     let mut lane = 0;
     while lane < L::N {
