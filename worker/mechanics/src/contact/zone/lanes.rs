@@ -457,10 +457,15 @@ fn closest<L: Lane>(p: V<L>, x: &[V<L>; 4]) -> Point<L> {
     let (d0, d1) = (sub(x[2], x[0]), sub(x[3], x[1]));
     let area = cross(d0, d1);
     let size2 = dot(area, area);
+    let span2 = L::splat(0.5) * (dot(d0, d0) + dot(d1, d1));
+    // Twice as far from coplanar as the limit: no rounding makes such faces flat, and no root is needed to see it.
+    let volume = dot(area, edges[0]);
+    if !L::any((volume * volume).less_equal(L::splat(4.0 * COPLANAR * COPLANAR) * span2 * size2)) {
+        return on_triangles(p, x);
+    }
     let inverse_size = inverse(size2.sqrt());
     let normal = [inverse_size * area[0], inverse_size * area[1], inverse_size * area[2]];
     let offset = dot(normal, edges[0]);
-    let span2 = L::splat(0.5) * (dot(d0, d0) + dot(d1, d1));
     let coplanar = (offset * offset).less_equal(L::splat(COPLANAR * COPLANAR) * span2);
     if !L::any(coplanar) {
         return on_triangles(p, x);
