@@ -153,7 +153,10 @@ fn a_sheet_that_was_flat_meets_itself_where_it_has_folded() {
         let push = if edges { 0.5 * 0.1 * (gap - apart) } else { 0.0 };
         for (nodes, sign) in [(0..6, -1.0), (6..12, 1.0)] {
             let sum = [0, 1, 2].map(|a| world.f[a][nodes.clone()].iter().sum::<f64>());
-            assert!(sum[0] == 0.0 && sum[1] == 0.0 && (sum[2] - sign * push).abs() < 1e-12, "{edges}: {sum:?}");
+            assert!(
+                sum[0] == 0.0 && sum[1] == 0.0 && (sum[2] - sign * push).abs() < 1e-12,
+                "{edges}: {sum:?}"
+            );
         }
     }
 }
