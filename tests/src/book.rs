@@ -89,6 +89,7 @@ macro_rules! each_case_of_the_book {
             shell: the_impulsive_panel_of_shells_is_dented_about_as_deep quick;
             shell: a_square_tube_folds_at_its_mean_crush_force long;
             shell: a_tube_that_feels_the_rate_folds_at_a_greater_force long;
+            shell: a_tube_that_is_crushed_to_a_block_passes_nowhere_through_itself long;
             shell: a_hexagonal_tube_folds_at_its_mean_crush_force long;
             shell: a_thin_tube_that_was_tested_folds_at_its_mean_crush_force long;
             shell: a_wide_tube_that_was_tested_folds_at_its_mean_crush_force long;

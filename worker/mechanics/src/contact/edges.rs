@@ -1,7 +1,7 @@
 //! Edges against edges, where the deck asks for it: what crosses without a node in any zone.
 //!
 //! Of two bodies that cross so, one does it with an edge that sticks out: one at which two faces meet at a convex angle, or
-//! the rim of a shell (`features`). The other edge may have been flat at the start, as a mesh line of a face into which the
+//! any edge of a shell (`features`). The other edge may have been flat at the start, as a mesh line of a face into which the
 //! first is pressed; only hollow ones are left out. The master pairs them up with the sort (`sort`); a worker computes the pairs of its units each
 //! cycle (`cycle`) from the closest points of the two lines and a weight that hands over to the nodes at the ends
 //! (`zone`).

@@ -7,7 +7,8 @@ use mechanics::{
         Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, edges::EDGE, initial_edges,
         sort,
     },
-    mesh::Mesh,
+    element::shell4::Rule,
+    mesh::{Mesh, Part, Section, Topology},
 };
 
 use crate::world::{Random, World, add_block, block, deform, materials, on_surface, settings, without_self};
@@ -107,6 +108,56 @@ fn rims_and_convex_edges_stick_out_and_flat_and_hollow_ones_do_not() {
         let straight = n_sharp(&surface_of(&folded, &|_| true));
         deform(&mut folded, |p| if p[0] <= 1.0 { p } else { [p[0], p[1], p[2] - angle.to_radians().tan()] });
         assert_eq!(n_sharp(&surface_of(&folded, &|_| true)), straight + more, "{angle}");
+    }
+}
+
+/// Two sheets of one part, two elements of 1 by 2 each, a unit apart: what will be their folds runs along y in the lower,
+/// along x in the upper.
+fn two_sheets() -> Mesh {
+    let across = [-1.0, 0.0, 1.0].map(|c| [[c, -1.0], [c, 1.0]]).concat();
+    let lower = across.iter().map(|&[x, y]| [x, y, 0.0]);
+    let upper = across.iter().map(|&[y, x]| [x, y, 1.0]);
+    let positions: Vec<[f64; 3]> = lower.chain(upper).collect();
+    let quads = vec![[0, 2, 3, 1], [2, 4, 5, 3], [6, 7, 9, 8], [8, 9, 11, 10]];
+    let section = Section { thickness: 0.1, rule: Rule::Gauss(2) };
+    let part = Part {
+        name: "sheets".into(),
+        material: 0,
+        topology: Topology::Shells { quads, section },
+        nodes: (0..12).collect(),
+        element_ids: (1..=4).collect(),
+    };
+    Mesh { positions, node_ids: (1..=12).collect(), parts: vec![part] }
+}
+
+#[test]
+fn a_sheet_that_was_flat_meets_itself_where_it_has_folded() {
+    let (gap, apart) = (0.3, 0.12);
+    let (sine, cosine) = 60.0_f64.to_radians().sin_cos();
+    for edges in [true, false] {
+        let settings = Settings { edges, ..settings(1, gap, 10.0) };
+        let mut world = World::new(&two_sheets(), settings, &|_| true);
+        // The lower sheet hangs down from its fold, the upper stands up from its own.
+        for n in 0..12 {
+            let [x, y, z] = [0, 1, 2].map(|a| world.x[a][n]);
+            let folded = if z < 0.5 {
+                [x * cosine, y, -(x.abs() * sine)]
+            } else {
+                [x, y * cosine, y.abs().mul_add(sine, apart)]
+            };
+            world.place(n, folded);
+        }
+        let vote = world.forces(0.0);
+        assert_eq!(vote.hits, u64::from(edges), "no node is in a zone");
+        // K h of both, half of it by the factor of the settings.
+        let push = if edges { 0.5 * 0.1 * (gap - apart) } else { 0.0 };
+        for (nodes, sign) in [(0..6, -1.0), (6..12, 1.0)] {
+            let sum = [0, 1, 2].map(|a| world.f[a][nodes.clone()].iter().sum::<f64>());
+            assert!(
+                sum[0] == 0.0 && sum[1] == 0.0 && (sum[2] - sign * push).abs() < 1e-12,
+                "{edges}: {sum:?}"
+            );
+        }
     }
 }
 

@@ -1,5 +1,8 @@
 //! Which edges there are and which stick out: a rule on the initial geometry and on which elements are alive, so that it is static data like
 //! stiffness, and the same whenever the surface is collected.
+//!
+//! A sheet folds along any line of its mesh by any angle, and two folds cross far from all nodes, on either side of both: so
+//! every edge between shells sticks out, however flat the sheet was.
 
 use super::{
     super::surface::{Face, Surface},
@@ -14,7 +17,7 @@ const SHARP: f64 = 0.965_925_826_289_068_3;
 /// How the faces at an edge meet.
 #[derive(PartialEq)]
 enum Shape {
-    /// At a convex angle; shells at any; more or fewer than two faces.
+    /// At a convex angle; shells at any, none included; more or fewer than two faces.
     Sharp,
     /// In a plane, or nearly.
     Flat,
@@ -43,8 +46,6 @@ pub(in super::super) fn features(surface: &Surface, mesh: &Mesh) -> Vec<Edge> {
             [(nodes, a), (_, b)] => {
                 let [a, b] = [a, b].map(|&f| &surface.faces[f as usize]);
                 match [a, b].map(|face| Face::is_shell(&face.corners)) {
-                    [true, true] if is_sharp(a, b, &at) => Shape::Sharp,
-                    [true, true] => Shape::Flat,
                     [false, false] if !is_sharp(a, b, &at) => Shape::Flat,
                     [false, false] if !is_convex(a, b, nodes[0], &at) => Shape::Hollow,
                     _ => Shape::Sharp,
@@ -79,24 +80,11 @@ fn normal(face: &Face, at: &impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Whether the normals of two faces are more than the least angle apart.
+/// Whether the normals of two faces of solids are more than the least angle apart.
 fn is_sharp(a: &Face, b: &Face, at: &impl Fn(u32) -> [f64; 3]) -> bool {
     let (m, n) = (normal(a, at), normal(b, at));
-    let mut cosine = dot(m, n);
-    // The normals of two shells point as their corners were numbered: along the edge in opposite senses if alike.
-    if Face::is_shell(&a.corners) && runs_alike(a, b) {
-        cosine = -cosine;
-    }
     let size = (dot(m, m) * dot(n, n)).sqrt();
-    cosine < SHARP * size || size == 0.0
-}
-
-/// Whether two faces go through the edge that they share in one sense.
-fn runs_alike(a: &Face, b: &Face) -> bool {
-    (0..4).any(|i| {
-        let edge = (a.nodes[i], a.nodes[(i + 1) & 3]);
-        edge.0 != edge.1 && (0..4).any(|j| edge == (b.nodes[j], b.nodes[(j + 1) & 3]))
-    })
+    dot(m, n) < SHARP * size || size == 0.0
 }
 
 /// Whether the second face lies behind the plane of the first, which passes through `node`.
