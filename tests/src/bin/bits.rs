@@ -254,7 +254,8 @@ fn on_clusters(asked: &Asked, deck: &Path, first: &str) -> Result<usize, String>
 /// What an example must have shown by the end of its run.
 #[derive(Clone, Copy, PartialEq)]
 enum Event {
-    /// None to wait for: nothing meets, burns or leaves in it, or it runs onto a wall at once.
+    /// None to wait for: nothing meets or leaves in it, or it runs onto a wall at once. The blade of `self-contact` folds without
+    /// a contact up to its last cycle.
     None,
     /// Contact.
     Contact,
@@ -272,17 +273,17 @@ const EXAMPLES: [(&str, u64, Event); 17] = [
     ("bar-on-wall.k", WHOLE, Event::None),
     ("block-on-plate.k", WHOLE, Event::Contact),
     ("explosive-on-plate.toml", WHOLE, Event::Contact),
-    ("fragment-on-water-box.toml", WHOLE, Event::Contact),
-    ("girder-crush.toml", 6000, Event::Contact),
+    ("fragment-on-water-box.toml", 300, Event::Contact),
+    ("girder-crush.toml", 4000, Event::Contact),
     ("pipe-whip.k", WHOLE, Event::Contact),
-    ("plates-64k-free-slip.toml", 150, Event::Contact),
-    ("plates-64k-joined.toml", 150, Event::None),
-    ("plates-free-slip.toml", WHOLE, Event::Contact),
-    ("plates-joined.toml", WHOLE, Event::None),
+    ("plates-64k-free-slip.toml", 60, Event::Contact),
+    ("plates-64k-joined.toml", 60, Event::None),
+    ("plates-free-slip.toml", 300, Event::Contact),
+    ("plates-joined.toml", 300, Event::None),
     ("punch-through-plate.k", WHOLE, Event::Erosion),
-    ("rod-through-plate.toml", 3000, Event::Erosion),
-    ("self-contact.toml", 12_000, Event::None),
-    ("taylor-copper.toml", WHOLE, Event::None),
+    ("rod-through-plate.toml", 1000, Event::Erosion),
+    ("self-contact.toml", 3000, Event::None),
+    ("taylor-copper.toml", 3000, Event::None),
     ("tube-crush.toml", WHOLE, Event::Contact),
     ("two-bars.toml", WHOLE, Event::Contact),
 ];
