@@ -8,6 +8,7 @@
 mod contact;
 mod element;
 mod erosion;
+mod fold;
 mod gas;
 mod girder;
 mod hexahedron;
@@ -96,6 +97,7 @@ macro_rules! each_case_of_the_book {
             shell: a_thin_tube_that_was_tested_folds_at_its_mean_crush_force long;
             shell: a_wide_tube_that_was_tested_folds_at_its_mean_crush_force long;
             shell: the_girder_folds_without_passing_through_itself long;
+            fold: arms_of_a_strip_that_are_thrown_together_stay_apart quick;
             girder: a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_throughout quick;
             load: a_pressure_by_curve_drives_a_wave_of_its_shape quick;
             load: a_velocity_by_curve_arrives_as_it_was_prescribed quick;

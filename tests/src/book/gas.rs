@@ -91,6 +91,8 @@ pub(super) fn sods_tube_has_its_plateaus_and_its_shock_in_place(sheet: &mut Shee
         0.5 * (0.265_574 + 0.125),
     );
     sheet.add("Sod: place of the shock", front.expect("the shock is in the tube"));
+    let membrane = solved.model.mesh.parts[1].nodes.iter().map(|n| solved.state.x[*n as usize][0]);
+    sheet.add("Sod: place of the contact", membrane.fold(f64::MAX, f64::min));
     // Energy by mass is E over density at first; at the contact the start leaves an overshoot that stays.
     let energy = |e: usize, first: f64| solved.state.elements[field::ENERGY][e] / first;
     let beside =
