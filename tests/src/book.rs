@@ -8,7 +8,9 @@
 mod contact;
 mod element;
 mod erosion;
+mod fold;
 mod gas;
+mod girder;
 mod hexahedron;
 mod law;
 mod load;
@@ -64,6 +66,7 @@ macro_rules! each_case_of_the_book {
             gas: sods_tube_has_its_plateaus_and_its_shock_in_place quick;
             gas: gas_that_runs_together_is_compressed_as_noh_says long;
             gas: the_blast_of_lulesh_reaches_sedovs_radius quick;
+            gas: a_point_blast_has_sedovs_radius_at_two_times long;
             law: products_have_their_chapman_jouguet_state_and_follow_its_isentrope quick;
             law: a_detonation_runs_at_its_speed_with_its_pressure_behind quick;
             law: johnson_cook_has_its_point_values_in_an_element quick;
@@ -78,6 +81,7 @@ macro_rules! each_case_of_the_book {
             structure: the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds quick;
             structure: a_beam_thrown_all_over_is_bent_about_as_a_rigid_plastic_one quick;
             structure: a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness quick;
+            structure: higher_tones_of_a_cantilever_are_those_of_timoshenko_with_that_stiffness long;
             shell: the_twisted_beam_bends_as_published quick;
             shell: the_roof_sags_as_published quick;
             shell: the_cylinder_is_pinched_as_published quick;
@@ -94,6 +98,8 @@ macro_rules! each_case_of_the_book {
             shell: a_thin_tube_that_was_tested_folds_at_its_mean_crush_force long;
             shell: a_wide_tube_that_was_tested_folds_at_its_mean_crush_force long;
             shell: the_girder_folds_without_passing_through_itself long;
+            fold: arms_of_a_strip_that_are_thrown_together_stay_apart quick;
+            girder: a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_throughout quick;
             load: a_pressure_by_curve_drives_a_wave_of_its_shape quick;
             load: a_velocity_by_curve_arrives_as_it_was_prescribed quick;
             load: a_transmitting_face_lets_a_pulse_out quick;

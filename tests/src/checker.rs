@@ -31,7 +31,7 @@ pub fn intruders(mesh: &Mesh, x: &[[f64; 3]]) -> Vec<Intruder> {
         }
         let corners: Vec<[[f64; 3]; 8]> =
             (0..part.n_elements()).map(|e| part.corners(e).map(|n| x[n as usize])).collect();
-        let boxes: Vec<[[f64; 3]; 2]> = corners.iter().map(bounds).collect();
+        let boxes: Vec<[[f64; 3]; 2]> = corners.iter().map(|corners| bounds(corners)).collect();
         let side = boxes
             .iter()
             .flat_map(|[low, high]| (0..3).map(move |a| high[a] - low[a]))
@@ -62,8 +62,8 @@ pub fn intruders(mesh: &Mesh, x: &[[f64; 3]]) -> Vec<Intruder> {
     found
 }
 
-fn bounds(corners: &[[f64; 3]; 8]) -> [[f64; 3]; 2] {
-    corners.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], c| {
+fn bounds(points: &[[f64; 3]]) -> [[f64; 3]; 2] {
+    points.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], c| {
         [[0, 1, 2].map(|a| low[a].min(c[a])), [0, 1, 2].map(|a| high[a].max(c[a]))]
     })
 }
@@ -122,6 +122,86 @@ pub fn crossed(mesh: &Mesh, x: &[[f64; 3]]) -> Vec<Pierced> {
     among(&faces_of(mesh, &|_| true), x)
 }
 
+/// The smallest distance between shells of all parts that share no node, at positions `x` by global node index: 0 where two
+/// pass through each other, `within` where none come nearer than that. Shells are taken as [`pierced`] takes them.
+pub fn nearest(mesh: &Mesh, x: &[[f64; 3]], within: f64) -> f64 {
+    let shells = faces_of(mesh, &|part| part.section().is_some());
+    if !among(&shells, x).is_empty() {
+        return 0.0;
+    }
+    let points = with_middles(&shells, x);
+    // Boxes that are wider by half of it on each side meet where shells may be so near.
+    let boxes: Vec<[[f64; 3]; 2]> = points
+        .iter()
+        .map(|points| bounds(points))
+        .map(|[low, high]| [low.map(|c| c - 0.5 * within), high.map(|c| c + 0.5 * within)])
+        .collect();
+    let mut smallest = within;
+    for (a, b) in meeting(&boxes).into_iter().filter(|(a, b)| a < b) {
+        if shells[a].1.iter().any(|n| shells[b].1.contains(n)) {
+            continue;
+        }
+        let [p, q] = [&points[a], &points[b]];
+        let triangles = |p: &[[f64; 3]; 5]| [0, 1, 2, 3].map(|i| [p[i], p[(i + 1) % 4], p[4]]);
+        for (mine, theirs) in triangles(p).iter().flat_map(|t| triangles(q).map(|u| (*t, u))) {
+            let of_nodes = mine.iter().map(|n| from_triangle(*n, theirs));
+            let of_theirs = theirs.iter().map(|n| from_triangle(*n, mine));
+            let of_edges = (0..3).flat_map(|i| {
+                (0..3).map(move |j| between([mine[i], mine[(i + 1) % 3]], [theirs[j], theirs[(j + 1) % 3]]))
+            });
+            smallest = of_nodes.chain(of_theirs).chain(of_edges).fold(smallest, f64::min);
+        }
+    }
+    smallest
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Distance of two segments; that of parallel ones is left to their ends.
+fn between(first: [[f64; 3]; 2], second: [[f64; 3]; 2]) -> f64 {
+    let (u, v, w) = (minus(first[1], first[0]), minus(second[1], second[0]), minus(first[0], second[0]));
+    let (uu, uv, vv, uw, vw) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));
+    let crossed = uu * vv - uv * uv;
+    let apart = |s: f64, t: f64| {
+        let d = [0, 1, 2].map(|a| w[a] + s * u[a] - t * v[a]);
+        dot(d, d).sqrt()
+    };
+    let mut smallest = f64::INFINITY;
+    if crossed > 0.0 {
+        let (s, t) = ((uv * vw - vv * uw) / crossed, (uu * vw - uv * uw) / crossed);
+        if (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
+            smallest = apart(s, t);
+        }
+    }
+    for end in [0.0, 1.0] {
+        smallest = smallest.min(apart(end, ((vw + end * uv) / vv).clamp(0.0, 1.0)));
+        smallest = smallest.min(apart(((end * uv - uw) / uu).clamp(0.0, 1.0), end));
+    }
+    smallest
+}
+
+/// Distance of a point to the inside of a triangle where it stands above it; that to its edges is left to [`between`].
+fn from_triangle(point: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
+    let (u, v, w) = (minus(b, a), minus(c, a), minus(point, a));
+    let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let square = dot(normal, normal);
+    if square == 0.0 {
+        return f64::INFINITY;
+    }
+    let turned = |a: [f64; 3], b: [f64; 3]| {
+        dot([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], normal)
+            / square
+    };
+    let (s, t) = (turned(w, v), turned(u, w));
+    if s >= 0.0 && t >= 0.0 && s + t <= 1.0 { dot(w, normal).abs() / square.sqrt() } else { f64::INFINITY }
+}
+
 /// Element and corners of the outer faces of some parts: of a shell its one face, of solids those that one element of the
 /// part has.
 fn faces_of(mesh: &Mesh, wanted: &dyn Fn(&Part) -> bool) -> Vec<(u32, [u32; 4])> {
@@ -149,21 +229,38 @@ fn faces_of(mesh: &Mesh, wanted: &dyn Fn(&Part) -> bool) -> Vec<(u32, [u32; 4])>
 
 /// Pairs of faces that share no node and pass through each other.
 fn among(shells: &[(u32, [u32; 4])], x: &[[f64; 3]]) -> Vec<Pierced> {
-    let points: Vec<[[f64; 3]; 5]> = shells
-        .iter()
-        .map(|(_, nodes)| {
-            let [a, b, c, d] = nodes.map(|n| x[n as usize]);
-            [a, b, c, d, [0, 1, 2].map(|i| 0.25 * (a[i] + b[i] + c[i] + d[i]))]
-        })
-        .collect();
-    let boxes: Vec<[[f64; 3]; 2]> = points
-        .iter()
-        .map(|points| {
-            points.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
-                [[0, 1, 2].map(|a| low[a].min(p[a])), [0, 1, 2].map(|a| high[a].max(p[a]))]
-            })
-        })
-        .collect();
+    let points = with_middles(shells, x);
+    let boxes: Vec<[[f64; 3]; 2]> = points.iter().map(|points| bounds(points)).collect();
+    let mut found = Vec::new();
+    for (a, b) in meeting(&boxes) {
+        if shells[a].1.iter().any(|n| shells[b].1.contains(n)) {
+            continue;
+        }
+        let p = &points[a];
+        let edges = (0..4).flat_map(|i| [[p[i], p[(i + 1) % 4]], [p[i], p[4]]]);
+        let q = &points[b];
+        let mut triangles = (0..4).map(|i| [q[i], q[(i + 1) % 4], q[4]]);
+        let through = |t: [[f64; 3]; 3]| edges.clone().any(|edge| goes_through(edge, t));
+        if triangles.any(through) {
+            found.push(Pierced { edge_of: shells[a].0, element: shells[b].0 });
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// Corners of faces, and their mean as the fifth.
+fn with_middles(faces: &[(u32, [u32; 4])], x: &[[f64; 3]]) -> Vec<[[f64; 3]; 5]> {
+    let all = faces.iter().map(|(_, nodes)| {
+        let [a, b, c, d] = nodes.map(|n| x[n as usize]);
+        [a, b, c, d, [0, 1, 2].map(|i| 0.25 * (a[i] + b[i] + c[i] + d[i]))]
+    });
+    all.collect()
+}
+
+/// Pairs of boxes that touch, each twice: in both orders.
+fn meeting(boxes: &[[[f64; 3]; 2]]) -> Vec<(usize, usize)> {
     let sides = boxes.iter().flat_map(|[low, high]| (0..3).map(move |a| high[a] - low[a]));
     let side = sides.fold(f64::MIN_POSITIVE, f64::max);
     let cells = |[low, high]: &[[f64; 3]; 2]| {
@@ -175,26 +272,17 @@ fn among(shells: &[(u32, [u32; 4])], x: &[[f64; 3]]) -> Vec<Pierced> {
     for (s, bounds) in boxes.iter().enumerate() {
         cells(bounds).for_each(|cell| bins.entry(cell).or_default().push(s));
     }
-    let mut found = Vec::new();
+    let mut pairs = Vec::new();
     for (a, bounds) in boxes.iter().enumerate() {
         for &b in cells(bounds).flat_map(|cell| bins.get(&cell)).flatten() {
-            let apart = (0..3).any(|i| bounds[1][i] < boxes[b][0][i] || boxes[b][1][i] < bounds[0][i]);
-            if apart || shells[a].1.iter().any(|n| shells[b].1.contains(n)) {
-                continue;
-            }
-            let p = &points[a];
-            let edges = (0..4).flat_map(|i| [[p[i], p[(i + 1) % 4]], [p[i], p[4]]]);
-            let q = &points[b];
-            let mut triangles = (0..4).map(|i| [q[i], q[(i + 1) % 4], q[4]]);
-            let through = |t: [[f64; 3]; 3]| edges.clone().any(|edge| goes_through(edge, t));
-            if triangles.any(through) {
-                found.push(Pierced { edge_of: shells[a].0, element: shells[b].0 });
+            if a != b && (0..3).all(|i| bounds[1][i] >= boxes[b][0][i] && boxes[b][1][i] >= bounds[0][i]) {
+                pairs.push((a, b));
             }
         }
     }
-    found.sort_unstable();
-    found.dedup();
-    found
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
 }
 
 /// Whether a segment crosses a triangle from one side to the other, inside it.
@@ -343,5 +431,45 @@ mod tests {
         x[mesh.parts[0].nodes[0] as usize] = [3.5, 3.5, 0.1];
         x[mesh.parts[0].nodes[21] as usize][2] = 0.5;
         assert!(pierced(&mesh, &x).iter().any(|p| p.edge_of == 0 || p.element == 0));
+    }
+
+    #[test]
+    fn distances_of_shells_are_those_of_nodes_edges_and_faces() {
+        let deck = r#"
+            title = "two sheets"
+            units = "SI"
+            [control]
+            end_cycle = 1
+            [[part]]
+            name = "lower"
+            material = "MILD_STEEL"
+            shell = { thickness = 0.1 }
+            plate = { origin = [0, 0, 0], side_i = [1, 0, 0], side_j = [0, 1, 0], cells = [1, 1] }
+            [[part]]
+            name = "upper"
+            material = "MILD_STEEL"
+            shell = { thickness = 0.1 }
+            plate = { origin = [0.3, 0.2, 0.2], side_i = [1, 0, 0], side_j = [0, 1, 0], cells = [1, 1] }
+        "#;
+        let mesh = model(deck).mesh;
+        let near = |distance: f64, expected: f64| {
+            assert!((distance - expected).abs() < 1e-14, "{distance} {expected}")
+        };
+        near(nearest(&mesh, &mesh.positions, 1.0), 0.2);
+        near(nearest(&mesh, &mesh.positions, 0.1), 0.1);
+        // The upper sheet in four places: a corner over the face, beside an edge, beyond a corner, upright through it.
+        let placed = |corners: [[f64; 3]; 4]| {
+            let mut x = mesh.positions.clone();
+            for (n, corner) in mesh.parts[1].corners(0).into_iter().zip(corners) {
+                x[n as usize] = corner;
+            }
+            nearest(&mesh, &x, 1.0)
+        };
+        near(placed([[0.5, 0.4, 0.05], [1.5, 0.4, 1.0], [1.5, 1.4, 2.0], [0.5, 1.4, 1.0]]), 0.05);
+        near(placed([[1.03, 0.5, 0.04], [2.0, 0.5, 0.04], [2.0, 1.5, 0.04], [1.03, 1.5, 0.04]]), 0.05);
+        near(placed([[1.02, 1.03, 0.06], [2.0, 1.03, 0.06], [2.0, 2.0, 0.06], [1.02, 2.0, 0.06]]), 0.07);
+        near(placed([[0.5, 0.2, -0.5], [0.5, 0.8, -0.5], [0.5, 0.8, 0.5], [0.5, 0.2, 0.5]]), 0.0);
+        // Edges that cross 0.1 apart, no node over a face.
+        near(placed([[1.05, -0.5, -0.5], [1.05, 0.5, 0.5], [3.0, 0.5, 0.5], [3.0, -0.5, -0.5]]), 0.05);
     }
 }

@@ -2,6 +2,9 @@
 //!
 //! `cargo run --release -p tests --bin bits -- [--bolide PATH] [--cycles N] [--deck PATH]... [--most-workers N] [--clusters FOLDER]`
 //!
+//! `bits -- --examples [--bolide PATH]` runs every deck of `deck/examples` instead, whole or to a cycle after its first events,
+//! on 1, 2 and 5 workers that are processes, and prints one line for each.
+//!
 //! With `--clusters deploy/clusters`, every cluster file there is emulated on both routes as well.
 //!
 //! Without `--bolide`, the binary beside this one; build it first with `cargo build --release -p master`. Without
@@ -23,6 +26,8 @@ struct Asked {
     most_workers: usize,
     /// Folder of cluster files to emulate too.
     clusters: Option<PathBuf>,
+    /// Every example instead of the matrix.
+    examples: bool,
 }
 
 fn asked() -> Result<Asked, String> {
@@ -34,9 +39,14 @@ fn asked() -> Result<Asked, String> {
         cycles: 300,
         most_workers: 7,
         clusters: None,
+        examples: false,
     };
     let mut arguments = std::env::args().skip(1);
     while let Some(flag) = arguments.next() {
+        if flag == "--examples" {
+            asked.examples = true;
+            continue;
+        }
         let value = arguments.next().ok_or_else(|| format!("{flag}: a value is needed"))?;
         let number = || value.parse::<u64>().map_err(|e| format!("{flag} {value}: {e}"));
         match flag.as_str() {
@@ -46,9 +56,14 @@ fn asked() -> Result<Asked, String> {
             "--clusters" => asked.clusters = Some(value.into()),
             "--most-workers" => asked.most_workers = number()? as usize,
             _ => {
-                return Err(format!("{flag}: read --bolide, --deck, --cycles, --most-workers or --clusters"));
+                return Err(format!(
+                    "{flag}: read --bolide, --deck, --cycles, --most-workers, --clusters or --examples"
+                ));
             }
         }
+    }
+    if asked.examples && !asked.decks.is_empty() {
+        return Err("--examples says which decks: leave --deck out".to_owned());
     }
     if asked.decks.is_empty() {
         let decks = ["plates-joined.toml", "plates-free-slip.toml", "pipe-whip.k"];
@@ -117,9 +132,12 @@ fn rows(asked: &Asked, processes: bool, lanes: &[&str], snapshot: &Path) -> Vec<
 #[derive(PartialEq)]
 struct Outcome {
     digest: String,
+    cycles: Value,
     energies: Value,
     momentum_error: Value,
     history: String,
+    eroded: Value,
+    deepest: Value,
 }
 
 fn run(asked: &Asked, deck: &Path, row: &Row, out: &Path) -> Result<(Outcome, f64), String> {
@@ -140,10 +158,13 @@ fn run(asked: &Asked, deck: &Path, row: &Row, out: &Path) -> Result<(Outcome, f6
     let history = out.join("history.csv");
     let outcome = Outcome {
         digest: summary["digest"].as_str().ok_or("a summary without a digest")?.to_owned(),
+        cycles: summary["cycles"].clone(),
         energies: summary["energies"].clone(),
         momentum_error: summary["momentum_error"].clone(),
         // Numbers are written so that they read back to the same bits: equal text is equal bits.
         history: std::fs::read_to_string(&history).map_err(|e| format!("{}: {e}", history.display()))?,
+        eroded: summary["eroded_elements"].clone(),
+        deepest: summary["worst_penetration"].clone(),
     };
     Ok((outcome, summary["wall_s"].as_f64().unwrap_or(f64::NAN)))
 }
@@ -159,7 +180,7 @@ fn lanes() -> Vec<&'static str> {
 }
 
 fn main() -> ExitCode {
-    match matrix() {
+    match asked().and_then(|asked| if asked.examples { examples(asked) } else { matrix(&asked) }) {
         Ok(0) => ExitCode::SUCCESS,
         Ok(different) => {
             eprintln!("{different} runs differ");
@@ -230,9 +251,107 @@ fn on_clusters(asked: &Asked, deck: &Path, first: &str) -> Result<usize, String>
     Ok(different)
 }
 
+/// What an example must have shown by the end of its run.
+#[derive(Clone, Copy, PartialEq)]
+enum Event {
+    /// None to wait for: nothing meets or leaves in it, or it runs onto a wall at once. The blade of `self-contact` folds without
+    /// a contact up to its last cycle.
+    None,
+    /// Contact.
+    Contact,
+    /// Contact, and elements that left.
+    Erosion,
+}
+
+/// The last cycle of a deck that runs to its own end.
+const WHOLE: u64 = 1_000_000;
+
+/// Every deck of `deck/examples`, the cycle at which its run ends, and what has happened by then. An explosive burns from the
+/// first cycle on.
+const EXAMPLES: [(&str, u64, Event); 17] = [
+    ("ball-on-shell.k", WHOLE, Event::Contact),
+    ("bar-on-wall.k", WHOLE, Event::None),
+    ("block-on-plate.k", WHOLE, Event::Contact),
+    ("explosive-on-plate.toml", WHOLE, Event::Contact),
+    ("fragment-on-water-box.toml", 300, Event::Contact),
+    ("girder-crush.toml", 4000, Event::Contact),
+    ("pipe-whip.k", WHOLE, Event::Contact),
+    ("plates-64k-free-slip.toml", 60, Event::Contact),
+    ("plates-64k-joined.toml", 60, Event::None),
+    ("plates-free-slip.toml", 300, Event::Contact),
+    ("plates-joined.toml", 300, Event::None),
+    ("punch-through-plate.k", WHOLE, Event::Erosion),
+    ("rod-through-plate.toml", 1000, Event::Erosion),
+    ("self-contact.toml", 3000, Event::None),
+    ("taylor-copper.toml", 3000, Event::None),
+    ("tube-crush.toml", WHOLE, Event::Contact),
+    ("two-bars.toml", WHOLE, Event::Contact),
+];
+
+/// Names of the decks of a folder; a keyword mesh is a part of the deck that includes it.
+fn decks_of(folder: &Path) -> Result<Vec<String>, String> {
+    let entries = std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| !name.ends_with("-mesh.k")).collect();
+    names.sort();
+    Ok(names)
+}
+
+/// Every example on 1, 2 and 5 workers: prints the table and counts the decks that differ, fail, or show too little.
+fn examples(mut asked: Asked) -> Result<usize, String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deck/examples");
+    let listed = EXAMPLES.map(|(name, ..)| name);
+    let found = decks_of(&folder)?;
+    if found != listed {
+        return Err(format!("the examples are {found:?}, the list of this program has {listed:?}"));
+    }
+    let out = std::env::temp_dir().join(format!("bolide-examples-{}", std::process::id()));
+    let mut wrong = 0;
+    println!(
+        "{:<28} {:>7} {:>7} {:>8}  {:<32}  {:<9} {:<9}",
+        "deck", "cycles", "eroded", "deepest", "digest, 1 worker", "2 workers", "5 workers"
+    );
+    for (name, cycles, event) in EXAMPLES {
+        asked.cycles = cycles;
+        let runs = [1, 2, 5].map(|workers| {
+            let row = row(name, &format!("--workers {workers} --threads 1 --processes"));
+            run(&asked, &folder.join(name), &row, &out).map(|(outcome, _)| outcome)
+        });
+        let [Ok(first), others @ ..] = &runs else {
+            wrong += 1;
+            println!("{name:<28} FAILED: {}", runs[0].as_ref().err().map_or("", String::as_str));
+            continue;
+        };
+        let verdicts = others.each_ref().map(|other| match other {
+            Ok(other) if other == first => "same",
+            Ok(_) => "other",
+            Err(_) => "FAILED",
+        });
+        let (eroded, deepest) = (first.eroded.as_u64().unwrap_or(0), first.deepest.as_f64().unwrap_or(0.0));
+        let shown = match event {
+            Event::None => true,
+            Event::Contact => deepest > 0.0,
+            Event::Erosion => deepest > 0.0 && eroded > 0,
+        };
+        wrong += usize::from(!shown || verdicts.iter().any(|verdict| *verdict != "same"));
+        println!(
+            "{name:<28} {:>7} {eroded:>7} {deepest:>8.4}  {:<32}  {:<9} {:<9}{}",
+            first.cycles.as_u64().unwrap_or(0),
+            first.digest,
+            verdicts[0],
+            verdicts[1],
+            if shown { "" } else { " ended before its events" }
+        );
+        for reason in others.iter().filter_map(|other| other.as_ref().err()) {
+            println!("    {reason}");
+        }
+    }
+    std::fs::remove_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
+    Ok(wrong)
+}
+
 /// Runs everything, prints the table and counts the runs that differ.
-fn matrix() -> Result<usize, String> {
-    let asked = asked()?;
+fn matrix(asked: &Asked) -> Result<usize, String> {
     let help = Command::new(&asked.bolide).args(["run", "--help"]).output().map_err(|e| {
         format!("{}: {e}; build it with `cargo build --release -p master`", asked.bolide.display())
     })?;
@@ -250,10 +369,10 @@ fn matrix() -> Result<usize, String> {
         let mut first: Option<Outcome> = None;
         let wider = with_doubled_slack(deck, &folder)?;
         let doubled = wider.iter().map(|deck| (deck, row("doubled slack", "--workers 2 --threads 1")));
-        let rows = rows(&asked, processes, &lanes(), &kept);
+        let rows = rows(asked, processes, &lanes(), &kept);
         for (deck, row) in rows.into_iter().map(|row| (deck, row)).chain(doubled) {
             let out = folder.join("results");
-            match run(&asked, deck, &row, &out) {
+            match run(asked, deck, &row, &out) {
                 Ok((outcome, wall)) => {
                     let same = first.as_ref().is_none_or(|first| *first == outcome);
                     different += usize::from(!same);
@@ -272,7 +391,7 @@ fn matrix() -> Result<usize, String> {
             }
         }
         if let Some(first) = &first {
-            different += on_clusters(&asked, deck, &first.digest)?;
+            different += on_clusters(asked, deck, &first.digest)?;
         }
     }
     std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;

@@ -17,6 +17,7 @@ use std::{
         Mutex, PoisonError,
         atomic::{AtomicUsize, Ordering},
     },
+    time::Instant,
 };
 
 use tests::{
@@ -56,7 +57,9 @@ fn main() -> ExitCode {
         }
     };
     let wanted = |entry: &&&Entry| !has("--kept") && (!words.is_empty() || shelf.take(entry).is_none());
-    let missing: Vec<&Entry> = chosen.iter().filter(wanted).copied().collect();
+    let mut missing: Vec<&Entry> = chosen.iter().filter(wanted).copied().collect();
+    // Long ones first, so that no core is left alone with one at the end.
+    missing.sort_by_key(|entry| entry.quick);
     let computed = compute(&missing, &shelf);
     let of = |entry: &Entry| match missing.iter().position(|other| other.name == entry.name) {
         Some(at) => computed[at].clone(),
@@ -132,12 +135,14 @@ fn compute(entries: &[&Entry], shelf: &Shelf) -> Vec<Done> {
                 while let at = next.fetch_add(1, Ordering::Relaxed)
                     && let Some(entry) = entries.get(at)
                 {
+                    let begun = Instant::now();
                     let result = catch_unwind(|| entry.run()).map_err(|panic| {
                         let text = panic.downcast_ref::<String>().map(String::as_str);
                         text.or_else(|| panic.downcast_ref::<&str>().copied())
                             .unwrap_or("no words")
                             .to_owned()
                     });
+                    println!("{:.1} s for {}", begun.elapsed().as_secs_f64(), entry.name);
                     if let Ok(sheet) = &result {
                         shelf.keep(entry, sheet);
                     }

@@ -8,7 +8,7 @@ use mechanics::{load::Drive, setup::Constraint};
 
 use crate::{
     case::Sheet,
-    checker::pierced,
+    checker::{nearest, pierced},
     solve::{Solved, example, model, run, run_with_states},
 };
 
@@ -337,7 +337,9 @@ struct Tube {
 impl Tube {
     /// Shortens it by a wall that keeps its speed; returns by how much too.
     fn crush(&self) -> (Solved, f64) {
-        (run(self.model()), self.widths[1] * self.width)
+        let (mut model, stroke) = (self.model(), self.widths[1] * self.width);
+        model.output.period = Some(0.05 * stroke / self.speed);
+        (run_with_states(model), stroke)
     }
 
     /// Every other side bulges by a hundredth of its width over the first fold, the others are dented: without that a
@@ -406,6 +408,12 @@ const SQUARE: Tube = Tube {
     mass: None,
 };
 
+/// The smallest distance of shells that share no node, in gaps, over all states; 4 where there is none so small.
+fn closest(solved: &Solved, gap: f64) -> f64 {
+    let all = solved.states.iter().map(|state| nearest(&solved.model.mesh, &state.x, 4.0 * gap));
+    all.fold(4.0 * gap, f64::min) / gap
+}
+
 pub(super) fn a_square_tube_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
     let (solved, stroke) = SQUARE.crush();
     let last = solved.rows.last().expect("rows");
@@ -414,12 +422,15 @@ pub(super) fn a_square_tube_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
     sheet.add("square tube: hourglass energy over internal", last.hourglass / last.internal);
     let crossings = pierced(&solved.model.mesh, &solved.state.x);
     sheet.add("square tube: edges through faces", crossings.len() as f64);
+    sheet.add("square tube: smallest distance of sheets that share no node (gaps)", closest(&solved, 1e-3));
     sheet.add("square tube: deepest contact (gaps)", solved.outcome.ledger.worst_penetration);
     // What the same tube does that does not feel itself.
     let (solved, stroke) = Tube { meets_itself: false, ..SQUARE }.crush();
     let through = solved.rows.last().expect("rows");
     let crossings = pierced(&solved.model.mesh, &solved.state.x);
     sheet.add("square tube without contact: edges through faces", crossings.len() as f64);
+    let of = "square tube without contact: smallest distance of sheets that share no node (gaps)";
+    sheet.add(of, closest(&solved, 1e-3));
     sheet.add(
         "square tube without contact: crush force over that with it",
         (through.internal + through.hourglass) / stroke / ((last.internal + last.hourglass) / stroke),
@@ -436,6 +447,8 @@ fn crushed(sheet: &mut Sheet, name: &str, tube: &Tube) {
     sheet.add(&format!("tube @ {name}, mean crush force (N)"), (last.internal + last.hourglass) / stroke);
     let crossings = pierced(&solved.model.mesh, &solved.state.x);
     sheet.add("tubes: edges through faces", crossings.len() as f64);
+    let of = "tubes: smallest distance of sheets that share no node (gaps)";
+    sheet.add(of, closest(&solved, 0.5 * tube.thickness));
 }
 
 pub(super) fn a_tube_that_feels_the_rate_folds_at_a_greater_force(sheet: &mut Sheet) {
@@ -479,6 +492,7 @@ pub(super) fn the_girder_folds_without_passing_through_itself(sheet: &mut Sheet)
     let solved = run_with_states(example("girder-crush"));
     let worst = solved.states.iter().map(|state| pierced(&solved.model.mesh, &state.x).len()).max();
     sheet.add("girder: edges through faces", worst.expect("states are written") as f64);
+    sheet.add("girder: smallest distance of sheets that share no node (gaps)", closest(&solved, 1e-3));
     let last = solved.rows.last().expect("rows");
     let rear = solved.model.output.gauges[0].node as usize;
     let shortened = solved.model.mesh.positions[rear][2] - last.gauges[0].x[2];
