@@ -5,23 +5,20 @@
 use std::collections::BTreeMap;
 
 use deck::Model;
-use master::{
-    embedded::Fate,
-    event::{Keep, Options},
-};
+use master::event::Options;
 use mechanics::{
     erosion::{ALIVE, SURFACE_LAG},
-    mesh::FACES,
+    mesh::{CORNERS, FACES},
     state::{GlobalState, field},
 };
 use protocol::message::Route;
 use tests::{
     bits::Fingerprint,
     checker::intruders,
-    solve::{Crew, Solved, keyword, model, solve, solve_through},
+    solve::{Crew, Solved, cross, keyword, model, solve},
 };
 
-use crate::bits::{asked, fingerprint, same_bits};
+use crate::bits::{asked, fingerprint, losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
 
 /// Cycles of the keyword deck in which punch and plate both erode.
 const PUNCHED: u64 = 420;
@@ -60,14 +57,7 @@ fn a_punch_that_erodes_a_plate_has_the_same_bits_on_any_crew() {
         };
         assert!(of_part(0) > 3 && of_part(1) > 10, "{} and {} eroded", of_part(0), of_part(1));
         same_bits(&model);
-        let one = Fingerprint::of(&alone);
-        for workers in [2, 5] {
-            let options = Options { route: Route::Direct, ..Options::default() };
-            one.assert_equal(
-                &fingerprint(&model, asked(workers, options)),
-                &format!("{workers} workers, direct"),
-            );
-        }
+        same_bits_on_route_direct(&model, &Fingerprint::of(&alone));
     }
 }
 
@@ -119,26 +109,7 @@ fn snapshots_after_an_erosion(model: &Model) {
 
 #[test]
 fn a_worker_of_eroding_parts_that_is_lost_changes_no_bit() {
-    let model = punch(false);
-    let one = fingerprint(&model, Crew::default());
-    let mut arrivals = 0;
-    let mut count = |number: u64| {
-        arrivals = number;
-        None
-    };
-    solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
-    let mut midway = 0;
-    for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
-        let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
-        let at = arrivals * (seed as u64 + 2) / 12;
-        let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
-        let solved = solve_through(model.clone(), asked(3, options), &mut fate)
-            .unwrap_or_else(|e| panic!("{seed}: {e}"));
-        one.assert_equal(&Fingerprint::of(&solved), &format!("loss {seed}, {route:?}"));
-        assert_eq!(solved.outcome.losses.len(), 1, "{seed}");
-        midway += usize::from(solved.outcome.losses[0].back_to > 0);
-    }
-    assert!(midway >= 4, "{midway} of 8 went back to a state on the way");
+    losing_a_worker_changes_no_bit(&punch(false));
 }
 
 /// A small block that strikes a plate, whose elements erode by `criterion`.
@@ -176,28 +147,15 @@ fn struck(criterion: &str, material: &str) -> Model {
 
 /// The deformation gradient in the middle of an element.
 fn gradient(model: &Model, state: &GlobalState, corners: [u32; 8]) -> [[f64; 3]; 3] {
-    // Corners as signs along the three natural axes.
-    const SIGNS: [[f64; 3]; 8] = [
-        [-1.0, -1.0, -1.0],
-        [1.0, -1.0, -1.0],
-        [1.0, 1.0, -1.0],
-        [-1.0, 1.0, -1.0],
-        [-1.0, -1.0, 1.0],
-        [1.0, -1.0, 1.0],
-        [1.0, 1.0, 1.0],
-        [-1.0, 1.0, 1.0],
-    ];
     let jacobian = |of: &[[f64; 3]]| -> [[f64; 3]; 3] {
         [0, 1, 2].map(|row| {
-            [0, 1, 2]
-                .map(|axis| (0..8).map(|c| SIGNS[c][axis] * of[corners[c] as usize][row]).sum::<f64>() / 8.0)
+            [0, 1, 2].map(|axis| {
+                (0..8).map(|c| CORNERS[c][axis] * of[corners[c] as usize][row]).sum::<f64>() / 8.0
+            })
         })
     };
     let (now, first) = (jacobian(&state.x), jacobian(&model.mesh.positions));
     let columns = [0, 1, 2].map(|c| [0, 1, 2].map(|r| first[r][c]));
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
     let rows = [cross(columns[1], columns[2]), cross(columns[2], columns[0]), cross(columns[0], columns[1])];
     let volume: f64 = (0..3).map(|a| rows[0][a] * columns[0][a]).sum();
     [0, 1, 2].map(|r| [0, 1, 2].map(|c| (0..3).map(|k| now[r][k] * rows[k][c] / volume).sum::<f64>()))
