@@ -207,6 +207,8 @@ pub struct Domain {
     time: f64,
     /// What left with dropped nodes in this cycle.
     gone: Gone,
+    /// The surface in force ends with this cycle.
+    surface_ends: bool,
     /// Where the walls are and how they move in this step.
     poses: Vec<Pose>,
     /// Takes what guests give walls, which their owners book.
@@ -301,6 +303,7 @@ impl Domain {
             cycle,
             time: 0.0,
             gone: Gone::default(),
+            surface_ends: false,
             poses: Vec::with_capacity(setup.walls.len()),
             unbooked: vec![WallVote::default(); setup.walls.len()],
             setup,
@@ -648,6 +651,11 @@ impl Domain {
             walls: &mut self.unbooked,
         };
         advance.run(&mut nodes, width);
+        if std::mem::take(&mut self.surface_ends) {
+            let mark = meter.start();
+            self.vote.released = Some(self.spring_energies(dt));
+            meter.stop(mark, true);
+        }
         self.cycle += 1;
         Ok(self.finish_vote())
     }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ContactRoom, Domain, Guests, NONE, Room, Shared, bodies, pack};
 use crate::{
-    contact::{Batch, Contact},
+    contact::{Batch, Contact, PairEnergies},
     lanes::SET,
     nodes::NodeSet,
 };
@@ -194,11 +194,22 @@ impl Domain {
         }
     }
 
-    /// Forgets gatherings whose plans will not come: that of this cycle replaces them.
-    pub fn forget_gathered(&mut self) {
+    /// The surface in force ends with this cycle: the gathering that is due replaces those whose plans will not come any more, and
+    /// the vote will say what the springs hold after it ([`crate::vote::Vote::released`]).
+    pub fn end_surface(&mut self) {
+        self.surface_ends = true;
         for room in &mut self.rooms {
             room.gathered.clear();
         }
+    }
+
+    /// Energies that the springs on the surface in force have at the positions as of now; `dt` is the step that led to them.
+    pub(super) fn spring_energies(&mut self, dt: f64) -> PairEnergies {
+        let Some(room) = &mut self.contact else { return PairEnergies::default() };
+        pack(&self.rooms, &self.guests, &room.sources, &mut room.x, &mut room.v);
+        // Forces are added to what is cleared before the next ones.
+        room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
+        room.contact.energies().of_springs()
     }
 
     /// Books the copies of a held node that is not exchanged.
