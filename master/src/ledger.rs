@@ -2,7 +2,7 @@
 
 use deck::model::Model;
 use mechanics::{
-    contact::{PairEnergies, PairEnergy},
+    contact::PairEnergies,
     element::hex8,
     rigid,
     vote::{PartVote, Vote},
@@ -10,6 +10,19 @@ use mechanics::{
 use serde::{Deserialize, Serialize};
 
 use crate::results::history::{GaugeRow, HistoryRow, PartEnergy};
+
+/// Energies of contact between two parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PairSums {
+    /// The parts, lower index first; equal for a part that meets itself.
+    pub parts: [u32; 2],
+    /// In springs now.
+    pub contact: f64,
+    /// Taken by friction so far.
+    pub friction: f64,
+    /// What springs lost so far where the surface changed by erosion.
+    pub eroded: f64,
+}
 
 /// Sums over all cycles so far; stored in a snapshot as it stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,7 +35,8 @@ pub struct Ledger {
     pub friction: f64,
     /// Work of supports and walls so far.
     pub external: f64,
-    /// Internal energy of eroded elements, and kinetic energy of nodes that were dropped.
+    /// Internal energy of eroded elements, kinetic energy of nodes that were dropped, and what springs of contact had less on each
+    /// new surface than on the one before it.
     pub eroded: f64,
     /// Momentum of those nodes.
     pub eroded_momentum: [f64; 3],
@@ -50,8 +64,10 @@ pub struct Ledger {
     pub worst_gap_travel: f64,
     /// Deepest contact, in gaps.
     pub worst_penetration: f64,
-    /// Energies of contact by pair of parts: in springs now, taken by friction so far.
-    pub contacts: Vec<PairEnergy>,
+    /// Energies of contact by pair of parts, ascending.
+    pub contacts: Vec<PairSums>,
+    /// What springs had at the start of the cycle to be booked next, on a surface that has ended; none where it stays.
+    pub released: Option<PairEnergies>,
     /// Rigid bodies as the last vote had them.
     pub bodies: Vec<rigid::State>,
     /// The last row.
@@ -104,6 +120,7 @@ impl Ledger {
             worst_gap_travel: 0.0,
             worst_penetration: 0.0,
             contacts: Vec::new(),
+            released: None,
             bodies: Vec::new(),
             last: HistoryRow::default(),
         }
@@ -122,6 +139,10 @@ impl Ledger {
         for (sum, lost) in self.eroded_momentum.iter_mut().zip(vote.gone.momentum) {
             *sum += lost;
         }
+        self.book_pairs(&vote.contact_energies);
+        if let Some(released) = std::mem::replace(&mut self.released, vote.released.clone()) {
+            self.book_released(&released);
+        }
         let total = kinetic + internal + self.hourglass + vote.contact + self.friction + self.eroded;
         let initial = *self.initial_total.get_or_insert(total - self.external);
         self.greatest_kinetic = self.greatest_kinetic.max(kinetic);
@@ -129,7 +150,6 @@ impl Ledger {
         self.first_step.get_or_insert(dt);
         self.book_parts(&vote.parts);
         self.bodies.clone_from(&vote.bodies);
-        self.book_pairs(&vote.contact_energies);
         let scale = initial.abs().max(self.greatest_kinetic);
         let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
         self.worst_courant = self.worst_courant.max(dt / vote.courant);
@@ -164,16 +184,32 @@ impl Ledger {
         };
     }
 
+    fn pair(&mut self, parts: [u32; 2]) -> &mut PairSums {
+        let at = self.contacts.binary_search_by_key(&parts, |pair| pair.parts).unwrap_or_else(|at| {
+            self.contacts.insert(at, PairSums { parts, ..PairSums::default() });
+            at
+        });
+        &mut self.contacts[at]
+    }
+
     fn book_pairs(&mut self, votes: &PairEnergies) {
         self.contacts.iter_mut().for_each(|pair| pair.contact = 0.0);
         for vote in votes.pairs() {
-            match self.contacts.binary_search_by_key(&vote.parts, |pair| pair.parts) {
-                Ok(at) => {
-                    self.contacts[at].contact = vote.contact;
-                    self.contacts[at].friction += vote.friction;
-                }
-                Err(at) => self.contacts.insert(at, *vote),
-            }
+            let pair = self.pair(vote.parts);
+            pair.contact = vote.contact;
+            pair.friction += vote.friction;
+        }
+    }
+
+    /// Books what springs on the surface before had more than those on the new one have now, at the same positions.
+    fn book_released(&mut self, before: &PairEnergies) {
+        for vote in before.pairs() {
+            self.pair(vote.parts).eroded += vote.contact;
+            self.eroded += vote.contact;
+        }
+        for pair in &mut self.contacts {
+            pair.eroded -= pair.contact;
+            self.eroded -= pair.contact;
         }
     }
 

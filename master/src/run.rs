@@ -493,9 +493,14 @@ fn named_parts(model: &Model, parts: &[PartEnergy], state: Option<&GlobalState>)
 }
 
 /// Energies of a pair beside the names of its parts.
-fn named_pair(model: &Model, pair: &mechanics::contact::PairEnergy) -> NamedPair {
+fn named_pair(model: &Model, pair: &crate::ledger::PairSums) -> NamedPair {
     let name = |p: u32| model.mesh.parts.get(p as usize).map_or_else(String::new, |part| part.name.clone());
-    NamedPair { parts: pair.parts.map(name), contact: pair.contact + pair.friction, friction: pair.friction }
+    NamedPair {
+        parts: pair.parts.map(name),
+        contact: pair.contact + pair.friction,
+        friction: pair.friction,
+        eroded: pair.eroded,
+    }
 }
 
 /// Pairs of workers that exchange over a link of their own, and those that the master relays for.

@@ -207,6 +207,7 @@ fn summary(model: &Model) -> Summary {
                 parts: ["target".into(), "rod".into()],
                 contact: 5e-324,
                 friction: 0.0,
+                eroded: 4.5e-7,
             }],
             parts: vec![NamedPart { name: "target".into(), kinetic: 0.7, ..NamedPart::default() }],
         },

@@ -16,7 +16,8 @@ use std::fmt;
 /// 4: what is watched in assignments, and in votes what was seen.
 /// 5: states of rigid bodies and energies by pair of parts in votes; rigid bodies in assignments.
 /// 6: criteria of erosion by stress, volume and principal strains in assignments; pairs of edges in plans.
-pub const VERSION: u16 = 6;
+/// 7: in votes what springs hold on a surface that ends.
+pub const VERSION: u16 = 7;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

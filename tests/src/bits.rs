@@ -11,7 +11,8 @@ pub struct Fingerprint {
     pub digest: String,
     /// Cycle and bits of each row.
     rows: Vec<(u64, Vec<u64>)>,
-    /// Bits of hourglass, viscosity, friction and external energy, momentum error and worst ratios.
+    /// Bits of hourglass, viscosity, friction and external energy, momentum error, worst ratios, and energies of contact by pair of
+    /// parts.
     ledger: Vec<u64>,
 }
 
@@ -32,8 +33,10 @@ impl Fingerprint {
                 ledger.worst_gap_travel,
                 ledger.worst_penetration,
             ]
+            .into_iter()
+            .chain(ledger.contacts.iter().flat_map(|pair| [pair.contact, pair.friction, pair.eroded]))
             .map(f64::to_bits)
-            .to_vec(),
+            .collect(),
         }
     }
 

@@ -152,6 +152,11 @@ pub fn mean(numbers: impl Iterator<Item = f64>) -> f64 {
     sum / n as f64
 }
 
+/// The cross product of two vectors.
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 /// The first time at which a rising or falling series crosses `level`, between its samples.
 pub fn crossing(series: impl Iterator<Item = (f64, f64)>, level: f64) -> Option<f64> {
     let mut before: Option<(f64, f64)> = None;

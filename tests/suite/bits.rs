@@ -76,6 +76,37 @@ pub(crate) fn same_bits(model: &Model) {
     }
 }
 
+/// Compares `one`, a run on one worker, with runs on route direct.
+pub(crate) fn same_bits_on_route_direct(model: &Model, one: &Fingerprint) {
+    for workers in [2, 3, 5] {
+        let options = Options { route: Route::Direct, ..Options::default() };
+        one.assert_equal(&fingerprint(model, asked(workers, options)), &format!("{workers} workers, direct"));
+    }
+}
+
+/// Loses each of three workers at several moments of a run, on either route.
+pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
+    let one = fingerprint(model, Crew::default());
+    let mut arrivals = 0;
+    let mut count = |number: u64| {
+        arrivals = number;
+        None
+    };
+    solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
+    let mut midway = 0;
+    for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
+        let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
+        let at = arrivals * (seed as u64 + 2) / 12;
+        let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
+        let solved = solve_through(model.clone(), asked(3, options), &mut fate)
+            .unwrap_or_else(|e| panic!("{seed}: {e}"));
+        one.assert_equal(&Fingerprint::of(&solved), &format!("loss {seed}, {route:?}"));
+        assert_eq!(solved.outcome.losses.len(), 1, "{seed}");
+        midway += usize::from(solved.outcome.losses[0].back_to > 0);
+    }
+    assert!(midway >= 4, "{midway} of 8 went back to a state on the way");
+}
+
 #[test]
 fn free_slip_plates_of_27000_elements_have_the_same_bits_on_any_crew() {
     let mut model = example("plates-free-slip");
@@ -232,13 +263,7 @@ fn every_load_and_wall_has_the_same_bits_on_both_routes() {
     );
     same_bits(&model);
     let one = Fingerprint::of(&solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}")));
-    for workers in [2, 5] {
-        let options = Options { route: Route::Direct, ..Options::default() };
-        one.assert_equal(
-            &fingerprint(&model, asked(workers, options)),
-            &format!("{workers} workers, direct"),
-        );
-    }
+    same_bits_on_route_direct(&model, &one);
     // Nothing of it is idle: without any one of them the bits are others.
     let without = |change: &dyn Fn(&mut Model)| {
         let mut other = model.clone();
@@ -443,13 +468,7 @@ fn shells_and_solids_in_contact_have_the_same_bits_on_both_routes() {
     // Shells turn, layers yield, and bodies of both kinds meet: without the ball the bits are others.
     assert!(alone.state.shells.spin.iter().flatten().any(|w| w.abs() > 1.0));
     let one = Fingerprint::of(&alone);
-    for workers in [2, 5] {
-        let options = Options { route: Route::Direct, ..Options::default() };
-        one.assert_equal(
-            &fingerprint(&model, asked(workers, options)),
-            &format!("{workers} workers, direct"),
-        );
-    }
+    same_bits_on_route_direct(&model, &one);
     for pair in [[1, 2], [1, 3]] {
         let mut other = model.clone();
         let contact = other.setup.contact.as_mut().expect("the deck has contact");
@@ -466,29 +485,6 @@ fn a_worker_of_shells_that_is_lost_changes_no_bit() {
     let mut model = shells_and_solids();
     model.setup.control.end_cycle = 120;
     losing_a_worker_changes_no_bit(&model);
-}
-
-/// Loses each of three workers at several moments of a run.
-fn losing_a_worker_changes_no_bit(model: &Model) {
-    let one = fingerprint(model, Crew::default());
-    let mut arrivals = 0;
-    let mut count = |number: u64| {
-        arrivals = number;
-        None
-    };
-    solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
-    let mut midway = 0;
-    for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(6).enumerate() {
-        let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
-        let crew = asked(3, options);
-        let at = arrivals * (seed as u64 + 1) / 10;
-        let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
-        let solved = solve_through(model.clone(), crew, &mut fate).unwrap_or_else(|e| panic!("{seed}: {e}"));
-        one.assert_equal(&Fingerprint::of(&solved), &format!("loss {seed}, {route:?}"));
-        assert_eq!(solved.outcome.losses.len(), 1, "{seed}");
-        midway += usize::from(solved.outcome.losses[0].back_to > 0);
-    }
-    assert!(midway >= 2, "{midway} of 6 went back to a state on the way");
 }
 
 #[test]
@@ -575,13 +571,7 @@ fn rigid_bodies_have_the_same_bits_on_both_routes() {
     );
     same_bits(&model);
     let one = Fingerprint::of(&solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}")));
-    for workers in [2, 5] {
-        let options = Options { route: Route::Direct, ..Options::default() };
-        one.assert_equal(
-            &fingerprint(&model, asked(workers, options)),
-            &format!("{workers} workers, direct"),
-        );
-    }
+    same_bits_on_route_direct(&model, &one);
     let without = |change: &dyn Fn(&mut Model)| {
         let mut other = model.clone();
         change(&mut other);
@@ -665,13 +655,7 @@ fn edges_that_meet_edges_have_the_same_bits_on_both_routes() {
     println!("{} eroded, energy error {}", alone.outcome.ledger.eroded_elements, row.error);
     assert!(alone.outcome.ledger.eroded_elements > 0, "nothing eroded");
     let one = Fingerprint::of(&alone);
-    for workers in [2, 5] {
-        let options = Options { route: Route::Direct, ..Options::default() };
-        one.assert_equal(
-            &fingerprint(&model, asked(workers, options)),
-            &format!("{workers} workers, direct"),
-        );
-    }
+    same_bits_on_route_direct(&model, &one);
     let mut without = model.clone();
     without.setup.contact.as_mut().expect("the deck has contact").edges = false;
     let without = solve(without, Crew::default()).unwrap_or_else(|e| panic!("{e}"));

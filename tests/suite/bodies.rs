@@ -1,18 +1,13 @@
 //! Rigid bodies of shells: the same bits on any crew, what is joined to them feels them as it should, nothing is lost.
 
 use deck::Model;
-use master::{
-    embedded::Fate,
-    event::{Keep, Options},
-    snapshot::file,
-};
-use protocol::message::Route;
+use master::{event::Options, snapshot::file};
 use tests::{
     bits::Fingerprint,
-    solve::{Crew, Solved, keyword, model, solve, solve_through},
+    solve::{Crew, Solved, cross, keyword, model, solve},
 };
 
-use crate::bits::same_bits;
+use crate::bits::{losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
 
 fn run(model: &Model, crew: Crew) -> Solved {
     solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}"))
@@ -40,36 +35,14 @@ fn a_pipe_between_rigid_shells_has_the_same_bits_on_both_routes() {
     let model = whip();
     same_bits(&model);
     let one = Fingerprint::of(&run(&model, Crew::default()));
-    for workers in [2, 3, 5] {
-        let options = Options { route: Route::Direct, ..Options::default() };
-        let crew = Crew { options, ..Crew::of(workers) };
-        one.assert_equal(&Fingerprint::of(&run(&model, crew)), &format!("{workers} workers, direct"));
-    }
+    same_bits_on_route_direct(&model, &one);
 }
 
 #[test]
 fn a_worker_of_rigid_shells_that_is_lost_changes_no_bit() {
     let mut model = whip();
     model.setup.control.end_cycle = 120;
-    let one = Fingerprint::of(&run(&model, Crew::default()));
-    let mut arrivals = 0;
-    let mut count = |number: u64| {
-        arrivals = number;
-        None
-    };
-    solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
-    let mut midway = 0;
-    for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(6).enumerate() {
-        let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
-        let crew = Crew { options, ..Crew::of(3) };
-        let at = arrivals * (seed as u64 + 1) / 10;
-        let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
-        let solved = solve_through(model.clone(), crew, &mut fate).unwrap_or_else(|e| panic!("{seed}: {e}"));
-        one.assert_equal(&Fingerprint::of(&solved), &format!("loss {seed}, {route:?}"));
-        assert_eq!(solved.outcome.losses.len(), 1, "{seed}");
-        midway += usize::from(solved.outcome.losses[0].back_to > 0);
-    }
-    assert!(midway >= 2, "{midway} of 6 went back to a state on the way");
+    losing_a_worker_changes_no_bit(&model);
 }
 
 #[test]
@@ -151,10 +124,6 @@ fn a_strip_on_a_body_that_is_held_bends_as_one_that_is_clamped() {
             assert!((a.x[axis] - b.x[axis]).abs() < 1e-9 * most, "{:?} {:?}", a.x, b.x);
         }
     }
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[test]

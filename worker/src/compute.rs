@@ -78,7 +78,7 @@ fn thread_cpu_ns() -> u64 {
 /// Positions for a sort, if one is due; a blocking one replaces those under way.
 fn gathered(domain: &mut Domain, gather: bool, blocking: bool) -> Vec<f64> {
     if blocking {
-        domain.forget_gathered();
+        domain.end_surface();
     }
     if gather { domain.gather() } else { Vec::new() }
 }

@@ -33,6 +33,18 @@ pub(super) struct Velocity {
     pub(super) own_turn: [f64; 3],
 }
 
+/// Axes along or about which a code from 0 to 7 holds: none, x, y, z, xy, yz, zx, all.
+pub(super) const AXES_OF_CODE: [[bool; 3]; 8] = [
+    [false, false, false],
+    [true, false, false],
+    [false, true, false],
+    [false, false, true],
+    [true, true, false],
+    [false, true, true],
+    [true, false, true],
+    [true, true, true],
+];
+
 /// Degrees of freedom of nodes that are held at rest.
 pub(super) struct Held {
     pub(super) at: Place,

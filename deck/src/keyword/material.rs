@@ -2,6 +2,7 @@
 
 use super::{
     cards::Block,
+    condition::AXES_OF_CODE,
     erosion::{self, Limits},
     fields::{Context, TENS},
     log::{Log, Place},
@@ -228,21 +229,10 @@ impl Problem {
                 if frame < 0.0 {
                     f[1].fault(0, "constraints along the axes of space", "give CMO 1 or 0");
                 }
-                // x, y, z, xy, yz, zx, all.
-                const HELD: [[bool; 3]; 8] = [
-                    [false, false, false],
-                    [true, false, false],
-                    [false, true, false],
-                    [false, false, true],
-                    [true, true, false],
-                    [false, true, true],
-                    [true, false, true],
-                    [true, true, true],
-                ];
                 let mut held = [[false; 3]; 2];
                 for (i, axes) in held.iter_mut().enumerate().filter(|_| frame > 0.0) {
                     let code = f[1].integer(1 + i);
-                    match usize::try_from(code).ok().and_then(|code| HELD.get(code)) {
+                    match usize::try_from(code).ok().and_then(|code| AXES_OF_CODE.get(code)) {
                         Some(known) => *axes = *known,
                         None => f[1].fault(1 + i, "a number from 0 to 7", "correct it"),
                     }

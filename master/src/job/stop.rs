@@ -101,6 +101,8 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<Stri
         }
         let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
         let numbers = energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external]);
+        let released = vote.released.iter().flat_map(|released| released.pairs()).map(|pair| pair.contact);
+        let numbers = numbers.chain(released);
         let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);
         let mut numbers = numbers
             .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| *state)))

@@ -38,7 +38,7 @@ pub struct HistoryRow {
     pub contact: f64,
     /// Energy taken by friction.
     pub friction: f64,
-    /// Energy that left with eroded elements and dropped nodes.
+    /// Energy that left with eroded elements, dropped nodes and springs of contact on surfaces that have ended.
     pub eroded: f64,
     /// Elements that have eroded.
     pub eroded_elements: u64,

@@ -68,7 +68,7 @@ pub struct Summary {
     pub eroded_elements: u64,
     /// Their mass, which stays at the nodes as long as those do.
     pub eroded_mass: f64,
-    /// Energy that left with them, and with nodes that were dropped.
+    /// Energy that left with them, with nodes that were dropped, and with springs of contact on surfaces that have ended.
     pub eroded_energy: f64,
     /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
     pub momentum_error: f64,
@@ -162,6 +162,9 @@ pub struct NamedPair {
     pub contact: f64,
     /// Part of `contact` that friction took.
     pub friction: f64,
+    /// What springs lost where the surface changed by erosion; part of the eroded energy.
+    #[serde(default)]
+    pub eroded: f64,
 }
 
 /// Energies of the whole problem in the deck's unit of energy; `error` is relative.

@@ -2,13 +2,9 @@
 
 use crate::{
     case::Sheet,
-    solve::{Solved, model, run},
+    solve::{Solved, cross, model, run},
 };
 use deck::model::Model;
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
 
 fn norm(a: [f64; 3]) -> f64 {
     a.iter().map(|c| c * c).sum::<f64>().sqrt()

@@ -46,6 +46,12 @@ impl<L: Lane> Deviator<L> {
         L::splat(2.0).mul_add(shear, normal)
     }
 
+    /// Squared von Mises stress, `3/2 self : self`.
+    #[inline(always)]
+    pub fn mises_square(&self) -> L {
+        L::splat(1.5) * self.contract(self)
+    }
+
     /// `self * factor`.
     #[inline(always)]
     pub fn scaled(&self, factor: L) -> Self {

@@ -68,6 +68,9 @@ pub struct Vote {
     pub eroded: Vec<u32>,
     /// What left the run with them, and with nodes that were dropped.
     pub gone: Gone,
+    /// Energies in contacts after the cycle, where its surface ends with it: what the springs on the next one then have less has
+    /// left the run. None where the surface stays.
+    pub released: Option<PairEnergies>,
 }
 
 /// What left the run in a cycle through erosion: exact sums.
@@ -165,6 +168,7 @@ impl Vote {
             fault: None,
             eroded: Vec::new(),
             gone: Gone::default(),
+            released: None,
         }
     }
 
@@ -210,6 +214,9 @@ impl Vote {
         self.note_fault(other.fault);
         self.add_eroded(&other.eroded);
         self.gone.merge(&other.gone);
+        if let Some(released) = &other.released {
+            self.released.get_or_insert_default().merge(released);
+        }
     }
 
     /// Joins elements that eroded elsewhere.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::{
     super::{
-        condition::{Meaning, Target},
+        condition::{AXES_OF_CODE, Meaning, Target},
         draft::vector,
         log::Place,
         problem::{cross, minus, unit},
@@ -98,16 +98,6 @@ impl Translation<'_> {
     /// What is held at rest, by the axes that are.
     pub(super) fn held(&mut self) {
         let (problem, log) = (self.problem, self.log);
-        const CODES: [[bool; 3]; 8] = [
-            [false, false, false],
-            [true, false, false],
-            [false, true, false],
-            [false, false, true],
-            [true, true, false],
-            [false, true, true],
-            [true, false, true],
-            [true, true, true],
-        ];
         // By node: translations, then rotations.
         let mut of_node: BTreeMap<u32, ([[bool; 3]; 2], Place)> = BTreeMap::new();
         let mut hold = |node: u32, axes: [[bool; 3]; 2], at: Place| {
@@ -117,7 +107,7 @@ impl Translation<'_> {
             }
         };
         for node in problem.nodes.iter().filter(|node| node.held != [0; 2] && self.used.contains(&node.id)) {
-            hold(node.id, node.held.map(|code| CODES[usize::from(code)]), node.at);
+            hold(node.id, node.held.map(|code| AXES_OF_CODE[usize::from(code)]), node.at);
         }
         for given in &problem.conditions.held {
             let [x, y, z, turn_x, turn_y, turn_z] = given.axes;

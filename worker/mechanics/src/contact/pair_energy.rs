@@ -45,6 +45,12 @@ impl PairEnergies {
         &self.list
     }
 
+    /// The same without what friction took.
+    pub fn of_springs(&self) -> Self {
+        let springs = self.list.iter().map(|pair| PairEnergy { friction: 0.0, ..*pair });
+        Self { list: springs.collect() }
+    }
+
     /// Forgets all.
     pub fn clear(&mut self) {
         self.list.clear();

@@ -57,7 +57,7 @@ impl FailureLaw for JohnsonCookDamage {
         if !L::any(L::splat(0.0).less(slip)) {
             return damage;
         }
-        let sigma = (L::splat(1.5) * loading.stress.contract(&loading.stress)).sqrt();
+        let sigma = loading.stress.mises_square().sqrt();
         let triaxiality = -loading.pressure / sigma.max(L::splat(f64::MIN_POSITIVE));
         let strain = self.fracture_strain(triaxiality, loading.strain.rate, loading.temperature);
         (damage + slip / strain).min(L::splat(1.0))

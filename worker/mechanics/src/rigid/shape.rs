@@ -12,7 +12,7 @@ use crate::{
     initial::largest_face,
     load::{Curve, Drive},
     material::Material,
-    mesh::{Mesh, Part, quad_area},
+    mesh::{CORNERS, Mesh, Part, quad_area},
     setup::Constraint,
 };
 
@@ -319,18 +319,8 @@ impl Moments {
 
 /// Place and Jacobian of a point of the unit cube from -1 to 1.
 fn mapped(x: &[[f64; 3]; 8], at: [f64; 3]) -> ([f64; 3], f64) {
-    const SIGNS: [[f64; 3]; 8] = [
-        [-1.0, -1.0, -1.0],
-        [1.0, -1.0, -1.0],
-        [1.0, 1.0, -1.0],
-        [-1.0, 1.0, -1.0],
-        [-1.0, -1.0, 1.0],
-        [1.0, -1.0, 1.0],
-        [1.0, 1.0, 1.0],
-        [-1.0, 1.0, 1.0],
-    ];
     let (mut place, mut rows) = ([0.0; 3], [[0.0; 3]; 3]);
-    for (x, sign) in x.iter().zip(SIGNS) {
+    for (x, sign) in x.iter().zip(CORNERS) {
         let f: [f64; 3] = std::array::from_fn(|a| 0.5 * (1.0 + sign[a] * at[a]));
         let slopes = [0.5 * sign[0] * f[1] * f[2], 0.5 * sign[1] * f[2] * f[0], 0.5 * sign[2] * f[0] * f[1]];
         for a in 0..3 {

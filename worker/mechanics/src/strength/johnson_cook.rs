@@ -91,7 +91,7 @@ impl StrengthLaw for JohnsonCook {
         active: L::Mask,
     ) -> Deviator<L> {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let sigma_square = L::splat(1.5) * trial.contract(&trial);
+        let sigma_square = trial.mises_square();
         // Cold lanes below A cannot yield: the yield stress used below is at least A times the softening, which
         // is at least 1 in the cold. The margin is far above the roundings.
         let cold = history.temperature.less_equal(L::splat(self.t_room));

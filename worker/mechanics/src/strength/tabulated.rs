@@ -57,7 +57,7 @@ impl StrengthLaw for Tabulated {
         active: L::Mask,
     ) -> Deviator<L> {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let sigma_square = L::splat(1.5) * trial.contract(&trial);
+        let sigma_square = trial.mises_square();
         // The table never descends, and no factor is below 1. The margin is far above the roundings.
         let first = self.points[0][1];
         let low = sigma_square.less_equal(L::splat(first * first * (1.0 - 1e-9)));

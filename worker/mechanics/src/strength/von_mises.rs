@@ -35,7 +35,7 @@ impl StrengthLaw for VonMises {
         history: &mut History<L>,
         active: L::Mask,
     ) -> Deviator<L> {
-        let sigma = (L::splat(1.5) * trial.contract(&trial)).sqrt();
+        let sigma = trial.mises_square().sqrt();
         let factor = self.rate.at(strain.rate);
         let hardening = L::splat(self.hardening) * factor;
         let yield_stress = hardening

@@ -1,0 +1,272 @@
+//! The plan that a domain acts by, from one boundary to the next: shared nodes, guests and work units put in their places,
+//! and freed nodes taken out.
+
+use std::{
+    collections::{HashMap, HashSet},
+    ops::Range,
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{ContactRoom, Domain, Guests, NONE, Room, Shared, bodies, pack};
+use crate::{
+    contact::{Batch, Contact, PairEnergies},
+    lanes::SET,
+    nodes::NodeSet,
+};
+
+/// Which nodes this worker shares with others and which work units it computes; from one plan boundary to the next.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Global nodes whose partial forces travel, in the order of the packed arrays.
+    pub exchange: Vec<u32>,
+    /// Work units.
+    pub batch: Option<Batch>,
+    /// Contact nodes that no sub-domain here has.
+    pub guests: Vec<Guest>,
+    /// Global nodes whose state this worker sends to others when the plan starts to act.
+    pub send: Vec<u32>,
+    /// Whether moments travel behind the forces of each node: six numbers instead of three.
+    pub moments: bool,
+    /// On route direct: the workers that hold nodes of `exchange` too.
+    pub neighbours: Vec<Neighbour>,
+    /// Nodes held here that have no element left and leave the run with this plan; in the first plan of an epoch, all that
+    /// have left before.
+    pub dropped: Vec<u32>,
+}
+
+impl Plan {
+    /// Numbers that travel for each node of the exchange.
+    pub fn stride(&self) -> usize {
+        if self.moments { 6 } else { 3 }
+    }
+}
+
+/// Another worker that holds nodes of the exchange.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Neighbour {
+    /// Its index among the workers of the job.
+    pub worker: u32,
+    /// Positions in [`Plan::exchange`] of the nodes that both hold, ascending; both sides list them in the same order
+    /// of nodes.
+    pub shared: Vec<u32>,
+}
+
+/// What integrating a guest needs beside its position and velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Guest {
+    /// Global node index.
+    pub node: u32,
+    /// Nodal mass.
+    pub mass: f64,
+    /// Index into the setup's constraints.
+    pub constraint: u16,
+}
+
+impl Domain {
+    /// Starts to act by `plan`. `guest_state` is x, y, z, vx, vy, vz of each guest, in the plan's order.
+    ///
+    /// # Errors
+    /// If the plan names a node that is neither held nor a guest, or the state has the wrong length.
+    pub fn install(&mut self, plan: &Plan, guest_state: &[f64]) -> Result<(), String> {
+        if guest_state.len() != 6 * plan.guests.len() {
+            return Err(format!(
+                "{} numbers of guest state for {} guests, expected 6 each",
+                guest_state.len(),
+                plan.guests.len()
+            ));
+        }
+        let constraint: Vec<u16> = plan.guests.iter().map(|g| g.constraint).collect();
+        let sets = NodeSet::all(&constraint);
+        let padded = |values: &mut dyn Iterator<Item = f64>, padding: f64| {
+            let mut array: Vec<f64> = values.collect();
+            array.resize(sets.len() * SET, padding);
+            array
+        };
+        let number = |i: usize| padded(&mut guest_state.chunks_exact(6).map(|s| s[i]), 0.0);
+        self.guests = Guests {
+            node: plan.guests.iter().map(|g| g.node).collect(),
+            x: std::array::from_fn(number),
+            v: std::array::from_fn(|a| number(3 + a)),
+            f: std::array::from_fn(|_| padded(&mut std::iter::empty(), 0.0)),
+            mass: padded(&mut plan.guests.iter().map(|g| g.mass), 1.0),
+            constraint,
+            sets,
+        };
+        let guest_of: HashMap<u32, u32> =
+            self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
+        let contact_nodes = plan.batch.as_ref().map_or(&[][..], |batch| &batch.nodes);
+        if !contact_nodes.is_sorted_by(|a, b| a.global < b.global) {
+            return Err("contact nodes are not in ascending order".to_owned());
+        }
+        self.contact = None;
+        if let (Some(batch), Some(settings)) = (&plan.batch, &self.setup.contact) {
+            let mut sources = Vec::with_capacity(batch.nodes.len());
+            for node in &batch.nodes {
+                let source = match (self.home.get(node.global), guest_of.get(&node.global)) {
+                    ([first, ..], _) => *first,
+                    ([], Some(&guest)) => (NONE, guest),
+                    ([], None) => {
+                        return Err(format!("contact node {} is neither held nor a guest", node.global));
+                    }
+                };
+                sources.push(source);
+            }
+            let n = sources.len();
+            let zeros = || std::array::from_fn(|_| vec![0.0; n]);
+            let (mut x, mut v) = (zeros(), zeros());
+            pack(&self.rooms, &self.guests, &sources, &mut x, &mut v);
+            let mut contact = Contact::new(batch, settings, &x);
+            contact.watch_pairs(&self.watched_pairs);
+            self.contact = Some(ContactRoom { contact, sources, x, v, f: zeros() });
+        }
+        // Every node with more than one copy, here or elsewhere, and every contact node.
+        self.moments = plan.moments;
+        self.copies.clear();
+        self.exchange.clear();
+        self.local.clear();
+        let mut exchanged = HashSet::with_capacity(plan.exchange.len());
+        let n_entries = bodies::entries_of(&plan.exchange, self.bodies.len())?;
+        self.sends_pushes = n_entries > 0;
+        for &node in &plan.exchange[..plan.exchange.len() - n_entries] {
+            exchanged.insert(node);
+            let contact = contact_nodes.binary_search_by_key(&node, |n| n.global);
+            let shared = self.shared(node, contact.map_or(NONE, |i| i as u32), &guest_of);
+            if shared.copies.is_empty() && shared.guest == NONE {
+                return Err(format!("node {node} of the exchange is neither held nor a guest"));
+            }
+            self.exchange.push(shared);
+        }
+        if !self.bodies.is_empty() {
+            let nodes: Vec<u32> = contact_nodes.iter().map(|node| node.global).collect();
+            self.find_bodies(&guest_of, &nodes, &mut exchanged);
+        }
+        // Both lists ascend, so one walk over them finds the contact node of each.
+        let (mut next, n_several) = (0, self.home.several().len());
+        for (i, node) in (0_u32..).zip(contact_nodes.iter().map(|n| n.global)) {
+            while next < n_several && self.home.several()[next] < node {
+                self.share_locally(self.home.several()[next], NONE, &exchanged, &guest_of);
+                next += 1;
+            }
+            next += usize::from(next < n_several && self.home.several()[next] == node);
+            self.share_locally(node, i, &exchanged, &guest_of);
+        }
+        for i in next..n_several {
+            self.share_locally(self.home.several()[i], NONE, &exchanged, &guest_of);
+        }
+        for room in &mut self.rooms {
+            (room.border, room.interior) = if exchanged.is_empty() {
+                let all = 0..room.block.n_sets();
+                (Vec::new(), vec![all])
+            } else {
+                let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
+                split(&room.block.sets_touching(&touched))
+            };
+            if room.eroding.is_some() {
+                room.leave_out_dead();
+            }
+            if let Some(gathered) = room.gathered.pop_front() {
+                room.reference = gathered;
+            }
+        }
+        self.drop_nodes(&plan.dropped);
+        Ok(())
+    }
+
+    /// Takes freed nodes out of the run: they stand still from now on, and nothing feels them. A first plan names those of
+    /// earlier cycles too, which stand still already: what left with them was booked then, and nothing is booked here.
+    fn drop_nodes(&mut self, nodes: &[u32]) {
+        for &node in nodes {
+            for &(room, local) in self.home.get(node) {
+                let room = &mut self.rooms[room as usize];
+                let booked = room.drop_node(local);
+                let (v, mass) = (&mut room.block.v, room.block.mass[local as usize]);
+                let velocity: [f64; 3] = std::array::from_fn(|a| std::mem::take(&mut v[a][local as usize]));
+                if booked {
+                    let [x, y, z] = velocity;
+                    let square = x.mul_add(x, y.mul_add(y, z * z));
+                    self.gone.kinetic += self.quanta.energy.round(0.5 * mass * square);
+                    for (sum, v) in self.gone.momentum.iter_mut().zip(velocity) {
+                        *sum += self.quanta.momentum.round(mass * v);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The surface in force ends with this cycle: the gathering that is due replaces those whose plans will not come any more, and
+    /// the vote will say what the springs hold after it ([`crate::vote::Vote::released`]).
+    pub fn end_surface(&mut self) {
+        self.surface_ends = true;
+        for room in &mut self.rooms {
+            room.gathered.clear();
+        }
+    }
+
+    /// Energies that the springs on the surface in force have at the positions as of now; `dt` is the step that led to them.
+    pub(super) fn spring_energies(&mut self, dt: f64) -> PairEnergies {
+        let Some(room) = &mut self.contact else { return PairEnergies::default() };
+        pack(&self.rooms, &self.guests, &room.sources, &mut room.x, &mut room.v);
+        // Forces are added to what is cleared before the next ones.
+        room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
+        room.contact.energies().of_springs()
+    }
+
+    /// Books the copies of a held node that is not exchanged.
+    fn share_locally(
+        &mut self,
+        node: u32,
+        contact: u32,
+        exchanged: &HashSet<u32>,
+        guest_of: &HashMap<u32, u32>,
+    ) {
+        if !self.home.get(node).is_empty() && !exchanged.contains(&node) {
+            let shared = self.shared(node, contact, guest_of);
+            self.local.push(shared);
+        }
+    }
+
+    fn shared(&mut self, node: u32, contact: u32, guest_of: &HashMap<u32, u32>) -> Shared {
+        let first = self.copies.len() as u32;
+        self.copies.extend_from_slice(self.home.get(node));
+        Shared {
+            copies: first..self.copies.len() as u32,
+            contact,
+            guest: guest_of.get(&node).copied().unwrap_or(NONE),
+        }
+    }
+}
+
+impl Room {
+    /// Sets without a living element are not computed any more.
+    pub(super) fn leave_out_dead(&mut self) {
+        let alive = self.block.alive();
+        self.border = living(&self.border, alive);
+        self.interior = living(&self.interior, alive);
+    }
+}
+
+/// The sets among these in which an element is alive, as ranges.
+fn living(ranges: &[Range<u32>], alive: &[u8]) -> Vec<Range<u32>> {
+    let mut living: Vec<Range<u32>> = Vec::new();
+    for set in ranges.iter().cloned().flatten().filter(|&set| alive[set as usize] != 0) {
+        match living.last_mut() {
+            Some(last) if last.end == set => last.end += 1,
+            _ => living.push(set..set + 1),
+        }
+    }
+    living
+}
+
+/// Sets that touch marked nodes and the others, as ranges.
+fn split(touching: &[bool]) -> (Vec<Range<u32>>, Vec<Range<u32>>) {
+    let mut sides = (Vec::<Range<u32>>::new(), Vec::<Range<u32>>::new());
+    for (set, &touches) in (0_u32..).zip(touching) {
+        let side = if touches { &mut sides.0 } else { &mut sides.1 };
+        match side.last_mut() {
+            Some(last) if last.end == set => last.end += 1,
+            _ => side.push(set..set + 1),
+        }
+    }
+    sides
+}
