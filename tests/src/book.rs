@@ -111,6 +111,7 @@ macro_rules! each_case_of_the_book {
             load: a_driven_wall_pushes_as_a_bar_that_strikes_it_is_pushed quick;
             load: a_wall_gives_the_impulse_that_bodies_lack_and_rubs_after_coulomb quick;
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
+            erosion: an_element_that_leaves_a_block_uncovers_its_neighbours quick;
             erosion: a_rod_goes_through_a_plate_and_the_ledger_closes long;
             erosion: a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked quick;
             rigid: a_free_top_precesses_after_euler quick;

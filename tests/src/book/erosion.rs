@@ -1,11 +1,33 @@
 //! Erosion: a rod goes through a plate, and what left is in the ledger.
 
-use mechanics::erosion::ALIVE;
+use mechanics::{contact::Surface, erosion::ALIVE};
 
 use crate::{
     case::Sheet,
-    solve::{Solved, example, keyword, run},
+    solve::{Solved, example, keyword, model, run},
 };
+
+/// A block of 4 by 4 by 4 elements without one of them: the faces on its surface.
+pub(super) fn an_element_that_leaves_a_block_uncovers_its_neighbours(sheet: &mut Sheet) {
+    let block = model(
+        r#"
+            title = "block"
+            units = "SI"
+            [control]
+            end_cycle = 1
+            [[part]]
+            name = "block"
+            material = "MILD_STEEL"
+            box = { origin = [0, 0, 0], size = [1, 1, 1], cells = [4, 4, 4] }
+        "#,
+    );
+    let n_faces = |gone: u32| Surface::new(&block.mesh, &block.setup.materials, &|e| e != gone).faces.len();
+    for (place, gone) in
+        [("nowhere", u32::MAX), ("a corner", 0), ("an edge", 1), ("a face", 5), ("inside", 21)]
+    {
+        sheet.add(&format!("block without an element @ {place}, faces"), n_faces(gone) as f64);
+    }
+}
 
 /// Whether what an instant of a run has lost is never less than what an earlier one had.
 fn never_falls(solved: &Solved) -> bool {
