@@ -13,7 +13,6 @@ mod plan;
 
 use std::{collections::VecDeque, ops::Range};
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -736,9 +735,25 @@ impl Domain {
 
 /// Runs `work` on each room, in parallel on the current pool when there are several.
 fn each(rooms: &mut [Room], work: impl Fn(&mut Room) + Send + Sync) {
+    one_by_one(rooms, &work);
+}
+
+/// So many rooms are taken one by one at most: each is handed to the next thread by the one before.
+const ONE_BY_ONE: usize = 32;
+
+/// Whichever thread is free takes the next room: rooms of a small part and of a large one are not alike, and halves of the
+/// list would leave a thread with all the large ones. Longer lists are halved first.
+fn one_by_one(rooms: &mut [Room], work: &(impl Fn(&mut Room) + Send + Sync)) {
     match rooms {
+        [] => {}
         [one] => work(one),
-        many => many.par_iter_mut().with_max_len(1).for_each(work),
+        [first, rest @ ..] if rest.len() < ONE_BY_ONE => {
+            rayon::join(|| work(first), || one_by_one(rest, work));
+        }
+        many => {
+            let (left, right) = many.split_at_mut(many.len() / 2);
+            rayon::join(|| one_by_one(left, work), || one_by_one(right, work));
+        }
     }
 }
 
