@@ -88,7 +88,7 @@ impl Job {
                 (Base { state: Arc::new(start), rest }, Vec::new())
             }
             Some(snapshot) => {
-                if snapshot.state.x.len() != start.x.len()
+                if shape(&snapshot.state) != shape(&start)
                     || snapshot.state.initial_volume != start.initial_volume
                     || snapshot.walls.len() != wall::first_poses(&setup.walls).len()
                     || snapshot.vote.bodies.len() != setup.bodies.len()
@@ -432,6 +432,16 @@ impl Cut {
         }
         Self { by_worker, holdings, gather }
     }
+}
+
+/// How long the arrays of a state are: what its mesh and its laws ask for.
+fn shape(state: &GlobalState) -> (Vec<usize>, Vec<usize>) {
+    let GlobalState { x, v, mass, constraint, initial_volume, elements, eroded, strain, shells, .. } = state;
+    let fixed =
+        [x.len(), v.len(), mass.len(), constraint.len(), initial_volume.len(), eroded.len(), strain.len()];
+    let of_shells =
+        [shells.spin.len(), shells.inertia.len()].into_iter().chain(shells.fields.iter().map(Vec::len));
+    (fixed.into_iter().chain(elements.iter().map(Vec::len)).collect(), of_shells.collect())
 }
 
 /// The blocks of a sub-domain, one for each thread of its worker.
