@@ -2,8 +2,8 @@
 //!
 //! A [`Piece`] is the image of a sub-domain in element and node order, as it travels and is stored; a [`Block`] is
 //! the same laid out for the kernels. Elements sit in *slots*, eight to a *lane set*, the same on every lane
-//! width. In a structured block the slots of a K layer follow the local node index of their corner 0, so that the
-//! corners of a set are contiguous loads; a slot at the end of a row holds no element (a *phantom*) and is masked
+//! width. In a structured block the slots of a set follow the local node index of their corner 0, so that the
+//! corners of a set are contiguous loads; a slot beyond the end of a row holds no element (a *phantom*) and is masked
 //! wherever a result leaves the kernel. A block knows nothing of other blocks: nodes that several hold are kept
 //! equal by whoever integrates them.
 
@@ -581,14 +581,20 @@ fn structured([ni, nj, nk]: [usize; 3], n_nodes: usize) -> (Layout, Vec<u32>, us
     let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
     assert!(n_nodes == plane * (nk + 1), "{n_nodes} nodes for {ni} x {nj} x {nk} elements");
     assert!(ni * nj * nk > 0, "{ni} x {nj} x {nk} elements");
-    let sets_per_layer = ((nj - 1) * row + ni).div_ceil(SET);
+    // Sets run on from row to row, over the node that ends each, or begin anew with each row: whichever needs fewer.
+    let (running, by_row) = (((nj - 1) * row + ni).div_ceil(SET), ni.div_ceil(SET));
+    let anew = nj * by_row < running;
+    let sets_per_layer = if anew { nj * by_row } else { running };
+    let base_in_layer = |set: usize| if anew { set / by_row * row + set % by_row * SET } else { set * SET };
+    let slot_in_layer = |i: usize, j: usize| if anew { j * by_row * SET + i } else { j * row + i };
     let n_sets = nk * sets_per_layer;
-    let base = (0..n_sets).map(|set| (set / sets_per_layer * plane + set % sets_per_layer * SET) as u32);
+    let base =
+        (0..n_sets).map(|set| (set / sets_per_layer * plane + base_in_layer(set % sets_per_layer)) as u32);
     let base: Vec<u32> = base.collect();
     let mut slots = Vec::with_capacity(ni * nj * nk);
     for k in 0..nk {
         for j in 0..nj {
-            slots.extend((0..ni).map(|i| (k * sets_per_layer * SET + j * row + i) as u32));
+            slots.extend((0..ni).map(|i| (k * sets_per_layer * SET + slot_in_layer(i, j)) as u32));
         }
     }
     let last = base[n_sets - 1] as usize;

@@ -10,6 +10,7 @@
 
 mod bodies;
 mod plan;
+mod seams;
 
 use std::{collections::VecDeque, ops::Range};
 
@@ -32,6 +33,7 @@ use crate::{
 
 use bodies::Held;
 pub use plan::{Guest, Neighbour, Plan};
+use seams::Seams;
 
 /// Measures the work of compute threads; the physics knows no clock of its own.
 pub trait Meter: Sync {
@@ -187,7 +189,9 @@ pub struct Domain {
     /// Whether there are shells anywhere in the run.
     moments: bool,
     exchange: Vec<Shared>,
+    /// Shared here only, but for the nodes of seams.
     local: Vec<Shared>,
+    seams: Seams,
     copies: Vec<(u32, u32)>,
     bodies: Vec<Held>,
     /// Pushes on bodies travel: there are other workers.
@@ -315,6 +319,7 @@ impl Domain {
             moments: false,
             exchange: Vec::new(),
             local: Vec::new(),
+            seams: Seams::default(),
             copies: Vec::new(),
             bodies,
             sends_pushes: false,
@@ -590,6 +595,7 @@ impl Domain {
             let moment = if self.moments { self.moment(&self.local[i]) } else { [0.0; 3] };
             self.set(i, false, total, moment);
         }
+        self.seams.add_up(&mut self.rooms, self.contact.as_ref().map(|room| &room.f));
         meter.stop(mark, false);
         self.move_bodies(pushes, dt_previous, dt);
         let setup = &self.setup;

@@ -125,6 +125,7 @@ impl Domain {
         self.copies.clear();
         self.exchange.clear();
         self.local.clear();
+        self.seams.clear();
         let mut exchanged = HashSet::with_capacity(plan.exchange.len());
         let n_entries = bodies::entries_of(&plan.exchange, self.bodies.len())?;
         self.sends_pushes = n_entries > 0;
@@ -220,10 +221,18 @@ impl Domain {
         exchanged: &HashSet<u32>,
         guest_of: &HashMap<u32, u32>,
     ) {
-        if !self.home.get(node).is_empty() && !exchanged.contains(&node) {
-            let shared = self.shared(node, contact, guest_of);
-            self.local.push(shared);
+        if exchanged.contains(&node) {
+            return;
         }
+        let copies = self.home.get(node);
+        // Moments go the general way, and so does a node that a guest stands for here.
+        let simple = !self.moments && !guest_of.contains_key(&node);
+        let contact_node = (contact != NONE).then_some(contact);
+        if copies.is_empty() || (simple && self.seams.take(copies, contact_node)) {
+            return;
+        }
+        let shared = self.shared(node, contact, guest_of);
+        self.local.push(shared);
     }
 
     fn shared(&mut self, node: u32, contact: u32, guest_of: &HashMap<u32, u32>) -> Shared {

@@ -137,6 +137,38 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: Fai
     sets: &[Range<u32>],
     vote: &mut ElementVote,
 ) {
+    // A loop for each layout: what one needs in memory the other keeps in registers.
+    // SAFETY: the caller's promise.
+    unsafe {
+        match view.layout {
+            Layout::Structured { row, plane, base } => {
+                all_sets::<L, _, E, S, F>(
+                    Rows { row: *row, plane: *plane, base },
+                    view,
+                    laws,
+                    step,
+                    sets,
+                    vote,
+                );
+            }
+            Layout::Explicit { corners } => {
+                all_sets::<L, _, E, S, F>(Lists { corners }, view, laws, step, sets, vote);
+            }
+        }
+    }
+}
+
+/// # Safety
+/// As [`compute`]; `place` is the layout of the view.
+#[inline(always)]
+unsafe fn all_sets<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+    place: P,
+    view: &mut View<'_>,
+    laws: &Laws<E, S, F>,
+    step: &Step,
+    sets: &[Range<u32>],
+    vote: &mut ElementVote,
+) {
     let zero = L::splat(0.0);
     let mut tally = Tally {
         internal: zero,
@@ -152,7 +184,7 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: Fai
             while lane < SET {
                 let slot = set as usize * SET + lane;
                 // SAFETY: handed on from the caller.
-                unsafe { slots::<L, E, S, F>(view, laws, step, slot, &mut tally, vote) };
+                unsafe { slots::<L, P, E, S, F>(place, view, laws, step, slot, &mut tally, vote) };
                 lane += L::N;
             }
         }
@@ -171,7 +203,8 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: Fai
 /// # Safety
 /// As [`compute`].
 #[inline(always)]
-unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+    place: P,
     view: &mut View<'_>,
     laws: &Laws<E, S, F>,
     step: &Step,
@@ -181,19 +214,23 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
 ) {
     let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
     let dt = L::splat(step.dt);
-    fetch_ahead(view, slot);
+    for axis in 0..3 {
+        for array in [view.x[axis], view.v[axis], &*view.f[axis]] {
+            place.fetch_ahead(array, slot);
+        }
+    }
     // SAFETY: slots are inside the state arrays, corners inside the node arrays.
     let (x, v, initial_volume, alive) = unsafe {
         (
             Modes::of(
-                modes_of(corners(view.layout, view.x[0], slot)),
-                modes_of(corners(view.layout, view.x[1], slot)),
-                modes_of(corners(view.layout, view.x[2], slot)),
+                modes_of(place.corners(view.x[0], slot)),
+                modes_of(place.corners(view.x[1], slot)),
+                modes_of(place.corners(view.x[2], slot)),
             ),
             Modes::of(
-                modes_of(corners(view.layout, view.v[0], slot)),
-                modes_of(corners(view.layout, view.v[1], slot)),
-                modes_of(corners(view.layout, view.v[2], slot)),
+                modes_of(place.corners(view.v[0], slot)),
+                modes_of(place.corners(view.v[1], slot)),
+                modes_of(place.corners(view.v[2], slot)),
             ),
             L::load(view.initial_volume, slot),
             L::mask(u32::from(*view.alive.get_unchecked(slot / SET)) >> (slot % SET)),
@@ -416,34 +453,9 @@ unsafe fn slots<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
         let forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
         let forces = balanced(forces, active, magic, &mut tally.largest_force);
         // SAFETY: corners are inside the node arrays.
-        unsafe { scatter(view.layout, view.f[axis], slot, forces) };
+        unsafe { place.scatter(view.f[axis], slot, forces) };
         axis += 1;
     }
-}
-
-/// Asks for what the next set of a structured block will be the first to touch: there are more streams than the machine
-/// foresees by itself.
-#[inline(always)]
-fn fetch_ahead(view: &View<'_>, slot: usize) {
-    #[cfg(target_arch = "x86_64")]
-    if let Layout::Structured { row, plane, base } = view.layout {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let n = base[slot / SET] as usize + slot % SET + 2 * SET;
-        let mut axis = 0;
-        while axis < 3 {
-            let ahead = |array: &[f64], at: usize| {
-                // SAFETY: any address may be asked for.
-                unsafe { _mm_prefetch::<_MM_HINT_T0>(array.as_ptr().wrapping_add(at).cast()) }
-            };
-            for array in [view.x[axis], view.v[axis], &*view.f[axis]] {
-                ahead(array, n + plane + row);
-                ahead(array, n + row);
-            }
-            axis += 1;
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (view, slot);
 }
 
 /// One component of the corner forces of active elements as it is added: seven corners are rounded, the eighth takes
@@ -474,24 +486,105 @@ fn balanced<L: Lane>(forces: [L; 8], active: L::Mask, magic: L, largest: &mut L)
 /// As [`compute`].
 #[inline(always)]
 pub(crate) unsafe fn corners<L: Lane>(layout: &Layout, from: &[f64], slot: usize) -> [L; 8] {
-    // SAFETY: the caller's promise covers every access here.
+    // SAFETY: the caller's promise.
     unsafe {
         match layout {
             Layout::Structured { row, plane, base } => {
-                let n = *base.get_unchecked(slot / SET) as usize + slot % SET;
-                let (row, plane) = (*row, *plane);
-                [
-                    L::load(from, n),
-                    L::load(from, n + 1),
-                    L::load(from, n + row + 1),
-                    L::load(from, n + row),
-                    L::load(from, n + plane),
-                    L::load(from, n + plane + 1),
-                    L::load(from, n + plane + row + 1),
-                    L::load(from, n + plane + row),
-                ]
+                Rows { row: *row, plane: *plane, base }.corners(from, slot)
             }
-            Layout::Explicit { corners } => [
+            Layout::Explicit { corners } => Lists { corners }.corners(from, slot),
+        }
+    }
+}
+
+/// A layout as the loop over its sets knows it.
+trait Place: Copy {
+    /// Values of one node array at the eight corners.
+    ///
+    /// # Safety
+    /// As [`compute`].
+    unsafe fn corners<L: Lane>(self, from: &[f64], slot: usize) -> [L; 8];
+
+    /// Adds corner values to one node array. Every value is a multiple of the quantum, so no order can show.
+    ///
+    /// # Safety
+    /// As [`compute`].
+    unsafe fn scatter<L: Lane>(self, to: &mut [f64], slot: usize, values: [L; 8]);
+
+    /// Asks for what the next set will be the first to touch of a node array.
+    fn fetch_ahead(self, array: &[f64], slot: usize);
+}
+
+/// [`Layout::Structured`].
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    row: usize,
+    plane: usize,
+    base: &'a [u32],
+}
+
+impl Place for Rows<'_> {
+    #[inline(always)]
+    unsafe fn corners<L: Lane>(self, from: &[f64], slot: usize) -> [L; 8] {
+        let Self { row, plane, base } = self;
+        // SAFETY: the caller's promise covers every access here.
+        unsafe {
+            let n = *base.get_unchecked(slot / SET) as usize + slot % SET;
+            [
+                L::load(from, n),
+                L::load(from, n + 1),
+                L::load(from, n + row + 1),
+                L::load(from, n + row),
+                L::load(from, n + plane),
+                L::load(from, n + plane + 1),
+                L::load(from, n + plane + row + 1),
+                L::load(from, n + plane + row),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter<L: Lane>(self, to: &mut [f64], slot: usize, values: [L; 8]) {
+        let Self { row, plane, base } = self;
+        // SAFETY: the caller's promise covers every access here.
+        unsafe {
+            let n = *base.get_unchecked(slot / SET) as usize + slot % SET;
+            add_pair(to, n, values[0], values[1]);
+            add_pair(to, n + row, values[3], values[2]);
+            add_pair(to, n + plane, values[4], values[5]);
+            add_pair(to, n + plane + row, values[7], values[6]);
+        }
+    }
+
+    #[inline(always)]
+    fn fetch_ahead(self, array: &[f64], slot: usize) {
+        #[cfg(target_arch = "x86_64")]
+        {
+            use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+            let n = self.base[slot / SET] as usize + slot % SET + 2 * SET;
+            for at in [n + self.plane + self.row, n + self.row] {
+                // SAFETY: any address may be asked for.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(array.as_ptr().wrapping_add(at).cast()) }
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        let _ = (array, slot);
+    }
+}
+
+/// [`Layout::Explicit`].
+#[derive(Clone, Copy)]
+struct Lists<'a> {
+    corners: &'a [Vec<u32>; 8],
+}
+
+impl Place for Lists<'_> {
+    #[inline(always)]
+    unsafe fn corners<L: Lane>(self, from: &[f64], slot: usize) -> [L; 8] {
+        let corners = self.corners;
+        // SAFETY: the caller's promise covers every access here.
+        unsafe {
+            [
                 L::gather(from, &corners[0], slot),
                 L::gather(from, &corners[1], slot),
                 L::gather(from, &corners[2], slot),
@@ -500,41 +593,28 @@ pub(crate) unsafe fn corners<L: Lane>(layout: &Layout, from: &[f64], slot: usize
                 L::gather(from, &corners[5], slot),
                 L::gather(from, &corners[6], slot),
                 L::gather(from, &corners[7], slot),
-            ],
+            ]
         }
     }
-}
 
-/// Adds corner values to one node array. Every value is a multiple of the quantum, so no order can show.
-///
-/// # Safety
-/// As [`compute`].
-#[inline(always)]
-unsafe fn scatter<L: Lane>(layout: &Layout, to: &mut [f64], slot: usize, values: [L; 8]) {
-    // SAFETY: the caller's promise covers every access here.
-    unsafe {
-        match layout {
-            Layout::Structured { row, plane, base } => {
-                let n = *base.get_unchecked(slot / SET) as usize + slot % SET;
-                let (row, plane) = (*row, *plane);
-                add_pair(to, n, values[0], values[1]);
-                add_pair(to, n + row, values[3], values[2]);
-                add_pair(to, n + plane, values[4], values[5]);
-                add_pair(to, n + plane + row, values[7], values[6]);
-            }
-            Layout::Explicit { corners } => {
-                // Written out, so that only this arm needs the lanes in memory.
-                add_each(to, &corners[0], slot, values[0]);
-                add_each(to, &corners[1], slot, values[1]);
-                add_each(to, &corners[2], slot, values[2]);
-                add_each(to, &corners[3], slot, values[3]);
-                add_each(to, &corners[4], slot, values[4]);
-                add_each(to, &corners[5], slot, values[5]);
-                add_each(to, &corners[6], slot, values[6]);
-                add_each(to, &corners[7], slot, values[7]);
-            }
+    #[inline(always)]
+    unsafe fn scatter<L: Lane>(self, to: &mut [f64], slot: usize, values: [L; 8]) {
+        let corners = self.corners;
+        // SAFETY: the caller's promise covers every access here.
+        unsafe {
+            add_each(to, &corners[0], slot, values[0]);
+            add_each(to, &corners[1], slot, values[1]);
+            add_each(to, &corners[2], slot, values[2]);
+            add_each(to, &corners[3], slot, values[3]);
+            add_each(to, &corners[4], slot, values[4]);
+            add_each(to, &corners[5], slot, values[5]);
+            add_each(to, &corners[6], slot, values[6]);
+            add_each(to, &corners[7], slot, values[7]);
         }
     }
+
+    #[inline(always)]
+    fn fetch_ahead(self, _array: &[f64], _slot: usize) {}
 }
 
 /// Adds each lane to the entry that `indices` has for it from `at` on.
