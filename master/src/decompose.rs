@@ -272,7 +272,7 @@ fn cut_planes(
     let mut best: Option<(f64, Cut, usize)> = None;
     for split in [middle, workers.len() - middle] {
         let target = volume as f64 * total(&workers[..split], speeds) / total(workers, speeds);
-        for axis in 0..3 {
+        for axis in AXES {
             let Some(whole) = Cut::whole(&boxes, axis, target, count) else { continue };
             let interface = volume as f64 / whole.planes;
             let near = NEAR * target.min(volume as f64 - target);
@@ -310,6 +310,10 @@ fn cut_planes(
     cut_planes(below, shortest, &workers[..split], speeds, count, out);
     cut_planes(above, shortest, &workers[split..], speeds, count, out);
 }
+
+/// Axes in the order in which equals are preferred: a lane set lies along I, so a cut across J has fewer of them at the
+/// border and leaves rows long.
+const AXES: [usize; 3] = [1, 0, 2];
 
 /// How near to the share of the workers whole planes have to come, relative to the smaller side.
 const NEAR: f64 = 0.002;
