@@ -16,7 +16,7 @@ use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     element::{
         ElementVote, Step,
-        hex8::{self, Laws, Layout, View},
+        hex8::{self, Along, Laws, Layout, View},
         shell4::{Core, ShellStep},
     },
     eos::{EquationOfState, IdealGas, Jwl, Linear, Polynomial, Shock},
@@ -128,9 +128,12 @@ impl Block {
         assert!(piece.fields.iter().all(|f| f.len() == n_elements), "fields for {n_elements} elements");
         let (layout, slots, reach) = match &piece.topology {
             Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
-            Topology::Explicit { hexahedra } => explicit(hexahedra, n_nodes),
+            Topology::Explicit { hexahedra } => explicit(hexahedra, in_runs(hexahedra), n_nodes),
             Topology::Shells { quads, .. } => {
-                explicit(&quads.iter().map(|&quad| twice(quad)).collect::<Vec<_>>(), n_nodes)
+                let corners: Vec<_> = quads.iter().map(|&quad| twice(quad)).collect();
+                // Shells have kernels and layers of their own, in the order of elements.
+                let order = (0..quads.len() as u32).collect();
+                explicit(&corners, (order, vec![None; quads.len().div_ceil(SET)]), n_nodes)
             }
         };
         let shells = match &piece.topology {
@@ -145,7 +148,7 @@ impl Block {
         assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
         let n_slots = match &layout {
             Layout::Structured { base, .. } => base.len() * SET,
-            Layout::Explicit { corners } => corners[0].len(),
+            Layout::Explicit { corners, .. } => corners[0].len(),
         };
         let by_slot = |values: Vec<f64>, phantom: f64| {
             let mut array = vec![phantom; n_slots];
@@ -337,7 +340,7 @@ impl Block {
                 let (row, plane) = (*row as u32, *plane as u32);
                 [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| n + d)
             }
-            Layout::Explicit { corners } => std::array::from_fn(|corner| corners[corner][slot]),
+            Layout::Explicit { corners, .. } => std::array::from_fn(|corner| corners[corner][slot]),
         }
     }
 
@@ -601,8 +604,42 @@ fn structured([ni, nj, nk]: [usize; 3], n_nodes: usize) -> (Layout, Vec<u32>, us
     (Layout::Structured { row, plane, base }, slots, last + plane + row + 1 + SET)
 }
 
-/// Layout of explicit hexahedra; phantoms stand on the corners of the first.
-fn explicit(hexahedra: &[[u32; 8]], n_nodes: usize) -> (Layout, Vec<u32>, usize) {
+/// The order in which explicit hexahedra fill the slots, and the direction of each set that is a run. Meshes are mostly
+/// numbered row by row: whatever of that order is left in the local nodes makes sets of eight that are loaded as those of a
+/// structured block are. What is left of the runs is put together in its order.
+fn in_runs(hexahedra: &[[u32; 8]]) -> (Vec<u32>, Vec<Option<Along>>) {
+    let (mut order, mut runs) = (Vec::with_capacity(hexahedra.len()), Vec::new());
+    let mut left: Vec<u32> = Vec::new();
+    let mut first = 0;
+    while first < hexahedra.len() {
+        let along = Along::ALL.into_iter().find(|along| along.steps(&hexahedra[first]));
+        let follows = |e: usize| hexahedra[e] == hexahedra[e - 1].map(|node| node + 1);
+        let mut end = first + 1;
+        while along.is_some() && end < hexahedra.len() && follows(end) {
+            end += 1;
+        }
+        let n_sets = (end - first) / SET;
+        order.extend((first..first + n_sets * SET).map(|e| e as u32));
+        runs.extend(std::iter::repeat_n(along, n_sets));
+        left.extend((first + n_sets * SET..end).map(|e| e as u32));
+        while left.len() >= SET {
+            order.extend(left.drain(..SET));
+            runs.push(None);
+        }
+        first = end;
+    }
+    runs.extend((!left.is_empty()).then_some(None));
+    order.extend(left);
+    (order, runs)
+}
+
+/// Layout of explicit hexahedra, given the order in which they fill the slots and which sets are runs; phantoms stand on the
+/// corners of the first.
+fn explicit(
+    hexahedra: &[[u32; 8]],
+    (order, runs): (Vec<u32>, Vec<Option<Along>>),
+    n_nodes: usize,
+) -> (Layout, Vec<u32>, usize) {
     assert!(!hexahedra.is_empty(), "a piece without elements");
     assert!(
         hexahedra.iter().flatten().all(|&node| (node as usize) < n_nodes),
@@ -611,12 +648,15 @@ fn explicit(hexahedra: &[[u32; 8]], n_nodes: usize) -> (Layout, Vec<u32>, usize)
     assert!(n_nodes < 1 << 31, "{n_nodes} nodes in one block");
     let n_slots = hexahedra.len().next_multiple_of(SET);
     let corners = std::array::from_fn(|corner| {
-        let mut nodes: Vec<u32> = hexahedra.iter().map(|hexahedron| hexahedron[corner]).collect();
+        let mut nodes: Vec<u32> = order.iter().map(|&e| hexahedra[e as usize][corner]).collect();
         nodes.resize(n_slots, hexahedra[0][corner]);
         nodes
     });
-    let slots = (0..hexahedra.len() as u32).collect();
-    (Layout::Explicit { corners: Box::new(corners) }, slots, n_nodes)
+    let mut slots = vec![0; hexahedra.len()];
+    for (slot, &element) in (0..).zip(&order) {
+        slots[element as usize] = slot;
+    }
+    (Layout::Explicit { corners: Box::new(corners), runs }, slots, n_nodes)
 }
 
 /// # Safety
@@ -682,4 +722,36 @@ unsafe fn on_avx512<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
 ) {
     // SAFETY: the caller's promise.
     unsafe { hex8::compute::<Avx512, E, S, F>(view, laws, step, sets, vote) };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_explicit_elements_are_runs_and_what_is_left_of_them_is_put_together() {
+        // Three rows of 19 elements, then their corners by other names, then numbered backwards.
+        let node = |i: u32, j: u32, k: u32| i + 20 * (j + 4 * k);
+        let corners = |i: u32, j: u32| {
+            [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+                .map(|[a, b, c]| node(i + a, j + b, c))
+        };
+        let mut hexahedra: Vec<[u32; 8]> = (0..3).flat_map(|j| (0..19).map(move |i| corners(i, j))).collect();
+        for along in [Along::I, Along::J, Along::K] {
+            let (order, runs) = in_runs(&hexahedra);
+            // Nine elements are left: one set and one more, which begins the last.
+            let count = |wanted: Option<Along>| runs.iter().filter(|&&run| run == wanted).count();
+            assert_eq!((count(Some(along)), count(None)), (6, 2), "{runs:?}");
+            let mut all = order.clone();
+            all.sort_unstable();
+            assert_eq!(all, (0..57).collect::<Vec<u32>>());
+            assert_eq!(order[..8], [0, 1, 2, 3, 4, 5, 6, 7]);
+            let turned = |c: [u32; 8]| [c[0], c[4], c[5], c[1], c[3], c[7], c[6], c[2]];
+            hexahedra.iter_mut().for_each(|corners| *corners = turned(*corners));
+        }
+        hexahedra.iter_mut().for_each(|corners| *corners = corners.map(|node| 159 - node));
+        let (order, runs) = in_runs(&hexahedra);
+        assert_eq!(order, (0..57).collect::<Vec<u32>>());
+        assert_eq!(runs, [None; 8]);
+    }
 }

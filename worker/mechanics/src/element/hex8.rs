@@ -58,7 +58,35 @@ pub(crate) enum Layout {
     Explicit {
         /// Eight arrays.
         corners: Box<[Vec<u32>; 8]>,
+        /// By set: in a run each corner of the next slot is the next local node.
+        runs: Vec<Option<Along>>,
     },
+}
+
+/// The direction in which the elements of a run share a face with the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Along {
+    I,
+    J,
+    K,
+}
+
+impl Along {
+    pub(crate) const ALL: [Self; 3] = [Self::I, Self::J, Self::K];
+
+    /// Corners of the face behind and, of each, the corner before it.
+    const fn pairs(self) -> [[usize; 2]; 4] {
+        match self {
+            Self::I => [[0, 1], [3, 2], [4, 5], [7, 6]],
+            Self::J => [[0, 3], [1, 2], [4, 7], [5, 6]],
+            Self::K => [[0, 4], [1, 5], [2, 6], [3, 7]],
+        }
+    }
+
+    /// Whether a step in this direction, from any corner of the face behind, goes to the next node.
+    pub(crate) fn steps(self, corners: &[u32; 8]) -> bool {
+        self.pairs().iter().all(|&[here, there]| corners[there] == corners[here] + 1)
+    }
 }
 
 /// The arrays of a block as a kernel sees them. State arrays are by slot, node arrays by local node and padded.
@@ -151,8 +179,8 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: Fai
                     vote,
                 );
             }
-            Layout::Explicit { corners } => {
-                all_sets::<L, _, E, S, F>(Lists { corners }, view, laws, step, sets, vote);
+            Layout::Explicit { corners, runs } => {
+                all_sets::<L, _, E, S, F>(Lists { corners, runs }, view, laws, step, sets, vote);
             }
         }
     }
@@ -492,7 +520,7 @@ pub(crate) unsafe fn corners<L: Lane>(layout: &Layout, from: &[f64], slot: usize
             Layout::Structured { row, plane, base } => {
                 Rows { row: *row, plane: *plane, base }.corners(from, slot)
             }
-            Layout::Explicit { corners } => Lists { corners }.corners(from, slot),
+            Layout::Explicit { corners, runs } => Lists { corners, runs }.corners(from, slot),
         }
     }
 }
@@ -576,14 +604,39 @@ impl Place for Rows<'_> {
 #[derive(Clone, Copy)]
 struct Lists<'a> {
     corners: &'a [Vec<u32>; 8],
+    runs: &'a [Option<Along>],
+}
+
+impl Lists<'_> {
+    /// The local node of a corner of a slot.
+    ///
+    /// # Safety
+    /// The slot is one of the block.
+    #[inline(always)]
+    unsafe fn node(self, corner: usize, slot: usize) -> usize {
+        // SAFETY: the caller's promise.
+        unsafe { *self.corners[corner].get_unchecked(slot) as usize }
+    }
 }
 
 impl Place for Lists<'_> {
     #[inline(always)]
     unsafe fn corners<L: Lane>(self, from: &[f64], slot: usize) -> [L; 8] {
-        let corners = self.corners;
-        // SAFETY: the caller's promise covers every access here.
+        // SAFETY: the caller's promise covers every access here; the nodes of a run follow each other.
         unsafe {
+            if self.runs.get_unchecked(slot / SET).is_some() {
+                return [
+                    L::load(from, self.node(0, slot)),
+                    L::load(from, self.node(1, slot)),
+                    L::load(from, self.node(2, slot)),
+                    L::load(from, self.node(3, slot)),
+                    L::load(from, self.node(4, slot)),
+                    L::load(from, self.node(5, slot)),
+                    L::load(from, self.node(6, slot)),
+                    L::load(from, self.node(7, slot)),
+                ];
+            }
+            let corners = self.corners;
             [
                 L::gather(from, &corners[0], slot),
                 L::gather(from, &corners[1], slot),
@@ -599,9 +652,18 @@ impl Place for Lists<'_> {
 
     #[inline(always)]
     unsafe fn scatter<L: Lane>(self, to: &mut [f64], slot: usize, values: [L; 8]) {
-        let corners = self.corners;
-        // SAFETY: the caller's promise covers every access here.
+        // SAFETY: the caller's promise covers every access here; the nodes of a run follow each other, and the corners of the
+        // face behind are one before those of the other.
         unsafe {
+            if let Some(along) = *self.runs.get_unchecked(slot / SET) {
+                let [[a, b], [c, d], [e, f], [g, h]] = along.pairs();
+                add_pair(to, self.node(a, slot), values[a], values[b]);
+                add_pair(to, self.node(c, slot), values[c], values[d]);
+                add_pair(to, self.node(e, slot), values[e], values[f]);
+                add_pair(to, self.node(g, slot), values[g], values[h]);
+                return;
+            }
+            let corners = self.corners;
             add_each(to, &corners[0], slot, values[0]);
             add_each(to, &corners[1], slot, values[1]);
             add_each(to, &corners[2], slot, values[2]);
