@@ -12,7 +12,7 @@ use std::{mem::take, ops::Range};
 use serde::{Deserialize, Serialize};
 
 #[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
+use crate::lanes::{avx2::Avx2, avx512::Avx512, twice::Twice};
 use crate::{
     element::{
         ElementVote, Step,
@@ -706,7 +706,7 @@ unsafe fn on_avx2<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     vote: &mut ElementVote,
 ) {
     // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Avx2, E, S, F>(view, laws, step, sets, vote) };
+    unsafe { hex8::compute::<Twice<Avx2>, E, S, F>(view, laws, step, sets, vote) };
 }
 
 /// # Safety

@@ -18,6 +18,8 @@ pub(crate) mod avx2;
 pub(crate) mod avx512;
 pub mod functions;
 pub mod scalar;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod twice;
 
 /// Slots in a lane set: the grouping of elements is the same on every width, and the widest holds 8.
 pub const SET: usize = 8;

@@ -52,6 +52,25 @@ impl<L: Lane> Deviator<L> {
         L::splat(1.5) * self.contract(self)
     }
 
+    /// `self + other`.
+    #[inline(always)]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            xx: self.xx + other.xx,
+            yy: self.yy + other.yy,
+            zz: self.zz + other.zz,
+            xy: self.xy + other.xy,
+            yz: self.yz + other.yz,
+            zx: self.zx + other.zx,
+        }
+    }
+
+    /// Sum of the components: finite only if all are.
+    #[inline(always)]
+    pub fn sum(&self) -> L {
+        (self.xx + self.yy + self.zz) + (self.xy + self.yz + self.zx)
+    }
+
     /// `self * factor`.
     #[inline(always)]
     pub fn scaled(&self, factor: L) -> Self {

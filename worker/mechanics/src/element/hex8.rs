@@ -329,8 +329,8 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         strain = Strain { rate: effective, increment: effective * dt };
         stress = laws.strength.update(trial, strain, &mut history, alive);
         // The stress before, turned, is `turned` less its half of the increment.
-        let turned_power = half_increment.neg_mul_add(rate_square, turned.contract(&rate));
-        deviatoric_power = half * (turned_power + stress.contract(&rate));
+        let sum = turned.plus(&stress);
+        deviatoric_power = half * half_increment.neg_mul_add(rate_square, sum.contract(&rate));
     }
 
     // 3. Geometry at the end of the step. It follows the stress, whose long chain of roots and quotients it fills. The
@@ -399,7 +399,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     }
 
     // 7. Which elements count.
-    let check = energy + pressure + viscosity + hourglass.square() + stress.contract(&stress);
+    let check = energy + pressure + viscosity + hourglass.square() + stress.sum();
     let upright = L::both(zero.less(at_mid.volume_times_64), zero.less(at_end.volume_times_64));
     let finite = check.abs().less_equal(L::splat(f64::MAX));
     let active = L::both(alive, L::both(upright, finite));

@@ -26,9 +26,8 @@ pub(crate) fn rotated<L: Lane>(s: &Deviator<L>, w: &Vector<L>) -> Deviator<L> {
     let s_z = Vector { x: s.zx, y: s.yz, z: s.zz };
     let m_x = Vector { x: row_x.dot(&s_x), y: row_x.dot(&s_y), z: row_x.dot(&s_z) };
     let m_y = Vector { x: row_y.dot(&s_x), y: row_y.dot(&s_y), z: row_y.dot(&s_z) };
-    let m_z = Vector { x: row_z.dot(&s_x), y: row_z.dot(&s_y), z: row_z.dot(&s_z) };
     let (xx, yy) = (m_x.dot(&row_x), m_y.dot(&row_y));
-    Deviator { xx, yy, zz: -(xx + yy), xy: m_x.dot(&row_y), yz: m_y.dot(&row_z), zx: m_z.dot(&row_x) }
+    Deviator { xx, yy, zz: -(xx + yy), xy: m_x.dot(&row_y), yz: m_y.dot(&row_z), zx: m_x.dot(&row_z) }
 }
 
 #[cfg(test)]
