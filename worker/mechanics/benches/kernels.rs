@@ -1,20 +1,22 @@
 //! Grind time: nanoseconds of thread CPU time per element per cycle, on one thread.
 //!
 //! First whole cycles of benchmark 1 (a steel plate on an aluminium plate, joined, 500 m/s; Johnson-Cook and shock) by
-//! number of elements, topology and lane width: elements, shared sums, integration and votes, as a worker runs them.
-//! Then the element kernel alone by laws, topology and lane width, on a strained plate of 27,000 elements.
+//! number of elements, topology and lane width: elements, shared sums, integration and votes, as a worker runs them; beside them
+//! a plate of shells with five points that is bent until it yields. Then the element kernel alone by laws, topology and lane
+//! width, on a strained plate of 27,000 elements. On request the same cycles on one thread and on two in turn.
 //!
-//! `cargo bench -p mechanics --bench kernels`; after `--` a word chooses: `cycles`, `kernels`, or a number of elements.
+//! `cargo bench -p mechanics --bench kernels`; after `--` a word chooses: `cycles`, `kernels`, `threads`, or a number of
+//! elements. `4000000` is on request only, for its memory.
 
 use mechanics::{
     block::{Block, Piece},
-    cycle::{Domain, Meter, Sets, Subdomain},
-    element::{ElementVote, Step, hex8},
+    cycle::{Domain, Meter, Plan, Sets, Subdomain},
+    element::{ElementVote, Step, hex8, shell4::Rule},
     exact::Quantum,
     initial,
     lanes::Width,
     material::{Eos, Failure, Material, Strength},
-    mesh::{Mesh, Part, Topology},
+    mesh::{Mesh, Part, Section, Topology},
     piece::{Region, cut},
     setup::{Constraint, Control, Setup},
     state::{N_FIELDS, field},
@@ -122,17 +124,39 @@ fn grind(material: &Material, explicit: bool, width: Width) -> [f64; 2] {
     [times[times.len() / 2], times[0]].map(|time| time * 1e9 / f64::from(CELLS.iter().product::<u32>()))
 }
 
+/// How the elements of the plates are given.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Structured,
+    /// Written out, numbered row by row.
+    Explicit,
+    /// Written out, numbered from the end: no node is the next of another, and nothing is loaded in a run.
+    Backwards,
+    /// One plate of shells.
+    Shells,
+}
+
+/// Layers of the one plate of shells, in place of those below and above.
+const FLAT: (u32, u32) = (0, 0);
+
 /// The domain of benchmark 1, whose plates have `below` and `above` layers of `side` by `side` elements, and the number
-/// of elements.
-fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (Domain, usize) {
+/// of elements; each plate is cut into `n_pieces`.
+fn plates(
+    side: u32,
+    (below, above): (u32, u32),
+    kind: Kind,
+    width: Width,
+    n_pieces: usize,
+) -> (Domain, usize) {
     let row = side + 1;
     let plane = row * row;
+    let n_nodes = plane * (below + above + 1);
     let size = 0.01;
-    let mut positions = Vec::new();
-    for k in 0..=below + above {
-        for j in 0..row {
-            positions.extend((0..row).map(|i| [i, j, k].map(|c| f64::from(c) * size)));
-        }
+    let number = |n: u32| if kind == Kind::Backwards { n_nodes - 1 - n } else { n };
+    let mut positions = vec![[0.0; 3]; n_nodes as usize];
+    for n in 0..n_nodes {
+        let place = [n % row, n / row % row, n / plane].map(|c| f64::from(c) * size);
+        positions[number(n) as usize] = place;
     }
     let part = |name: &str, material: u32, layers: u32, first: u32| {
         let cells = [side, side, layers];
@@ -144,15 +168,32 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
             nodes: (0..plane * (layers + 1)).collect(),
             element_ids: (0..n_elements).collect(),
         };
-        if explicit {
+        if kind != Kind::Structured {
             let hexahedra = (0..n_elements as usize).map(|e| part.corners(e)).collect();
             part.topology = Topology::Explicit { hexahedra };
         }
-        part.nodes.iter_mut().for_each(|n| *n += first * plane);
+        part.nodes.iter_mut().for_each(|n| *n = number(*n + first * plane));
         part
     };
-    let parts = vec![part("target", 0, below, 0), part("projectile", 1, above, below)];
-    let mesh = Mesh { node_ids: (0..positions.len() as u32).collect(), positions, parts };
+    let sheet = || {
+        let quads = (0..side * side).map(|e| e / side * row + e % side);
+        let section = Section { thickness: 0.2 * size, rule: Rule::Gauss(5) };
+        Part {
+            name: "sheet".into(),
+            material: 1,
+            topology: Topology::Shells {
+                quads: quads.map(|n| [n, n + 1, n + row + 1, n + row]).collect(),
+                section,
+            },
+            nodes: (0..plane).collect(),
+            element_ids: (0..side * side).collect(),
+        }
+    };
+    let parts = match kind {
+        Kind::Shells => vec![sheet()],
+        _ => vec![part("target", 0, below, 0), part("projectile", 1, above, below)],
+    };
+    let mesh = Mesh { node_ids: (0..n_nodes).collect(), positions, parts };
     let steel = [7896.0, 4569.0, 1.49, 2.17, 81.8e9, 350e6, 275e6, 0.36, 0.022, 1811.0, 452.0];
     let aluminium = [2785.0, 5328.0, 1.338, 2.0, 27.6e9, 265e6, 426e6, 0.34, 0.015, 775.0, 875.0];
     let materials = [("aluminium", aluminium), ("steel", steel)].map(|(name, constants)| {
@@ -189,28 +230,33 @@ fn plates(side: u32, below: u32, above: u32, explicit: bool, width: Width) -> (D
         loads: Default::default(),
         erosion: Default::default(),
     };
-    let falls = |n: u32| [0.0, 0.0, if n / plane > below { -500.0 } else { 0.0 }];
-    let velocity: Vec<[f64; 3]> = mesh.node_ids.iter().map(|&n| falls(n)).collect();
+    // The upper plate falls; a sheet is bent in waves of twenty elements.
+    let velocity = |[x, y, z]: [f64; 3]| match kind {
+        Kind::Shells => [0.0, 0.0, 60.0 * (31.0 * x).sin() * (27.0 * y).sin()],
+        _ => [0.0, 0.0, if z > size * (f64::from(below) + 0.5) { -500.0 } else { 0.0 }],
+    };
+    let velocity: Vec<[f64; 3]> = mesh.positions.iter().map(|&x| velocity(x)).collect();
     let state = initial::state(&mesh, &setup, &velocity, &vec![0; mesh.n_nodes()]).expect("sound cubes");
     let quanta = initial::quanta(&mesh, &setup, &state);
-    let subdomains: Vec<Subdomain> = (0..2)
+    let subdomains: Vec<Subdomain> = (0..mesh.parts.len())
         .map(|p| {
-            let n_elements = mesh.parts[p].n_elements() as u32;
-            let region = if explicit {
-                Region::List((0..n_elements).collect())
-            } else {
-                let Topology::Structured { cells } = mesh.parts[p].topology else { panic!("built above") };
-                Region::Cells { low: [0; 3], high: cells }
+            let region = match mesh.parts[p].topology {
+                Topology::Structured { cells } => Region::Cells { low: [0; 3], high: cells },
+                _ => Region::List((0..mesh.parts[p].n_elements() as u32).collect()),
             };
             let last = below * plane;
-            let unowned = if p == 1 { (last..last + plane).collect() } else { Vec::new() };
-            let pieces = vec![cut(&mesh, &state, p, &region)];
+            let mut unowned: Vec<u32> =
+                if p == 1 { (last..last + plane).map(number).collect() } else { Vec::new() };
+            unowned.sort_unstable();
+            let pieces = region.split(n_pieces).iter().map(|region| cut(&mesh, &state, p, region)).collect();
             Subdomain { id: p as u32, pieces, unowned, surface: Vec::new() }
         })
         .collect();
     let n_elements = mesh.n_elements();
-    let mut domain = Domain::new(setup, 2, quanta, (subdomains, 0), &[], width);
-    domain.install(&Default::default(), &[]).expect("a plan without other workers");
+    let n_parts = mesh.parts.len();
+    let mut domain = Domain::new(setup, n_parts, quanta, (subdomains, 0), &[], width);
+    let plan = Plan { moments: kind == Kind::Shells, ..Plan::default() };
+    domain.install(&plan, &[]).expect("a plan without other workers");
     (domain, n_elements)
 }
 
@@ -225,69 +271,116 @@ impl Meter for Silent {
     fn stop(&self, _mark: u64, _contact: bool) {}
 }
 
-/// Median and least over `n_cycles` cycles of the nanoseconds per element of a whole cycle, from the impact on.
-fn whole_cycle(plates: (Domain, usize), n_cycles: usize) -> [f64; 2] {
-    let (mut domain, n_elements) = plates;
+/// Median and least over `n_cycles` cycles of the nanoseconds per element of a whole cycle by `clock` (seconds), from the
+/// impact on.
+fn whole_cycle(
+    (domain, n_elements): &mut (Domain, usize),
+    n_cycles: usize,
+    clock: &dyn Fn() -> f64,
+) -> [f64; 2] {
     let mut vote = domain.prepare(&Silent);
     let mut dt_previous = 0.0;
     let mut times: Vec<f64> = (0..n_cycles)
         .map(|cycle| {
             let limit = 0.6666 * vote.courant.min(vote.volume_limit);
             let dt = if cycle == 0 { 0.5 * limit } else { limit.min(1.05 * dt_previous) };
-            let start = now();
+            let start = clock();
             domain.contact(dt_previous, &Silent);
             domain.elements(Sets::Border, dt_previous, &Silent);
             let partials = domain.partials(&Silent);
             domain.elements(Sets::Interior, dt_previous, &Silent);
             vote =
                 domain.integrate(&partials, dt_previous, dt, &[], &Silent).expect("totals of the exchange");
-            let spent = now() - start;
+            let spent = clock() - start;
             assert!(vote.fault.is_none(), "fault {:?}", vote.fault);
             dt_previous = dt;
             spent
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    [times[times.len() / 2], times[0]].map(|time| time * 1e9 / n_elements as f64)
+    [times[times.len() / 2], times[0]].map(|time| time * 1e9 / *n_elements as f64)
 }
 
 /// The table of whole cycles; `only` chooses a number of elements.
 fn cycles(only: Option<usize>) {
     println!("whole cycle of benchmark 1, ns per element and cycle, median and (least)");
-    println!("{:>9}  {:<12}{:>16}{:>16}", "elements", "topology", "avx2", "avx512");
+    println!("{:>9}  {:<22}{:>16}{:>16}", "elements", "elements are", "avx2", "avx512");
     let shapes = [
-        (30, 20, 10, false, 200),
-        (40, 30, 10, false, 120),
-        (40, 30, 10, true, 120),
-        (60, 40, 20, false, 50),
-        (100, 75, 25, false, 20),
+        (30, (20, 10), Kind::Structured, 200),
+        (40, (30, 10), Kind::Structured, 120),
+        (40, (30, 10), Kind::Explicit, 120),
+        (40, (30, 10), Kind::Backwards, 120),
+        (60, (40, 20), Kind::Structured, 50),
+        (100, (75, 25), Kind::Structured, 20),
+        (160, (120, 37), Kind::Structured, 8),
+        (164, FLAT, Kind::Shells, 200),
+        (253, FLAT, Kind::Shells, 120),
+        (465, FLAT, Kind::Shells, 50),
+        (1000, FLAT, Kind::Shells, 20),
     ];
-    for (side, below, above, explicit, n_cycles) in shapes {
-        let n_elements = (side * side * (below + above)) as usize;
-        if only.is_some_and(|only| only != n_elements) {
+    for (side, layers, kind, n_cycles) in shapes {
+        let n_elements = (side * side * (layers.0 + layers.1).max(1)) as usize;
+        let about = |only: usize| n_elements.abs_diff(only) <= only / 50;
+        if !only.map_or(n_elements < LARGE, about) {
             continue;
         }
         let columns = [Width::Avx2, Width::Avx512].map(|width| {
             if width.available() {
-                let [median, least] = whole_cycle(plates(side, below, above, explicit, width), n_cycles);
+                let [median, least] = whole_cycle(&mut plates(side, layers, kind, width, 1), n_cycles, &now);
                 format!("{median:.1} ({least:.1})")
             } else {
                 "-".to_owned()
             }
         });
-        let topology = if explicit { "explicit" } else { "structured" };
-        println!("{n_elements:>9}  {topology:<12}{:>16}{:>16}", columns[0], columns[1]);
+        let name = match kind {
+            Kind::Structured => "structured",
+            Kind::Explicit => "explicit, in rows",
+            Kind::Backwards => "explicit, in no rows",
+            Kind::Shells => "shells, five points",
+        };
+        println!("{n_elements:>9}  {name:<22}{:>16}{:>16}", columns[0], columns[1]);
     }
 }
 
-fn main() {
-    // Blocks spread over the current pool: one of a single thread keeps all work on the clock.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
-    pool.install(tables);
+/// Elements from which a size is measured on request only.
+const LARGE: usize = 2_000_000;
+
+/// Cycles of 64,000 elements by wall clock, on one thread and on two in turn.
+fn threads() {
+    println!(
+        "64,000 elements, four blocks, wall-clock ns per element and cycle, median and (least); half of the first over the second"
+    );
+    let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
+    let from = std::time::Instant::now();
+    let wall = || from.elapsed().as_secs_f64();
+    let mut found: Vec<f64> = (0..11)
+        .map(|_| {
+            let [one, two] = [0, 1].map(|i: usize| {
+                let run =
+                    || whole_cycle(&mut plates(40, (30, 10), Kind::Structured, Width::best(), 2), 120, &wall);
+                pools[i].install(run)
+            });
+            let efficiency = 0.5 * one[0] / two[0];
+            println!("{:.1} ({:.1})  {:.1} ({:.1})  {efficiency:.3}", one[0], one[1], two[0], two[1]);
+            efficiency
+        })
+        .collect();
+    found.sort_by(f64::total_cmp);
+    println!("median {:.3}, best {:.3}", found[5], found[10]);
 }
 
-fn tables() {
+fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    if words.iter().any(|word| word == "threads") {
+        threads();
+        return;
+    }
+    // Blocks spread over the current pool: one of a single thread keeps all work on the clock.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    pool.install(|| tables(&words));
+}
+
+fn tables(words: &[String]) {
     let only = words.iter().find_map(|word| word.parse().ok());
     let asks = |name: &str| words.iter().any(|word| word == name);
     if !asks("kernels") {
