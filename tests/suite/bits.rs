@@ -2,7 +2,9 @@
 //!
 //! The whole matrix, with worker processes, is the program `bits` of this package.
 
-use mechanics::lanes::Width;
+use std::sync::Arc;
+
+use mechanics::{lanes::Width, state::GlobalState};
 use tests::{
     bits::{Fingerprint, forced_sorts},
     solve::{Crew, example, keyword, model, solve, solve_through},
@@ -105,6 +107,29 @@ pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
         midway += usize::from(solved.outcome.losses[0].back_to > 0);
     }
     assert!(midway >= 4, "{midway} of 8 went back to a state on the way");
+}
+
+#[test]
+fn a_snapshot_whose_arrays_are_not_as_long_as_the_problems_is_refused() {
+    let mut model = example("plates-joined");
+    model.setup.control.end_cycle = 4;
+    let options = Options { snapshot_at: Some(2), ..Options::default() };
+    let whole = solve(model.clone(), asked(1, options)).unwrap_or_else(|e| panic!("{e}"));
+    let snapshot = whole.snapshot.expect("a snapshot was asked for");
+    let spoils: [fn(&mut GlobalState); 5] = [
+        |state| state.x.truncate(7),
+        |state| state.v.push([0.0; 3]),
+        |state| state.mass.clear(),
+        |state| state.elements[2].clear(),
+        |state| state.initial_volume.truncate(26_999),
+    ];
+    for (number, spoil) in spoils.into_iter().enumerate() {
+        let mut snapshot = snapshot.clone();
+        spoil(Arc::make_mut(&mut snapshot.state));
+        let crew = Crew { resume: Some(snapshot), ..Crew::of(2) };
+        let error = solve(model.clone(), crew).err().unwrap_or_else(|| panic!("{number} is taken"));
+        assert!(error.to_string().contains("of another problem"), "{number}: {error}");
+    }
 }
 
 #[test]

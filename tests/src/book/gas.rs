@@ -1,4 +1,4 @@
-//! Gases: Sod's tube, Noh's implosion in one, two and three directions, Sedov's blast as LULESH sets it up.
+//! Gases: Sod's tube, Noh's implosion in one, two and three directions, Sedov's blast from a point and as LULESH sets it up.
 
 use mechanics::state::{GlobalState, field};
 
