@@ -423,7 +423,7 @@ impl Domain {
     pub fn contact(&mut self, dt: f64, meter: &dyn Meter) {
         let mark = meter.start();
         if let Some(room) = &mut self.contact {
-            pack(&self.rooms, &self.guests, &room.sources, &mut room.x, &mut room.v);
+            room.pack(&self.rooms, &self.guests);
             for f in &mut room.f {
                 f.fill(0.0);
             }
@@ -767,22 +767,32 @@ fn speed_squared(v: &[Vec<f64>; 3], i: usize) -> f64 {
     v[0][i] * v[0][i] + v[1][i] * v[1][i] + v[2][i] * v[2][i]
 }
 
-fn pack(
-    rooms: &[Room],
-    guests: &Guests,
-    sources: &[(u32, u32)],
-    x: &mut [Vec<f64>; 3],
-    v: &mut [Vec<f64>; 3],
-) {
+impl ContactRoom {
+    /// Brings positions, and velocities if contact reads them, to those of now.
+    fn pack(&mut self, rooms: &[Room], guests: &Guests) {
+        pack(&self.sources, |room| positions(rooms, guests, room), &mut self.x);
+        if self.contact.reads_velocities() {
+            pack(&self.sources, |room| velocities(rooms, guests, room), &mut self.v);
+        }
+    }
+}
+
+/// Positions of the nodes of a block, or of the guests.
+fn positions<'a>(rooms: &'a [Room], guests: &'a Guests, room: u32) -> &'a [Vec<f64>; 3] {
+    if room == NONE { &guests.x } else { &rooms[room as usize].block.x }
+}
+
+/// Velocities of the nodes of a block, or of the guests.
+fn velocities<'a>(rooms: &'a [Room], guests: &'a Guests, room: u32) -> &'a [Vec<f64>; 3] {
+    if room == NONE { &guests.v } else { &rooms[room as usize].block.v }
+}
+
+/// Packs what `from` gives by block, node by node.
+fn pack<'a>(sources: &[(u32, u32)], from: impl Fn(u32) -> &'a [Vec<f64>; 3], to: &mut [Vec<f64>; 3]) {
     for (i, &(room, local)) in sources.iter().enumerate() {
-        let local = local as usize;
-        let (from_x, from_v) = match room {
-            NONE => (&guests.x, &guests.v),
-            room => (&rooms[room as usize].block.x, &rooms[room as usize].block.v),
-        };
+        let from = from(room);
         for a in 0..3 {
-            x[a][i] = from_x[a][local];
-            v[a][i] = from_v[a][local];
+            to[a][i] = from[a][local as usize];
         }
     }
 }

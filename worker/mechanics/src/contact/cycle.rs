@@ -206,6 +206,11 @@ impl Contact {
         Self { width, ..self }
     }
 
+    /// Whether [`Contact::forces`] reads velocities.
+    pub(crate) fn reads_velocities(&self) -> bool {
+        !self.smooth || self.edges.n_pairs() > 0
+    }
+
     /// Number of pairs that a cycle looks at, of nodes and faces and of edges.
     pub fn n_pairs(&self) -> usize {
         self.watch.candidates.faces.len() + self.edges.n_pairs()

@@ -137,6 +137,23 @@ impl Bounds {
         }
     }
 
+    /// Box of points; one that meets nothing for none.
+    fn around(points: &[[f64; 3]]) -> Self {
+        let mut bounds = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+        for p in points {
+            for a in 0..3 {
+                bounds.min[a] = if p[a] < bounds.min[a] { p[a] } else { bounds.min[a] };
+                bounds.max[a] = if p[a] > bounds.max[a] { p[a] } else { bounds.max[a] };
+            }
+        }
+        bounds
+    }
+
+    /// Whether two boxes have a point in common.
+    fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|a| self.min[a] <= other.max[a] && other.min[a] <= self.max[a])
+    }
+
     /// The box that is smaller on all sides.
     fn shrunk(&self, by: f64) -> Self {
         Self { min: self.min.map(|c| c + by), max: self.max.map(|c| c - by) }
@@ -184,14 +201,24 @@ pub fn cull(
         met.clear();
         met.resize(nodes.len(), false);
         let mut pairs = 0;
+        // Most faces of a unit are those of its nodes' own body, or beside them all.
+        let around = Bounds::around(&at);
+        let of_nodes = nodes.first().map(|&n| surface.node_part[n as usize]);
+        let alone = nodes.iter().all(|&n| Some(surface.node_part[n as usize]) == of_nodes);
         faces.retain(|&f| {
             let face = &surface.faces[f as usize];
+            if alone && of_nodes.is_some_and(|part| !settings.permits(part, face.part)) {
+                return false;
+            }
             let place = &mut place[f as usize];
             if *place == NONE {
                 *place = boxes.len() as u32;
                 boxes.push(Bounds::of(&face.nodes.map(|n| x[n as usize]), reach));
             }
             let bounds = boxes[*place as usize];
+            if !bounds.meets(&around) {
+                return false;
+            }
             let near = bounds.shrunk(beyond);
             let mut any = false;
             for (i, _) in at.iter().enumerate().filter(|(_, p)| bounds.holds(**p)) {

@@ -8,7 +8,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{ContactRoom, Domain, Guests, NONE, Room, Shared, bodies, pack};
+use super::{ContactRoom, Domain, Guests, NONE, Room, Shared, bodies, pack, positions};
 use crate::{
     contact::{Batch, Contact, PairEnergies},
     lanes::SET,
@@ -114,11 +114,11 @@ impl Domain {
             }
             let n = sources.len();
             let zeros = || std::array::from_fn(|_| vec![0.0; n]);
-            let (mut x, mut v) = (zeros(), zeros());
-            pack(&self.rooms, &self.guests, &sources, &mut x, &mut v);
+            let mut x = zeros();
+            pack(&sources, |room| positions(&self.rooms, &self.guests, room), &mut x);
             let mut contact = Contact::new(batch, settings, &x);
             contact.watch_pairs(&self.watched_pairs);
-            self.contact = Some(ContactRoom { contact, sources, x, v, f: zeros() });
+            self.contact = Some(ContactRoom { contact, sources, x, v: zeros(), f: zeros() });
         }
         // Every node with more than one copy, here or elsewhere, and every contact node.
         self.moments = plan.moments;
@@ -207,7 +207,7 @@ impl Domain {
     /// Energies that the springs on the surface in force have at the positions as of now; `dt` is the step that led to them.
     pub(super) fn spring_energies(&mut self, dt: f64) -> PairEnergies {
         let Some(room) = &mut self.contact else { return PairEnergies::default() };
-        pack(&self.rooms, &self.guests, &room.sources, &mut room.x, &mut room.v);
+        room.pack(&self.rooms, &self.guests);
         // Forces are added to what is cleared before the next ones.
         room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
         room.contact.energies().of_springs()
