@@ -134,8 +134,8 @@ fn grind(material: &Material, explicit: bool, width: Width) -> [f64; 2] {
     [times[times.len() / 2], times[0]].map(|time| time * 1e9 / f64::from(CELLS.iter().product::<u32>()))
 }
 
-/// Nanoseconds per element of the kernel alone, wall clock, each chunk of 32 sets by the least of the cycles in which all yield:
-/// what neighbours take shows in most cycles, but hardly in all of them for one chunk.
+/// Nanoseconds per element of the kernel alone, wall clock, each chunk of 32 sets by its least of 80 cycles, the first twenty, in
+/// which not all elements yield, left out: what neighbours take shows in most cycles, but hardly in all of them for one chunk.
 fn quiet(material: &Material, explicit: bool, width: Width) -> f64 {
     let mut block = Block::new(&plate(material, explicit));
     let chunks: Vec<_> = (0..block.n_sets()).step_by(32).map(|s| s..(s + 32).min(block.n_sets())).collect();
@@ -304,7 +304,7 @@ impl Meter for Silent {
 /// Median and least over `n_cycles` cycles of the nanoseconds per element of a whole cycle by `clock` (seconds), from the
 /// impact on.
 fn whole_cycle(
-    (domain, n_elements): &mut (Domain, usize),
+    (mut domain, n_elements): (Domain, usize),
     n_cycles: usize,
     clock: &dyn Fn() -> f64,
 ) -> [f64; 2] {
@@ -328,7 +328,7 @@ fn whole_cycle(
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    [times[times.len() / 2], times[0]].map(|time| time * 1e9 / *n_elements as f64)
+    [times[times.len() / 2], times[0]].map(|time| time * 1e9 / n_elements as f64)
 }
 
 /// The table of whole cycles; `only` chooses a number of elements.
@@ -356,7 +356,7 @@ fn cycles(only: Option<usize>) {
         }
         let columns = [Width::Avx2, Width::Avx512].map(|width| {
             if width.available() {
-                let [median, least] = whole_cycle(&mut plates(side, layers, kind, width, 1), n_cycles, &now);
+                let [median, least] = whole_cycle(plates(side, layers, kind, width, 1), n_cycles, &now);
                 format!("{median:.1} ({least:.1})")
             } else {
                 "-".to_owned()
@@ -387,7 +387,7 @@ fn threads() {
         .map(|_| {
             let [one, two] = [0, 1].map(|i: usize| {
                 let run =
-                    || whole_cycle(&mut plates(40, (30, 10), Kind::Structured, Width::best(), 2), 120, &wall);
+                    || whole_cycle(plates(40, (30, 10), Kind::Structured, Width::best(), 2), 120, &wall);
                 pools[i].install(run)
             });
             let efficiency = 0.5 * one[0] / two[0];
@@ -406,10 +406,10 @@ fn main() {
         return;
     }
     if words.iter().any(|word| word == "quiet") {
+        let material = steel("steel", SHOCK, johnson_cook(1.0));
         println!("kernel alone, Johnson-Cook and shock, ns per element: structured, and written out");
         for width in Width::ALL.into_iter().filter(|width| width.available()) {
-            let [rows, lists] =
-                [false, true].map(|explicit| quiet(&johnson_cook_and_shock(), explicit, width));
+            let [rows, lists] = [false, true].map(|explicit| quiet(&material, explicit, width));
             println!("{:<9}{rows:>8.1}{lists:>8.1}", width.to_string());
         }
         return;
@@ -430,59 +430,39 @@ fn tables(words: &[String]) {
     }
 }
 
-/// The material of the projectile.
-fn johnson_cook_and_shock() -> Material {
-    Material {
-        name: "steel".into(),
-        density: 7896.0,
-        eos: Eos::Shock { c0: 4569.0, s: 1.49, gamma: 2.17 },
-        strength: Strength::JohnsonCook {
-            shear: 81.8e9,
-            a: 350e6,
-            b: 275e6,
-            n: 0.36,
-            c: 0.022,
-            m: 1.0,
-            t_melt: 1811.0,
-            t_room: 300.0,
-            specific_heat: 452.0,
-            rate0: 1.0,
-        },
-        failure: Failure::None,
-    }
+const SHOCK: Eos = Eos::Shock { c0: 4569.0, s: 1.49, gamma: 2.17 };
+const SHEAR: f64 = 81.8e9;
+
+/// Strength of the steel, by its thermal exponent.
+fn johnson_cook(m: f64) -> Strength {
+    let (a, b, n, c) = (350e6, 275e6, 0.36, 0.022);
+    let (t_melt, t_room, specific_heat, rate0) = (1811.0, 300.0, 452.0, 1.0);
+    Strength::JohnsonCook { shear: SHEAR, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 }
+}
+
+/// A steel by these laws.
+fn steel(name: &str, eos: Eos, strength: Strength) -> Material {
+    Material { name: name.into(), density: 7896.0, eos, strength, failure: Failure::None }
 }
 
 /// The table of kernels.
 fn kernels() {
-    let shock = Eos::Shock { c0: 4569.0, s: 1.49, gamma: 2.17 };
-    let shear = 81.8e9;
-    let johnson_cook = |m: f64| Strength::JohnsonCook {
-        shear,
-        a: 350e6,
-        b: 275e6,
-        n: 0.36,
-        c: 0.022,
-        m,
-        t_melt: 1811.0,
-        t_room: 300.0,
-        specific_heat: 452.0,
-        rate0: 1.0,
-    };
+    let shear = SHEAR;
     let laws = [
         ("hydro + linear", Eos::Linear { bulk: 164e9 }, Strength::Hydro),
         ("elastic + linear", Eos::Linear { bulk: 164e9 }, Strength::Elastic { shear }),
         (
             "von Mises + shock",
-            shock,
+            SHOCK,
             Strength::VonMises { shear, yield_stress: 350e6, hardening: 1e8, rate: None },
         ),
-        ("Johnson-Cook (m = 1) + shock", shock, johnson_cook(1.0)),
-        ("Johnson-Cook (m = 1.03) + shock", shock, johnson_cook(1.03)),
+        ("Johnson-Cook (m = 1) + shock", SHOCK, johnson_cook(1.0)),
+        ("Johnson-Cook (m = 1.03) + shock", SHOCK, johnson_cook(1.03)),
     ];
     println!("element kernel alone, ns per element and cycle, median and (least)");
     println!("{:<34}{:<9}{:>16}{:>16}", "laws", "width", "structured", "explicit");
     for (name, eos, strength) in laws {
-        let material = Material { name: name.into(), density: 7896.0, eos, strength, failure: Failure::None };
+        let material = steel(name, eos, strength);
         for width in Width::ALL {
             match width.require() {
                 Ok(width) => {
