@@ -7,7 +7,8 @@
 //! ([`cycle`]):
 //! 1. takes the node-face pairs that can meet before the next sort ([`search`], once per batch);
 //! 2. drops those whose boxes are apart ([`search`]), most of them for several cycles at once;
-//! 3. finds the closest point of each face to its node: the contact detection zone ([`zone`]);
+//! 3. finds the closest point of each face to its node: the contact detection zone ([`zone`]), many nodes at a time
+//!    (`slots`);
 //! 4. reduces the hits of a node to distinct closest features with a side ([`joint`]);
 //! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
 //!
@@ -28,6 +29,7 @@ mod pair_energy;
 mod pairs;
 pub mod reach;
 pub mod search;
+mod slots;
 pub mod sort;
 pub mod surface;
 mod tally;

@@ -52,6 +52,16 @@ pub trait Lane:
     /// # Safety
     /// `at + N <= indices.len()`; every index read is below `from.len()` and below 2^31.
     unsafe fn gather(from: &[f64], indices: &[u32], at: usize) -> Self;
+    /// Entry `a` of the rows `from[indices[at]], .. from[indices[at + N - 1]]`, for each of the four.
+    ///
+    /// # Safety
+    /// As [`Lane::gather`].
+    unsafe fn rows(from: &[[f64; 4]], indices: &[u32], at: usize) -> [Self; 4];
+    /// `from[at..at + N]` as they are, whole numbers.
+    ///
+    /// # Safety
+    /// `at + N <= from.len()`; every number read is below 2^31.
+    unsafe fn whole(from: &[u32], at: usize) -> Self;
 
     /// `self * b + c`, rounded once.
     fn mul_add(self, b: Self, c: Self) -> Self;
@@ -72,10 +82,14 @@ pub trait Lane:
     fn less(self, other: Self) -> Self::Mask;
     /// `self <= other`; false if either is NaN.
     fn less_equal(self, other: Self) -> Self::Mask;
+    /// `self == other`; false if either is NaN.
+    fn equal(self, other: Self) -> Self::Mask;
     /// Lane `i` set where bit `i` is; higher bits are no matter.
     fn mask(bits: u32) -> Self::Mask;
     /// Both masks.
     fn both(one: Self::Mask, other: Self::Mask) -> Self::Mask;
+    /// One mask or the other.
+    fn either(one: Self::Mask, other: Self::Mask) -> Self::Mask;
     /// `yes` where the mask is set, else `no`. What is not chosen has no influence, NaN included.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Bit `i` is lane `i`.
@@ -225,6 +239,47 @@ mod tests {
         );
         let missing = WidthError::Unavailable { width: Width::Avx512 }.to_string();
         assert!(missing.starts_with("lane width avx512 is not on this machine"), "{missing}");
+    }
+
+    /// Rows, whole numbers, equality and the joining of masks on one width, a value per lane.
+    fn rows_and_masks<L: Lane>() {
+        let from: Vec<[f64; 4]> =
+            (0..40).map(|i| [0.0, 0.25, 0.5, 0.75].map(|part| f64::from(i) + part)).collect();
+        let indices: Vec<u32> = (0..24).map(|i| (7 * i + 3) % 40).collect();
+        for at in [0, 5, 16] {
+            // SAFETY: eight indices are left behind `at`, each below the number of rows.
+            let (rows, whole) = unsafe { (L::rows(&from, &indices, at), L::whole(&indices, at)) };
+            let four = L::splat(f64::from(indices[at]));
+            for lane in 0..L::N {
+                let wanted = from[indices[at + lane] as usize];
+                assert_eq!(rows.map(|row| row.to_array()[lane]), wanted);
+                assert_eq!(whole.to_array()[lane], f64::from(indices[at + lane]));
+            }
+            assert_eq!(L::bits(whole.equal(four)), 1);
+            assert_eq!(L::bits(whole.equal(whole)), (1 << L::N) - 1);
+        }
+        let nan = L::splat(f64::NAN);
+        assert_eq!(L::bits(nan.equal(nan)), 0);
+        for (one, other) in [(0b1010_0110, 0b0011_0101), (0, 0), (0, 0b1000_0001)] {
+            let all = (1 << L::N) - 1;
+            assert_eq!(L::bits(L::either(L::mask(one), L::mask(other))), (one | other) & all);
+            assert_eq!(L::bits(L::both(L::mask(one), L::mask(other))), one & other & all);
+        }
+    }
+
+    #[test]
+    fn rows_and_masks_are_the_same_on_every_width() {
+        rows_and_masks::<scalar::Scalar>();
+        rows_and_masks::<twice::Twice<scalar::Scalar>>();
+        #[cfg(target_arch = "x86_64")]
+        if Width::Avx2.available() {
+            rows_and_masks::<avx2::Avx2>();
+            rows_and_masks::<twice::Twice<avx2::Avx2>>();
+        }
+        #[cfg(target_arch = "x86_64")]
+        if Width::Avx512.available() {
+            rows_and_masks::<avx512::Avx512>();
+        }
     }
 
     #[test]

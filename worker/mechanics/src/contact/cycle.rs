@@ -3,6 +3,8 @@
 //! The only place that knows search, geometry and force. Gather: corners of faces to boxes; compute: near
 //! features, hits, reactions; scatter: into the force arrays, in any order because all terms are exact.
 
+use std::ops::Range;
+
 use super::{
     ContactVote, Exclusions, Settings, WARNING,
     boxes::Boxes,
@@ -11,21 +13,30 @@ use super::{
         self,
         lanes::{Pushes, Statics, Terms},
     },
-    joint::{self, Hit, Near},
+    joint::{
+        self, Hit, Near,
+        lanes::{Firsts, firsts},
+    },
     pair_energy::{ByPair, PairEnergies},
     pairs::Pairs,
     search::{self, Bounds, Candidates},
+    slots::Slots,
     sort::sort,
     surface::Surface,
     tally::Tally,
-    watch::Watch,
+    watch::{BLOCK, Watch},
     work_unit::Batch,
     zone::{
-        Frame, INNER, OUTER,
-        lanes::{self, Approach, Closest},
+        Frame, OUTER,
+        approach::{Approach, approach},
+        lanes::{Closest, Rest, nearest},
     },
 };
-use crate::{exact::Quantum, lanes::Width, vote::PairVote};
+use crate::{
+    exact::Quantum,
+    lanes::{SET, Width},
+    vote::PairVote,
+};
 
 /// A pair at exactly one gap is outside the zone, rounding or not: only nearer ones by this fraction are
 /// inside it at time zero.
@@ -66,9 +77,8 @@ pub struct Contact {
     n_parts: usize,
     /// Pairs that can meet; `faces` are indices into the lists of active faces.
     candidates: Candidates,
-    /// By active face, one that has candidates: batch nodes, global nodes of the same corners, face id, part.
+    /// By active face, one that has candidates: batch nodes, face id (ascending), part.
     faces: Vec<[u32; 4]>,
-    corners: Vec<[u32; 4]>,
     ids: Vec<u32>,
     parts: Vec<u32>,
     /// By active face, whether it is a shell; empty if none is.
@@ -99,7 +109,13 @@ struct Work {
     /// Active faces whose boxes hold a node, and the end of those of each node, while a list is taken.
     held: Vec<u32>,
     ends: Vec<u32>,
+    /// Positions by batch node, a row each.
+    rows: Vec<[f64; 4]>,
     closest: Closest,
+    rest: Rest,
+    firsts: Firsts,
+    /// By near feature: lane of its node among the sets.
+    lane: Vec<u32>,
     /// Features near nodes: where the pushes act.
     near_pairs: Pairs,
     approach: Approach,
@@ -142,7 +158,6 @@ impl Contact {
             settings: settings.clone(),
             candidates: Candidates::default(),
             faces: Vec::new(),
-            corners: Vec::new(),
             ids: Vec::new(),
             parts: Vec::new(),
             shells: Vec::new(),
@@ -165,7 +180,6 @@ impl Contact {
         for (index, face) in index.iter_mut().zip(&batch.faces).filter(|(index, _)| **index == 0) {
             *index = contact.faces.len() as u32;
             contact.faces.push(face.nodes);
-            contact.corners.push(face.nodes.map(|n| batch.nodes[n as usize].global));
             contact.ids.push(face.id);
             contact.shells.push(super::surface::Face::is_shell(&face.corners));
             contact.parts.push(face.part);
@@ -266,9 +280,15 @@ impl Contact {
         if watch.is_stale(cycle.x, &self.settings) {
             self.look(&mut watch, &mut work, cycle.x);
         }
-        for bounds in watch.blocks.windows(2) {
-            let voted =
-                self.block(&watch, (bounds[0], bounds[1]), &mut work, &mut cycle, (&mut vote, &mut by_pair));
+        let n_sets = watch.slots.n_sets();
+        if n_sets > 0 {
+            let [x, y, z] = cycle.x;
+            work.rows.clear();
+            work.rows.extend(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z, 0.0]));
+        }
+        for first in (0..n_sets).step_by(BLOCK) {
+            let sets = first..(first + BLOCK).min(n_sets);
+            let voted = self.block(&watch.slots, sets, &mut work, &mut cycle, (&mut vote, &mut by_pair));
             frequency2 = if voted > frequency2 { voted } else { frequency2 };
         }
         if self.edges.n_pairs() > 0 {
@@ -283,50 +303,49 @@ impl Contact {
         vote
     }
 
-    /// Forces of one block of the list, from where it begins among nodes and pairs to where it ends. Gives the greatest
-    /// squared frequency of their springs.
+    /// Forces of the nodes of some sets. Gives the greatest squared frequency of their springs.
     #[inline(always)]
     fn block(
         &self,
-        watch: &Watch,
-        ((first, first_pair), (end, end_pair)): ((u32, u32), (u32, u32)),
+        slots: &Slots,
+        sets: Range<usize>,
         work: &mut Work,
         cycle: &mut Cycle,
         (vote, by_pair): (&mut ContactVote, &mut ByPair),
     ) -> f64 {
-        let range = first_pair as usize..end_pair as usize;
-        let warning = WARNING * self.settings.gap;
-        lanes::nearest(self.width, cycle.x, warning, &watch.pairs, range.clone(), &mut work.closest);
+        let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
+        let Work { rows, closest, rest, .. } = work;
+        nearest(self.width, rows, warning, slots, sets.clone(), closest, rest);
+        firsts(self.width, (gap, warning), slots, sets.clone(), &work.closest, &mut work.firsts);
         work.approach.clear();
+        work.lane.clear();
         work.share.clear();
         work.stacking.clear();
         work.long_way.clear();
-        let starts = &watch.candidates.starts[first as usize..=end as usize];
-        let listed = &watch.candidates.faces[starts[0] as usize..];
-        for bounds in starts.windows(2) {
-            let (start, end) = (bounds[0] - starts[0], bounds[1] - starts[0]);
-            self.node(start as usize, end as usize, listed, work, cycle.x);
+        let base = SET * slots.of_sets(&sets).start;
+        for (i, set) in sets.enumerate() {
+            self.take_near(slots, (i, set), base, work);
         }
         let n = work.approach.index.len();
         if n == 0 {
             return 0.0;
         }
-        work.near_pairs.choose(&watch.pairs, range.start, &work.approach.index);
-        work.approach.fill_up();
-        let filled = work.approach.index.len();
-        let Work { approach, face, share, stacking, .. } = work;
-        // Of the last set what is left over repeats a pair and pushes nothing.
+        let Work { approach: near, face, share, stacking, lane, .. } = work;
         face.clear();
-        face.extend(approach.index.iter().map(|&i| listed[i as usize]));
+        face.extend(near.index.iter().map(|&i| slots.face()[base + i as usize]));
+        work.near_pairs.choose(slots, lane, base, &near.index);
+        // Of the last set what is left over repeats a pair and pushes nothing.
+        near.fill_up();
+        let filled = near.index.len();
+        face.resize(filled, face[n - 1]);
         share.resize(filled, 0.0);
         stacking.resize(filled, 0.0);
-        let gap = self.settings.gap;
-        lanes::approach(self.width, cycle.x, gap, &work.near_pairs, &work.closest, approach);
+        approach(self.width, &work.rows, gap, &work.near_pairs, &work.closest, near);
         for &(i, depth, direction) in &work.long_way {
-            approach.depth[i] = depth;
-            (0..3).for_each(|a| approach.direction[a][i] = direction[a]);
+            near.depth[i] = depth;
+            (0..3).for_each(|a| near.direction[a][i] = direction[a]);
         }
-        approach.depth[n..].fill(0.0);
+        near.depth[n..].fill(0.0);
         if self.smooth {
             self.push(n, work, cycle, (vote, by_pair))
         } else {
@@ -340,88 +359,69 @@ impl Contact {
         !self.shells.is_empty() && self.shells[face as usize]
     }
 
-    /// Takes the near features of one node, whose pairs are `start..end` of the block, into the lists; `listed` are the
-    /// faces of the block.
+    /// Takes the near features of the nodes of a set, the `i`-th of the block, into the lists; closest points count from
+    /// lane `base` of the slots.
     #[inline(always)]
-    fn node(&self, start: usize, end: usize, listed: &[u32], work: &mut Work, x: &[Vec<f64>; 3]) {
-        let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
-        let closest = &work.closest;
-        let distance2 = &closest.distance2[start..end];
-        let held = &listed[start..end];
-        let (mut nearest, mut least) = (usize::MAX, warning * warning);
-        for (i, &d2) in distance2.iter().enumerate() {
-            let tie = d2 == least && nearest != usize::MAX;
-            if d2 < least || (tie && self.ids[held[i] as usize] < self.ids[held[nearest] as usize]) {
-                (nearest, least) = (i, d2);
+    fn take_near(&self, slots: &Slots, (i, set): (usize, usize), base: usize, work: &mut Work) {
+        let firsts = &work.firsts;
+        let (mut near, alone) = (firsts.near[i], firsts.alone[i]);
+        let (outer, inner) = (firsts.outer[i], firsts.inner[i]);
+        let first = SET * slots.of_sets(&(set..set + 1)).start;
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize;
+            near &= near - 1;
+            let at = first + SET * work.firsts.slot[SET * i + lane] as usize + lane;
+            let shell = self.is_shell(slots.face()[at]);
+            let is_outer = outer >> lane & 1 == 1;
+            let one_sided = is_outer != (inner >> lane & 1 == 1);
+            if alone >> lane & 1 == 1 && (one_sided || shell) {
+                work.approach.index.push((at - base) as u32);
+                work.approach.sign.push(if is_outer || shell { 1.0 } else { -1.0 });
+                work.lane.push((SET * set + lane) as u32);
+                work.share.push(1.0);
+                work.stacking.push(1.0);
+            } else {
+                self.reduce(slots, (set, lane), base, work);
             }
-        }
-        if nearest == usize::MAX {
-            return;
-        }
-        // Mostly all other faces are dropped by the nearest: the first step of the reduction is then all of it.
-        let corners = &self.corners[held[nearest] as usize];
-        let feature = closest.feature(start + nearest);
-        let mut sides = closest.sides(start + nearest);
-        let mut alone = true;
-        for (i, &d2) in distance2.iter().enumerate() {
-            if d2 < warning * warning && i != nearest {
-                let others = &self.corners[held[i] as usize];
-                let shared = joint::shares(feature, corners, others);
-                alone &= shared || joint::shares(closest.feature(start + i), others, corners);
-                sides |= if shared { closest.sides(start + i) } else { 0 };
-            }
-        }
-        if self.is_shell(held[nearest]) {
-            sides = OUTER;
-        }
-        // Nodes on the feature, whose line has no direction, and some that are only very near it.
-        let touches = least <= 1e-17 * gap * gap;
-        if alone && (sides == OUTER || sides == INNER) && !touches {
-            work.approach.index.push((start + nearest) as u32);
-            work.approach.sign.push(if sides == OUTER { 1.0 } else { -1.0 });
-            work.share.push(1.0);
-            work.stacking.push(1.0);
-        } else {
-            self.reduce(start, end, listed, work, x);
         }
     }
 
-    /// As [`Contact::node`], the long way.
+    /// Takes the near features of one node, the long way.
     #[inline(never)]
-    fn reduce(&self, start: usize, end: usize, listed: &[u32], work: &mut Work, x: &[Vec<f64>; 3]) {
+    fn reduce(&self, slots: &Slots, (set, lane): (usize, usize), base: usize, work: &mut Work) {
         let (gap, warning) = (self.settings.gap, WARNING * self.settings.gap);
-        let Work { closest, near, hits, beyond, .. } = work;
+        let Work { closest, near, hits, beyond, rows, .. } = work;
         near.clear();
-        for i in start..end {
-            if closest.distance2[i] < warning * warning {
-                let face = listed[i] as usize;
-                let (id, corners) = (self.ids[face], self.corners[face]);
-                let mut nearest = closest.nearest(i);
-                if self.is_shell(listed[i]) {
+        for slot in slots.of_sets(&(set..set + 1)) {
+            let at = SET * slot + lane;
+            if closest.distance2[at - base] < warning * warning {
+                let face = slots.face()[at];
+                let (id, corners) = (self.ids[face as usize], self.faces[face as usize]);
+                let mut nearest = closest.nearest(at - base);
+                if self.is_shell(face) {
                     nearest.sides = OUTER;
                 }
-                near.push(Near { face: i as u32, id, corners, nearest });
+                near.push(Near { face: at as u32, id, corners, nearest });
             }
         }
-        let frame = |i: u32| {
-            let corners = self.faces[listed[i as usize] as usize];
-            Frame::new(&corners.map(|n| x.each_ref().map(|x| x[n as usize])))
+        let frame = |at: u32| {
+            let corners = self.faces[slots.face()[at as usize] as usize];
+            Frame::new(&corners.map(|n| [0, 1, 2].map(|a| rows[n as usize][a])))
         };
         joint::reduce(near, gap, frame, hits, beyond);
         let stacking = if hits.len() > 1 { joint::stacking(hits) } else { 1.0 };
-        for &i in beyond.iter() {
-            work.approach.index.push(near[i as usize].face);
+        let first_hit = work.approach.index.len() + beyond.len();
+        let mut take = |at: u32, share: f64| {
+            work.approach.index.push(at - base as u32);
             work.approach.sign.push(1.0);
-            work.share.push(1.0);
+            work.lane.push((SET * set + lane) as u32);
+            work.share.push(share);
             work.stacking.push(stacking);
-        }
-        for hit in hits.iter() {
-            work.long_way.push((work.approach.index.len(), hit.depth, hit.direction));
-            work.approach.index.push(near[hit.near as usize].face);
-            work.approach.sign.push(1.0);
-            work.share.push(hit.share);
-            work.stacking.push(stacking);
-        }
+        };
+        beyond.iter().for_each(|&i| take(near[i as usize].face, 1.0));
+        hits.iter().for_each(|hit| take(near[hit.near as usize].face, hit.share));
+        let long_way = hits.iter().enumerate().map(|(i, hit)| (first_hit + i, hit.depth, hit.direction));
+        work.long_way.extend(long_way);
     }
 
     /// Forces without friction of the first `n` pushes. Gives the greatest squared frequency.
@@ -464,14 +464,15 @@ impl Contact {
         vote.energy += sums.energy;
         vote.force_bound =
             if sums.force_bound > vote.force_bound { sums.force_bound } else { vote.force_bound };
-        for a in 0..3 {
-            let f = &mut cycle.f[a];
-            let corners = work.near_pairs.corners().each_ref().map(Vec::as_slice);
-            let ends = [work.near_pairs.node(), corners[0], corners[1], corners[2], corners[3]];
-            for (e, nodes) in ends.into_iter().enumerate() {
-                for (&node, &term) in nodes[..n].iter().zip(&work.terms[3 * e + a]) {
-                    f[node as usize] += term;
-                }
+        let n_nodes = self.global.len();
+        let [fx, fy, fz] = cycle.f.each_mut().map(|f| &mut f[..n_nodes]);
+        let corners = work.near_pairs.corners().each_ref().map(Vec::as_slice);
+        let ends = [work.near_pairs.node(), corners[0], corners[1], corners[2], corners[3]];
+        for (nodes, terms) in ends.into_iter().zip(work.terms.chunks_exact(3)) {
+            for (((&node, x), y), z) in nodes[..n].iter().zip(&terms[0]).zip(&terms[1]).zip(&terms[2]) {
+                fx[node as usize] += x;
+                fy[node as usize] += y;
+                fz[node as usize] += z;
             }
         }
         sums.frequency2

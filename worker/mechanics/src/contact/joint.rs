@@ -13,6 +13,8 @@
 //! What is left is distinct: one hit over a flat or convex surface; several in a concave corner, or between
 //! bodies.
 
+pub(super) mod lanes;
+
 use super::zone::{Feature, Frame, INNER, Nearest, OUTER, Vector, dot, unit};
 
 /// A face near a node.
@@ -22,7 +24,7 @@ pub struct Near {
     pub face: u32,
     /// Face id: the order of equals.
     pub id: u32,
-    /// Global nodes of the face's corners.
+    /// Nodes of the face's corners, in one numbering for all faces.
     pub corners: [u32; 4],
     /// Closest point of the face.
     pub nearest: Nearest,

@@ -8,9 +8,9 @@
 
 use super::{
     Settings,
-    pairs::Pairs,
     reach::{self, Extent},
     search::Candidates,
+    slots::Slots,
 };
 use crate::lanes::SET;
 
@@ -21,8 +21,8 @@ pub(super) const SPREAD: f64 = 2.0;
 /// A list counts as stale this fraction before its spread: far more than rounding of positions can hide.
 const MARGIN: f64 = 1e-3;
 
-/// Nodes whose pairs are computed together: their lists fit the first cache.
-const BLOCK: usize = 64;
+/// Sets of nodes whose pairs are computed together: their lists fit the first cache.
+pub(super) const BLOCK: usize = 8;
 
 /// Batch nodes and active faces.
 #[derive(Clone, Debug, Default)]
@@ -39,10 +39,8 @@ pub(super) struct Watch {
     pub(super) all: Listed,
     /// Pairs on the list.
     pub(super) candidates: Candidates,
-    /// The same for lanes, those of each block of nodes in whole sets.
-    pub(super) pairs: Pairs,
-    /// Where each block begins: among the nodes, among `pairs`; and the ends.
-    pub(super) blocks: Vec<(u32, u32)>,
+    /// The same for lanes.
+    pub(super) slots: Slots,
     /// Positions at which the list was taken, by batch node; empty before the first.
     x: [Vec<f64>; 3],
     /// Runs of batch nodes of one part: part, first, end.
@@ -74,9 +72,13 @@ impl Watch {
             },
             ..Self::default()
         };
-        let n_blocks = candidates.nodes.len().div_ceil(BLOCK);
-        watch.blocks.reserve(n_blocks + 1);
-        watch.pairs.reserve(candidates.faces.len() + SET * n_blocks);
+        // A set has as many slots as that of its nodes with the most faces. Where nodes are left out, those of one set come
+        // into two at most.
+        let most = |starts: &[u32]| starts.windows(2).map(|w| w[1] - w[0]).max().unwrap_or(0) as usize;
+        let sets = (0..candidates.nodes.len()).step_by(SET);
+        let n_slots =
+            sets.map(|first| most(&candidates.starts[first..(first + SET + 1).min(candidates.starts.len())]));
+        watch.slots.reserve(candidates.nodes.len(), 2 * n_slots.sum::<usize>());
         watch.all = Listed::of(candidates, faces, part.len());
         for (node, &part) in (0..).zip(part) {
             match watch.runs.last_mut() {
@@ -168,14 +170,7 @@ impl Watch {
                 starts.push(end);
             }
         }
-        self.pairs.clear();
-        self.blocks.clear();
-        for first in (0..near.len()).step_by(BLOCK) {
-            let end = (first + BLOCK).min(near.len());
-            self.blocks.push((first as u32, self.pairs.node().len() as u32));
-            self.pairs.extend(&near[first..end], &starts[first..=end], near_faces, faces);
-        }
-        self.blocks.push((near.len() as u32, self.pairs.node().len() as u32));
+        self.slots.take(&self.candidates, faces);
     }
 }
 

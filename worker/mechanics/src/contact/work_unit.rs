@@ -195,14 +195,16 @@ impl Batch {
         Self { nodes, faces, units, excluded, edges }
     }
 
-    /// Whether every index is in range, parts among `n_parts` and masses positive: what a batch from outside
-    /// must satisfy before [`super::Contact::new`].
+    /// Whether every index is in range, parts among `n_parts`, masses positive and nodes and faces in order: what a batch
+    /// from outside must satisfy before [`super::Contact::new`].
     pub fn is_sound(&self, n_parts: usize) -> bool {
         let (n_nodes, n_faces) = (self.nodes.len(), self.faces.len());
         let below = |indices: &[u32], n: usize| indices.iter().all(|&i| (i as usize) < n);
         self.nodes.iter().all(|n| (n.part as usize) < n_parts && n.mass > 0.0)
             && self.faces.iter().all(|f| (f.part as usize) < n_parts && below(&f.nodes, n_nodes))
             && self.units.iter().all(|u| below(&u.nodes, n_nodes) && below(&u.faces, n_faces))
+            && self.nodes.is_sorted_by(|a, b| a.global < b.global)
+            && self.faces.is_sorted_by(|a, b| a.id < b.id)
             && self.excluded.is_sorted()
             && self.edges.is_sound(n_nodes, n_parts)
     }

@@ -12,7 +12,9 @@
 //! needs, weights and pseudonormal, is left to a second step. All is done relative to the node, so that bodies
 //! far from the origin lose nothing.
 
+pub(super) mod approach;
 pub(super) mod lanes;
+mod vectors;
 
 /// A face is coplanar if its diagonals pass each other nearer than this fraction of their mean length.
 ///
@@ -122,12 +124,6 @@ pub(super) fn unit(a: Vector) -> Vector {
 // Fours are written out: a closure in `map` may become a function of its own, without the caller's
 // fused multiply-add.
 
-/// `p - x_i`.
-#[inline(always)]
-fn from_each(p: Vector, x: &[Vector; 4]) -> [Vector; 4] {
-    [sub(p, x[0]), sub(p, x[1]), sub(p, x[2]), sub(p, x[3])]
-}
-
 /// `a_i . b_i`.
 #[inline(always)]
 fn dot_each(a: &[Vector; 4], b: &[Vector; 4]) -> [f64; 4] {
@@ -196,19 +192,20 @@ impl Frame {
     /// Closest point to `p`.
     #[inline(always)]
     pub fn nearest(&self, p: Vector) -> Nearest {
-        if self.flat { self.on_plane(p) } else { self.on_triangles(p) }
+        let [a, b, c, d] = self.corners;
+        let w = [sub(p, a), sub(p, b), sub(p, c), sub(p, d)];
+        match on_rim(&w) {
+            Some(nearest) => nearest,
+            None if self.flat => self.on_plane(&w),
+            None => on_triangles(&w),
+        }
     }
 
-    /// Closest point of a coplanar convex face.
+    /// Closest point inside of a coplanar convex face, or on its rim but for rounding.
     #[inline(always)]
-    fn on_plane(&self, p: Vector) -> Nearest {
-        let from = from_each(p, &self.corners);
+    fn on_plane(&self, w: &[Vector; 4]) -> Nearest {
         // Distance beyond each edge, times its length.
-        let beyond = dot_each(&self.outward, &from);
-        if (beyond[0] > 0.0) | (beyond[1] > 0.0) | (beyond[2] > 0.0) | (beyond[3] > 0.0) {
-            return self.on_border(&from, &beyond);
-        }
-        let height = dot(self.normal, from[0]);
+        let beyond = dot_each(&self.outward, w);
         let inverse = &self.inverse_length2;
         let near = [
             beyond[0] * inverse[0] >= -JOINT,
@@ -227,6 +224,7 @@ impl Frame {
             [_, _, true, _] => Feature::Edge(2),
             [_, _, _, true] => Feature::Edge(3),
         };
+        let height = dot(self.normal, w[0]);
         Nearest {
             feature,
             distance2: height * height,
@@ -235,69 +233,6 @@ impl Frame {
             triangle: PLANE,
             shares: [0.0; 3],
         }
-    }
-
-    /// Closest point on the border of a coplanar convex face beside which the node lies. Only edges that it
-    /// lies beyond can be closest.
-    #[inline(always)]
-    fn on_border(&self, from: &[Vector; 4], beyond: &[f64; 4]) -> Nearest {
-        let (mut distance2, mut edge, mut at, mut vector) = (f64::INFINITY, 0, 0.0, from[0]);
-        for i in 0..4 {
-            if beyond[i] > 0.0 {
-                let u = dot(from[i], self.edges[i]) * self.inverse_length2[i];
-                let (u, v) = if u <= 0.0 {
-                    (0.0, from[i])
-                } else if u >= 1.0 {
-                    (1.0, from[(i + 1) & 3])
-                } else {
-                    (u, along(from[i], -u, self.edges[i]))
-                };
-                let d2 = dot(v, v);
-                if d2 < distance2 {
-                    (distance2, edge, at, vector) = (d2, i, u, v);
-                }
-            }
-        }
-        Nearest {
-            feature: edge_feature(edge, at),
-            distance2,
-            vector,
-            sides: side(dot(self.normal, vector)),
-            triangle: edge as u8,
-            shares: [0.0, 1.0 - at, at],
-        }
-    }
-
-    /// Closest point of a split face: the nearest of those of its four triangles, the first of equals.
-    #[inline(always)]
-    fn on_triangles(&self, p: Vector) -> Nearest {
-        let c = &self.corners;
-        let r = [sub(c[0], p), sub(c[1], p), sub(c[2], p), sub(c[3], p)];
-        let mid = middle(&r);
-        let mut best = (f64::INFINITY, 0, Region::Inside, [1.0, 0.0, 0.0], mid);
-        for i in 0..4 {
-            let (region, shares, point) = on_triangle(mid, r[i], r[(i + 1) & 3]);
-            let d2 = dot(point, point);
-            if d2 < best.0 {
-                best = (d2, i, region, shares, point);
-            }
-        }
-        let (distance2, i, region, shares, point) = best;
-        let next = (i + 1) & 3;
-        let feature = match region {
-            Region::Border => edge_feature(i, shares[2]),
-            Region::Inside if shares[1] >= 1.0 - JOINT => Feature::Corner(i as u8),
-            Region::Inside if shares[2] >= 1.0 - JOINT => Feature::Corner(next as u8),
-            Region::Inside if shares[0] <= JOINT => Feature::Edge(i as u8),
-            Region::Inside => Feature::Face,
-        };
-        let vector = scale(-1.0, point);
-        let mut nearest = Nearest { feature, distance2, vector, sides: 0, triangle: i as u8, shares };
-        let mut sides = 0;
-        // The length of a normal has no say in its side.
-        self.for_each_normal(&nearest, |normal, _| sides |= side(dot(normal, vector)));
-        nearest.sides = sides;
-        nearest
     }
 
     /// Calls `visit` with every normal of this face that meets at a closest point, a unit vector if the face is flat, and with how much of
@@ -398,6 +333,79 @@ impl Frame {
     }
 }
 
+/// Closest point of a face to a node that is at `w` from its corners, if it is plainly on the rim: a point of an edge such that no corner lies before the plane through it that
+/// stands across the line to the node, or, where that is as near a corner as a joint is wide, the corner. The face is
+/// within the hull of its corners, so nothing of it is nearer. All signs follow from
+/// the products `w_i . e_i` and those of edges.
+#[inline(always)]
+fn on_rim(w: &[Vector; 4]) -> Option<Nearest> {
+    let e = [sub(w[0], w[1]), sub(w[1], w[2]), sub(w[2], w[3]), sub(w[3], w[0])];
+    let length2 = dot_each(&e, &e);
+    let turn = dot_each(&e, &[e[1], e[2], e[3], e[0]]);
+    let t = dot_each(w, &e);
+    let past = [t[0] - length2[0], t[1] - length2[1], t[2] - length2[2], t[3] - length2[3]];
+    let joint = [JOINT * length2[0], JOINT * length2[1], JOINT * length2[2], JOINT * length2[3]];
+    for i in 0..4 {
+        let (j, l) = ((i + 1) & 3, (i + 3) & 3);
+        let next = t[j] + turn[i];
+        let corner = t[i] <= joint[i] && past[l] >= -joint[l] && t[i] + next <= 0.0;
+        let ahead = length2[i] * next <= t[i] * turn[i];
+        let behind = t[i] * turn[l] <= length2[i] * past[l];
+        if corner || (joint[i] < t[i] && past[i] < -joint[i] && ahead && behind) {
+            let u = if corner { 0.0 } else { t[i] / length2[i] };
+            let vector = along(w[i], -u, e[i]);
+            // The triangle of the edge; at a corner also that of the edge before.
+            let spoke = sub(middle(w), w[i]);
+            let of_edge = side(dot(cross(spoke, e[i]), vector));
+            return Some(Nearest {
+                feature: if corner { Feature::Corner(i as u8) } else { Feature::Edge(i as u8) },
+                distance2: dot(vector, vector),
+                vector,
+                sides: if corner { of_edge | side(dot(cross(spoke, e[l]), vector)) } else { of_edge },
+                triangle: i as u8,
+                shares: [0.0, 1.0 - u, u],
+            });
+        }
+    }
+    None
+}
+
+/// Closest point of a split face to a node that is at `w` from its corners: the nearest of those of its four triangles,
+/// the first of equals.
+#[inline(always)]
+fn on_triangles(w: &[Vector; 4]) -> Nearest {
+    let mid = middle(w);
+    let spoke = [sub(mid, w[0]), sub(mid, w[1]), sub(mid, w[2]), sub(mid, w[3])];
+    let mut best = (f64::INFINITY, 0, Region::Inside, [1.0, 0.0, 0.0], mid);
+    for i in 0..4 {
+        let j = (i + 1) & 3;
+        let (region, shares, vector) = on_triangle([mid, w[i], w[j]], spoke[i], spoke[j]);
+        let d2 = dot(vector, vector);
+        if d2 < best.0 {
+            best = (d2, i, region, shares, vector);
+        }
+    }
+    let (distance2, i, region, shares, vector) = best;
+    let feature = match region {
+        Region::Border => edge_feature(i, shares[2]),
+        Region::Inside if shares[1] >= 1.0 - JOINT => Feature::Corner(i as u8),
+        Region::Inside if shares[2] >= 1.0 - JOINT => Feature::Corner((i as u8 + 1) & 3),
+        Region::Inside if shares[0] <= JOINT => Feature::Edge(i as u8),
+        Region::Inside => Feature::Face,
+    };
+    // The length of a normal has no say in its side.
+    let of = |i: usize| side(dot(cross(spoke[i & 3], spoke[(i + 1) & 3]), vector));
+    let sides = match feature {
+        Feature::Corner(c) => of(c as usize) | of(c as usize + 3),
+        Feature::Edge(e) => of(e as usize),
+        Feature::Face if shares[0] == 1.0 => of(0) | of(1) | of(2) | of(3),
+        Feature::Face if shares[2] == 0.0 => of(i) | of(i + 3),
+        Feature::Face if shares[1] == 0.0 => of(i) | of(i + 1),
+        Feature::Face => of(i),
+    };
+    Nearest { feature, distance2, vector, sides, triangle: i as u8, shares }
+}
+
 /// Mean of four corners.
 #[inline(always)]
 fn middle(x: &[Vector; 4]) -> Vector {
@@ -424,42 +432,42 @@ enum Region {
     Border,
 }
 
-/// Closest point of the triangle `a b c` to the origin by its Voronoi regions (Ericson 2005, section 5.1.5):
-/// region, barycentric shares, point.
+/// Closest point of a triangle to a node that is at `a`, `b`, `c` from its corners, by its Voronoi regions (Ericson 2005,
+/// section 5.1.5): region, barycentric shares, vector from the point to the node. `ab` and `ac` are its edges from `a`.
 #[inline(always)]
-fn on_triangle(a: Vector, b: Vector, c: Vector) -> (Region, [f64; 3], Vector) {
-    let (ab, ac) = (sub(b, a), sub(c, a));
-    let (d1, d2) = (-dot(ab, a), -dot(ac, a));
+fn on_triangle([a, b, c]: [Vector; 3], ab: Vector, ac: Vector) -> (Region, [f64; 3], Vector) {
+    let (d1, d2) = (dot(ab, a), dot(ac, a));
     if d1 <= 0.0 && d2 <= 0.0 {
         return (Region::Inside, [1.0, 0.0, 0.0], a);
     }
-    let (d3, d4) = (-dot(ab, b), -dot(ac, b));
+    let (d3, d4) = (dot(ab, b), dot(ac, b));
     if d3 >= 0.0 && d4 <= d3 {
         return (Region::Border, [0.0, 1.0, 0.0], b);
     }
     let vc = d1.mul_add(d4, -(d3 * d2));
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        let v = d1 / (d1 - d3);
-        return (Region::Inside, [1.0 - v, v, 0.0], along(a, v, ab));
+        let v = d1 * (1.0 / (d1 - d3));
+        return (Region::Inside, [1.0 - v, v, 0.0], along(a, -v, ab));
     }
-    let (d5, d6) = (-dot(ab, c), -dot(ac, c));
+    let (d5, d6) = (dot(ab, c), dot(ac, c));
     if d6 >= 0.0 && d5 <= d6 {
         return (Region::Border, [0.0, 0.0, 1.0], c);
     }
     let vb = d5.mul_add(d2, -(d1 * d6));
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        let w = d2 / (d2 - d6);
-        return (Region::Inside, [1.0 - w, 0.0, w], along(a, w, ac));
+        let w = d2 * (1.0 / (d2 - d6));
+        return (Region::Inside, [1.0 - w, 0.0, w], along(a, -w, ac));
     }
     let va = d3.mul_add(d6, -(d5 * d4));
     if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return (Region::Border, [0.0, 1.0 - w, w], along(b, w, sub(c, b)));
+        let w = (d4 - d3) * (1.0 / ((d4 - d3) + (d5 - d6)));
+        return (Region::Border, [0.0, 1.0 - w, w], along(b, -w, sub(b, c)));
     }
     let sum = va + vb + vc;
     if sum > 0.0 {
-        let (v, w) = (vb / sum, vc / sum);
-        return (Region::Inside, [(1.0 - v) - w, v, w], along(along(a, v, ab), w, ac));
+        let inverse = 1.0 / sum;
+        let (v, w) = (vb * inverse, vc * inverse);
+        return (Region::Inside, [(1.0 - v) - w, v, w], along(along(a, -v, ab), -w, ac));
     }
     // A triangle of no area whose regions rounding has mixed up.
     (Region::Inside, [1.0, 0.0, 0.0], a)

@@ -97,6 +97,34 @@ impl Lane for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn rows(from: &[[f64; 4]], indices: &[u32], at: usize) -> [Self; 4] {
+        debug_assert!(at + 4 <= indices.len(), "rows {at} of {}", indices.len());
+        // SAFETY: the caller keeps the lanes and the indices inside; the wrapper has AVX2.
+        unsafe {
+            let (first, rows) = (indices.as_ptr().add(at), from.as_ptr());
+            let a = _mm256_loadu_pd(rows.add(*first as usize).cast());
+            let b = _mm256_loadu_pd(rows.add(*first.add(1) as usize).cast());
+            let c = _mm256_loadu_pd(rows.add(*first.add(2) as usize).cast());
+            let d = _mm256_loadu_pd(rows.add(*first.add(3) as usize).cast());
+            let (low, high) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+            let (next_low, next_high) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+            [
+                Self(_mm256_permute2f128_pd::<0x20>(low, next_low)),
+                Self(_mm256_permute2f128_pd::<0x20>(high, next_high)),
+                Self(_mm256_permute2f128_pd::<0x31>(low, next_low)),
+                Self(_mm256_permute2f128_pd::<0x31>(high, next_high)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn whole(from: &[u32], at: usize) -> Self {
+        debug_assert!(at + 4 <= from.len(), "whole {at} of {}", from.len());
+        // SAFETY: the caller keeps the lanes inside; the wrapper has AVX2.
+        Self(unsafe { _mm256_cvtepi32_pd(_mm_loadu_si128(from.as_ptr().add(at).cast())) })
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         Self(avx2!(_mm256_fmadd_pd(self.0, b.0, c.0)))
     }
@@ -142,6 +170,11 @@ impl Lane for Avx2 {
     }
 
     #[inline(always)]
+    fn equal(self, other: Self) -> __m256d {
+        avx2!(_mm256_cmp_pd::<_CMP_EQ_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
     fn mask(bits: u32) -> __m256d {
         avx2!({
             let one_each = _mm256_set_epi64x(8, 4, 2, 1);
@@ -153,6 +186,11 @@ impl Lane for Avx2 {
     #[inline(always)]
     fn both(one: __m256d, other: __m256d) -> __m256d {
         avx2!(_mm256_and_pd(one, other))
+    }
+
+    #[inline(always)]
+    fn either(one: __m256d, other: __m256d) -> __m256d {
+        avx2!(_mm256_or_pd(one, other))
     }
 
     #[inline(always)]

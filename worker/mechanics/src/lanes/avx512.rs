@@ -14,6 +14,21 @@ use super::{Lane, avx2::four};
 #[derive(Clone, Copy)]
 pub(crate) struct Avx512(__m512d);
 
+/// The rows at `indices[at]` and, `apart` further on in the list, behind it.
+///
+/// # Safety
+/// Both places of the list and the rows exist; in a wrapper that has AVX-512.
+#[inline(always)]
+unsafe fn two_rows(from: &[[f64; 4]], indices: &[u32], at: usize, apart: usize) -> __m512d {
+    // SAFETY: the caller's.
+    unsafe {
+        let (first, rows) = (indices.as_ptr().add(at), from.as_ptr());
+        let low = _mm256_loadu_pd(rows.add(*first as usize).cast());
+        let high = _mm256_loadu_pd(rows.add(*first.add(apart) as usize).cast());
+        _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low), high)
+    }
+}
+
 /// Evaluates intrinsics on register values.
 macro_rules! avx512 {
     ($e:expr) => {
@@ -83,6 +98,32 @@ impl Lane for Avx512 {
     }
 
     #[inline(always)]
+    unsafe fn rows(from: &[[f64; 4]], indices: &[u32], at: usize) -> [Self; 4] {
+        debug_assert!(at + 8 <= indices.len(), "rows {at} of {}", indices.len());
+        // SAFETY: the caller keeps the lanes and the indices inside; the wrapper has AVX-512.
+        unsafe {
+            // Rows 0 and 2, 1 and 3, 4 and 6, 5 and 7 share a register: then two steps put all in order.
+            let (a, b) = (two_rows(from, indices, at, 2), two_rows(from, indices, at + 1, 2));
+            let (c, d) = (two_rows(from, indices, at + 4, 2), two_rows(from, indices, at + 5, 2));
+            let (low, high) = (_mm512_unpacklo_pd(a, b), _mm512_unpackhi_pd(a, b));
+            let (next_low, next_high) = (_mm512_unpacklo_pd(c, d), _mm512_unpackhi_pd(c, d));
+            [
+                Self(_mm512_shuffle_f64x2::<0b10_00_10_00>(low, next_low)),
+                Self(_mm512_shuffle_f64x2::<0b10_00_10_00>(high, next_high)),
+                Self(_mm512_shuffle_f64x2::<0b11_01_11_01>(low, next_low)),
+                Self(_mm512_shuffle_f64x2::<0b11_01_11_01>(high, next_high)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn whole(from: &[u32], at: usize) -> Self {
+        debug_assert!(at + 8 <= from.len(), "whole {at} of {}", from.len());
+        // SAFETY: the caller keeps the lanes inside; the wrapper has AVX-512.
+        Self(unsafe { _mm512_cvtepi32_pd(_mm256_loadu_si256(from.as_ptr().add(at).cast())) })
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         Self(avx512!(_mm512_fmadd_pd(self.0, b.0, c.0)))
     }
@@ -129,6 +170,11 @@ impl Lane for Avx512 {
     }
 
     #[inline(always)]
+    fn equal(self, other: Self) -> __mmask8 {
+        avx512!(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
     fn mask(bits: u32) -> __mmask8 {
         bits as u8
     }
@@ -136,6 +182,11 @@ impl Lane for Avx512 {
     #[inline(always)]
     fn both(one: __mmask8, other: __mmask8) -> __mmask8 {
         one & other
+    }
+
+    #[inline(always)]
+    fn either(one: __mmask8, other: __mmask8) -> __mmask8 {
+        one | other
     }
 
     #[inline(always)]

@@ -70,6 +70,20 @@ impl Lane for Scalar {
     }
 
     #[inline(always)]
+    unsafe fn rows(from: &[[f64; 4]], indices: &[u32], at: usize) -> [Self; 4] {
+        debug_assert!(at < indices.len(), "rows {at} of {}", indices.len());
+        // SAFETY: the caller keeps `at` and the index inside.
+        unsafe { from.get_unchecked(*indices.get_unchecked(at) as usize) }.map(Self)
+    }
+
+    #[inline(always)]
+    unsafe fn whole(from: &[u32], at: usize) -> Self {
+        debug_assert!(at < from.len(), "whole {at} of {}", from.len());
+        // SAFETY: the caller keeps `at` inside.
+        Self(f64::from(unsafe { *from.get_unchecked(at) }))
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         Self(self.0.mul_add(b.0, c.0))
     }
@@ -115,6 +129,11 @@ impl Lane for Scalar {
     }
 
     #[inline(always)]
+    fn equal(self, other: Self) -> bool {
+        self.0 == other.0
+    }
+
+    #[inline(always)]
     fn mask(bits: u32) -> bool {
         bits & 1 == 1
     }
@@ -122,6 +141,11 @@ impl Lane for Scalar {
     #[inline(always)]
     fn both(one: bool, other: bool) -> bool {
         one & other
+    }
+
+    #[inline(always)]
+    fn either(one: bool, other: bool) -> bool {
+        one | other
     }
 
     #[inline(always)]

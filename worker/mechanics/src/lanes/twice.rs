@@ -68,6 +68,20 @@ impl<L: Lane> Lane for Twice<L> {
     }
 
     #[inline(always)]
+    unsafe fn rows(from: &[[f64; 4]], indices: &[u32], at: usize) -> [Self; 4] {
+        // SAFETY: the caller keeps lanes and indices of both inside.
+        let ([a, b, c, d], [e, f, g, h]) =
+            unsafe { (L::rows(from, indices, at), L::rows(from, indices, at + L::N)) };
+        [Self(a, e), Self(b, f), Self(c, g), Self(d, h)]
+    }
+
+    #[inline(always)]
+    unsafe fn whole(from: &[u32], at: usize) -> Self {
+        // SAFETY: the caller keeps the lanes of both inside.
+        unsafe { Self(L::whole(from, at), L::whole(from, at + L::N)) }
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         Self(self.0.mul_add(b.0, c.0), self.1.mul_add(b.1, c.1))
     }
@@ -113,6 +127,11 @@ impl<L: Lane> Lane for Twice<L> {
     }
 
     #[inline(always)]
+    fn equal(self, other: Self) -> Self::Mask {
+        (self.0.equal(other.0), self.1.equal(other.1))
+    }
+
+    #[inline(always)]
     fn mask(bits: u32) -> Self::Mask {
         (L::mask(bits), L::mask(bits >> L::N))
     }
@@ -120,6 +139,11 @@ impl<L: Lane> Lane for Twice<L> {
     #[inline(always)]
     fn both(one: Self::Mask, other: Self::Mask) -> Self::Mask {
         (L::both(one.0, other.0), L::both(one.1, other.1))
+    }
+
+    #[inline(always)]
+    fn either(one: Self::Mask, other: Self::Mask) -> Self::Mask {
+        (L::either(one.0, other.0), L::either(one.1, other.1))
     }
 
     #[inline(always)]

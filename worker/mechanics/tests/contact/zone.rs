@@ -151,6 +151,34 @@ fn distance_and_direction_change_smoothly_through_edge_and_corner_zones() {
 }
 
 #[test]
+fn nothing_is_lost_between_the_regions_of_edges_and_corners() {
+    let steps = [0.0, 1e-16, 1e-14, 9e-13, 1.1e-12, 1e-10, 0.07];
+    let mut along: Vec<f64> = vec![0.3];
+    for step in steps {
+        along.extend([-step, step, 1.0 - step, 1.0 + step]);
+    }
+    let beyond = |c: f64| (-c).max(c - 1.0).max(0.0);
+    let nearly = SQUARE.map(|[x, y, z]| [x + 1e-13 * y, y - 2e-13 * x, z]);
+    let hardly_warped = [SQUARE[0], SQUARE[1], [1., 1., 1e-9], SQUARE[3]];
+    for x in [SQUARE, nearly, hardly_warped] {
+        for &u in &along {
+            for &v in &along {
+                for height in [0.0, 1e-13, 0.05, -0.05] {
+                    // Square, rotated by a third of a turn about (1, 1, 1), so that every plane is tried.
+                    for turns in 0..3 {
+                        let turned = |p: [f64; 3]| [p[turns], p[(turns + 1) % 3], p[(turns + 2) % 3]];
+                        let c = closest(&x.map(turned), turned([u, v, height]));
+                        let exact = (beyond(u).powi(2) + beyond(v).powi(2) + height * height).sqrt();
+                        let off = (c.distance - exact).abs();
+                        assert!(off < 3e-9, "{x:?} {u} {v} {height}: {} for {exact}", c.distance);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_collapsed_face_is_a_triangle() {
     let triangle = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 1., 0.]];
     for (p, distance) in

@@ -84,7 +84,7 @@ fn slowly(contact: &Contact, cycle: Cycle) -> ContactVote {
             let nearest = frame(face).nearest(p);
             let bounds = Bounds::of(&contact.faces[face as usize].map(at), warning);
             if bounds.holds(p) && nearest.distance2 < warning * warning {
-                let (id, corners) = (contact.ids[face as usize], contact.corners[face as usize]);
+                let (id, corners) = (contact.ids[face as usize], contact.faces[face as usize]);
                 near.push(Near { face, id, corners, nearest });
             }
         }

@@ -75,7 +75,7 @@ pub(in crate::contact) fn push(
     let lists = pushes.direction.iter().chain(pushes.weights).map(Vec::len);
     let lengths = lists.chain([pushes.depth.len(), pushes.share.len(), pushes.stacking.len()]);
     lengths.for_each(|length| assert!(length == n, "{length} values of {n} pairs"));
-    pairs.check_nodes(width, n_nodes);
+    pairs.check(width, n_nodes);
     terms.iter_mut().for_each(|values| values.resize(n, 0.0));
     let magic = [force_quantum.magic(), energy_quantum.magic()];
     match width {
