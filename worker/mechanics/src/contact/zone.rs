@@ -14,6 +14,7 @@
 
 pub(super) mod approach;
 pub(super) mod lanes;
+mod point;
 mod vectors;
 
 /// A face is coplanar if its diagonals pass each other nearer than this fraction of their mean length.
