@@ -158,16 +158,22 @@ fn quiet(material: &Material, explicit: bool, width: Width) -> f64 {
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Structured,
-    /// Written out, numbered row by row.
+    /// Written out, row by row.
     Explicit,
-    /// Written out, numbered from the end: no node is the next of another, and nothing is loaded in a run.
-    Backwards,
+    /// Written out in the order of a curve that goes from cube to cube: nothing is loaded in a run.
+    Scattered,
     /// One plate of shells.
     Shells,
 }
 
 /// Layers of the one plate of shells, in place of those below and above.
 const FLAT: (u32, u32) = (0, 0);
+
+/// How far along that curve an element is.
+fn along_curve(place: [u32; 3]) -> u64 {
+    let level = |bit: u32| -> u64 { (0..3).map(|a| u64::from(place[a] >> bit & 1) << a).sum() };
+    (0..16).map(|bit| level(bit) << (3 * bit)).sum()
+}
 
 /// The domain of benchmark 1, whose plates have `below` and `above` layers of `side` by `side` elements, and the number
 /// of elements; each plate is cut into `n_pieces`.
@@ -182,12 +188,8 @@ fn plates(
     let plane = row * row;
     let n_nodes = plane * (below + above + 1);
     let size = 0.01;
-    let number = |n: u32| if kind == Kind::Backwards { n_nodes - 1 - n } else { n };
-    let mut positions = vec![[0.0; 3]; n_nodes as usize];
-    for n in 0..n_nodes {
-        let place = [n % row, n / row % row, n / plane].map(|c| f64::from(c) * size);
-        positions[number(n) as usize] = place;
-    }
+    let place = |n: u32| [n % row, n / row % row, n / plane].map(|c| f64::from(c) * size);
+    let positions: Vec<[f64; 3]> = (0..n_nodes).map(place).collect();
     let part = |name: &str, material: u32, layers: u32, first: u32| {
         let cells = [side, side, layers];
         let n_elements = side * side * layers;
@@ -199,10 +201,14 @@ fn plates(
             element_ids: (0..n_elements).collect(),
         };
         if kind != Kind::Structured {
-            let hexahedra = (0..n_elements as usize).map(|e| part.corners(e)).collect();
+            let mut order: Vec<u32> = (0..n_elements).collect();
+            if kind == Kind::Scattered {
+                order.sort_by_key(|&e| along_curve([e % side, e / side % side, e / (side * side)]));
+            }
+            let hexahedra = order.iter().map(|&e| part.corners(e as usize)).collect();
             part.topology = Topology::Explicit { hexahedra };
         }
-        part.nodes.iter_mut().for_each(|n| *n = number(*n + first * plane));
+        part.nodes.iter_mut().for_each(|n| *n += first * plane);
         part
     };
     let sheet = || {
@@ -275,9 +281,7 @@ fn plates(
                 _ => Region::List((0..mesh.parts[p].n_elements() as u32).collect()),
             };
             let last = below * plane;
-            let mut unowned: Vec<u32> =
-                if p == 1 { (last..last + plane).map(number).collect() } else { Vec::new() };
-            unowned.sort_unstable();
+            let unowned = if p == 1 { (last..last + plane).collect() } else { Vec::new() };
             let pieces = region.split(n_pieces).iter().map(|region| cut(&mesh, &state, p, region)).collect();
             Subdomain { id: p as u32, pieces, unowned, surface: Vec::new() }
         })
@@ -339,7 +343,7 @@ fn cycles(only: Option<usize>) {
         (30, (20, 10), Kind::Structured, 200),
         (40, (30, 10), Kind::Structured, 120),
         (40, (30, 10), Kind::Explicit, 120),
-        (40, (30, 10), Kind::Backwards, 120),
+        (40, (30, 10), Kind::Scattered, 120),
         (60, (40, 20), Kind::Structured, 50),
         (100, (75, 25), Kind::Structured, 20),
         (160, (120, 37), Kind::Structured, 8),
@@ -365,7 +369,7 @@ fn cycles(only: Option<usize>) {
         let name = match kind {
             Kind::Structured => "structured",
             Kind::Explicit => "explicit, in rows",
-            Kind::Backwards => "explicit, in no rows",
+            Kind::Scattered => "explicit, in no rows",
             Kind::Shells => "shells, five points",
         };
         println!("{n_elements:>9}  {name:<22}{:>16}{:>16}", columns[0], columns[1]);

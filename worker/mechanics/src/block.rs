@@ -16,7 +16,7 @@ use crate::lanes::{avx2::Avx2, avx512::Avx512, twice::Twice};
 use crate::{
     element::{
         ElementVote, Step,
-        hex8::{self, Along, Laws, Layout, View},
+        hex8::{self, Along, Corners, Laws, Layout, Nodal, Slots, View},
         shell4::{Core, ShellStep},
     },
     eos::{EquationOfState, IdealGas, Jwl, Linear, Polynomial, Shock},
@@ -148,7 +148,7 @@ impl Block {
         assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
         let n_slots = match &layout {
             Layout::Structured { base, .. } => base.len() * SET,
-            Layout::Explicit { corners, .. } => corners[0].len(),
+            Layout::Explicit { sets, .. } => sets.len() * SET,
         };
         let by_slot = |values: Vec<f64>, phantom: f64| {
             let mut array = vec![phantom; n_slots];
@@ -340,7 +340,13 @@ impl Block {
                 let (row, plane) = (*row as u32, *plane as u32);
                 [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| n + d)
             }
-            Layout::Explicit { corners, .. } => std::array::from_fn(|corner| corners[corner][slot]),
+            Layout::Explicit { sets, lists } => {
+                let lane = slot % SET;
+                match sets[slot / SET] {
+                    Corners::Run(_, first) => first.map(|node| node + lane as u32),
+                    Corners::List(list) => lists[list as usize].map(|nodes| nodes[lane]),
+                }
+            }
         }
     }
 
@@ -523,17 +529,21 @@ impl Block {
         let [fx, fy, fz] = &mut self.f;
         let mut view = View {
             layout: &self.layout,
-            x: std::array::from_fn(|axis| self.x[axis].as_slice()),
-            v: std::array::from_fn(|axis| self.v[axis].as_slice()),
-            f: [fx, fy, fz],
-            fields: self.fields.each_mut().map(Vec::as_mut_slice),
-            initial_volume: &self.initial_volume,
-            alive: &self.alive,
-            elements: &self.slot_elements,
-            lowest: &self.lowest,
+            nodes: Nodal {
+                x: std::array::from_fn(|axis| self.x[axis].as_slice()),
+                v: std::array::from_fn(|axis| self.v[axis].as_slice()),
+                f: [fx, fy, fz],
+            },
+            slots: Slots {
+                fields: self.fields.each_mut().map(Vec::as_mut_slice),
+                initial_volume: &self.initial_volume,
+                alive: &self.alive,
+                elements: &self.slot_elements,
+                lowest: &self.lowest,
+            },
         };
-        let n_padded = view.x.iter().chain(&view.v).map(|a| a.len()).min().unwrap_or(0);
-        let n_forces = view.f.iter().map(|a| a.len()).min().unwrap_or(0);
+        let n_padded = view.nodes.x.iter().chain(&view.nodes.v).map(|a| a.len()).min().unwrap_or(0);
+        let n_forces = view.nodes.f.iter().map(|a| a.len()).min().unwrap_or(0);
         let needed = self.reach;
         assert!(n_padded >= needed && n_forces >= needed, "node arrays shrunk below {needed}");
         // SAFETY: the machine has the width; sets and node arrays were checked just now, and the slots of a
@@ -633,6 +643,11 @@ fn in_runs(hexahedra: &[[u32; 8]]) -> (Vec<u32>, Vec<Option<Along>>) {
     (order, runs)
 }
 
+/// How many sets of these elements are runs.
+pub(crate) fn n_runs(hexahedra: &[[u32; 8]]) -> usize {
+    in_runs(hexahedra).1.iter().flatten().count()
+}
+
 /// Layout of explicit hexahedra, given the order in which they fill the slots and which sets are runs; phantoms stand on the
 /// corners of the first.
 fn explicit(
@@ -646,17 +661,23 @@ fn explicit(
         "corners beyond {n_nodes} nodes"
     );
     assert!(n_nodes < 1 << 31, "{n_nodes} nodes in one block");
-    let n_slots = hexahedra.len().next_multiple_of(SET);
-    let corners = std::array::from_fn(|corner| {
-        let mut nodes: Vec<u32> = order.iter().map(|&e| hexahedra[e as usize][corner]).collect();
-        nodes.resize(n_slots, hexahedra[0][corner]);
-        nodes
+    let mut lists = Vec::new();
+    let sets = order.chunks(SET).zip(runs).map(|(elements, run)| match run {
+        Some(along) => Corners::Run(along, hexahedra[elements[0] as usize]),
+        None => {
+            let element = |slot: usize| elements.get(slot).map_or(0, |&e| e as usize);
+            lists.push(std::array::from_fn(|corner| {
+                std::array::from_fn(|slot| hexahedra[element(slot)][corner])
+            }));
+            Corners::List(lists.len() as u32 - 1)
+        }
     });
+    let sets = sets.collect();
     let mut slots = vec![0; hexahedra.len()];
     for (slot, &element) in (0..).zip(&order) {
         slots[element as usize] = slot;
     }
-    (Layout::Explicit { corners: Box::new(corners), runs }, slots, n_nodes)
+    (Layout::Explicit { sets, lists }, slots, n_nodes)
 }
 
 /// # Safety

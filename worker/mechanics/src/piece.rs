@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    block::Piece,
+    block::{Piece, n_runs},
     erosion::PieceErosion,
     mesh::{Mesh, Topology},
     state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},
@@ -97,7 +97,7 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             // Local nodes are numbered by first use, which keeps an element's corners close together.
             let mut local_of = std::collections::BTreeMap::new();
             let mut nodes = Vec::new();
-            let corners = list
+            let corners: Vec<_> = list
                 .iter()
                 .map(|&e| {
                     hexahedra[e as usize].map(|n| {
@@ -108,6 +108,7 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
                     })
                 })
                 .collect();
+            let (corners, nodes) = as_rows_are(corners, nodes);
             (Topology::Explicit { hexahedra: corners }, nodes, list.clone())
         }
         (Topology::Shells { quads, section }, Region::List(list)) => {
@@ -168,6 +169,22 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         elements,
         shells,
     }
+}
+
+/// Corners and nodes numbered in the order of the mesh, if more elements then are in runs: first use breaks rows at their ends and
+/// where a layer begins.
+fn as_rows_are(corners: Vec<[u32; 8]>, nodes: Vec<u32>) -> (Vec<[u32; 8]>, Vec<u32>) {
+    let mut order: Vec<u32> = (0..nodes.len() as u32).collect();
+    order.sort_unstable_by_key(|&local| nodes[local as usize]);
+    let mut place = vec![0; nodes.len()];
+    for (new, &old) in (0..).zip(&order) {
+        place[old as usize] = new;
+    }
+    let sorted: Vec<_> = corners.iter().map(|corners| corners.map(|local| place[local as usize])).collect();
+    if n_runs(&sorted) <= n_runs(&corners) {
+        return (corners, nodes);
+    }
+    (sorted, order.iter().map(|&local| nodes[local as usize]).collect())
 }
 
 /// Writes what a cycle changes of a piece back into the global state. Its arrays go one by one, so that there need not be
@@ -234,4 +251,44 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_keep_the_order_of_the_mesh_where_that_makes_runs() {
+        // Two layers of two rows of 17 elements, then the same in leaps.
+        let node = |i: u32, j: u32, k: u32| i + 18 * (j + 3 * k);
+        let place = |e: u32| [e % 17, e / 17 % 2, e / 34];
+        let corners = |e: u32| {
+            let [i, j, k] = place(e);
+            [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+                .map(|[a, b, c]| node(i + a, j + b, k + c))
+        };
+        let by_first_use = |elements: &[u32]| {
+            let mut nodes: Vec<u32> = Vec::new();
+            let mut local = |n: u32| match nodes.iter().position(|&known| known == n) {
+                Some(at) => at as u32,
+                None => {
+                    nodes.push(n);
+                    nodes.len() as u32 - 1
+                }
+            };
+            let corners: Vec<_> = elements.iter().map(|&e| corners(e).map(&mut local)).collect();
+            (corners, nodes)
+        };
+        let in_rows: Vec<u32> = (0..68).collect();
+        let (numbered, nodes) = by_first_use(&in_rows);
+        assert!(n_runs(&numbered) < 8);
+        let (numbered, nodes) = as_rows_are(numbered, nodes);
+        assert_eq!(n_runs(&numbered), 8);
+        assert!(nodes.is_sorted());
+        let global = |local: &[u32; 8]| local.map(|n| nodes[n as usize]);
+        assert!((0..68).all(|e| global(&numbered[e as usize]) == corners(e)));
+        let in_leaps: Vec<u32> = (0..68).map(|e| 25 * e % 68).collect();
+        let as_used = by_first_use(&in_leaps);
+        assert!(as_rows_are(as_used.0.clone(), as_used.1.clone()) == as_used);
+    }
 }

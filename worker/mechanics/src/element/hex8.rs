@@ -54,13 +54,22 @@ pub(crate) enum Layout {
         /// Corner 0 of the first slot of each set.
         base: Vec<u32>,
     },
-    /// Local node of each corner by slot.
+    /// Local nodes of the corners by set.
     Explicit {
-        /// Eight arrays.
-        corners: Box<[Vec<u32>; 8]>,
-        /// By set: in a run each corner of the next slot is the next local node.
-        runs: Vec<Option<Along>>,
+        /// Of each set.
+        sets: Vec<Corners>,
+        /// Those of sets that are not runs, by corner and slot.
+        lists: Vec<[[u32; SET]; 8]>,
     },
+}
+
+/// Local nodes of the corners of a set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Corners {
+    /// Each corner of the next slot is the next local node: those of the first slot.
+    Run(Along, [u32; 8]),
+    /// Which of the lists.
+    List(u32),
 }
 
 /// The direction in which the elements of a run share a face with the next.
@@ -92,9 +101,27 @@ impl Along {
 /// The arrays of a block as a kernel sees them. State arrays are by slot, node arrays by local node and padded.
 pub(crate) struct View<'a> {
     pub layout: &'a Layout,
+    pub nodes: Nodal<'a>,
+    pub slots: Slots<'a>,
+}
+
+/// Node arrays.
+pub(crate) struct Nodal<'a> {
     pub x: [&'a [f64]; 3],
     pub v: [&'a [f64]; 3],
     pub f: [&'a mut [f64]; 3],
+}
+
+impl Nodal<'_> {
+    #[inline(always)]
+    fn reborrow(&mut self) -> Nodal<'_> {
+        let [fx, fy, fz] = &mut self.f;
+        Nodal { x: self.x, v: self.v, f: [fx, fy, fz] }
+    }
+}
+
+/// Arrays by slot or set.
+pub(crate) struct Slots<'a> {
     pub fields: [&'a mut [f64]; N_FIELDS],
     /// Volume at time zero by slot; 1 in phantoms.
     pub initial_volume: &'a [f64],
@@ -106,7 +133,7 @@ pub(crate) struct View<'a> {
     pub lowest: &'a [u32],
 }
 
-impl View<'_> {
+impl Slots<'_> {
     /// A state field of the slots from `slot` on, which is inside the arrays.
     #[inline(always)]
     fn state<L: Lane>(&self, slot: usize, field: usize) -> L {
@@ -144,6 +171,30 @@ struct Tally<L> {
 }
 
 impl<L: Lane> Tally<L> {
+    #[inline(always)]
+    fn new(vote: &ElementVote) -> Self {
+        let zero = L::splat(0.0);
+        Self {
+            internal: zero,
+            hourglass: zero,
+            viscosity: zero,
+            largest_force: zero,
+            largest_rate: zero,
+            frequency: 1.0 / vote.courant,
+        }
+    }
+
+    #[inline(always)]
+    fn join(&self, vote: &mut ElementVote) {
+        for lane in 0..L::N {
+            vote.internal += self.internal.to_array()[lane];
+            vote.hourglass += self.hourglass.to_array()[lane];
+            vote.viscosity += self.viscosity.to_array()[lane];
+            vote.force_bound = vote.force_bound.max(self.largest_force.to_array()[lane]);
+            vote.volume_limit = vote.volume_limit.min(0.1 / self.largest_rate.to_array()[lane]);
+        }
+    }
+
     /// The frequency that an element must exceed to change the vote. An element of higher index than that of the vote
     /// is not chosen among equals; one of lower index is, also when only the inverses are equal.
     #[inline(always)]
@@ -165,64 +216,66 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: Fai
     sets: &[Range<u32>],
     vote: &mut ElementVote,
 ) {
+    let View { layout, nodes, slots } = view;
+    let mut tally = Tally::<L>::new(vote);
     // A loop for each layout: what one needs in memory the other keeps in registers.
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's promise; what is packed holds whole sets.
     unsafe {
-        match view.layout {
+        match layout {
             Layout::Structured { row, plane, base } => {
-                all_sets::<L, _, E, S, F>(
-                    Rows { row: *row, plane: *plane, base },
-                    view,
-                    laws,
-                    step,
-                    sets,
-                    vote,
-                );
+                let place = Rows { row: *row, plane: *plane, base };
+                for set in sets.iter().cloned().flatten() {
+                    of_set::<L, _, E, S, F>(place, nodes, slots, laws, step, set, &mut tally, vote);
+                }
             }
-            Layout::Explicit { corners, runs } => {
-                all_sets::<L, _, E, S, F>(Lists { corners, runs }, view, laws, step, sets, vote);
+            Layout::Explicit { sets: places, lists } => {
+                let mut packed = Packed::new();
+                for set in sets.iter().cloned().flatten() {
+                    // One kernel for both, which knows only whence it loads: a choice at each load would cost it its registers.
+                    let place = *places.get_unchecked(set as usize);
+                    let (place, mut arrays, list) = match place {
+                        Corners::Run(along, first) => {
+                            (Bases { first, along: Some(along) }, nodes.reborrow(), None)
+                        }
+                        Corners::List(list) => {
+                            let list = lists.get_unchecked(list as usize);
+                            packed.gather::<L>(nodes, list);
+                            (PACKED, packed.nodal(), Some(list))
+                        }
+                    };
+                    of_set::<L, _, E, S, F>(place, &mut arrays, slots, laws, step, set, &mut tally, vote);
+                    if let Some(list) = list {
+                        packed.scatter(nodes, list);
+                    }
+                }
             }
         }
     }
+    tally.join(vote);
 }
 
+/// The slots of a set.
+///
 /// # Safety
-/// As [`compute`]; `place` is the layout of the view.
+/// As [`compute`].
 #[inline(always)]
-unsafe fn all_sets<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+#[allow(clippy::too_many_arguments, reason = "one level of the kernel")]
+unsafe fn of_set<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     place: P,
-    view: &mut View<'_>,
+    nodes: &mut Nodal<'_>,
+    view: &mut Slots<'_>,
     laws: &Laws<E, S, F>,
     step: &Step,
-    sets: &[Range<u32>],
+    set: u32,
+    tally: &mut Tally<L>,
     vote: &mut ElementVote,
 ) {
-    let zero = L::splat(0.0);
-    let mut tally = Tally {
-        internal: zero,
-        hourglass: zero,
-        viscosity: zero,
-        largest_force: zero,
-        largest_rate: zero,
-        frequency: 1.0 / vote.courant,
-    };
-    for range in sets {
-        for set in range.clone() {
-            let mut lane = 0;
-            while lane < SET {
-                let slot = set as usize * SET + lane;
-                // SAFETY: handed on from the caller.
-                unsafe { slots::<L, P, E, S, F>(place, view, laws, step, slot, &mut tally, vote) };
-                lane += L::N;
-            }
-        }
-    }
-    for lane in 0..L::N {
-        vote.internal += tally.internal.to_array()[lane];
-        vote.hourglass += tally.hourglass.to_array()[lane];
-        vote.viscosity += tally.viscosity.to_array()[lane];
-        vote.force_bound = vote.force_bound.max(tally.largest_force.to_array()[lane]);
-        vote.volume_limit = vote.volume_limit.min(0.1 / tally.largest_rate.to_array()[lane]);
+    let mut lane = 0;
+    while lane < SET {
+        let slot = set as usize * SET + lane;
+        // SAFETY: handed on from the caller.
+        unsafe { slots::<L, P, E, S, F>(place, nodes, view, laws, step, slot, tally, vote) };
+        lane += L::N;
     }
 }
 
@@ -231,9 +284,11 @@ unsafe fn all_sets<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Fai
 /// # Safety
 /// As [`compute`].
 #[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "one level of the kernel")]
 unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     place: P,
-    view: &mut View<'_>,
+    nodes: &mut Nodal<'_>,
+    view: &mut Slots<'_>,
     laws: &Laws<E, S, F>,
     step: &Step,
     slot: usize,
@@ -243,7 +298,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
     let dt = L::splat(step.dt);
     for axis in 0..3 {
-        for array in [view.x[axis], view.v[axis], &*view.f[axis]] {
+        for array in [nodes.x[axis], nodes.v[axis], &*nodes.f[axis]] {
             place.fetch_ahead(array, slot);
         }
     }
@@ -251,14 +306,14 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let (x, v, initial_volume, alive) = unsafe {
         (
             Modes::of(
-                modes_of(place.corners(view.x[0], slot)),
-                modes_of(place.corners(view.x[1], slot)),
-                modes_of(place.corners(view.x[2], slot)),
+                modes_of(place.corners(nodes.x[0], slot)),
+                modes_of(place.corners(nodes.x[1], slot)),
+                modes_of(place.corners(nodes.x[2], slot)),
             ),
             Modes::of(
-                modes_of(place.corners(view.v[0], slot)),
-                modes_of(place.corners(view.v[1], slot)),
-                modes_of(place.corners(view.v[2], slot)),
+                modes_of(place.corners(nodes.v[0], slot)),
+                modes_of(place.corners(nodes.v[1], slot)),
+                modes_of(place.corners(nodes.v[2], slot)),
             ),
             L::load(view.initial_volume, slot),
             L::mask(u32::from(*view.alive.get_unchecked(slot / SET)) >> (slot % SET)),
@@ -481,7 +536,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         let forces = at_end.forces(&rows[axis], resist, amplitudes[axis]);
         let forces = balanced(forces, active, magic, &mut tally.largest_force);
         // SAFETY: corners are inside the node arrays.
-        unsafe { place.scatter(view.f[axis], slot, forces) };
+        unsafe { place.scatter(nodes.f[axis], slot, forces) };
         axis += 1;
     }
 }
@@ -520,7 +575,23 @@ pub(crate) unsafe fn corners<L: Lane>(layout: &Layout, from: &[f64], slot: usize
             Layout::Structured { row, plane, base } => {
                 Rows { row: *row, plane: *plane, base }.corners(from, slot)
             }
-            Layout::Explicit { corners, runs } => Lists { corners, runs }.corners(from, slot),
+            Layout::Explicit { sets, lists } => match *sets.get_unchecked(slot / SET) {
+                Corners::Run(along, first) => Bases { first, along: Some(along) }.corners(from, slot),
+                Corners::List(list) => {
+                    let [a, b, c, d, e, f, g, h] = lists.get_unchecked(list as usize);
+                    let lane = slot % SET;
+                    [
+                        L::gather(from, a, lane),
+                        L::gather(from, b, lane),
+                        L::gather(from, c, lane),
+                        L::gather(from, d, lane),
+                        L::gather(from, e, lane),
+                        L::gather(from, f, lane),
+                        L::gather(from, g, lane),
+                        L::gather(from, h, lane),
+                    ]
+                }
+            },
         }
     }
 }
@@ -600,78 +671,71 @@ impl Place for Rows<'_> {
     }
 }
 
-/// [`Layout::Explicit`].
+/// A set of [`Layout::Explicit`], in the node arrays or packed.
 #[derive(Clone, Copy)]
-struct Lists<'a> {
-    corners: &'a [Vec<u32>; 8],
-    runs: &'a [Option<Along>],
+struct Bases {
+    /// Where each corner of the first slot is; those of the next follow it.
+    first: [u32; 8],
+    /// The direction of a run; none of what is packed, where every corner has its own entry.
+    along: Option<Along>,
 }
 
-impl Lists<'_> {
-    /// The local node of a corner of a slot.
-    ///
-    /// # Safety
-    /// The slot is one of the block.
+impl Bases {
     #[inline(always)]
-    unsafe fn node(self, corner: usize, slot: usize) -> usize {
-        // SAFETY: the caller's promise.
-        unsafe { *self.corners[corner].get_unchecked(slot) as usize }
+    fn at(self, corner: usize, slot: usize) -> usize {
+        self.first[corner] as usize + slot % SET
+    }
+
+    /// # Safety
+    /// As [`compute`].
+    #[inline(always)]
+    unsafe fn add_pairs<L: Lane>(self, to: &mut [f64], slot: usize, values: [L; 8], along: Along) {
+        let [[a, b], [c, d], [e, f], [g, h]] = along.pairs();
+        // SAFETY: the caller's promise; the corners of the face behind are one before those of the other.
+        unsafe {
+            add_pair(to, self.at(a, slot), values[a], values[b]);
+            add_pair(to, self.at(c, slot), values[c], values[d]);
+            add_pair(to, self.at(e, slot), values[e], values[f]);
+            add_pair(to, self.at(g, slot), values[g], values[h]);
+        }
     }
 }
 
-impl Place for Lists<'_> {
+impl Place for Bases {
     #[inline(always)]
     unsafe fn corners<L: Lane>(self, from: &[f64], slot: usize) -> [L; 8] {
         // SAFETY: the caller's promise covers every access here; the nodes of a run follow each other.
         unsafe {
-            if self.runs.get_unchecked(slot / SET).is_some() {
-                return [
-                    L::load(from, self.node(0, slot)),
-                    L::load(from, self.node(1, slot)),
-                    L::load(from, self.node(2, slot)),
-                    L::load(from, self.node(3, slot)),
-                    L::load(from, self.node(4, slot)),
-                    L::load(from, self.node(5, slot)),
-                    L::load(from, self.node(6, slot)),
-                    L::load(from, self.node(7, slot)),
-                ];
-            }
-            let corners = self.corners;
             [
-                L::gather(from, &corners[0], slot),
-                L::gather(from, &corners[1], slot),
-                L::gather(from, &corners[2], slot),
-                L::gather(from, &corners[3], slot),
-                L::gather(from, &corners[4], slot),
-                L::gather(from, &corners[5], slot),
-                L::gather(from, &corners[6], slot),
-                L::gather(from, &corners[7], slot),
+                L::load(from, self.at(0, slot)),
+                L::load(from, self.at(1, slot)),
+                L::load(from, self.at(2, slot)),
+                L::load(from, self.at(3, slot)),
+                L::load(from, self.at(4, slot)),
+                L::load(from, self.at(5, slot)),
+                L::load(from, self.at(6, slot)),
+                L::load(from, self.at(7, slot)),
             ]
         }
     }
 
     #[inline(always)]
     unsafe fn scatter<L: Lane>(self, to: &mut [f64], slot: usize, values: [L; 8]) {
-        // SAFETY: the caller's promise covers every access here; the nodes of a run follow each other, and the corners of the
-        // face behind are one before those of the other.
+        // SAFETY: the caller's promise covers every access here.
         unsafe {
-            if let Some(along) = *self.runs.get_unchecked(slot / SET) {
-                let [[a, b], [c, d], [e, f], [g, h]] = along.pairs();
-                add_pair(to, self.node(a, slot), values[a], values[b]);
-                add_pair(to, self.node(c, slot), values[c], values[d]);
-                add_pair(to, self.node(e, slot), values[e], values[f]);
-                add_pair(to, self.node(g, slot), values[g], values[h]);
-                return;
+            match self.along {
+                // Each by itself, so that no value is chosen by an index in memory.
+                Some(Along::I) => self.add_pairs(to, slot, values, Along::I),
+                Some(Along::J) => self.add_pairs(to, slot, values, Along::J),
+                Some(Along::K) => self.add_pairs(to, slot, values, Along::K),
+                None => {
+                    let mut corner = 0;
+                    while corner < 8 {
+                        values[corner].store(to, self.at(corner, slot));
+                        corner += 1;
+                    }
+                }
             }
-            let corners = self.corners;
-            add_each(to, &corners[0], slot, values[0]);
-            add_each(to, &corners[1], slot, values[1]);
-            add_each(to, &corners[2], slot, values[2]);
-            add_each(to, &corners[3], slot, values[3]);
-            add_each(to, &corners[4], slot, values[4]);
-            add_each(to, &corners[5], slot, values[5]);
-            add_each(to, &corners[6], slot, values[6]);
-            add_each(to, &corners[7], slot, values[7]);
         }
     }
 
@@ -679,21 +743,81 @@ impl Place for Lists<'_> {
     fn fetch_ahead(self, _array: &[f64], _slot: usize) {}
 }
 
-/// Adds each lane to the entry that `indices` has for it from `at` on.
-///
-/// # Safety
-/// `at + N <= indices.len()`, each index read is below `to.len()`.
-#[inline(always)]
-unsafe fn add_each<L: Lane>(to: &mut [f64], indices: &[u32], at: usize, values: L) {
-    let lanes = values.to_array();
-    let mut lane = 0;
-    while lane < L::N {
-        // SAFETY: the caller's promise.
-        unsafe {
-            let node = *indices.get_unchecked(at + lane) as usize;
-            *to.get_unchecked_mut(node) += lanes[lane];
+/// What a set has at its corners, by corner and slot.
+const PACKED: Bases = Bases { first: [0, 8, 16, 24, 32, 40, 48, 56], along: None };
+
+/// The node arrays of a set that is no run, put together by corner and slot.
+#[repr(align(64))]
+struct Packed {
+    x: [[f64; 8 * SET]; 3],
+    v: [[f64; 8 * SET]; 3],
+    f: [[f64; 8 * SET]; 3],
+}
+
+impl Packed {
+    fn new() -> Self {
+        let zeros = [[0.0; 8 * SET]; 3];
+        Self { x: zeros, v: zeros, f: zeros }
+    }
+
+    #[inline(always)]
+    fn nodal(&mut self) -> Nodal<'_> {
+        let [fx, fy, fz] = &mut self.f;
+        Nodal {
+            x: [&self.x[0], &self.x[1], &self.x[2]],
+            v: [&self.v[0], &self.v[1], &self.v[2]],
+            f: [fx, fy, fz],
         }
-        lane += 1;
+    }
+
+    /// Positions and velocities of these nodes.
+    ///
+    /// # Safety
+    /// The nodes are inside the arrays.
+    #[inline(always)]
+    unsafe fn gather<L: Lane>(&mut self, nodes: &Nodal<'_>, list: &[[u32; SET]; 8]) {
+        let mut corner = 0;
+        while corner < 8 {
+            let of_slots = list[corner];
+            let mut lane = 0;
+            while lane < SET {
+                let mut axis = 0;
+                while axis < 3 {
+                    // SAFETY: the caller's promise; a set has eight slots.
+                    unsafe {
+                        let at = corner * SET + lane;
+                        L::gather(nodes.x[axis], &of_slots, lane).store(&mut self.x[axis], at);
+                        L::gather(nodes.v[axis], &of_slots, lane).store(&mut self.v[axis], at);
+                    }
+                    axis += 1;
+                }
+                lane += L::N;
+            }
+            corner += 1;
+        }
+    }
+
+    /// Adds the forces to those of these nodes. Every value is a multiple of the quantum, so no order can show.
+    ///
+    /// # Safety
+    /// The nodes are inside the arrays.
+    #[inline(always)]
+    unsafe fn scatter(&self, nodes: &mut Nodal<'_>, list: &[[u32; SET]; 8]) {
+        let mut corner = 0;
+        while corner < 8 {
+            let mut lane = 0;
+            while lane < SET {
+                let node = list[corner][lane] as usize;
+                let mut axis = 0;
+                while axis < 3 {
+                    // SAFETY: the caller's promise.
+                    unsafe { *nodes.f[axis].get_unchecked_mut(node) += self.f[axis][corner * SET + lane] };
+                    axis += 1;
+                }
+                lane += 1;
+            }
+            corner += 1;
+        }
     }
 }
 
