@@ -2,6 +2,7 @@
 //!
 //! [`Step`] is what a cycle tells the elements, [`ElementVote`] what they answer. The eight-node hexahedron stands
 //! in `hex8`, its geometry in `modes`, with rotation, hourglass control, viscosity and time-step limit beside it;
+//! `layout` says which nodes a lane set has and `place` brings their values to the kernel and forces back;
 //! `vector` is the small algebra they are written in.
 
 use serde::{Deserialize, Serialize};
@@ -10,7 +11,9 @@ use crate::exact::Quantum;
 
 pub mod hex8;
 pub(crate) mod hourglass;
+pub(crate) mod layout;
 pub(crate) mod modes;
+pub(crate) mod place;
 pub(crate) mod rotation;
 pub mod shell4;
 pub(crate) mod vector;

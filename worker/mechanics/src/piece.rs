@@ -6,7 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    block::{Piece, n_runs},
+    block::Piece,
+    element::layout::n_runs,
     erosion::PieceErosion,
     mesh::{Mesh, Topology},
     state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},

@@ -8,8 +8,9 @@ use std::ops::Range;
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     element::{
-        hex8::{Layout, corners},
+        layout::Layout,
         modes::{Gradient, Modes, modes_of},
+        place::corners,
         vector::{Tensor, Vector},
         viscosity::{Spread, frequency},
     },
