@@ -111,15 +111,15 @@ fn contact_matrices_are_symmetric_and_follow_the_pairs() {
 }
 
 #[test]
-fn the_slack_is_half_a_face_within_two_and_a_half_and_four_gaps() {
+fn the_slack_makes_the_reach_a_face_within_two_and_a_half_and_eight_gaps() {
     // Faces of half a metre.
     let slack = |keys: &str| {
         let model = read(&(cube("a", [0.0; 3], "") + &cube("b", [2.0, 0.0, 0.0], "") + "[contact]\n" + keys));
         model.setup.contact.expect("the deck has contact").slack
     };
     for (keys, wanted) in [
-        ("", 0.2),
-        ("gap_fraction = 0.15\n", 0.25),
+        ("", 0.4),
+        ("gap_fraction = 0.15\n", 0.35),
         ("gap_fraction = 0.4\n", 0.5),
         ("gap_fraction = 0.4\nslack_gaps = 2\n", 0.4),
     ] {

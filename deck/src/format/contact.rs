@@ -1,7 +1,12 @@
 //! `[contact]`: gap, slack, which parts meet, friction.
 
 use mechanics::{
-    contact::Settings, load::Drive, material::Material, rigid::Body, setup::Constraint, wall::Motion,
+    contact::{Settings, WARNING},
+    load::Drive,
+    material::Material,
+    rigid::Body,
+    setup::Constraint,
+    wall::Motion,
 };
 
 use super::{MAX_CONTACT_PARTS, MAX_ENTRIES, Names, boundary::Conditions};
@@ -27,10 +32,10 @@ const GAP_FRACTION: f64 = 0.1;
 const FIT_LEAST: f64 = 0.01;
 /// A gap that fits over the distance of the bodies.
 const FIT_SHARE: f64 = 0.95;
-/// Default slack over the gap. Two nodes travel at most 40 % of the gap against each other in a cycle, so lists last ten
-/// cycles at the least: two for votes and orders, eight for a sort.
-const SLACK_GAPS: f64 = 4.0;
-/// Default slack over the gap where that is more than half a face: longer lists would cost more than sorts.
+/// Default slack over the gap. Two nodes travel at most 40 % of the gap against each other in a cycle, so lists last twenty
+/// cycles at the least; two go to votes and orders, eight to a sort.
+const SLACK_GAPS: f64 = 8.0;
+/// Default slack over the gap where that would be less: shorter lists would cost more in sorts than they save.
 const LEAST_SLACK_GAPS: f64 = 2.5;
 /// Default friction velocity over the largest difference of initial velocities.
 const FRICTION_VELOCITY: f64 = 0.01;
@@ -164,9 +169,10 @@ fn read_pairs(table: &Table<'_>, names: &Names, interacts: &mut [bool], friction
     }
 }
 
-/// Default slack for a gap and the smallest face dimension (lengths).
+/// Default slack for a gap and the smallest face dimension (lengths): so much that the reach of a sort is that dimension, for
+/// its cubes have twice that as their side anyway.
 fn default_slack(gap: f64, smallest: Option<f64>) -> f64 {
-    let wide = smallest.map_or(f64::INFINITY, |face| 0.5 * face);
+    let wide = smallest.map_or(f64::INFINITY, |face| WARNING.mul_add(-gap, face));
     (SLACK_GAPS * gap).min(wide).max(LEAST_SLACK_GAPS * gap)
 }
 
