@@ -206,6 +206,9 @@ fn every_cluster_file_and_route_gives_the_digest_of_a_plain_run() {
 fn a_sort_that_is_late_makes_workers_wait_and_changes_no_later_sort() {
     let mut model = Arc::unwrap_or_clone(model("plates-free-slip.toml", 60));
     model.setup.control.sort_lag = 4;
+    // Short lists, so that some sorts fall into the run.
+    let contact = model.setup.contact.as_mut().expect("the deck has contact");
+    contact.slack = 4.0 * contact.gap;
     let model = Arc::new(model);
     let mut three = machines(3);
     let (quick, tape) = virtual_clock::run(&model, &three, Scheme::control(), None).expect("the deck runs");
