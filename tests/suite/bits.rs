@@ -98,7 +98,7 @@ pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
     let mut midway = 0;
     for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
         let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
-        let at = arrivals * (seed as u64 + 2) / 12;
+        let at = arrivals * (seed as u64 + 4) / 12;
         let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
         let solved = solve_through(model.clone(), asked(3, options), &mut fate)
             .unwrap_or_else(|e| panic!("{seed}: {e}"));
