@@ -4,14 +4,14 @@ use std::process::Command;
 
 use tests::cluster::{Cluster, Process, repository, said, until};
 
-use crate::{BOLIDE, digest_of, long, reference, small};
+use crate::{BOLIDE, digest_of, reference, small};
 
 #[test]
 fn a_cancelled_job_keeps_what_it_had_and_frees_its_workers() {
     let mut cluster = Cluster::start(BOLIDE, false);
     cluster.worker("a", "1");
     let mut waiting =
-        Process::start("submit", &mut cluster.command("client", &["submit", &long(), "--wait"]));
+        Process::start("submit", &mut cluster.command("client", &["submit", &small(), "--wait"]));
     cluster.wait_until_running(1);
     assert_eq!(cluster.json(&["submit", &small(), "--cycles", "40"])["job"], 2);
     assert_eq!(cluster.json(&["submit", &small(), "--cycles", "40"])["job"], 3);
@@ -69,7 +69,7 @@ fn a_second_worker_of_the_same_name_is_refused() {
 #[test]
 fn an_interrupted_run_of_processes_ends_at_a_whole_cycle_and_leaves_no_child() {
     let mut command = Command::new(BOLIDE);
-    command.args(["run", &long(), "--no-output", "--processes", "--workers", "2", "--threads", "1"]);
+    command.args(["run", &small(), "--no-output", "--processes", "--workers", "2", "--threads", "1"]);
     let mut run = Process::start("run", &mut command);
     let (me, children) = (run.id(), format!("/proc/{0}/task/{0}/children", run.id()));
     let children = until(
