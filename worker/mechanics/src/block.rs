@@ -16,7 +16,7 @@ use crate::lanes::{avx2::Avx2, avx512::Avx512, twice::Twice};
 use crate::{
     element::{
         ElementVote, Step,
-        hex8::{self, Laws, Slots, View},
+        hex8::{self, BySlot, Laws, View},
         layout::{Corners, Layout, explicit, in_runs, structured},
         place::Nodal,
         shell4::{Core, ShellStep},
@@ -536,7 +536,7 @@ impl Block {
                 v: std::array::from_fn(|axis| self.v[axis].as_slice()),
                 f: [fx, fy, fz],
             },
-            slots: Slots {
+            slots: BySlot {
                 fields: self.fields.each_mut().map(Vec::as_mut_slice),
                 initial_volume: &self.initial_volume,
                 alive: &self.alive,

@@ -334,10 +334,10 @@ impl Frame {
     }
 }
 
-/// Closest point of a face to a node that is at `w` from its corners, if it is plainly on the rim: a point of an edge such that no corner lies before the plane through it that
-/// stands across the line to the node, or, where that is as near a corner as a joint is wide, the corner. The face is
-/// within the hull of its corners, so nothing of it is nearer. All signs follow from
-/// the products `w_i . e_i` and those of edges.
+/// Closest point of a face to a node that is at `w` from its corners, if it is plainly on the rim: a point of an edge such
+/// that no corner lies before the plane through it that stands across the line to the node, or, where that is as near a
+/// corner as a joint is wide, the corner. The face is within the hull of its corners, so nothing of it is nearer. All signs
+/// follow from the products `w_i . e_i` and those of edges.
 #[inline(always)]
 fn on_rim(w: &[Vector; 4]) -> Option<Nearest> {
     let e = [sub(w[0], w[1]), sub(w[1], w[2]), sub(w[2], w[3]), sub(w[3], w[0])];

@@ -49,11 +49,11 @@ fn scalar_modes(corners: &[[f64; 3]; 8]) -> Modes<Scalar> {
 pub(crate) struct View<'a> {
     pub layout: &'a Layout,
     pub nodes: Nodal<'a>,
-    pub slots: Slots<'a>,
+    pub slots: BySlot<'a>,
 }
 
 /// Arrays by slot or set.
-pub(crate) struct Slots<'a> {
+pub(crate) struct BySlot<'a> {
     pub fields: [&'a mut [f64]; N_FIELDS],
     /// Volume at time zero by slot; 1 in phantoms.
     pub initial_volume: &'a [f64],
@@ -65,7 +65,7 @@ pub(crate) struct Slots<'a> {
     pub lowest: &'a [u32],
 }
 
-impl Slots<'_> {
+impl BySlot<'_> {
     /// A state field of the slots from `slot` on, which is inside the arrays.
     #[inline(always)]
     fn state<L: Lane>(&self, slot: usize, field: usize) -> L {
@@ -195,7 +195,7 @@ pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: Fai
 unsafe fn of_set<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     place: P,
     nodes: &mut Nodal<'_>,
-    view: &mut Slots<'_>,
+    view: &mut BySlot<'_>,
     laws: &Laws<E, S, F>,
     step: &Step,
     set: u32,
@@ -220,7 +220,7 @@ unsafe fn of_set<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failu
 unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     place: P,
     nodes: &mut Nodal<'_>,
-    view: &mut Slots<'_>,
+    view: &mut BySlot<'_>,
     laws: &Laws<E, S, F>,
     step: &Step,
     slot: usize,

@@ -3,7 +3,7 @@
 use super::{
     PLANE,
     lanes::Closest,
-    vectors::{V, along, cross, dot, inverse, points, sub},
+    vectors::{V, along, corners, cross, dot, inverse, points, sub},
 };
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
@@ -126,13 +126,8 @@ unsafe fn near<L: Lane>(rows: &[[f64; 4]], gap: f64, pairs: &Pairs, closest: &Cl
             let plane = L::splat(PLANE as f64).less_equal(triangle);
             if L::any(plane) {
                 let p: V<L> = points(rows, pairs.node(), at);
-                let corners: [V<L>; 4] = [
-                    points(rows, &pairs.corners()[0], at),
-                    points(rows, &pairs.corners()[1], at),
-                    points(rows, &pairs.corners()[2], at),
-                    points(rows, &pairs.corners()[3], at),
-                ];
-                let inside = bilinear(sub(sub(p, vector), corners[0]), &corners);
+                let x = corners::<L>(rows, pairs.corners(), at);
+                let inside = bilinear(sub(sub(p, vector), x[0]), &x);
                 weights = [
                     L::select(plane, inside[0], weights[0]),
                     L::select(plane, inside[1], weights[1]),

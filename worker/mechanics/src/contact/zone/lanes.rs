@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::{
     Feature, INNER, Nearest, OUTER,
     point::{Point, inside, on_rim},
-    vectors::{V, points, sub},
+    vectors::{V, corners, from_each, points},
 };
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
@@ -217,7 +217,7 @@ unsafe fn kernel<L: Lane>(
                 // SAFETY: as above; `found` has room for the slots of the sets.
                 unsafe {
                     let x = corners::<L>(rows, slots.corners(), from);
-                    let w = [sub(p, x[0]), sub(p, x[1]), sub(p, x[2]), sub(p, x[3])];
+                    let w = from_each(&x, p);
                     let held = L::both(own, holds(&w, grow));
                     if !L::any(held) {
                         far.store(&mut found.distance2, at);
@@ -245,27 +245,12 @@ unsafe fn kernel<L: Lane>(
         unsafe {
             let p: V<L> = points(rows, rest.pairs.node(), at);
             let x = corners::<L>(rows, rest.pairs.corners(), at);
-            let w = [sub(p, x[0]), sub(p, x[1]), sub(p, x[2]), sub(p, x[3])];
+            let w = from_each(&x, p);
             inside(&x, &w).store(&mut rest.points, at);
         }
         at += L::N;
     }
     found.put(&rest.at, &rest.points);
-}
-
-/// # Safety
-/// As [`Lane::rows`] of each list.
-#[inline(always)]
-unsafe fn corners<L: Lane>(rows: &[[f64; 4]], of: &[Vec<u32>; 4], at: usize) -> [V<L>; 4] {
-    // SAFETY: the caller's.
-    unsafe {
-        [
-            points(rows, &of[0], at),
-            points(rows, &of[1], at),
-            points(rows, &of[2], at),
-            points(rows, &of[3], at),
-        ]
-    }
 }
 
 /// Whether the box of four corners, grown on all sides, holds a node that is at `w` from the corners.

@@ -84,7 +84,7 @@ fn edge_feature<L: Lane>(u: L, from: L, to: L, edge: L) -> L {
 
 /// An edge of a face, from one corner to the next, and the corner before them.
 #[derive(Clone, Copy)]
-struct Along<L> {
+struct Rim<L> {
     number: L,
     /// From the corners to the node: the one before, start and end.
     before: V<L>,
@@ -95,7 +95,7 @@ struct Along<L> {
     length2: L,
 }
 
-impl<L: Lane> Along<L> {
+impl<L: Lane> Rim<L> {
     #[inline(always)]
     fn chosen(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
@@ -124,7 +124,7 @@ pub(super) fn on_rim<L: Lane>(w: &[V<L>; 4]) -> (L::Mask, Point<L>) {
     let joint = [joint * length2[0], joint * length2[1], joint * length2[2], joint * length2[3]];
     let mut rim = one.less(zero);
     let mut best =
-        Along { number: L::splat(3.0), before: w[2], start: w[3], end: w[0], at: t[3], length2: length2[3] };
+        Rim { number: L::splat(3.0), before: w[2], start: w[3], end: w[0], at: t[3], length2: length2[3] };
     // From the last to the first, which overrides those behind it.
     let mut i = 4;
     while i > 0 {
@@ -143,8 +143,8 @@ pub(super) fn on_rim<L: Lane>(w: &[V<L>; 4]) -> (L::Mask, Point<L>) {
         if i < 3 {
             let (before, start, end) = (w[l], w[i], w[j]);
             let number = L::splat(i as f64);
-            let along = Along { number, before, start, end, at: t[i], length2: length2[i] };
-            best = Along::chosen(here, &along, &best);
+            let edge = Rim { number, before, start, end, at: t[i], length2: length2[i] };
+            best = Rim::chosen(here, &edge, &best);
         }
     }
     let is_edge = (L::splat(JOINT) * best.length2).less(best.at);

@@ -16,6 +16,29 @@ pub(super) unsafe fn points<L: Lane>(rows: &[[f64; 4]], indices: &[u32], at: usi
     [x, y, z]
 }
 
+/// Corners of faces: [`points`] of four lists.
+///
+/// # Safety
+/// As [`Lane::rows`] of each list.
+#[inline(always)]
+pub(super) unsafe fn corners<L: Lane>(rows: &[[f64; 4]], of: &[Vec<u32>; 4], at: usize) -> [V<L>; 4] {
+    // SAFETY: the caller's.
+    unsafe {
+        [
+            points(rows, &of[0], at),
+            points(rows, &of[1], at),
+            points(rows, &of[2], at),
+            points(rows, &of[3], at),
+        ]
+    }
+}
+
+/// From each corner to a point.
+#[inline(always)]
+pub(super) fn from_each<L: Lane>(x: &[V<L>; 4], p: V<L>) -> [V<L>; 4] {
+    [sub(p, x[0]), sub(p, x[1]), sub(p, x[2]), sub(p, x[3])]
+}
+
 #[inline(always)]
 pub(super) fn sub<L: Lane>(a: V<L>, b: V<L>) -> V<L> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
