@@ -62,6 +62,11 @@ pub trait Lane:
     /// # Safety
     /// `at + N <= from.len()`; every number read is below 2^31.
     unsafe fn whole(from: &[u32], at: usize) -> Self;
+    /// Writes whole numbers to `to[at..at + N]`, the inverse of [`Lane::whole`].
+    ///
+    /// # Safety
+    /// `at + N <= to.len()`; every number is whole, from 0 to below 2^31.
+    unsafe fn store_whole(self, to: &mut [u32], at: usize);
 
     /// `self * b + c`, rounded once.
     fn mul_add(self, b: Self, c: Self) -> Self;
@@ -254,6 +259,13 @@ mod tests {
                 let wanted = from[indices[at + lane] as usize];
                 assert_eq!(rows.map(|row| row.to_array()[lane]), wanted);
                 assert_eq!(whole.to_array()[lane], f64::from(indices[at + lane]));
+            }
+            let mut to = vec![u32::MAX; 24];
+            // SAFETY: eight places are left behind `at`; the numbers are below 40.
+            unsafe { whole.store_whole(&mut to, at) };
+            for (i, number) in to.into_iter().enumerate() {
+                let is_written = (at..at + L::N).contains(&i);
+                assert_eq!(number, if is_written { indices[i] } else { u32::MAX });
             }
             assert_eq!(L::bits(whole.equal(four)), 1);
             assert_eq!(L::bits(whole.equal(whole)), (1 << L::N) - 1);

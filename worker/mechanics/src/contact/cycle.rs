@@ -331,6 +331,8 @@ impl Contact {
             return 0.0;
         }
         let Work { approach: near, face, share, stacking, lane, .. } = work;
+        share.resize(n, 1.0);
+        stacking.resize(n, 1.0);
         face.clear();
         face.extend(near.index.iter().map(|&i| slots.face()[base + i as usize]));
         work.near_pairs.choose(slots, lane, base, &near.index);
@@ -364,22 +366,23 @@ impl Contact {
     #[inline(always)]
     fn take_near(&self, slots: &Slots, (i, set): (usize, usize), base: usize, work: &mut Work) {
         let firsts = &work.firsts;
-        let (mut near, alone) = (firsts.near[i], firsts.alone[i]);
-        let (outer, inner) = (firsts.outer[i], firsts.inner[i]);
-        let first = SET * slots.of_sets(&(set..set + 1)).start;
+        let (mut near, alone, one_sided) = (firsts.near[i], firsts.alone[i], firsts.one_sided[i]);
+        let (of_set, first) = (SET * i..SET * (i + 1), (SET * set) as u32);
+        if alone & one_sided == u8::MAX && self.shells.is_empty() {
+            work.approach.index.extend_from_slice(&firsts.index[of_set.clone()]);
+            work.approach.sign.extend_from_slice(&firsts.sign[of_set]);
+            work.lane.extend(first..first + SET as u32);
+            return;
+        }
         while near != 0 {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
-            let at = first + SET * work.firsts.slot[SET * i + lane] as usize + lane;
-            let shell = self.is_shell(slots.face()[at]);
-            let is_outer = outer >> lane & 1 == 1;
-            let one_sided = is_outer != (inner >> lane & 1 == 1);
-            if alone >> lane & 1 == 1 && (one_sided || shell) {
-                work.approach.index.push((at - base) as u32);
-                work.approach.sign.push(if is_outer || shell { 1.0 } else { -1.0 });
-                work.lane.push((SET * set + lane) as u32);
-                work.share.push(1.0);
-                work.stacking.push(1.0);
+            let index = work.firsts.index[of_set.start + lane];
+            let shell = self.is_shell(slots.face()[base + index as usize]);
+            if alone >> lane & 1 == 1 && (one_sided >> lane & 1 == 1 || shell) {
+                work.approach.index.push(index);
+                work.approach.sign.push(if shell { 1.0 } else { work.firsts.sign[of_set.start + lane] });
+                work.lane.push(first + lane as u32);
             } else {
                 self.reduce(slots, (set, lane), base, work);
             }
@@ -410,7 +413,10 @@ impl Contact {
         };
         joint::reduce(near, gap, frame, hits, beyond);
         let stacking = if hits.len() > 1 { joint::stacking(hits) } else { 1.0 };
-        let first_hit = work.approach.index.len() + beyond.len();
+        let n_before = work.approach.index.len();
+        work.share.resize(n_before, 1.0);
+        work.stacking.resize(n_before, 1.0);
+        let first_hit = n_before + beyond.len();
         let mut take = |at: u32, share: f64| {
             work.approach.index.push(at - base as u32);
             work.approach.sign.push(1.0);
@@ -447,7 +453,9 @@ impl Contact {
         let sums = force::lanes::push(self.width, statics, pairs, pushes, quanta, &mut work.terms);
         vote.hits += approach.depth.iter().map(|&depth| u64::from(depth > 0.0)).sum::<u64>();
         if sums.deepest > 0.0 && sums.deepest / self.settings.gap >= vote.worst_depth {
-            for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+            // A quotient is one of the greatest only if its depth is nearly.
+            let nearly = (1.0 - 1e-12) * sums.deepest;
+            for (i, &depth) in approach.depth[..n].iter().enumerate().filter(|(_, depth)| **depth >= nearly) {
                 let pair = (self.global[pairs.node()[i] as usize], self.ids[work.face[i] as usize]);
                 vote.deepest(depth / self.settings.gap, pair);
             }

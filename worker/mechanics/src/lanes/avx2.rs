@@ -125,6 +125,13 @@ impl Lane for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn store_whole(self, to: &mut [u32], at: usize) {
+        debug_assert!(at + 4 <= to.len(), "store whole {at} of {}", to.len());
+        // SAFETY: the caller keeps the lanes inside; the wrapper has AVX2.
+        unsafe { _mm_storeu_si128(to.as_mut_ptr().add(at).cast(), _mm256_cvttpd_epi32(self.0)) };
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         Self(avx2!(_mm256_fmadd_pd(self.0, b.0, c.0)))
     }

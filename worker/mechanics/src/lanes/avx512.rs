@@ -124,6 +124,13 @@ impl Lane for Avx512 {
     }
 
     #[inline(always)]
+    unsafe fn store_whole(self, to: &mut [u32], at: usize) {
+        debug_assert!(at + 8 <= to.len(), "store whole {at} of {}", to.len());
+        // SAFETY: the caller keeps the lanes inside; the wrapper has AVX-512.
+        unsafe { _mm256_storeu_si256(to.as_mut_ptr().add(at).cast(), _mm512_cvttpd_epi32(self.0)) };
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         Self(avx512!(_mm512_fmadd_pd(self.0, b.0, c.0)))
     }

@@ -84,6 +84,13 @@ impl Lane for Scalar {
     }
 
     #[inline(always)]
+    unsafe fn store_whole(self, to: &mut [u32], at: usize) {
+        debug_assert!(at < to.len(), "store whole {at} of {}", to.len());
+        // SAFETY: the caller keeps `at` inside.
+        unsafe { *to.get_unchecked_mut(at) = self.0 as u32 };
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         Self(self.0.mul_add(b.0, c.0))
     }

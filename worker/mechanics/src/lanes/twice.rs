@@ -82,6 +82,15 @@ impl<L: Lane> Lane for Twice<L> {
     }
 
     #[inline(always)]
+    unsafe fn store_whole(self, to: &mut [u32], at: usize) {
+        // SAFETY: the caller keeps the lanes of both inside.
+        unsafe {
+            self.0.store_whole(to, at);
+            self.1.store_whole(to, at + L::N);
+        }
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         Self(self.0.mul_add(b.0, c.0), self.1.mul_add(b.1, c.1))
     }

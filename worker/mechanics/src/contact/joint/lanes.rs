@@ -15,6 +15,9 @@ use crate::lanes::{avx2::Avx2, avx512::Avx512};
 /// more than [`is_on_feature`](super::is_on_feature) squared.
 const TOUCHING: f64 = 1e-17;
 
+/// The number of each lane in its set.
+const LANES: [u32; SET] = [0, 1, 2, 3, 4, 5, 6, 7];
+
 /// What is found of the nodes of some sets: by set, a bit for each lane.
 #[derive(Clone, Debug, Default)]
 pub(in crate::contact) struct Firsts {
@@ -22,22 +25,23 @@ pub(in crate::contact) struct Firsts {
     pub(in crate::contact) near: Vec<u8>,
     /// Those of which the nearest drops all others, and that do not touch it.
     pub(in crate::contact) alone: Vec<u8>,
-    /// On the outer side of a normal that meets at the closest point.
-    pub(in crate::contact) outer: Vec<u8>,
-    /// On the inner side of one.
-    pub(in crate::contact) inner: Vec<u8>,
-    /// By lane: the slot of the nearest face, counted from the first of the set; of equals the first.
-    pub(in crate::contact) slot: Vec<f64>,
+    /// On the outer side of a normal that meets at the closest point or on the inner side of one, not both.
+    pub(in crate::contact) one_sided: Vec<u8>,
+    /// By lane: which of the closest points is that of the nearest face; of equals the first.
+    pub(in crate::contact) index: Vec<u32>,
+    /// By lane: 1 on the outer side of a normal, else -1.
+    pub(in crate::contact) sign: Vec<f64>,
 }
 
 impl Firsts {
     fn resize(&mut self, n_sets: usize) {
-        let bits = [&mut self.near, &mut self.alone, &mut self.outer, &mut self.inner];
+        let bits = [&mut self.near, &mut self.alone, &mut self.one_sided];
         for list in bits {
             list.clear();
             list.resize(n_sets, 0);
         }
-        self.slot.resize(SET * n_sets, 0.0);
+        self.index.resize(SET * n_sets, 0);
+        self.sign.resize(SET * n_sets, 0.0);
     }
 }
 
@@ -160,10 +164,15 @@ unsafe fn kernel<L: Lane>(
             let at = set - first_set;
             found.near[at] |= (near << lane) as u8;
             found.alone[at] |= ((near & !kept & !touching) << lane) as u8;
-            found.outer[at] |= (L::bits(zero.less(highest)) << lane) as u8;
-            found.inner[at] |= (L::bits(lowest.less(zero)) << lane) as u8;
+            let outer = zero.less(highest);
+            found.one_sided[at] |= ((L::bits(outer) ^ L::bits(lowest.less(zero))) << lane) as u8;
+            let first = L::splat((SET * (of_set.start - base)) as f64);
             // SAFETY: as above.
-            unsafe { nearest.store(&mut found.slot, SET * (set - first_set) + lane) };
+            unsafe {
+                let index = L::splat(SET as f64).mul_add(nearest, first + L::whole(&LANES, lane));
+                index.store_whole(&mut found.index, SET * at + lane);
+                L::select(outer, L::splat(1.0), L::splat(-1.0)).store(&mut found.sign, SET * at + lane);
+            }
             lane += L::N;
         }
     }
