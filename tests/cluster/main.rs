@@ -16,7 +16,7 @@ use tests::cluster::{repository, said};
 /// The binary of this build.
 const BOLIDE: &str = env!("CARGO_BIN_EXE_bolide");
 
-/// Path of the small deck: 3,456 elements. To its end it runs for five seconds on two cores.
+/// Path of the small deck: 3,456 elements. To its end it runs for five seconds or more.
 fn small() -> String {
     repository("tests/decks/plates-small.toml").display().to_string()
 }

@@ -331,6 +331,7 @@ impl Contact {
             return 0.0;
         }
         let Work { approach: near, face, share, stacking, lane, .. } = work;
+        // Whoever did not go the long way has the whole push.
         share.resize(n, 1.0);
         stacking.resize(n, 1.0);
         face.clear();
