@@ -11,27 +11,19 @@ use std::{mem::take, ops::Range};
 
 use serde::{Deserialize, Serialize};
 
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512, twice::Twice};
 use crate::{
     element::{
         ElementVote, Step,
-        hex8::{self, BySlot, Laws, View},
+        hex8::{BySlot, View, pass},
         layout::{Corners, Layout, explicit, in_runs, structured},
         place::Nodal,
         shell4::{Core, ShellStep},
     },
-    eos::{EquationOfState, IdealGas, Jwl, Linear, Polynomial, Shock},
     erosion::PieceErosion,
-    failure::{
-        Failing, FailureLaw, Unfailing, hydrostatic::Hydrostatic, johnson_cook::JohnsonCookDamage,
-        plastic_strain::PlasticStrain, principal_stress::PrincipalStress,
-    },
-    lanes::{SET, Width, scalar::Scalar},
-    material::{Eos, Failure, Material, Strength},
+    lanes::{SET, Width},
+    material::Material,
     mesh::{Topology, quad_area, twice},
     state::{N_FIELDS, ShellState, field::ENERGY, sparse, write_changed},
-    strength::{Elastic, Hydro, JohnsonCook, RateFactor, StrengthLaw, Tabulated, VonMises},
 };
 
 /// Stands for the global element index in a slot without an element.
@@ -421,116 +413,10 @@ impl Block {
             core.compute(&self.x, &self.v, &mut self.f, sets, &step, width, vote);
             return;
         }
-        match material.eos {
-            Eos::Linear { bulk } => {
-                self.compute_with(Linear { bulk }, material, sets, step, width, vote);
-            }
-            Eos::Shock { c0, s, gamma } => {
-                let eos = Shock { bulk: material.density * c0 * c0, s, gamma };
-                self.compute_with(eos, material, sets, step, width, vote);
-            }
-            Eos::Polynomial { a1, a2, a3, b0, b1, t1, t2 } => {
-                let eos = Polynomial { a: [a1, a2, a3], b: [b0, b1], t: [t1, t2] };
-                self.compute_with(eos, material, sets, step, width, vote);
-            }
-            // Gases have no strength, so nothing in them fails.
-            Eos::IdealGas { gamma, .. } => {
-                let (density, eos) = (material.density, IdealGas { gamma });
-                let laws = Laws { density, eos, strength: Hydro, failure: Unfailing };
-                self.run(laws, sets, step, width, vote);
-            }
-            Eos::Jwl { a, b, r1, r2, omega, energy: _, detonation, cj_pressure } => {
-                let density = material.density;
-                let unburnt_stiffness = density * detonation * detonation;
-                let eos = Jwl {
-                    amplitude: [a, b],
-                    decay: [r1, r2],
-                    omega,
-                    detonation,
-                    unburnt_stiffness,
-                    inverse_compression: unburnt_stiffness / cj_pressure,
-                };
-                let laws = Laws { density, eos, strength: Hydro, failure: Unfailing };
-                self.run(laws, sets, step, width, vote);
-            }
-        }
-    }
-
-    fn compute_with<E: EquationOfState>(
-        &mut self,
-        eos: E,
-        material: &Material,
-        sets: &[Range<u32>],
-        step: &Step,
-        width: Width,
-        vote: &mut ElementVote,
-    ) {
-        match failing(material) {
-            None => self.compute_failing(eos, Unfailing, material, sets, step, width, vote),
-            Some(failure) => self.compute_failing(eos, failure, material, sets, step, width, vote),
-        }
-    }
-
-    #[allow(clippy::too_many_arguments, reason = "one level of the dispatch, called twice just above")]
-    fn compute_failing<E: EquationOfState, F: FailureLaw>(
-        &mut self,
-        eos: E,
-        failure: F,
-        material: &Material,
-        sets: &[Range<u32>],
-        step: &Step,
-        width: Width,
-        vote: &mut ElementVote,
-    ) {
-        let density = material.density;
-        match material.strength {
-            Strength::Hydro => {
-                self.run(Laws { density, eos, strength: Hydro, failure }, sets, step, width, vote);
-            }
-            Strength::Elastic { shear } => {
-                let strength = Elastic { shear };
-                self.run(Laws { density, eos, strength, failure }, sets, step, width, vote);
-            }
-            Strength::VonMises { shear, yield_stress, hardening, rate } => {
-                let strength = VonMises { shear, yield_stress, hardening, rate: RateFactor::of(rate) };
-                self.run(Laws { density, eos, strength, failure }, sets, step, width, vote);
-            }
-            Strength::Tabulated { shear, hardening, rate } => {
-                let strength = Tabulated::new(shear, &hardening, RateFactor::of(rate));
-                self.run(Laws { density, eos, strength, failure }, sets, step, width, vote);
-            }
-            Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => {
-                let strength = JohnsonCook {
-                    shear,
-                    a,
-                    b,
-                    n,
-                    c,
-                    m,
-                    t_room,
-                    inverse_range: 1.0 / (t_melt - t_room),
-                    heating: 1.0 / (density * specific_heat),
-                    inverse_rate0: 1.0 / rate0,
-                };
-                self.run(Laws { density, eos, strength, failure }, sets, step, width, vote);
-            }
-        }
-    }
-
-    fn run<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
-        &mut self,
-        laws: Laws<E, S, F>,
-        sets: &[Range<u32>],
-        step: &Step,
-        width: Width,
-        vote: &mut ElementVote,
-    ) {
-        let n_sets = self.n_sets();
-        assert!(sets.iter().all(|r| r.end <= n_sets), "sets {sets:?} of a block of {n_sets}");
-        assert!(width.available(), "lane width {width} is not on this machine");
         let [fx, fy, fz] = &mut self.f;
-        let mut view = View {
+        let view = View {
             layout: &self.layout,
+            reach: self.reach,
             nodes: Nodal {
                 x: std::array::from_fn(|axis| self.x[axis].as_slice()),
                 v: std::array::from_fn(|axis| self.v[axis].as_slice()),
@@ -544,114 +430,12 @@ impl Block {
                 lowest: &self.lowest,
             },
         };
-        let n_padded = view.nodes.x.iter().chain(&view.nodes.v).map(|a| a.len()).min().unwrap_or(0);
-        let n_forces = view.nodes.f.iter().map(|a| a.len()).min().unwrap_or(0);
-        let needed = self.reach;
-        assert!(n_padded >= needed && n_forces >= needed, "node arrays shrunk below {needed}");
-        // SAFETY: the machine has the width; sets and node arrays were checked just now, and the slots of a
-        // block are inside its state arrays since it was built.
-        unsafe {
-            match width {
-                Width::Scalar => on_scalar(&mut view, &laws, step, sets, vote),
-                #[cfg(target_arch = "x86_64")]
-                Width::Avx2 => on_avx2(&mut view, &laws, step, sets, vote),
-                #[cfg(target_arch = "x86_64")]
-                Width::Avx512 => on_avx512(&mut view, &laws, step, sets, vote),
-                #[cfg(not(target_arch = "x86_64"))]
-                Width::Avx2 | Width::Avx512 => on_scalar(&mut view, &laws, step, sets, vote),
-            }
-        }
+        // SAFETY: corners and slots of a block are inside its arrays since it was built.
+        unsafe { pass::run(view, material, step, sets, width, vote) };
     }
 }
 
 /// The first `n` of arrays by axis, by node.
 fn by_node(n: usize, arrays: &[Vec<f64>; 3]) -> Vec<[f64; 3]> {
     (0..n).map(|node| std::array::from_fn(|axis| arrays[axis][node])).collect()
-}
-
-/// The failure law of a material made ready, if it has one.
-fn failing(material: &Material) -> Option<Failing> {
-    Some(match material.failure {
-        Failure::None => return None,
-        Failure::PlasticStrain { limit } => {
-            Failing::PlasticStrain(PlasticStrain { inverse_limit: 1.0 / limit })
-        }
-        Failure::PrincipalStress { tension } => Failing::PrincipalStress(PrincipalStress { tension }),
-        Failure::Hydrostatic { tension, heals } => Failing::Hydrostatic(Hydrostatic { tension, heals }),
-        Failure::JohnsonCook { d } => {
-            // Zeros make the factors of rate and temperature 1.
-            let (inverse_rate0, t_room, inverse_range) = match material.strength {
-                Strength::JohnsonCook { rate0, t_room, t_melt, .. } => {
-                    (1.0 / rate0, t_room, 1.0 / (t_melt - t_room))
-                }
-                _ => (0.0, 0.0, 0.0),
-            };
-            Failing::JohnsonCook(JohnsonCookDamage { d, inverse_rate0, t_room, inverse_range })
-        }
-    })
-}
-
-/// # Safety
-/// As [`hex8::compute`].
-unsafe fn on_scalar<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
-    view: &mut View<'_>,
-    laws: &Laws<E, S, F>,
-    step: &Step,
-    sets: &[Range<u32>],
-    vote: &mut ElementVote,
-) {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("fma") {
-        // SAFETY: the machine has FMA; the rest is the caller's promise.
-        unsafe { on_scalar_fma(view, laws, step, sets, vote) };
-        return;
-    }
-    // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Scalar, E, S, F>(view, laws, step, sets, vote) };
-}
-
-/// # Safety
-/// As [`hex8::compute`], on a machine with FMA. Without the feature a fused product is a call into the library,
-/// with the same bits.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "fma")]
-unsafe fn on_scalar_fma<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
-    view: &mut View<'_>,
-    laws: &Laws<E, S, F>,
-    step: &Step,
-    sets: &[Range<u32>],
-    vote: &mut ElementVote,
-) {
-    // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Scalar, E, S, F>(view, laws, step, sets, vote) };
-}
-
-/// # Safety
-/// As [`hex8::compute`], on a machine with [`Width::Avx2`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
-    view: &mut View<'_>,
-    laws: &Laws<E, S, F>,
-    step: &Step,
-    sets: &[Range<u32>],
-    vote: &mut ElementVote,
-) {
-    // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Twice<Avx2>, E, S, F>(view, laws, step, sets, vote) };
-}
-
-/// # Safety
-/// As [`hex8::compute`], on a machine with [`Width::Avx512`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
-    view: &mut View<'_>,
-    laws: &Laws<E, S, F>,
-    step: &Step,
-    sets: &[Range<u32>],
-    vote: &mut ElementVote,
-) {
-    // SAFETY: the caller's promise.
-    unsafe { hex8::compute::<Avx512, E, S, F>(view, laws, step, sets, vote) };
 }

@@ -5,7 +5,10 @@
 //! isentropic stiffness of all of them. A law that burns is given the fraction that has burnt; the others leave it
 //! unread. A new law is a file like its neighbours here: constants, [`EquationOfState`], tests of points and slopes.
 
-use crate::lanes::Lane;
+use crate::{
+    lanes::Lane,
+    material::{Eos, Material},
+};
 
 pub(crate) mod ideal_gas;
 pub(crate) mod jwl;
@@ -17,8 +20,14 @@ pub(crate) use {ideal_gas::IdealGas, jwl::Jwl, linear::Linear, polynomial::Polyn
 
 /// A law of pressure.
 pub(crate) trait EquationOfState: Copy {
+    /// Whether which law it is shows only at run time.
+    const IS_CHOSEN: bool = false;
+
     /// Whether the law burns, hence reads the time until it is lit.
-    const BURNS: bool = false;
+    #[inline(always)]
+    fn burns(&self) -> bool {
+        false
+    }
 
     /// The line and its slope at relative volumes `v > 0`, with the burnt fraction `burnt`.
     fn line<L: Lane>(&self, v: L, burnt: L) -> Line<L>;
@@ -31,6 +40,80 @@ pub(crate) trait EquationOfState: Copy {
     #[inline(always)]
     fn burn<L: Lane>(&self, time_to_light: L, _v: L, _initial_volume: L) -> (L, L) {
         (time_to_light, L::splat(1.0))
+    }
+}
+
+/// Any of the laws, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
+#[derive(Clone, Copy)]
+pub(crate) enum AnyEos {
+    Linear(Linear),
+    Shock(Shock),
+    Polynomial(Polynomial),
+    IdealGas(IdealGas),
+    Jwl(Jwl),
+}
+
+impl AnyEos {
+    /// That of a material, made ready.
+    pub fn of(material: &Material) -> Self {
+        match material.eos {
+            Eos::Linear { bulk } => Self::Linear(Linear { bulk }),
+            Eos::Shock { c0, s, gamma } => Self::Shock(Shock { bulk: material.density * c0 * c0, s, gamma }),
+            Eos::Polynomial { a1, a2, a3, b0, b1, t1, t2 } => {
+                Self::Polynomial(Polynomial { a: [a1, a2, a3], b: [b0, b1], t: [t1, t2] })
+            }
+            Eos::IdealGas { gamma, .. } => Self::IdealGas(IdealGas { gamma }),
+            Eos::Jwl { a, b, r1, r2, omega, energy: _, detonation, cj_pressure } => {
+                let unburnt_stiffness = material.density * detonation * detonation;
+                Self::Jwl(Jwl {
+                    amplitude: [a, b],
+                    decay: [r1, r2],
+                    omega,
+                    detonation,
+                    unburnt_stiffness,
+                    inverse_compression: unburnt_stiffness / cj_pressure,
+                })
+            }
+        }
+    }
+}
+
+impl EquationOfState for AnyEos {
+    const IS_CHOSEN: bool = true;
+
+    #[inline(always)]
+    fn burns(&self) -> bool {
+        matches!(self, Self::Jwl(_))
+    }
+
+    #[inline(always)]
+    fn line<L: Lane>(&self, v: L, burnt: L) -> Line<L> {
+        match self {
+            Self::Linear(law) => law.line(v, burnt),
+            Self::Shock(law) => law.line(v, burnt),
+            Self::Polynomial(law) => law.line(v, burnt),
+            Self::IdealGas(law) => law.line(v, burnt),
+            Self::Jwl(law) => law.line(v, burnt),
+        }
+    }
+
+    #[inline(always)]
+    fn least_stiffness<L: Lane>(&self, burnt: L) -> L {
+        match self {
+            Self::Linear(law) => law.least_stiffness(burnt),
+            Self::Shock(law) => law.least_stiffness(burnt),
+            Self::Polynomial(law) => law.least_stiffness(burnt),
+            Self::IdealGas(law) => law.least_stiffness(burnt),
+            Self::Jwl(law) => law.least_stiffness(burnt),
+        }
+    }
+
+    #[inline(always)]
+    fn burn<L: Lane>(&self, time_to_light: L, v: L, initial_volume: L) -> (L, L) {
+        match self {
+            Self::Jwl(law) => law.burn(time_to_light, v, initial_volume),
+            _ => (time_to_light, L::splat(1.0)),
+        }
     }
 }
 

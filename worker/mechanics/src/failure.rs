@@ -7,6 +7,7 @@
 
 use crate::{
     lanes::Lane,
+    material::{Failure, Material, Strength},
     strength::{Deviator, Strain},
 };
 
@@ -33,12 +34,16 @@ pub(crate) struct Loading<L> {
 /// A failure law.
 pub(crate) trait FailureLaw: Copy {
     /// Whether there is damage at all.
-    const FAILS: bool;
+    #[inline(always)]
+    fn fails(&self) -> bool {
+        true
+    }
 
     /// Damage after, from `damage` before; lanes that hold nothing may give anything.
     fn damage<L: Lane>(&self, damage: L, loading: &Loading<L>) -> L;
 
     /// The least pressure that an element which has not failed can have (stress).
+    #[inline(always)]
     fn least_pressure(&self) -> f64 {
         -f64::MAX
     }
@@ -49,7 +54,10 @@ pub(crate) trait FailureLaw: Copy {
 pub(crate) struct Unfailing;
 
 impl FailureLaw for Unfailing {
-    const FAILS: bool = false;
+    #[inline(always)]
+    fn fails(&self) -> bool {
+        false
+    }
 
     #[inline(always)]
     fn damage<L: Lane>(&self, damage: L, _loading: &Loading<L>) -> L {
@@ -57,33 +65,66 @@ impl FailureLaw for Unfailing {
     }
 }
 
-/// Any of the laws that fail. They are chosen once for each lane set, not for each block, so that the kernels of all
-/// other laws are compiled twice and not five times: the choice is one branch, the same for the whole block.
+/// Any of the laws, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
 #[derive(Clone, Copy)]
-pub(crate) enum Failing {
+pub(crate) enum AnyFailure {
+    Unfailing(Unfailing),
     PlasticStrain(plastic_strain::PlasticStrain),
     PrincipalStress(principal_stress::PrincipalStress),
     Hydrostatic(hydrostatic::Hydrostatic),
     JohnsonCook(johnson_cook::JohnsonCookDamage),
 }
 
-impl FailureLaw for Failing {
-    const FAILS: bool = true;
+impl AnyFailure {
+    /// That of a material, made ready. Gases have no strength, so nothing in them fails.
+    pub fn of(material: &Material) -> Self {
+        match material.failure {
+            _ if material.is_gas() => Self::Unfailing(Unfailing),
+            Failure::None => Self::Unfailing(Unfailing),
+            Failure::PlasticStrain { limit } => {
+                Self::PlasticStrain(plastic_strain::PlasticStrain { inverse_limit: 1.0 / limit })
+            }
+            Failure::PrincipalStress { tension } => {
+                Self::PrincipalStress(principal_stress::PrincipalStress { tension })
+            }
+            Failure::Hydrostatic { tension, heals } => {
+                Self::Hydrostatic(hydrostatic::Hydrostatic { tension, heals })
+            }
+            Failure::JohnsonCook { d } => {
+                // Zeros make the factors of rate and temperature 1.
+                let (inverse_rate0, t_room, inverse_range) = match material.strength {
+                    Strength::JohnsonCook { rate0, t_room, t_melt, .. } => {
+                        (1.0 / rate0, t_room, 1.0 / (t_melt - t_room))
+                    }
+                    _ => (0.0, 0.0, 0.0),
+                };
+                Self::JohnsonCook(johnson_cook::JohnsonCookDamage { d, inverse_rate0, t_room, inverse_range })
+            }
+        }
+    }
+}
+
+impl FailureLaw for AnyFailure {
+    #[inline(always)]
+    fn fails(&self) -> bool {
+        !matches!(self, Self::Unfailing(_))
+    }
 
     #[inline(always)]
     fn damage<L: Lane>(&self, damage: L, loading: &Loading<L>) -> L {
         match self {
-            Failing::PlasticStrain(law) => law.damage(damage, loading),
-            Failing::PrincipalStress(law) => law.damage(damage, loading),
-            Failing::Hydrostatic(law) => law.damage(damage, loading),
-            Failing::JohnsonCook(law) => law.damage(damage, loading),
+            Self::Unfailing(law) => law.damage(damage, loading),
+            Self::PlasticStrain(law) => law.damage(damage, loading),
+            Self::PrincipalStress(law) => law.damage(damage, loading),
+            Self::Hydrostatic(law) => law.damage(damage, loading),
+            Self::JohnsonCook(law) => law.damage(damage, loading),
         }
     }
 
     #[inline(always)]
     fn least_pressure(&self) -> f64 {
         match self {
-            Failing::Hydrostatic(law) => law.least_pressure(),
+            Self::Hydrostatic(law) => law.least_pressure(),
             _ => -f64::MAX,
         }
     }

@@ -1,7 +1,7 @@
 //! Lanes: one f64 calculation done on 1, 4 or 8 elements at a time, with one result on every width.
 //!
 //! [`Lane`] is the vocabulary of the kernels. A kernel is a generic `#[inline(always)]` function over `L: Lane`,
-//! called from a thin `#[target_feature]` wrapper that [`Width`] chose at run time; only inside such a wrapper do
+//! called from one of the `#[target_feature]` functions of [`dispatch`], which [`Width::run`] chooses; only inside them do
 //! its operations become single instructions. Two rules keep the bits: lanes never mix, and a product that is
 //! added to something is written as [`Lane::mul_add`] on every width (no compiler fuses by itself).
 //! Closures do not inherit target features, so kernels have none.
@@ -16,6 +16,7 @@ use std::{
 pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx512;
+pub(crate) mod dispatch;
 pub mod functions;
 pub mod scalar;
 #[cfg(target_arch = "x86_64")]

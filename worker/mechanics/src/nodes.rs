@@ -5,13 +5,11 @@
 //! same bits. Only the owner's copy is booked. Nodes go in sets of eight on lanes; those that something holds are
 //! corrected one by one, and a set without any pays nothing for it.
 
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     contact::Extent,
     element::vector::Vector,
     exact::rounded,
-    lanes::{Lane, SET, Width, scalar::Scalar},
+    lanes::{Lane, SET, Width, dispatch::Task},
     load::Loads,
     setup::Constraint,
     vote::Quanta,
@@ -157,6 +155,22 @@ struct Body {
     loss: f64,
 }
 
+/// The integration of nodes whose arrays have been checked.
+struct Integration<'a, 'n> {
+    advance: &'a Advance<'a>,
+    nodes: &'a mut Nodes<'n>,
+}
+
+impl Task for Integration<'_, '_> {
+    type Output = Booked;
+
+    #[inline(always)]
+    fn run<L: Lane>(self) -> Booked {
+        // SAFETY: [`Advance::run`], which alone makes it, has found that the arrays hold all sets.
+        unsafe { self.advance.all_sets::<L>(self.nodes) }
+    }
+}
+
 impl Advance<'_> {
     /// Gravity and relaxation in this step, if there are any.
     fn body(&self) -> Option<Body> {
@@ -209,19 +223,7 @@ impl Advance<'_> {
         assert!(shortest >= n, "node arrays of {shortest}, {n} in sets");
         let n_referred = nodes.sets.iter().filter(|set| set.surface != 0).count() * SET;
         assert!(nodes.reference.iter().all(|r| r.len() >= n_referred), "reference of {n_referred} nodes");
-        assert!(width.available(), "lane width {width} is not on this machine");
-        // SAFETY: the machine has the width, and the arrays hold all sets.
-        unsafe {
-            match width {
-                Width::Scalar => on_scalar(self, nodes),
-                #[cfg(target_arch = "x86_64")]
-                Width::Avx2 => on_avx2(self, nodes),
-                #[cfg(target_arch = "x86_64")]
-                Width::Avx512 => on_avx512(self, nodes),
-                #[cfg(not(target_arch = "x86_64"))]
-                Width::Avx2 | Width::Avx512 => on_scalar(self, nodes),
-            }
-        }
+        width.run(Integration { advance: self, nodes })
     }
 
     /// # Safety
@@ -419,45 +421,6 @@ unsafe fn store<L: Lane>(values: &Vector<L>, to: &mut [Vec<f64>; 3], at: usize) 
         values.y.store(y, at);
         values.z.store(z, at);
     }
-}
-
-/// # Safety
-/// As [`Advance::all_sets`].
-unsafe fn on_scalar(advance: &Advance<'_>, nodes: &mut Nodes<'_>) -> Booked {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("fma") {
-        // SAFETY: the machine has FMA; the rest is the caller's promise.
-        return unsafe { on_scalar_fma(advance, nodes) };
-    }
-    // SAFETY: the caller's promise.
-    unsafe { advance.all_sets::<Scalar>(nodes) }
-}
-
-/// # Safety
-/// As [`Advance::all_sets`], on a machine with FMA.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "fma")]
-unsafe fn on_scalar_fma(advance: &Advance<'_>, nodes: &mut Nodes<'_>) -> Booked {
-    // SAFETY: the caller's promise.
-    unsafe { advance.all_sets::<Scalar>(nodes) }
-}
-
-/// # Safety
-/// As [`Advance::all_sets`], on a machine with [`Width::Avx2`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2(advance: &Advance<'_>, nodes: &mut Nodes<'_>) -> Booked {
-    // SAFETY: the caller's promise.
-    unsafe { advance.all_sets::<Avx2>(nodes) }
-}
-
-/// # Safety
-/// As [`Advance::all_sets`], on a machine with [`Width::Avx512`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512(advance: &Advance<'_>, nodes: &mut Nodes<'_>) -> Booked {
-    // SAFETY: the caller's promise.
-    unsafe { advance.all_sets::<Avx512>(nodes) }
 }
 
 #[cfg(test)]

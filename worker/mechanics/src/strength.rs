@@ -5,7 +5,10 @@
 //! [`StrengthLaw`], tests. Lanes whose trial lies inside the surface come back
 //! unchanged to the bit, so that leaving out the plastic branch for a set without yielding lanes changes nothing.
 
-use crate::lanes::Lane;
+use crate::{
+    lanes::Lane,
+    material::{Material, Strength},
+};
 
 pub(crate) mod cowper_symonds;
 pub(crate) mod elastic;
@@ -117,11 +120,22 @@ pub(crate) struct Strain<L> {
 /// A strength law.
 pub(crate) trait StrengthLaw: Copy {
     /// Whether there is a deviatoric stress at all.
-    const DEVIATORIC: bool;
+    #[inline(always)]
+    fn deviatoric(&self) -> bool {
+        true
+    }
+
     /// Whether the plastic strain changes.
-    const PLASTIC: bool;
+    #[inline(always)]
+    fn plastic(&self) -> bool {
+        true
+    }
+
     /// Whether the temperature matters and changes.
-    const THERMAL: bool;
+    #[inline(always)]
+    fn thermal(&self) -> bool {
+        false
+    }
 
     /// Shear modulus G (stress).
     fn shear(&self) -> f64;
@@ -135,4 +149,90 @@ pub(crate) trait StrengthLaw: Copy {
         history: &mut History<L>,
         active: L::Mask,
     ) -> Deviator<L>;
+}
+
+/// Any of the laws, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
+#[derive(Clone, Copy)]
+pub(crate) enum AnyStrength {
+    Hydro(Hydro),
+    Elastic(Elastic),
+    VonMises(VonMises),
+    Tabulated(Tabulated),
+    JohnsonCook(JohnsonCook),
+}
+
+impl AnyStrength {
+    /// That of a material, made ready. Gases have none.
+    pub fn of(material: &Material) -> Self {
+        match material.strength {
+            _ if material.is_gas() => Self::Hydro(Hydro),
+            Strength::Hydro => Self::Hydro(Hydro),
+            Strength::Elastic { shear } => Self::Elastic(Elastic { shear }),
+            Strength::VonMises { shear, yield_stress, hardening, rate } => {
+                Self::VonMises(VonMises { shear, yield_stress, hardening, rate: RateFactor::of(rate) })
+            }
+            Strength::Tabulated { shear, hardening, rate } => {
+                Self::Tabulated(Tabulated::new(shear, &hardening, RateFactor::of(rate)))
+            }
+            Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => {
+                Self::JohnsonCook(JohnsonCook {
+                    shear,
+                    a,
+                    b,
+                    n,
+                    c,
+                    m,
+                    t_room,
+                    inverse_range: 1.0 / (t_melt - t_room),
+                    heating: 1.0 / (material.density * specific_heat),
+                    inverse_rate0: 1.0 / rate0,
+                })
+            }
+        }
+    }
+}
+
+impl StrengthLaw for AnyStrength {
+    #[inline(always)]
+    fn deviatoric(&self) -> bool {
+        !matches!(self, Self::Hydro(_))
+    }
+
+    #[inline(always)]
+    fn plastic(&self) -> bool {
+        !matches!(self, Self::Hydro(_) | Self::Elastic(_))
+    }
+
+    #[inline(always)]
+    fn thermal(&self) -> bool {
+        matches!(self, Self::JohnsonCook(_))
+    }
+
+    #[inline(always)]
+    fn shear(&self) -> f64 {
+        match self {
+            Self::Hydro(law) => law.shear(),
+            Self::Elastic(law) => law.shear(),
+            Self::VonMises(law) => law.shear(),
+            Self::Tabulated(law) => law.shear(),
+            Self::JohnsonCook(law) => law.shear(),
+        }
+    }
+
+    #[inline(always)]
+    fn update<L: Lane>(
+        &self,
+        trial: Deviator<L>,
+        strain: Strain<L>,
+        history: &mut History<L>,
+        active: L::Mask,
+    ) -> Deviator<L> {
+        match self {
+            Self::Hydro(law) => law.update(trial, strain, history, active),
+            Self::Elastic(law) => law.update(trial, strain, history, active),
+            Self::VonMises(law) => law.update(trial, strain, history, active),
+            Self::Tabulated(law) => law.update(trial, strain, history, active),
+            Self::JohnsonCook(law) => law.update(trial, strain, history, active),
+        }
+    }
 }

@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+pub(crate) mod pass;
+
 use super::{
     ElementVote, Fault, Step,
     hourglass::{Hourglass, amplitude},
@@ -12,7 +14,7 @@ use super::{
     modes::{Gradient, Modes, corner_values, modes_of},
     place::{Bases, Nodal, PACKED, Packed, Place, Rows},
     rotation::rotated,
-    vector::Vector,
+    vector::{Tensor, Vector},
     viscosity::{Spread, frequency},
 };
 use crate::{
@@ -48,6 +50,8 @@ fn scalar_modes(corners: &[[f64; 3]; 8]) -> Modes<Scalar> {
 /// The arrays of a block as a kernel sees them. State arrays are by slot, node arrays by local node and padded.
 pub(crate) struct View<'a> {
     pub layout: &'a Layout,
+    /// Entries of a node array that the kernel may touch.
+    pub reach: usize,
     pub nodes: Nodal<'a>,
     pub slots: BySlot<'a>,
 }
@@ -141,14 +145,14 @@ impl<L: Lane> Tally<L> {
 /// Sets are below the number of sets of the block, and every corner of every slot, phantoms included, is
 /// inside the node arrays with [`SET`] lanes behind it in a structured layout.
 #[inline(always)]
-pub(crate) unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     view: &mut View<'_>,
     laws: &Laws<E, S, F>,
     step: &Step,
     sets: &[Range<u32>],
     vote: &mut ElementVote,
 ) {
-    let View { layout, nodes, slots } = view;
+    let View { layout, nodes, slots, .. } = view;
     let mut tally = Tally::<L>::new(vote);
     // A loop for each layout: what one needs in memory the other keeps in registers.
     // SAFETY: the caller's promise; what is packed holds whole sets.
@@ -264,78 +268,30 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     };
     let volume_rate = gradient.x.x + gradient.y.y + gradient.z.z;
 
-    // 2. Deviatoric stress: rotation, elastic increment, yield; its power.
-    let damage: L = if F::FAILS { view.state(slot, field::DAMAGE) } else { zero };
-    let failed = one.less_equal(damage);
-    let mut history = History { plastic_strain: zero, temperature: zero };
-    let mut strain = Strain { rate: zero, increment: zero };
-    let mut plastic_before = zero;
-    let mut stress = Deviator::zero();
-    let mut deviatoric_power = zero;
-    if S::DEVIATORIC {
-        let third = volume_rate * L::splat(1.0 / 3.0);
-        let rate = Deviator {
-            xx: gradient.x.x - third,
-            yy: gradient.y.y - third,
-            zz: gradient.z.z - third,
-            xy: half * (gradient.x.y + gradient.y.x),
-            yz: half * (gradient.y.z + gradient.z.y),
-            zx: half * (gradient.z.x + gradient.x.z),
-        };
-        let half_dt = L::splat(0.5 * step.dt);
-        let spin = Vector {
-            x: half_dt * (gradient.z.y - gradient.y.z),
-            y: half_dt * (gradient.x.z - gradient.z.x),
-            z: half_dt * (gradient.y.x - gradient.x.y),
-        };
-        let (xx, yy): (L, L) = (view.state(slot, field::SXX), view.state(slot, field::SYY));
-        let before = Deviator {
-            xx,
-            yy,
-            zz: -(xx + yy),
-            xy: view.state(slot, field::SXY),
-            yz: view.state(slot, field::SYZ),
-            zx: view.state(slot, field::SZX),
-        };
-        // Half of the increment turns with the stress, half does not: second order in the spin.
-        let half_increment = L::splat(laws.strength.shear() * step.dt);
-        let turned = rotated(&rate.mul_add(half_increment, &before), &spin);
-        let mut trial = rate.mul_add(half_increment, &turned);
-        if F::FAILS {
-            trial = trial.scaled(L::select(failed, zero, one));
-        }
-        if S::PLASTIC {
-            history.plastic_strain = view.state(slot, field::PLASTIC_STRAIN);
-            plastic_before = history.plastic_strain;
-        }
-        if S::THERMAL {
-            history.temperature = view.state(slot, field::TEMPERATURE);
-        }
-        let rate_square = rate.contract(&rate);
-        let effective = (L::splat(2.0 / 3.0) * rate_square).sqrt();
-        strain = Strain { rate: effective, increment: effective * dt };
-        stress = laws.strength.update(trial, strain, &mut history, alive);
-        // The stress before, turned, is `turned` less its half of the increment.
-        let sum = turned.plus(&stress);
-        deviatoric_power = half * half_increment.neg_mul_add(rate_square, sum.contract(&rate));
+    // 2. Deviatoric stress, and 3. the geometry at the end of the step. With laws that are known the stress comes first: the
+    //    geometry then fills its long chain of roots and quotients. Laws that are chosen here stand between branches, which nothing
+    //    fills, and what they leave in registers is less than what the geometry needs.
+    let (stressed, end);
+    if E::IS_CHOSEN {
+        end = End::of(&x, initial_volume);
+        stressed = Stressed::of(&gradient, view, slot, laws, step.dt, alive);
+    } else {
+        stressed = Stressed::of(&gradient, view, slot, laws, step.dt, alive);
+        end = End::of(&x, initial_volume);
     }
-
-    // 3. Geometry at the end of the step. It follows the stress, whose long chain of roots and quotients it fills. The
-    //    relative volume is exactly 1 as long as nothing moves.
-    let at_end = Gradient::of(&x);
-    let spread = Spread::of([&at_end.a, &at_end.b, &at_end.c, &at_end.d, &at_end.e, &at_end.f]);
-    let area_square = L::splat(2.0 / 3.0 / 512.0) * spread.trace();
-    let area = area_square.sqrt();
-    // One division inverts volume, initial volume and area: it is much slower than products.
-    let starting = initial_volume * area_square;
-    let inverse = one / (at_end.volume_times_64 * starting);
-    let inverse_by_64 = inverse * starting;
-    let inverse_others = inverse * at_end.volume_times_64;
-    let inverse_initial = inverse_others * area_square;
-    let volume = at_end.volume();
-    let length = volume * (inverse_others * initial_volume * area);
+    let Stressed { stress, power: deviatoric_power, history, plastic_before, strain, damage, failed } =
+        stressed;
+    let End {
+        gradient: at_end,
+        spread,
+        area,
+        volume,
+        length,
+        inverse_by_64,
+        inverse_initial,
+        relative_volume,
+    } = end;
     let inverse_volume = inverse_by_64 * L::splat(64.0);
-    let relative_volume = (volume - initial_volume).mul_add(inverse_initial, one);
 
     // 4. Pressure line at the new volume and the sound speed there.
     let (pressure_before, energy_before, volume_before): (L, L, L) = (
@@ -349,7 +305,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let energy_before = (deviatoric_power * dt).mul_add(middle, energy_before);
     let mut burnt = one;
     let mut time_to_light = zero;
-    if E::BURNS {
+    if laws.eos.burns() {
         let left = view.state::<L>(slot, field::TIME_TO_LIGHT) - dt;
         (time_to_light, burnt) = laws.eos.burn(left, relative_volume, initial_volume);
     }
@@ -373,7 +329,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let mut energy = line.energy_after(energy_before, pressure_before, viscosity, volume_change);
     let mut pressure = line.pressure(energy);
     let mut damage_after = damage;
-    if F::FAILS {
+    if laws.failure.fails() {
         let least = L::select(failed, zero, L::splat(laws.failure.least_pressure()));
         let cut = pressure.less(least);
         let resistance = half.mul_add(pressure_before + least, viscosity);
@@ -425,23 +381,23 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
 
     // 9. State.
     if step.dt != 0.0 {
-        if S::DEVIATORIC {
+        if laws.strength.deviatoric() {
             view.set_state(slot, field::SXX, stress.xx, active);
             view.set_state(slot, field::SYY, stress.yy, active);
             view.set_state(slot, field::SXY, stress.xy, active);
             view.set_state(slot, field::SYZ, stress.yz, active);
             view.set_state(slot, field::SZX, stress.zx, active);
         }
-        if S::PLASTIC {
+        if laws.strength.plastic() {
             view.set_state(slot, field::PLASTIC_STRAIN, history.plastic_strain, active);
         }
-        if S::THERMAL {
+        if laws.strength.thermal() {
             view.set_state(slot, field::TEMPERATURE, history.temperature, active);
         }
-        if F::FAILS {
+        if laws.failure.fails() {
             view.set_state(slot, field::DAMAGE, damage_after, active);
         }
-        if E::BURNS {
+        if laws.eos.burns() {
             view.set_state(slot, field::TIME_TO_LIGHT, time_to_light, active);
         }
         view.set_state(slot, field::PRESSURE, pressure, active);
@@ -470,6 +426,129 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         // SAFETY: corners are inside the node arrays.
         unsafe { place.scatter(nodes.f[axis], slot, forces) };
         axis += 1;
+    }
+}
+
+/// The deviatoric stress of the end of a step and what came with it.
+struct Stressed<L: Lane> {
+    stress: Deviator<L>,
+    /// Its power per volume, with the mean of the stresses before and after.
+    power: L,
+    history: History<L>,
+    plastic_before: L,
+    strain: Strain<L>,
+    /// Before the step.
+    damage: L,
+    /// Where that is 1.
+    failed: L::Mask,
+}
+
+impl<L: Lane> Stressed<L> {
+    /// Rotation, elastic increment, yield.
+    #[inline(always)]
+    fn of<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+        gradient: &Tensor<L>,
+        view: &BySlot<'_>,
+        slot: usize,
+        laws: &Laws<E, S, F>,
+        dt: f64,
+        alive: L::Mask,
+    ) -> Self {
+        let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
+        let damage: L = if laws.failure.fails() { view.state(slot, field::DAMAGE) } else { zero };
+        let failed = one.less_equal(damage);
+        let mut history = History { plastic_strain: zero, temperature: zero };
+        let mut strain = Strain { rate: zero, increment: zero };
+        let mut plastic_before = zero;
+        let mut stress = Deviator::zero();
+        let mut power = zero;
+        if laws.strength.deviatoric() {
+            let third = (gradient.x.x + gradient.y.y + gradient.z.z) * L::splat(1.0 / 3.0);
+            let rate = Deviator {
+                xx: gradient.x.x - third,
+                yy: gradient.y.y - third,
+                zz: gradient.z.z - third,
+                xy: half * (gradient.x.y + gradient.y.x),
+                yz: half * (gradient.y.z + gradient.z.y),
+                zx: half * (gradient.z.x + gradient.x.z),
+            };
+            let half_dt = L::splat(0.5 * dt);
+            let spin = Vector {
+                x: half_dt * (gradient.z.y - gradient.y.z),
+                y: half_dt * (gradient.x.z - gradient.z.x),
+                z: half_dt * (gradient.y.x - gradient.x.y),
+            };
+            let (xx, yy): (L, L) = (view.state(slot, field::SXX), view.state(slot, field::SYY));
+            let before = Deviator {
+                xx,
+                yy,
+                zz: -(xx + yy),
+                xy: view.state(slot, field::SXY),
+                yz: view.state(slot, field::SYZ),
+                zx: view.state(slot, field::SZX),
+            };
+            // Half of the increment turns with the stress, half does not: second order in the spin.
+            let half_increment = L::splat(laws.strength.shear() * dt);
+            let turned = rotated(&rate.mul_add(half_increment, &before), &spin);
+            let mut trial = rate.mul_add(half_increment, &turned);
+            if laws.failure.fails() {
+                trial = trial.scaled(L::select(failed, zero, one));
+            }
+            if laws.strength.plastic() {
+                history.plastic_strain = view.state(slot, field::PLASTIC_STRAIN);
+                plastic_before = history.plastic_strain;
+            }
+            if laws.strength.thermal() {
+                history.temperature = view.state(slot, field::TEMPERATURE);
+            }
+            let rate_square = rate.contract(&rate);
+            let effective = (L::splat(2.0 / 3.0) * rate_square).sqrt();
+            strain = Strain { rate: effective, increment: effective * L::splat(dt) };
+            stress = laws.strength.update(trial, strain, &mut history, alive);
+            // The stress before, turned, is `turned` less its half of the increment.
+            let sum = turned.plus(&stress);
+            power = half * half_increment.neg_mul_add(rate_square, sum.contract(&rate));
+        }
+        Self { stress, power, history, plastic_before, strain, damage, failed }
+    }
+}
+
+/// The geometry at the end of a step.
+struct End<L> {
+    gradient: Gradient<L>,
+    spread: Spread<L>,
+    /// `sqrt(2/3 tr S)`.
+    area: L,
+    volume: L,
+    /// That of the viscosity.
+    length: L,
+    /// `1 / (64 volume)`.
+    inverse_by_64: L,
+    /// `1 / initial volume`.
+    inverse_initial: L,
+    /// Exactly 1 as long as nothing moves.
+    relative_volume: L,
+}
+
+impl<L: Lane> End<L> {
+    #[inline(always)]
+    fn of(x: &Modes<L>, initial_volume: L) -> Self {
+        let one = L::splat(1.0);
+        let gradient = Gradient::of(x);
+        let spread =
+            Spread::of([&gradient.a, &gradient.b, &gradient.c, &gradient.d, &gradient.e, &gradient.f]);
+        let area_square = L::splat(2.0 / 3.0 / 512.0) * spread.trace();
+        let area = area_square.sqrt();
+        // One division inverts volume, initial volume and area: it is much slower than products.
+        let starting = initial_volume * area_square;
+        let inverse = one / (gradient.volume_times_64 * starting);
+        let inverse_by_64 = inverse * starting;
+        let inverse_others = inverse * gradient.volume_times_64;
+        let inverse_initial = inverse_others * area_square;
+        let volume = gradient.volume();
+        let length = volume * (inverse_others * initial_volume * area);
+        let relative_volume = (volume - initial_volume).mul_add(inverse_initial, one);
+        Self { gradient, spread, area, volume, length, inverse_by_64, inverse_initial, relative_volume }
     }
 }
 

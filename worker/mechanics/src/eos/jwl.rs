@@ -37,7 +37,10 @@ pub(crate) struct Jwl {
 }
 
 impl EquationOfState for Jwl {
-    const BURNS: bool = true;
+    #[inline(always)]
+    fn burns(&self) -> bool {
+        true
+    }
 
     #[inline(always)]
     fn line<L: Lane>(&self, v: L, burnt: L) -> Line<L> {

@@ -4,8 +4,6 @@
 
 use std::ops::Range;
 
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     element::{
         layout::Layout,
@@ -14,7 +12,7 @@ use crate::{
         vector::{Tensor, Vector},
         viscosity::{Spread, frequency},
     },
-    lanes::{Lane, SET, Width, scalar::Scalar},
+    lanes::{Lane, SET, Width, dispatch::Task},
     strength::Deviator,
 };
 
@@ -72,47 +70,26 @@ pub(super) fn run(scan: &mut Scan<'_>, sets: &[Range<u32>], reach: usize, width:
         scan.strain.as_ref().is_none_or(|(values, _)| values.len() >= n_slots),
         "incremental strain of {n_slots} slots"
     );
-    assert!(width.available(), "lane width {width} is not on this machine");
-    let mut found = Vec::new();
-    // SAFETY: the machine has the width; sets and arrays were checked just now, and every corner of every slot is below
-    // the reach of the block, lanes behind it included.
-    unsafe {
-        match width {
-            Width::Scalar => on_scalar(scan, sets, &mut found),
-            #[cfg(target_arch = "x86_64")]
-            Width::Avx2 => on_avx2(scan, sets, &mut found),
-            #[cfg(target_arch = "x86_64")]
-            Width::Avx512 => on_avx512(scan, sets, &mut found),
-            #[cfg(not(target_arch = "x86_64"))]
-            Width::Avx2 | Width::Avx512 => on_scalar(scan, sets, &mut found),
-        }
+    width.run(Pass { scan, sets })
+}
+
+/// A scan whose arrays have been checked.
+struct Pass<'a, 's> {
+    scan: &'a mut Scan<'s>,
+    sets: &'a [Range<u32>],
+}
+
+impl Task for Pass<'_, '_> {
+    type Output = Vec<u32>;
+
+    #[inline(always)]
+    fn run<L: Lane>(self) -> Vec<u32> {
+        let mut found = Vec::new();
+        // SAFETY: `run` above, which alone makes a pass, has checked sets and arrays, and every corner of every slot is below
+        // the reach of the block, lanes behind it included.
+        unsafe { all::<L>(self.scan, self.sets, &mut found) };
+        found
     }
-    found
-}
-
-/// # Safety
-/// As [`all`].
-unsafe fn on_scalar(scan: &mut Scan<'_>, sets: &[Range<u32>], found: &mut Vec<u32>) {
-    // SAFETY: the caller's promise.
-    unsafe { all::<Scalar>(scan, sets, found) };
-}
-
-/// # Safety
-/// As [`all`], on a machine with [`Width::Avx2`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2(scan: &mut Scan<'_>, sets: &[Range<u32>], found: &mut Vec<u32>) {
-    // SAFETY: the caller's promise.
-    unsafe { all::<Avx2>(scan, sets, found) };
-}
-
-/// # Safety
-/// As [`all`], on a machine with [`Width::Avx512`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512(scan: &mut Scan<'_>, sets: &[Range<u32>], found: &mut Vec<u32>) {
-    // SAFETY: the caller's promise.
-    unsafe { all::<Avx512>(scan, sets, found) };
 }
 
 /// # Safety

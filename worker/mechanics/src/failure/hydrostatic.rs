@@ -15,8 +15,6 @@ pub(crate) struct Hydrostatic {
 }
 
 impl FailureLaw for Hydrostatic {
-    const FAILS: bool = true;
-
     #[inline(always)]
     fn damage<L: Lane>(&self, damage: L, loading: &Loading<L>) -> L {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));

@@ -48,8 +48,6 @@ impl JohnsonCookDamage {
 }
 
 impl FailureLaw for JohnsonCookDamage {
-    const FAILS: bool = true;
-
     #[inline(always)]
     fn damage<L: Lane>(&self, damage: L, loading: &Loading<L>) -> L {
         let slip = loading.plastic_strain[1] - loading.plastic_strain[0];

@@ -11,8 +11,6 @@ pub(crate) struct PlasticStrain {
 }
 
 impl FailureLaw for PlasticStrain {
-    const FAILS: bool = true;
-
     #[inline(always)]
     fn damage<L: Lane>(&self, damage: L, loading: &Loading<L>) -> L {
         let reached = loading.plastic_strain[1] * L::splat(self.inverse_limit);

@@ -28,8 +28,6 @@ pub(crate) struct PrincipalStress {
 }
 
 impl FailureLaw for PrincipalStress {
-    const FAILS: bool = true;
-
     #[inline(always)]
     fn damage<L: Lane>(&self, damage: L, loading: &Loading<L>) -> L {
         let whole = below(&loading.stress, loading.pressure, self.tension);

@@ -110,7 +110,7 @@ pub fn cbrt<L: Lane>(x: L) -> L {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{Width, scalar::Scalar};
+    use crate::lanes::{Width, dispatch::Task, scalar::Scalar};
 
     fn seeded(n: usize) -> impl Iterator<Item = f64> {
         let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
@@ -169,19 +169,21 @@ mod tests {
         }
     }
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    fn all_avx2(x: &[f64], y: &[f64], out: &mut [f64]) {
-        all::<crate::lanes::avx2::Avx2>(x, y, out);
+    struct All<'a> {
+        x: &'a [f64],
+        y: &'a [f64],
+        out: &'a mut [f64],
     }
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-    fn all_avx512(x: &[f64], y: &[f64], out: &mut [f64]) {
-        all::<crate::lanes::avx512::Avx512>(x, y, out);
+    impl Task for All<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<L: Lane>(self) {
+            all::<L>(self.x, self.y, self.out);
+        }
     }
 
-    #[cfg(target_arch = "x86_64")]
     #[test]
     fn every_width_gives_the_same_bits() {
         let n = 4096;
@@ -195,10 +197,7 @@ mod tests {
                 continue;
             }
             let mut wide = vec![0.0; 4 * n];
-            // SAFETY: the machine has the width.
-            unsafe {
-                if width == Width::Avx2 { all_avx2(&x, &y, &mut wide) } else { all_avx512(&x, &y, &mut wide) }
-            }
+            width.run(All { x: &x, y: &y, out: &mut wide });
             for (at, (a, b)) in scalar.iter().zip(&wide).enumerate() {
                 assert_eq!(a.to_bits(), b.to_bits(), "{width}, function {}, lane {}", at / n, at % n);
             }

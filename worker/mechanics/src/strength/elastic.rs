@@ -8,9 +8,15 @@ use crate::lanes::Lane;
 pub(crate) struct Hydro;
 
 impl StrengthLaw for Hydro {
-    const DEVIATORIC: bool = false;
-    const PLASTIC: bool = false;
-    const THERMAL: bool = false;
+    #[inline(always)]
+    fn deviatoric(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn plastic(&self) -> bool {
+        false
+    }
 
     #[inline(always)]
     fn shear(&self) -> f64 {
@@ -37,9 +43,10 @@ pub(crate) struct Elastic {
 }
 
 impl StrengthLaw for Elastic {
-    const DEVIATORIC: bool = true;
-    const PLASTIC: bool = false;
-    const THERMAL: bool = false;
+    #[inline(always)]
+    fn plastic(&self) -> bool {
+        false
+    }
 
     #[inline(always)]
     fn shear(&self) -> f64 {

@@ -71,9 +71,10 @@ impl JohnsonCook {
 }
 
 impl StrengthLaw for JohnsonCook {
-    const DEVIATORIC: bool = true;
-    const PLASTIC: bool = true;
-    const THERMAL: bool = true;
+    #[inline(always)]
+    fn thermal(&self) -> bool {
+        true
+    }
 
     #[inline(always)]
     fn shear(&self) -> f64 {

@@ -37,10 +37,6 @@ impl Tabulated {
 }
 
 impl StrengthLaw for Tabulated {
-    const DEVIATORIC: bool = true;
-    const PLASTIC: bool = true;
-    const THERMAL: bool = false;
-
     #[inline(always)]
     fn shear(&self) -> f64 {
         self.shear

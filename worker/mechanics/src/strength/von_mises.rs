@@ -17,10 +17,6 @@ pub(crate) struct VonMises {
 }
 
 impl StrengthLaw for VonMises {
-    const DEVIATORIC: bool = true;
-    const PLASTIC: bool = true;
-    const THERMAL: bool = false;
-
     #[inline(always)]
     fn shear(&self) -> f64 {
         self.shear

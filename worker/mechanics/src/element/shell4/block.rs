@@ -3,12 +3,10 @@
 use std::{fmt, ops::Range};
 
 use super::{Rule, kernel};
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     element::ElementVote,
     exact::Quantum,
-    lanes::{SET, Width, scalar::Scalar},
+    lanes::{SET, Width},
     material::Material,
     mesh::{Section, quad_area},
     state::ShellState,
@@ -223,7 +221,6 @@ impl Core {
         width: Width,
         vote: &mut ElementVote,
     ) {
-        assert!(width.available(), "lane width {width} is not on this machine");
         let n_nodes = self.inertia.len();
         let arrays = [x, v, &*f, &self.w, &self.m];
         assert!(arrays.into_iter().flatten().all(|a| a.len() >= n_nodes), "node arrays not of {n_nodes}");
@@ -238,7 +235,7 @@ impl Core {
             inverse_arm: step.force_quantum.value() / step.moment_quantum.value(),
             energy_magic: step.energy_quantum.magic(),
         };
-        let mut view = kernel::View {
+        let view = kernel::View {
             corners: &self.corners,
             x: x.each_ref().map(Vec::as_slice),
             v: v.each_ref().map(Vec::as_slice),
@@ -251,17 +248,10 @@ impl Core {
             alive: &self.alive,
             elements: &self.elements,
         };
-        // SAFETY: the machine has the width, node arrays and sets were checked just now, corners when they were taken
-        // in, and arrays by slot were built in whole sets.
-        unsafe {
-            match width {
-                #[cfg(target_arch = "x86_64")]
-                Width::Avx2 => on_avx2(&mut view, &constants, sets, vote),
-                #[cfg(target_arch = "x86_64")]
-                Width::Avx512 => on_avx512(&mut view, &constants, sets, vote),
-                _ => kernel::compute::<Scalar>(&mut view, &constants, sets, vote),
-            }
-        }
+        // SAFETY: node arrays and sets were checked just now, corners when they were taken in, and arrays by slot were built
+        // in whole sets.
+        let pass = unsafe { kernel::Pass::new(view, &constants, sets, vote) };
+        width.run(pass);
     }
 }
 
@@ -376,32 +366,4 @@ impl Shells {
         self.core.compute(&self.x, &self.v, &mut self.f, &[all], step, width, &mut vote);
         vote
     }
-}
-
-/// # Safety
-/// As [`kernel::compute`], on a machine with AVX2 and FMA.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2(
-    view: &mut kernel::View<'_>,
-    c: &kernel::Constants<'_>,
-    sets: &[Range<u32>],
-    vote: &mut ElementVote,
-) {
-    // SAFETY: handed on from the caller.
-    unsafe { kernel::compute::<Avx2>(view, c, sets, vote) }
-}
-
-/// # Safety
-/// As [`kernel::compute`], on a machine with AVX-512 F and DQ.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512(
-    view: &mut kernel::View<'_>,
-    c: &kernel::Constants<'_>,
-    sets: &[Range<u32>],
-    vote: &mut ElementVote,
-) {
-    // SAFETY: handed on from the caller.
-    unsafe { kernel::compute::<Avx512>(view, c, sets, vote) }
 }

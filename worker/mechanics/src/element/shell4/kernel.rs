@@ -6,7 +6,7 @@ use super::geometry::{Geometry, dot};
 use crate::{
     element::{ElementVote, Fault, vector::Vector},
     exact,
-    lanes::{Lane, SET},
+    lanes::{Lane, SET, dispatch::Task},
     strength::plane_stress::{Layer, Plane, PlaneLaw},
 };
 
@@ -54,12 +54,43 @@ pub(super) struct Constants<'a> {
     pub energy_magic: f64,
 }
 
+/// The elements of some sets.
+pub(super) struct Pass<'a> {
+    view: View<'a>,
+    constants: &'a Constants<'a>,
+    sets: &'a [Range<u32>],
+    vote: &'a mut ElementVote,
+}
+
+impl<'a> Pass<'a> {
+    /// # Safety
+    /// As [`compute`].
+    pub unsafe fn new(
+        view: View<'a>,
+        constants: &'a Constants<'a>,
+        sets: &'a [Range<u32>],
+        vote: &'a mut ElementVote,
+    ) -> Self {
+        Self { view, constants, sets, vote }
+    }
+}
+
+impl Task for Pass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane>(mut self) {
+        // SAFETY: whoever made the pass has promised it.
+        unsafe { compute::<L>(&mut self.view, self.constants, self.sets, self.vote) }
+    }
+}
+
 /// The sets of these ranges.
 ///
 /// # Safety
 /// Every array by slot holds all sets of the ranges, and every corner is inside the node arrays.
 #[inline(always)]
-pub(super) unsafe fn compute<L: Lane>(
+unsafe fn compute<L: Lane>(
     view: &mut View<'_>,
     c: &Constants<'_>,
     sets: &[Range<u32>],

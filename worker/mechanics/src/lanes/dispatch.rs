@@ -1,0 +1,69 @@
+//! The one place where a lane width becomes machine instructions.
+//!
+//! A [`Task`] is a calculation that is generic over its lanes, together with what it works on. [`Width::run`] calls it from a
+//! function that has the target features of the width, and the task is inlined there: only so do its lanes become single
+//! instructions. A call costs one branch and hands over one pointer, so a task covers many lane sets.
+
+use super::{Lane, Width, scalar::Scalar};
+#[cfg(target_arch = "x86_64")]
+use super::{avx2::Avx2, avx512::Avx512, twice::Twice};
+
+/// A calculation on lanes. [`Task::run`] is to be `#[inline(always)]`, and so is every function that it calls with lanes.
+pub(crate) trait Task {
+    /// The answer.
+    type Output;
+
+    /// Whether a set of eight is done in two registers at once where one holds four, see [`Twice`].
+    const PAIRED: bool = false;
+
+    /// Does the work.
+    fn run<L: Lane>(self) -> Self::Output;
+}
+
+impl Width {
+    /// Does a task on this width. The answer does not depend on it.
+    ///
+    /// # Panics
+    /// If the machine lacks the width, see [`Width::require`].
+    pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
+        assert!(self.available(), "lane width {self} is not on this machine");
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the machine has the width.
+            Width::Avx2 => unsafe { on_avx2(task) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Width::Avx512 => unsafe { on_avx512(task) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the machine has FMA.
+            Width::Scalar if is_x86_feature_detected!("fma") => unsafe { on_scalar_with_fma(task) },
+            _ => task.run::<Scalar>(),
+        }
+    }
+}
+
+/// Without the feature a fused product is a call into the library, with the same bits.
+///
+/// # Safety
+/// The machine has FMA.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "fma")]
+unsafe fn on_scalar_with_fma<T: Task>(task: T) -> T::Output {
+    task.run::<Scalar>()
+}
+
+/// # Safety
+/// The machine has [`Width::Avx2`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn on_avx2<T: Task>(task: T) -> T::Output {
+    if T::PAIRED { task.run::<Twice<Avx2>>() } else { task.run::<Avx2>() }
+}
+
+/// # Safety
+/// The machine has [`Width::Avx512`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+unsafe fn on_avx512<T: Task>(task: T) -> T::Output {
+    task.run::<Avx512>()
+}
