@@ -9,7 +9,7 @@ use std::{fmt::Write, process::ExitCode, process::Stdio, time::Duration};
 use serde::Serialize;
 use tokio::{io::AsyncWriteExt, process::Command, sync::Semaphore};
 
-use crate::{command::AddArgs, run::quoted};
+use crate::{command::AddArgs, shell::quoted};
 
 pub mod file;
 use file::{Host, Way};

@@ -13,16 +13,17 @@ use protocol::{
     frame::Kind,
     handshake::{Hello, Role},
     link::Receiver,
+    options::JobOptions,
     order::{BULK_ON_THE_WAY, Inbox, Outbox, Place},
-    request::{DECK_LIMIT, HostRow, JobOptions, Reply, Request, State, Status, check_file_name},
+    request::{DECK_LIMIT, HostRow, Reply, Request, State, Status, check_file_name},
     wire::Packed,
 };
 
 use crate::{
     command::{ClientArgs, SubmitArgs},
     daemon::host_name,
+    deck_file::{self, gather_deck, warn},
     results::{Folder, create_anew},
-    run::{gather_deck, list_of_faults, warn},
 };
 
 pub mod top;
@@ -152,7 +153,7 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
         min_workers: args.min_workers,
         priority: args.priority,
         trace: args.trace,
-        ..args.job.asked()
+        ..args.job.clone()
     };
     let mut client = Client::new(&args.at)?;
     match client.ask(&Request::Submit { name, text, options })? {
@@ -170,7 +171,7 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
             }
             Ok(ExitCode::SUCCESS)
         }
-        Reply::Faults(lines) => Err(list_of_faults(&lines)),
+        Reply::Faults(lines) => Err(deck_file::Error::Faults(lines).into()),
         _ => Err(surprise()),
     }
 }

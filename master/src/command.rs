@@ -10,12 +10,13 @@ use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::{
-    request::{JobOptions, RouteChoice},
+    options::{self, Balance, JobOptions, Route},
     shape::Rate,
     tls,
 };
+use worker::processors::Processors;
 
-use crate::picture::arguments::PictureArgs;
+use crate::{bench::grind::Speed, picture::arguments::PictureArgs};
 
 /// What the process ends with, as `--help` says it.
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 a fault, which is printed (deck, disk, physics, peer); 2 wrong flags; 130 \
@@ -174,141 +175,6 @@ impl ReadingArgs {
     }
 }
 
-/// How partial forces travel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Route {
-    /// Direct with two workers or more that all take peers, else master
-    Auto,
-    /// All through the master, which adds them
-    Master,
-    /// From worker to worker; votes and orders pass the master
-    Direct,
-}
-
-impl From<Route> for RouteChoice {
-    fn from(route: Route) -> Self {
-        match route {
-            Route::Auto => Self::Auto,
-            Route::Master => Self::Master,
-            Route::Direct => Self::Direct,
-        }
-    }
-}
-
-/// What speeds work is dealt out by; the bits do not depend on it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Balance {
-    /// Those that workers were started with
-    Given,
-    /// Those, corrected by what the workers take
-    Measured,
-}
-
-impl From<Balance> for protocol::request::Balance {
-    fn from(balance: Balance) -> Self {
-        match balance {
-            Balance::Given => Self::Given,
-            Balance::Measured => Self::Measured,
-        }
-    }
-}
-
-/// Lane width of the kernels; the bits do not depend on it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Lanes {
-    /// One element at a time
-    Scalar,
-    /// Four
-    Avx2,
-    /// Eight
-    Avx512,
-}
-
-impl Lanes {
-    /// The name that a worker understands.
-    pub fn name(self) -> String {
-        match self {
-            Self::Scalar => "scalar",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        }
-        .to_owned()
-    }
-}
-
-/// What a user may ask of one run, wherever it runs.
-#[derive(Args, Clone, Debug)]
-pub struct JobArgs {
-    /// Route of the shared-node forces
-    #[arg(long, value_enum, default_value = "auto")]
-    pub route: Route,
-    /// Stop after this many cycles, or at the deck's end, whichever comes first
-    #[arg(long)]
-    pub cycles: Option<u64>,
-    /// Stop at this time in the deck's unit, or at the deck's end, whichever comes first
-    #[arg(long)]
-    pub end_time: Option<f64>,
-    /// Lane width; the widest of each machine by default
-    #[arg(long, value_enum)]
-    pub lanes: Option<Lanes>,
-    /// Write no results folder
-    #[arg(long)]
-    pub no_output: bool,
-    /// Store the run at the start of this cycle, as snapshot.bolide in the results folder
-    #[arg(long, value_name = "CYCLE")]
-    pub snapshot_at: Option<u64>,
-    /// Speeds that work is dealt out by
-    #[arg(long, value_enum, default_value = "given")]
-    pub balance: Balance,
-    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for no oftener than on disk
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
-    pub keep_every: f64,
-    /// Store the run on disk every so many seconds, to be gone on with by --resume; 0 for never [default: the deck's; else a
-    /// master's jobs every 10, `run` only when it is interrupted]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub snapshot_every: Option<f64>,
-    /// The same every so many cycles
-    #[arg(long, value_name = "CYCLES", value_parser = clap::value_parser!(u64).range(1..))]
-    pub snapshot_cycles: Option<u64>,
-    /// Extra sorts every so many cycles, to test that they change nothing
-    #[arg(long, hide = true)]
-    pub sort_every: Option<u64>,
-    /// Extra sorts at pseudo-random cycles of this seed, to test that they change nothing
-    #[arg(long, hide = true)]
-    pub sort_seed: Option<u64>,
-}
-
-/// A number of seconds that a timer can wait for.
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(seconds),
-        _ => Err("expected seconds from 0 to 1e9".to_owned()),
-    }
-}
-
-impl JobArgs {
-    /// The same as a master takes it.
-    pub fn asked(&self) -> JobOptions {
-        JobOptions {
-            cycles: self.cycles,
-            end_time: self.end_time,
-            route: self.route.into(),
-            lanes: self.lanes.map(Lanes::name),
-            no_output: self.no_output,
-            snapshot_at: self.snapshot_at,
-            sort_every: self.sort_every,
-            sort_seed: self.sort_seed,
-            min_workers: 1,
-            balance: self.balance.into(),
-            keep_every: (self.keep_every > 0.0).then_some(self.keep_every),
-            snapshot_every: self.snapshot_every,
-            snapshot_cycles: self.snapshot_cycles,
-            priority: 0,
-            trace: false,
-        }
-    }
-}
-
 /// Flags of `run`.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
@@ -349,10 +215,14 @@ pub struct RunArgs {
     pub json: bool,
     /// The rest
     #[command(flatten)]
-    pub job: JobArgs,
+    pub job: JobOptions,
 }
 
 /// Flags of `simulate`.
+#[expect(
+    unused_qualifications,
+    reason = "by the whole path clap takes an option for the type of the value, as `auto` needs"
+)]
 #[derive(Args, Clone, Debug)]
 pub struct SimulateArgs {
     /// The deck (TOML)
@@ -371,8 +241,8 @@ pub struct SimulateArgs {
     #[arg(long, conflicts_with_all = ["table", "decomposition"])]
     pub measure_costs: bool,
     /// Lane width to measure with: the machines of the paper had none; the widest by default
-    #[arg(long, value_enum, requires = "measure_costs")]
-    pub lanes: Option<Lanes>,
+    #[arg(long, value_parser = options::lanes(), requires = "measure_costs")]
+    pub lanes: Option<String>,
     /// How often to measure; medians count
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repetitions: u32,
@@ -395,8 +265,8 @@ pub struct SimulateArgs {
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u64).range(4..))]
     pub cycles: u64,
     /// Route of the shared-node forces
-    #[arg(long, value_enum, default_value = "direct")]
-    pub route: Route,
+    #[arg(long, value_parser = options::routes(), default_value = "direct")]
+    pub route: std::option::Option<Route>,
     /// Speeds that work is dealt out by, in a run of one deck
     #[arg(long, value_enum, default_value = "given", conflicts_with = "table")]
     pub balance: Balance,
@@ -550,7 +420,7 @@ pub struct SubmitArgs {
     pub trace: bool,
     /// The job
     #[command(flatten)]
-    pub job: JobArgs,
+    pub job: JobOptions,
     /// The master
     #[command(flatten)]
     pub at: ClientArgs,
@@ -566,71 +436,14 @@ pub struct GrindArgs {
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(6..=120))]
     pub side: u32,
     /// Lane width; the widest by default
-    #[arg(long, value_enum)]
-    pub lanes: Option<Lanes>,
+    #[arg(long, value_parser = options::lanes())]
+    pub lanes: Option<String>,
     /// Run on these processors only, as in 0,2-3
     #[arg(long, value_name = "LIST")]
     pub pin: Option<Processors>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-}
-
-/// Processors of this machine, as in `0,2-3`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Processors(Vec<usize>);
-
-impl Processors {
-    /// The highest number that is read.
-    const LAST: usize = 1023;
-
-    /// Confines this process to them: the calling thread, and all that it starts from now on.
-    ///
-    /// # Errors
-    /// If this machine has none of them.
-    pub fn apply(&self) -> Result<(), String> {
-        worker::compute::pin(&self.0)
-    }
-}
-
-impl std::str::FromStr for Processors {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let fault = || format!("processors {text:?}: a list of numbers up to {} as in 0,2-3", Self::LAST);
-        let number =
-            |digits: &str| digits.trim().parse::<usize>().ok().filter(|n| *n <= Self::LAST).ok_or_else(fault);
-        let mut processors = Vec::new();
-        for range in text.split(',') {
-            let (first, last) = range.split_once('-').unwrap_or((range, range));
-            let (first, last) = (number(first)?, number(last)?);
-            if first > last {
-                return Err(fault());
-            }
-            processors.extend(first..=last);
-        }
-        Ok(Self(processors))
-    }
-}
-
-/// A worker's speed relative to the others.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Speed {
-    /// Measured when the worker starts.
-    Auto,
-    /// As it was said.
-    Given(f64),
-}
-
-impl std::str::FromStr for Speed {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "auto" {
-            return Ok(Self::Auto);
-        }
-        text.parse().map(Self::Given).map_err(|_| format!("speed {text:?}: a number, or auto to measure it"))
-    }
 }
 
 /// What `bench` measures.
@@ -765,25 +578,5 @@ impl CertRole {
             Self::Worker => tls::Role::Worker,
             Self::Client => tls::Role::Client,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lists_of_processors_and_speeds_are_read_and_faults_say_what_was_read() {
-        assert_eq!("0,2-3".parse(), Ok(Processors(vec![0, 2, 3])));
-        for text in ["", "a", "3-2", "1024", "0,,1", "-1"] {
-            let fault = text.parse::<Processors>().expect_err(text);
-            assert!(fault.starts_with(&format!("processors {text:?}: ")), "{fault}");
-        }
-        assert_eq!("auto".parse(), Ok(Speed::Auto));
-        assert_eq!("0.5".parse(), Ok(Speed::Given(0.5)));
-        assert_eq!(
-            "fast".parse::<Speed>(),
-            Err("speed \"fast\": a number, or auto to measure it".to_owned())
-        );
     }
 }

@@ -4,7 +4,7 @@ use std::{fs, path::Path, process::ExitCode};
 
 use deck::bundle::Options;
 
-use crate::run::{gather_deck, list_of_faults, warn};
+use crate::deck_file::{self, gather_deck, warn};
 
 /// Writes `to` and its mesh.
 ///
@@ -20,10 +20,8 @@ pub fn run(deck: &Path, to: &Path, force: bool, options: &Options) -> Result<Exi
             return Err(format!("{}: is there already; name another, or give --force", path.display()));
         }
     }
-    let converted = deck::convert(&text, &deck.display().to_string(), name).map_err(|faults| {
-        let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
-        list_of_faults(&lines)
-    })?;
+    let converted = deck::convert(&text, &deck.display().to_string(), name)
+        .map_err(|faults| deck_file::Error::of_faults(faults.iter().map(ToString::to_string)))?;
     warn(&converted.warnings);
     for (path, text) in [(&*mesh, &converted.mesh), (to, &converted.deck)] {
         fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))?;

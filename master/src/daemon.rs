@@ -17,7 +17,8 @@ use std::{
 
 use protocol::{
     handshake::{Hello, Role},
-    request::{Ended, HostRow, JobOptions, State, Status},
+    options::JobOptions,
+    request::{Ended, HostRow, State, Status},
     shape::{Shape, Wire},
     tls,
     token::Token,
@@ -149,7 +150,8 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         );
         tokio::spawn(listen(listener, Arc::clone(&gate)));
         let board = open_page(args, join, &events).await?;
-        let stop = crate::run::stop_on_interrupt("ending; the job under way is stored for the next master");
+        let stop =
+            crate::interrupt::stop_on_interrupt("ending; the job under way is stored for the next master");
         notify::say(&format!("READY=1\nSTATUS=listening on {address}"));
         Owner::new(args.spool.clone(), spool, left, events, board).run(heard, &stop, &gate).await;
         Ok(ExitCode::SUCCESS)

@@ -13,8 +13,9 @@ use protocol::{
     Error, Result, codec,
     frame::Kind,
     link::{Receiver, Sender},
+    options::JobOptions,
     order::{Inbox, Outbox, Place},
-    request::{DECK_LIMIT, JobOptions, PIECE_LIMIT, Reply, Request, check_file_name},
+    request::{DECK_LIMIT, PIECE_LIMIT, Reply, Request, check_file_name},
     wire::Packed,
 };
 use tokio::sync::{mpsc, oneshot};

@@ -251,7 +251,7 @@ impl Driver {
 
     /// Tells the epoch's workers where they find each other, before they are dealt their work.
     fn introduce(&mut self) {
-        if self.job.route() == protocol::message::Route::Direct {
+        if self.job.route() == protocol::options::Route::Direct {
             let crew: Vec<(usize, &Seat)> =
                 self.job.crew().iter().map(|&index| (index, &self.seats[index])).collect();
             self.lost.extend(peers::introduce(&crew, self.place));

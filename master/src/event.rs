@@ -3,15 +3,13 @@
 use std::sync::Arc;
 
 use mechanics::{contact::Census, state::GlobalState};
-pub use protocol::request::Balance;
 use protocol::{
-    message::{Route, ToMaster, ToWorker, Work},
+    message::{ToMaster, ToWorker, Work},
     phase::Report,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    balance::{Costs, Dealing},
     job::Bench,
     ledger::Ledger,
     results::history::HistoryRow,
@@ -28,68 +26,6 @@ pub struct Hand {
     pub speed: f64,
     /// Compute threads.
     pub threads: u32,
-}
-
-/// What a user may ask of a run beside the deck.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Options {
-    /// Lane width by name; none for the best.
-    pub lanes: Option<String>,
-    /// How partial forces travel.
-    pub route: Route,
-    /// How work units are dealt.
-    pub dealing: Dealing,
-    /// What work costs on the workers, relative to an element.
-    pub costs: Costs,
-    /// Store a snapshot at the start of this cycle.
-    pub snapshot_at: Option<u64>,
-    /// How often the state is kept in memory, to go back to when a worker is lost.
-    pub keep: Keep,
-    /// Give every base to the sink, for snapshots on disk.
-    pub store: bool,
-    /// What speeds work is dealt out by.
-    pub balance: Balance,
-    /// With no worker left, wait for one instead of ending.
-    pub waits: bool,
-    /// Write states while the run goes (the last one is always gathered).
-    pub states: bool,
-    /// Samples of what elements come to are computed again here, at the first cycle of each epoch and where states are
-    /// kept; a worker whose sample differs is dropped.
-    pub replay: bool,
-    /// Forces extra sorts, for tests of bits.
-    pub force_sorts: ForceSorts,
-}
-
-/// How often the state is kept in memory, always at a plan boundary.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Keep {
-    /// Only where an epoch begins.
-    #[default]
-    Never,
-    /// After so many seconds, which [`Action::Timer`] asks for.
-    Seconds(f64),
-    /// After so many cycles.
-    Cycles(u64),
-    /// After so many seconds or cycles, whichever comes first.
-    Either(f64, u64),
-}
-
-impl Keep {
-    /// Its seconds.
-    pub(crate) const fn seconds(self) -> Option<f64> {
-        match self {
-            Self::Seconds(seconds) | Self::Either(seconds, _) => Some(seconds),
-            Self::Never | Self::Cycles(_) => None,
-        }
-    }
-
-    /// Its cycles.
-    pub(crate) const fn cycles(self) -> Option<u64> {
-        match self {
-            Self::Cycles(cycles) | Self::Either(_, cycles) => Some(cycles),
-            Self::Never | Self::Seconds(_) => None,
-        }
-    }
 }
 
 /// Work was dealt out anew because speeds turned out to be others.
@@ -120,32 +56,6 @@ pub struct Loss {
     pub back_to: u64,
     /// Why.
     pub why: String,
-}
-
-/// Extra sorts, which may not change a bit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ForceSorts {
-    /// Only when due.
-    #[default]
-    Never,
-    /// Every so many cycles.
-    Every(u64),
-    /// At pseudo-random cycles, about one in four.
-    Seeded(u64),
-}
-
-impl ForceSorts {
-    pub(crate) fn at(self, cycle: u64) -> bool {
-        match self {
-            Self::Never => false,
-            Self::Every(n) => cycle.is_multiple_of(n.max(1)),
-            Self::Seeded(seed) => {
-                let mut x = cycle.wrapping_add(seed).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-                x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-                (x ^ (x >> 31)).is_multiple_of(4)
-            }
-        }
-    }
 }
 
 /// What happens to a job. Workers have the index at which they came: first those of [`Job::new`](crate::job::Job::new),

@@ -10,7 +10,7 @@ use mechanics::{
     state::GlobalState,
 };
 
-use protocol::message::Route;
+use protocol::options::Route;
 
 use crate::holdings::{Holdings, Standing, share};
 

@@ -26,15 +26,17 @@ use mechanics::{
     wall::{self, Pose},
 };
 use protocol::{
-    message::{IMAGE_VERSION, Orders, Route, ToMaster, ToWorker, Work},
+    message::{IMAGE_VERSION, Orders, ToMaster, ToWorker, Work},
+    options::Route,
     phase::Report,
 };
 
 use crate::{
-    event::{Action, Event, Limit, Loss, Options, Outcome, Progress, Rebalance},
+    event::{Action, Event, Limit, Loss, Outcome, Progress, Rebalance},
     exchange::Exchange,
     holdings::Holdings,
     ledger::Ledger,
+    options::SessionOptions,
     results::{history::HistoryRow, surface::Probe},
     sort::{Gathered, Sorted, Sorter},
 };
@@ -104,7 +106,7 @@ struct Arrivals {
 /// The master's part in one job.
 pub struct Job {
     model: Arc<Model>,
-    options: Options,
+    options: SessionOptions,
     /// Those of the start; the quantum of forces may grow with the epoch.
     quanta: Quanta,
     /// None without contact.
@@ -185,7 +187,7 @@ impl Job {
 
     /// How partial forces travel.
     pub fn route(&self) -> Route {
-        self.options.route
+        self.options.route()
     }
 
     /// Whether it has ended.
@@ -271,10 +273,7 @@ impl Job {
                 .collect(),
             imbalance: self.imbalance,
             lanes: self.lanes.clone(),
-            route: match self.options.route {
-                Route::Master => "master",
-                Route::Direct => "direct",
-            },
+            route: self.options.route().name(),
             cycles_run,
             workers: self.epoch.crew.iter().map(|&m| self.members[m].hand.name.clone()).collect(),
             rebalances: std::mem::take(&mut self.rebalances),
@@ -393,7 +392,7 @@ impl Job {
         }
         let Step { dt, time, quantum } = self.epoch.steps[&first];
         let at_end = time >= control.end_time || first >= control.end_cycle;
-        let store = self.options.snapshot_at == Some(first) && self.epoch.number == 0;
+        let store = self.options.asked.snapshot_at == Some(first) && self.epoch.number == 0;
         let blocking = !at_end && self.surface_changes_at(first);
         if blocking {
             self.gather_at(first, true);

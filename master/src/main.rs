@@ -8,9 +8,11 @@ use clap::{CommandFactory, Parser};
 use deck::bundle::Options;
 
 use master::{
-    add, bench, certs, client,
-    command::{Bench, Certs, Cli, Command, Speed, WorkerArgs},
-    convert, daemon,
+    add, bench,
+    bench::grind::Speed,
+    certs, client,
+    command::{Bench, Certs, Cli, Command, WorkerArgs},
+    convert, daemon, deck_file,
     lab::Lab,
     memory, newcomer, picture, processes, run, simulate,
 };
@@ -150,7 +152,7 @@ fn manual(folder: Option<&Path>) -> Result<ExitCode, String> {
 }
 
 fn check(path: &Path, options: &Options) -> Result<ExitCode, String> {
-    let model = run::read_deck_with(path, options)?;
+    let model = deck_file::read_deck_with(path, options)?;
     println!(
         "{}: no fault; {} parts, {} elements, {} nodes",
         path.display(),

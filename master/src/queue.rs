@@ -4,7 +4,7 @@
 
 use std::{cmp::Reverse, collections::BTreeMap, path::PathBuf, sync::Arc};
 
-use protocol::request::{JobOptions, State};
+use protocol::{options::JobOptions, request::State};
 
 /// Most jobs that may wait.
 pub const QUEUED_LIMIT: usize = 1000;

@@ -12,7 +12,8 @@ use deck::model::Model;
 use mechanics::contact::Surface;
 use protocol::{
     message::ToMaster,
-    request::{Ended, JobOptions, Share, Status},
+    options::JobOptions,
+    request::{Ended, Share, Status},
 };
 use tokio::sync::{mpsc, watch};
 use tracing::{info, warn};
@@ -21,13 +22,15 @@ use crate::{
     balance,
     drive::{self, Input, Seat, drive},
     embedded::Sink,
-    event::{Action, Deal, Hand, Options},
+    event::{Action, Deal, Hand},
     http::board::{self, Board, Sheet},
     job::Job,
+    options::{Keep, SessionOptions, bring_end_forward, interval_for},
+    output::{Output, progress_line},
     queue::Event,
     results::{Folder, TRACE, report, trace},
-    run::{Census, Output, interval_for, keep_for, limit, options_for, progress_line, summarise},
     snapshot::{keeper::Keeper, store::Store},
+    summarise::{SurfaceCensus, summarise},
 };
 
 /// Seconds between snapshots of a job that asks for no other.
@@ -100,18 +103,18 @@ fn share_with_sorts(model: &Model, hands: &mut [Hand], beside: &[bool]) {
 fn run(order: &Order) -> Result<(Event, Ended), String> {
     let mut model = deck::read(&order.text, &order.name)
         .map_err(|faults| faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
-    limit(&mut model, &order.options)?;
+    bring_end_forward(&mut model, &order.options)?;
     let model = Arc::new(model);
     let mut hands: Vec<_> = order.seats.iter().map(|seat| seat.hand.clone()).collect();
     let beside: Vec<bool> = order.seats.iter().map(|seat| is_here(&seat.address)).collect();
     share_with_sorts(&model, &mut hands, &beside);
     let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
     let interval = interval_for(&order.options, &model, Some(SNAPSHOT_SECONDS));
-    let keep = keep_for(order.options.keep_every, interval);
+    let keep = Keep::for_both(order.options.keep_every, interval);
     // The others will be back.
     let workers = hands.len().max(order.crew_before.unwrap_or_default());
-    let options = options_for(&order.options, workers, all_take_peers);
-    let options = Options { waits: true, keep, store: true, replay: true, ..options };
+    let options = SessionOptions::of(&order.options, workers, all_take_peers);
+    let options = SessionOptions { waits: true, keep, store: true, replay: true, ..options };
     if let Some(path) = order.folder.as_ref().filter(|path| path.is_symlink()) {
         return Err(format!("{} is a link; results stay in the spool folder, remove it", path.display()));
     }
@@ -141,7 +144,7 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
         job.rows_before().iter().for_each(|row| sheet.row(row));
         sheet.state(&model, job.start_state());
     }
-    let census = Census::of(&job, &model);
+    let census = SurfaceCensus::of(&job, &model);
     let started = Instant::now();
     let mut reporter = Reporter {
         number: order.number,

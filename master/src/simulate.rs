@@ -10,7 +10,7 @@ use std::{path::Path, process::ExitCode, sync::Arc};
 
 use deck::model::Model;
 use mechanics::lanes::Width;
-use protocol::{message::Route, request::RouteChoice};
+use protocol::options::{Balance, Route};
 use serde::Serialize;
 
 pub mod calibrate;
@@ -32,8 +32,8 @@ pub mod virtual_clock;
 use crate::{
     balance::Costs,
     command::{Clock, SimulateArgs},
-    event::{Balance, Loss, Rebalance},
-    run::read_deck,
+    deck_file::read_deck,
+    event::{Loss, Rebalance},
 };
 
 use cluster::{Cluster, ElementCost};
@@ -100,7 +100,8 @@ fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, Str
 fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
     let lanes = args
         .lanes
-        .map(|lanes| lanes.name().parse::<Width>().and_then(Width::require))
+        .as_ref()
+        .map(|lanes| lanes.parse::<Width>().and_then(Width::require))
         .transpose()
         .map_err(|e| e.to_string())?;
     let (all, medians) =
@@ -212,8 +213,8 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         network: cluster.network.clone(),
         changes: cluster.changes.clone(),
     };
-    let route = RouteChoice::from(args.route).choose(cluster.speeds.len(), true);
-    let scheme = Scheme { balance: args.balance.into(), ..Scheme::bolide(route) };
+    let route = Route::choose(args.route, cluster.speeds.len(), true);
+    let scheme = Scheme { balance: args.balance, ..Scheme::bolide(route) };
     if args.clock == Clock::Real && scheme.balance != Balance::Given {
         return Err("--balance measured is followed under --clock virtual only".to_owned());
     }
@@ -238,10 +239,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
             Clock::Virtual => "virtual",
             Clock::Real => "real",
         },
-        route: match route {
-            Route::Master => "master",
-            Route::Direct => "direct",
-        },
+        route: route.name(),
         elements: model.mesh.n_elements(),
         hosts: cluster.speeds.len(),
         cycles: timeline.counts.len(),

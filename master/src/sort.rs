@@ -9,7 +9,7 @@ use mechanics::{
     state::GlobalState,
 };
 
-use protocol::message::Route;
+use protocol::options::Route;
 
 use crate::{
     balance::{self, Dealing},

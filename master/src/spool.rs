@@ -17,7 +17,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use protocol::request::{Ended, JobOptions, State};
+use protocol::{
+    options::JobOptions,
+    request::{Ended, State},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::snapshot::store::{self, write_durably};

@@ -2,9 +2,10 @@
 
 use master::{
     embedded::Fate,
-    event::{Balance, ForceSorts, Hand, Keep, Options},
+    event::Hand,
+    options::{Keep, SessionOptions},
 };
-use protocol::message::Route;
+use protocol::options::{Balance, JobOptions, Route};
 use tests::{
     bits::Fingerprint,
     solve::{Crew, Solved, model, solve, solve_through},
@@ -59,12 +60,13 @@ fn plates() -> Model {
     )
 }
 
-fn options(keep: Keep, route: Route) -> Options {
+fn options(keep: Keep, route: Route) -> SessionOptions {
     // Sorts at one cycle in four: losses hit them, their transfers and their plans.
-    Options { keep, route, states: true, force_sorts: ForceSorts::Seeded(11), ..Options::default() }
+    let asked = JobOptions { route: Some(route), sort_seed: Some(11), ..JobOptions::default() };
+    SessionOptions { asked, keep, ..SessionOptions::default() }
 }
 
-fn crew(workers: usize, options: Options) -> Crew {
+fn crew(workers: usize, options: SessionOptions) -> Crew {
     Crew { options, ..Crew::of(workers) }
 }
 
@@ -166,7 +168,7 @@ fn with_no_worker_left_a_job_that_waits_goes_on_with_the_next_and_another_ends()
             Some(2) => Some(Fate::Join(hand())),
             _ => None,
         };
-        let waiting = Options { waits: true, ..options(Keep::Cycles(10), Route::Master) };
+        let waiting = SessionOptions { waits: true, ..options(Keep::Cycles(10), Route::Master) };
         let solved = solve_through(plates(), crew(2, waiting), &mut fate).unwrap_or_else(|e| panic!("{e}"));
         one.assert_equal(&Fingerprint::of(&solved), &format!("seed {seed}"));
         assert_eq!(states(&solved), written, "seed {seed}: states");
@@ -181,7 +183,8 @@ fn with_no_worker_left_a_job_that_waits_goes_on_with_the_next_and_another_ends()
 fn measured_balance_on_workers_of_given_speeds_that_are_wrong_changes_no_bit() {
     let (one, written, _) = undisturbed();
     for route in [Route::Master, Route::Direct] {
-        let options = Options { balance: Balance::Measured, ..options(Keep::Cycles(25), route) };
+        let mut options = options(Keep::Cycles(25), route);
+        options.asked.balance = Balance::Measured;
         let solved = solve(plates(), Crew { speeds: vec![1.0, 4.0, 1.0], options, ..Crew::default() });
         let solved = solved.unwrap_or_else(|e| panic!("{e}"));
         one.assert_equal(&Fingerprint::of(&solved), &format!("{route:?}"));

@@ -11,15 +11,16 @@ use master::{
     daemon::Event,
     drive::{Seat, channel, drive},
     embedded::{self, Sink},
-    event::{Action, Hand, Options, Outcome},
+    event::{Action, Hand, Outcome},
     job::Job,
+    options::SessionOptions,
     snapshot::Snapshot,
 };
 use protocol::{
     dial,
     handshake::{Hello, Role},
     link::{Settings, split},
-    message::Route,
+    options::{JobOptions, Route},
 };
 use tokio::{
     io::{AsyncRead, AsyncWrite},
@@ -51,8 +52,9 @@ impl Sink for Keep {
     }
 }
 
-fn options() -> Options {
-    Options { states: true, snapshot_at: Some(17), ..Options::default() }
+fn options(route: Route) -> SessionOptions {
+    let asked = JobOptions { route: Some(route), snapshot_at: Some(17), ..JobOptions::default() };
+    SessionOptions { asked, ..SessionOptions::default() }
 }
 
 fn model(text: &str, cycles: u64) -> Arc<Model> {
@@ -72,7 +74,7 @@ fn digest(outcome: &Outcome) -> String {
 }
 
 fn embedded_run(model: &Arc<Model>, hands: &[Hand]) -> (String, Option<Box<Snapshot>>) {
-    let (job, first) = Job::new(Arc::clone(model), hands, options(), None).expect("it starts");
+    let (job, first) = Job::new(Arc::clone(model), hands, options(Route::Master), None).expect("it starts");
     let (stop, mut sink) = (AtomicBool::new(false), Keep::default());
     let run = embedded::run(job, first, hands.len(), 2, &mut sink, &stop).expect("it runs");
     (digest(&run.0), sink.0)
@@ -122,7 +124,7 @@ where
     }
     seats.sort_by(|a, b| a.hand.name.cmp(&b.hand.name));
     let running = tokio::task::spawn_blocking(move || {
-        let options = Options { route, ..options() };
+        let options = options(route);
         let (job, first) = Job::new(model, &hands, options, None).expect("it starts");
         let mut sink = Keep::default();
         let ran = drive(job, first, 1, &seats, channel(seats.len()), &mut sink, &AtomicBool::new(false));

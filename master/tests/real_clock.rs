@@ -9,7 +9,7 @@ use std::{
 
 use deck::model::Model;
 use master::{
-    run::read_deck,
+    deck_file::read_deck,
     simulate::{
         machines::{Change, Costs, Machines, Scheme, What},
         network::{Network, Wires},
@@ -18,7 +18,7 @@ use master::{
         virtual_clock,
     },
 };
-use protocol::{message::Route, shape::TICK};
+use protocol::{options::Route, shape::TICK};
 
 fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../deck/examples").join(name)

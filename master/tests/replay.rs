@@ -2,12 +2,13 @@
 
 use master::{
     embedded::Fate,
-    event::{Hand, Keep, Options},
+    event::Hand,
+    options::{Keep, SessionOptions},
 };
-use protocol::message::Route;
+use protocol::options::{JobOptions, Route};
 use tests::{
     bits::Fingerprint,
-    solve::{Crew, Solved, model, solve, solve_through},
+    solve::{Crew, Solved, model, solve, solve_through, without_states},
 };
 
 const PLATES: &str = r#"
@@ -39,7 +40,8 @@ const PLATES: &str = r#"
 "#;
 
 fn crew(workers: usize, replay: bool, route: Route) -> Crew {
-    let options = Options { keep: Keep::Cycles(10), replay, route, ..Options::default() };
+    let options = without_states(JobOptions { route: Some(route), ..JobOptions::default() });
+    let options = SessionOptions { keep: Keep::Cycles(10), replay, ..options };
     Crew { options, ..Crew::of(workers) }
 }
 

@@ -7,10 +7,11 @@ use std::{
 
 use deck::model::Model;
 use master::{
+    deck_file::read_deck,
     embedded::{self, Sink},
-    event::{Action, Balance, Hand, Options},
+    event::{Action, Hand},
     job::Job,
-    run::read_deck,
+    options::SessionOptions,
     simulate::{
         calibrate,
         cluster::{self, Cluster},
@@ -22,7 +23,7 @@ use master::{
         virtual_clock,
     },
 };
-use protocol::message::Route;
+use protocol::options::{Balance, Route};
 
 fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -142,7 +143,7 @@ impl Sink for Nowhere {
 fn embedded_digest(model: &Arc<Model>) -> String {
     let hand = Hand { name: "worker".into(), speed: 1.0, threads: 1 };
     let (job, first) =
-        Job::new(Arc::clone(model), &[hand], Options::default(), None).expect("the deck starts");
+        Job::new(Arc::clone(model), &[hand], SessionOptions::default(), None).expect("the deck starts");
     let (outcome, _) =
         embedded::run(job, first, 1, 1, &mut Nowhere, &AtomicBool::new(false)).expect("the deck runs");
     outcome.digest
@@ -390,7 +391,7 @@ fn elements_lost_to_erosion_are_followed_within_two_boundaries() {
     let (job, first) = Job::new(
         Arc::clone(&model),
         &[Hand { name: "worker".into(), speed: 1.0, threads: 1 }],
-        Options::default(),
+        SessionOptions::default(),
         None,
     )
     .expect("the deck starts");

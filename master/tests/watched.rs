@@ -9,14 +9,15 @@ use std::{
 
 use deck::Model;
 use master::{
-    event::{Hand, Options},
+    event::Hand,
     job::Job,
     results::{self, Folder, vtu::read::Piece},
 };
 use mechanics::state::field;
+use protocol::options::JobOptions;
 use tests::{
     bits::Fingerprint,
-    solve::{Crew, Solved, model, run, solve},
+    solve::{Crew, Solved, model, run, solve, without_states},
 };
 
 const PARTS: &str = r#"
@@ -79,7 +80,7 @@ fn watching_changes_no_bit_and_sees_the_same_on_any_workers() {
             one.assert_equal(&Fingerprint::of(&many), &format!("{workers} workers, friction {friction}"));
         }
         // From a snapshot, on other workers.
-        let options = Options { snapshot_at: Some(33), ..Options::default() };
+        let options = without_states(JobOptions { snapshot_at: Some(33), ..JobOptions::default() });
         let stored = solve(plates(friction, true), Crew { options, ..Crew::default() });
         let resume = stored.unwrap_or_else(|e| panic!("{e}")).snapshot;
         assert!(resume.is_some(), "no snapshot at cycle 33");
@@ -163,8 +164,8 @@ fn contact_surface_carries_the_force_of_the_history_as_pressure_where_bodies_tou
     deck.setup.control.end_cycle = 60;
     let solved = run(deck);
     let hand = Hand { name: "one".into(), speed: 1.0, threads: 1 };
-    let (job, _) =
-        Job::new(Arc::clone(&solved.model), &[hand], Options::default(), None).expect("it has run");
+    let (job, _) = Job::new(Arc::clone(&solved.model), &[hand], without_states(JobOptions::default()), None)
+        .expect("it has run");
     let probe = job.probe().expect("there is contact");
     let (surface, map) = probe.map(&solved.model, &solved.state);
     let on_projectile = |n: usize| surface.node_part[n] == 1;

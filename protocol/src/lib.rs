@@ -5,7 +5,7 @@
 //! large messages into chunks; [`link`] carries frames both ways over any byte stream without one
 //! direction waiting for the other; [`order`] keeps control messages in order over it; [`handshake`] says who is at the other end; [`tls`] proves it, and a [`token`] brings a newcomer there. [`message`] and
 //! [`wire`] are what master and workers say in a run, [`phase`] how workers report on their time, [`request`] what clients
-//! ask, [`dial`] how to call; [`shape`] makes a stream as slow as an emulated wire.
+//! ask and [`options`] what they ask of a run, [`dial`] how to call; [`shape`] makes a stream as slow as an emulated wire.
 //!
 //! Nothing here knows what a cycle computes: a link moves frames and ends with one [`Error`] value when
 //! the peer breaks a rule. No input from a peer reaches a panic.
@@ -16,6 +16,7 @@ pub mod frame;
 pub mod handshake;
 pub mod link;
 pub mod message;
+pub mod options;
 pub mod order;
 pub mod phase;
 pub mod request;

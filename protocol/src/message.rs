@@ -23,7 +23,7 @@ use mechanics::{
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
 
-use crate::phase::Report;
+use crate::{options::Route, phase::Report};
 
 /// From the master to a worker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -104,16 +104,6 @@ pub struct ToPeer {
     pub cycle: u64,
     /// Partial forces of the nodes that both hold, three numbers each.
     pub partials: Vec<f64>,
-}
-
-/// How partial forces travel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Route {
-    /// To the master, which adds them and sends totals back: the paper's card, and the reference.
-    #[default]
-    Master,
-    /// From each worker to those that share nodes with it; votes and orders pass the master.
-    Direct,
 }
 
 /// All that a worker holds of a job.

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{codec::finite, message::Route};
+use crate::{codec::finite, options::JobOptions};
 
 /// Most bytes of a deck's text.
 pub const DECK_LIMIT: usize = 256 << 20;
@@ -106,76 +106,6 @@ pub enum Reply {
     Piece(Vec<u8>),
     /// It cannot be done, and why.
     No(String),
-}
-
-/// What a user asks of a run beside its deck.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct JobOptions {
-    /// Stop after this many cycles, unless the deck ends before.
-    pub cycles: Option<u64>,
-    /// Stop at this time (deck's unit), unless the deck ends before.
-    pub end_time: Option<f64>,
-    /// Lane width by name; the widest of each machine if none.
-    pub lanes: Option<String>,
-    /// How partial forces travel.
-    pub route: RouteChoice,
-    /// Write no results folder.
-    pub no_output: bool,
-    /// Store the run at the start of this cycle.
-    pub snapshot_at: Option<u64>,
-    /// Extra sorts every so many cycles.
-    pub sort_every: Option<u64>,
-    /// Extra sorts at pseudo-random cycles of this seed.
-    pub sort_seed: Option<u64>,
-    /// Start when so many workers are there.
-    pub min_workers: u32,
-    /// What speeds work is dealt out by.
-    pub balance: Balance,
-    /// Seconds from one state kept in memory to the next; none if it is never kept, so that a loss begins the run anew.
-    pub keep_every: Option<f64>,
-    /// Seconds from one snapshot on disk to the next; 0 for none, none for the deck's or the master's choice.
-    pub snapshot_every: Option<f64>,
-    /// The same in cycles.
-    pub snapshot_cycles: Option<u64>,
-    /// Jobs of a higher one go first.
-    pub priority: i32,
-    /// Write `trace.json`: what every worker did in its last cycles.
-    pub trace: bool,
-}
-
-/// What speeds work is dealt out by. No bit of a result depends on it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Balance {
-    /// Those that users gave.
-    #[default]
-    Given,
-    /// Those, corrected by what is measured.
-    Measured,
-}
-
-/// How a user wants partial forces to travel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum RouteChoice {
-    /// As [`RouteChoice::choose`] says.
-    #[default]
-    Auto,
-    /// Through the master.
-    Master,
-    /// From worker to worker; pairs that cannot reach each other are relayed by the master.
-    Direct,
-}
-
-impl RouteChoice {
-    /// The route of a job on so many workers. Auto is direct with two workers or more when every one of them takes peers
-    /// (`all_take_peers`), and master otherwise: one worker has nobody to exchange with, and what is relayed passes the
-    /// master's link twice as often as sums do.
-    pub const fn choose(self, workers: usize, all_take_peers: bool) -> Route {
-        match self {
-            Self::Direct => Route::Direct,
-            Self::Auto if workers > 1 && all_take_peers => Route::Direct,
-            Self::Master | Self::Auto => Route::Master,
-        }
-    }
 }
 
 /// Where a job stands.
@@ -315,20 +245,6 @@ pub fn check_file_name(name: &str) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn auto_is_direct_where_there_is_somebody_to_exchange_with_who_can_be_reached() {
-        use RouteChoice::{Auto, Direct, Master};
-        for (choice, workers, all_take_peers, route) in [
-            (Auto, 2, true, Route::Direct),
-            (Auto, 1, true, Route::Master),
-            (Auto, 9, false, Route::Master),
-            (Direct, 1, false, Route::Direct),
-            (Master, 9, true, Route::Master),
-        ] {
-            assert_eq!(choice.choose(workers, all_take_peers), route, "{choice:?} of {workers}");
-        }
-    }
 
     #[test]
     fn file_names_cannot_leave_their_folder() {

@@ -55,7 +55,7 @@ fn bad_peers_are_one_line_each_and_the_job_goes_on() {
     let mut damaged = old.clone();
     damaged[HEADER_LEN + 3] ^= 1;
     for (bytes, words) in [
-        (old.clone(), "protocol version 9, this side speaks 7"),
+        (old.clone(), "protocol version 9, this side speaks 8"),
         (vec![0x55; 400], "frame starts with [55, 55, 55, 55]"),
         (oversize.to_vec(), "hello: length 4294967295, limit 4096"),
         (old[..20].to_vec(), "frame header: ended after 20 bytes, needs 52"),

@@ -1,6 +1,7 @@
 //! What must be equal to the bit between two runs of one problem.
 
-use master::{event::ForceSorts, results::history::HistoryRow};
+use master::results::history::HistoryRow;
+use protocol::options::JobOptions;
 
 use crate::solve::Solved;
 
@@ -71,6 +72,7 @@ fn numbers(row: &HistoryRow) -> Vec<u64> {
 }
 
 /// The forced sorts that every comparison tries.
-pub fn forced_sorts() -> [ForceSorts; 3] {
-    [ForceSorts::Every(1), ForceSorts::Every(7), ForceSorts::Seeded(11)]
+pub fn forced_sorts() -> [JobOptions; 3] {
+    let every = |n| JobOptions { sort_every: Some(n), ..JobOptions::default() };
+    [every(1), every(7), JobOptions { sort_seed: Some(11), ..JobOptions::default() }]
 }

@@ -17,8 +17,9 @@ use std::{
 
 use deck::Model;
 use master::{
-    event::{Action, Event, Hand, Options, Outcome},
+    event::{Action, Event, Hand, Outcome},
     job::Job,
+    options::SessionOptions,
     results::history::HistoryRow,
     snapshot::Snapshot,
 };
@@ -167,7 +168,7 @@ struct Disk {
 /// The world of one seed.
 struct World {
     model: Arc<Model>,
-    options: Options,
+    options: SessionOptions,
     draws: Draws,
     now: u64,
     /// Time, number: so that what is due at once happens in the order it was put there.
@@ -196,7 +197,7 @@ pub struct Played {
 ///
 /// # Errors
 /// What kept it from its end.
-pub fn play(model: &Arc<Model>, options: &Options, seed: u64, plot: Plot) -> Result<Played, String> {
+pub fn play(model: &Arc<Model>, options: &SessionOptions, seed: u64, plot: Plot) -> Result<Played, String> {
     let mut world = World {
         model: Arc::clone(model),
         options: options.clone(),
@@ -235,8 +236,8 @@ impl World {
         self.hosts.extend((0..workers).map(Host::new));
         let resume = self.disk.snapshot.clone();
         let cycle = resume.as_ref().map_or(0, |snapshot| snapshot.state.cycle);
-        let options =
-            Options { snapshot_at: self.plot.snapshot_at.filter(|at| *at > cycle), ..self.options.clone() };
+        let mut options = self.options.clone();
+        options.asked.snapshot_at = self.plot.snapshot_at.filter(|at| *at > cycle);
         let (mut job, actions) = Job::new(Arc::clone(&self.model), &hands, options, resume)?;
         if self.plot.unfenced {
             job.plant_unfenced();

@@ -5,12 +5,14 @@ use std::sync::{Arc, atomic::AtomicBool};
 use deck::Model;
 use master::{
     embedded::{self, Fate, Sink},
-    event::{Action, Hand, Options, Outcome},
+    event::{Action, Hand, Outcome},
     job::Job,
+    options::SessionOptions,
     results::history::{GaugeRow, HistoryRow},
     snapshot::Snapshot,
 };
 use mechanics::state::GlobalState;
+use protocol::options::JobOptions;
 
 /// Reads a deck.
 ///
@@ -38,7 +40,7 @@ pub fn example(name: &str) -> Model {
 /// If it is not there or has faults.
 pub fn keyword(name: &str) -> Model {
     let path = format!("{}/../deck/examples/{name}.k", env!("CARGO_MANIFEST_DIR"));
-    master::run::read_deck(std::path::Path::new(&path)).unwrap_or_else(|faults| panic!("{faults}"))
+    master::deck_file::read_deck(std::path::Path::new(&path)).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 /// Who computes, and what is asked beside the deck.
@@ -49,7 +51,7 @@ pub struct Crew {
     /// Compute threads of each worker.
     pub threads: u32,
     /// Options of the job.
-    pub options: Options,
+    pub options: SessionOptions,
     /// Where to go on from.
     pub resume: Option<Snapshot>,
 }
@@ -57,7 +59,7 @@ pub struct Crew {
 impl Default for Crew {
     /// One worker of one thread.
     fn default() -> Self {
-        Self { speeds: vec![1.0], threads: 1, options: Options::default(), resume: None }
+        Self { speeds: vec![1.0], threads: 1, options: without_states(JobOptions::default()), resume: None }
     }
 }
 
@@ -66,6 +68,11 @@ impl Crew {
     pub fn of(workers: usize) -> Self {
         Self { speeds: vec![1.0; workers], ..Self::default() }
     }
+}
+
+/// The options of a session that gathers no states on its way.
+pub fn without_states(asked: JobOptions) -> SessionOptions {
+    SessionOptions { asked: JobOptions { no_output: true, ..asked }, ..SessionOptions::default() }
 }
 
 /// A run that came to its end.
@@ -249,6 +256,6 @@ pub fn run(model: Model) -> Solved {
 /// # Panics
 /// If the run fails.
 pub fn run_with_states(model: Model) -> Solved {
-    let options = Options { states: true, ..Options::default() };
+    let options = SessionOptions::default();
     solve(model, Crew { options, ..Crew::default() }).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -7,22 +7,22 @@ use std::sync::Arc;
 use mechanics::{lanes::Width, state::GlobalState};
 use tests::{
     bits::{Fingerprint, forced_sorts},
-    solve::{Crew, example, keyword, model, solve, solve_through},
+    solve::{Crew, example, keyword, model, solve, solve_through, without_states},
 };
 
 use deck::Model;
 use master::{
     embedded::Fate,
-    event::{ForceSorts, Keep, Options},
+    options::{Keep, SessionOptions},
 };
-use protocol::message::Route;
+use protocol::options::{JobOptions, Route};
 
 pub(crate) fn fingerprint(model: &Model, crew: Crew) -> Fingerprint {
     Fingerprint::of(&solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}")))
 }
 
 /// A crew with these options.
-pub(crate) fn asked(workers: usize, options: Options) -> Crew {
+pub(crate) fn asked(workers: usize, options: SessionOptions) -> Crew {
     Crew { options, ..Crew::of(workers) }
 }
 
@@ -37,7 +37,7 @@ fn crews() -> Vec<(String, Crew)> {
     }
     crews.push(("speeds 1, 2, 0.5".to_owned(), Crew { speeds: vec![1.0, 2.0, 0.5], ..Crew::default() }));
     for width in Width::ALL.into_iter().filter(|width| width.available()) {
-        let options = Options { lanes: Some(width.to_string()), ..Options::default() };
+        let options = without_states(JobOptions { lanes: Some(width.to_string()), ..JobOptions::default() });
         crews.push((format!("{width}, 2 workers"), asked(2, options)));
     }
     crews
@@ -57,8 +57,8 @@ pub(crate) fn same_bits(model: &Model) {
     if model.setup.contact.is_some() {
         for sorts in forced_sorts() {
             for workers in [1, 3] {
-                let options = Options { force_sorts: sorts, ..Options::default() };
-                let name = format!("{workers} workers, sorts {sorts:?}");
+                let name = format!("{workers} workers, sorts {:?} {:?}", sorts.sort_every, sorts.sort_seed);
+                let options = without_states(sorts.clone());
                 one.assert_equal(&fingerprint(model, asked(workers, options)), &name);
             }
         }
@@ -66,13 +66,13 @@ pub(crate) fn same_bits(model: &Model) {
         slack.setup.contact.as_mut().expect("just asked").slack *= 2.0;
         one.assert_equal(&fingerprint(&slack, Crew::of(2)), "doubled slack");
     }
-    let options = Options { snapshot_at: Some(cycles / 2), ..Options::default() };
+    let options = without_states(JobOptions { snapshot_at: Some(cycles / 2), ..JobOptions::default() });
     let whole = solve(model.clone(), asked(2, options)).unwrap_or_else(|e| panic!("{e}"));
     one.assert_equal(&Fingerprint::of(&whole), "a snapshot taken on the way");
     let snapshot = whole.snapshot.expect("a snapshot was asked for");
     assert_eq!(snapshot.state.cycle, cycles / 2);
     for workers in [1, 3] {
-        let options = Options { force_sorts: ForceSorts::Seeded(5), ..Options::default() };
+        let options = without_states(JobOptions { sort_seed: Some(5), ..JobOptions::default() });
         let crew = Crew { resume: Some(snapshot.clone()), ..asked(workers, options) };
         one.assert_equal(&fingerprint(model, crew), &format!("restored on {workers} workers"));
     }
@@ -81,7 +81,7 @@ pub(crate) fn same_bits(model: &Model) {
 /// Compares `one`, a run on one worker, with runs on route direct.
 pub(crate) fn same_bits_on_route_direct(model: &Model, one: &Fingerprint) {
     for workers in [2, 3, 5] {
-        let options = Options { route: Route::Direct, ..Options::default() };
+        let options = without_states(JobOptions { route: Some(Route::Direct), ..JobOptions::default() });
         one.assert_equal(&fingerprint(model, asked(workers, options)), &format!("{workers} workers, direct"));
     }
 }
@@ -97,7 +97,8 @@ pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
     solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
     let mut midway = 0;
     for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
-        let options = Options { keep: Keep::Cycles(10), route, ..Options::default() };
+        let options = without_states(JobOptions { route: Some(route), ..JobOptions::default() });
+        let options = SessionOptions { keep: Keep::Cycles(10), ..options };
         let at = arrivals * (seed as u64 + 4) / 12;
         let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
         let solved = solve_through(model.clone(), asked(3, options), &mut fate)
@@ -113,7 +114,7 @@ pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
 fn a_snapshot_whose_arrays_are_not_as_long_as_the_problems_is_refused() {
     let mut model = example("plates-joined");
     model.setup.control.end_cycle = 4;
-    let options = Options { snapshot_at: Some(2), ..Options::default() };
+    let options = without_states(JobOptions { snapshot_at: Some(2), ..JobOptions::default() });
     let whole = solve(model.clone(), asked(1, options)).unwrap_or_else(|e| panic!("{e}"));
     let snapshot = whole.snapshot.expect("a snapshot was asked for");
     let spoils: [fn(&mut GlobalState); 5] = [

@@ -1,10 +1,11 @@
 //! Rigid bodies of shells: the same bits on any crew, what is joined to them feels them as it should, nothing is lost.
 
 use deck::Model;
-use master::{event::Options, snapshot::file};
+use master::snapshot::file;
+use protocol::options::JobOptions;
 use tests::{
     bits::Fingerprint,
-    solve::{Crew, Solved, cross, keyword, model, solve},
+    solve::{Crew, Solved, cross, keyword, model, solve, without_states},
 };
 
 use crate::bits::{losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
@@ -50,7 +51,7 @@ fn a_snapshot_of_rigid_shells_goes_on_from_its_file_with_the_same_bits() {
     let mut model = whip();
     model.setup.control.end_cycle = 120;
     let one = Fingerprint::of(&run(&model, Crew::default()));
-    let options = Options { snapshot_at: Some(70), ..Options::default() };
+    let options = without_states(JobOptions { snapshot_at: Some(70), ..JobOptions::default() });
     let taken = run(&model, Crew { options, ..Crew::of(2) }).snapshot.expect("a snapshot was asked for");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("snapshot.bolide");

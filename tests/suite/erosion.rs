@@ -5,17 +5,16 @@
 use std::collections::BTreeMap;
 
 use deck::Model;
-use master::event::Options;
 use mechanics::{
     erosion::{ALIVE, SURFACE_LAG},
     mesh::{CORNERS, FACES},
     state::{GlobalState, field},
 };
-use protocol::message::Route;
+use protocol::options::{JobOptions, Route};
 use tests::{
     bits::Fingerprint,
     checker::intruders,
-    solve::{Crew, Solved, cross, keyword, model, solve},
+    solve::{Crew, Solved, cross, keyword, model, solve, without_states},
 };
 
 use crate::bits::{asked, fingerprint, losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
@@ -89,7 +88,8 @@ fn snapshots_after_an_erosion(model: &Model) {
     assert!(cycles.len() > 5, "{cycles:?}");
     let eroded = cycles[cycles.len() / 2];
     for after in 1..=SURFACE_LAG + 1 {
-        let options = Options { snapshot_at: Some(eroded + after), ..Options::default() };
+        let options =
+            without_states(JobOptions { snapshot_at: Some(eroded + after), ..JobOptions::default() });
         let whole = solved(model, asked(2, options));
         one.assert_equal(&Fingerprint::of(&whole), &format!("a snapshot {after} cycles after"));
         let snapshot = whole.snapshot.expect("a snapshot was asked for");
@@ -97,7 +97,7 @@ fn snapshots_after_an_erosion(model: &Model) {
         for (workers, route) in [(1, Route::Master), (3, Route::Direct)] {
             let crew = Crew {
                 resume: Some(snapshot.clone()),
-                ..asked(workers, Options { route, ..Options::default() })
+                ..asked(workers, without_states(JobOptions { route: Some(route), ..JobOptions::default() }))
             };
             one.assert_equal(
                 &fingerprint(model, crew),
@@ -261,7 +261,7 @@ fn each_criterion_takes_out_the_elements_that_meet_it_and_the_surface_is_that_of
         let last = *cycles.last().unwrap_or_else(|| panic!("nothing erodes by {criterion}"));
         // The state that the last pass with an erosion looked at, and that after it.
         model.setup.control.end_cycle = last + 1;
-        let options = Options { snapshot_at: Some(last), ..Options::default() };
+        let options = without_states(JobOptions { snapshot_at: Some(last), ..JobOptions::default() });
         let run = solved(&model, asked(2, options));
         let before = run.snapshot.expect("a snapshot was asked for").state;
         assert_eq!((before.cycle, run.state.cycle), (last, last + 1));

@@ -2,7 +2,8 @@
 //!
 //! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics; [`daemon`]
 //! carries bytes between a master and the compute thread of [`runner`]; [`peers`] between that and other workers.
-//! [`stopwatch`] tells where the time goes, [`notify`] a service manager how this process does.
+//! [`stopwatch`] tells where the time goes, [`notify`] a service manager how this process does;
+//! [`processors`] confines it to some of this machine's.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 
@@ -11,6 +12,7 @@ pub mod daemon;
 pub mod failpoint;
 pub mod notify;
 pub mod peers;
+pub mod processors;
 pub mod runner;
 pub mod session;
 pub mod stopwatch;

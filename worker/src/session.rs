@@ -14,7 +14,10 @@ use mechanics::{
     vote::Vote,
     wall::Pose,
 };
-use protocol::message::{Assign, IMAGE_VERSION, Orders, Route, ToMaster, ToPeer, ToWorker, Work};
+use protocol::{
+    message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToPeer, ToWorker, Work},
+    options::Route,
+};
 
 /// What happens to a session.
 #[derive(Debug)]

@@ -7,22 +7,45 @@
 
 use std::{
     process::ExitCode,
+    str::FromStr,
     sync::{Arc, atomic::AtomicBool},
     time::Instant,
 };
 
 use deck::model::Model;
 use mechanics::{lanes::Width, mesh::Topology};
+use protocol::options::JobOptions;
 use serde::Serialize;
 
 use crate::{
     command::GrindArgs,
+    deck_file,
     embedded::{self, Sink},
-    event::{Action, Hand, Options},
+    event::{Action, Hand},
     job::Job,
-    run::list_of_faults,
+    options::SessionOptions,
     simulate::measure::{self, Measured},
 };
+
+/// A worker's speed relative to the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Speed {
+    /// Measured when the worker starts.
+    Auto,
+    /// As it was said.
+    Given(f64),
+}
+
+impl FromStr for Speed {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        text.parse().map(Self::Given).map_err(|_| format!("speed {text:?}: a number, or auto to measure it"))
+    }
+}
 
 /// The grind time of speed 1 (ns): a thread that takes half as long has speed 2.
 const SPEED_ONE: f64 = 100.0;
@@ -97,7 +120,7 @@ fn shells(side: u32) -> String {
 
 fn model(text: &str, explicit: bool) -> Result<Arc<Model>, String> {
     let mut model = deck::read(text, "bench")
-        .map_err(|faults| list_of_faults(&faults.iter().map(ToString::to_string).collect::<Vec<_>>()))?;
+        .map_err(|faults| deck_file::Error::of_faults(faults.iter().map(ToString::to_string)))?;
     model.setup.control.end_cycle = CYCLES;
     if explicit {
         for part in &mut model.mesh.parts {
@@ -146,7 +169,9 @@ struct Taken {
 
 fn once(model: &Arc<Model>, threads: u32, lanes: Option<Width>) -> Result<Taken, String> {
     let hands = [Hand { name: "bench".to_owned(), speed: 1.0, threads }];
-    let options = Options { lanes: lanes.map(|width| width.to_string()), ..Options::default() };
+    let lanes = lanes.map(|width| width.to_string());
+    let asked = JobOptions { lanes, no_output: true, ..JobOptions::default() };
+    let options = SessionOptions { asked, ..SessionOptions::default() };
     let (mut job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
     job.keep_no_state();
     let surface_nodes = job.surface().map_or(0, |surface| surface.nodes.len());
@@ -226,7 +251,7 @@ pub fn run(args: &GrindArgs) -> Result<ExitCode, String> {
     if let Some(pin) = &args.pin {
         pin.apply()?;
     }
-    let lanes = args.lanes.map(|lanes| lanes.name().parse::<Width>().and_then(Width::require));
+    let lanes = args.lanes.as_ref().map(|lanes| lanes.parse::<Width>().and_then(Width::require));
     let lanes = lanes.transpose().map_err(|e| e.to_string())?;
     let report = measured(args.rounds, args.side, lanes)?;
     if args.json {
@@ -333,6 +358,14 @@ pub fn speed(threads: u32) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn speeds_are_read_and_faults_say_what_was_read() {
+        assert_eq!("auto".parse(), Ok(Speed::Auto));
+        assert_eq!("0.5".parse(), Ok(Speed::Given(0.5)));
+        let fault = "speed \"fast\": a number, or auto to measure it".to_owned();
+        assert_eq!("fast".parse::<Speed>(), Err(fault));
+    }
 
     #[test]
     fn all_cases_run_and_explicit_connectivity_is_the_grid_s() {

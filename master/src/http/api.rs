@@ -22,7 +22,10 @@ use axum::{
     response::{IntoResponse, Response, Sse, sse},
     routing::{get, post},
 };
-use protocol::request::{DECK_LIMIT, JobOptions, Status};
+use protocol::{
+    options::JobOptions,
+    request::{DECK_LIMIT, Status},
+};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use tokio::sync::{mpsc, oneshot};

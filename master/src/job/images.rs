@@ -109,7 +109,7 @@ impl Job {
         if state.cycle > self.first_cycle && last != Some(state.cycle - 1) {
             self.row(actions);
         }
-        if self.options.states {
+        if !self.options.asked.no_output {
             actions.push(Action::State(Box::new(state.clone())));
         }
         self.finish(Some(state), actions);
@@ -140,7 +140,7 @@ impl Job {
 
     /// Gives the base to the sink, where that is asked for.
     pub(super) fn store(&self, cycle: u64, actions: &mut Vec<Action>) {
-        if self.options.snapshot_at == Some(cycle)
+        if self.options.asked.snapshot_at == Some(cycle)
             && let Some(snapshot) = self.base_as_snapshot()
         {
             actions.push(Action::Snapshot(snapshot));

@@ -9,12 +9,12 @@
 
 use std::collections::VecDeque;
 
-use protocol::message::Work;
+use protocol::{message::Work, options::Balance};
 
 use super::Job;
 use crate::{
     decompose::{Living, decompose, work},
-    event::{Balance, Rebalance},
+    event::Rebalance,
 };
 
 /// Cycles whose median counts.
@@ -86,7 +86,7 @@ pub(super) struct Patience {
 impl Job {
     /// Looks, at a plan boundary, whether other speeds would be better; true if the epoch is to end for that.
     pub(super) fn wants_other_speeds(&mut self, cycle: u64) -> bool {
-        if self.options.balance == Balance::Given || self.epoch.n() < 2 {
+        if self.options.asked.balance == Balance::Given || self.epoch.n() < 2 {
             return false;
         }
         let Some(medians) = self.epoch.meter.medians() else { return false };

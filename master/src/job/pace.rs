@@ -39,7 +39,7 @@ impl Job {
         }
         let stop = self.epoch.stop_at == Some(after);
         let due = match (self.epoch.next_state_time, self.model.output.period) {
-            (Some(due), Some(period)) if self.options.states && time_after >= due => {
+            (Some(due), Some(period)) if !self.options.asked.no_output && time_after >= due => {
                 self.epoch.next_state_time = Some(output_after(time_after, period));
                 true
             }
@@ -95,7 +95,7 @@ impl Job {
         if due {
             self.epoch.last_base = cycle;
         }
-        due || self.options.snapshot_at == Some(cycle)
+        due || self.options.asked.snapshot_at == Some(cycle)
     }
 
     /// Whether positions travel at the start of cycle `cycle`, so that a sort acts a lag later.
@@ -107,7 +107,7 @@ impl Job {
         if in_flight as u64 > 2 * lag + 2 {
             return false;
         }
-        if self.options.force_sorts.at(cycle) {
+        if self.options.asked.forces_sort(cycle) {
             return true;
         }
         let Some(vote) = vote else { return false };

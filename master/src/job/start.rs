@@ -31,10 +31,11 @@ use super::{
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
     decompose::{self, Living, decompose, work},
-    event::{Action, Deal, Hand, Options},
+    event::{Action, Deal, Hand},
     exchange::Exchange,
     holdings::Holdings,
     ledger::Ledger,
+    options::SessionOptions,
     snapshot::Snapshot,
     sort::{Gathered, Sorter},
 };
@@ -60,7 +61,7 @@ impl Job {
     pub fn new(
         model: Arc<Model>,
         hands: &[Hand],
-        options: Options,
+        options: SessionOptions,
         resume: Option<Snapshot>,
     ) -> Result<(Self, Vec<Action>), String> {
         if hands.is_empty() {
@@ -241,7 +242,7 @@ impl Job {
                     settings.clone(),
                     Arc::clone(&touching.exclusions),
                     speeds.clone(),
-                    self.options.route,
+                    self.options.route(),
                     self.options.dealing,
                     costs.pair,
                     &cut.gather,
@@ -259,7 +260,7 @@ impl Job {
                 self.census = sorted.census;
                 (sorted.exchange, sorted.interactions)
             }
-            _ => (Exchange::new(&cut.holdings, vec![None; n], state, self.options.route), vec![0; n]),
+            _ => (Exchange::new(&cut.holdings, vec![None; n], state, self.options.route()), vec![0; n]),
         };
         self.imbalance = imbalance(&elements, &interactions, &speeds);
         let exchange = Arc::new(exchange);
@@ -281,10 +282,10 @@ impl Job {
                 subdomains,
                 gauges: gauges.clone(),
                 watched: watched.clone(),
-                lanes: self.options.lanes.clone(),
+                lanes: self.options.asked.lanes.clone(),
                 cycle: state.cycle,
                 dt_previous: base.rest.dt_previous,
-                route: self.options.route,
+                route: self.options.route(),
                 plan: exchange.plans[position].clone(),
                 plan_hash: exchange.hash,
                 guest_state: exchange.guest_state_from(position, state),

@@ -3,11 +3,15 @@
 use std::{collections::VecDeque, sync::Arc};
 
 use mechanics::vote::Vote;
-use protocol::message::{IMAGE_VERSION, ToMaster, ToWorker, Work};
+use protocol::{
+    message::{IMAGE_VERSION, ToMaster, ToWorker, Work},
+    options::{Balance, JobOptions},
+};
 
 use super::Job;
 use crate::{
-    event::{Action, Balance, Event, Hand, Options},
+    event::{Action, Event, Hand},
+    options::SessionOptions,
     sort::Gathered,
 };
 
@@ -35,7 +39,7 @@ fn hands(n: usize) -> Vec<Hand> {
 
 fn job(n: usize) -> (Job, Vec<Action>) {
     let model = deck::read(DECK, "two cubes").expect("a good deck");
-    Job::new(Arc::new(model), &hands(n), Options::default(), None).expect("a good problem")
+    Job::new(Arc::new(model), &hands(n), SessionOptions::default(), None).expect("a good problem")
 }
 
 /// A job whose workers are ready and have their first orders, and the number of exchange nodes of each.
@@ -161,7 +165,7 @@ fn the_last_worker_lost_ends_a_job_that_does_not_wait() {
 
 fn waiting(n: usize) -> Job {
     let model = Arc::new(deck::read(DECK, "two cubes").expect("a good deck"));
-    let options = Options { waits: true, ..Options::default() };
+    let options = SessionOptions { waits: true, ..SessionOptions::default() };
     let (mut job, _) = Job::new(model, &hands(n), options, None).expect("a good problem");
     for worker in 0..n {
         job.apply(Event::Lost(worker, "power cut".into()));
@@ -265,7 +269,8 @@ fn dealt_anew(cycles: u64, mut nanoseconds: impl FnMut(usize, u64) -> f64) -> Ve
         "title = \"bar\"\nunits = \"SI\"\n[control]\nend_cycle = {cycles}\nplan_interval = 20\n[[part]]\nname = \"bar\"\nmaterial = \"LEAD\"\nbox = {{ origin = [0, 0, 0], size = [4, 1, 1], cells = [40, 10, 10] }}\n"
     );
     let model = Arc::new(deck::read(&text, "bar").expect("a good deck"));
-    let options = Options { balance: Balance::Measured, ..Options::default() };
+    let asked = JobOptions { balance: Balance::Measured, ..JobOptions::default() };
+    let options = SessionOptions { asked, ..SessionOptions::default() };
     let (mut job, first) = Job::new(model, &hands(4), options, None).expect("a good problem");
     let vote = || Some(Box::new(Vote { courant: 1e-9, ..Vote::empty(1) }));
     let mut busy = [0.0; 4];

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use deck::model::Model;
 use mechanics::contact::Surface;
-use protocol::message::Route;
+use protocol::options::Route;
 
 use super::{
     cluster::{Cluster, ElementCost},

@@ -1,16 +1,13 @@
 //! What a run is put on: hosts, what work costs on them, and how the program itself goes about it.
 
 use mechanics::{cycle::Load, lanes::Width};
-use protocol::message::Route;
+use protocol::options::{Balance, Route};
 
 use super::{
     network::Network,
     timeline::{Kind, Phases},
 };
-use crate::{
-    balance::{self, Dealing},
-    event::Balance,
-};
+use crate::balance::{self, Dealing};
 
 /// What work costs on a host of speed 1 (s).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

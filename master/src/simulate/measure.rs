@@ -15,7 +15,7 @@ use deck::model::Model;
 use mechanics::{cycle::Meter, lanes::Width};
 use protocol::{
     frame::{self, Frame, Header},
-    message::Route,
+    options::Route,
 };
 use serde::Serialize;
 use worker::compute::ThreadClock;

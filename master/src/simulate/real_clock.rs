@@ -21,7 +21,8 @@ use deck::model::Model;
 use mechanics::cycle::{Load, Meter};
 use protocol::{
     frame,
-    message::{Route, ToWorker},
+    message::ToWorker,
+    options::{JobOptions, Route},
     order::Letter,
     wire::{self, Packed},
 };
@@ -36,8 +37,9 @@ use super::{
     timeline::{Flight, Kind, Span, Timeline, counts_at, phases_at},
 };
 use crate::{
-    event::{Action, Event, Hand, Options},
+    event::{Action, Event, Hand},
     job::Job,
+    options::SessionOptions,
     sort::Sorted,
 };
 
@@ -213,8 +215,12 @@ pub fn run(
         .map(|(i, &speed)| Hand { name: format!("host-{}", i + 1), speed, threads: 1 })
         .collect();
     let scheme = Scheme::bolide(route);
-    let options =
-        Options { route, dealing: scheme.dealing, costs: machines.costs.relative(), ..Options::default() };
+    let options = SessionOptions {
+        asked: JobOptions { route: Some(route), no_output: true, ..JobOptions::default() },
+        dealing: scheme.dealing,
+        costs: machines.costs.relative(),
+        ..SessionOptions::default()
+    };
     let (job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
     let (send, receive) = mpsc::channel();
     let arrived =

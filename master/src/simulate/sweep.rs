@@ -7,7 +7,7 @@
 use std::{fmt::Write as _, sync::Arc};
 
 use deck::model::Model;
-use protocol::message::Route;
+use protocol::options::Route;
 use serde::Serialize;
 
 use super::{

@@ -18,6 +18,7 @@ use std::{
 use deck::model::Model;
 use protocol::{
     message::ToWorker,
+    options::JobOptions,
     wire::{self, Packed},
 };
 use worker::session::{self, Session, Task};
@@ -31,8 +32,9 @@ use super::{
 };
 use crate::{
     embedded::timed_sort,
-    event::{Action, Event, Hand, Keep, Options},
+    event::{Action, Event, Hand},
     job::Job,
+    options::{Keep, SessionOptions},
     sort::Sorted,
 };
 use agenda::{Begun, Due, End, Parcel, What, Work};
@@ -95,15 +97,19 @@ pub fn run(
     let first_crew: Vec<usize> = (0..n).filter(|&host| !machines.comes_later(host)).collect();
     let hands: Vec<Hand> = first_crew.iter().map(|&host| hand(machines, host)).collect();
     let come_and_go = machines.come_and_go();
-    let options = Options {
+    let options = SessionOptions {
+        asked: JobOptions {
+            route: Some(scheme.route),
+            balance: scheme.balance,
+            lanes: scheme.lanes.map(|width| width.to_string()),
+            no_output: true,
+            ..JobOptions::default()
+        },
         keep: if come_and_go { Keep::Seconds(KEEP_SECONDS) } else { Keep::Never },
         waits: come_and_go,
-        route: scheme.route,
         dealing: scheme.dealing,
         costs: machines.costs.relative(),
-        balance: scheme.balance,
-        lanes: scheme.lanes.map(|width| width.to_string()),
-        ..Options::default()
+        ..SessionOptions::default()
     };
     let (job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
     let players: Vec<Player> = match tape {

@@ -1,8 +1,9 @@
 //! An octagonal girder that runs onto a rigid wall with nothing behind it: what the wall has of it, the stress that it
 //! meets the wall with, and how long its eight sides stay alike.
 
-use master::event::Options;
+use master::options::SessionOptions;
 use mechanics::state::GlobalState;
+use protocol::options::JobOptions;
 
 use crate::{
     case::Sheet,
@@ -40,7 +41,8 @@ fn thrown() -> Solved {
     );
     let mut model = model(&deck);
     model.output.period = Some(50e-6);
-    let options = Options { states: true, snapshot_at: Some(CYCLES - 10), ..Options::default() };
+    let asked = JobOptions { snapshot_at: Some(CYCLES - 10), ..JobOptions::default() };
+    let options = SessionOptions { asked, ..SessionOptions::default() };
     solve(model, Crew { options, ..Crew::default() }).unwrap_or_else(|e| panic!("{e}"))
 }
 

@@ -3,11 +3,11 @@
 //!
 //! Bars are columns of cubes without Poisson's ratio, 200 GPa and 8000 kg/m3: waves of 5000 m/s, 40 MPa s/m.
 
-use master::event::Options;
+use protocol::options::JobOptions;
 
 use crate::{
     case::Sheet,
-    solve::{Crew, Solved, mean, model, run, solve},
+    solve::{Crew, Solved, mean, model, run, solve, without_states},
 };
 
 const IMPEDANCE: f64 = 4e7;
@@ -149,7 +149,7 @@ pub(super) fn what_bodies_lose_a_wall_of_finite_mass_has(sheet: &mut Sheet) {
         [[part]]\nname = \"cube\"\nmaterial = \"CU_OFHC\"\nvelocity = [60, 0, -80]\n\
         box = { origin = [0, 0, 1e-5], size = [0.01, 0.01, 0.01], cells = [5, 5, 5] }\n\
         [[wall]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\nmass = 0.05\nfriction = 0.2\n";
-    let options = Options { snapshot_at: Some(490), ..Options::default() };
+    let options = without_states(JobOptions { snapshot_at: Some(490), ..JobOptions::default() });
     let solved = solve(model(deck), Crew { options, ..Crew::default() }).expect("a cube bounces");
     let snapshot = solved.snapshot.as_ref().expect("it was asked for");
     let [_, wall] = snapshot.walls[0];

@@ -3,15 +3,16 @@
 use std::sync::Arc;
 
 use master::{
-    event::{Action, Event, Hand, Options},
+    event::{Action, Event, Hand},
     job::Job,
+    options::{Keep, SessionOptions},
     snapshot,
 };
 use protocol::{
     codec,
     frame::{CHUNK, Frame, HEADER_LEN, Header, Kind, decode_header, encode_header},
     handshake::{self, Hello, Policy, Role, Server},
-    message::Route,
+    options::{JobOptions, Route},
     order::Inbox,
     request::{JOINING_LIMIT, Joined, Joining, Reply, Request},
     token::Token,
@@ -25,7 +26,7 @@ use worker::{
 use super::damage;
 use crate::{
     seeds::Draws,
-    solve::{Crew, model, solve},
+    solve::{Crew, model, solve, without_states},
 };
 
 /// Something that reads what comes from outside.
@@ -181,8 +182,9 @@ const WORKERS: usize = 2;
 fn job(model: &Arc<deck::Model>) -> (Job, Vec<Action>) {
     let hand = |i: usize| Hand { name: format!("host-{i}"), speed: 1.0, threads: 1 };
     let hands: Vec<Hand> = (0..WORKERS).map(hand).collect();
-    let keep = master::event::Keep::Cycles(3);
-    let options = Options { replay: true, route: Route::Master, keep, ..Options::default() };
+    let keep = Keep::Cycles(3);
+    let options = without_states(JobOptions { route: Some(Route::Master), ..JobOptions::default() });
+    let options = SessionOptions { replay: true, keep, ..options };
     Job::new(Arc::clone(model), &hands, options, None).unwrap_or_else(|e| panic!("the corpus: {e}"))
 }
 
@@ -449,7 +451,7 @@ impl Snapshots {
     const SUM: usize = 32;
 
     fn new() -> Self {
-        let options = Options { snapshot_at: Some(4), ..Options::default() };
+        let options = without_states(JobOptions { snapshot_at: Some(4), ..JobOptions::default() });
         let solved = solve(model(DECK), Crew { options, ..Crew::of(1) });
         let solved = solved.unwrap_or_else(|e| panic!("the corpus: {e}"));
         let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("the corpus: {e}"));
@@ -495,7 +497,7 @@ impl Target for Snapshots {
         }
         let Ok(stored) = snapshot::read(&path) else { return false };
         let hands = [Hand { name: "host".into(), speed: 1.0, threads: 1 }];
-        Job::new(Arc::clone(&self.model), &hands, Options::default(), Some(stored)).is_ok()
+        Job::new(Arc::clone(&self.model), &hands, without_states(JobOptions::default()), Some(stored)).is_ok()
     }
 }
 

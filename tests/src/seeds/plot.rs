@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use deck::Model;
-use master::event::{ForceSorts, Keep, Options};
-use protocol::message::Route;
+use master::options::{Keep, SessionOptions};
+use protocol::options::{JobOptions, Route};
 
 use super::{Draws, Played, play, seen};
 use crate::{bits::Fingerprint, solve::model};
@@ -134,14 +134,9 @@ const DECK: &str = r#"
     point = [2, 1, 2]
 "#;
 
-fn options() -> Options {
-    Options {
-        waits: true,
-        states: true,
-        force_sorts: ForceSorts::Seeded(11),
-        replay: true,
-        ..Options::default()
-    }
+fn options(route: Route) -> SessionOptions {
+    let asked = JobOptions { route: Some(route), sort_seed: Some(11), ..JobOptions::default() };
+    SessionOptions { asked, waits: true, replay: true, ..SessionOptions::default() }
 }
 
 impl Stage {
@@ -151,7 +146,7 @@ impl Stage {
     /// If that fails, or has no contact.
     pub fn new() -> Self {
         let model = Arc::new(model(DECK));
-        let Played { solved, count } = match play(&model, &options(), 0, Plot::quiet(3)) {
+        let Played { solved, count } = match play(&model, &options(Route::Master), 0, Plot::quiet(3)) {
             Ok(played) => played,
             Err(why) => panic!("the undisturbed run: {why}"),
         };
@@ -161,7 +156,7 @@ impl Stage {
     }
 
     /// The plot of a seed.
-    pub fn plot(&self, seed: u64) -> (Plot, Options) {
+    pub fn plot(&self, seed: u64) -> (Plot, SessionOptions) {
         let mut draws = Draws::new(seed);
         let workers = 1 + draws.below(4) as usize;
         let route = [Route::Master, Route::Direct][draws.below(2) as usize];
@@ -196,7 +191,10 @@ impl Stage {
             .collect();
         faults.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
         let store = draws.below(2) == 0;
-        (Plot { snapshot_at, faults, ..Plot::quiet(workers) }, Options { route, keep, store, ..options() })
+        (
+            Plot { snapshot_at, faults, ..Plot::quiet(workers) },
+            SessionOptions { keep, store, ..options(route) },
+        )
     }
 
     /// Plays a seed; gives what it took, or how it went wrong, with the seed and its plot.
@@ -218,7 +216,7 @@ impl Stage {
     fn perform(&self, seed: u64, unfenced: bool) -> Result<Played, String> {
         let (plot, options) = self.plot(seed);
         let plot = Plot { unfenced, ..plot };
-        let told = format!("seed {seed}: {plot:?}, {:?}, {:?}", options.route, options.keep);
+        let told = format!("seed {seed}: {plot:?}, {:?}, {:?}", options.route(), options.keep);
         let played = play(&self.model, &options, seed, plot).map_err(|why| format!("{told}: {why}"))?;
         if seen(&played.solved) != self.answer {
             let (ours, theirs) = (&self.answer.0.digest, &played.solved.outcome.digest);

@@ -1,0 +1,247 @@
+//! Where the outputs of one run go: rows and states to its folder, checkpoints to the keeper, progress to the terminal.
+
+use std::{io::IsTerminal, sync::Arc, time::Instant};
+
+use deck::model::Model;
+use indicatif::{ProgressBar, ProgressStyle};
+use mechanics::state::GlobalState;
+
+use crate::{
+    embedded::Sink,
+    event::{Action, Limit, Progress},
+    job::Job,
+    results::{
+        Folder,
+        history::{History, HistoryRow},
+        vtu::Series,
+        writer::Writer,
+    },
+    snapshot::{self, keeper::Keeper},
+};
+
+/// Writes rows and states, shows progress.
+pub struct Output {
+    model: Arc<Model>,
+    /// The results folder; none with `--no-output`.
+    pub folder: Option<Folder>,
+    /// Where bases go; none where nothing is stored.
+    pub keeper: Option<Keeper>,
+    history: Option<History>,
+    writer: Option<Writer>,
+    /// By global element index, who computes what; none where nobody wants to know.
+    owners: Option<Arc<[u32]>>,
+    bar: Option<ProgressBar>,
+    started: Instant,
+    last_line: Instant,
+    /// Length of the history before its first row and after each (bytes).
+    row_ends: Vec<u64>,
+    /// Cycle and time of each state written.
+    states: Vec<(u64, f64)>,
+}
+
+impl Output {
+    /// Opens the files of a results folder.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn new(model: Arc<Model>, folder: Option<Folder>, json: bool) -> Result<Self, String> {
+        let fault = |e: crate::results::Error| e.to_string();
+        let history = folder.as_ref().map(|f| History::create(f, &model)).transpose().map_err(fault)?;
+        let series = folder.as_ref().map(|f| Series::new(f, &model)).transpose().map_err(fault)?;
+        let writer = series.map(|series| Writer::start(series, Arc::clone(&model))).transpose()?;
+        let bar = (std::io::stderr().is_terminal() && !json).then(|| {
+            let bar = ProgressBar::new(1000);
+            if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3}% {msg}") {
+                bar.set_style(style);
+            }
+            bar
+        });
+        let row_ends = history.iter().map(History::length).collect();
+        Ok(Self {
+            model,
+            folder,
+            keeper: None,
+            history,
+            row_ends,
+            states: Vec::new(),
+            writer,
+            owners: None,
+            bar,
+            started: Instant::now(),
+            last_line: Instant::now(),
+        })
+    }
+
+    /// Writes what belongs before the first cycle of a session: the rows so far, and the first state. `states` are those
+    /// that an earlier session wrote into this very folder before the snapshot that is gone on with; later ones go.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn go_on(&mut self, job: &Job, states: Option<Vec<(u64, f64)>>) -> Result<(), String> {
+        for row in job.rows_before() {
+            self.row(row)?;
+        }
+        let Some(writer) = &self.writer else { return Ok(()) };
+        if let Some(probe) = job.probe().filter(|_| self.model.output.contact_surface) {
+            let on = |series: &mut Series| {
+                series.with_contact(probe);
+                Ok(())
+            };
+            writer.with(on).map_err(|e| e.to_string())?;
+        }
+        self.owners = job.owners();
+        let Some(states) = states else { return self.state(Box::new(job.start_state().clone())) };
+        if let Some(folder) = &self.folder {
+            folder.keep_states(states.len()).map_err(|e| e.to_string())?;
+        }
+        self.states = states;
+        self.roll_back()
+    }
+
+    /// Makes the index name the states that are left.
+    fn roll_back(&mut self) -> Result<(), String> {
+        let Some(writer) = &self.writer else { return Ok(()) };
+        let times: Vec<f64> = self.states.iter().map(|(_, time)| *time).collect();
+        writer.with(|series| series.roll_back(&times)).map_err(|e| e.to_string())
+    }
+
+    /// States that were handed over are on disk after this.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn flush(&self) -> Result<(), String> {
+        self.writer.as_ref().map_or(Ok(()), Writer::flush).map_err(|e| e.to_string())
+    }
+
+    /// Appends a row of history.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn row(&mut self, row: &HistoryRow) -> Result<(), String> {
+        let Some(history) = &mut self.history else { return Ok(()) };
+        history.append(row).map_err(|e| e.to_string())?;
+        self.row_ends.push(history.length());
+        Ok(())
+    }
+
+    /// Drops all rows but the first so many, and states of later cycles than this.
+    fn rewind(&mut self, rows: usize, cycle: u64) -> Result<(), String> {
+        let fault = |e: crate::results::Error| e.to_string();
+        self.row_ends.truncate(rows + 1);
+        if let (Some(history), Some(&end)) = (&mut self.history, self.row_ends.last()) {
+            history.roll_back(end).map_err(fault)?;
+        }
+        self.states.retain(|(written, _)| *written <= cycle);
+        self.roll_back()
+    }
+
+    /// Has a state written, unless one of that time was the last.
+    ///
+    /// # Errors
+    /// What the disk refused, of this state or of one before.
+    pub fn state(&mut self, state: Box<GlobalState>) -> Result<(), String> {
+        if self.states.last().is_some_and(|(_, time)| *time == state.time) {
+            return Ok(());
+        }
+        let moment = (state.cycle, state.time);
+        if let Some(writer) = &self.writer {
+            writer.put(state, self.owners.clone()).map_err(|e| e.to_string())?;
+        }
+        self.states.push(moment);
+        Ok(())
+    }
+
+    fn progress(&mut self, progress: Progress) {
+        let now = Instant::now();
+        let every = if self.bar.is_some() { 0.1 } else { 10.0 };
+        if now.duration_since(self.last_line).as_secs_f64() < every {
+            return;
+        }
+        self.last_line = now;
+        let elapsed = now.duration_since(self.started).as_secs_f64();
+        let (line, share) = progress_line(&self.model, &progress, elapsed);
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position((share * 1000.0) as u64);
+                bar.set_message(line);
+            }
+            None => eprintln!("{line}"),
+        }
+    }
+
+    /// Clears the progress bar.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// How far a run is, in words and as a share of the whole, `elapsed` seconds after its start.
+pub fn progress_line(model: &Model, progress: &Progress, elapsed: f64) -> (String, f64) {
+    let control = &model.setup.control;
+    let share =
+        (progress.time / control.end_time).max(progress.cycle as f64 / control.end_cycle as f64).min(1.0);
+    let grind = elapsed * 1e9 / (progress.cycle.max(1) as f64 * model.mesh.n_elements() as f64);
+    let limit = match (progress.limit, progress.element) {
+        (Limit::Courant, Some(element)) => format!("element {element}"),
+        (limit, _) => format!("{limit:?}").to_lowercase(),
+    };
+    let eta =
+        if share > 0.0 { format!("  ETA {:.0} s", elapsed * (1.0 - share) / share) } else { String::new() };
+    let units = crate::results::Units::named(&model.units).time;
+    let line = format!(
+        "cycle {}  t {:.4e} {units}  dt {:.3e} ({limit})  {grind:.0} ns/element wall{eta}",
+        progress.cycle, progress.time, progress.dt
+    );
+    (line, share)
+}
+
+impl Sink for Output {
+    fn take(&mut self, action: Action) -> Result<(), String> {
+        if let Some(writer) = &self.writer {
+            writer.check().map_err(|e| e.to_string())?;
+        }
+        match action {
+            Action::Row(row) => self.row(&row),
+            Action::State(state) => self.state(state),
+            Action::Snapshot(stored) => match &self.folder {
+                Some(folder) => {
+                    self.flush()?;
+                    let mut stored = stored;
+                    let cycle = stored.state.cycle;
+                    stored.states.extend(self.states.iter().filter(|(written, _)| *written <= cycle));
+                    snapshot::write(&folder.file("snapshot.bolide"), &stored).map(|_| ())
+                }
+                None => Err("a snapshot needs a results folder; leave out --no-output".to_owned()),
+            },
+            Action::Base { mut snapshot, last } => {
+                let cycle = snapshot.state.cycle;
+                if self.keeper.as_ref().is_some_and(|keeper| last || keeper.is_due(cycle)) {
+                    // A snapshot counts on the states that it names.
+                    self.flush()?;
+                }
+                if let Some(keeper) = self.keeper.as_mut().filter(|keeper| last || keeper.is_due(cycle)) {
+                    snapshot.states.extend(self.states.iter().filter(|(written, _)| *written <= cycle));
+                    keeper.put(snapshot);
+                }
+                Ok(())
+            }
+            Action::Progress(progress) => {
+                self.progress(progress);
+                Ok(())
+            }
+            Action::Rewind { rows, cycle } => self.rewind(rows, cycle),
+            Action::Owners(owners) => {
+                self.owners = Some(owners);
+                Ok(())
+            }
+            Action::Send(..)
+            | Action::Sort(..)
+            | Action::Timer(_)
+            | Action::Dealt(_)
+            | Action::Dismiss(..)
+            | Action::Over(_) => Ok(()),
+        }
+    }
+}

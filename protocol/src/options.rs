@@ -1,0 +1,211 @@
+//! What a user may ask of one run beside its deck: one structure, from the command line or the page to the session of the job.
+//!
+//! `bolide run` and `bolide submit` take its fields as flags, so the comments of fields that are flags are the help that users
+//! read. To add an option, add a field here and read it where it acts.
+
+#![allow(rustdoc::invalid_html_tags, reason = "what stands in brackets is part of the help that users read")]
+
+use clap::{
+    Args, ValueEnum,
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+};
+use serde::{Deserialize, Serialize};
+
+/// How partial forces travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Route {
+    /// To the master, which adds them and sends totals back: the paper's card, and the reference.
+    #[default]
+    Master,
+    /// From each worker to those that share nodes with it; votes and orders pass the master, and so does what is exchanged by
+    /// pairs that cannot reach each other.
+    Direct,
+}
+
+impl Route {
+    /// Its name on the command line and in summaries.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Master => "master",
+            Self::Direct => "direct",
+        }
+    }
+
+    /// The route of a job on so many workers: the one asked for, else direct with two workers or more when every one of them
+    /// takes peers (`all_take_peers`), and master otherwise. One worker has nobody to exchange with, and what is relayed
+    /// passes the master's link twice as often as sums do.
+    pub const fn choose(asked: Option<Self>, workers: usize, all_take_peers: bool) -> Self {
+        match asked {
+            Some(route) => route,
+            None if workers > 1 && all_take_peers => Self::Direct,
+            None => Self::Master,
+        }
+    }
+}
+
+/// What speeds work is dealt out by. No bit of a result depends on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+pub enum Balance {
+    /// Those that workers were started with
+    #[default]
+    Given,
+    /// Those, corrected by what the workers take
+    Measured,
+}
+
+/// Routes as users write them; none for `auto`.
+pub fn routes() -> impl TypedValueParser<Value = Option<Route>> {
+    let values = [
+        PossibleValue::new("auto").help("Direct with two workers or more that all take peers, else master"),
+        PossibleValue::new("master").help("All through the master, which adds them"),
+        PossibleValue::new("direct").help("From worker to worker; votes and orders pass the master"),
+    ];
+    PossibleValuesParser::new(values).map(|name| match name.as_str() {
+        "master" => Some(Route::Master),
+        "direct" => Some(Route::Direct),
+        _ => None,
+    })
+}
+
+/// Names of lane widths.
+pub fn lanes() -> PossibleValuesParser {
+    PossibleValuesParser::new([
+        PossibleValue::new("scalar").help("One element at a time"),
+        PossibleValue::new("avx2").help("Four"),
+        PossibleValue::new("avx512").help("Eight"),
+    ])
+}
+
+/// A number of seconds that a timer can wait for.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(seconds),
+        _ => Err("expected seconds from 0 to 1e9".to_owned()),
+    }
+}
+
+/// [`seconds`] between two states; none for 0.
+fn period(text: &str) -> Result<Option<f64>, String> {
+    seconds(text).map(|seconds| Some(seconds).filter(|seconds| *seconds > 0.0))
+}
+
+/// What a user asks of a run beside its deck.
+#[expect(
+    unused_qualifications,
+    reason = "by the whole path clap takes an option for the type of the value, as 0 and `auto` need"
+)]
+#[derive(Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct JobOptions {
+    /// Stop after this many cycles, or at the deck's end, whichever comes first
+    #[arg(long)]
+    pub cycles: Option<u64>,
+    /// Stop at this time in the deck's unit, or at the deck's end, whichever comes first
+    #[arg(long)]
+    pub end_time: Option<f64>,
+    /// Lane width; the widest of each machine by default
+    #[arg(long, value_parser = lanes())]
+    pub lanes: Option<String>,
+    /// Route of the shared-node forces
+    #[arg(long, value_parser = routes(), default_value = "auto")]
+    pub route: std::option::Option<Route>,
+    /// Write no results folder
+    #[arg(long)]
+    pub no_output: bool,
+    /// Store the run at the start of this cycle, as snapshot.bolide in the results folder
+    #[arg(long, value_name = "CYCLE")]
+    pub snapshot_at: Option<u64>,
+    /// Extra sorts every so many cycles, to test that they change nothing
+    #[arg(long, hide = true)]
+    pub sort_every: Option<u64>,
+    /// Extra sorts at pseudo-random cycles of this seed, to test that they change nothing
+    #[arg(long, hide = true)]
+    pub sort_seed: Option<u64>,
+    /// Start when so many workers are there.
+    #[arg(skip)]
+    pub min_workers: u32,
+    /// Speeds that work is dealt out by
+    #[arg(long, value_enum, default_value = "given")]
+    pub balance: Balance,
+    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for no oftener than on disk
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = period)]
+    pub keep_every: std::option::Option<f64>,
+    /// Store the run on disk every so many seconds, to be gone on with by --resume; 0 for never [default: the deck's; else a
+    /// master's jobs every 10, `run` only when it is interrupted]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub snapshot_every: Option<f64>,
+    /// The same every so many cycles
+    #[arg(long, value_name = "CYCLES", value_parser = clap::value_parser!(u64).range(1..))]
+    pub snapshot_cycles: Option<u64>,
+    /// Jobs of a higher one go first.
+    #[arg(skip)]
+    pub priority: i32,
+    /// Write `trace.json`: what every worker did in its last cycles.
+    #[arg(skip)]
+    pub trace: bool,
+}
+
+impl JobOptions {
+    /// Whether an extra sort is asked for at a cycle, for tests of bits: every so many cycles, or at pseudo-random ones, about
+    /// one in four.
+    pub fn forces_sort(&self, cycle: u64) -> bool {
+        match (self.sort_every, self.sort_seed) {
+            (Some(n), _) => cycle.is_multiple_of(n.max(1)),
+            (None, Some(seed)) => {
+                let mut x = cycle.wrapping_add(seed).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                (x ^ (x >> 31)).is_multiple_of(4)
+            }
+            (None, None) => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Flags {
+        #[command(flatten)]
+        job: JobOptions,
+    }
+
+    fn flags(words: &[&str]) -> Result<JobOptions, String> {
+        let words = std::iter::once(&"flags").chain(words);
+        Flags::try_parse_from(words).map(|flags| flags.job).map_err(|fault| fault.to_string())
+    }
+
+    #[test]
+    fn flags_are_the_options_and_auto_and_zero_are_none() {
+        let plain = JobOptions { keep_every: Some(10.0), ..JobOptions::default() };
+        assert_eq!(flags(&[]), Ok(plain.clone()));
+        assert_eq!(flags(&["--route", "auto"]), Ok(plain.clone()));
+        let direct = JobOptions { route: Some(Route::Direct), ..plain.clone() };
+        assert_eq!(flags(&["--route", "direct"]), Ok(direct));
+        assert_eq!(flags(&["--keep-every", "0"]), Ok(JobOptions::default()));
+        let lanes = JobOptions { lanes: Some("avx2".to_owned()), balance: Balance::Measured, ..plain };
+        assert_eq!(flags(&["--lanes", "avx2", "--balance", "measured"]), Ok(lanes));
+        for bad in
+            [["--route", "sideways"], ["--lanes", "avx"], ["--keep-every", "-1"], ["--keep-every", "x"]]
+        {
+            let fault = flags(&bad).expect_err(bad[1]);
+            assert!(fault.contains(bad[0]) && fault.contains(bad[1]), "{fault}");
+        }
+    }
+
+    #[test]
+    fn auto_is_direct_where_there_is_somebody_to_exchange_with_who_can_be_reached() {
+        use Route::{Direct, Master};
+        for (asked, workers, all_take_peers, route) in [
+            (None, 2, true, Direct),
+            (None, 1, true, Master),
+            (None, 9, false, Master),
+            (Some(Direct), 1, false, Direct),
+            (Some(Master), 9, true, Master),
+        ] {
+            assert_eq!(Route::choose(asked, workers, all_take_peers), route, "{asked:?} of {workers}");
+        }
+    }
+}
