@@ -5,6 +5,7 @@
 mod bits;
 mod bodies;
 mod book;
+mod documents;
 mod erosion;
 mod fuzz;
 mod seeds;

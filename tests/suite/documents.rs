@@ -1,0 +1,121 @@
+//! The documents keep what they promise: links lead somewhere, the README's deck runs, and both overviews stay short.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use tests::cluster::repository;
+
+/// Every Markdown file of the repository.
+fn documents() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![repository("")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("a folder of the repository is readable").flatten() {
+            let (path, name) = (entry.path(), entry.file_name());
+            let name = name.to_string_lossy();
+            // Git's own, artefacts and results are no documents.
+            if name.starts_with('.') || name == "target" || name == "results" {
+                continue;
+            }
+            if path.is_dir() {
+                folders.push(path);
+            } else if name.ends_with(".md") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The text outside code blocks, where `[` begins no link.
+fn prose(text: &str) -> String {
+    let blocks = text.split("\n```").enumerate().filter(|(index, _)| index % 2 == 0);
+    let outside: Vec<&str> = blocks.map(|(_, block)| block).collect();
+    outside
+        .join("\n")
+        .split('`')
+        .enumerate()
+        .filter(|(index, _)| index % 2 == 0)
+        .map(|(_, piece)| piece)
+        .collect()
+}
+
+/// Where `[text](target)` and `![text](target)` lead.
+fn links(text: &str) -> Vec<String> {
+    let prose = prose(text);
+    prose
+        .split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split_once(')'))
+        .map(|(target, _)| target.to_owned())
+        .collect()
+}
+
+/// The anchor that a heading gets: lower case, without punctuation, dashes for spaces.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim().chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+    kept.map(|c| if c == ' ' { '-' } else { c.to_ascii_lowercase() }).collect()
+}
+
+fn has_anchor(text: &str, wanted: &str) -> bool {
+    text.lines()
+        .filter(|line| line.starts_with('#'))
+        .any(|line| anchor(line.trim_start_matches('#')) == wanted)
+}
+
+#[test]
+fn every_link_of_a_document_leads_somewhere() {
+    let documents = documents();
+    assert!(documents.len() > 15, "{} documents", documents.len());
+    let mut broken = Vec::new();
+    let mut checked = 0;
+    for document in &documents {
+        let text = fs::read_to_string(document).expect("a document is readable");
+        for link in links(&text) {
+            if link.contains("://") {
+                continue;
+            }
+            let (file, wanted) = link.split_once('#').unwrap_or((&link, ""));
+            let target = if file.is_empty() {
+                document.clone()
+            } else {
+                document.parent().unwrap_or(Path::new("")).join(file)
+            };
+            let leads = if wanted.is_empty() {
+                target.exists()
+            } else {
+                fs::read_to_string(&target).is_ok_and(|text| has_anchor(&text, wanted))
+            };
+            checked += 1;
+            if !leads {
+                broken.push(format!("{}: {link}", document.display()));
+            }
+        }
+    }
+    assert!(checked > 100, "{checked} links");
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+#[test]
+fn the_deck_of_the_readme_has_no_fault() {
+    let readme = fs::read_to_string(repository("README.md")).expect("the README is in the repository");
+    let (_, rest) = readme.split_once("```toml\n").expect("the README has a deck");
+    let (deck, _) = rest.split_once("```").expect("the deck ends");
+    let model = deck::read(deck, "README.md").unwrap_or_else(|faults| panic!("{faults:?}"));
+    assert_eq!(model.mesh.parts[0].n_elements(), 3888);
+}
+
+#[test]
+fn the_overviews_stay_short() {
+    for (name, most) in [("README.md", 900), ("ARCHITECTURE.md", 2500)] {
+        let text = fs::read_to_string(repository(name)).expect("an overview is in the repository");
+        let words = text.split_whitespace().count();
+        assert!(
+            words <= most,
+            "{name} has {words} words, at most {most}: move details to a document beside the code"
+        );
+    }
+}
