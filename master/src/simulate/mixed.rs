@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use deck::model::Model;
 use mechanics::{
     contact::{self, Batch, Contact, Exclusions, Surface, WorkUnit, initial_pairs},
+    lanes::Width,
     mesh::{Mesh, Topology},
     piece::Region,
 };
@@ -166,7 +167,7 @@ impl Sorted {
                 let at = |global: u32| self.surface.node_index(global).map_or(0.0, |i| self.x[i as usize][a]);
                 batch.nodes.iter().map(|node| at(node.global)).collect()
             });
-            Contact::new(&batch, settings, &x).n_pairs()
+            Contact::new(&batch, settings, &x, Width::best()).n_pairs()
         };
         mine.iter().map(of_worker).collect()
     }

@@ -9,6 +9,7 @@
 use mechanics::{
     contact::{Batch, Contact, Exclusions, Surface, WorkUnit, sort},
     exact::Quantum,
+    lanes::Width,
     mesh::Mesh,
 };
 use rustix::time::{ClockId, clock_gettime};
@@ -74,9 +75,9 @@ fn main() {
         }
         let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
         let [built, _] = times(20, || {
-            std::hint::black_box(Contact::new(&batch, &apart, &x));
+            std::hint::black_box(Contact::new(&batch, &apart, &x, Width::best()));
         });
-        let mut contact = Contact::new(&batch, &apart, &x);
+        let mut contact = Contact::new(&batch, &apart, &x, Width::best());
         let mut vote = contact.forces(&x, &x, 1.0, quantum, quantum, &mut f);
         let [median, least] = times(200, || vote = contact.forces(&x, &x, 1.0, quantum, quantum, &mut f));
         let (pairs, hits) = (vote.pairs as f64, vote.hits as f64);

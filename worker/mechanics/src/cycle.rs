@@ -11,6 +11,8 @@
 mod bodies;
 mod plan;
 mod seams;
+#[cfg(test)]
+mod tests;
 
 use std::{collections::VecDeque, ops::Range};
 

@@ -336,7 +336,7 @@ fn of_contact(friction: f64, width: Width, hasher: &mut blake3::Hasher) {
         ignores_initial: false,
         edges: false,
     };
-    let mut contact = Contact::new(&batch, &settings, &x).on(width);
+    let mut contact = Contact::new(&batch, &settings, &x, width);
     let v = [x[1].clone(), x[2].clone(), x[0].clone()];
     let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
     let quantum = Quantum::for_reference(1.0, 42);

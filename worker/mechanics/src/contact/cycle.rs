@@ -143,11 +143,13 @@ struct Cycle<'a> {
 
 impl Contact {
     /// Takes the pairs of a batch that can meet before the next sort. `x` by batch node, at any moment at
-    /// which no spread since the sort exceeds the slack.
+    /// which no spread since the sort exceeds the slack. The forces do not depend on `width`.
     ///
     /// # Panics
-    /// If the batch is not sound ([`Batch::is_sound`]) or `x` has fewer nodes.
-    pub fn new(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3]) -> Self {
+    /// If the batch is not sound ([`Batch::is_sound`]), `x` has fewer nodes or the machine lacks the width
+    /// ([`Width::require`]).
+    pub fn new(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3], width: Width) -> Self {
+        assert!(width.available(), "lane width {width} is not on this machine");
         let mut candidates = search::candidates(batch, settings, x);
         let mut index = vec![u32::MAX; batch.faces.len()];
         for &f in &candidates.faces {
@@ -172,7 +174,7 @@ impl Contact {
             only_pair: settings.only_pair(),
             by_pair: ByPair::default(),
             smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
-            width: Width::best(),
+            width,
             watch: Watch::default(),
             edges: Edges::new(batch, settings),
             work: Work::default(),
@@ -215,9 +217,9 @@ impl Contact {
         self.by_pair.forces.as_ref().map(Tally::votes).unwrap_or_default()
     }
 
-    /// The same on lanes of another width, which the machine must have; the forces do not depend on it.
-    pub(crate) fn on(self, width: Width) -> Self {
-        Self { width, ..self }
+    /// The lane width that it computes on.
+    pub(crate) fn width(&self) -> Width {
+        self.width
     }
 
     /// Whether [`Contact::forces`] reads velocities.
@@ -254,7 +256,7 @@ impl Contact {
     ) -> ContactVote {
         let cycle = Cycle { x, v, dt, force_quantum, energy_quantum, f };
         #[cfg(target_arch = "x86_64")]
-        if self.width != Width::Scalar && std::arch::is_x86_feature_detected!("fma") {
+        if std::arch::is_x86_feature_detected!("fma") {
             // SAFETY: the feature has just been detected.
             return unsafe { self.forces_with_fma(cycle) };
         }

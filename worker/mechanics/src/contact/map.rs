@@ -9,7 +9,7 @@ use super::{
     sort::sort,
     zone::Frame,
 };
-use crate::exact::Quantum;
+use crate::{exact::Quantum, lanes::Width};
 
 /// Contact of a surface in one state.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +50,7 @@ impl Map {
         let packed: [Vec<f64>; 3] = std::array::from_fn(|a| index.iter().map(|&n| x[n][a]).collect());
         let at_rest = packed.each_ref().map(|x| vec![0.0; x.len()]);
         let mut forces = at_rest.clone();
-        Contact::new(&batch, &settings, &packed).forces(
+        Contact::new(&batch, &settings, &packed, Width::best()).forces(
             &packed,
             &at_rest,
             0.0,

@@ -116,7 +116,7 @@ impl Domain {
             let zeros = || std::array::from_fn(|_| vec![0.0; n]);
             let mut x = zeros();
             pack(&sources, |room| positions(&self.rooms, &self.guests, room), &mut x);
-            let mut contact = Contact::new(batch, settings, &x);
+            let mut contact = Contact::new(batch, settings, &x, self.width);
             contact.watch_pairs(&self.watched_pairs);
             self.contact = Some(ContactRoom { contact, sources, x, v: zeros(), f: zeros() });
         }

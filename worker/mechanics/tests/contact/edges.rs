@@ -8,6 +8,7 @@ use mechanics::{
         sort,
     },
     element::shell4::Rule,
+    lanes::Width,
     mesh::{Mesh, Part, Section, Topology},
 };
 
@@ -241,7 +242,7 @@ fn forces_are_the_gradient_of_the_energy_and_keep_both_momenta() {
         // Without nodes and faces only the edges are left.
         let mut edges_only = world.batch.clone();
         edges_only.units.clear();
-        world.contact = Contact::new(&edges_only, &world.settings, &world.x);
+        world.contact = Contact::new(&edges_only, &world.settings, &world.x, Width::best());
         let vote = world.forces(0.0);
         if vote.hits == 0 {
             continue;
@@ -459,7 +460,7 @@ fn pairs_dealt_out_to_any_workers_add_to_the_same_bits() {
                 batch.nodes.iter().map(|n| f64::from((n.global * 7 + a) % 5) - 2.0).collect::<Vec<f64>>()
             });
             let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
-            let mut contact = Contact::new(&batch, &settings, &packed);
+            let mut contact = Contact::new(&batch, &settings, &packed, Width::best());
             let vote = contact.forces(&packed, &v, 0.01, quantum, quantum, &mut f);
             merged.merge(&vote);
             for (i, node) in batch.nodes.iter().enumerate() {

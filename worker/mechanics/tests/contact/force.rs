@@ -1,6 +1,9 @@
 //! What a cycle of contact books and votes; conservation is a case of the verification book.
 
-use mechanics::contact::{Batch, Contact, ContactVote, Exclusions, WorkUnit, sort};
+use mechanics::{
+    contact::{Batch, Contact, ContactVote, Exclusions, WorkUnit, sort},
+    lanes::Width,
+};
 
 use crate::world::{World, add_block, block, deform, on_surface, settings, totals, with_probe, without_self};
 
@@ -31,7 +34,7 @@ fn friction_is_coulombs_and_creeps_below_its_velocity() {
     let (mut world, probe) = with_probe(block([1, 1, 1], 1.0), 0.1, &|_| true);
     world.place(probe, [0.5, 0.5, 1.05]);
     world.settings.friction.fill(0.3);
-    world.contact = Contact::new(&world.batch, &world.settings, &world.x);
+    world.contact = Contact::new(&world.batch, &world.settings, &world.x, Width::best());
     let (normal, dt) = (0.5 * 0.05, 1e-4);
     // Sliding and approaching: only sliding matters.
     (world.v[0][probe], world.v[1][probe], world.v[2][probe]) = (3.0, 4.0, -2.0);
@@ -82,7 +85,7 @@ fn pressed(n: usize, chunk_order: bool) -> (Vec<u64>, ContactVote) {
         });
         let v = [x[1].clone(), x[2].clone(), x[0].clone()];
         let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
-        let mut contact = Contact::new(&batch, &settings, &x);
+        let mut contact = Contact::new(&batch, &settings, &x, Width::best());
         vote.merge(&contact.forces(&x, &v, 0.01, world.force_quantum, world.energy_quantum, &mut f));
         for a in 0..3 {
             for (node, f) in batch.nodes.iter().zip(&f[a]) {

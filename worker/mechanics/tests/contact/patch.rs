@@ -1,6 +1,6 @@
 //! A joint counts once, and the side is right; sweeps over joints are cases of the verification book.
 
-use mechanics::mesh::Mesh;
+use mechanics::{contact::Contact, lanes::Width, mesh::Mesh};
 
 use crate::world::{Random, add_block, block, deform, with_probe};
 
@@ -113,7 +113,7 @@ fn hits_do_not_depend_on_the_order_of_candidates() {
         let (mut world, probe) = with_probe(mesh.clone(), 0.3, &|_| true);
         if reverse {
             world.batch.units.iter_mut().for_each(|u| u.faces.reverse());
-            world.contact = mechanics::contact::Contact::new(&world.batch, &world.settings, &world.x);
+            world.contact = Contact::new(&world.batch, &world.settings, &world.x, Width::best());
         }
         let mut random = Random(9);
         let mut bits = vec![];

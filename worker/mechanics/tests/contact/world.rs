@@ -6,6 +6,7 @@ use mechanics::{
         sort,
     },
     exact::Quantum,
+    lanes::Width,
     material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
 };
@@ -128,7 +129,7 @@ impl World {
         let batch = Batch::gather(&surface, &all, &|_| 1.0, &exclusions);
         let x = [0, 1, 2]
             .map(|a| batch.nodes.iter().map(|n| mesh.positions[n.global as usize][a]).collect::<Vec<f64>>());
-        let contact = Contact::new(&batch, &settings, &x);
+        let contact = Contact::new(&batch, &settings, &x, Width::best());
         let zero = vec![0.0; batch.nodes.len()];
         Self {
             surface,
@@ -182,7 +183,7 @@ pub fn with_probe(mut mesh: Mesh, gap: f64, alive: &dyn Fn(u32) -> bool) -> (Wor
     for unit in &mut world.batch.units {
         unit.faces.retain(|&f| faces[f as usize].part != probe as u32);
     }
-    world.contact = Contact::new(&world.batch, &world.settings, &world.x);
+    world.contact = Contact::new(&world.batch, &world.settings, &world.x, Width::best());
     let index = world.index(first);
     (world, index)
 }

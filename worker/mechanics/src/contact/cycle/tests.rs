@@ -131,7 +131,7 @@ fn lanes_of_every_width_have_the_bits_of_one_pair_at_a_time() {
     let mut long_way = 0;
     for (bump, friction) in [(0.0, 0.0), (0.2, 0.0), (0.9, 0.0), (0.0, 0.3), (0.9, 0.3)] {
         let (batch, x) = patch(&mut random, bump);
-        let mut contact = Contact::new(&batch, &settings(friction), &x);
+        let mut contact = Contact::new(&batch, &settings(friction), &x, Width::best());
         let v = [x[1].clone(), x[2].clone(), x[0].clone()];
         let quantum = Quantum::for_reference(1.0, 42);
         let mut run = |width: Option<Width>| {
@@ -163,7 +163,7 @@ fn watching_few_pairs_for_several_cycles_loses_no_bit_of_bodies_that_move() {
     let (batch, mut x) = patch(&mut random, 0.4);
     let mut settings = settings(0.0);
     settings.slack = 3.0;
-    let mut contact = Contact::new(&batch, &settings, &x);
+    let mut contact = Contact::new(&batch, &settings, &x, Width::best());
     let quantum = Quantum::for_reference(1.0, 42);
     // A common motion, a slide of the nodes over the patch, and noise, in all about an eighth of the spread.
     // The first list is taken with the candidates.

@@ -1,0 +1,150 @@
+//! A domain of two blocks that touch, by lane width.
+
+use super::*;
+use crate::{
+    contact::{Batch, Exclusions, Settings, Surface, WorkUnit, sort},
+    erosion::Erosion,
+    exact::Quantum,
+    load::Loads,
+    material::{Eos, Failure, Material, Strength},
+    mesh::{Mesh, Part, Topology},
+    piece::{Region, cut},
+    setup::{Constraint, Control},
+};
+
+/// No clock.
+struct Silent;
+
+impl Meter for Silent {
+    fn start(&self) -> u64 {
+        0
+    }
+
+    fn stop(&self, _: u64, _: bool) {}
+}
+
+const CELLS: [u32; 3] = [3, 3, 2];
+const GAP: f64 = 0.2;
+
+/// Two blocks of unit cubes, the second beside the corners of the first by a third of a cube and half a gap above it.
+fn two_blocks() -> Mesh {
+    let mut mesh = Mesh::default();
+    for (name, origin) in [("below", [0.0; 3]), ("above", [0.3, 0.4, 2.0 + 0.5 * GAP])] {
+        let first = mesh.positions.len() as u32;
+        for k in 0..=CELLS[2] {
+            for j in 0..=CELLS[1] {
+                for i in 0..=CELLS[0] {
+                    let n = [i, j, k];
+                    mesh.positions.push([0, 1, 2].map(|a| origin[a] + f64::from(n[a])));
+                }
+            }
+        }
+        let nodes: Vec<u32> = (first..mesh.positions.len() as u32).collect();
+        mesh.node_ids.extend(&nodes);
+        mesh.parts.push(Part {
+            name: name.into(),
+            material: 0,
+            topology: Topology::Structured { cells: CELLS },
+            nodes,
+            element_ids: (0..CELLS.iter().product()).collect(),
+        });
+    }
+    mesh
+}
+
+fn setup(friction: f64) -> Setup {
+    let shear = 0.5;
+    Setup {
+        materials: vec![Material {
+            name: "test".into(),
+            density: 1.0,
+            eos: Eos::Linear { bulk: 1.0 },
+            strength: Strength::Elastic { shear },
+            failure: Failure::None,
+        }],
+        control: Control {
+            end_time: 1.0,
+            end_cycle: 100,
+            safety_factor: 0.6666,
+            growth: 1.05,
+            energy_error: 0.5,
+            time_step_floor: 0.0,
+            linear_viscosity: 0.2,
+            quadratic_viscosity: 1.0,
+            hourglass: 0.1,
+            sort_lag: 2,
+            plan_interval: 100,
+        },
+        contact: Some(Settings {
+            gap: GAP,
+            slack: GAP,
+            friction: vec![friction; 4],
+            interacts: vec![false, true, true, false],
+            stiffness: 0.5,
+            friction_velocity: 1e-3,
+            ignores_initial: true,
+            edges: true,
+        }),
+        constraints: vec![Constraint::default()],
+        walls: Vec::new(),
+        detonations: Vec::new(),
+        loads: Loads::default(),
+        erosion: Erosion::default(),
+        bodies: Vec::new(),
+    }
+}
+
+/// The blocks on one worker, about to run into each other, with a plan that has all of their contact.
+fn touching(friction: f64, width: Width) -> Domain {
+    let (mesh, setup) = (two_blocks(), setup(friction));
+    let n = mesh.n_nodes();
+    let velocity: Vec<[f64; 3]> =
+        (0..n).map(|node| if 2 * node < n { [0.0; 3] } else { [0.02, 0.01, -0.05] }).collect();
+    let state = crate::initial::state(&mesh, &setup, &velocity, &vec![0; n]).expect("sound cubes");
+    let quantum = Quantum::for_reference(1.0, 42);
+    let quanta = Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 };
+    let mut surface = Surface::new(&mesh, &setup.materials, &|_| true);
+    surface.find_edges(&mesh);
+    let x: Vec<[f64; 3]> = surface.nodes.iter().map(|&n| mesh.positions[n as usize]).collect();
+    let settings = setup.contact.as_ref().expect("just set");
+    let units = sort(&surface, &x, settings, &Exclusions::default());
+    let all: Vec<&WorkUnit> = units.iter().collect();
+    let batch = Batch::gather(&surface, &all, &|node| state.mass[node as usize], &Exclusions::default());
+    let whole = Region::Cells { low: [0; 3], high: CELLS };
+    let pieces = (0..2).map(|part| cut(&mesh, &state, part, &whole)).collect();
+    let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: surface.nodes.clone() };
+    let mut domain = Domain::new(setup, 2, quanta, (vec![subdomain], 0), &[], width);
+    domain.install(&Plan { batch: Some(batch), ..Plan::default() }, &[]).expect("all nodes are held");
+    domain
+}
+
+/// Forces of contact and positions after some cycles, in bits, and the greatest number of hits.
+fn run(friction: f64, width: Width) -> (Vec<u64>, u64) {
+    const DT: f64 = 0.05;
+    let mut domain = touching(friction, width);
+    let (mut bits, mut hits, mut dt_previous) = (Vec::new(), 0, 0.0);
+    for cycle in 0..20 {
+        domain.begin(domain.quanta.force, DT * f64::from(cycle));
+        domain.contact(dt_previous, &Silent);
+        let room = domain.contact.as_ref().expect("the plan has a batch");
+        assert_eq!(room.contact.width(), width, "contact on other lanes than those of the elements");
+        bits.extend(room.f.iter().flatten().map(|f| f.to_bits()));
+        domain.elements(Sets::All, dt_previous, &Silent);
+        let vote = domain.integrate(&[], dt_previous, DT, &[], &Silent).expect("no node is exchanged");
+        hits = hits.max(vote.hits);
+        dt_previous = DT;
+    }
+    bits.extend(domain.pieces().iter().flat_map(|piece| &piece.x).flatten().map(|x| x.to_bits()));
+    (bits, hits)
+}
+
+#[test]
+fn contact_computes_on_the_lanes_of_its_domain_and_no_width_changes_a_bit() {
+    for friction in [0.0, 0.3] {
+        let (one, hits) = run(friction, Width::Scalar);
+        assert!(hits > 10, "{hits} hits");
+        for width in Width::ALL.into_iter().filter(|width| width.available()) {
+            assert!(run(friction, width).0 == one, "{width}, friction {friction}");
+        }
+    }
+}
