@@ -211,12 +211,7 @@ impl Block {
             fields: match &self.shells {
                 None => std::array::from_fn(|field| by_element(&self.fields[field])),
                 Some(core) => {
-                    let summary = |e: usize| {
-                        let [a, b, c, d, ..] = self.corners(e);
-                        let x = [a, b, c, d].map(|n| std::array::from_fn(|axis| self.x[axis][n as usize]));
-                        core.summary(e, self.initial_volume[e], quad_area(&x))
-                    };
-                    let all: Vec<_> = (0..self.elements.len()).map(summary).collect();
+                    let all: Vec<_> = (0..self.elements.len()).map(|e| self.summary(core, e)).collect();
                     std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect())
                 }
             },
@@ -280,7 +275,7 @@ impl Block {
         self.alive[slot / SET] >> (slot % SET) & 1 == 1
     }
 
-    /// One state field by slot.
+    /// One state field by slot, of solids: what shells say of themselves is [`Block::element`].
     pub(crate) fn field_slots(&self, field: usize) -> &[f64] {
         &self.fields[field]
     }
@@ -308,13 +303,25 @@ impl Block {
 
     /// One state field of a local element.
     pub fn field(&self, element: usize, field: usize) -> f64 {
-        self.fields[field][self.slots[element] as usize]
+        match &self.shells {
+            None => self.fields[field][self.slots[element] as usize],
+            Some(core) => self.summary(core, element)[field],
+        }
     }
 
-    /// The state of a local element, one number per entry of [`crate::state::FIELDS`].
+    /// The state of a local element as [`Block::piece`] has it, one number per entry of [`crate::state::FIELDS`].
     pub fn element(&self, element: usize) -> [f64; N_FIELDS] {
-        let slot = self.slots[element] as usize;
-        self.fields.each_ref().map(|values| values[slot])
+        match &self.shells {
+            None => self.fields.each_ref().map(|values| values[self.slots[element] as usize]),
+            Some(core) => self.summary(core, element),
+        }
+    }
+
+    /// What a shell says of itself in the fields of solids, which its block does not keep up.
+    fn summary(&self, core: &Core, element: usize) -> [f64; N_FIELDS] {
+        let [a, b, c, d, ..] = self.corners(element);
+        let x = [a, b, c, d].map(|n| std::array::from_fn(|axis| self.x[axis][n as usize]));
+        core.summary(element, self.initial_volume[self.slot(element)], quad_area(&x))
     }
 
     /// The lane set of a local element.

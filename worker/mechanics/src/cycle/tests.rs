@@ -1,15 +1,17 @@
-//! A domain of two blocks that touch, by lane width.
+//! A domain of two blocks that touch, by lane width; gauges on shells.
 
 use super::*;
 use crate::{
     contact::{Batch, Exclusions, Settings, Surface, WorkUnit, sort},
+    element::shell4::Rule,
     erosion::Erosion,
     exact::Quantum,
     load::Loads,
     material::{Eos, Failure, Material, Strength},
-    mesh::{Mesh, Part, Topology},
+    mesh::{Mesh, Part, Section, Topology},
     piece::{Region, cut},
     setup::{Constraint, Control},
+    state::field,
 };
 
 /// No clock.
@@ -145,6 +147,68 @@ fn contact_computes_on_the_lanes_of_its_domain_and_no_width_changes_a_bit() {
         assert!(hits > 10, "{hits} hits");
         for width in Width::ALL.into_iter().filter(|width| width.available()) {
             assert!(run(friction, width).0 == one, "{width}, friction {friction}");
+        }
+    }
+}
+
+/// A plate of 4 x 3 shells that is stretched and folded until it yields.
+fn folding_plate() -> Domain {
+    let (columns, rows) = (4, 3);
+    let mut mesh = Mesh::default();
+    let mut velocity = Vec::new();
+    for j in 0..=rows {
+        for i in 0..=columns {
+            let (x, y) = (f64::from(i), f64::from(j));
+            mesh.positions.push([x, y, 0.0]);
+            velocity.push([0.04 * x, -0.01 * y * x, 0.02 * x * x]);
+        }
+    }
+    let row = columns + 1;
+    let quads: Vec<[u32; 4]> = (0..rows)
+        .flat_map(|j| (0..columns).map(move |i| [0, 1, row + 1, row].map(|d| j * row + i + d)))
+        .collect();
+    let nodes: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    mesh.node_ids.clone_from(&nodes);
+    let element_ids: Vec<u32> = (0..quads.len() as u32).collect();
+    let section = Section { thickness: 0.2, rule: Rule::Gauss(3) };
+    let topology = Topology::Shells { quads, section };
+    mesh.parts.push(Part { name: "plate".into(), material: 0, topology, nodes, element_ids });
+    let mut setup = Setup { contact: None, ..setup(0.0) };
+    setup.materials[0].strength =
+        Strength::VonMises { shear: 0.5, yield_stress: 1e-3, hardening: 1e-2, rate: None };
+    let state =
+        crate::initial::state(&mesh, &setup, &velocity, &vec![0; velocity.len()]).expect("a sound plate");
+    let quantum = Quantum::for_reference(1.0, 42);
+    let quanta = Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 };
+    let all = Region::List((0..mesh.n_elements() as u32).collect());
+    let pieces = vec![cut(&mesh, &state, 0, &all)];
+    let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: Vec::new() };
+    let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], Width::best());
+    domain.watch(&Watched { elements: vec![7, 0], contacts: Vec::new() });
+    domain.install(&Plan { moments: true, ..Plan::default() }, &[]).expect("all nodes are held");
+    domain
+}
+
+#[test]
+fn element_gauges_on_shells_read_what_the_state_has_of_them() {
+    const DT: f64 = 0.02;
+    let mut domain = folding_plate();
+    for cycle in 0..30 {
+        domain.begin(domain.quanta.force, DT * f64::from(cycle));
+        domain.elements(Sets::All, DT, &Silent);
+        let vote = domain.integrate(&[], DT, DT, &[], &Silent).expect("no node is exchanged");
+        let piece = domain.pieces().remove(0);
+        assert_eq!(vote.element_gauges.len(), 2);
+        for (gauge, found) in vote.element_gauges {
+            let element = [7, 0][gauge as usize];
+            let stored = piece.fields.each_ref().map(|field| field[element]);
+            assert_eq!(found.map(f64::to_bits), stored.map(f64::to_bits), "{found:?} for {stored:?}");
+            for (index, value) in found.into_iter().enumerate() {
+                assert_eq!(domain.rooms[0].block.field(element, index).to_bits(), value.to_bits());
+            }
+            if cycle == 29 {
+                assert!(found[field::SXX] > 1e-4 && found[field::PLASTIC_STRAIN] > 1e-3, "{found:?}");
+            }
         }
     }
 }
