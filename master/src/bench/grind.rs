@@ -385,6 +385,25 @@ mod tests {
     }
 
     #[test]
+    fn every_line_of_a_small_bench_is_a_measured_figure() {
+        let report = measured(1, 6, Some(Width::Scalar)).expect("all of its runs end");
+        assert_eq!((report.lanes.as_str(), report.elements.len()), ("scalar", 7));
+        let of_elements = report.elements.iter().map(|row| (row.name.as_str(), row.ns.least));
+        let others = [
+            ("contact", report.contact_node_ns.least),
+            ("pair", report.pair_ns),
+            ("sort", report.sort_node_ns),
+            ("message", report.message_ns),
+            ("speed", report.speed_of_a_thread),
+        ];
+        for (name, ns) in of_elements.chain(others) {
+            assert!(ns > 0.0 && ns.is_finite(), "{name}: {ns} ns");
+        }
+        let lines = 1 + 7 + 5 + usize::from(report.two_threads.is_some());
+        assert_eq!(table(&report).lines().count(), lines, "{}", table(&report));
+    }
+
+    #[test]
     fn a_thread_of_fifty_nanoseconds_has_speed_two() {
         assert_eq!(speed_of(50.0, 1), 2.0);
         assert_eq!(speed_of(80.0, 2), 2.5);

@@ -115,12 +115,21 @@ pub struct Scheme {
     pub balance: Balance,
     /// Lane width; none for the best of this machine. It changes no figure but measured ones.
     pub lanes: Option<Width>,
+    /// Sorts beside those that are due: a measurement needs some, and new plans, in a short run.
+    pub sort_every: Option<u64>,
 }
 
 impl Scheme {
     /// What Bolide does, on a route.
     pub fn bolide(route: Route) -> Self {
-        Self { route, dealing: Dealing::Owners, overlap: true, balance: Balance::Given, lanes: None }
+        Self {
+            route,
+            dealing: Dealing::Owners,
+            overlap: true,
+            balance: Balance::Given,
+            lanes: None,
+            sort_every: None,
+        }
     }
 
     /// The control: a star without overlap, units dealt by weight alone.
@@ -131,6 +140,7 @@ impl Scheme {
             overlap: false,
             balance: Balance::Given,
             lanes: None,
+            sort_every: None,
         }
     }
 }

@@ -46,6 +46,9 @@ pub struct Measured {
     pub byte_ns: f64,
 }
 
+/// Cycles between sorts: lists of contact may last longer than the whole run, which would then have no sort to measure.
+const SORTS_EVERY: u64 = 8;
+
 /// Bytes of the short and the long message that are timed.
 const MESSAGES: [usize; 2] = [64, 256 * 1024];
 /// How often each is sent.
@@ -78,7 +81,7 @@ pub fn once(model: &Arc<Model>, hosts: usize, lanes: Option<Width>) -> Result<Me
         changes: Vec::new(),
     };
     let run = |hosts: usize| {
-        let scheme = Scheme { lanes, ..Scheme::bolide(Route::Direct) };
+        let scheme = Scheme { lanes, sort_every: Some(SORTS_EVERY), ..Scheme::bolide(Route::Direct) };
         let (_, tape) = pool.install(|| virtual_clock::run(model, &machines(hosts), scheme, None))?;
         tape.ok_or_else(|| "a run that computes keeps a tape".to_owned())
     };
@@ -96,7 +99,8 @@ pub fn once(model: &Arc<Model>, hosts: usize, lanes: Option<Width>) -> Result<Me
     let install = median(per(Kind::Install, |load| load.pairs));
     let sort = median(run(hosts)?.sort_ns);
     if element <= 0.0 || pair <= 0.0 || install <= 0.0 || sort <= 0.0 {
-        return Err("no plan began to act in the run: take a deck with contact, or more --cycles".to_owned());
+        return Err("no plan of contact began to act in the run: take a deck with contact, or more --cycles"
+            .to_owned());
     }
     let [message, byte] = messages().map_err(|e| format!("loopback: {e}"))?;
     Ok(Measured {

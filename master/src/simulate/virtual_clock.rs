@@ -102,6 +102,7 @@ pub fn run(
             route: Some(scheme.route),
             balance: scheme.balance,
             lanes: scheme.lanes.map(|width| width.to_string()),
+            sort_every: scheme.sort_every,
             no_output: true,
             ..JobOptions::default()
         },
