@@ -188,7 +188,7 @@ pub struct Domain {
     rooms: Vec<Room>,
     guests: Guests,
     contact: Option<ContactRoom>,
-    /// Whether there are shells anywhere in the run.
+    /// Whether nodes turn anywhere in the run.
     moments: bool,
     exchange: Vec<Shared>,
     /// Shared here only, but for the nodes of seams.
@@ -536,9 +536,9 @@ impl Domain {
     fn moment(&self, shared: &Shared) -> [f64; 3] {
         let mut total = [0.0; 3];
         for &(room, local) in &self.copies[shared.copies.start as usize..shared.copies.end as usize] {
-            if let Some(core) = &self.rooms[room as usize].block.shells {
+            if let Some(turning) = &self.rooms[room as usize].block.turning {
                 for a in 0..3 {
-                    total[a] += core.m[a][local as usize];
+                    total[a] += turning.m[a][local as usize];
                 }
             }
         }
@@ -552,9 +552,9 @@ impl Domain {
             for a in 0..3 {
                 block.f[a][local as usize] = total[a];
             }
-            if let Some(core) = &mut block.shells {
+            if let Some(turning) = &mut block.turning {
                 for a in 0..3 {
-                    core.m[a][local as usize] = moment[a];
+                    turning.m[a][local as usize] = moment[a];
                 }
             }
         }
@@ -627,8 +627,8 @@ impl Domain {
                 walls: &mut room.walls,
             };
             room.booked = advance.run(&mut nodes, width);
-            if let Some(core) = &mut block.shells {
-                let (kinetic, external) = spin::advance(&advance, core, &block.constraint, &room.sets);
+            if let Some(turning) = &mut block.turning {
+                let (kinetic, external) = spin::advance(&advance, turning, &block.constraint, &room.sets);
                 room.booked.kinetic += kinetic;
                 room.booked.external += external;
             }

@@ -1,6 +1,6 @@
 //! Elements: the words between a cycle and its element kernels.
 //!
-//! [`Step`] is what a cycle tells the elements, [`ElementVote`] what they answer. The eight-node hexahedron stands
+//! [`Step`] is what a cycle tells the elements, [`ElementVote`] what they answer; `group` is the seam that each kind fills. The eight-node hexahedron stands
 //! in `hex8`, its geometry in `modes`, with rotation, hourglass control, viscosity and time-step limit beside it;
 //! `layout` says which nodes a lane set has and `place` brings their values to the kernel and forces back;
 //! `vector` is the small algebra they are written in.
@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::exact::Quantum;
 
+pub(crate) mod group;
 pub mod hex8;
 pub(crate) mod hourglass;
 pub(crate) mod layout;

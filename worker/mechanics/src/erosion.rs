@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     block::Block,
-    element::{Step, modes::modes_of},
+    element::{Step, group::Scanned, modes::modes_of},
     lanes::{Width, scalar::Scalar},
     material::Material,
     state::field,
@@ -214,19 +214,19 @@ impl Eroding {
         width: Width,
     ) {
         let Self { criteria, strain, inverse, .. } = self;
-        let (layout, reach) = block.layout();
+        let Some(Scanned { layout, reach, alive, fields }) = block.scanned() else { return };
         let mut scan = Scan {
             layout,
             x: block.x.each_ref().map(Vec::as_slice),
             v: block.v.each_ref().map(Vec::as_slice),
-            alive: block.alive(),
-            plastic: criteria.plastic_strain.map(|limit| (block.field_slots(field::PLASTIC_STRAIN), limit)),
-            damage: criteria.failure.then(|| block.field_slots(field::DAMAGE)),
+            alive,
+            plastic: criteria.plastic_strain.map(|limit| (fields[field::PLASTIC_STRAIN], limit)),
+            damage: criteria.failure.then(|| fields[field::DAMAGE]),
             stress: Stress::of(criteria).map(|limits| {
-                let fields = [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX, field::PRESSURE];
-                (fields.map(|field| block.field_slots(field)), limits)
+                let stress = [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX, field::PRESSURE];
+                (stress.map(|field| fields[field]), limits)
             }),
-            volume: Volume::of(criteria).map(|limits| (block.field_slots(field::RELATIVE_VOLUME), limits)),
+            volume: Volume::of(criteria).map(|limits| (fields[field::RELATIVE_VOLUME], limits)),
             shape: Shape::of(criteria).map(|limits| (&*inverse, limits)),
             strain: criteria.incremental_strain.map(|limit| (strain.as_mut_slice(), limit)),
             step: criteria.time_step.map(|_| (self.sound_square, self.frequency)),

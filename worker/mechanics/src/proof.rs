@@ -50,22 +50,10 @@ pub(crate) fn of_block(block: &Block, vote: &ElementVote) -> [u8; 16] {
     for f in &block.f {
         put(&mut hasher, f[..n].iter().copied());
     }
-    match &block.shells {
-        None => {
-            for index in 0..N_FIELDS {
-                put(&mut hasher, (0..block.elements.len()).map(|element| block.field(element, index)));
-            }
-        }
-        // The fields of their block are those of its beginning.
-        Some(shells) => {
-            for m in &shells.m {
-                put(&mut hasher, m[..n].iter().copied());
-            }
-            for layer in shells.image(n, block.elements.len()).fields {
-                put(&mut hasher, layer.into_iter());
-            }
-        }
+    for m in block.turning.iter().flat_map(|turning| &turning.m) {
+        put(&mut hasher, m[..n].iter().copied());
     }
+    block.visit(&mut |value| put(&mut hasher, std::iter::once(value)));
     let ElementVote {
         courant,
         courant_element,

@@ -1,16 +1,48 @@
-//! Rotation of the nodes of shells: `w_{n+1/2} = w_{n-1/2} + m/I (dt_{n-1} + dt_n)/2`.
+//! Rotation of nodes, where a kind of elements turns them: `w_{n+1/2} = w_{n-1/2} + m/I (dt_{n-1} + dt_n)/2`.
 //!
 //! As for the rest of a node, every block that has a copy does this with the same total moment and inertia and gets the
 //! same bits; the booked copy alone counts. Nodes are few beside the work of their elements, so this is plain code.
 
-use crate::{element::shell4::Core, lanes::SET, nodes::Advance, nodes::NodeSet};
+use crate::{lanes::SET, nodes::Advance, nodes::NodeSet};
+
+/// Rotations of the nodes of a block, by local node and padded as its other arrays are.
+pub struct Turning {
+    /// Rotation rate by axis (1/time), the same in space for all elements of a node.
+    pub w: [Vec<f64>; 3],
+    /// Moment by axis (force times length).
+    pub m: [Vec<f64>; 3],
+    /// Rotational inertia, see [`crate::state::ShellState::inertia`]; positive in the padding.
+    pub inertia: Vec<f64>,
+}
+
+impl Turning {
+    /// These rates and inertias; no moments.
+    ///
+    /// # Panics
+    /// If there are not as many of the one as of the other.
+    pub fn new(spin: &[[f64; 3]], mut inertia: Vec<f64>) -> Self {
+        let n_nodes = spin.len();
+        assert!(inertia.len() == n_nodes, "{} inertias, {n_nodes} nodes", inertia.len());
+        let n_padded = n_nodes.next_multiple_of(SET);
+        inertia.resize(n_padded, 1.0);
+        Self {
+            w: std::array::from_fn(|axis| {
+                let mut w: Vec<f64> = spin.iter().map(|w| w[axis]).collect();
+                w.resize(n_padded, 0.0);
+                w
+            }),
+            m: std::array::from_fn(|_| vec![0.0; n_padded]),
+            inertia,
+        }
+    }
+}
 
 /// Advances the rotation rates of the nodes of a block and clears the moments; gives the kinetic energy of rotation
 /// `sum 1/2 I w_{n-1/2} . w_{n+1/2}` of the booked nodes, and the work that relaxation does on them. What clamps a
 /// node does no work: it does not turn.
 pub(crate) fn advance(
     advance: &Advance<'_>,
-    core: &mut Core,
+    turning: &mut Turning,
     constraint: &[u16],
     sets: &[NodeSet],
 ) -> (f64, f64) {
@@ -21,12 +53,12 @@ pub(crate) fn advance(
     let (mut kinetic, mut external) = (0.0, 0.0);
     for (i, &held) in constraint.iter().enumerate() {
         let clamped = advance.constraints[held as usize].clamped;
-        let inertia = core.inertia[i];
+        let inertia = turning.inertia[i];
         let scale = half_steps / inertia;
         let (mut product, mut work) = (0.0, 0.0);
         for axis in 0..3 {
-            let old = core.w[axis][i];
-            let mut new = core.m[axis][i].mul_add(scale, old);
+            let old = turning.w[axis][i];
+            let mut new = turning.m[axis][i].mul_add(scale, old);
             if loss > 0.0 {
                 let change = -loss * old;
                 new += change;
@@ -35,8 +67,8 @@ pub(crate) fn advance(
             if clamped >> axis & 1 == 1 {
                 new = 0.0;
             }
-            core.w[axis][i] = new;
-            core.m[axis][i] = 0.0;
+            turning.w[axis][i] = new;
+            turning.m[axis][i] = 0.0;
             product = old.mul_add(new, product);
         }
         if sets[i / SET].booked >> (i % SET) & 1 == 1 {

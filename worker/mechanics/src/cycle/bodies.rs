@@ -107,8 +107,8 @@ impl Domain {
             for &[room, local, place] in &held.copies {
                 let block = &self.rooms[room as usize].block;
                 push(&mut held.push, at(&block.f, local), body, state, place, force);
-                if let Some(core) = &block.shells {
-                    held.push.add_moment(at(&core.m, local), force, body.length);
+                if let Some(turning) = &block.turning {
+                    held.push.add_moment(at(&turning.m, local), force, body.length);
                 }
             }
             if let Some(contact) = &self.contact {
@@ -163,10 +163,10 @@ impl Domain {
                 let (x, v) = (at(&block.x, local), at(&block.v, local));
                 let force = of_nodes.leading(x, v, block.mass[local as usize], target);
                 (0..3).for_each(|a| block.f[a][local as usize] = force[a]);
-                if let Some(core) = &mut block.shells {
-                    let (spin, inertia) = (at(&core.w, local), core.inertia[local as usize]);
+                if let Some(turning) = &mut block.turning {
+                    let (spin, inertia) = (at(&turning.w, local), turning.inertia[local as usize]);
                     let moment = of_nodes.turning(spin, inertia, held.state.spin);
-                    (0..3).for_each(|a| core.m[a][local as usize] = moment[a]);
+                    (0..3).for_each(|a| turning.m[a][local as usize] = moment[a]);
                 }
             }
             for &[guest, place] in &held.guests {

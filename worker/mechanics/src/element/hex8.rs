@@ -5,7 +5,8 @@
 
 use std::ops::Range;
 
-pub(crate) mod pass;
+pub(crate) mod group;
+mod pass;
 
 use super::{
     ElementVote, Fault, Step,

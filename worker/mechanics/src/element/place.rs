@@ -11,7 +11,16 @@ pub(crate) struct Nodal<'a> {
     pub f: [&'a mut [f64]; 3],
 }
 
-impl Nodal<'_> {
+impl<'a> Nodal<'a> {
+    /// The arrays of a block.
+    pub fn of(x: &'a [Vec<f64>; 3], v: &'a [Vec<f64>; 3], f: &'a mut [Vec<f64>; 3]) -> Self {
+        Self {
+            x: x.each_ref().map(Vec::as_slice),
+            v: v.each_ref().map(Vec::as_slice),
+            f: f.each_mut().map(Vec::as_mut_slice),
+        }
+    }
+
     #[inline(always)]
     pub(super) fn reborrow(&mut self) -> Nodal<'_> {
         let [fx, fy, fz] = &mut self.f;

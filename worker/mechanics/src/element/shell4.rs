@@ -11,8 +11,7 @@
 //! deflection and the twist of rotations in the plane with that of transverse shear scaled by `h^2 / A`. All are blind
 //! to rigid motion and to constant strain, curvature and twist.
 //!
-//! The elements stand in [`block::Core`], which a block of a cycle holds beside its nodes; [`block::Shells`] is a core with
-//! nodes of its own.
+//! The elements stand in `block::Core`, which a block of a cycle holds as its group; [`Shells`] is a core with nodes of its own.
 
 pub mod block;
 mod geometry;
@@ -20,7 +19,8 @@ mod kernel;
 
 use serde::{Deserialize, Serialize};
 
-pub use block::{Core, SectionError, ShellStep, Shells};
+pub(crate) use block::Core;
+pub use block::{SectionError, ShellStep, Shells};
 pub use kernel::{ELEMENT, LAYER, THICKNESS};
 
 /// Points through the thickness: heights by half the thickness and weights that add up to 1.

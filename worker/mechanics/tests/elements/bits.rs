@@ -257,11 +257,8 @@ fn border_sets_first_and_then_the_rest_make_the_whole() {
     let border = block.sets_touching(&marked);
     for set in 0..block.n_sets() {
         let members = (0..piece.elements.len()).filter(|&e| block.set_of_element(e) == set);
-        let mut nodes: Vec<u32> = members.flat_map(|e| block.corners(e)).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        assert_eq!(block.nodes_of_set(set), nodes);
-        assert_eq!(border[set as usize], nodes.iter().any(|&node| marked[node as usize]), "set {set}");
+        let mut nodes = members.flat_map(|e| block.corners(e));
+        assert_eq!(border[set as usize], nodes.any(|node| marked[node as usize]), "set {set}");
     }
     let mut joined = ElementVote::default();
     let ranges = |wanted: bool| -> Vec<std::ops::Range<u32>> {

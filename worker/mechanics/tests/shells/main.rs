@@ -79,13 +79,13 @@ fn kick(shells: &mut Shells, dt: f64, damping: f64, load: &[(usize, [f64; 3])], 
         for node in 0..shells.mass.len() {
             shells.v[axis][node] =
                 keep * shells.v[axis][node] + take * shells.f[axis][node] / shells.mass[node];
-            shells.core.w[axis][node] = keep * shells.core.w[axis][node]
-                + take * shells.core.m[axis][node] / shells.core.inertia[node];
+            shells.turning.w[axis][node] = keep * shells.turning.w[axis][node]
+                + take * shells.turning.m[axis][node] / shells.turning.inertia[node];
         }
     }
     for &node in fixed {
         set(&mut shells.v, node, [0.0; 3]);
-        set(&mut shells.core.w, node, [0.0; 3]);
+        set(&mut shells.turning.w, node, [0.0; 3]);
     }
 }
 
@@ -114,7 +114,7 @@ fn a_rigid_rotation_of_a_warped_patch_leaves_no_stress_and_no_force() {
             let (sin, cos) = f64::sin_cos(angle);
             let v = std::array::from_fn(|i| (sin * k[i] + (1.0 - cos) * kk[i]) / dt);
             set(&mut shells.v, node, v);
-            set(&mut shells.core.w, node, axis.map(|a| rate * a));
+            set(&mut shells.turning.w, node, axis.map(|a| rate * a));
         }
         advance(&mut shells, dt);
         shells.compute(&step(dt, 1e10), Width::best());
@@ -145,7 +145,7 @@ fn constant_strain_curvature_and_twist_pass_the_patch_test_without_hourglass() {
         let w = 0.5 * bend * (x * x + x * y + y * y);
         let (slope_x, slope_y) = (bend * (x + 0.5 * y), bend * (y + 0.5 * x));
         set(&mut shells.v, node, [stretch * (x + 0.5 * y), stretch * (y + 0.5 * x), w]);
-        set(&mut shells.core.w, node, [slope_y, -slope_x, 0.0]);
+        set(&mut shells.turning.w, node, [slope_y, -slope_x, 0.0]);
     }
     // Rates over a small time: the geometry stays flat.
     shells.compute(&step(dt, 1e-9), Width::best());
@@ -168,7 +168,7 @@ fn constant_strain_curvature_and_twist_pass_the_patch_test_without_hourglass() {
         assert!(shells.hourglass_energy(element) < 1e-20 * young * dt * dt, "{element}");
     }
     for node in 4..8 {
-        let (force, moment) = (at(&shells.f, node), at(&shells.core.m, node));
+        let (force, moment) = (at(&shells.f, node), at(&shells.turning.m, node));
         let scale = membrane * h * 0.1;
         assert!(force.iter().all(|f| f.abs() < 1e-8 * scale), "{force:?} of {scale}");
         assert!(moment.iter().all(|m| m.abs() < 1e-8 * scale * h), "{moment:?} of {scale}");
@@ -187,7 +187,11 @@ fn stirred(width: Width, strength: Strength) -> (Shells, ElementVote) {
             node,
             [30.0 * phase.sin(), 40.0 * (2.0 * phase).cos(), 50.0 * (3.0 * phase).sin()],
         );
-        set(&mut shells.core.w, node, [200.0 * phase.cos(), 100.0 * (1.5 * phase).sin(), 20.0 * phase.sin()]);
+        set(
+            &mut shells.turning.w,
+            node,
+            [200.0 * phase.cos(), 100.0 * (1.5 * phase).sin(), 20.0 * phase.sin()],
+        );
     }
     let mut vote = ElementVote::default();
     for _ in 0..40 {
@@ -226,9 +230,11 @@ fn every_lane_width_gives_the_same_bits() {
         for width in Width::ALL.into_iter().filter(|width| width.available()) {
             let (wide, other) = stirred(width, strength);
             assert_eq!(vote, other, "{width}");
-            for (a, b) in
-                [(&scalar.x, &wide.x), (&scalar.core.w, &wide.core.w), (&scalar.core.m, &wide.core.m)]
-            {
+            for (a, b) in [
+                (&scalar.x, &wide.x),
+                (&scalar.turning.w, &wide.turning.w),
+                (&scalar.turning.m, &wide.turning.m),
+            ] {
                 assert!(a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| a.to_bits() == b.to_bits()));
             }
         }
@@ -243,7 +249,7 @@ fn forces_add_to_zero_exactly_and_moments_to_rounding() {
         let mut turning = [0.0; 3];
         let mut scale: f64 = 0.0;
         for node in 0..shells.mass.len() {
-            let (r, f, m) = (at(&shells.x, node), at(&shells.f, node), at(&shells.core.m, node));
+            let (r, f, m) = (at(&shells.x, node), at(&shells.f, node), at(&shells.turning.m, node));
             let arm = cross(r, f);
             for i in 0..3 {
                 total[i] += f[i];
@@ -268,7 +274,7 @@ fn a_cantilever_strip_vibrates_at_the_frequency_of_the_beam() {
         // About the first mode: w = s^2 (6 - 4 s + s^2) / 3, w' beside it.
         let slope = (12.0 * s - 12.0 * s * s + 4.0 * s * s * s) / 3.0 / 0.2;
         set(&mut shells.v, node, [0.0, 0.0, 1e-3 * s * s * (6.0 - 4.0 * s + s * s) / 3.0]);
-        set(&mut shells.core.w, node, [0.0, -1e-3 * slope, 0.0]);
+        set(&mut shells.turning.w, node, [0.0, -1e-3 * slope, 0.0]);
     }
     let dt = 5e-7;
     let (mut crossings, mut before, mut cycle) = (Vec::new(), 0.0, 0);

@@ -4,11 +4,10 @@ use std::ops::Range;
 
 use super::{Laws, View, compute};
 use crate::{
-    element::{ElementVote, Step},
+    element::{ElementVote, Step, group::Call},
     eos::{AnyEos, EquationOfState},
     failure::{AnyFailure, FailureLaw, Unfailing},
-    lanes::{Lane, Width, dispatch::Task},
-    material::Material,
+    lanes::{Lane, dispatch::Task},
     strength::{AnyStrength, StrengthLaw},
 };
 
@@ -20,14 +19,8 @@ use crate::{
 /// # Safety
 /// Arrays by slot and set hold the sets of the layout; every corner of every slot, phantoms included, is below the reach, with
 /// [`SET`](crate::lanes::SET) lanes behind it in a structured layout.
-pub(crate) unsafe fn run(
-    view: View<'_>,
-    material: &Material,
-    step: &Step,
-    sets: &[Range<u32>],
-    width: Width,
-    vote: &mut ElementVote,
-) {
+pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, vote: &mut ElementVote) {
+    let Call { material, sets, step, width } = *call;
     let (n_sets, reach) = (view.slots.alive.len(), view.reach);
     assert!(sets.iter().all(|r| r.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
     let arrays = view.nodes.x.iter().chain(&view.nodes.v).map(|a| a.len());

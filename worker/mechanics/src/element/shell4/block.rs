@@ -4,12 +4,17 @@ use std::{fmt, ops::Range};
 
 use super::{Rule, kernel};
 use crate::{
-    element::ElementVote,
+    element::{
+        ElementVote,
+        group::{Call, Group, Image},
+        place::Nodal,
+    },
     exact::Quantum,
     lanes::{SET, Width},
     material::Material,
-    mesh::{Section, quad_area},
-    state::ShellState,
+    mesh::{Section, quad_area, twice},
+    spin::Turning,
+    state::{N_FIELDS, field},
     strength::plane_stress::PlaneLaw,
 };
 
@@ -71,14 +76,12 @@ impl fmt::Display for SectionError {
 
 impl std::error::Error for SectionError {}
 
-/// What shells have beside positions, velocities and forces of their nodes: a cycle keeps those in a block.
-pub struct Core {
-    /// Rotation rate by axis (1/time) by node, the same in space for all elements of a node.
-    pub w: [Vec<f64>; 3],
-    /// Nodal moment by axis (force times length).
-    pub m: [Vec<f64>; 3],
-    /// Rotational inertia of each node, see [`crate::state::ShellState::inertia`].
-    pub inertia: Vec<f64>,
+/// The shells of a block, without its nodes. Arrays are by slot, which is the local element; phantoms follow.
+pub(crate) struct Core {
+    n_nodes: usize,
+    n_elements: usize,
+    /// Area times thickness at the start.
+    initial_volume: Vec<f64>,
     corners: [Vec<u32>; 4],
     state: Vec<Vec<f64>>,
     layers: Vec<Vec<f64>>,
@@ -113,7 +116,7 @@ impl Section {
 
 impl Core {
     /// Lays out the state of `quads.len()` elements in slots, eight to a set. `elements` are their global indices,
-    /// `volume` their area times thickness at the start.
+    /// `volume` their area times thickness at the start, `fields` their state, see [`crate::state::ShellState::fields`].
     ///
     /// # Errors
     /// [`SectionError`].
@@ -122,36 +125,29 @@ impl Core {
     /// If there is no element, or arrays of the state are not by node and element.
     pub fn new(
         quads: &[[u32; 4]],
+        n_nodes: usize,
         elements: &[u32],
         volume: &[f64],
-        state: &ShellState,
+        fields: &[Vec<f64>],
         section: &Section,
         material: &Material,
     ) -> Result<Core, SectionError> {
         let (points, law) = section_of(section, material)?;
         assert!(!quads.is_empty(), "a block without elements");
-        let (n_nodes, n_elements) = (state.spin.len(), quads.len());
+        let n_elements = quads.len();
         assert!(quads.iter().flatten().all(|&n| (n as usize) < n_nodes), "corners beyond {n_nodes} nodes");
-        assert!(state.inertia.len() == n_nodes, "{} inertias, {n_nodes} nodes", state.inertia.len());
-        assert!(state.fields.len() == section.n_fields(), "{} fields of shells", state.fields.len());
+        assert!(fields.len() == section.n_fields(), "{} fields of shells", fields.len());
         assert!(elements.len() == n_elements && volume.len() == n_elements, "{n_elements} elements");
-        assert!(state.fields.iter().all(|f| f.len() == n_elements), "fields of {n_elements} elements");
+        assert!(fields.iter().all(|f| f.len() == n_elements), "fields of {n_elements} elements");
         let n_slots = n_elements.next_multiple_of(SET);
         // Phantoms stand on the first element.
         let of_slot = |slot: usize| if slot < n_elements { slot } else { 0 };
         let by_slot = |array: &[f64]| -> Vec<f64> { (0..n_slots).map(|slot| array[of_slot(slot)]).collect() };
-        let n_padded = n_nodes.next_multiple_of(SET);
-        let (own, layers) = state.fields.split_at(kernel::ELEMENT);
-        let mut inertia = state.inertia.clone();
-        inertia.resize(n_padded, 1.0);
+        let (own, layers) = fields.split_at(kernel::ELEMENT);
         Ok(Core {
-            w: std::array::from_fn(|axis| {
-                let mut w: Vec<f64> = state.spin.iter().map(|w| w[axis]).collect();
-                w.resize(n_padded, 0.0);
-                w
-            }),
-            m: std::array::from_fn(|_| vec![0.0; n_padded]),
-            inertia,
+            n_nodes,
+            n_elements,
+            initial_volume: volume.to_vec(),
             corners: std::array::from_fn(|i| (0..n_slots).map(|slot| quads[of_slot(slot)][i]).collect()),
             state: own.iter().map(|field| by_slot(field)).collect(),
             layers: layers.iter().map(|field| by_slot(field)).collect(),
@@ -165,32 +161,18 @@ impl Core {
         })
     }
 
-    /// The state image of the first `n_nodes` nodes and `n_elements` elements.
-    pub fn image(&self, n_nodes: usize, n_elements: usize) -> ShellState {
-        ShellState {
-            spin: (0..n_nodes).map(|n| std::array::from_fn(|axis| self.w[axis][n])).collect(),
-            inertia: self.inertia[..n_nodes].to_vec(),
-            fields: self.state.iter().chain(&self.layers).map(|field| field[..n_elements].to_vec()).collect(),
-        }
-    }
-
-    /// Makes a stress of the first element wrong by one unit in the last place, see [`crate::cycle::Domain::plant_fault`].
-    pub(crate) fn plant_fault(&mut self) {
-        if let Some(stress) = self.layers.first_mut().and_then(|layer| layer.first_mut()) {
-            *stress = stress.next_up();
-        }
-    }
-
     /// What an element says of itself in the fields of solids: greatest plastic strain and temperature of its layers,
-    /// energy, pressure and deviator of the mean stress in its own frame. `volume` is that of the start, `area` of now.
-    pub fn summary(&self, element: usize, volume: f64, area: f64) -> [f64; crate::state::N_FIELDS] {
-        use crate::state::field;
+    /// energy, pressure and deviator of the mean stress in its own frame.
+    fn summary(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
+        let corners = self.corners.each_ref().map(|of_slot| of_slot[element] as usize);
+        let area = quad_area(&corners.map(|n| std::array::from_fn(|axis| x[axis][n])));
+        let volume = self.initial_volume[element];
         let layer = |point: usize, i: usize| self.layers[point * kernel::LAYER + i][element];
         let mean = |i: usize| (0..self.points.len()).map(|p| self.points[p].1 * layer(p, i)).sum::<f64>();
         let most = |i: usize| (0..self.points.len()).map(|p| layer(p, i)).fold(f64::MIN, f64::max);
         let (xx, yy) = (mean(0), mean(1));
         let pressure = -(xx + yy) / 3.0;
-        let mut fields = [0.0; crate::state::N_FIELDS];
+        let mut fields = [0.0; N_FIELDS];
         fields[field::SXX] = xx + pressure;
         fields[field::SYY] = yy + pressure;
         (fields[field::SXY], fields[field::SYZ], fields[field::SZX]) = (mean(2), mean(3), mean(4));
@@ -202,28 +184,26 @@ impl Core {
         fields
     }
 
-    /// Adds forces and moments of the elements of `sets` at `x`, brings their state from `n-1` to `n` and adds their
-    /// votes. The result does not depend on `width`.
+    /// Adds forces and moments of the elements of `sets`, brings their state from `n-1` to `n` and adds their votes. The result does
+    /// not depend on `width`.
     ///
     /// # Panics
-    /// If node arrays are shorter than the core's, a set is out of range or the machine lacks the width.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "positions, velocities and forces stand in the caller's arrays"
-    )]
-    pub fn compute(
+    /// If node arrays are shorter than the nodes, a set is out of range or the machine lacks the width.
+    fn run(
         &mut self,
-        x: &[Vec<f64>; 3],
-        v: &[Vec<f64>; 3],
-        f: &mut [Vec<f64>; 3],
+        nodes: Nodal<'_>,
+        turning: &mut Turning,
         sets: &[Range<u32>],
         step: &ShellStep,
         width: Width,
         vote: &mut ElementVote,
     ) {
-        let n_nodes = self.inertia.len();
-        let arrays = [x, v, &*f, &self.w, &self.m];
-        assert!(arrays.into_iter().flatten().all(|a| a.len() >= n_nodes), "node arrays not of {n_nodes}");
+        let n_nodes = self.n_nodes;
+        let lengths = nodes.x.iter().chain(&nodes.v).map(|a| a.len());
+        let lengths = lengths.chain(nodes.f.iter().map(|a| a.len()));
+        let lengths = lengths.chain(turning.w.iter().chain(&turning.m).map(Vec::len));
+        let shortest = lengths.min().unwrap_or(0);
+        assert!(shortest >= n_nodes, "node arrays of {shortest}, not of {n_nodes}");
         let n_sets = self.alive.len() as u32;
         assert!(sets.iter().all(|r| r.end <= n_sets), "sets {sets:?} of a block of {n_sets}");
         let constants = kernel::Constants {
@@ -237,11 +217,11 @@ impl Core {
         };
         let view = kernel::View {
             corners: &self.corners,
-            x: x.each_ref().map(Vec::as_slice),
-            v: v.each_ref().map(Vec::as_slice),
-            w: self.w.each_ref().map(Vec::as_slice),
-            f: f.each_mut().map(Vec::as_mut_slice),
-            m: self.m.each_mut().map(Vec::as_mut_slice),
+            x: nodes.x,
+            v: nodes.v,
+            w: turning.w.each_ref().map(Vec::as_slice),
+            f: nodes.f,
+            m: turning.m.each_mut().map(Vec::as_mut_slice),
             state: &mut self.state,
             layers: &mut self.layers,
             mass: &self.element_mass,
@@ -252,6 +232,76 @@ impl Core {
         // in whole sets.
         let pass = unsafe { kernel::Pass::new(view, &constants, sets, vote) };
         width.run(pass);
+    }
+}
+
+impl Group for Core {
+    fn reach(&self) -> usize {
+        self.n_nodes
+    }
+
+    fn alive(&self) -> &[u8] {
+        &self.alive
+    }
+
+    fn slot(&self, element: usize) -> usize {
+        element
+    }
+
+    fn corners(&self, element: usize) -> [u32; 8] {
+        twice(self.corners.each_ref().map(|of_slot| of_slot[element]))
+    }
+
+    fn compute(
+        &mut self,
+        nodes: Nodal<'_>,
+        turning: Option<&mut Turning>,
+        call: &Call<'_>,
+        vote: &mut ElementVote,
+    ) {
+        let step = ShellStep {
+            dt: call.step.dt,
+            force_quantum: call.step.force_quantum,
+            moment_quantum: call.step.force_quantum.times(call.step.arm),
+            energy_quantum: call.step.energy_quantum,
+        };
+        let turning = turning.expect("a block of shells was built with rotations");
+        self.run(nodes, turning, call.sets, &step, call.width, vote);
+    }
+
+    fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
+        self.summary(element, x)
+    }
+
+    fn image(&self, x: &[Vec<f64>; 3]) -> Image {
+        let all: Vec<_> = (0..self.n_elements).map(|e| self.summary(e, x)).collect();
+        let own = self.state.iter().chain(&self.layers);
+        Image {
+            initial_volume: self.initial_volume.clone(),
+            fields: std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect()),
+            own: own.map(|field| field[..self.n_elements].to_vec()).collect(),
+        }
+    }
+
+    fn into_image(self: Box<Self>, x: &[Vec<f64>; 3]) -> Image {
+        self.image(x)
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(f64)) {
+        for field in self.state.iter().chain(&self.layers) {
+            field[..self.n_elements].iter().for_each(|&value| visit(value));
+        }
+    }
+
+    fn take_out(&mut self, slot: usize) -> (u32, f64) {
+        self.alive[slot / SET] &= !(1 << (slot % SET));
+        (self.elements[slot], self.state[kernel::INTERNAL][slot])
+    }
+
+    fn plant_fault(&mut self) {
+        if let Some(stress) = self.layers.first_mut().and_then(|layer| layer.first_mut()) {
+            *stress = stress.next_up();
+        }
     }
 }
 
@@ -266,9 +316,9 @@ pub struct Shells {
     pub f: [Vec<f64>; 3],
     /// Nodal mass: a quarter of each element's.
     pub mass: Vec<f64>,
-    /// The rest.
-    pub core: Core,
-    n_elements: usize,
+    /// Rotations of the nodes.
+    pub turning: Turning,
+    core: Core,
 }
 
 impl Shells {
@@ -290,13 +340,10 @@ impl Shells {
         section.check(material)?;
         let (n_nodes, n_elements) = (x.len(), corners.len());
         let n_padded = n_nodes.next_multiple_of(SET);
-        let mut state = ShellState {
-            spin: vec![[0.0; 3]; n_nodes],
-            inertia: vec![0.0; n_nodes],
-            fields: vec![vec![0.0; n_elements]; section.n_fields()],
-        };
-        state.fields[kernel::THICKNESS].fill(thickness);
-        for layer in state.fields[kernel::ELEMENT..].chunks_mut(kernel::LAYER) {
+        let mut inertia = vec![0.0; n_nodes];
+        let mut fields = vec![vec![0.0; n_elements]; section.n_fields()];
+        fields[kernel::THICKNESS].fill(thickness);
+        for layer in fields[kernel::ELEMENT..].chunks_mut(kernel::LAYER) {
             layer[kernel::LAYER - 1].fill(material.initial_temperature());
         }
         let mut masses = vec![0.0; n_padded];
@@ -308,7 +355,7 @@ impl Shells {
             volumes.push(area * thickness);
             for &node in corners {
                 masses[node as usize] += 0.25 * mass;
-                state.inertia[node as usize] += 0.25 * mass * (thickness * thickness / 12.0).max(area / 8.0);
+                inertia[node as usize] += 0.25 * mass * (thickness * thickness / 12.0).max(area / 8.0);
             }
         }
         let elements: Vec<u32> = (0..n_elements as u32).collect();
@@ -322,14 +369,14 @@ impl Shells {
             v: zeros(),
             f: zeros(),
             mass: masses,
-            core: Core::new(corners, &elements, &volumes, &state, &section, material)?,
-            n_elements,
+            turning: Turning::new(&vec![[0.0; 3]; n_nodes], inertia),
+            core: Core::new(corners, n_nodes, &elements, &volumes, &fields, &section, material)?,
         })
     }
 
     /// Number of elements.
     pub fn n_elements(&self) -> usize {
-        self.n_elements
+        self.core.n_elements
     }
 
     /// Thickness of an element now (length).
@@ -358,12 +405,13 @@ impl Shells {
     /// # Panics
     /// If node arrays changed their length or the machine lacks the width.
     pub fn compute(&mut self, step: &ShellStep, width: Width) -> ElementVote {
-        for array in self.f.iter_mut().chain(&mut self.core.m) {
+        for array in self.f.iter_mut().chain(&mut self.turning.m) {
             array.fill(0.0);
         }
         let mut vote = ElementVote::default();
         let all = 0..self.core.alive.len() as u32;
-        self.core.compute(&self.x, &self.v, &mut self.f, &[all], step, width, &mut vote);
+        let nodes = Nodal::of(&self.x, &self.v, &mut self.f);
+        self.core.run(nodes, &mut self.turning, &[all], step, width, &mut vote);
         vote
     }
 }

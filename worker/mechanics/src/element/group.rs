@@ -1,0 +1,121 @@
+//! The seam between a block and its elements: a block has nodes and one group of elements of one kind.
+//!
+//! An element kind is a module that implements [`Group`] and has an arm in [`Topology`] and in [`of`]; a block, a cycle, erosion,
+//! loads and samples ask a group by this trait and by nothing else. Elements sit in *slots*, eight to a *lane set*, the same on every
+//! lane width; a slot may be empty.
+
+use std::ops::Range;
+
+use super::{ElementVote, Step, hex8::group::Solids, layout::Layout, place::Nodal, shell4::Core};
+use crate::{
+    block::Piece,
+    lanes::Width,
+    material::Material,
+    mesh::Topology,
+    spin::Turning,
+    state::{N_FIELDS, ShellState},
+};
+
+/// Stands for the global element index in a slot without an element.
+pub(crate) const PHANTOM: u32 = u32::MAX;
+
+/// What a group is told beside the nodes.
+pub(crate) struct Call<'a> {
+    pub material: &'a Material,
+    /// The sets to compute, each once a cycle.
+    pub sets: &'a [Range<u32>],
+    pub step: &'a Step,
+    pub width: Width,
+}
+
+/// Element arrays of a [`Piece`], by local element.
+pub(crate) struct Image {
+    /// Volume at time zero.
+    pub initial_volume: Vec<f64>,
+    /// One array per entry of [`crate::state::FIELDS`]: the state, or what stands for it in results.
+    pub fields: [Vec<f64>; N_FIELDS],
+    /// State of this kind alone.
+    pub own: Vec<Vec<f64>>,
+}
+
+/// The arrays that the pass of erosion reads.
+pub(crate) struct Scanned<'a> {
+    pub layout: &'a Layout,
+    /// Entries of a node array that a pass over all slots may touch.
+    pub reach: usize,
+    /// Bits of the slots of each set whose elements take part.
+    pub alive: &'a [u8],
+    /// One array per entry of [`crate::state::FIELDS`], by slot.
+    pub fields: [&'a [f64]; N_FIELDS],
+}
+
+/// The elements of a block. Elements are by local index, nodes by the local index of the block.
+pub(crate) trait Group: Send + Sync {
+    /// Entries of a node array that the kernels may touch.
+    fn reach(&self) -> usize;
+
+    /// Bits of the slots of each set whose elements take part.
+    fn alive(&self) -> &[u8];
+
+    /// The slot of an element.
+    fn slot(&self, element: usize) -> usize;
+
+    /// Nodes of the corners of an element. A kind with fewer corners than a hexahedron names some of them twice.
+    fn corners(&self, element: usize) -> [u32; 8];
+
+    /// Adds forces and moments of the elements at `x_n`, brings their state from `n-1` to `n` (unless the step is zero) and adds
+    /// their votes. The result depends neither on the width, nor on the order of sets, nor on how they are cut into calls.
+    ///
+    /// # Panics
+    /// If a set is out of range, node arrays are shorter than the reach or the machine lacks the width.
+    fn compute(
+        &mut self,
+        nodes: Nodal<'_>,
+        turning: Option<&mut Turning>,
+        call: &Call<'_>,
+        vote: &mut ElementVote,
+    );
+
+    /// What an element says of itself, one number per entry of [`crate::state::FIELDS`], with its nodes at `x`.
+    fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS];
+
+    /// The arrays of the image, with the nodes at `x`.
+    fn image(&self, x: &[Vec<f64>; 3]) -> Image;
+
+    /// [`Group::image`] of a group that is not needed any more: a kind with large arrays lets them go one by one.
+    fn into_image(self: Box<Self>, x: &[Vec<f64>; 3]) -> Image;
+
+    /// Every number that a cycle changes, in a fixed order.
+    fn visit(&self, visit: &mut dyn FnMut(f64));
+
+    /// Takes the element of a slot out: it gives no force and no vote any more and keeps its state. Gives its global index and
+    /// internal energy.
+    fn take_out(&mut self, slot: usize) -> (u32, f64);
+
+    /// The arrays for the pass of erosion; none of a kind that does not erode.
+    fn scanned(&self) -> Option<Scanned<'_>> {
+        None
+    }
+
+    /// Makes a stress of the first element wrong by one unit in the last place, see [`crate::cycle::Domain::plant_fault`].
+    fn plant_fault(&mut self);
+}
+
+/// The elements of a piece, whose element arrays they take, and the rotations of its nodes where its kind turns them.
+///
+/// # Panics
+/// If the arrays of the piece do not fit its topology, or elements of this kind cannot be of its material.
+pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, Option<Turning>) {
+    let n_nodes = piece.nodes.len();
+    match &piece.topology {
+        Topology::Structured { .. } | Topology::Explicit { .. } => (Box::new(Solids::of(piece)), None),
+        Topology::Shells { quads, section } => {
+            let ShellState { spin, inertia, fields } = std::mem::take(&mut piece.shells);
+            let material = materials.get(piece.material as usize).expect("shells need their material");
+            let volume = &piece.initial_volume;
+            let core = Core::new(quads, n_nodes, &piece.elements, volume, &fields, section, material);
+            let core = core.expect("the deck has checked section and material");
+            (Box::new(core), Some(Turning::new(&spin, inertia)))
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Hexahedra of a block.
+//!
+//! In a structured block the slots of a set follow the local node index of their corner 0, so that the corners of a set are
+//! contiguous loads; a slot beyond the end of a row holds no element (a *phantom*) and is masked wherever a result leaves the kernel.
+
+use std::mem::take;
+
+use super::{BySlot, View, pass};
+use crate::{
+    block::Piece,
+    element::{
+        ElementVote,
+        group::{Call, Group, Image, PHANTOM, Scanned},
+        layout::{Corners, Layout, explicit, in_runs, structured},
+        place::Nodal,
+    },
+    lanes::SET,
+    mesh::Topology,
+    spin::Turning,
+    state::{
+        N_FIELDS,
+        field::{ENERGY, PRESSURE},
+        sparse, write_changed,
+    },
+};
+
+/// Hexahedra, laid out for the kernel. Arrays are by slot.
+pub(crate) struct Solids {
+    layout: Layout,
+    /// Slot of each local element.
+    slots: Vec<u32>,
+    fields: [Vec<f64>; N_FIELDS],
+    initial_volume: Vec<f64>,
+    /// Bits of the slots of each set that hold elements.
+    alive: Vec<u8>,
+    slot_elements: Vec<u32>,
+    /// Lowest global element index of each set.
+    lowest: Vec<u32>,
+    /// Entries of a node array that the kernels may touch.
+    reach: usize,
+}
+
+impl Solids {
+    /// Those of a piece, whose element arrays go one by one.
+    ///
+    /// # Panics
+    /// If the arrays do not fit the topology or that is none of hexahedra.
+    pub fn of(piece: &mut Piece) -> Self {
+        let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
+        let (layout, slots, reach) = match &piece.topology {
+            Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
+            Topology::Explicit { hexahedra } => explicit(hexahedra, in_runs(hexahedra), n_nodes),
+            Topology::Shells { .. } => panic!("shells as hexahedra"),
+        };
+        assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
+        let n_slots = match &layout {
+            Layout::Structured { base, .. } => base.len() * SET,
+            Layout::Explicit { sets, .. } => sets.len() * SET,
+        };
+        let by_slot = |values: Vec<f64>, phantom: f64| {
+            let mut array = vec![phantom; n_slots];
+            for (&slot, value) in slots.iter().zip(values) {
+                write_changed(&mut array[slot as usize], value);
+            }
+            array
+        };
+        let mut slot_elements = vec![PHANTOM; n_slots];
+        for (&slot, &element) in slots.iter().zip(&piece.elements) {
+            slot_elements[slot as usize] = element;
+        }
+        Self {
+            fields: piece.fields.each_mut().map(|values| by_slot(take(values), 0.0)),
+            initial_volume: by_slot(take(&mut piece.initial_volume), 1.0),
+            alive: slot_elements
+                .chunks(SET)
+                .map(|set| (0..).zip(set).map(|(i, &element)| u8::from(element != PHANTOM) << i).sum())
+                .collect(),
+            lowest: slot_elements
+                .chunks(SET)
+                .map(|set| set.iter().copied().min().unwrap_or(PHANTOM))
+                .collect(),
+            slot_elements,
+            layout,
+            slots,
+            reach,
+        }
+    }
+
+    fn by_element(&self, array: &[f64]) -> Vec<f64> {
+        sparse(self.slots.iter().map(|&slot| array[slot as usize]))
+    }
+}
+
+impl Group for Solids {
+    fn reach(&self) -> usize {
+        self.reach
+    }
+
+    fn alive(&self) -> &[u8] {
+        &self.alive
+    }
+
+    fn slot(&self, element: usize) -> usize {
+        self.slots[element] as usize
+    }
+
+    fn corners(&self, element: usize) -> [u32; 8] {
+        let slot = self.slot(element);
+        match &self.layout {
+            Layout::Structured { row, plane, base } => {
+                let n = base[slot / SET] + (slot % SET) as u32;
+                let (row, plane) = (*row as u32, *plane as u32);
+                [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| n + d)
+            }
+            Layout::Explicit { sets, lists } => {
+                let lane = slot % SET;
+                match sets[slot / SET] {
+                    Corners::Run(_, first) => first.map(|node| node + lane as u32),
+                    Corners::List(list) => lists[list as usize].map(|nodes| nodes[lane]),
+                }
+            }
+        }
+    }
+
+    fn compute(
+        &mut self,
+        nodes: Nodal<'_>,
+        _turning: Option<&mut Turning>,
+        call: &Call<'_>,
+        vote: &mut ElementVote,
+    ) {
+        let view = View {
+            layout: &self.layout,
+            reach: self.reach,
+            nodes,
+            slots: BySlot {
+                fields: self.fields.each_mut().map(Vec::as_mut_slice),
+                initial_volume: &self.initial_volume,
+                alive: &self.alive,
+                elements: &self.slot_elements,
+                lowest: &self.lowest,
+            },
+        };
+        // SAFETY: corners and slots are inside their arrays since these were built.
+        unsafe { pass::run(view, call, vote) };
+    }
+
+    fn element(&self, element: usize, _x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
+        let slot = self.slot(element);
+        self.fields.each_ref().map(|values| values[slot])
+    }
+
+    fn image(&self, _x: &[Vec<f64>; 3]) -> Image {
+        Image {
+            initial_volume: self.by_element(&self.initial_volume),
+            fields: self.fields.each_ref().map(|values| self.by_element(values)),
+            own: Vec::new(),
+        }
+    }
+
+    fn into_image(mut self: Box<Self>, _x: &[Vec<f64>; 3]) -> Image {
+        drop(take(&mut self.slot_elements));
+        let initial_volume = take(&mut self.initial_volume);
+        let initial_volume = self.by_element(&initial_volume);
+        let fields = std::array::from_fn(|field| {
+            let values = take(&mut self.fields[field]);
+            self.by_element(&values)
+        });
+        Image { initial_volume, fields, own: Vec::new() }
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(f64)) {
+        for values in &self.fields {
+            self.slots.iter().for_each(|&slot| visit(values[slot as usize]));
+        }
+    }
+
+    fn take_out(&mut self, slot: usize) -> (u32, f64) {
+        self.alive[slot / SET] &= !(1 << (slot % SET));
+        (self.slot_elements[slot], self.fields[ENERGY][slot] * self.initial_volume[slot])
+    }
+
+    fn scanned(&self) -> Option<Scanned<'_>> {
+        let fields = self.fields.each_ref().map(Vec::as_slice);
+        Some(Scanned { layout: &self.layout, reach: self.reach, alive: &self.alive, fields })
+    }
+
+    fn plant_fault(&mut self) {
+        if let Some(&slot) = self.slots.first() {
+            let pressure = &mut self.fields[PRESSURE][slot as usize];
+            *pressure = pressure.next_up();
+        }
+    }
+}
