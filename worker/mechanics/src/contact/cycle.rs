@@ -218,6 +218,7 @@ impl Contact {
     }
 
     /// The lane width that it computes on.
+    #[cfg(test)]
     pub(crate) fn width(&self) -> Width {
         self.width
     }
