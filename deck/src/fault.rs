@@ -145,7 +145,7 @@ pub fn short(x: f64) -> String {
     }
 }
 
-/// The known word nearest to `word`, if it is near enough to be what was meant.
+/// The known word nearest to `word`, if it is near enough to be what was meant. Words of the same pieces in another order are nearest.
 pub fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
     if word.chars().count() > MAX_QUOTE {
         return None;
@@ -153,10 +153,20 @@ pub fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Opti
     let lower = word.to_lowercase();
     known
         .into_iter()
-        .map(|k| (edit_distance(&lower, &k.to_lowercase()), k))
+        .map(|k| (k.to_lowercase(), k))
+        .map(|(known, k)| {
+            (if pieces(&known) == pieces(&lower) { 0 } else { edit_distance(&lower, &known) }, k)
+        })
         .filter(|&(d, k)| d <= 1 + k.chars().count() / 3)
         .min_by_key(|&(d, _)| d)
         .map(|(_, k)| k)
+}
+
+/// The pieces between dashes, in alphabetical order.
+fn pieces(word: &str) -> Vec<&str> {
+    let mut pieces: Vec<&str> = word.split('-').collect();
+    pieces.sort_unstable();
+    pieces
 }
 
 /// Least number of insertions, deletions and replacements between two words (Levenshtein).
@@ -200,6 +210,7 @@ mod tests {
     fn nearest_finds_a_misspelt_key_and_ignores_a_foreign_one() {
         assert_eq!(nearest("velocty", ["velocity", "material"]), Some("velocity"));
         assert_eq!(nearest("banana", ["velocity", "material"]), None);
+        assert_eq!(nearest("mm-kg-ms", ["cm-g-us", "mm-ms-kg"]), Some("mm-ms-kg"));
     }
 
     #[test]
