@@ -33,8 +33,12 @@ pub struct Ledger {
     pub viscosity: f64,
     /// Energy lost to friction so far.
     pub friction: f64,
-    /// Work of supports and walls so far.
+    /// Work done from outside up to the time of the last cycle booked: by supports, walls and loads.
     pub external: f64,
+    /// Work that the impulses of that cycle do after its time; the next cycle books it.
+    pub external_ahead: f64,
+    /// The same by part; empty before the first cycle.
+    pub external_ahead_of_parts: Vec<f64>,
     /// Internal energy of eroded elements, kinetic energy of nodes that were dropped, and what springs of contact had less on each
     /// new surface than on the one before it.
     pub eroded: f64,
@@ -46,6 +50,8 @@ pub struct Ledger {
     pub eroded_mass: f64,
     /// Total energy less external work after the first cycle; none before it.
     pub initial_total: Option<f64>,
+    /// The first cycle in which anything had energy or work was done; none while all is at rest.
+    pub first_stirred: Option<u64>,
     /// Greatest kinetic energy so far.
     pub greatest_kinetic: f64,
     /// Greatest size of the external work so far.
@@ -105,11 +111,14 @@ impl Ledger {
             viscosity: 0.0,
             friction: 0.0,
             external: 0.0,
+            external_ahead: 0.0,
+            external_ahead_of_parts: Vec::new(),
             eroded: 0.0,
             eroded_momentum: [0.0; 3],
             eroded_elements: 0,
             eroded_mass: 0.0,
             initial_total: None,
+            first_stirred: None,
             greatest_kinetic: 0.0,
             greatest_external: 0.0,
             parts: Default::default(),
@@ -132,7 +141,8 @@ impl Ledger {
         self.hourglass += sum(&|p| p.hourglass);
         self.viscosity += sum(&|p| p.viscosity);
         self.friction += vote.friction;
-        self.external += vote.external;
+        self.external +=
+            std::mem::replace(&mut self.external_ahead, vote.external.after) + vote.external.before;
         let kinetic = sum(&|p| p.kinetic);
         let internal = sum(&|p| p.internal);
         self.eroded += vote.gone.internal + vote.gone.kinetic;
@@ -150,7 +160,11 @@ impl Ledger {
         self.first_step.get_or_insert(dt);
         self.book_parts(&vote.parts);
         self.bodies.clone_from(&vote.bodies);
-        let scale = initial.abs().max(self.greatest_kinetic);
+        // Slow loading is not judged by the little kinetic energy that it has.
+        let scale = initial.abs().max(self.greatest_kinetic).max(self.greatest_external);
+        if scale > 0.0 {
+            self.first_stirred.get_or_insert(cycle);
+        }
         let error = if scale > 0.0 { (total - self.external - initial) / scale } else { 0.0 };
         self.worst_courant = self.worst_courant.max(dt / vote.courant);
         if let Some(gap) = gap {
@@ -235,11 +249,12 @@ impl Ledger {
     fn book_parts(&mut self, votes: &[PartVote]) {
         let [first, now] = &mut self.parts;
         now.resize(votes.len(), PartEnergy::default());
-        for (part, vote) in now.iter_mut().zip(votes) {
+        self.external_ahead_of_parts.resize(votes.len(), 0.0);
+        for ((part, ahead), vote) in now.iter_mut().zip(&mut self.external_ahead_of_parts).zip(votes) {
             (part.kinetic, part.internal) = (vote.kinetic, vote.internal);
             part.hourglass += vote.hourglass;
             part.viscosity += vote.viscosity;
-            part.external += vote.external;
+            part.external += std::mem::replace(ahead, vote.external.after) + vote.external.before;
         }
         if first.is_empty() {
             first.clone_from(now);
@@ -249,15 +264,6 @@ impl Ledger {
     /// Energy that appeared or vanished since the first cycle.
     pub fn unexplained(&self) -> f64 {
         self.initial_total.map_or(0.0, |initial| self.last.total - self.external - initial)
-    }
-
-    /// Energy that appeared or vanished over the scale of the problem, by which a run is judged: the largest of initial
-    /// energy, greatest kinetic energy and greatest external work, so that slow loading is not judged by the little
-    /// kinetic energy it has.
-    pub fn imbalance(&self) -> f64 {
-        let Some(initial) = self.initial_total else { return 0.0 };
-        let scale = initial.abs().max(self.greatest_kinetic).max(self.greatest_external);
-        if scale > 0.0 { self.unexplained() / scale } else { 0.0 }
     }
 
     /// The part whose own energy grew most since the first cycle: its index and what it gained; the first of equals.

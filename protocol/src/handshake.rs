@@ -17,7 +17,8 @@ use std::fmt;
 /// 5: states of rigid bodies and energies by pair of parts in votes; rigid bodies in assignments.
 /// 6: criteria of erosion by stress, volume and principal strains in assignments; pairs of edges in plans.
 /// 7: in votes what springs hold on a surface that ends.
-/// 8: a submitted job has no route where the master is to choose it.
+/// 8: a submitted job has no route where the master is to choose it; votes have the external work of a cycle before and after
+/// its time.
 pub const VERSION: u16 = 8;
 
 /// Most characters of a host's name.

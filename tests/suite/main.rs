@@ -8,6 +8,7 @@ mod book;
 mod documents;
 mod erosion;
 mod fuzz;
+mod late;
 mod seeds;
 
 /// A row that nobody computes would look like one that holds.

@@ -100,7 +100,8 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<Stri
             return Some("the state of a rigid body in its vote is no number".to_owned());
         }
         let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
-        let numbers = energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external]);
+        let numbers =
+            energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external.whole()]);
         let released = vote.released.iter().flat_map(|released| released.pairs()).map(|pair| pair.contact);
         let numbers = numbers.chain(released);
         let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);

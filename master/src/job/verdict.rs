@@ -13,7 +13,8 @@ use crate::event::{Action, Limit};
 /// Deepest contact (gaps) before the run is stopped. Where elements erode, a face that they leave bare may have a node at any
 /// depth, and one that comes through is pushed on from the other side: there it is only reported.
 const DEEPEST: f64 = 0.9;
-/// Cycles before energies are judged: work is booked over half steps, which in the first cycles from rest is all there is.
+/// Cycles before energies are judged, from the first in which anything stirs. The heat of viscosity and of hourglass control is booked by
+/// the velocities of half a step before: too much where a body is struck, and in the first cycles that is much of what there is.
 const SETTLED: u64 = 20;
 /// Share of the first time step below which a run is stopped where the deck gives no floor.
 const FLOOR: f64 = 1e-4;
@@ -73,11 +74,12 @@ impl Job {
 
     /// Whether more energy appeared or vanished than the deck allows.
     fn run_away(&self, cycle: u64) -> Option<String> {
-        let (error, limit) = (self.ledger.imbalance(), self.model.setup.control.energy_error);
+        let (error, limit) = (self.ledger.last.error, self.model.setup.control.energy_error);
         // Energies are sums of whole quanta, one rounding for each element and cycle: what lies below cannot be judged.
         let rounding =
             0.5 * self.quanta.energy.value() * self.model.mesh.n_elements() as f64 * (cycle + 1) as f64;
-        if cycle < SETTLED || error.abs() <= limit || self.ledger.unexplained().abs() <= rounding {
+        let settled = self.ledger.first_stirred.is_some_and(|first| cycle >= first + SETTLED);
+        if !settled || error.abs() <= limit || self.ledger.unexplained().abs() <= rounding {
             return None;
         }
         let last = &self.ledger.last;

@@ -12,7 +12,7 @@ use std::{
 use super::Snapshot;
 
 /// First bytes of a snapshot file: the form of the file and of what is in it.
-const MAGIC: &[u8; 8] = b"BLDSNAPA";
+const MAGIC: &[u8; 8] = b"BLDSNAPB";
 /// Bytes that one checksum covers.
 pub const CHUNK: usize = 1 << 20;
 /// Magic, length, cycle.

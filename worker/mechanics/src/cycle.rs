@@ -630,11 +630,12 @@ impl Domain {
             if let Some(turning) = &mut block.turning {
                 let (kinetic, external) = spin::advance(&advance, turning, &block.constraint, &room.sets);
                 room.booked.kinetic += kinetic;
-                room.booked.external += external;
+                room.booked.external.merge(external);
             }
             if !room.faces.is_empty() {
                 let half_steps = 0.5 * (dt_previous + dt);
-                room.booked.external += face::work(&room.faces, block, half_steps, advance.quanta.energy);
+                let work = face::work(&room.faces, block, half_steps, advance.quanta.energy);
+                room.booked.external.merge(work);
             }
             if room.eroding.as_mut().is_some_and(Eroding::take_change) {
                 // Loads leave with the faces of eroded elements.
@@ -677,8 +678,8 @@ impl Domain {
             vote.add_walls(&room.walls);
             room.walls.fill(WallVote::default());
             vote.parts[part].kinetic += room.booked.kinetic;
-            vote.external += room.booked.external;
-            vote.parts[part].external += room.booked.external;
+            vote.external.merge(room.booked.external);
+            vote.parts[part].external.merge(room.booked.external);
             for a in 0..3 {
                 vote.momentum[a] += room.booked.momentum[a];
             }

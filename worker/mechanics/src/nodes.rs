@@ -12,7 +12,7 @@ use crate::{
     lanes::{Lane, SET, Width, dispatch::Task},
     load::Loads,
     setup::Constraint,
-    vote::Quanta,
+    vote::{Quanta, Work},
     wall::{Motion, Pose, RigidWall, WallVote, touched_quantum},
 };
 
@@ -87,7 +87,7 @@ pub struct Booked {
     /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`.
     pub kinetic: f64,
     /// Work done on the nodes by prescribed velocities, walls, forces, gravity and relaxation.
-    pub external: f64,
+    pub external: Work,
     /// `sum m v_{n+1/2}`.
     pub momentum: [f64; 3],
     /// Displacements of surface nodes from the reference.
@@ -106,8 +106,9 @@ struct Tally<L> {
     high: Vector<L>,
     speed_squared: L,
     speed_ahead: L,
-    body_work: L,
-    external: f64,
+    /// Work of gravity and relaxation, before `t_n` and after it.
+    body_work: [L; 2],
+    external: Work,
 }
 
 impl<L: Lane> Tally<L> {
@@ -121,8 +122,8 @@ impl<L: Lane> Tally<L> {
             high: splat(f64::NEG_INFINITY),
             speed_squared: zero,
             speed_ahead: zero,
-            body_work: zero,
-            external: 0.0,
+            body_work: [zero; 2],
+            external: Work::default(),
         }
     }
 
@@ -132,10 +133,10 @@ impl<L: Lane> Tally<L> {
         let (kinetic, momentum) = (self.kinetic.to_array(), arrays(&self.momentum));
         let (low, high) = (arrays(&self.low), arrays(&self.high));
         let (squared, ahead) = (self.speed_squared.to_array(), self.speed_ahead.to_array());
-        let body_work = self.body_work.to_array();
+        let [before, after] = [self.body_work[0].to_array(), self.body_work[1].to_array()];
         for lane in 0..L::N {
             booked.kinetic += kinetic[lane];
-            booked.external += body_work[lane];
+            booked.external.merge(Work { before: before[lane], after: after[lane] });
             for a in 0..3 {
                 booked.momentum[a] += momentum[a][lane];
                 booked.extent.min[a] = booked.extent.min[a].min(low[a][lane]);
@@ -284,7 +285,7 @@ impl Advance<'_> {
         }
         if set.held != 0 {
             let mut held = arrays(&new);
-            tally.external += self.hold(nodes, set, at, &mut held);
+            tally.external.merge(self.hold(nodes, set, at, &mut held));
             // SAFETY: the arrays hold a whole set.
             new = unsafe {
                 Vector { x: L::load(&held[0], 0), y: L::load(&held[1], 0), z: L::load(&held[2], 0) }
@@ -301,9 +302,13 @@ impl Advance<'_> {
         let booked = L::mask(u32::from(set.booked));
         let energy = L::splat(self.quanta.energy.magic());
         if body.is_some() {
-            let mean = Vector { x: old.x + new.x, y: old.y + new.y, z: old.z + new.z };
-            let work = L::splat(0.5) * mass * change.dot(&mean);
-            tally.body_work = tally.body_work + L::select(booked, rounded(work, energy), zero);
+            let half_impulse = change.scaled(L::splat(0.5) * mass);
+            let [before, after] = tally.body_work;
+            let (earlier, later) = (half_impulse.dot(&old), half_impulse.dot(&new));
+            tally.body_work = [
+                before + L::select(booked, rounded(earlier, energy), zero),
+                after + L::select(booked, rounded(later, energy), zero),
+            ];
         }
         let kinetic = L::splat(0.5) * mass * old.dot(&new);
         tally.kinetic = tally.kinetic + L::select(booked, rounded(kinetic, energy), zero);
@@ -331,8 +336,8 @@ impl Advance<'_> {
     }
 
     /// Corrects the free velocities of held nodes from `at` on; gives the work of what holds the booked ones.
-    fn hold(&self, nodes: &mut Nodes<'_>, set: NodeSet, at: usize, velocity: &mut [[f64; SET]; 3]) -> f64 {
-        let mut external = 0.0;
+    fn hold(&self, nodes: &mut Nodes<'_>, set: NodeSet, at: usize, velocity: &mut [[f64; SET]; 3]) -> Work {
+        let mut external = Work::default();
         let half_steps = 0.5 * (self.dt_previous + self.dt);
         let curves = &self.loads.curves;
         for lane in (0..SET).filter(|lane| set.held >> lane & 1 == 1) {
@@ -374,9 +379,11 @@ impl Advance<'_> {
                 walls &= walls - 1;
             }
             if booked && new != free {
-                // Impulse of what holds and pushes times the mean velocity is its work.
-                let work = (0..3).map(|a| mass * (new[a] - free[a]) * 0.5 * (old[a] + new[a])).sum::<f64>();
-                external += self.quanta.energy.round(work);
+                let with = |v: [f64; 3]| {
+                    let work = (0..3).map(|a| 0.5 * mass * (new[a] - free[a]) * v[a]).sum::<f64>();
+                    self.quanta.energy.round(work)
+                };
+                external.merge(Work { before: with(old), after: with(new) });
             }
             for a in 0..3 {
                 velocity[a][lane] = new[a];
@@ -487,7 +494,7 @@ mod tests {
     fn free_node_gains_force_over_mass_times_dt() {
         let (x, v, booked) = advance_one([1.0, 0.0, 0.0], [4.0, 0.0, 0.0], Constraint::default(), &[]);
         assert!((v[0] - 1.002).abs() < 1e-15 && (x[0] - 1.002e-3).abs() < 1e-15);
-        assert!((booked.kinetic - 1.002).abs() < 1e-9 && booked.external == 0.0);
+        assert!((booked.kinetic - 1.002).abs() < 1e-9 && booked.external == Work::default());
     }
 
     #[test]
@@ -495,7 +502,9 @@ mod tests {
         let hold = Constraint { velocity: [Some(Drive::constant(1.0)), None, None], ..Constraint::default() };
         let (_, v, booked) = advance_one([1.0, 0.0, 0.0], [4.0, 0.0, 0.0], hold, &[]);
         assert_eq!(v[0], 1.0);
-        assert!((booked.external + 4.0e-3).abs() < 1e-9, "{}", booked.external);
+        // As fast before as after: half of the work is done by t_n.
+        let Work { before, after } = booked.external;
+        assert!((before + 2.0e-3).abs() < 1e-9 && (after + 2.0e-3).abs() < 1e-9, "{before} {after}");
     }
 
     #[test]
@@ -543,8 +552,8 @@ mod tests {
         assert!((0..3).all(|a| (v[a] - expected[a]).abs() < 1e-15), "{v:?}");
         let energy = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>();
         assert!(
-            (booked.external - (energy(v) - energy([1.0, 2.0, 0.0]))).abs() < 1e-9,
-            "{}",
+            (booked.external.whole() - (energy(v) - energy([1.0, 2.0, 0.0]))).abs() < 1e-9,
+            "{:?}",
             booked.external
         );
         let late = Loads { relaxation: Some(Relaxation { factor: 0.9, until: 0.5 }), ..loads.clone() };
@@ -615,7 +624,7 @@ mod tests {
                 walls: &mut votes,
             };
             let booked = advance.run(&mut nodes, width);
-            assert!(booked.external != 0.0 && booked.speed_ahead > booked.speed_squared.sqrt());
+            assert!(booked.external != Work::default() && booked.speed_ahead > booked.speed_squared.sqrt());
             let bits: Vec<u64> = x.iter().chain(&v).flatten().map(|c| c.to_bits()).collect();
             assert!(votes[0].touched > 0.0);
             (booked, votes, bits)

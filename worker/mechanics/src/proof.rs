@@ -281,7 +281,7 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
         hasher.update(&hash.expect("there is one block"));
         let vote = domain.integrate(&[], DT, DT, &[], &Unmeasured);
         let vote = vote.expect("no node is exchanged");
-        put(hasher, [vote.external, vote.courant].into_iter().chain(vote.momentum));
+        put(hasher, [vote.external.whole(), vote.courant].into_iter().chain(vote.momentum));
     }
     for piece in domain.pieces() {
         put(hasher, piece.x.iter().chain(&piece.v).flatten().copied());

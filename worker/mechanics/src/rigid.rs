@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     exact::Quantum,
     load::{Drive, Loads},
-    vote::Quanta,
+    vote::{Quanta, Work},
 };
 
 pub mod shape;
@@ -170,7 +170,7 @@ pub struct Booked {
     /// Kinetic energy at `t_n`: `1/2 m v_{n-1/2} . v_{n+1/2}` and the same of the turning.
     pub kinetic: f64,
     /// Work of gravity, relaxation, nodal forces and whatever prescribes its motion.
-    pub external: f64,
+    pub external: Work,
     /// `m v_{n+1/2}`.
     pub momentum: [f64; 3],
 }
@@ -226,14 +226,15 @@ impl Advance<'_> {
         let Quanta { energy, momentum: of_momentum, .. } = self.quanta;
         let translation = 0.5 * body.mass * dot(old.velocity, velocity);
         let rotation = 0.25 * (dot(old.spin, momentum) + dot(spin, old.momentum));
-        let mut work = 0.0;
-        for a in 0..3 {
-            work += 0.5 * body.mass * (velocity[a] - pushed[a]) * (old.velocity[a] + velocity[a]);
-            work += 0.5 * (momentum[a] - twisted[a]) * (old.spin[a] + spin[a]);
-        }
+        let work = |with_velocity: [f64; 3], with_spin: [f64; 3]| {
+            let along = |a: usize| body.mass * (velocity[a] - pushed[a]) * with_velocity[a];
+            let about = |a: usize| (momentum[a] - twisted[a]) * with_spin[a];
+            energy.round((0..3).map(|a| 0.5 * (along(a) + about(a))).sum())
+        };
+        let external = Work { before: work(old.velocity, old.spin), after: work(velocity, spin) };
         Booked {
             kinetic: energy.round(translation + rotation),
-            external: energy.round(work),
+            external,
             momentum: velocity.map(|v| of_momentum.round(body.mass * v)),
         }
     }

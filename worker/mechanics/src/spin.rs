@@ -3,7 +3,7 @@
 //! As for the rest of a node, every block that has a copy does this with the same total moment and inertia and gets the
 //! same bits; the booked copy alone counts. Nodes are few beside the work of their elements, so this is plain code.
 
-use crate::{lanes::SET, nodes::Advance, nodes::NodeSet};
+use crate::{lanes::SET, nodes::Advance, nodes::NodeSet, vote::Work};
 
 /// Rotations of the nodes of a block, by local node and padded as its other arrays are.
 pub struct Turning {
@@ -45,24 +45,24 @@ pub(crate) fn advance(
     turning: &mut Turning,
     constraint: &[u16],
     sets: &[NodeSet],
-) -> (f64, f64) {
+) -> (f64, Work) {
     let half_steps = 0.5 * (advance.dt_previous + advance.dt);
     let relaxation = advance.loads.relaxation.filter(|r| advance.time < r.until);
     let loss = relaxation.map_or(0.0, |r| 1.0 - r.factor);
     let energy = advance.quanta.energy;
-    let (mut kinetic, mut external) = (0.0, 0.0);
+    let (mut kinetic, mut external) = (0.0, Work::default());
     for (i, &held) in constraint.iter().enumerate() {
         let clamped = advance.constraints[held as usize].clamped;
         let inertia = turning.inertia[i];
         let scale = half_steps / inertia;
-        let (mut product, mut work) = (0.0, 0.0);
+        let (mut product, mut work) = (0.0, Work::default());
         for axis in 0..3 {
             let old = turning.w[axis][i];
             let mut new = turning.m[axis][i].mul_add(scale, old);
             if loss > 0.0 {
                 let change = -loss * old;
                 new += change;
-                work = (change * 0.5).mul_add(old + new, work);
+                work.merge(Work { before: 0.5 * change * old, after: 0.5 * change * new });
             }
             if clamped >> axis & 1 == 1 {
                 new = 0.0;
@@ -73,7 +73,8 @@ pub(crate) fn advance(
         }
         if sets[i / SET].booked >> (i % SET) & 1 == 1 {
             kinetic += energy.round(0.5 * inertia * product);
-            external += energy.round(inertia * work);
+            let [before, after] = [work.before, work.after].map(|half| energy.round(inertia * half));
+            external.merge(Work { before, after });
         }
     }
     (kinetic, external)

@@ -45,7 +45,7 @@ pub struct Vote {
     /// The last two by pair of parts.
     pub contact_energies: PairEnergies,
     /// Work of prescribed velocities, walls and loads in this cycle.
-    pub external: f64,
+    pub external: Work,
     /// Momentum of all nodes, `m v_{n+1/2}`.
     pub momentum: [f64; 3],
     /// Energies by part.
@@ -123,6 +123,32 @@ impl PairVote {
     }
 }
 
+/// Work done from outside by the impulses of one cycle, which act at `t_n`; exact sums.
+///
+/// An impulse `J` takes a node from `v_{n-1/2}` to `v_{n+1/2}`, so its work is `J . (v_{n-1/2} + v_{n+1/2}) / 2`. Only the
+/// first half of it is done at `t_n`, where the kinetic energy `1/2 m v_{n-1/2} . v_{n+1/2}` and the internal energy stand;
+/// the second half follows with the motion from `x_n` to `x_{n+1}`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Work {
+    /// `J . v_{n-1/2} / 2`: part of the work up to `t_n`.
+    pub before: f64,
+    /// `J . v_{n+1/2} / 2`: part of the work up to `t_{n+1}`.
+    pub after: f64,
+}
+
+impl Work {
+    /// Adds the work of other impulses of the cycle.
+    pub fn merge(&mut self, other: Self) {
+        self.before += other.before;
+        self.after += other.after;
+    }
+
+    /// Both halves.
+    pub fn whole(self) -> f64 {
+        self.before + self.after
+    }
+}
+
 /// Energies of one part in one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartVote {
@@ -135,7 +161,7 @@ pub struct PartVote {
     /// Work of artificial viscosity in this cycle (part of `internal`).
     pub viscosity: f64,
     /// Work of prescribed velocities, walls and loads in this cycle.
-    pub external: f64,
+    pub external: Work,
 }
 
 impl Vote {
@@ -156,7 +182,7 @@ impl Vote {
             contact: 0.0,
             friction: 0.0,
             contact_energies: PairEnergies::default(),
-            external: 0.0,
+            external: Work::default(),
             momentum: [0.0; 3],
             parts: vec![PartVote::default(); n_parts],
             walls: Vec::new(),
@@ -188,7 +214,7 @@ impl Vote {
         self.contact += other.contact;
         self.friction += other.friction;
         self.contact_energies.merge(&other.contact_energies);
-        self.external += other.external;
+        self.external.merge(other.external);
         for axis in 0..3 {
             self.momentum[axis] += other.momentum[axis];
         }
@@ -197,7 +223,7 @@ impl Vote {
             mine.internal += theirs.internal;
             mine.hourglass += theirs.hourglass;
             mine.viscosity += theirs.viscosity;
-            mine.external += theirs.external;
+            mine.external.merge(theirs.external);
         }
         for (mine, theirs) in self.extents.iter_mut().zip(&other.extents) {
             mine.merge(theirs);

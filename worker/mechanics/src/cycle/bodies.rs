@@ -191,8 +191,8 @@ impl Domain {
             }
             let part = body.parts.first().map_or(0, |&part| part as usize);
             vote.parts[part].kinetic += held.booked.kinetic;
-            vote.parts[part].external += held.booked.external;
-            vote.external += held.booked.external;
+            vote.parts[part].external.merge(held.booked.external);
+            vote.external.merge(held.booked.external);
             (0..3).for_each(|a| vote.momentum[a] += held.booked.momentum[a]);
         }
     }

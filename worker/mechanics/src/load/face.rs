@@ -6,7 +6,9 @@
 use nalgebra::Vector3;
 
 use super::{Loads, SurfaceKind};
-use crate::{block::Block, element::hex8, exact::Quantum, material::Material, mesh::FACES, setup::Control};
+use crate::{
+    block::Block, element::hex8, exact::Quantum, material::Material, mesh::FACES, setup::Control, vote::Work,
+};
 
 /// A loaded face and what acted on it in this cycle.
 #[derive(Clone, Debug)]
@@ -142,19 +144,21 @@ fn damper_limit(x: &[Vector3<f64>; 8], together: f64, speed: f64, control: &Cont
     2.0 / (damped + damped.mul_add(damped, 4.0 * rate * rate).sqrt())
 }
 
-/// Work of the loads in the step around the time at which they acted: their power with the mean of the velocities
-/// before and after, times `half_steps`, the mean of the two steps. A sum of terms rounded to `quantum`.
-pub(crate) fn work(faces: &[LoadedFace], block: &Block, half_steps: f64, quantum: Quantum) -> f64 {
-    let one = |face: &LoadedFace| {
+/// Work of the loads in the step around the time at which they acted: their power with half the velocities before and
+/// half of those after, times `half_steps`, the mean of the two steps. A sum of terms rounded to `quantum`.
+pub(crate) fn work(faces: &[LoadedFace], block: &Block, half_steps: f64, quantum: Quantum) -> Work {
+    let mut sum = Work::default();
+    for face in faces {
         let after: f64 = face
             .nodes()
             .iter()
             .zip(&face.force)
             .map(|(&n, f)| f[0] * block.v[0][n] + f[1] * block.v[1][n] + f[2] * block.v[2][n])
             .sum();
-        quantum.round(0.5 * half_steps * (face.power + after))
-    };
-    faces.iter().map(one).sum()
+        let [before, after] = [face.power, after].map(|power| quantum.round(0.5 * half_steps * power));
+        sum.merge(Work { before, after });
+    }
+    sum
 }
 
 #[cfg(test)]

@@ -292,11 +292,11 @@ fn a_prescribed_turn_has_its_angle_and_its_support_does_the_work() {
     let (dt, mut work) = (1e-3, 0.0);
     let first =
         Advance { dt_previous: 0.0, ..advance(&loads, 0.0, dt) }.run(&body, &Push::default(), &mut state);
-    work += first.external;
     let mut last = first;
     for n in 1..1000 {
+        work += last.external.after;
         last = advance(&loads, f64::from(n) * dt, dt).run(&body, &Push::default(), &mut state);
-        work += last.external;
+        work += last.external.before;
     }
     // Angle 1 about z after one second; five metres along x, and half g t^2 down.
     let turned_by = 2.0 * (state.attitude[3] / state.attitude[0]).atan();
