@@ -3,7 +3,10 @@
 
 use std::sync::OnceLock;
 
-use mechanics::material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength};
+use mechanics::{
+    law::{Bound, Constant, Declaration},
+    material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength},
+};
 use toml::de::DeTable;
 
 use crate::{
@@ -157,12 +160,19 @@ fn read_jwl(table: &Table<'_>) -> Option<Eos> {
     })
 }
 
-/// The strength laws by the word a deck writes.
+/// The strength laws that are read by hand, by the word a deck writes.
 const STRENGTHS: [&str; 5] = ["hydro", "elastic", "von-mises", "tabulated", "johnson-cook"];
 
 fn read_strength(table: Table<'_>) -> Option<Strength> {
-    let words = STRENGTHS.join(", ");
-    let kind = table.require("type", &format!("one of {words}"))?.one_of(&STRENGTHS)?;
+    let all: Vec<&str> =
+        STRENGTHS.iter().copied().chain(Strength::DECLARED.iter().map(|law| law.name)).collect();
+    let words = all.join(", ");
+    let kind = table.require("type", &format!("one of {words}"))?.one_of(&all)?;
+    if let Some(law) = kind.checked_sub(STRENGTHS.len()).map(|declared| &Strength::DECLARED[declared]) {
+        let strength = read_declared(&table, law);
+        table.finish();
+        return strength;
+    }
     let strength = match STRENGTHS[kind] {
         "hydro" => Some(Strength::Hydro),
         "elastic" => table.number("shear", Range::Positive).map(|shear| Strength::Elastic { shear }),
@@ -193,6 +203,21 @@ fn read_strength(table: Table<'_>) -> Option<Strength> {
     };
     table.finish();
     strength
+}
+
+/// A law that says itself which constants it has; `None` after reporting what is wrong.
+fn read_declared<T>(table: &Table<'_>, law: &Declaration<T>) -> Option<T> {
+    let number = |constant: &Constant| {
+        let range = match constant.bound {
+            Bound::Positive => Range::Positive,
+            Bound::NotNegative => Range::NotNegative,
+        };
+        table.number(constant.key, range)
+    };
+    // All are read before the first that is missing ends it, so that every fault is reported.
+    let values: Vec<Option<f64>> = law.constants.iter().map(number).collect();
+    let values: Option<Vec<f64>> = values.into_iter().collect();
+    values.map(|values| (law.of)(&values))
 }
 
 /// The rate factor of a yield stress, if it has one; `None` after reporting what is wrong.

@@ -3,7 +3,10 @@
 //! Each unit of a set that the library is converted to is a power of ten of its SI unit, so that a conversion is one correctly rounded
 //! multiplication or division by an exact power of ten.
 
-use mechanics::material::{CowperSymonds, Eos, Failure, Material, Strength};
+use mechanics::{
+    law::Unit,
+    material::{CowperSymonds, Eos, Failure, Material, Strength},
+};
 
 /// A consistent set: one deck unit is ten to this power of the SI unit, where the library is converted to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +70,11 @@ impl Units {
 
     fn stress(&self) -> i32 {
         self.mass - self.length - 2 * self.time
+    }
+
+    /// One unit of the set is ten to this power of the SI unit.
+    fn power(&self, unit: Unit) -> i32 {
+        unit.length * self.length + unit.mass * self.mass + unit.time * self.time
     }
 
     fn specific_energy(&self) -> i32 {
@@ -134,6 +142,7 @@ impl Units {
                         rate0: scale(rate0, -self.time),
                     }
                 }
+                declared => declared.converted(&|unit, x| scale(x, self.power(unit))),
             },
             failure: self.failure_from_si(material.failure),
         }
@@ -194,6 +203,8 @@ mod tests {
         // Stress is density times velocity squared, whatever the units.
         for units in SETS {
             assert_eq!(units.stress(), units.density() + 2 * units.velocity(), "{}", units.name);
+            assert_eq!(units.power(Unit::STRESS), units.stress(), "{}", units.name);
+            assert_eq!(units.power(Unit::NONE), 0, "{}", units.name);
         }
     }
 }

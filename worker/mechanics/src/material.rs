@@ -1,12 +1,15 @@
 //! Laws: a material is an equation of state, a strength law and a failure law.
 //!
 //! The enums hold constants only; the lane code that evaluates them stands in `eos/`, `strength/` and `failure/`, one
-//! file per law. To add a law: a variant here with the units of its constants, a file beside the others of its kind
-//! (copy a neighbour: constants, the trait, tests of points and slopes), an arm in [`crate::block`]'s dispatch, a
-//! reader in the deck's `library.rs` and the powers of its units in `units.rs`, and an entry in the list of laws that
-//! the tests of bits run.
+//! file per law. To add a strength law: a file beside the others (copy `strength/voce.rs`: constants with units and bounds, the
+//! update in three dimensions and in plane stress, tests of points and slopes), its lines in the lists of `strength.rs`, and an
+//! entry in the list of laws that the tests of bits run; the deck reads and converts what the law declares. An equation of state
+//! or a failure law also needs a variant here, a reader in the deck's `library.rs` and the powers of its units in `units.rs`.
 
 use serde::{Deserialize, Serialize};
+
+use crate::strength::{AnyStrength, StrengthLaw};
+pub use crate::strength::{CowperSymonds, Hardening, MAX_HARDENING, Strength};
 
 /// One material: constants in the deck's consistent units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -86,85 +89,6 @@ pub enum Eos {
     },
 }
 
-/// Strength law.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Strength {
-    /// No shear strength.
-    Hydro,
-    /// Hypoelastic.
-    Elastic {
-        /// Shear modulus G (stress).
-        shear: f64,
-    },
-    /// Von Mises yield with linear isotropic hardening: `Y = yield_stress + hardening * plastic strain`.
-    VonMises {
-        /// Shear modulus G (stress).
-        shear: f64,
-        /// Initial yield stress.
-        yield_stress: f64,
-        /// `d Y / d plastic strain`.
-        hardening: f64,
-        /// Factor for the strain rate.
-        rate: Option<CowperSymonds>,
-    },
-    /// Von Mises yield, the yield stress a line from point to point of the plastic strain and constant beyond.
-    Tabulated {
-        /// Shear modulus G (stress).
-        shear: f64,
-        /// Yield stress by plastic strain.
-        hardening: Hardening,
-        /// Factor for the strain rate.
-        rate: Option<CowperSymonds>,
-    },
-    /// `Y = (A + B e^n)(1 + C ln max(rate/rate0, 1))(1 - T*^m)`, `T* = (T - t_room)/(t_melt - t_room)` clamped
-    /// to 0..1; T rises by plastic work over `density * specific_heat` (Johnson and Cook 1983).
-    JohnsonCook {
-        /// Shear modulus G (stress).
-        shear: f64,
-        /// A (stress).
-        a: f64,
-        /// B (stress).
-        b: f64,
-        /// Hardening exponent n.
-        n: f64,
-        /// Rate coefficient C.
-        c: f64,
-        /// Thermal exponent m.
-        m: f64,
-        /// Melting temperature (K).
-        t_melt: f64,
-        /// Room temperature (K), also the initial one.
-        t_room: f64,
-        /// Specific heat (energy per mass per K).
-        specific_heat: f64,
-        /// Reference strain rate (1/time).
-        rate0: f64,
-    },
-}
-
-/// Most points of a [`Hardening`].
-pub const MAX_HARDENING: usize = 10;
-
-/// Yield stress at growing plastic strains.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Hardening {
-    /// Points in use, 1 to [`MAX_HARDENING`].
-    pub n_points: u32,
-    /// Effective plastic strain: the first is 0, the others ascend.
-    pub strain: [f64; MAX_HARDENING],
-    /// Yield stress there (stress), positive and not descending.
-    pub stress: [f64; MAX_HARDENING],
-}
-
-/// `1 + (rate / reference)^(1/exponent)`, a factor on the yield stress (Cowper and Symonds 1957).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CowperSymonds {
-    /// D, the rate that doubles the yield stress (1/time).
-    pub reference: f64,
-    /// q.
-    pub exponent: f64,
-}
-
 /// Failure law. A failed element bears neither tension nor shear, keeps its mass and its place in the mesh, and still
 /// resists compression. The stress falls in the cycle after the one in which the damage came to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -201,16 +125,7 @@ pub enum Failure {
 impl Material {
     /// Shear modulus G (stress); zero without strength.
     pub fn shear(&self) -> f64 {
-        if self.is_gas() {
-            return 0.0;
-        }
-        match self.strength {
-            Strength::Hydro => 0.0,
-            Strength::Elastic { shear }
-            | Strength::VonMises { shear, .. }
-            | Strength::Tabulated { shear, .. }
-            | Strength::JohnsonCook { shear, .. } => shear,
-        }
+        AnyStrength::of(self).shear()
     }
 
     /// Whether the equation of state is that of a gas, which has no strength.

@@ -5,9 +5,12 @@
 //! [`StrengthLaw`], tests. Lanes whose trial lies inside the surface come back
 //! unchanged to the bit, so that leaving out the plastic branch for a set without yielding lanes changes nothing.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     lanes::Lane,
-    material::{Material, Strength},
+    law::{Declaration, Unit},
+    material::Material,
 };
 
 pub(crate) mod cowper_symonds;
@@ -15,8 +18,10 @@ pub(crate) mod elastic;
 pub(crate) mod johnson_cook;
 pub(crate) mod plane_stress;
 pub(crate) mod tabulated;
+pub(crate) mod voce;
 pub(crate) mod von_mises;
 
+pub use voce::Voce;
 pub(crate) use {
     cowper_symonds::RateFactor, elastic::Elastic, elastic::Hydro, johnson_cook::JohnsonCook,
     tabulated::Tabulated, von_mises::VonMises,
@@ -140,6 +145,25 @@ pub(crate) trait StrengthLaw: Copy {
     /// Shear modulus G (stress).
     fn shear(&self) -> f64;
 
+    /// Yield stress and its slope at a plastic strain, times `factor`: what plane stress returns to. A law that never yields has
+    /// none.
+    #[inline(always)]
+    fn flow<L: Lane>(&self, _strain: L, _factor: L) -> (L, L) {
+        (L::splat(f64::MAX), L::splat(0.0))
+    }
+
+    /// The factor of rate and temperature on the yield stress of [`StrengthLaw::flow`].
+    #[inline(always)]
+    fn factor<L: Lane>(&self, _rate: L, _temperature: L) -> L {
+        L::splat(1.0)
+    }
+
+    /// Rise of the temperature by plastic work per volume.
+    #[inline(always)]
+    fn heating(&self) -> f64 {
+        0.0
+    }
+
     /// Returns the trial deviator to the yield surface. Only lanes in `active` need be right; what the others
     /// hold is arbitrary.
     fn update<L: Lane>(
@@ -151,6 +175,20 @@ pub(crate) trait StrengthLaw: Copy {
     ) -> Deviator<L>;
 }
 
+/// The laws of this module by their names in [`AnyStrength`]: the one list that calls go by.
+macro_rules! of_any {
+    ($any:expr, $law:ident => $call:expr) => {
+        match $any {
+            AnyStrength::Hydro($law) => $call,
+            AnyStrength::Elastic($law) => $call,
+            AnyStrength::VonMises($law) => $call,
+            AnyStrength::Tabulated($law) => $call,
+            AnyStrength::JohnsonCook($law) => $call,
+            AnyStrength::Voce($law) => $call,
+        }
+    };
+}
+
 /// Any of the laws, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
 #[derive(Clone, Copy)]
 pub(crate) enum AnyStrength {
@@ -159,6 +197,105 @@ pub(crate) enum AnyStrength {
     VonMises(VonMises),
     Tabulated(Tabulated),
     JohnsonCook(JohnsonCook),
+    Voce(Voce),
+}
+
+/// Strength law.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Strength {
+    /// No shear strength.
+    Hydro,
+    /// Hypoelastic.
+    Elastic {
+        /// Shear modulus G (stress).
+        shear: f64,
+    },
+    /// Von Mises yield with linear isotropic hardening: `Y = yield_stress + hardening * plastic strain`.
+    VonMises {
+        /// Shear modulus G (stress).
+        shear: f64,
+        /// Initial yield stress.
+        yield_stress: f64,
+        /// `d Y / d plastic strain`.
+        hardening: f64,
+        /// Factor for the strain rate.
+        rate: Option<CowperSymonds>,
+    },
+    /// Von Mises yield, the yield stress a line from point to point of the plastic strain and constant beyond.
+    Tabulated {
+        /// Shear modulus G (stress).
+        shear: f64,
+        /// Yield stress by plastic strain.
+        hardening: Hardening,
+        /// Factor for the strain rate.
+        rate: Option<CowperSymonds>,
+    },
+    /// `Y = (A + B e^n)(1 + C ln max(rate/rate0, 1))(1 - T*^m)`, `T* = (T - t_room)/(t_melt - t_room)` clamped
+    /// to 0..1; T rises by plastic work over `density * specific_heat` (Johnson and Cook 1983).
+    JohnsonCook {
+        /// Shear modulus G (stress).
+        shear: f64,
+        /// A (stress).
+        a: f64,
+        /// B (stress).
+        b: f64,
+        /// Hardening exponent n.
+        n: f64,
+        /// Rate coefficient C.
+        c: f64,
+        /// Thermal exponent m.
+        m: f64,
+        /// Melting temperature (K).
+        t_melt: f64,
+        /// Room temperature (K), also the initial one.
+        t_room: f64,
+        /// Specific heat (energy per mass per K).
+        specific_heat: f64,
+        /// Reference strain rate (1/time).
+        rate0: f64,
+    },
+    /// Von Mises yield with saturating hardening.
+    Voce(Voce),
+}
+
+impl Strength {
+    /// The laws that declare their constants.
+    pub const DECLARED: &'static [Declaration<Strength>] = &[Declaration {
+        name: Voce::NAME,
+        constants: Voce::CONSTANTS,
+        of: |values| Strength::Voce(Voce::of(values)),
+    }];
+
+    /// A law that declares its constants with each as `convert` makes it of its unit and value; any other law as it is.
+    pub fn converted(self, convert: &dyn Fn(Unit, f64) -> f64) -> Self {
+        match self {
+            Strength::Voce(law) => Strength::Voce(law.converted(convert)),
+            other => other,
+        }
+    }
+}
+
+/// Most points of a [`Hardening`].
+pub const MAX_HARDENING: usize = 10;
+
+/// Yield stress at growing plastic strains.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hardening {
+    /// Points in use, 1 to [`MAX_HARDENING`].
+    pub n_points: u32,
+    /// Effective plastic strain: the first is 0, the others ascend.
+    pub strain: [f64; MAX_HARDENING],
+    /// Yield stress there (stress), positive and not descending.
+    pub stress: [f64; MAX_HARDENING],
+}
+
+/// `1 + (rate / reference)^(1/exponent)`, a factor on the yield stress (Cowper and Symonds 1957).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CowperSymonds {
+    /// D, the rate that doubles the yield stress (1/time).
+    pub reference: f64,
+    /// q.
+    pub exponent: f64,
 }
 
 impl AnyStrength {
@@ -188,6 +325,7 @@ impl AnyStrength {
                     inverse_rate0: 1.0 / rate0,
                 })
             }
+            Strength::Voce(law) => Self::Voce(law),
         }
     }
 }
@@ -195,28 +333,37 @@ impl AnyStrength {
 impl StrengthLaw for AnyStrength {
     #[inline(always)]
     fn deviatoric(&self) -> bool {
-        !matches!(self, Self::Hydro(_))
+        of_any!(self, law => law.deviatoric())
     }
 
     #[inline(always)]
     fn plastic(&self) -> bool {
-        !matches!(self, Self::Hydro(_) | Self::Elastic(_))
+        of_any!(self, law => law.plastic())
     }
 
     #[inline(always)]
     fn thermal(&self) -> bool {
-        matches!(self, Self::JohnsonCook(_))
+        of_any!(self, law => law.thermal())
     }
 
     #[inline(always)]
     fn shear(&self) -> f64 {
-        match self {
-            Self::Hydro(law) => law.shear(),
-            Self::Elastic(law) => law.shear(),
-            Self::VonMises(law) => law.shear(),
-            Self::Tabulated(law) => law.shear(),
-            Self::JohnsonCook(law) => law.shear(),
-        }
+        of_any!(self, law => law.shear())
+    }
+
+    #[inline(always)]
+    fn flow<L: Lane>(&self, strain: L, factor: L) -> (L, L) {
+        of_any!(self, law => law.flow(strain, factor))
+    }
+
+    #[inline(always)]
+    fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
+        of_any!(self, law => law.factor(rate, temperature))
+    }
+
+    #[inline(always)]
+    fn heating(&self) -> f64 {
+        of_any!(self, law => law.heating())
     }
 
     #[inline(always)]
@@ -227,12 +374,6 @@ impl StrengthLaw for AnyStrength {
         history: &mut History<L>,
         active: L::Mask,
     ) -> Deviator<L> {
-        match self {
-            Self::Hydro(law) => law.update(trial, strain, history, active),
-            Self::Elastic(law) => law.update(trial, strain, history, active),
-            Self::VonMises(law) => law.update(trial, strain, history, active),
-            Self::Tabulated(law) => law.update(trial, strain, history, active),
-            Self::JohnsonCook(law) => law.update(trial, strain, history, active),
-        }
+        of_any!(self, law => law.update(trial, strain, history, active))
     }
 }

@@ -84,6 +84,28 @@ impl StrengthLaw for JohnsonCook {
     /// One evaluation, at the plastic strain that the step would reach if all its strain were plastic, and the
     /// tangent there. The tangent is finite even when the step starts at zero plastic strain.
     #[inline(always)]
+    fn flow<L: Lane>(&self, strain: L, factor: L) -> (L, L) {
+        let grown = self.hardening(strain);
+        // The slope is infinite at zero; a floor keeps the first step finite.
+        let slope = L::splat(self.n) * grown / strain.max(L::splat(1e-9));
+        ((L::splat(self.a) + grown) * factor, slope * factor)
+    }
+
+    #[inline(always)]
+    fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
+        let one = L::splat(1.0);
+        let logarithm = ln((rate * L::splat(self.inverse_rate0)).max(one));
+        let hot = (temperature - L::splat(self.t_room)) * L::splat(self.inverse_range);
+        let hot = hot.max(L::splat(0.0)).min(one);
+        L::splat(self.c).mul_add(logarithm, one) * (one - pow(hot, L::splat(self.m)))
+    }
+
+    #[inline(always)]
+    fn heating(&self) -> f64 {
+        self.heating
+    }
+
+    #[inline(always)]
     fn update<L: Lane>(
         &self,
         trial: Deviator<L>,

@@ -6,11 +6,8 @@
 //! where s meets the yield stress. Newton's steps come from one side where hardening does not grow steeper, since the
 //! difference is then convex. Each lane stops where its own step was small, whatever its neighbours do.
 
-use super::RateFactor;
-use crate::{
-    lanes::{Lane, functions},
-    material::{CowperSymonds, Hardening, Material, Strength},
-};
+use super::{AnyStrength, StrengthLaw};
+use crate::{lanes::Lane, material::Material};
 
 /// Most Newton steps of the return.
 const STEPS: usize = 10;
@@ -37,132 +34,35 @@ pub(crate) struct Layer<L> {
     pub temperature: L,
 }
 
-/// Constants of a layer made ready.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A law in plane stress.
+#[derive(Clone, Copy)]
 pub(crate) struct PlaneLaw {
     /// Young's modulus (stress).
     pub young: f64,
     /// Poisson's ratio.
     pub poisson: f64,
-    /// Yield stress; none for elastic layers.
-    pub flow: Flow,
-    /// Factor of the strain rate on a linear or tabulated yield stress.
-    pub rate: Option<CowperSymonds>,
-}
-
-/// Yield stress of a layer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Flow {
-    /// Never yields.
-    Elastic,
-    /// `Y = yield_stress + hardening e`.
-    Linear { yield_stress: f64, hardening: f64 },
-    /// In straight lines from point to point, constant beyond the last.
-    Tabulated(Hardening),
-    /// Johnson and Cook's; `heating` is `1 / (density specific heat)`.
-    JohnsonCook {
-        a: f64,
-        b: f64,
-        n: f64,
-        c: f64,
-        m: f64,
-        t_room: f64,
-        inverse_range: f64,
-        heating: f64,
-        inverse_rate0: f64,
-    },
+    /// Yield stress and what it depends on.
+    pub strength: AnyStrength,
 }
 
 impl PlaneLaw {
     /// The law of a material, or its name if layers do not know it: shells need strength.
     pub fn of(material: &Material) -> Result<PlaneLaw, &'static str> {
-        let mut factor = None;
-        let flow = match material.strength {
-            _ if material.is_gas() => return Err("a gas"),
-            Strength::Hydro => return Err("hydro"),
-            Strength::Elastic { .. } => Flow::Elastic,
-            Strength::VonMises { yield_stress, hardening, rate, .. } => {
-                factor = rate;
-                Flow::Linear { yield_stress, hardening }
-            }
-            Strength::Tabulated { hardening, rate, .. } => {
-                factor = rate;
-                Flow::Tabulated(hardening)
-            }
-            Strength::JohnsonCook { a, b, n, c, m, t_melt, t_room, specific_heat, rate0, .. } => {
-                Flow::JohnsonCook {
-                    a,
-                    b,
-                    n,
-                    c,
-                    m,
-                    t_room,
-                    inverse_range: 1.0 / (t_melt - t_room),
-                    heating: 1.0 / (material.density * specific_heat),
-                    inverse_rate0: 1.0 / rate0,
-                }
-            }
-        };
+        if material.is_gas() {
+            return Err("a gas");
+        }
+        let strength = AnyStrength::of(material);
+        if !strength.deviatoric() {
+            return Err("hydro");
+        }
         let (bulk, shear) = (material.bulk(), material.shear());
         let young = 9.0 * bulk * shear / (3.0 * bulk + shear);
-        Ok(PlaneLaw { young, poisson: young / (2.0 * shear) - 1.0, flow, rate: factor })
+        Ok(PlaneLaw { young, poisson: young / (2.0 * shear) - 1.0, strength })
     }
 
     /// Shear modulus.
     pub fn shear(&self) -> f64 {
         0.5 * self.young / (1.0 + self.poisson)
-    }
-
-    /// Yield stress and its slope at a plastic strain; `factor` is that of rate and temperature.
-    #[inline(always)]
-    fn yield_stress<L: Lane>(&self, strain: L, factor: L) -> (L, L) {
-        match self.flow {
-            Flow::Elastic => (L::splat(f64::MAX), L::splat(0.0)),
-            Flow::Linear { yield_stress, hardening } => {
-                let stress = L::splat(hardening).mul_add(strain, L::splat(yield_stress));
-                (stress * factor, L::splat(hardening) * factor)
-            }
-            Flow::Tabulated(table) => {
-                let (mut stress, mut slope) = (L::splat(table.stress[0]), L::splat(0.0));
-                let mut point = 0;
-                while point < table.n_points as usize {
-                    let (at, here) = (table.strain[point], table.stress[point]);
-                    let next = if point + 1 < table.n_points as usize {
-                        (table.stress[point + 1] - here) / (table.strain[point + 1] - at)
-                    } else {
-                        0.0
-                    };
-                    let beyond = L::splat(at).less_equal(strain);
-                    let line = L::splat(next).mul_add(strain - L::splat(at), L::splat(here));
-                    stress = L::select(beyond, line, stress);
-                    slope = L::select(beyond, L::splat(next), slope);
-                    point += 1;
-                }
-                (stress * factor, slope * factor)
-            }
-            Flow::JohnsonCook { a, b, n, .. } => {
-                let grown = L::splat(b) * functions::pow(strain, L::splat(n));
-                // The slope is infinite at zero; a floor keeps the first step finite.
-                let slope = L::splat(n) * grown / strain.max(L::splat(1e-9));
-                ((L::splat(a) + grown) * factor, slope * factor)
-            }
-        }
-    }
-
-    /// Factor of rate and temperature.
-    #[inline(always)]
-    fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
-        let one = L::splat(1.0);
-        match self.flow {
-            Flow::JohnsonCook { c, m, t_room, inverse_range, inverse_rate0, .. } => {
-                let logarithm = functions::ln((rate * L::splat(inverse_rate0)).max(one));
-                let hot = (temperature - L::splat(t_room)) * L::splat(inverse_range);
-                let hot = hot.max(L::splat(0.0)).min(one);
-                L::splat(c).mul_add(logarithm, one) * (one - functions::pow(hot, L::splat(m)))
-            }
-            Flow::Elastic => one,
-            Flow::Linear { .. } | Flow::Tabulated(_) => RateFactor::of(self.rate).at(rate),
-        }
     }
 
     /// Returns the trial stress in `layer` to the yield surface and keeps its history; `rate` is the effective strain
@@ -171,7 +71,7 @@ impl PlaneLaw {
     pub fn update<L: Lane>(&self, layer: &mut Layer<L>, rate: L) -> L::Mask {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let none = L::mask(0);
-        if self.flow == Flow::Elastic {
+        if !self.strength.plastic() {
             return none;
         }
         let s = layer.stress;
@@ -179,9 +79,9 @@ impl PlaneLaw {
         let a = L::splat(0.25) * sum * sum;
         let shears = s.xy.mul_add(s.xy, s.yz.mul_add(s.yz, s.zx * s.zx));
         let b = (L::splat(0.75) * difference).mul_add(difference, L::splat(3.0) * shears);
-        let factor = self.factor(rate, layer.temperature);
+        let factor = self.strength.factor(rate, layer.temperature);
         let start = layer.plastic_strain;
-        let yields = self.yield_stress(start, factor).0.less((a + b).sqrt());
+        let yields = self.strength.flow(start, factor).0.less((a + b).sqrt());
         if !L::any(yields) {
             return none;
         }
@@ -198,7 +98,7 @@ impl PlaneLaw {
             let sigma = (au + bw).sqrt().max(tiny);
             let slope = -(au * u).mul_add(k_a, bw * w * k_b) / sigma;
             let strain = (two_thirds * g).mul_add(sigma, start);
-            let (flow, hardening) = self.yield_stress(strain, factor);
+            let (flow, hardening) = self.strength.flow(strain, factor);
             let strain_slope = two_thirds * g.mul_add(slope, sigma);
             let descent = hardening.mul_add(strain_slope, -slope).max(tiny);
             let next = (g + (sigma - flow) / descent).max(zero);
@@ -220,8 +120,8 @@ impl PlaneLaw {
             zx: L::select(yields, s.zx * w, s.zx),
         };
         layer.plastic_strain = start + L::select(yields, slip, zero);
-        if let Flow::JohnsonCook { heating, .. } = self.flow {
-            let heat = L::splat(heating) * sigma * slip;
+        if self.strength.thermal() {
+            let heat = L::splat(self.strength.heating()) * sigma * slip;
             layer.temperature = layer.temperature + L::select(yields, heat, zero);
         }
         yields
@@ -231,7 +131,19 @@ impl PlaneLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::scalar::Scalar;
+    use crate::{
+        lanes::scalar::Scalar,
+        material::{Eos, Failure, Hardening, Strength},
+        strength::CowperSymonds,
+    };
+
+    const SHEAR: f64 = 77e9;
+
+    fn law(strength: Strength) -> PlaneLaw {
+        let (density, eos) = (7850.0, Eos::Linear { bulk: 167e9 });
+        let material = Material { name: "steel".into(), density, eos, strength, failure: Failure::None };
+        PlaneLaw::of(&material).expect("a law that layers know")
+    }
 
     fn layer(stress: [f64; 5]) -> Layer<Scalar> {
         let [xx, yy, xy, yz, zx] = stress.map(Scalar);
@@ -241,8 +153,7 @@ mod tests {
 
     #[test]
     fn the_return_ends_on_the_hardened_surface_and_in_the_closed_form_of_shear() {
-        let flow = Flow::Linear { yield_stress: 300e6, hardening: 1e9 };
-        let law = PlaneLaw { young: 200e9, poisson: 0.3, flow, rate: None };
+        let law = law(Strength::VonMises { shear: SHEAR, yield_stress: 300e6, hardening: 1e9, rate: None });
         let mut mixed = layer([500e6, -200e6, 150e6, 20e6, -40e6]);
         assert!(law.update(&mut mixed, Scalar(0.0)));
         let s = mixed.stress;
@@ -259,18 +170,18 @@ mod tests {
 
     #[test]
     fn johnson_cook_returns_to_its_flow_stress_from_the_first_strain_on() {
-        let flow = Flow::JohnsonCook {
+        let law = law(Strength::JohnsonCook {
+            shear: 46e9,
             a: 90e6,
             b: 292e6,
             n: 0.31,
             c: 0.0,
             m: 1.09,
+            t_melt: 1356.0,
             t_room: 294.0,
-            inverse_range: 1.0 / 1062.0,
-            heating: 0.0,
-            inverse_rate0: 1.0,
-        };
-        let law = PlaneLaw { young: 124e9, poisson: 0.34, flow, rate: None };
+            specific_heat: 383.0,
+            rate0: 1.0,
+        });
         let mut layer = layer([0.0, 0.0, 120e6, 0.0, 0.0]);
         layer.temperature = Scalar(294.0);
         law.update(&mut layer, Scalar(1.0));
@@ -294,7 +205,7 @@ mod tests {
         };
         let rated = CowperSymonds { reference: 40.4, exponent: 5.0 };
         for (rate, factor) in [(None, 1.0), (Some(rated), 1.0 + (200.0_f64 / 40.4).powf(0.2))] {
-            let law = PlaneLaw { young: 200e9, poisson: 0.3, flow: Flow::Tabulated(table), rate };
+            let law = law(Strength::Tabulated { shear: SHEAR, hardening: table, rate });
             for overshoot in [1.001, 1.2, 2.0, 5.0, 40.0] {
                 let mut layer = layer([0.0, 0.0, overshoot * factor * 300e6 / 3f64.sqrt(), 0.0, 0.0]);
                 assert!(law.update(&mut layer, Scalar(200.0)));
@@ -307,8 +218,7 @@ mod tests {
 
     #[test]
     fn a_layer_inside_the_surface_keeps_its_bits() {
-        let flow = Flow::Linear { yield_stress: 3e8, hardening: 0.0 };
-        let law = PlaneLaw { young: 2e11, poisson: 0.3, flow, rate: None };
+        let law = law(Strength::VonMises { shear: SHEAR, yield_stress: 3e8, hardening: 0.0, rate: None });
         let mut inside = layer([1.1e8, 0.7e8, -0.3e8, 1.0, 2.0]);
         assert!(!law.update(&mut inside, Scalar(0.0)));
         assert_eq!(inside.stress.xx.0.to_bits(), 1.1e8f64.to_bits());

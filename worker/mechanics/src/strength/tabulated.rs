@@ -42,6 +42,25 @@ impl StrengthLaw for Tabulated {
         self.shear
     }
 
+    #[inline(always)]
+    fn flow<L: Lane>(&self, strain: L, factor: L) -> (L, L) {
+        let (mut stress, mut slope) = (L::splat(self.points[0][1]), L::splat(0.0));
+        let mut point = 0;
+        while point < self.n_points {
+            let [at, here, next] = self.points[point].map(L::splat);
+            let beyond = at.less_equal(strain);
+            stress = L::select(beyond, next.mul_add(strain - at, here), stress);
+            slope = L::select(beyond, next, slope);
+            point += 1;
+        }
+        (stress * factor, slope * factor)
+    }
+
+    #[inline(always)]
+    fn factor<L: Lane>(&self, rate: L, _temperature: L) -> L {
+        self.rate.at(rate)
+    }
+
     /// The implicit return `sigma - 3 G d = Y(e + d)` has its root on the last line whose first point still leaves
     /// stress above the table; on a line it is linear in d, hence exact.
     #[inline(always)]

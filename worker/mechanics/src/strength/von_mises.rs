@@ -22,6 +22,17 @@ impl StrengthLaw for VonMises {
         self.shear
     }
 
+    #[inline(always)]
+    fn flow<L: Lane>(&self, strain: L, factor: L) -> (L, L) {
+        let stress = L::splat(self.hardening).mul_add(strain, L::splat(self.yield_stress));
+        (stress * factor, L::splat(self.hardening) * factor)
+    }
+
+    #[inline(always)]
+    fn factor<L: Lane>(&self, rate: L, _temperature: L) -> L {
+        self.rate.at(rate)
+    }
+
     /// The implicit return `sigma - 3 G d = Y(e + d)` is linear in d, hence exact.
     #[inline(always)]
     fn update<L: Lane>(

@@ -90,6 +90,11 @@ pub fn all_laws() -> Vec<Material> {
     add(linear, Strength::Elastic { shear }, Failure::PrincipalStress { tension: 3e8 });
     add(shock, von_mises(None), Failure::Hydrostatic { tension: 2e8, heals: false });
     add(shock, johnson_cook(), Failure::JohnsonCook { d: [0.05, 0.3, -2.12, 0.002, 0.61] });
+    add(
+        shock,
+        Strength::Voce(mechanics::strength::Voce { shear, yield_stress: 3e8, q: 2e8, b: 12.0 }),
+        Failure::None,
+    );
     materials
 }
 
@@ -214,8 +219,8 @@ pub fn stirred(material: &Material, cells: [u32; 3], seed: u64) -> Piece {
             // Some are not lit yet, some burn, some have burnt.
             set(field::TIME_TO_LIGHT, 1e-5 * draws.next());
         }
-        use Strength::{JohnsonCook, Tabulated, VonMises};
-        if matches!(material.strength, VonMises { .. } | Tabulated { .. } | JohnsonCook { .. }) {
+        use Strength::{Elastic, Hydro, JohnsonCook};
+        if !matches!(material.strength, Hydro | Elastic { .. }) && !material.is_gas() {
             // Some are virgin and cold.
             let strain = draws.next().max(0.0);
             set(field::PLASTIC_STRAIN, strain);

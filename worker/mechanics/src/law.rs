@@ -1,0 +1,97 @@
+//! How a law declares its constants: by key, unit and bounds, once, in the file of the law.
+//!
+//! The deck reads a declared law, checks it and converts it between sets of units without knowing it.
+
+/// Powers of length, mass and time; temperatures stay in K in every set of units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unit {
+    /// Power of the unit of length.
+    pub length: i32,
+    /// Power of the unit of mass.
+    pub mass: i32,
+    /// Power of the unit of time.
+    pub time: i32,
+}
+
+impl Unit {
+    /// A plain number.
+    pub const NONE: Self = Self { length: 0, mass: 0, time: 0 };
+    /// Force per area, energy per volume.
+    pub const STRESS: Self = Self { length: -1, mass: 1, time: -2 };
+}
+
+/// What values a constant may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// Above zero.
+    Positive,
+    /// Zero or above.
+    NotNegative,
+}
+
+/// One constant of a law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Constant {
+    /// The key that a deck writes.
+    pub key: &'static str,
+    /// Its unit.
+    pub unit: Unit,
+    /// Its bounds.
+    pub bound: Bound,
+}
+
+/// A law as a deck names it, and how its constants make one.
+pub struct Declaration<T> {
+    /// The word after `type`.
+    pub name: &'static str,
+    /// Its constants, in the order that `of` takes.
+    pub constants: &'static [Constant],
+    /// The law with these constants, each within its bounds.
+    pub of: fn(&[f64]) -> T,
+}
+
+/// A law whose constants are plain numbers, each declared with its key, unit and bounds: the struct, its declaration, and the way
+/// from and to values in the order of the declaration.
+macro_rules! declared {
+    (
+        $(#[$of_law:meta])*
+        pub struct $law:ident = $name:literal {
+            $($(#[$of_constant:meta])* $constant:ident: $unit:ident, $bound:ident;)*
+        }
+    ) => {
+        $(#[$of_law])*
+        #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        pub struct $law {
+            $($(#[$of_constant])* pub $constant: f64,)*
+        }
+
+        impl $law {
+            /// The word after `type` in a deck.
+            pub const NAME: &'static str = $name;
+
+            /// The constants in the order of their declaration.
+            pub const CONSTANTS: &'static [$crate::law::Constant] = &[$($crate::law::Constant {
+                key: stringify!($constant),
+                unit: $crate::law::Unit::$unit,
+                bound: $crate::law::Bound::$bound,
+            }),*];
+
+            /// The law with these constants, in the order of their declaration.
+            ///
+            /// # Panics
+            /// If there are fewer.
+            pub(crate) fn of(values: &[f64]) -> Self {
+                let mut values = values.iter().copied();
+                $(let $constant = values.next().expect("a value for each constant");)*
+                Self { $($constant),* }
+            }
+
+            /// The law with each constant as `convert` makes it of its unit and value.
+            pub(crate) fn converted(mut self, convert: &dyn Fn($crate::law::Unit, f64) -> f64) -> Self {
+                $(self.$constant = convert($crate::law::Unit::$unit, self.$constant);)*
+                self
+            }
+        }
+    };
+}
+pub(crate) use declared;
