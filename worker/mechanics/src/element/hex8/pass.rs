@@ -56,8 +56,13 @@ impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw> Task for Pass<'_, E, S, 
     const PAIRED: bool = true;
 
     #[inline(always)]
-    fn run<L: Lane>(mut self) {
+    fn run<L: Lane>(self) {
+        // Copies of its own: what is behind a reference that a task carries could be what the kernel writes, for all the compiler
+        // knows, and would be loaded again after each store.
+        let Self { mut view, laws, step, sets, vote } = self;
+        let (step, mut own) = (*step, *vote);
         // SAFETY: `run` above, which alone makes a pass, has checked it or has the promise of its caller.
-        unsafe { compute::<L, E, S, F>(&mut self.view, &self.laws, self.step, self.sets, self.vote) }
+        unsafe { compute::<L, E, S, F>(&mut view, &laws, &step, sets, &mut own) }
+        *vote = own;
     }
 }
