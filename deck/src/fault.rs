@@ -4,9 +4,11 @@
 //! has, so a user sees the whole list at once.
 
 use std::{
-    cell::{Cell, RefCell},
+    cell::{Cell, OnceCell, RefCell},
     fmt,
 };
+
+use crate::place::{Origin, Place};
 
 /// Most faults reported for one deck; the list ends with the number left out.
 pub const MAX_FAULTS: usize = 500;
@@ -40,21 +42,39 @@ impl fmt::Display for Fault {
 
 impl std::error::Error for Fault {}
 
-/// The faults found so far, with the text that turns offsets into lines and columns.
-pub struct Faults<'a> {
-    file: &'a str,
+/// A file of a deck, and where its lines start.
+struct File<'a> {
+    name: &'a str,
     text: &'a str,
-    line_starts: Vec<usize>,
-    list: RefCell<Vec<Fault>>,
+    line_starts: OnceCell<Vec<usize>>,
+}
+
+impl File<'_> {
+    fn line_starts(&self) -> &[usize] {
+        let starts = || std::iter::once(0).chain(self.text.match_indices('\n').map(|(i, _)| i + 1)).collect();
+        self.line_starts.get_or_init(starts)
+    }
+}
+
+/// The faults found so far, with the texts that turn offsets into lines and columns.
+pub struct Faults<'a> {
+    files: Vec<File<'a>>,
+    /// Each with the index of its file.
+    list: RefCell<Vec<(u16, Fault)>>,
     /// Faults past [`MAX_FAULTS`], which are only counted.
     more: Cell<usize>,
 }
 
 impl<'a> Faults<'a> {
-    /// No faults yet.
+    /// No faults yet of one file.
     pub fn new(file: &'a str, text: &'a str) -> Self {
-        let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
-        Self { file, text, line_starts, list: RefCell::new(Vec::new()), more: Cell::new(0) }
+        Self::of_files(&[(file, text)])
+    }
+
+    /// No faults yet of several files, of which there is at least one.
+    pub(crate) fn of_files(files: &[(&'a str, &'a str)]) -> Self {
+        let file = |(name, text): &(&'a str, &'a str)| File { name, text, line_starts: OnceCell::new() };
+        Self { files: files.iter().map(file).collect(), list: RefCell::new(Vec::new()), more: Cell::new(0) }
     }
 
     /// Adds a fault at byte offset `at` of the text.
@@ -65,44 +85,94 @@ impl<'a> Faults<'a> {
         expected: impl Into<String>,
         advice: impl Into<String>,
     ) {
+        self.add_at(Place::text(at), read, expected, advice);
+    }
+
+    /// Adds a fault at a place.
+    pub(crate) fn add_at(
+        &self,
+        at: Place,
+        read: impl Into<String>,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) {
         if self.full() {
             self.more.set(self.more.get() + 1);
             return;
         }
-        let (line, column) = self.place(at);
-        self.list.borrow_mut().push(Fault {
-            file: self.file.to_string(),
+        let (line, column) = self.line_and_column(at);
+        let file = file_of(at);
+        let fault = Fault {
+            file: self.name(file).to_string(),
             line,
             column,
             read: read.into(),
             expected: expected.into(),
             advice: advice.into(),
-        });
+        };
+        self.list.borrow_mut().push((file, fault));
+    }
+
+    /// Name of a file.
+    fn name(&self, file: u16) -> &'a str {
+        self.files.get(usize::from(file)).map_or("deck", |file| file.name)
+    }
+
+    /// Line and column of a place, both from 1.
+    fn line_and_column(&self, at: Place) -> (u32, u32) {
+        match at {
+            Place::Text(at) => self.place(at as usize),
+            Place::Card { line, column, .. } => (line, u32::from(column)),
+        }
+    }
+
+    /// The line of a place, for a message about another place: with its file where that is another.
+    pub(crate) fn line_seen_from(&self, at: Place, from: Place) -> String {
+        let (line, _) = self.line_and_column(at);
+        match file_of(at) == file_of(from) {
+            true => format!("line {line}"),
+            false => format!("line {line} of {}", self.name(file_of(at))),
+        }
     }
 
     /// Line and column of a byte offset, both from 1. Offsets past the end or inside a character are
     /// moved back to the nearest character.
     pub fn place(&self, at: usize) -> (u32, u32) {
-        let mut at = at.min(self.text.len());
-        while !self.text.is_char_boundary(at) {
+        let Some(file) = self.files.first() else { return (1, 1) };
+        let mut at = at.min(file.text.len());
+        while !file.text.is_char_boundary(at) {
             at -= 1;
         }
-        let line = self.line_starts.partition_point(|&start| start <= at);
-        let start = self.line_starts[line - 1];
-        (line as u32, self.text[start..at].chars().count() as u32 + 1)
+        let starts = file.line_starts();
+        let line = starts.partition_point(|&start| start <= at);
+        (line as u32, file.text[starts[line - 1]..at].chars().count() as u32 + 1)
     }
 
     /// The deck's own words between two offsets, on one line and cut to a readable length.
     pub fn quote(&self, from: usize, to: usize) -> String {
-        let piece = self.text.get(from..to).unwrap_or_default();
-        let mut words = String::new();
-        for (n, c) in piece.split_whitespace().flat_map(|w| w.chars().chain([' '])).enumerate() {
-            if n >= MAX_QUOTE {
-                return words.trim_end().to_string() + "...";
+        let text = self.files.first().map_or("", |file| file.text);
+        cut(text.get(from..to).unwrap_or_default())
+    }
+
+    /// The words between two places of one file, the second given as [`Origin::end`] is.
+    pub(crate) fn quote_origin(&self, origin: Origin) -> String {
+        match origin.at {
+            Place::Text(at) => self.quote(at as usize, origin.end as usize),
+            Place::Card { file, line, column } => {
+                let from = usize::from(column).saturating_sub(1);
+                let long = (origin.end as usize).saturating_sub(usize::from(column));
+                cut(&self.line(file, line).chars().skip(from).take(long).collect::<String>())
             }
-            words.push(c);
         }
-        words.trim_end().to_string()
+    }
+
+    /// A line of a file, from 1, without its end.
+    pub(crate) fn line(&self, file: u16, line: u32) -> &'a str {
+        let Some(file) = self.files.get(usize::from(file)) else { return "" };
+        let starts = file.line_starts();
+        let Some(from) = starts.get((line as usize).wrapping_sub(1)) else { return "" };
+        let to = starts.get(line as usize).copied().unwrap_or(file.text.len());
+        file.text[*from..to].trim_end()
     }
 
     /// Number of faults so far.
@@ -117,12 +187,13 @@ impl<'a> Faults<'a> {
 
     /// The faults in the order of their places, at most [`MAX_FAULTS`] and then one with the rest.
     pub fn into_list(self) -> Vec<Fault> {
-        let mut list = self.list.into_inner();
-        list.sort_by_key(|fault| (fault.line, fault.column));
+        let mut list = std::mem::take(&mut *self.list.borrow_mut());
+        list.sort_by_key(|(file, fault)| (*file, fault.line, fault.column));
+        let mut list: Vec<Fault> = list.into_iter().map(|(_, fault)| fault).collect();
         let rest = self.more.get();
         if rest > 0 {
             list.push(Fault {
-                file: self.file.to_string(),
+                file: self.name(0).to_string(),
                 line: 1,
                 column: 1,
                 read: format!("{rest} more faults"),
@@ -132,6 +203,26 @@ impl<'a> Faults<'a> {
         }
         list
     }
+}
+
+/// The file that a place is in.
+fn file_of(at: Place) -> u16 {
+    match at {
+        Place::Text(_) => 0,
+        Place::Card { file, .. } => file,
+    }
+}
+
+/// Words on one line, cut to a readable length.
+fn cut(piece: &str) -> String {
+    let mut words = String::new();
+    for (n, c) in piece.split_whitespace().flat_map(|w| w.chars().chain([' '])).enumerate() {
+        if n >= MAX_QUOTE {
+            return words.trim_end().to_string() + "...";
+        }
+        words.push(c);
+    }
+    words.trim_end().to_string()
 }
 
 /// A measured number to six digits, for messages.

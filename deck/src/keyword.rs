@@ -30,13 +30,7 @@ pub use unit::NAMES as UNIT_NAMES;
 
 pub(crate) use cards::includes;
 
-use crate::{
-    bundle::Bundle,
-    fault::Fault,
-    format::{self, Meshes},
-    mesh_file::MeshFile,
-    model::Model,
-};
+use crate::{bundle::Bundle, fault::Fault, mesh_file::MeshFile, model::Model, typed::mesh::Meshes};
 
 /// Name of the mesh inside the deck that is made.
 const MESH: &str = "keyword.mesh";
@@ -63,9 +57,9 @@ pub(crate) fn read(bundle: &Bundle<'_>, mesh_name: Option<&str>) -> Result<Trans
     if log.count() > 0 {
         return Err(log.into_lists().0);
     }
-    let meshes = Meshes::from([(mesh_name.to_string(), mesh)]);
-    let model = format::read(&draft.text, "deck", &meshes);
-    let mesh = meshes.into_values().next().unwrap_or_default();
+    let meshes = Meshes::from([(mesh_name.to_string(), Some(mesh.into()))]);
+    let model = crate::read_toml(&draft.text, "deck", &meshes);
+    let mesh = meshes.into_values().flatten().next().map(|mesh| mesh.file).unwrap_or_default();
     match model {
         Ok(model) => {
             let (_, warnings) = log.into_lists();

@@ -9,25 +9,28 @@
 //! Parts are built from blocks, by the material library or materials of the deck ([`library`]), in one
 //! named consistent set of units ([`units`]). Nothing is computed here that a cycle needs.
 
-mod assembly;
 mod blocks;
 pub mod bundle;
-mod check;
 pub mod fault;
-mod format;
 mod geometry;
 mod keyword;
 pub mod library;
+mod limits;
+mod log;
+mod make;
 pub mod mesh_file;
 pub mod model;
+mod place;
 pub mod table;
+mod toml_deck;
+mod typed;
 pub mod units;
 
 use bundle::{Bundle, Kind};
 
 pub use fault::{Fault, MAX_FAULTS};
-pub use format::{MAX_CONTACT_PARTS, MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT, MAX_TITLE};
 pub use keyword::{UNIT_NAMES, Warning};
+pub use limits::{MAX_CONTACT_PARTS, MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT, MAX_TITLE};
 pub use model::Model;
 pub use table::{MAX_NAME, MAX_NUMBER};
 
@@ -61,15 +64,28 @@ pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
         let read = keyword::read(&bundle, None)?;
         return Ok(Reading { model: read.model, warnings: read.warnings });
     }
-    let mut meshes = format::Meshes::new();
+    let mut meshes = typed::mesh::Meshes::new();
     for (path, text) in &bundle.files[1..] {
         // The deck names its meshes as it sees them.
         let folder = name.rsplit_once('/').map_or(String::new(), |(folder, _)| format!("{folder}/"));
         let seen = path.strip_prefix(&folder).unwrap_or(path);
-        meshes.insert(seen.to_string(), mesh_file::parse(text, path)?);
+        meshes.insert(seen.to_string(), Some(mesh_file::parse(text, path)?.into()));
     }
-    let model = format::read(deck, name, &meshes)?;
+    let model = read_toml(deck, name, &meshes)?;
     Ok(Reading { model, warnings: Vec::new() })
+}
+
+/// Reads and checks a TOML deck.
+fn read_toml(text: &str, name: &str, meshes: &typed::mesh::Meshes) -> Result<Model, Vec<Fault>> {
+    let log = log::Log::toml(name, text);
+    let model = toml_deck::read(text, &log).and_then(|deck| make::model(&deck, meshes, &log));
+    match model {
+        Some(model) if log.count() == 0 => Ok(model),
+        _ => {
+            assert!(log.count() > 0, "a deck was refused without a fault");
+            Err(log.into_lists().0)
+        }
+    }
 }
 
 /// A keyword deck as a TOML deck and a mesh file.

@@ -21,7 +21,7 @@
 //! 5 0 0.1 0
 //! ```
 //!
-//! A triangle among shells names its last node twice. Bodies of one file share the nodes that they both name. What a deck does with a mesh is in `format/part.rs`.
+//! A triangle among shells names its last node twice. Bodies of one file share the nodes that they both name. What a deck does with a mesh is in `make/part.rs`.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -30,15 +30,12 @@ use std::{
 
 use crate::{
     fault::{Fault, Faults},
-    format::{MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES},
+    limits::{MAX_ELEMENTS, MAX_ENTRIES, MAX_ID, MAX_NODES},
     table::{MAX_NAME, MAX_NUMBER},
 };
 
 /// First line of every mesh file.
 const FIRST: &str = "bolide mesh 1";
-
-/// Greatest number of a node or an element.
-const MAX_ID: u32 = 2_000_000_000;
 
 /// Most faults reported for one file.
 const MAX_REPORTED: usize = 50;

@@ -7,7 +7,10 @@ use std::{cell::RefCell, collections::BTreeSet};
 
 use toml::de::{DeTable, DeValue};
 
-use crate::fault::{Faults, nearest};
+use crate::{
+    fault::{Faults, nearest},
+    place::{Origin, Place, Placed},
+};
 
 /// Longest name of a part, material or gauge (characters).
 pub const MAX_NAME: usize = 64;
@@ -43,6 +46,11 @@ impl<'a> Table<'a> {
     /// A table called `title`, its header at offset `at`.
     pub fn new(table: &'a DeTable<'a>, at: usize, title: String, faults: &'a Faults<'a>) -> Self {
         Self { table, at, title, faults, known: RefCell::new(BTreeSet::new()) }
+    }
+
+    /// Where it stands.
+    pub(crate) fn place(&self) -> Place {
+        Place::text(self.at)
     }
 
     /// The value under `key`, if the deck has one.
@@ -161,7 +169,8 @@ pub enum Range {
 }
 
 impl Range {
-    fn admits(self, x: f64) -> bool {
+    /// Whether a number is one of them.
+    pub(crate) fn admits(self, x: f64) -> bool {
         match self {
             Self::Any => true,
             Self::Positive => x > 0.0,
@@ -170,7 +179,8 @@ impl Range {
         }
     }
 
-    fn words(self) -> &'static str {
+    /// What is expected.
+    pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Any => "a finite number",
             Self::Positive => "a number above 0",
@@ -184,6 +194,16 @@ impl<'a> Value<'a> {
     /// What the deck says here, as `key = value`.
     pub fn words(&self) -> String {
         format!("{} = {}", self.key, self.faults.quote(self.at, self.end))
+    }
+
+    /// The words that it stands in.
+    pub(crate) fn origin(&self) -> Origin {
+        Origin { at: Place::text(self.at), end: self.end as u32, word: self.key }
+    }
+
+    /// Something that was read here, with these words.
+    pub(crate) fn placed<T>(&self, value: T) -> Placed<T> {
+        Placed::new(value, self.origin())
     }
 
     /// Reports this value.

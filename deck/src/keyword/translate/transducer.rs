@@ -4,7 +4,7 @@ use super::{
     super::{draft::quoted, log::Place},
     Translation,
 };
-use crate::format::MAX_CONTACT_FORCES;
+use crate::limits::MAX_CONTACT_FORCES;
 
 impl Translation<'_> {
     /// The pairs of all transducers, each once, in the words of a TOML deck, and where the first transducer stands.

@@ -1,21 +1,17 @@
 //! What spans entries of a deck: inverted elements, parts without mass, contact zones that overlap.
 
-mod surface;
-mod zones;
-
 use mechanics::{
+    contact::Settings,
     material::{Failure, Material},
     mesh::Topology,
 };
 
-pub(crate) use surface::{Face, outer_faces, smallest_face_dimension};
-pub(crate) use zones::clearance;
-
+use super::{assembly::Assembly, part::PartDraft, surface::Face, zones};
 use crate::{
-    assembly::Assembly,
-    fault::{Faults, short},
-    format::{ContactDraft, Explicit, PartDraft},
+    fault::short,
     geometry::{EDGES, norm, sub, worst_corner},
+    log::Log,
+    typed::mesh::Numbers,
 };
 
 /// Most elements named per part; the rest are counted.
@@ -29,36 +25,36 @@ const FLAT: f64 = 1e-12;
 const CORNER_ORDER: &str = "order the corners 0(000) 1(100) 2(110) 3(010) 4(001) 5(101) 6(111) 7(011)";
 
 /// Every check that needs the whole mesh.
-pub(crate) fn spans(
+pub(super) fn check(
     parts: &[PartDraft],
     assembly: &Assembly,
-    contact: Option<&ContactDraft>,
+    contact: Option<(&Settings, &[Face])>,
     materials: &[Material],
-    faults: &Faults<'_>,
+    log: &Log<'_>,
 ) {
-    sections(parts, assembly, materials, faults);
+    sections(parts, assembly, materials, log);
     // Elements that a join folds together were reported with the join.
-    let volumes_fit = !assembly.collapsed && volumes(parts, assembly, faults);
+    let volumes_fit = !assembly.collapsed && volumes(parts, assembly, log);
     // Inside and outside mean nothing for inverted elements.
-    if volumes_fit && let Some(contact) = contact.filter(|contact| !contact.settings.ignores_initial) {
-        zones::overlaps(parts, assembly, contact, faults);
+    if volumes_fit && let Some((settings, faces)) = contact.filter(|(s, _)| !s.ignores_initial) {
+        zones::overlaps(parts, assembly, settings, faces, log);
     }
 }
 
 /// Reports shells of a material that layers do not know.
-fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], faults: &Faults<'_>) {
+fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], log: &Log<'_>) {
     for (part, draft) in assembly.mesh.parts.iter().zip(parts) {
         let material = draft.material.and_then(|index| materials.get(index as usize));
         if let (Some(section), Some(material)) = (part.section(), material) {
             if let Err(error) = section.check(material) {
-                faults.add(
+                log.fault(
                     draft.at,
                     format!("part \"{}\": {error}", part.name),
                     "a material whose law has a plane-stress form",
                     "choose another material, or model the part with solids",
                 );
             } else if material.failure != Failure::None {
-                faults.add(
+                log.fault(
                     draft.at,
                     format!("part \"{}\" of shells, whose material \"{}\" fails", part.name, material.name),
                     "a material without failure",
@@ -70,7 +66,7 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], fa
 }
 
 /// Reports elements whose volume is not positive; true where there is none.
-fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> bool {
+fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
     let offsets = assembly.mesh.element_offsets();
     let mut fit = true;
     for (p, (part, draft)) in assembly.mesh.parts.iter().zip(parts).enumerate() {
@@ -83,19 +79,19 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
             })
             .collect();
         fit &= bad.is_empty();
-        if let Some(own) = &draft.explicit
+        if let Some(own) = &draft.numbers
             && bad.is_empty()
         {
-            fit &= folded(assembly, p, offsets[p], own, faults);
+            fit &= folded(assembly, p, offsets[p], own, log);
         }
         for &e in bad.iter().take(MAX_NAMED) {
-            let at = draft.explicit.as_ref().map_or(draft.at, |own| own.element_places[e]);
+            let at = draft.numbers.as_ref().map_or(draft.at, |own| own.element_places.of(e));
             let advice = match part.topology {
                 Topology::Shells { .. } => "order the corners around the element",
-                Topology::Explicit { .. } if draft.explicit.is_some() => CORNER_ORDER,
+                Topology::Explicit { .. } if draft.numbers.is_some() => CORNER_ORDER,
                 _ => "use a size that the numbers can hold, or a smaller join tolerance",
             };
-            faults.add(
+            log.fault(
                 at,
                 format!(
                     "element {} of part \"{}\" with volume {}",
@@ -108,7 +104,7 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
             );
         }
         if bad.len() > MAX_NAMED {
-            faults.add(
+            log.fault(
                 draft.at,
                 format!("{} more such elements in part \"{}\"", bad.len() - MAX_NAMED, part.name),
                 "volumes above 0",
@@ -122,7 +118,7 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, faults: &Faults<'_>) -> boo
 /// Reports elements of an explicit mesh that are folded at a corner though their volume is positive, as
 /// corners in a wrong order leave them; true where there is none. `offset` is the global index of the part's first
 /// element.
-fn folded(assembly: &Assembly, p: usize, offset: usize, own: &Explicit, faults: &Faults<'_>) -> bool {
+fn folded(assembly: &Assembly, p: usize, offset: usize, own: &Numbers, log: &Log<'_>) -> bool {
     let part = &assembly.mesh.parts[p];
     if part.section().is_some() {
         return true;
@@ -138,8 +134,8 @@ fn folded(assembly: &Assembly, p: usize, offset: usize, own: &Explicit, faults: 
         }
         n_folded += 1;
         if n_folded <= MAX_NAMED {
-            faults.add(
-                own.element_places[e],
+            log.fault(
+                own.element_places.of(e),
                 format!(
                     "element {} of part \"{}\" folded at its corner {corner} (node {})",
                     part.element_ids[e], part.name, assembly.mesh.node_ids[nodes[corner] as usize]
@@ -150,8 +146,8 @@ fn folded(assembly: &Assembly, p: usize, offset: usize, own: &Explicit, faults: 
         }
     }
     if n_folded > MAX_NAMED {
-        faults.add(
-            own.element_places[0],
+        log.fault(
+            own.element_places.of(0),
             format!("{} more folded elements in part \"{}\"", n_folded - MAX_NAMED, part.name),
             "none",
             "mend those named first",

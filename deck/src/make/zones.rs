@@ -7,12 +7,13 @@
 
 use std::collections::BTreeMap;
 
-use super::Face;
+use mechanics::contact::Settings;
+
+use super::{assembly::Assembly, part::PartDraft, surface::Face};
 use crate::{
-    assembly::Assembly,
-    fault::{Faults, short},
-    format::{ContactDraft, PartDraft},
+    fault::short,
     geometry::{add, scaled, triangle_distance},
+    log::Log,
 };
 
 /// A gap that the deck rounded is still a gap.
@@ -27,34 +28,38 @@ struct Worst {
 }
 
 /// Reports every pair of parts whose zones overlap.
-pub(crate) fn overlaps(
+pub(super) fn overlaps(
     parts: &[PartDraft],
     assembly: &Assembly,
-    contact: &ContactDraft,
-    faults: &Faults<'_>,
+    settings: &Settings,
+    faces: &[Face],
+    log: &Log<'_>,
 ) {
-    let gap = contact.settings.gap;
-    let found = worst_of_pairs(assembly, &contact.settings.interacts, &contact.faces, gap);
+    let gap = settings.gap;
+    let found = worst_of_pairs(assembly, &settings.interacts, faces, gap);
     for ((a, b), worst) in found {
-        let (line, _) = faults.place(parts[a].at);
+        let line = log.line(parts[a].at, parts[b].at);
         let id = assembly.mesh.node_ids[worst.node as usize];
         let how = if worst.inside {
             format!("node {id} inside the other part")
         } else {
             format!("node {id} only {} from the other part", short(worst.distance))
         };
-        faults.add(
+        log.fault(
             parts[b].at,
-            format!("part \"{}\" that meets part \"{}\" (line {line}): {how}", parts[b].name, parts[a].name),
+            format!("part \"{}\" that meets part \"{}\" ({line}): {how}", parts[b].name, parts[a].name),
             format!("parts at least one gap ({}) apart at the start", short(gap)),
-            "move one of them, join them, or switch the pair off in [[contact.pair]]",
+            log.say(
+                "move one of them, join them, or switch the pair off in [[contact.pair]]",
+                "move one of them, or name other parts in the *CONTACT",
+            ),
         );
     }
 }
 
 /// The least distance of a node of one part from the surface of another that it may meet, as far as it is below
 /// `within`; 0 where a node is inside.
-pub(crate) fn clearance(assembly: &Assembly, interacts: &[bool], faces: &[Face], within: f64) -> Option<f64> {
+pub(super) fn clearance(assembly: &Assembly, interacts: &[bool], faces: &[Face], within: f64) -> Option<f64> {
     let found = worst_of_pairs(assembly, interacts, faces, within);
     found.values().map(|w| if w.inside { 0.0 } else { w.distance }).min_by(f64::total_cmp)
 }

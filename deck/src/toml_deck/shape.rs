@@ -2,10 +2,10 @@
 
 use mechanics::mesh::Section;
 
-use super::MAX_NODES;
 use crate::{
     blocks::{Sector, Shape, graded},
     geometry::{cross, norm},
+    limits::MAX_NODES,
     table::{Range, Table},
 };
 

@@ -2,29 +2,27 @@
 
 use mechanics::mesh::Topology;
 
-use crate::{
-    assembly::Assembly,
-    geometry::{FACES, norm, sub},
-};
+use super::assembly::Assembly;
+use crate::geometry::{FACES, norm, sub};
 
 /// The side of a shell that stands for it, an index into [`FACES`].
 const UPPER: usize = 1;
 
 /// An outer face of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Face {
-    pub(crate) part: u32,
+pub(super) struct Face {
+    pub(super) part: u32,
     /// Global element, and which of its faces in the order of [`mechanics::mesh::FACES`], which is not that of ours.
-    pub(crate) element: u32,
-    pub(crate) side: u8,
+    pub(super) element: u32,
+    pub(super) side: u8,
     /// Global nodes, outward by the right hand.
-    pub(crate) nodes: [u32; 4],
+    pub(super) nodes: [u32; 4],
     /// Whether another part has the same face: joined bodies touch there and contact does not see it.
-    pub(crate) inside: bool,
+    pub(super) inside: bool,
 }
 
 /// Faces that one element of their part has, in the order of parts and elements.
-pub(crate) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
+pub(super) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
     let mut keyed: Vec<([u32; 4], u64, Face)> = Vec::new();
     let mut order = 0;
     let offsets = assembly.mesh.element_offsets();
@@ -105,7 +103,7 @@ fn on_side(cells: [u32; 3], e: usize, f: usize) -> bool {
 }
 
 /// The shortest edge of the outer faces of parts that meet any part; none where there is no such face.
-pub(crate) fn smallest_face_dimension(
+pub(super) fn smallest_face_dimension(
     assembly: &Assembly,
     faces: &[Face],
     interacts: &[bool],

@@ -7,89 +7,88 @@ use mechanics::{
     mesh::{Mesh, Part, Topology},
 };
 
+use super::{names::Names, part::PartDraft};
 use crate::{
-    fault::{Faults, short},
-    format::{Explicit, MAX_ENTRIES, Meshes, Names, PartDraft},
+    fault::short,
     geometry::{EDGES, dot, norm, sub},
+    log::Log,
     mesh_file::MeshFile,
-    table::{Range, Table},
+    place::Place,
+    typed::{
+        contact,
+        mesh::{Meshes, Numbers},
+    },
 };
 
-/// One `[[join]]`.
-pub(crate) struct Join {
-    at: usize,
+/// Parts whose coincident nodes become one.
+pub(super) struct Join {
+    at: Place,
     parts: Vec<usize>,
     /// Greatest distance of nodes that merge, over the smallest edge of the joined parts.
     tolerance: f64,
 }
 
 /// The mesh of all parts and what was measured on the way.
-pub(crate) struct Assembly {
-    pub(crate) mesh: Mesh,
+pub(super) struct Assembly {
+    pub(super) mesh: Mesh,
     /// Initial velocity by global node.
-    pub(crate) velocity: Vec<[f64; 3]>,
+    pub(super) velocity: Vec<[f64; 3]>,
     /// Initial rotation rate by global node (1/time); empty where no mesh file gives one.
-    pub(crate) spin: Vec<[f64; 3]>,
+    pub(super) spin: Vec<[f64; 3]>,
     /// Kinetic energy lost in joins.
-    pub(crate) join_energy: f64,
+    pub(super) join_energy: f64,
     /// Named faces of each part: their global nodes.
-    pub(crate) faces: Vec<Vec<(&'static str, Vec<u32>)>>,
+    pub(super) faces: Vec<Vec<(&'static str, Vec<u32>)>>,
     /// Smallest edge of each part; infinite for a part without elements.
-    pub(crate) smallest_edge: Vec<f64>,
+    pub(super) smallest_edge: Vec<f64>,
     /// Largest edge of each part.
-    pub(crate) largest_edge: Vec<f64>,
+    pub(super) largest_edge: Vec<f64>,
     /// Volume by global element.
-    pub(crate) volumes: Vec<f64>,
+    pub(super) volumes: Vec<f64>,
     /// Whether a join merged nodes of one part, which has been reported.
-    pub(crate) collapsed: bool,
+    pub(super) collapsed: bool,
     /// Pairs of parts that share nodes, lower index first.
-    pub(crate) joined: Vec<(usize, usize)>,
+    pub(super) joined: Vec<(usize, usize)>,
     /// The global node of each user's number.
-    pub(crate) node_of_id: BTreeMap<u32, u32>,
+    pub(super) node_of_id: BTreeMap<u32, u32>,
     /// The initial velocity each part was given.
-    pub(crate) part_velocity: Vec<[f64; 3]>,
+    pub(super) part_velocity: Vec<[f64; 3]>,
     /// Two corners of the box around the velocities that mesh files give, where they give any.
-    pub(crate) file_velocities: Vec<[f64; 3]>,
+    pub(super) file_velocities: Vec<[f64; 3]>,
     /// Named sets of nodes from mesh files: global nodes, ascending.
-    pub(crate) sets: BTreeMap<String, Vec<u32>>,
+    pub(super) sets: BTreeMap<String, Vec<u32>>,
     /// Named sets of faces from mesh files: global nodes. Faces of nodes that no part has are left out.
-    pub(crate) segments: BTreeMap<String, Vec<[u32; 4]>>,
+    pub(super) segments: BTreeMap<String, Vec<[u32; 4]>>,
 }
 
-/// Reads every `[[join]]`.
-pub(crate) fn read_joins(deck: &Table<'_>, names: &Names) -> Vec<Join> {
-    let mut joins = Vec::new();
-    for table in deck.tables("join", MAX_ENTRIES) {
-        let value = table.require("parts", "\"all\" or a list of at least two part names");
-        let parts = value.and_then(|v| names.several(v));
-        let tolerance =
-            table.number_or("tolerance", 1e-3, Range::Within(0.0, 0.5, "a number above 0 and at most 0.5"));
-        let at = value.map_or(table.at, |v| v.at);
-        table.finish();
-        let Some(parts) = parts else { continue };
+/// The joins of a deck, by the index of their parts.
+pub(super) fn joins(joins: &[contact::Join], names: &Names<'_>, log: &Log<'_>) -> Vec<Join> {
+    let mut list = Vec::new();
+    for contact::Join { at, parts, tolerance } in joins {
+        let Some(parts) = names.several(parts) else { continue };
         if parts.len() < 2 {
-            deck.faults.add(
-                at,
+            log.fault(
+                *at,
                 "a join of one part",
                 "at least two different parts",
                 "name another part or remove the join",
             );
             continue;
         }
-        joins.push(Join { at, parts, tolerance });
+        list.push(Join { at: *at, parts, tolerance: *tolerance });
     }
-    joins
+    list
 }
 
 /// One mesh of all parts.
-pub(crate) fn assemble(
+pub(super) fn assemble(
     drafts: &[PartDraft],
     joins: &[Join],
     materials: &[Material],
     meshes: &Meshes,
-    faults: &Faults<'_>,
+    log: &Log<'_>,
 ) -> Assembly {
-    let mut mesh = number(drafts, faults);
+    let mut mesh = number(drafts, log);
     let mut smallest_edge = Vec::new();
     let mut largest_edge = Vec::new();
     for part in &mesh.parts {
@@ -117,7 +116,7 @@ pub(crate) fn assemble(
     };
     share(&mesh, drafts, &mut assembly.joined);
     if !joins.is_empty() {
-        merge(&mut mesh, joins, &mut assembly, faults);
+        merge(&mut mesh, joins, &mut assembly, log);
     }
     assembly.faces = drafts.iter().zip(&mesh.parts).map(|(draft, part)| global_faces(draft, part)).collect();
     for part in &mesh.parts {
@@ -128,16 +127,16 @@ pub(crate) fn assemble(
     }
     assembly.mesh = mesh;
     velocities(&mut assembly, materials);
-    let used = drafts.iter().filter_map(|d| d.explicit.as_ref()?.file.as_ref());
-    for mesh in used.collect::<BTreeSet<_>>().into_iter().filter_map(|file| meshes.get(file)) {
-        take_over(mesh, &mut assembly);
+    let used = drafts.iter().filter_map(|d| d.numbers.as_ref()?.mesh.as_ref());
+    for mesh in used.collect::<BTreeSet<_>>().into_iter().filter_map(|name| meshes.get(name)?.as_ref()) {
+        take_over(&mesh.file, &mut assembly);
     }
     assembly
 }
 
 /// Pairs of parts of one file that name the same node, into `joined`.
 fn share(mesh: &Mesh, drafts: &[PartDraft], joined: &mut Vec<(usize, usize)>) {
-    if !drafts.iter().any(|d| d.explicit.as_ref().is_some_and(|e| e.file.is_some())) {
+    if !drafts.iter().any(|d| d.numbers.as_ref().is_some_and(|e| e.mesh.is_some())) {
         return;
     }
     let mut holders: Vec<Option<usize>> = vec![None; mesh.n_nodes()];
@@ -200,11 +199,11 @@ fn take_over(mesh: &MeshFile, assembly: &mut Assembly) {
 }
 
 /// Numbers nodes and elements part by part, without joins.
-fn number(drafts: &[PartDraft], faults: &Faults<'_>) -> Mesh {
+fn number(drafts: &[PartDraft], log: &Log<'_>) -> Mesh {
     let mut mesh = Mesh::default();
-    let explicit = || drafts.iter().filter_map(|d| d.explicit.as_ref().map(|e| (d, e)));
-    let mut next_node = explicit().flat_map(|(_, e)| e.node_ids.iter().copied()).max().unwrap_or(0) + 1;
-    let mut next_element = explicit().flat_map(|(_, e)| e.element_ids.iter().copied()).max().unwrap_or(0) + 1;
+    let explicit = || drafts.iter().filter_map(|d| d.numbers.as_ref().map(|e| (d, e)));
+    let mut next_node = explicit().flat_map(|(_, e)| e.nodes.iter().copied()).max().unwrap_or(0) + 1;
+    let mut next_element = explicit().flat_map(|(_, e)| e.elements.iter().copied()).max().unwrap_or(0) + 1;
     // Numbers of different parts may not meet; inside a part this was looked at when it was read.
     let mut node_owner: Owners<'_> = BTreeMap::new();
     // Solids and shells are numbered apart.
@@ -217,10 +216,10 @@ fn number(drafts: &[PartDraft], faults: &Faults<'_>) -> Mesh {
             None => (&[][..], Topology::Explicit { hexahedra: Vec::new() }),
         };
         let first = mesh.positions.len() as u32;
-        let file = draft.explicit.as_ref().and_then(|own| own.file.as_deref().map(|file| (file, own)));
+        let file = draft.numbers.as_ref().and_then(|own| own.mesh.as_deref().map(|file| (file, own)));
         if let Some((file, own)) = file {
             number_shared(&mut mesh, positions, topology, draft, file, own, &mut of_file);
-            owned(own, draft, &mut element_owner, &mut node_owner, faults);
+            owned(own, draft, &mut element_owner, &mut node_owner, log);
             continue;
         }
         mesh.positions.extend_from_slice(positions);
@@ -231,11 +230,11 @@ fn number(drafts: &[PartDraft], faults: &Faults<'_>) -> Mesh {
             nodes: (first..mesh.positions.len() as u32).collect(),
             element_ids: Vec::new(),
         };
-        match &draft.explicit {
+        match &draft.numbers {
             Some(own) => {
-                owned(own, draft, &mut element_owner, &mut node_owner, faults);
-                mesh.node_ids.extend(&own.node_ids);
-                part.element_ids = own.element_ids.clone();
+                owned(own, draft, &mut element_owner, &mut node_owner, log);
+                mesh.node_ids.extend(&own.nodes);
+                part.element_ids = own.elements.clone();
             }
             None => {
                 let n_elements = part.n_elements() as u32;
@@ -257,11 +256,11 @@ fn number_shared<'a>(
     topology: Topology,
     draft: &PartDraft,
     file: &'a str,
-    own: &Explicit,
+    own: &Numbers,
     of_file: &mut BTreeMap<(&'a str, u32), u32>,
 ) {
     let mut nodes = Vec::with_capacity(positions.len());
-    for (x, id) in positions.iter().zip(&own.node_ids) {
+    for (x, id) in positions.iter().zip(&own.nodes) {
         let next = mesh.positions.len() as u32;
         let node = *of_file.entry((file, *id)).or_insert(next);
         if node == next {
@@ -275,39 +274,39 @@ fn number_shared<'a>(
         material: draft.material.unwrap_or(0),
         topology,
         nodes,
-        element_ids: own.element_ids.clone(),
+        element_ids: own.elements.clone(),
     });
 }
 
-/// Where each number was taken: the place in the text, and the file.
-type Owners<'a> = BTreeMap<u32, (usize, Option<&'a str>)>;
+/// Where each number was taken: its place, and the mesh.
+type Owners<'a> = BTreeMap<u32, (Place, Option<&'a str>)>;
 
 /// Reports numbers that an earlier part has; parts of one file share nodes.
 fn owned<'a>(
-    own: &'a Explicit,
+    own: &'a Numbers,
     draft: &PartDraft,
     elements: &mut [Owners<'a>; 2],
     nodes: &mut Owners<'a>,
-    faults: &Faults<'_>,
+    log: &Log<'_>,
 ) {
     let of_shells =
         draft.block.as_ref().is_some_and(|block| matches!(block.topology, Topology::Shells { .. }));
     let elements = &mut elements[usize::from(of_shells)];
     for (ids, places, owner, what) in [
-        (&own.node_ids, &own.node_places, nodes, "node"),
-        (&own.element_ids, &own.element_places, elements, "element"),
+        (&own.nodes, &own.node_places, nodes, "node"),
+        (&own.elements, &own.element_places, elements, "element"),
     ] {
-        for (id, place) in ids.iter().zip(places) {
-            let file = own.file.as_deref();
-            let Some((other, of)) = owner.insert(*id, (*place, file)) else { continue };
+        for (i, id) in ids.iter().enumerate() {
+            let (place, file) = (places.of(i), own.mesh.as_deref());
+            let Some((other, of)) = owner.insert(*id, (place, file)) else { continue };
             if what == "node" && file.is_some() && of == file {
                 continue;
             }
-            let (line, _) = faults.place(other);
-            faults.add(
-                *place,
+            let line = log.line(other, place);
+            log.fault(
+                place,
                 format!("{what} {id} of part \"{}\"", draft.name),
-                format!("a number other than {id}, which line {line} has"),
+                format!("a number other than {id}, which {line} has"),
                 "renumber one; nodes shared by parts are listed in both and joined",
             );
         }
@@ -329,7 +328,7 @@ fn edges(positions: &[[f64; 3]], part: &Part) -> (f64, f64) {
 }
 
 /// Merges coincident nodes of joined parts: a merged node keeps the lowest index, the others close up.
-fn merge(mesh: &mut Mesh, joins: &[Join], assembly: &mut Assembly, faults: &Faults<'_>) {
+fn merge(mesh: &mut Mesh, joins: &[Join], assembly: &mut Assembly, log: &Log<'_>) {
     let n_nodes = mesh.n_nodes();
     let mut part_of = vec![0u32; n_nodes];
     for (p, part) in mesh.parts.iter().enumerate() {
@@ -350,7 +349,7 @@ fn merge(mesh: &mut Mesh, joins: &[Join], assembly: &mut Assembly, faults: &Faul
         if merged == 0 {
             let names: Vec<String> =
                 join.parts.iter().map(|&p| format!("\"{}\"", mesh.parts[p].name)).collect();
-            faults.add(
+            log.fault(
                 join.at,
                 format!("a join of parts {} that share no nodes", names.join(", ")),
                 format!("coincident nodes within {}", short(tolerance)),
@@ -361,7 +360,7 @@ fn merge(mesh: &mut Mesh, joins: &[Join], assembly: &mut Assembly, faults: &Faul
     for node in 0..n_nodes as u32 {
         root[node as usize] = find(&root, node);
     }
-    assembly.collapsed = collapsed(mesh, &root, &part_of, joins, faults);
+    assembly.collapsed = collapsed(mesh, &root, &part_of, joins, log);
     // Close up the numbering.
     let mut new = vec![0u32; n_nodes];
     let mut kept = 0;
@@ -438,7 +437,7 @@ fn merge_pairs(mesh: &Mesh, join: &Join, tolerance: f64, part_of: &[u32], root: 
 }
 
 /// Reports parts of which a join merges two nodes of their own; true where there is one.
-fn collapsed(mesh: &Mesh, root: &[u32], part_of: &[u32], joins: &[Join], faults: &Faults<'_>) -> bool {
+fn collapsed(mesh: &Mesh, root: &[u32], part_of: &[u32], joins: &[Join], log: &Log<'_>) -> bool {
     let mut last: HashMap<(u32, u32), u32> = HashMap::new();
     let mut reported = vec![false; mesh.parts.len()];
     for node in 0..root.len() {
@@ -446,8 +445,9 @@ fn collapsed(mesh: &Mesh, root: &[u32], part_of: &[u32], joins: &[Join], faults:
         if let Some(other) = last.insert((root[node], part), node as u32)
             && !std::mem::replace(&mut reported[part as usize], true)
         {
-            let at = joins.iter().find(|j| j.parts.contains(&(part as usize))).map_or(0, |j| j.at);
-            faults.add(
+            let at =
+                joins.iter().find(|j| j.parts.contains(&(part as usize))).map_or(Place::text(0), |j| j.at);
+            log.fault(
                 at,
                 format!(
                     "a join that merges nodes {} and {} of the same part \"{}\"",

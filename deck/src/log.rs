@@ -1,0 +1,181 @@
+//! Faults and warnings of a deck, in the words of the format that its user wrote.
+
+use std::{cell::RefCell, collections::BTreeMap, fmt};
+
+use crate::{
+    fault::{Fault, Faults, MAX_FAULTS},
+    place::{Origin, Place},
+};
+
+/// The format that a user wrote.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Dialect {
+    Toml,
+    Keyword,
+}
+
+/// Something a user should know about a deck that runs. Displayed as `file:line: words`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// Name of the file.
+    pub file: String,
+    /// Line, from 1.
+    pub line: u32,
+    /// What is done otherwise than the deck says.
+    pub words: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}: {}", self.file, self.line, self.words)
+    }
+}
+
+/// What was found so far in all files of a deck. Readers and checks share one.
+pub(crate) struct Log<'a> {
+    /// Where tables of a TOML deck report.
+    pub(crate) faults: Faults<'a>,
+    dialect: Dialect,
+    files: Vec<&'a str>,
+    warnings: RefCell<Vec<(Place, String)>>,
+    /// Keywords that change nothing here, by name: the first line of each.
+    ignored: RefCell<BTreeMap<String, Place>>,
+}
+
+impl<'a> Log<'a> {
+    /// Nothing found yet in a TOML deck.
+    pub(crate) fn toml(name: &'a str, text: &'a str) -> Self {
+        Self::of(Dialect::Toml, &[(name, text)])
+    }
+
+    /// Nothing found yet in the files of a keyword deck.
+    pub(crate) fn keyword(files: &[(&'a str, &'a str)]) -> Self {
+        Self::of(Dialect::Keyword, files)
+    }
+
+    fn of(dialect: Dialect, files: &[(&'a str, &'a str)]) -> Self {
+        Self {
+            faults: Faults::of_files(files),
+            dialect,
+            files: files.iter().map(|(name, _)| *name).collect(),
+            warnings: RefCell::new(Vec::new()),
+            ignored: RefCell::new(BTreeMap::new()),
+        }
+    }
+
+    /// A fault at a place.
+    pub(crate) fn fault(
+        &self,
+        at: Place,
+        read: impl Into<String>,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) {
+        self.faults.add_at(at, read, expected, advice);
+    }
+
+    /// A fault of a value, which is quoted.
+    pub(crate) fn fault_of(&self, origin: Origin, expected: impl Into<String>, advice: impl Into<String>) {
+        self.fault(origin.at, self.quote_origin(origin), expected, advice);
+    }
+
+    /// What a deck says at an origin: `key = value`, or `FIELD = value in card 2 of *KEYWORD`.
+    pub(crate) fn quote_origin(&self, origin: Origin) -> String {
+        let value = self.faults.quote_origin(origin);
+        match origin.at {
+            Place::Text(_) => format!("{} = {value}", origin.word),
+            Place::Card { .. } => match (origin.word, value.as_str()) {
+                ("", _) => self.card(origin.at),
+                (word, "") => format!("{word} blank in {}", self.card(origin.at)),
+                (word, value) => format!("{word} = {value} in {}", self.card(origin.at)),
+            },
+        }
+    }
+
+    /// Which card of which keyword stands at a place of a keyword deck.
+    fn card(&self, at: Place) -> String {
+        let Place::Card { file, line, .. } = at else { return String::new() };
+        let mut number = 0;
+        for line in (1..=line).rev() {
+            let words = self.faults.line(file, line);
+            if let Some(keyword) = words.strip_prefix('*') {
+                let keyword = keyword.split_whitespace().next().unwrap_or_default().to_ascii_uppercase();
+                return match number {
+                    0 => format!("*{keyword}"),
+                    _ => format!("card {number} of *{keyword}"),
+                };
+            }
+            number += u32::from(!words.starts_with('$'));
+        }
+        format!("line {line}")
+    }
+
+    /// Of the same words in both formats those of the user's.
+    pub(crate) fn say<'w>(&self, toml: &'w str, keyword: &'w str) -> &'w str {
+        match self.dialect {
+            Dialect::Toml => toml,
+            Dialect::Keyword => keyword,
+        }
+    }
+
+    /// `line 12`, with its file where that is not the one of `from`.
+    pub(crate) fn line(&self, at: Place, from: Place) -> String {
+        self.faults.line_seen_from(at, from)
+    }
+
+    /// A warning.
+    pub(crate) fn warn(&self, at: Place, words: impl Into<String>) {
+        let warning = (at.at_column(1), words.into());
+        let mut warnings = self.warnings.borrow_mut();
+        if warnings.len() < MAX_FAULTS && !warnings.contains(&warning) {
+            warnings.push(warning);
+        }
+    }
+
+    /// A keyword that changes nothing here.
+    pub(crate) fn ignore(&self, at: Place, keyword: &str) {
+        self.ignored.borrow_mut().entry(keyword.to_string()).or_insert(at);
+    }
+
+    /// Number of faults so far.
+    pub(crate) fn count(&self) -> usize {
+        self.faults.count()
+    }
+
+    /// A piece of a line, cut to a readable length; `a blank field` where there is nothing.
+    pub(crate) fn quote(&self, words: &str) -> String {
+        const MAX_QUOTE: usize = 60;
+        let words = words.trim();
+        match words.char_indices().nth(MAX_QUOTE) {
+            _ if words.is_empty() => "a blank field".to_string(),
+            Some((end, _)) => format!("{}...", &words[..end]),
+            None => words.to_string(),
+        }
+    }
+
+    /// Faults and warnings, each in the order of their places.
+    pub(crate) fn into_lists(self) -> (Vec<Fault>, Vec<Warning>) {
+        let mut warnings = self.warnings.into_inner();
+        let ignored = self.ignored.into_inner();
+        let line = |at: &Place| match at {
+            Place::Card { line, .. } => *line,
+            Place::Text(_) => 1,
+        };
+        if let Some(first) = ignored.values().min() {
+            let names: Vec<String> =
+                ignored.iter().map(|(name, at)| format!("*{name} (line {})", line(at))).collect();
+            let words = format!("ignored, nothing here depends on it: {}", names.join(", "));
+            warnings.push((*first, words));
+        }
+        warnings.sort();
+        let file = |at: &Place| match at {
+            Place::Card { file, .. } => self.files.get(usize::from(*file)).copied().unwrap_or("deck"),
+            Place::Text(_) => self.files.first().copied().unwrap_or("deck"),
+        };
+        let warnings = warnings
+            .into_iter()
+            .map(|(at, words)| Warning { file: file(&at).to_string(), line: line(&at), words })
+            .collect();
+        (self.faults.into_list(), warnings)
+    }
+}

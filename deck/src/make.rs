@@ -1,0 +1,94 @@
+//! A typed deck becomes a model: the one set of checks on what spans entries, whichever format the deck was written in.
+//!
+//! The stages, each of which goes on past the faults of the one before as far as it can:
+//! 1. names, materials, parts with their blocks;
+//! 2. one mesh with one numbering, joins, volumes, masses, velocities;
+//! 3. boundaries, walls, loads, rigid bodies, contact, output, which refer to parts and nodes;
+//! 4. elements that are turned inside out, sections, contact zones that overlap.
+
+mod assembly;
+mod boundary;
+mod burn;
+mod contact;
+mod control;
+mod erosion;
+mod load;
+mod material;
+mod names;
+mod output;
+mod part;
+mod region;
+mod rigid;
+mod spans;
+mod surface;
+mod wall;
+mod zones;
+
+use mechanics::setup::{Control, Setup};
+
+use crate::{
+    log::Log,
+    model::Model,
+    typed::{Deck, mesh::Meshes},
+};
+use material::Materials;
+use names::{Curves, Names};
+
+/// Checks a deck and makes its model; none where it has no control. The model is not to be used after a fault.
+pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model> {
+    let mut materials = Materials::of(deck, log);
+    let parts = part::make(&deck.parts, &mut materials, meshes, log);
+    let materials = materials.list;
+    let names = Names::of(&deck.parts, log);
+    let joins = assembly::joins(&deck.joins, &names, log);
+    let mut assembly = assembly::assemble(&parts, &joins, &materials, meshes, log);
+    let curves = Curves::of(&deck.curves, log);
+    let rigid = rigid::drafts(&deck.rigid, &names, &curves, log);
+    let mut conditions = boundary::make(deck, &names, curves, &parts, &assembly, log);
+    let bodies = rigid::make(&rigid, &materials, &mut assembly, &mut conditions, log);
+    let contact = deck
+        .contact
+        .as_ref()
+        .and_then(|contact| contact::make(contact, &names, &assembly, &materials, &conditions, &rigid, log));
+    let settings = contact.as_ref().map(|contact| &contact.settings);
+    let control = deck.control.as_ref().map(|given| {
+        let control = control::make(given, log);
+        Control { sort_lag: control::sort_lag(given, control.sort_lag, settings, log), ..control }
+    });
+    let erosion = erosion::make(deck, &parts, &rigid, log);
+    let output = output::make(deck, &names, &assembly, log);
+    let detonations = burn::make(deck, &materials, &parts, log);
+    let faces = contact.as_ref().map(|contact| (&contact.settings, contact.faces.as_slice()));
+    spans::check(&parts, &assembly, faces, &materials, log);
+
+    let mut velocity = assembly.velocity;
+    for (node, index) in conditions.constraint.iter().enumerate() {
+        let prescribed = conditions.constraints[*index as usize].velocity;
+        for (axis, value) in prescribed.iter().enumerate() {
+            if let Some(value) = value {
+                velocity[node][axis] = value.at(&conditions.loads.curves, 0.0);
+            }
+        }
+    }
+    Some(Model {
+        title: deck.title.clone(),
+        units: deck.units.name.to_string(),
+        mesh: assembly.mesh,
+        velocity,
+        spin: assembly.spin,
+        constraint: conditions.constraint,
+        join_energy: assembly.join_energy,
+        setup: Setup {
+            materials,
+            control: control?,
+            contact: contact.map(|contact| contact.settings),
+            constraints: conditions.constraints,
+            walls: conditions.walls,
+            bodies,
+            detonations,
+            loads: conditions.loads,
+            erosion,
+        },
+        output,
+    })
+}

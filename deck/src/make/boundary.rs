@@ -1,0 +1,249 @@
+//! Velocities prescribed by node, walls, and the constraints that nodes have by both.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mechanics::{
+    load::{Drive, Loads, SurfaceKind, SurfaceLoad},
+    setup::{Constraint, MAX_WALLS},
+    wall::RigidWall,
+};
+
+use super::{
+    assembly::Assembly,
+    load::{self, LoadDraft},
+    names::{Curves, Names},
+    part::PartDraft,
+    region::{self, Asking, broken, choose},
+    wall,
+};
+use crate::{
+    log::Log,
+    place::Place,
+    typed::{
+        Deck,
+        condition::{Boundary, BoundaryKind},
+    },
+};
+
+/// Constraints, walls and loads of the deck.
+pub(super) struct Conditions {
+    pub(super) constraints: Vec<Constraint>,
+    pub(super) constraint: Vec<u16>,
+    pub(super) walls: Vec<RigidWall>,
+    /// What the walls are called in messages.
+    pub(super) wall_titles: Vec<String>,
+    pub(super) loads: Loads,
+}
+
+/// What a boundary prescribes, and where it stands.
+struct Prescribing {
+    at: Place,
+    velocity: Prescribed,
+}
+
+/// A drive as a key: bits of the factor, and the curve.
+type DriveBits = Option<(u64, Option<u32>)>;
+
+/// Velocities by axis.
+type Prescribed = [Option<Drive>; 3];
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Makes boundaries, walls and loads.
+pub(super) fn make(
+    deck: &Deck,
+    names: &Names<'_>,
+    curves: Curves<'_>,
+    parts: &[PartDraft],
+    assembly: &Assembly,
+    log: &Log<'_>,
+) -> Conditions {
+    let turns = turning(assembly);
+    let mut loads = load::make(deck, names, parts, assembly, &curves, log);
+    let mut boundaries: Vec<Prescribing> = Vec::new();
+    // By node and axis: the boundary that prescribes it.
+    let mut prescribed: BTreeMap<u32, [Option<usize>; 3]> = BTreeMap::new();
+    // By node: axes about which it does not turn.
+    let mut clamps: BTreeMap<u32, u8> = BTreeMap::new();
+    // By pair of boundaries and axis: the first node both prescribe differently, and how many.
+    let mut conflicts: BTreeMap<(usize, usize, usize), (u32, usize)> = BTreeMap::new();
+    for boundary in &deck.boundaries {
+        if let BoundaryKind::Transmit(faces) = &boundary.kind {
+            let selected = names.several(&boundary.parts).unwrap_or_default();
+            let asking = Asking { at: boundary.at, title: &boundary.title, selected: &selected };
+            let faces = match faces {
+                Some(faces) => region::faces(faces, &asking, parts, assembly, log),
+                None => Vec::new(),
+            };
+            if let Some(&p) = selected.iter().find(|&&p| assembly.mesh.parts[p].section().is_some()) {
+                let read = format!("{} on part \"{}\" of shells", boundary.title, parts[p].name);
+                log.fault(boundary.at, read, "parts of solids", "name them under parts");
+            }
+            loads.list.surfaces.push(SurfaceLoad { kind: SurfaceKind::Transmit, faces });
+            continue;
+        }
+        let Some((velocity, clamped, nodes)) = held(boundary, names, parts, assembly, &curves, log) else {
+            continue;
+        };
+        let this = boundaries.len();
+        boundaries.push(Prescribing { at: boundary.at, velocity });
+        for node in nodes {
+            if clamped != 0 && turns[node as usize] {
+                *clamps.entry(node).or_default() |= clamped;
+            }
+            let held = prescribed.entry(node).or_default();
+            for axis in 0..3 {
+                if velocity[axis].is_none() {
+                    continue;
+                }
+                match held[axis] {
+                    Some(other) if boundaries[other].velocity[axis] != velocity[axis] => {
+                        conflicts.entry((other, this, axis)).or_insert((node, 0)).1 += 1;
+                    }
+                    _ => held[axis] = Some(this),
+                }
+            }
+        }
+    }
+    for ((first, second, axis), (node, count)) in conflicts {
+        let value = |b: usize| boundaries[b].velocity[axis].map(|v| curves.words(v)).unwrap_or_default();
+        let line = log.line(boundaries[first].at, boundaries[second].at);
+        let other = log.say("the boundary at ", "");
+        log.fault(
+            boundaries[second].at,
+            format!(
+                "{} velocity {} at node {} and {} more",
+                AXES[axis],
+                value(second),
+                assembly.mesh.node_ids[node as usize],
+                count - 1
+            ),
+            format!("{}, as {other}{line} prescribes there", value(first)),
+            "take the nodes out of one of the two",
+        );
+    }
+    let (walls, wall_titles, touched) = make_walls(deck, names, assembly, &curves, log);
+    let (constraints, constraint) =
+        number(&boundaries, &prescribed, &clamps, &loads, &touched, assembly.mesh.n_nodes(), log);
+    let loads = Loads { curves: curves.list, ..loads.list };
+    Conditions { constraints, constraint, walls, wall_titles, loads }
+}
+
+/// The walls, what they are called, and by node the walls that name it, one bit each. Walls that name parts are bound at
+/// the start of a run.
+fn make_walls(
+    deck: &Deck,
+    names: &Names<'_>,
+    assembly: &Assembly,
+    curves: &Curves<'_>,
+    log: &Log<'_>,
+) -> (Vec<RigidWall>, Vec<String>, BTreeMap<u32, u32>) {
+    let (mut walls, mut titles) = (Vec::new(), Vec::new());
+    let mut touched: BTreeMap<u32, u32> = BTreeMap::new();
+    for given in &deck.walls {
+        let Some((wall, nodes)) = wall::make(given, names, assembly, curves, log) else { continue };
+        if nodes.is_some() && walls.len() >= MAX_WALLS {
+            log.fault(given.at, "a wall by nodes after 32 others", "at most 32 walls", "join some");
+            continue;
+        }
+        for node in nodes.into_iter().flatten() {
+            *touched.entry(node).or_default() |= 1 << walls.len();
+        }
+        walls.push(wall);
+        titles.push(given.title.clone());
+    }
+    (walls, titles, touched)
+}
+
+/// Numbers the different constraints; entry 0 is free.
+fn number(
+    boundaries: &[Prescribing],
+    prescribed: &BTreeMap<u32, [Option<usize>; 3]>,
+    clamps: &BTreeMap<u32, u8>,
+    loads: &LoadDraft,
+    touched: &BTreeMap<u32, u32>,
+    n_nodes: usize,
+    log: &Log<'_>,
+) -> (Vec<Constraint>, Vec<u16>) {
+    let mut list = vec![Constraint::default()];
+    let mut known: BTreeMap<([DriveBits; 3], u32, u32, u8), u16> = BTreeMap::new();
+    let mut of_node = vec![0u16; n_nodes];
+    let forces = &loads.forces;
+    let nodes: BTreeSet<u32> =
+        prescribed.keys().chain(clamps.keys()).chain(forces.keys()).chain(touched.keys()).copied().collect();
+    for node in nodes {
+        let held = prescribed.get(&node).copied().unwrap_or_default();
+        let forces = forces.get(&node).copied().unwrap_or_default();
+        let walls = touched.get(&node).copied().unwrap_or_default();
+        let clamped = clamps.get(&node).copied().unwrap_or_default();
+        let velocity = [0, 1, 2].map(|axis| held[axis].and_then(|b| boundaries[b].velocity[axis]));
+        let key = (velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve))), forces, walls, clamped);
+        let next = list.len();
+        let index = match known.get(&key) {
+            Some(index) => *index,
+            None => {
+                let Ok(index) = u16::try_from(next) else {
+                    log.fault(
+                        boundaries.first().map_or(Place::text(0), |boundary| boundary.at),
+                        format!("more than {} different constraints", u16::MAX),
+                        "fewer",
+                        "give more nodes the same velocities and forces",
+                    );
+                    return (list, of_node);
+                };
+                list.push(Constraint { velocity, walls, forces, clamped });
+                known.insert(key, index);
+                index
+            }
+        };
+        of_node[node as usize] = index;
+    }
+    (list, of_node)
+}
+
+/// What a boundary prescribes, the axes about which its nodes do not turn, and its nodes; none after a fault.
+fn held(
+    boundary: &Boundary,
+    names: &Names<'_>,
+    parts: &[PartDraft],
+    assembly: &Assembly,
+    curves: &Curves<'_>,
+    log: &Log<'_>,
+) -> Option<(Prescribed, u8, Vec<u32>)> {
+    let selected = names.several(&boundary.parts).unwrap_or_default();
+    let (velocity, clamped, nodes) = match &boundary.kind {
+        BoundaryKind::Transmit(_) => return None,
+        BoundaryKind::Symmetry { axis, place } => {
+            let mut velocity = [None; 3];
+            velocity[*axis] = Some(Drive::constant(0.0));
+            let nodes = choose(assembly, &selected, |x, near| (x[*axis] - place).abs() <= near);
+            // The plane turns only with itself.
+            (velocity, 0b111 & !(1 << axis), nodes)
+        }
+        BoundaryKind::Held { velocity, clamped, nodes } => {
+            let velocity = curves.components(velocity);
+            let nodes = region::nodes(nodes.as_ref()?, &selected, assembly, log);
+            (velocity?, *clamped, nodes?)
+        }
+    };
+    if nodes.is_empty() && !broken(&selected, parts) {
+        log.fault(
+            boundary.at,
+            format!("{} that holds no node", boundary.title),
+            "at least one node",
+            "check parts, face, box, plane or axis against the mesh",
+        );
+    }
+    Some((velocity, clamped, nodes))
+}
+
+/// Which nodes have shells and so turn, by global node.
+fn turning(assembly: &Assembly) -> Vec<bool> {
+    let mut turns = vec![false; assembly.mesh.n_nodes()];
+    for part in assembly.mesh.parts.iter().filter(|part| part.section().is_some()) {
+        for &n in &part.nodes {
+            turns[n as usize] = true;
+        }
+    }
+    turns
+}

@@ -1,0 +1,36 @@
+//! Where and when explosives are lit.
+
+use mechanics::{burn::Detonation, material::Material};
+
+use super::part::PartDraft;
+use crate::{log::Log, typed::Deck};
+
+/// The detonations. An explosive that nothing lights would bear no load for ever, and a detonation without an
+/// explosive does nothing: both are faults.
+pub(super) fn make(
+    deck: &Deck,
+    materials: &[Material],
+    parts: &[PartDraft],
+    log: &Log<'_>,
+) -> Vec<Detonation> {
+    let burns =
+        |part: &&PartDraft| part.material.is_some_and(|m| materials[m as usize].detonation_speed().is_some());
+    let explosive = parts.iter().find(burns);
+    match (deck.detonations.first(), explosive) {
+        (None, Some(part)) => log.fault(
+            part.at,
+            format!("part \"{}\" of an explosive in a deck without [[detonation]]", part.name),
+            "at least one point that lights it",
+            "add [[detonation]] with point = [x, y, z]",
+        ),
+        // A part whose material could not be read may have been meant.
+        (Some((at, _)), None) if parts.iter().all(|part| part.material.is_some()) => log.fault(
+            *at,
+            "[[detonation]] in a deck without an explosive",
+            "a part with a jwl equation of state",
+            "remove it, or choose an explosive",
+        ),
+        _ => {}
+    }
+    deck.detonations.iter().filter_map(|(_, detonation)| *detonation).collect()
+}

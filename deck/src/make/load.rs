@@ -1,0 +1,94 @@
+//! What pushes bodies from outside.
+
+use std::collections::BTreeMap;
+
+use mechanics::load::{Gravity, Loads, MAX_FORCES, NodalForce, Relaxation, SurfaceKind, SurfaceLoad};
+
+use super::{
+    assembly::Assembly,
+    names::{Curves, Names},
+    part::PartDraft,
+    region::{self, Asking, broken},
+};
+use crate::{
+    log::Log,
+    typed::{
+        Deck,
+        condition::{self, Load, LoadKind},
+    },
+};
+
+/// The loads of a deck, without its curves.
+pub(super) struct LoadDraft {
+    pub(super) list: Loads,
+    /// By node: the forces that act on it, one bit each.
+    pub(super) forces: BTreeMap<u32, u32>,
+}
+
+/// Makes them.
+pub(super) fn make(
+    deck: &Deck,
+    names: &Names<'_>,
+    parts: &[PartDraft],
+    assembly: &Assembly,
+    curves: &Curves<'_>,
+    log: &Log<'_>,
+) -> LoadDraft {
+    let mut draft = LoadDraft { list: Loads::default(), forces: BTreeMap::new() };
+    for load in &deck.loads {
+        let selected = names.several(&load.parts).unwrap_or_default();
+        match &load.kind {
+            LoadKind::Pressure { pressure, faces } => {
+                let pressure = pressure.as_ref().and_then(|pressure| curves.drive(pressure));
+                let asking = Asking { at: load.at, title: &load.title, selected: &selected };
+                let faces = match faces {
+                    Some(faces) => region::faces(faces, &asking, parts, assembly, log),
+                    None => Vec::new(),
+                };
+                if let Some(pressure) = pressure {
+                    draft.list.surfaces.push(SurfaceLoad { kind: SurfaceKind::Pressure(pressure), faces });
+                }
+            }
+            LoadKind::Force { force, drive, nodes } => {
+                let drive = curves.of_entry(drive);
+                let nodes = nodes.as_ref().and_then(|nodes| region::nodes(nodes, &selected, assembly, log));
+                let (Some(force), Some(nodes)) = (force, nodes) else { continue };
+                if nodes.is_empty() && !broken(&selected, parts) {
+                    log.fault(
+                        load.at,
+                        format!("{} that holds no node", load.title),
+                        "at least one node",
+                        "check parts, face, box, plane or nodes against the mesh",
+                    );
+                }
+                push(&mut draft, load, NodalForce { force: *force, drive }, nodes, log);
+            }
+        }
+    }
+    let gravity =
+        |g: &condition::Gravity| Gravity { acceleration: g.acceleration, drive: curves.of_entry(&g.drive) };
+    draft.list.gravity = deck.gravity.as_ref().map(gravity);
+    draft.list.relaxation =
+        deck.relaxation.map(|r| Relaxation { factor: r.factor, until: r.until.unwrap_or(f64::MAX) });
+    draft
+}
+
+/// Adds a force on some nodes.
+fn push(draft: &mut LoadDraft, load: &Load, force: NodalForce, nodes: Vec<u32>, log: &Log<'_>) {
+    let index = draft.list.forces.len();
+    if index == MAX_FORCES {
+        log.fault(
+            load.at,
+            format!("more than {MAX_FORCES} loads of type force"),
+            format!("at most {MAX_FORCES}"),
+            "give more nodes the same force",
+        );
+    }
+    if index >= MAX_FORCES {
+        return;
+    }
+    draft.list.forces.push(force);
+    for node in nodes {
+        *draft.forces.entry(node).or_default() |= 1 << index;
+    }
+}

@@ -1,0 +1,301 @@
+//! Parts with their blocks, before they are put together.
+
+use std::collections::BTreeMap;
+
+use mechanics::{
+    erosion::{Criteria, GEOMETRIC_STRAIN},
+    material::{Failure, Material, Strength},
+    mesh::{Section, Topology},
+};
+
+use super::material::Materials;
+use crate::{
+    blocks::Block,
+    geometry::{norm, scaled},
+    limits::{MAX_ELEMENTS, MAX_NODES},
+    log::Log,
+    mesh_file::Body,
+    place::{Place, Placed},
+    typed::{
+        mesh::{Meshes, Numbers, PartMesh, Places, Source},
+        part::{Criterion, Erosion, Part},
+    },
+};
+
+/// A part with its nodes and elements.
+pub(super) struct PartDraft {
+    pub(super) name: String,
+    pub(super) at: Place,
+    /// Index into the materials in use; none after a fault.
+    pub(super) material: Option<u32>,
+    pub(super) velocity: [f64; 3],
+    /// When its elements erode; none if they do not.
+    pub(super) erosion: Option<Criteria>,
+    /// None after a fault.
+    pub(super) block: Option<Block>,
+    /// Numbers and places of an explicit mesh.
+    pub(super) numbers: Option<Numbers>,
+}
+
+/// Makes every part. A part with a fault keeps its place in the list, so that others may refer to it.
+pub(super) fn make(
+    parts: &[Part],
+    materials: &mut Materials<'_>,
+    meshes: &Meshes,
+    log: &Log<'_>,
+) -> Vec<PartDraft> {
+    let mut drafts: Vec<PartDraft> = Vec::with_capacity(parts.len());
+    let mut first: BTreeMap<&str, Place> = BTreeMap::new();
+    let mut budget = Budget { nodes: MAX_NODES, elements: MAX_ELEMENTS };
+    for part in parts {
+        let other = first.get(part.name.as_str()).copied();
+        if let Some(named) = part.named {
+            if let Some(other) = other {
+                let expected = format!("a name that the part at {} does not use", log.line(other, part.at));
+                log.fault_of(named, expected, "choose another name");
+            }
+            if part.name == "all" {
+                let expected = "a name other than \"all\", which stands for every part";
+                log.fault_of(named, expected, "choose another name");
+            }
+        }
+        first.entry(&part.name).or_insert(part.at);
+        let material = materials.resolve(part);
+        let of_material = material.map(|m| &materials.list[m as usize]);
+        let erosion = part.erosion.as_ref().map(|given| {
+            if part.shell.is_some() {
+                log.fault_of(
+                    given.origin,
+                    "solids: shells do not erode",
+                    log.say(
+                        "remove erosion, or make the part of solids",
+                        "leave the limit blank, or make the part of solids",
+                    ),
+                );
+            }
+            criteria(given, of_material, log)
+        });
+        let (mut block, numbers) = mesh_of(part, meshes, &mut budget, log);
+        match &mut block {
+            Some(block) if numbers.as_ref().is_none_or(|own| own.mesh.is_none()) => transform(part, block),
+            Some(_) => {
+                let moves = part.rotate.as_ref().map(|r| r.origin);
+                for origin in moves.into_iter().chain(part.translate.as_ref().map(|by| by.origin)) {
+                    log.fault_of(origin, "a mesh file where it is", "move the nodes in the file");
+                }
+            }
+            None => {}
+        }
+        let (name, at, velocity) = (part.name.clone(), part.at, part.velocity);
+        drafts.push(PartDraft { name, at, material, velocity, erosion, block, numbers });
+    }
+    drafts
+}
+
+/// The criteria of a part, whose material is `material` if that could be read.
+fn criteria(given: &Erosion, material: Option<&Material>, log: &Log<'_>) -> Criteria {
+    let mut criteria = Criteria::default();
+    for (criterion, limit) in &given.limits {
+        *criterion.of(&mut criteria) = Some(limit.value);
+    }
+    criteria.failure = given.failure.as_ref().is_some_and(|on| on.value);
+    if let Some(material) = material {
+        let yields = !matches!(material.strength, Strength::Hydro | Strength::Elastic { .. });
+        for (criterion, limit) in &given.limits {
+            match criterion {
+                Criterion::PlasticStrain if !yields => log.fault_of(
+                    limit.origin,
+                    "a material whose strength law yields",
+                    log.say(
+                        "give the material such a strength, or erode by geometric_strain",
+                        "take a *MAT that yields, or erode by EFFEPS of *MAT_ADD_EROSION",
+                    ),
+                ),
+                Criterion::PrincipalStress | Criterion::VonMises if material.shear() == 0.0 => log.fault_of(
+                    limit.origin,
+                    "a material with shear stiffness",
+                    log.say(
+                        "give the material a strength, or erode by pressure or tension",
+                        "take a *MAT with a strength, or erode by MXPRES or MNPRES",
+                    ),
+                ),
+                _ => {}
+            }
+        }
+        if let Some(failure) = given.failure.as_ref().filter(|on| on.value)
+            && material.failure == Failure::None
+        {
+            log.fault_of(
+                failure.origin,
+                "a material with a failure law",
+                "give the material a failure, or say fracture = true for one of the library that has constants",
+            );
+        }
+    }
+    if criteria.is_empty() {
+        criteria.geometric_strain = Some(GEOMETRIC_STRAIN);
+    }
+    criteria
+}
+
+/// Nodes and elements that may still be made.
+struct Budget {
+    nodes: u64,
+    elements: u64,
+}
+
+impl Budget {
+    /// Takes a mesh of that size from the budget, or reports that it is too large.
+    fn take(&mut self, size: Option<(u64, u64)>, mesh: &PartMesh, log: &Log<'_>) -> Option<()> {
+        let (nodes, elements) = size.unwrap_or((u64::MAX, u64::MAX));
+        if nodes > self.nodes || elements > self.elements {
+            let title = &mesh.title;
+            let read = match size {
+                Some((nodes, elements)) => format!("{title} with some {nodes} nodes and {elements} elements"),
+                None => format!("{title} with more than 2^64 nodes"),
+            };
+            log.fault(
+                mesh.at,
+                read,
+                format!("at most {MAX_NODES} nodes and {MAX_ELEMENTS} elements in all parts together"),
+                log.say("use fewer cells", "use fewer elements"),
+            );
+            return None;
+        }
+        self.nodes -= nodes;
+        self.elements -= elements;
+        Some(())
+    }
+}
+
+/// The block of a part, and its numbers where they are the user's.
+fn mesh_of(
+    part: &Part,
+    meshes: &Meshes,
+    budget: &mut Budget,
+    log: &Log<'_>,
+) -> (Option<Block>, Option<Numbers>) {
+    let Some(mesh) = &part.mesh else { return (None, None) };
+    match &mesh.source {
+        Source::Shape(shape) => {
+            let fits = budget.take(shape.size(), mesh, log);
+            (fits.map(|()| shape.build()), None)
+        }
+        Source::Explicit(own) => {
+            let size = (own.numbers.nodes.len() as u64, own.numbers.elements.len() as u64);
+            match budget.take(Some(size), mesh, log) {
+                Some(()) => (Some(own.block.clone()), Some(own.numbers.clone())),
+                None => (None, None),
+            }
+        }
+        Source::Body { mesh: name, body } => {
+            match body_of(part, mesh, name, body.as_ref(), meshes, budget, log) {
+                Some((block, numbers)) => (Some(block), Some(numbers)),
+                None => (None, None),
+            }
+        }
+    }
+}
+
+/// A body of a mesh, by default the one called like the part.
+fn body_of(
+    part: &Part,
+    at: &PartMesh,
+    file: &Placed<String>,
+    body: Option<&Placed<String>>,
+    meshes: &Meshes,
+    budget: &mut Budget,
+    log: &Log<'_>,
+) -> Option<(Block, Numbers)> {
+    let Some(mesh) = meshes.get(&file.value) else {
+        let advice = "put it beside the deck, or correct the name";
+        log.fault_of(file.origin, "a mesh file that can be read", advice);
+        return None;
+    };
+    let mesh = mesh.as_ref()?;
+    let name = body.map_or(part.name.as_str(), |body| &body.value);
+    let holds =
+        |body: &&Body| if part.shell.is_some() { !body.shells.is_empty() } else { !body.solids.is_empty() };
+    if part.shell.is_none() && mesh.file.body(name).is_some_and(|body| !body.shells.is_empty()) {
+        let read = format!("the shells of body \"{name}\" in part \"{}\"", part.name);
+        log.fault(at.at, read, "their thickness", "add shell = { thickness = ... } to the part");
+        return None;
+    }
+    let index = mesh.file.bodies.iter().position(|body| body.name == name);
+    let Some((index, found)) = index.map(|i| (i, &mesh.file.bodies[i])).filter(|(_, body)| holds(body))
+    else {
+        let names: Vec<&str> =
+            mesh.file.bodies.iter().filter(holds).map(|b| b.name.as_str()).take(20).collect();
+        let what = if part.shell.is_some() { "shells" } else { "solids" };
+        log.fault_of(
+            body.unwrap_or(file).origin,
+            format!("a body with {what} of that file ({})", names.join(", ")),
+            "choose one with body = \"name\"",
+        );
+        return None;
+    };
+    let distinct =
+        |corners: &[u32]| (0..corners.len()).filter(|&i| !corners[..i].contains(&corners[i])).count();
+    let (kinds, expected): (&[usize], _) = match part.shell {
+        None => (&[4, 5, 6, 8], "eight, or six, five or four of a wedge, a pyramid or a tetrahedron"),
+        Some(_) => (&[3, 4], "four, or three of a triangle"),
+    };
+    let all = found.solids.iter().map(|(id, corners)| (id, &corners[..]));
+    let mut all = all.chain(found.shells.iter().map(|(id, corners)| (id, &corners[..])));
+    if let Some((id, corners)) = all.find(|(_, corners)| !kinds.contains(&distinct(corners))) {
+        let read = format!("element {id} with {} different corners", distinct(corners));
+        log.fault(at.at, read, expected, "correct the element");
+        return None;
+    }
+    let mut local: BTreeMap<u32, u32> = BTreeMap::new();
+    for id in found.corners() {
+        local.entry(id).or_insert(0);
+    }
+    let n_elements = found.solids.len() + found.shells.len();
+    budget.take(Some((local.len() as u64, n_elements as u64)), at, log)?;
+    let mut positions = Vec::with_capacity(local.len());
+    let mut nodes = Vec::with_capacity(local.len());
+    // Nodes in the order of the file.
+    for (id, x) in &mesh.file.nodes {
+        if let Some(local) = local.get_mut(id) {
+            *local = positions.len() as u32;
+            positions.push(*x);
+            nodes.push(*id);
+        }
+    }
+    let topology = topology(found, part.shell, &local);
+    let ids = found.solids.iter().map(|(id, _)| id).chain(found.shells.iter().map(|(id, _)| id));
+    let elements: Vec<u32> = ids.copied().collect();
+    let places = mesh.elements.get(index).map_or(Places::All(at.at), |places| Places::Each(places.clone()));
+    let numbers = Numbers {
+        nodes,
+        elements,
+        node_places: Places::All(at.at),
+        element_places: places,
+        mesh: Some(file.value.clone()),
+    };
+    Some((Block { positions, topology, faces: Vec::new() }, numbers))
+}
+
+/// The elements of a body by the local index of each of its nodes.
+fn topology(body: &Body, shell: Option<Section>, local: &BTreeMap<u32, u32>) -> Topology {
+    match shell {
+        None => Topology::Explicit {
+            hexahedra: body.solids.iter().map(|(_, corners)| corners.map(|id| local[&id])).collect(),
+        },
+        Some(section) => Topology::Shells {
+            quads: body.shells.iter().map(|(_, corners)| corners.map(|id| local[&id])).collect(),
+            section,
+        },
+    }
+}
+
+/// Turns a block, then moves it.
+fn transform(part: &Part, block: &mut Block) {
+    if let Some(rotate) = &part.rotate {
+        block.rotate(rotate.point, scaled(rotate.axis, 1.0 / norm(rotate.axis)), rotate.degrees);
+    }
+    if let Some(by) = &part.translate {
+        block.translate(by.value);
+    }
+}

@@ -1,0 +1,165 @@
+//! Parts whose nodes move as one.
+
+use mechanics::{
+    material::Material,
+    rigid::{Body, shape},
+};
+
+use super::{
+    assembly::Assembly,
+    boundary::Conditions,
+    names::{Curves, Names},
+};
+use crate::{log::Log, typed::condition::Rigid};
+
+/// A rigid body and what it is given.
+pub(super) struct RigidDraft<'d> {
+    rigid: &'d Rigid,
+    given: shape::Given,
+}
+
+/// Resolves what the bodies are given; a part of two bodies is a fault.
+pub(super) fn drafts<'d>(
+    list: &'d [Rigid],
+    names: &Names<'_>,
+    curves: &Curves<'_>,
+    log: &Log<'_>,
+) -> Vec<RigidDraft<'d>> {
+    let mut drafts: Vec<RigidDraft<'d>> = Vec::new();
+    for rigid in list {
+        let parts: Vec<u32> =
+            names.several(&rigid.parts).unwrap_or_default().into_iter().map(|p| p as u32).collect();
+        let of_both = |other: &&RigidDraft<'d>| parts.iter().any(|p| other.given.parts.contains(p));
+        for other in drafts.iter().filter(of_both) {
+            let line = log.line(other.rigid.at, rigid.at);
+            let a_body = log.say("the [[rigid]]", "the rigid body");
+            log.fault(
+                rigid.at,
+                format!("{} with a part of {a_body} at {line}", rigid.title),
+                "every part in one rigid body",
+                "take it out of one of the two",
+            );
+        }
+        let [velocity, spin] =
+            [&rigid.velocity, &rigid.spin].map(|c| curves.components(c).unwrap_or_default());
+        let given = shape::Given {
+            parts,
+            mass: rigid.mass,
+            inertia: rigid.inertia,
+            start_spin: rigid.start_spin,
+            velocity,
+            spin,
+        };
+        drafts.push(RigidDraft { rigid, given });
+    }
+    drafts
+}
+
+/// The parts of each body.
+pub(super) fn parts_of<'a>(drafts: &'a [RigidDraft<'_>]) -> impl Iterator<Item = &'a [u32]> {
+    drafts.iter().map(|draft| draft.given.parts.as_slice())
+}
+
+/// Makes the bodies; what was to hold or push their nodes goes to them or is a fault. None after any fault.
+pub(super) fn make(
+    drafts: &[RigidDraft<'_>],
+    materials: &[Material],
+    assembly: &mut Assembly,
+    conditions: &mut Conditions,
+    log: &Log<'_>,
+) -> Vec<Body> {
+    if drafts.is_empty() {
+        return Vec::new();
+    }
+    let mut body_of: Vec<Option<usize>> = vec![None; assembly.mesh.n_nodes()];
+    let mut bodies = Vec::new();
+    for (b, RigidDraft { rigid, given }) in drafts.iter().enumerate() {
+        let (at, title) = (rigid.at, &rigid.title);
+        let names = |p: usize| format!("\"{}\"", assembly.mesh.parts[p].name);
+        let walls = &conditions.walls;
+        if let Some((w, p)) = (0..walls.len())
+            .find_map(|w| given.parts.iter().find(|&&p| walls[w].parts[p as usize]).map(|&p| (w, p as usize)))
+        {
+            log.fault(
+                at,
+                format!("{title} with part {}, which {} stops", names(p), conditions.wall_titles[w]),
+                "parts that no wall stops: walls act on single nodes",
+                log.say(
+                    "name the other parts in the wall; to stop the body, give it contact with a rigid part that is held",
+                    "leave its nodes out of the wall by NSIDEX; to stop the body, give it a *CONTACT with a rigid part that \
+                     is held",
+                ),
+            );
+        }
+        for &n in given.parts.iter().flat_map(|&p| &assembly.mesh.parts[p as usize].nodes) {
+            let id = assembly.mesh.node_ids[n as usize];
+            let held = conditions.constraints[conditions.constraint[n as usize] as usize];
+            if held.velocity.iter().any(Option::is_some) || held.clamped != 0 || held.walls != 0 {
+                log.fault(
+                    at,
+                    format!("{title} with node {id}, which a boundary or a wall holds"),
+                    "nodes that move as the body does",
+                    log.say(
+                        "take them out of the boundary or wall; velocity and spin of [[rigid]] hold the body",
+                        "take them out of the boundary or wall; CON1 and CON2 of *MAT_RIGID hold the body",
+                    ),
+                );
+                break;
+            }
+            // Of bodies with a common part that was reported.
+            let apart = |other: &usize| !drafts[*other].given.parts.iter().any(|p| given.parts.contains(p));
+            if let Some(other) = body_of[n as usize].replace(b).filter(|other| *other != b && apart(other)) {
+                log.fault(
+                    at,
+                    format!("{title} with node {id}, which {} has too", drafts[other].rigid.title),
+                    "bodies that share no nodes",
+                    "make them one [[rigid]] of all their parts, or do not join them",
+                );
+                break;
+            }
+        }
+        if log.count() > 0 {
+            continue;
+        }
+        let made = shape::body(
+            &assembly.mesh,
+            materials,
+            (&conditions.constraints, &conditions.constraint),
+            &conditions.loads.curves,
+            given.clone(),
+            &mut assembly.velocity,
+        );
+        match made {
+            Ok(body) => {
+                turn(assembly, &body);
+                bodies.push(body);
+            }
+            Err(words) => log.fault(
+                at,
+                format!("{title} with {words}"),
+                "mass and inertia of a body",
+                log.say(
+                    "correct the mesh, or mass and inertia of [[rigid]]",
+                    "correct the mesh, or convert the deck and give mass and inertia in [[rigid]]",
+                ),
+            ),
+        }
+    }
+    let n_rigid: usize = bodies.iter().map(|body| body.parts.len()).sum();
+    for body in &mut bodies {
+        body.nodes.iter().for_each(|&n| conditions.constraint[n as usize] = 0);
+        if n_rigid == assembly.mesh.parts.len() {
+            body.courant = shape::courant(&assembly.mesh, materials, &body.parts);
+        }
+    }
+    bodies
+}
+
+/// Lets the nodes of a body turn at the start as it does; only those of shells ever use it.
+fn turn(assembly: &mut Assembly, body: &Body) {
+    let has_shells = assembly.mesh.parts.iter().any(|part| part.section().is_some());
+    if has_shells && (body.start.spin != [0.0; 3] || !assembly.spin.is_empty()) {
+        assembly.spin.resize(assembly.velocity.len(), [0.0; 3]);
+        body.nodes.iter().for_each(|&n| assembly.spin[n as usize] = body.start.spin);
+    }
+}

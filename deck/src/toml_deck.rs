@@ -1,0 +1,125 @@
+//! The reader of TOML decks: text becomes a typed deck, every fault with its place.
+//!
+//! It looks at syntax (faults of which end the reading: nothing after them can be trusted), at keys, and at each value by
+//! itself. What values have to do with each other is looked at in `make`.
+
+mod condition;
+mod contact;
+mod entry;
+mod output;
+mod part;
+mod shape;
+
+use toml::de::DeTable;
+
+use crate::{
+    limits::{MAX_TEXT, MAX_TITLE},
+    log::Log,
+    place::Place,
+    table::{Range, Table},
+    typed::{Control, Deck, FreedNodes},
+    units::SETS,
+};
+
+/// Reads a deck; none after a fault past which nothing can be read.
+pub(crate) fn read(text: &str, log: &Log<'_>) -> Option<Deck> {
+    if text.len() > MAX_TEXT {
+        log.fault(
+            Place::text(0),
+            format!("{} bytes of text", text.len()),
+            format!("at most {MAX_TEXT}"),
+            "describe regular bodies as blocks instead of nodes and elements",
+        );
+        return None;
+    }
+    let (document, errors) = DeTable::parse_recoverable(text);
+    for error in &errors {
+        let at = error.span().map_or(0, |span| span.start);
+        let message = error.message().trim().replace('\n', ", ");
+        log.fault(Place::text(at), format!("a syntax error ({message})"), "TOML", "mend the line");
+    }
+    errors.is_empty().then(|| read_document(document.get_ref(), log))
+}
+
+fn read_document(document: &DeTable<'_>, log: &Log<'_>) -> Deck {
+    let table = Table::new(document, 0, "the deck".to_string(), &log.faults);
+    let title = table.require("title", "a title in quotes");
+    let text = title.and_then(|v| v.text()).unwrap_or_default();
+    if let Some(title) = title
+        && (text.chars().count() > MAX_TITLE || text.chars().any(char::is_control))
+    {
+        title.fault(&format!("at most {MAX_TITLE} characters on one line"), "shorten it");
+    }
+    let names = SETS.map(|set| set.name);
+    let units = table
+        .require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t, in-s-lbf")
+        .and_then(|v| v.one_of(&names));
+    let control = read_control(&table);
+    let mut deck = Deck::new(text.to_string(), SETS[units.unwrap_or(0)]);
+    deck.control = control;
+    deck.materials = part::read_materials(&table);
+    deck.parts = part::read_parts(&table);
+    deck.joins = contact::read_joins(&table);
+    deck.curves = condition::read_curves(&table);
+    deck.loads = condition::read_loads(&table);
+    deck.gravity = condition::read_gravity(&table);
+    deck.relaxation = condition::read_relaxation(&table);
+    deck.boundaries = condition::read_boundaries(&table);
+    deck.walls = condition::read_walls(&table);
+    deck.rigid = condition::read_rigid(&table);
+    deck.has_contact = table.has("contact");
+    deck.contact = contact::read(&table);
+    deck.erosion = read_erosion(&table);
+    deck.output = output::read(&table);
+    deck.gauges = output::read_gauges(&table);
+    deck.detonations = condition::read_detonations(&table);
+    table.finish();
+    deck
+}
+
+/// Reads `[control]`.
+fn read_control(deck: &Table<'_>) -> Option<Control> {
+    let Some(control) = deck.get("control") else {
+        let expected = "a [control] table with end_time or end_cycle";
+        deck.faults.add(0, "a deck without [control]", expected, "add [control]");
+        return None;
+    };
+    let table = control.table("[control]".to_string())?;
+    if !table.has("end_time") && !table.has("end_cycle") {
+        table.faults.add(
+            table.at,
+            "[control] without end_time and without end_cycle",
+            "at least one of them",
+            "add end_time = ... or end_cycle = ...",
+        );
+    }
+    let number = |key, range| table.get(key).and_then(|v| v.number(range));
+    let cycles = |key, min, max| table.get(key).and_then(|v| v.integer(min, max));
+    let coefficient = Range::NotNegative;
+    let read = Control {
+        at: table.place(),
+        end_time: number("end_time", Range::Positive),
+        end_cycle: cycles("end_cycle", 1, i64::MAX as u64),
+        safety_factor: number("safety_factor", Range::Within(0.0, 1.0, "a number above 0 and at most 1")),
+        growth: number("growth", Range::Within(1.0, 2.0, "a number above 1 and at most 2")),
+        energy_error: number("energy_error", Range::Positive),
+        time_step_floor: number("time_step_floor", Range::NotNegative),
+        linear_viscosity: number("linear_viscosity", coefficient),
+        quadratic_viscosity: number("quadratic_viscosity", coefficient),
+        hourglass: number("hourglass", coefficient),
+        sort_lag: cycles("sort_lag", 1, 1000).map(|n| n as u32),
+        plan_interval: cycles("plan_interval", 2, 100_000).map(|n| n as u32),
+    };
+    table.finish();
+    Some(read)
+}
+
+/// Reads `[erosion]`.
+fn read_erosion(deck: &Table<'_>) -> Option<FreedNodes> {
+    let table = deck.get("erosion").and_then(|v| v.table("[erosion]".to_string()))?;
+    let retain_inertia =
+        table.get("retain_inertia").map(|value| value.placed(value.boolean().unwrap_or(true)));
+    let at = table.place();
+    table.finish();
+    Some(FreedNodes { at, retain_inertia })
+}

@@ -1,0 +1,282 @@
+//! `[[curve]]`, `[[boundary]]`, `[[wall]]`, `[[rigid]]`, `[[load]]`, `[gravity]`, `[relaxation]`, `[[detonation]]`.
+
+use mechanics::burn::Detonation;
+
+use super::entry::{AXES, components, direction, drive, faces, parts, parts_of, region, text};
+use crate::{
+    limits::MAX_ENTRIES,
+    place::Place,
+    table::{Range, Table, Value},
+    typed::condition::{
+        Boundary, BoundaryKind, Components, Curve, Drive, Gravity, Load, LoadKind, Parts, Relaxation, Rigid,
+        Wall, WallMotion, WallShape,
+    },
+};
+
+/// Most points of a curve.
+const MAX_POINTS: usize = 100_000;
+
+const NO_COMPONENTS: Components = [const { None }; 3];
+
+/// Reads every `[[curve]]`.
+pub(super) fn read_curves(deck: &Table<'_>) -> Vec<Curve> {
+    let curve = |table: Table<'_>| {
+        let value = table.require("name", "a name in quotes");
+        let name = value.and_then(|v| v.name().map(|name| v.placed(name)));
+        // A curve that cannot be read keeps its name, so that what refers to it is no second fault.
+        let points = read_points(&table).unwrap_or_else(|| vec![[0.0; 2]]);
+        table.finish();
+        Curve { name, points }
+    };
+    deck.tables("curve", MAX_ENTRIES).into_iter().map(curve).collect()
+}
+
+/// `points = [[t, y], ...]` with ascending times.
+fn read_points(table: &Table<'_>) -> Option<Vec<[f64; 2]>> {
+    let value = table.require("points", "[[time, value], ...]")?;
+    let items = value.items()?;
+    if items.is_empty() || items.len() > MAX_POINTS {
+        value.fault(&format!("1 to {MAX_POINTS} points"), "write [[time, value], ...]");
+        return None;
+    }
+    let mut points: Vec<[f64; 2]> = Vec::with_capacity(items.len());
+    for item in items {
+        let point = item.numbers::<2>("[time, value]", Range::Any)?;
+        if points.last().is_some_and(|last| last[0] >= point[0]) {
+            item.fault("a time after that of the point before", "put the points in the order of time");
+            return None;
+        }
+        points.push(point);
+    }
+    Some(points)
+}
+
+/// Reads every `[[boundary]]`.
+pub(super) fn read_boundaries(deck: &Table<'_>) -> Vec<Boundary> {
+    const TYPES: [&str; 4] = ["fixed", "velocity", "symmetry", "transmit"];
+    let mut boundaries = Vec::new();
+    for table in deck.tables("boundary", MAX_ENTRIES) {
+        let kind = table
+            .require("type", "one of fixed, velocity, symmetry, transmit")
+            .and_then(|v| v.one_of(&TYPES));
+        // Which keys belong depends on the type, so without one none is called unknown.
+        let Some(kind) = kind else { continue };
+        let (at, title, parts) = (table.place(), table.title.clone(), parts_of(&table));
+        let kind = match TYPES[kind] {
+            "transmit" => Some(BoundaryKind::Transmit(faces(&table))),
+            "symmetry" => {
+                let axis = table.require("axis", "one of x, y, z").and_then(|v| v.one_of(&AXES));
+                let place = table.number_or("at", 0.0, Range::Any);
+                axis.map(|axis| BoundaryKind::Symmetry { axis, place })
+            }
+            kind => read_held(&table, kind),
+        };
+        table.finish();
+        boundaries.extend(kind.map(|kind| Boundary { at, title, parts, kind }));
+    }
+    boundaries
+}
+
+/// What a boundary of type fixed or velocity prescribes.
+fn read_held(table: &Table<'_>, kind: &str) -> Option<BoundaryKind> {
+    let clamped = table.get("rotations").map_or(Some(0), read_letters);
+    let velocity = if kind == "fixed" {
+        read_axes(table, clamped.is_some_and(|clamped| clamped != 0))
+    } else {
+        components(table, "velocity")
+    };
+    let nodes = region(table);
+    Some(BoundaryKind::Held { velocity: velocity?, clamped: clamped?, nodes })
+}
+
+/// Bits of the axes that a text of the letters x, y, z names.
+fn read_letters(value: Value<'_>) -> Option<u8> {
+    let text = value.text()?;
+    let mut bits = 0;
+    for c in text.chars() {
+        match AXES.iter().position(|axis| axis.starts_with(c)) {
+            Some(axis) => bits |= 1 << axis,
+            None => {
+                value.fault("some of the letters x, y, z", "write for instance \"xz\"");
+                return None;
+            }
+        }
+    }
+    Some(bits)
+}
+
+/// `axes = "xy"`: zero velocity on those; all three where it is absent. It may be empty where rotations are held.
+fn read_axes(table: &Table<'_>, turns_held: bool) -> Option<Components> {
+    let still = |bits: u8| [0, 1, 2].map(|axis| (bits >> axis & 1 == 1).then(|| Drive::constant(0.0)));
+    let Some(value) = table.get("axes") else { return Some(still(0b111)) };
+    let bits = read_letters(value)?;
+    if bits == 0 && !turns_held {
+        value.fault("some of the letters x, y, z", "write for instance \"xz\"");
+        return None;
+    }
+    Some(still(bits))
+}
+
+/// Reads every `[[wall]]`.
+pub(super) fn read_walls(deck: &Table<'_>) -> Vec<Wall> {
+    deck.tables("wall", MAX_ENTRIES).into_iter().filter_map(read_wall).collect()
+}
+
+fn read_wall(table: Table<'_>) -> Option<Wall> {
+    const SHAPES: [&str; 3] = ["plane", "cylinder", "sphere"];
+    let kind = match table.get("shape") {
+        // Which keys belong depends on the shape, so without one none is called unknown.
+        Some(value) => value.one_of(&SHAPES)?,
+        None => 0,
+    };
+    let point = table.vector("point");
+    let shape = match SHAPES[kind] {
+        "plane" => {
+            let normal = direction(&table, "normal");
+            point.zip(normal).map(|(point, normal)| WallShape::Plane { point, normal })
+        }
+        "cylinder" => {
+            let (axis, radius) = (direction(&table, "axis"), table.number("radius", Range::Positive));
+            let all = point.zip(axis).zip(radius);
+            all.map(|((point, axis), radius)| WallShape::Cylinder { point, axis, radius })
+        }
+        _ => {
+            let radius = table.number("radius", Range::Positive);
+            point.zip(radius).map(|(centre, radius)| WallShape::Sphere { centre, radius })
+        }
+    };
+    let friction = table.number_or("friction", 0.0, Range::NotNegative);
+    let motion = read_motion(&table);
+    let parts = parts_of(&table);
+    let nodes = match table.has("nodes") {
+        true => Some(region(&table)?),
+        false => None,
+    };
+    let (at, title) = (table.place(), table.title.clone());
+    table.finish();
+    Some(Wall { at, title, shape, friction, motion, parts, nodes })
+}
+
+/// `velocity` and `mass`: with a mass the velocity is that of the start.
+fn read_motion(table: &Table<'_>) -> Option<WallMotion> {
+    let given = table.has("velocity");
+    let velocity = if given { components(table, "velocity") } else { Some(NO_COMPONENTS) };
+    let mass = match table.get("mass") {
+        Some(value) => Some(value.number(Range::Positive)?),
+        None => None,
+    };
+    let velocity = velocity?;
+    let Some(mass) = mass else {
+        return Some(if given { WallMotion::Driven(velocity) } else { WallMotion::Fixed });
+    };
+    if velocity.iter().flatten().any(|v| v.curve.is_some()) {
+        table.faults.add(
+            table.at,
+            format!("{} with a mass and a velocity by curve", table.title),
+            "one of the two",
+            "remove mass to drive the wall, or give the velocity of its start as numbers",
+        );
+        return None;
+    }
+    Some(WallMotion::Free { mass, velocity: velocity.map(|v| v.map_or(0.0, |v| v.factor)) })
+}
+
+/// Reads every `[[rigid]]`.
+pub(super) fn read_rigid(deck: &Table<'_>) -> Vec<Rigid> {
+    let rigid = |table: Table<'_>| {
+        let (at, title) = (table.place(), table.title.clone());
+        let members = table.require("parts", "\"all\" or a list of part names").map_or(Parts::Broken, parts);
+        let mass = table.get("mass").and_then(|v| v.number(Range::Positive));
+        let centre = table.get("centre").map(|v| v.vector());
+        let inertia = table.get("inertia").map(|v| {
+            let table = v.table(format!("inertia of {title}"))?;
+            let [xx, yy, zz] = ["xx", "yy", "zz"].map(|key| table.number(key, Range::Positive));
+            let [xy, yz, zx] = ["xy", "yz", "zx"].map(|key| table.number_or(key, 0.0, Range::Any));
+            table.finish();
+            Some([xx?, yy?, zz?, xy, yz, zx])
+        });
+        if centre.is_some() != inertia.is_some() {
+            table.faults.add(
+                table.at,
+                format!("{title} with {} alone", if centre.is_some() { "centre" } else { "inertia" }),
+                "centre and inertia, or neither",
+                "give both, or remove it: they follow from the elements",
+            );
+        }
+        let start_spin = table.get("start_spin").and_then(|v| v.vector());
+        let given = |key| if table.has(key) { components(&table, key) } else { Some(NO_COMPONENTS) };
+        let (velocity, spin) = (given("velocity"), given("spin"));
+        table.finish();
+        Rigid {
+            at,
+            title,
+            parts: members,
+            mass,
+            inertia: centre.flatten().zip(inertia.flatten()),
+            start_spin,
+            velocity: velocity.unwrap_or(NO_COMPONENTS),
+            spin: spin.unwrap_or(NO_COMPONENTS),
+        }
+    };
+    deck.tables("rigid", MAX_ENTRIES).into_iter().map(rigid).collect()
+}
+
+/// Reads every `[[load]]`.
+pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
+    const TYPES: [&str; 2] = ["pressure", "force"];
+    let mut loads = Vec::new();
+    for table in deck.tables("load", MAX_ENTRIES) {
+        let kind = table.require("type", "one of pressure, force").and_then(|v| v.one_of(&TYPES));
+        // Which keys belong depends on the type, so without one none is called unknown.
+        let Some(kind) = kind else { continue };
+        let (at, title, parts) = (table.place(), table.title.clone(), parts_of(&table));
+        let kind = match TYPES[kind] {
+            "pressure" => {
+                let pressure = table.require("pressure", "a number or a curve").and_then(drive);
+                LoadKind::Pressure { pressure, faces: faces(&table) }
+            }
+            _ => {
+                let force = table.vector("force");
+                LoadKind::Force { force, drive: drive_of(&table), nodes: region(&table) }
+            }
+        };
+        table.finish();
+        loads.push(Load { at, title, parts, kind });
+    }
+    loads
+}
+
+/// The curve under `curve` of a table, if it has one.
+fn drive_of(table: &Table<'_>) -> Drive {
+    Drive { factor: 1.0, curve: table.get("curve").and_then(text) }
+}
+
+/// Reads `[gravity]`.
+pub(super) fn read_gravity(deck: &Table<'_>) -> Option<Gravity> {
+    let table = deck.get("gravity")?.table("[gravity]".to_string())?;
+    let acceleration = table.vector("acceleration");
+    let drive = drive_of(&table);
+    table.finish();
+    Some(Gravity { acceleration: acceleration?, drive })
+}
+
+/// Reads `[relaxation]`.
+pub(super) fn read_relaxation(deck: &Table<'_>) -> Option<Relaxation> {
+    let table = deck.get("relaxation")?.table("[relaxation]".to_string())?;
+    let range = Range::Within(0.0, 1.0, "a number above 0 and at most 1");
+    let factor = table.number("factor", range);
+    let until = table.get("until").and_then(|v| v.number(Range::Positive));
+    table.finish();
+    Some(Relaxation { factor: factor?, until })
+}
+
+/// Reads every `[[detonation]]`.
+pub(super) fn read_detonations(deck: &Table<'_>) -> Vec<(Place, Option<Detonation>)> {
+    let detonation = |table: Table<'_>| {
+        let (at, point) = (table.place(), table.vector("point"));
+        let time = table.number_or("time", 0.0, Range::NotNegative);
+        table.finish();
+        (at, point.map(|point| Detonation { point, time }))
+    };
+    deck.tables("detonation", MAX_ENTRIES).into_iter().map(detonation).collect()
+}

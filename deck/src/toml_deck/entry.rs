@@ -1,0 +1,131 @@
+//! What several tables have: parts by name, numbers that may follow a curve, nodes and faces.
+
+use crate::{
+    geometry::norm,
+    place::Placed,
+    table::{Range, Table, Value},
+    typed::condition::{Components, Drive, Faces, Parts, Region},
+};
+
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// A text with its place.
+pub(super) fn text(value: Value<'_>) -> Option<Placed<String>> {
+    value.text().map(|text| value.placed(text.to_string()))
+}
+
+/// The parts of `"all"` or of a list of names.
+pub(super) fn parts(value: Value<'_>) -> Parts {
+    if value.is_text() {
+        if value.text() == Some("all") {
+            return Parts::All;
+        }
+        value.fault("\"all\" or a list of part names", "write [\"name\", ...]");
+        return Parts::Broken;
+    }
+    let Some(items) = value.items() else { return Parts::Broken };
+    if items.is_empty() {
+        value.fault("at least one part", "name a part or remove the key");
+        return Parts::Broken;
+    }
+    let names: Option<Vec<Placed<String>>> = items.into_iter().map(text).collect();
+    names.map_or(Parts::Broken, Parts::Named)
+}
+
+/// The parts under `parts` of a table; all where it is absent.
+pub(super) fn parts_of(table: &Table<'_>) -> Parts {
+    table.get("parts").map_or(Parts::All, parts)
+}
+
+/// A number, or `{ curve = "name", factor = 2.0 }`.
+pub(super) fn drive(value: Value<'_>) -> Option<Drive> {
+    if !value.is_table() {
+        return value.number(Range::Any).map(Drive::constant);
+    }
+    let table = value.table("a value by curve".to_string())?;
+    let curve = table.require("curve", "the name of a [[curve]]").and_then(text);
+    let factor = table.number_or("factor", 1.0, Range::Any);
+    table.finish();
+    Some(Drive { factor, curve: Some(curve?) })
+}
+
+/// `velocity = { x = 1.0, z = { curve = "name" } }` or the like of another key: the axes not named stay free.
+pub(super) fn components(table: &Table<'_>, key: &'static str) -> Option<Components> {
+    let value = table.require(key, "a table of components such as { x = 1.0 }")?;
+    let given = value.table(format!("{key} of {}", table.title))?;
+    let mut list = [const { None }; 3];
+    let mut faulty = false;
+    for (component, name) in list.iter_mut().zip(AXES) {
+        if let Some(value) = given.get(name) {
+            *component = drive(value);
+            faulty |= component.is_none();
+        }
+    }
+    given.finish();
+    if !faulty && list.iter().all(Option::is_none) {
+        value.fault("at least one of x, y, z", "name the component that is prescribed");
+        return None;
+    }
+    (!faulty).then_some(list)
+}
+
+/// A direction of any length above 0.
+pub(super) fn direction(table: &Table<'_>, key: &'static str) -> Option<[f64; 3]> {
+    let value = table.require(key, "[x, y, z]")?;
+    let normal = value.vector()?;
+    let long = norm(normal);
+    if long > 0.0 && long.is_finite() {
+        return Some(normal);
+    }
+    value.fault(
+        &format!("{} {key} of some length", if key == "axis" { "an" } else { "a" }),
+        "give a direction such as [0, 0, 1]",
+    );
+    None
+}
+
+/// The nodes of an entry: all of its parts, or those of one face, box, plane or list.
+pub(super) fn region(table: &Table<'_>) -> Option<Region> {
+    const WAYS: [&str; 4] = ["face", "box", "plane", "nodes"];
+    let given: Vec<(&str, Value<'_>)> = WAYS.iter().filter_map(|w| table.get(w).map(|v| (*w, v))).collect();
+    match given[..] {
+        [] => Some(Region::All),
+        [("face", value)] => text(value).map(Region::Face),
+        [("box", value)] => {
+            let corners = value.table(format!("box of {}", table.title))?;
+            let (low, high) = (corners.vector("min"), corners.vector("max"));
+            corners.finish();
+            Some(Region::Box { low: low?, high: high? })
+        }
+        [("plane", value)] => {
+            let plane = value.table(format!("plane of {}", table.title))?;
+            let (point, normal) = (plane.vector("point"), direction(&plane, "normal"));
+            plane.finish();
+            Some(Region::Plane { point: point?, normal: normal? })
+        }
+        [("nodes", value)] if value.is_text() => text(value).map(Region::Set),
+        [("nodes", value)] => {
+            let number =
+                |item: Value<'_>| item.integer(1, u64::from(u32::MAX)).map(|id| item.placed(id as u32));
+            Some(Region::Numbers(value.items()?.into_iter().filter_map(number).collect()))
+        }
+        _ => {
+            let words: Vec<&str> = given.iter().map(|(way, _)| *way).collect();
+            given[1].1.faults.add(
+                given[1].1.at,
+                words.join(" and "),
+                "one of face, box, plane, nodes",
+                "write one [[boundary]] for each",
+            );
+            None
+        }
+    }
+}
+
+/// The faces of an entry: segments of a mesh, or outer faces by their nodes.
+pub(super) fn faces(table: &Table<'_>) -> Option<Faces> {
+    match table.get("segments") {
+        Some(value) => text(value).map(Faces::Segments),
+        None => region(table).map(Faces::Of),
+    }
+}

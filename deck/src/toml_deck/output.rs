@@ -1,0 +1,93 @@
+//! `[output]` and `[[gauge]]`.
+
+use super::entry::text;
+use crate::{
+    fault::nearest,
+    limits::MAX_ENTRIES,
+    model::FIELD_NAMES,
+    place::Placed,
+    table::{Range, Table},
+    typed::{Gauge, Kind, Output, Spot},
+};
+
+/// Reads `[output]`.
+pub(super) fn read(deck: &Table<'_>) -> Output {
+    let mut output = Output::default();
+    let Some(table) = deck.get("output").and_then(|v| v.table("[output]".to_string())) else { return output };
+    output.period = table.get("period").and_then(|v| v.number(Range::Positive));
+    output.history_cycles = table.integer_or("history_cycles", 10, 1, 1_000_000_000) as u32;
+    output.snapshot_seconds = table.get("snapshot_seconds").and_then(|v| v.number(Range::Positive));
+    output.snapshot_cycles = table.get("snapshot_cycles").and_then(|v| v.integer(1, 1_000_000_000));
+    output.fields = read_fields(&table);
+    let flag = |key: &'static str| table.get(key).and_then(|v| v.boolean());
+    output.compress = flag("compress").unwrap_or(true);
+    output.workers = flag("workers").unwrap_or(false);
+    output.contact_surface = table.get("contact_surface").and_then(|v| v.boolean().map(|on| v.placed(on)));
+    output.contact_forces = read_contact_forces(&table);
+    table.finish();
+    output
+}
+
+/// Pairs of parts whose contact force is wanted.
+fn read_contact_forces(table: &Table<'_>) -> Option<Placed<Vec<Placed<[Placed<String>; 2]>>>> {
+    let value = table.get("contact_forces")?;
+    let mut pairs = Vec::new();
+    for item in value.items().unwrap_or_default() {
+        let Some(both) = item.fixed::<2>("two part names") else { continue };
+        let [Some(a), Some(b)] = both.map(text) else { continue };
+        pairs.push(item.placed([a, b]));
+    }
+    Some(value.placed(pairs))
+}
+
+fn read_fields(table: &Table<'_>) -> Vec<String> {
+    let mut fields = Vec::new();
+    let known = || FIELD_NAMES.into_iter();
+    for item in table.get("fields").and_then(|v| v.items()).unwrap_or_default() {
+        let Some(name) = item.text() else { continue };
+        if known().any(|field| field == name) {
+            if !fields.iter().any(|f| f == name) {
+                fields.push(name.to_string());
+            }
+            continue;
+        }
+        let words: Vec<&str> = known().collect();
+        let advice = match nearest(name, known()) {
+            Some(near) => format!("write \"{near}\""),
+            None => "choose one of them".to_string(),
+        };
+        item.fault(&format!("one of {}", words.join(", ")), &advice);
+    }
+    fields
+}
+
+/// Reads every `[[gauge]]`: at a node or element number, or at the node or element nearest to a point.
+pub(super) fn read_gauges(deck: &Table<'_>) -> Vec<Gauge> {
+    let gauge = |table: Table<'_>| {
+        let value = table.require("name", "a name in quotes");
+        let name = value.and_then(|v| v.name().map(|name| v.placed(name)));
+        let of_element = table.get("of").and_then(|v| v.one_of(&["node", "element"])) == Some(1);
+        let part = table.get("part").and_then(text);
+        let of = if of_element || table.has("element") { Kind::Element } else { Kind::Node };
+        let key = if of == Kind::Element { "element" } else { "node" };
+        let spot = match (table.get(key), table.get("point")) {
+            (Some(value), None) => {
+                let number = value.integer(1, u64::from(u32::MAX));
+                number.map(|id| Spot::Number(value.placed(id as u32)))
+            }
+            (None, Some(value)) => value.vector().map(|point| Spot::Point(value.placed(point))),
+            _ => {
+                table.faults.add(
+                    table.at,
+                    format!("{} with neither or both of {key} and point", table.title),
+                    "one of them",
+                    format!("write {key} = number or point = [x, y, z]"),
+                );
+                None
+            }
+        };
+        table.finish();
+        Gauge { name, of, spot, part }
+    };
+    deck.tables("gauge", MAX_ENTRIES).into_iter().map(gauge).collect()
+}

@@ -1,0 +1,300 @@
+//! `[[material]]` and `[[part]]`.
+
+use std::collections::BTreeMap;
+
+use mechanics::{
+    element::shell4::Rule,
+    mesh::{Section, Topology},
+};
+
+use super::{entry::text, shape};
+use crate::{
+    blocks::Block,
+    geometry::norm,
+    library,
+    limits::{MAX_ENTRIES, MAX_ID, MAX_PARTS},
+    place::Place,
+    table::{Range, Table, Value},
+    typed::{
+        mesh::{Explicit, Numbers, PartMesh, Places, Source},
+        part::{Choice, Criterion, Erosion, Own, Part, Rotation},
+    },
+};
+
+/// Reads every `[[material]]`.
+pub(super) fn read_materials(deck: &Table<'_>) -> Vec<Own> {
+    let mut materials = Vec::new();
+    for table in deck.tables("material", MAX_ENTRIES) {
+        let value = table.require("name", "a name in quotes");
+        let name = value.and_then(|v| v.name()).unwrap_or_else(|| table.title.clone());
+        let named = value.map(|v| v.origin());
+        let material = library::read_material(table, name.clone());
+        materials.push(Own { name, named, material });
+    }
+    materials
+}
+
+/// Reads every `[[part]]`. A part with a fault keeps its place in the list, so that others may refer to it.
+pub(super) fn read_parts(deck: &Table<'_>) -> Vec<Part> {
+    let tables = deck.tables("part", MAX_PARTS);
+    if tables.is_empty() && !deck.has("part") {
+        deck.faults.add(0, "a deck without [[part]]", "at least one part", "add a [[part]]");
+    }
+    let part = |(n, table): (usize, Table<'_>)| {
+        let value = table.require("name", "a name in quotes");
+        let given = value.and_then(|v| v.name());
+        let named = value.filter(|_| given.is_some()).map(|v| v.origin());
+        let at = value.map_or(table.place(), |v| Place::text(v.at));
+        let name = given.unwrap_or_else(|| format!("part {}", n + 1));
+        let fracture = table.get("fracture").filter(|v| v.boolean() == Some(true)).map(|v| v.origin());
+        let material = table
+            .require("material", "a material by name or as an inline table")
+            .and_then(|v| read_choice(v, &name));
+        let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
+        let erosion = table.get("erosion").and_then(|v| read_erosion(v, &name));
+        let shell = table.get("shell");
+        let section = shell.and_then(|value| read_section(value, &name));
+        let mesh = read_mesh(&table, &name, shell, section);
+        let rotate = table.get("rotate").and_then(|v| read_rotation(v, &table));
+        let translate = table.get("translate").and_then(|v| v.vector().map(|by| v.placed(by)));
+        table.finish();
+        Part {
+            at,
+            name,
+            named,
+            material,
+            fracture,
+            velocity,
+            shell: section,
+            erosion,
+            mesh,
+            rotate,
+            translate,
+        }
+    };
+    tables.into_iter().enumerate().map(part).collect()
+}
+
+/// A material that a part names or writes inline.
+fn read_choice(value: Value<'_>, part: &str) -> Option<Choice> {
+    if !value.is_table() {
+        return text(value).map(Choice::Named);
+    }
+    let table = value.table(format!("material of \"{part}\""))?;
+    let name = table.get("name").map_or(Some(part.to_string()), |v| v.name());
+    library::read_material(table, name?).map(|material| Choice::Inline(Box::new(material)))
+}
+
+/// Reads `erosion = { ... }` of a part.
+fn read_erosion(value: Value<'_>, part: &str) -> Option<Erosion> {
+    let table = value.table(format!("erosion of \"{part}\""))?;
+    let mut limits = Vec::new();
+    for criterion in Criterion::ALL {
+        let given = table.get(criterion.key());
+        if let Some((value, limit)) = given.and_then(|v| v.number(criterion.range()).map(|x| (v, x))) {
+            limits.push((criterion, value.placed(limit)));
+        }
+    }
+    let failure = table.get("failure").and_then(|v| v.boolean().map(|on| v.placed(on)));
+    table.finish();
+    Some(Erosion { origin: value.origin(), limits, failure })
+}
+
+/// `shell = { thickness, points, rule }`.
+fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
+    let table = value.table(format!("shell of \"{name}\""))?;
+    let thickness = table.number("thickness", Range::Positive);
+    let rule = table.get("rule").map_or(Some(0), |v| v.one_of(&["gauss", "lobatto"]));
+    let (least, default) = if rule == Some(1) { (3, 5) } else { (1, 3) };
+    let points = table.integer_or("points", default, least, 5) as u32;
+    table.finish();
+    let rule = if rule? == 1 { Rule::Lobatto(points) } else { Rule::Gauss(points) };
+    Some(Section { thickness: thickness?, rule })
+}
+
+/// The mesh of a part: exactly one of the blocks, or `mesh`.
+fn read_mesh(
+    table: &Table<'_>,
+    name: &str,
+    shell: Option<Value<'_>>,
+    section: Option<Section>,
+) -> Option<PartMesh> {
+    const KINDS: [&str; 7] = ["box", "cylinder", "sphere", "tube", "plate", "prism", "mesh"];
+    let present: Vec<(&'static str, Value<'_>)> =
+        KINDS.iter().filter_map(|kind| table.get(kind).map(|v| (*kind, v))).collect();
+    let [(kind, value)] = present[..] else {
+        let found: Vec<&str> = present.iter().map(|(kind, _)| *kind).collect();
+        let read = if found.is_empty() { "no mesh".to_string() } else { found.join(" and ") };
+        table.faults.add(
+            table.at,
+            format!("{read} in {}", table.title),
+            format!("exactly one of {}", KINDS.join(", ")),
+            "give each part one mesh, for instance [part.box]",
+        );
+        return None;
+    };
+    let inner = value.table(format!("{kind} of \"{name}\""))?;
+    let of_shells = ["plate", "prism"].contains(&kind);
+    match shell {
+        None if of_shells => {
+            let read = format!("a {kind} without a shell in {}", table.title);
+            table.faults.add(table.at, read, "its thickness", "add shell = { thickness = ... }");
+        }
+        Some(shell) if !of_shells && kind != "mesh" => {
+            shell.fault("no shell: solids fill this block", "remove it, or take plate, prism or mesh");
+        }
+        _ => {}
+    }
+    let (at, title) = (inner.place(), inner.title.clone());
+    let source = if kind != "mesh" {
+        let shape = shape::read(kind, &inner, section);
+        inner.finish();
+        shape.map(Source::Shape)
+    } else if shell.is_some() && section.is_none() {
+        None
+    } else if inner.has("file") {
+        let mesh = inner.require("file", "the name of a mesh file").and_then(text);
+        let body = match inner.get("body") {
+            None => Some(None),
+            Some(value) => text(value).map(Some),
+        };
+        inner.finish();
+        mesh.zip(body).map(|(mesh, body)| Source::Body { mesh, body })
+    } else {
+        read_explicit(inner, section).map(|own| Source::Explicit(Box::new(own)))
+    };
+    source.map(|source| PartMesh { at, title, source })
+}
+
+/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`, of shells `[id, n1 ... n4]`.
+fn read_explicit(table: Table<'_>, section: Option<Section>) -> Option<Explicit> {
+    let max = u64::from(MAX_ID);
+    let nodes = table.require("nodes", "a list of [id, x, y, z]").and_then(|v| v.items());
+    let elements = table.require("elements", "a list of [id, n1, ..., n8]").and_then(|v| v.items());
+    let (nodes, elements) = (nodes?, elements?);
+    let before = table.faults.count();
+    let (mut node_ids, mut node_places) = (Vec::new(), Vec::new());
+    let (mut element_ids, mut element_places) = (Vec::new(), Vec::new());
+    let mut positions = Vec::new();
+    let mut index: BTreeMap<u32, u32> = BTreeMap::new();
+    for node in &nodes {
+        let Some([id, x, y, z]) = node.fixed::<4>("[id, x, y, z]") else { continue };
+        let id = id.integer(1, max);
+        let at = [x, y, z].map(|v| v.number(Range::Any));
+        let (Some(id), [Some(x), Some(y), Some(z)]) = (id, at) else { continue };
+        if let Some(first) = index.get(&(id as u32)) {
+            let place: Place = node_places[*first as usize];
+            let line = table.faults.line_seen_from(place, table.place());
+            node.fault(&format!("a node number other than {id}, which {line} has"), "renumber one");
+            continue;
+        }
+        index.insert(id as u32, positions.len() as u32);
+        node_ids.push(id as u32);
+        node_places.push(Place::text(node.at));
+        positions.push([x, y, z]);
+    }
+    let mut hexahedra = Vec::new();
+    let mut seen: BTreeMap<u32, Place> = BTreeMap::new();
+    let mut used = vec![false; positions.len()];
+    for element in &elements {
+        let numbers = if section.is_some() {
+            element.integers::<5>("[id, n1, n2, n3, n4]", 1, max).map(|n| n.to_vec())
+        } else {
+            element.integers::<9>("[id, n1, ..., n8]", 1, max).map(|n| n.to_vec())
+        };
+        let Some(numbers) = numbers else { continue };
+        let id = numbers[0] as u32;
+        if let Some(first) = seen.insert(id, Place::text(element.at)) {
+            let line = table.faults.line_seen_from(first, table.place());
+            element.fault(&format!("an element number other than {id}, which {line} has"), "renumber one");
+        }
+        let mut corners = [0; 8];
+        let mut complete = true;
+        for (corner, number) in corners.iter_mut().zip(&numbers[1..]) {
+            match index.get(&(*number as u32)) {
+                Some(node) => {
+                    *corner = *node;
+                    used[*node as usize] = true;
+                }
+                None => {
+                    complete = false;
+                    table.faults.add(
+                        element.at,
+                        format!("element {id} with node {number}"),
+                        "nodes of this part",
+                        "add the node to nodes, or correct the element",
+                    );
+                }
+            }
+        }
+        let mut sorted = corners[..numbers.len() - 1].to_vec();
+        sorted.sort_unstable();
+        if complete && sorted.windows(2).any(|w| w[0] == w[1]) {
+            complete = false;
+            let (expected, advice) = match section {
+                None => ("eight different nodes", "list each corner once; wedges are not read"),
+                Some(_) => ("four different nodes", "list each corner once; triangles come in mesh files"),
+            };
+            element.fault(expected, advice);
+        }
+        if complete {
+            hexahedra.push(corners);
+            element_ids.push(id);
+            element_places.push(Place::text(element.at));
+        }
+    }
+    if elements.is_empty() {
+        table.faults.add(
+            table.at,
+            format!("{} without elements, hence without mass", table.title),
+            "at least one element",
+            "add elements or remove the part",
+        );
+    }
+    // A node that a faulty element might have used is not called unused.
+    if table.faults.count() == before {
+        for (n, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
+            table.faults.add_at(
+                node_places[n],
+                format!("node {} of no element, hence without mass", node_ids[n]),
+                "nodes that elements use",
+                "remove the node",
+            );
+        }
+    }
+    let clean = table.faults.count() == before;
+    table.finish();
+    let topology = match section {
+        None => Topology::Explicit { hexahedra },
+        Some(section) => {
+            let quads = hexahedra.iter().map(|&[a, b, c, d, ..]: &[u32; 8]| [a, b, c, d]).collect();
+            Topology::Shells { quads, section }
+        }
+    };
+    let numbers = Numbers {
+        nodes: node_ids,
+        elements: element_ids,
+        node_places: Places::Each(node_places),
+        element_places: Places::Each(element_places),
+        mesh: None,
+    };
+    clean.then_some(Explicit { block: Block { positions, topology, faces: Vec::new() }, numbers })
+}
+
+/// `rotate` of a part.
+fn read_rotation(value: Value<'_>, part: &Table<'_>) -> Option<Rotation> {
+    let table = value.table(format!("rotate of {}", part.title))?;
+    let axis = table.vector("axis");
+    let degrees = table.number("degrees", Range::Any);
+    let point = table.get("point").map_or(Some([0.0; 3]), |v| v.vector());
+    let (at, faults) = (table.at, table.faults);
+    table.finish();
+    let (axis, degrees, point) = (axis?, degrees?, point?);
+    let long = norm(axis);
+    if long > 0.0 && long.is_finite() {
+        return Some(Rotation { origin: value.origin(), point, axis, degrees });
+    }
+    let (read, expected) = (format!("axis = {axis:?}"), "an axis of some length");
+    faults.add(at, read, expected, "give a direction such as [0, 0, 1]");
+    None
+}

@@ -1,0 +1,172 @@
+//! What holds, moves, stops and pushes bodies, and what makes them rigid.
+
+use crate::place::{Origin, Place, Placed};
+
+/// A tabulated function of time.
+#[derive(Clone, Debug)]
+pub(crate) struct Curve {
+    pub(crate) name: Option<Placed<String>>,
+    /// Times ascend; at least one.
+    pub(crate) points: Vec<[f64; 2]>,
+}
+
+/// A number that may follow a curve.
+#[derive(Clone, Debug)]
+pub(crate) struct Drive {
+    pub(crate) factor: f64,
+    /// Name of the curve.
+    pub(crate) curve: Option<Placed<String>>,
+}
+
+impl Drive {
+    /// A constant.
+    pub(crate) fn constant(factor: f64) -> Self {
+        Self { factor, curve: None }
+    }
+}
+
+/// Numbers by axis; none is free.
+pub(crate) type Components = [Option<Drive>; 3];
+
+/// The parts that an entry speaks of.
+#[derive(Clone, Debug)]
+pub(crate) enum Parts {
+    All,
+    /// By name; at least one.
+    Named(Vec<Placed<String>>),
+    /// What could not be read.
+    Broken,
+}
+
+/// The nodes that an entry speaks of, among those of its parts.
+#[derive(Clone, Debug)]
+pub(crate) enum Region {
+    All,
+    /// A named face of blocks.
+    Face(Placed<String>),
+    Box {
+        low: [f64; 3],
+        high: [f64; 3],
+    },
+    /// The normal is of any length above 0.
+    Plane {
+        point: [f64; 3],
+        normal: [f64; 3],
+    },
+    /// A named set of a mesh, whatever the parts.
+    Set(Placed<String>),
+    /// Numbers of nodes, whatever the parts.
+    Numbers(Vec<Placed<u32>>),
+}
+
+/// The faces that an entry speaks of.
+#[derive(Clone, Debug)]
+pub(crate) enum Faces {
+    /// Outer faces with all their nodes in a region.
+    Of(Region),
+    /// Named segments of a mesh.
+    Segments(Placed<String>),
+}
+
+/// What is said of nodes or faces of some parts.
+#[derive(Clone, Debug)]
+pub(crate) struct Boundary {
+    pub(crate) at: Place,
+    /// What it is called in messages, in the words of the user's format.
+    pub(crate) title: String,
+    pub(crate) parts: Parts,
+    pub(crate) kind: BoundaryKind,
+}
+
+/// Kinds of boundaries.
+#[derive(Clone, Debug)]
+pub(crate) enum BoundaryKind {
+    /// Waves leave through these faces; none where they could not be read.
+    Transmit(Option<Faces>),
+    /// A plane of symmetry: `x[axis] = place`.
+    Symmetry { axis: usize, place: f64 },
+    /// Velocities of nodes, and axes about which those of shells do not turn (bit 0 is x).
+    Held { velocity: Components, clamped: u8, nodes: Option<Region> },
+}
+
+/// A rigid wall.
+#[derive(Clone, Debug)]
+pub(crate) struct Wall {
+    pub(crate) at: Place,
+    pub(crate) title: String,
+    pub(crate) shape: Option<WallShape>,
+    pub(crate) friction: f64,
+    pub(crate) motion: Option<WallMotion>,
+    pub(crate) parts: Parts,
+    /// The nodes that feel it, where it names any: then all others pass it.
+    pub(crate) nodes: Option<Region>,
+}
+
+/// Surfaces of walls. Directions are of any length above 0.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum WallShape {
+    Plane { point: [f64; 3], normal: [f64; 3] },
+    Cylinder { point: [f64; 3], axis: [f64; 3], radius: f64 },
+    Sphere { centre: [f64; 3], radius: f64 },
+}
+
+/// How a wall moves.
+#[derive(Clone, Debug)]
+pub(crate) enum WallMotion {
+    Fixed,
+    Driven(Components),
+    /// By what strikes it, from this velocity on.
+    Free {
+        mass: f64,
+        velocity: [f64; 3],
+    },
+}
+
+/// Parts whose nodes move as one.
+#[derive(Clone, Debug)]
+pub(crate) struct Rigid {
+    pub(crate) at: Place,
+    pub(crate) title: String,
+    pub(crate) parts: Parts,
+    pub(crate) mass: Option<f64>,
+    /// Centre of mass and inertia about it, xx, yy, zz, xy, yz, zx.
+    pub(crate) inertia: Option<([f64; 3], [f64; 6])>,
+    pub(crate) start_spin: Option<[f64; 3]>,
+    pub(crate) velocity: Components,
+    pub(crate) spin: Components,
+}
+
+/// What pushes faces or nodes.
+#[derive(Clone, Debug)]
+pub(crate) struct Load {
+    pub(crate) at: Place,
+    pub(crate) title: String,
+    pub(crate) parts: Parts,
+    pub(crate) kind: LoadKind,
+}
+
+/// Kinds of loads; none is what could not be read.
+#[derive(Clone, Debug)]
+pub(crate) enum LoadKind {
+    Pressure { pressure: Option<Drive>, faces: Option<Faces> },
+    Force { force: Option<[f64; 3]>, drive: Drive, nodes: Option<Region> },
+}
+
+/// An acceleration of everything.
+#[derive(Clone, Debug)]
+pub(crate) struct Gravity {
+    pub(crate) acceleration: [f64; 3],
+    pub(crate) drive: Drive,
+}
+
+/// Velocities that shrink in each cycle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Relaxation {
+    pub(crate) factor: f64,
+    pub(crate) until: Option<f64>,
+}
+
+/// Words for a name that a reader makes up: it stands nowhere.
+pub(crate) fn made(name: String, at: Place) -> Placed<String> {
+    Placed::new(name, Origin::card(at))
+}

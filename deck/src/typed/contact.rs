@@ -1,0 +1,64 @@
+//! Which parts meet, and which are one body.
+
+use super::condition::Parts;
+use crate::place::{Origin, Place, Placed};
+
+/// Contact of a deck.
+#[derive(Clone, Debug)]
+pub(crate) struct Contact {
+    pub(crate) at: Place,
+    pub(crate) friction: f64,
+    /// Whether different parts meet that no pair names.
+    pub(crate) default_interacts: bool,
+    /// Parts that meet themselves.
+    pub(crate) self_interaction: Option<Parts>,
+    pub(crate) pairs: Vec<Pair>,
+    pub(crate) gap: Gap,
+    pub(crate) slack: Slack,
+    pub(crate) stiffness: Option<f64>,
+    pub(crate) friction_velocity: Option<f64>,
+    pub(crate) edges: bool,
+    /// Whether parts that overlap at the start may.
+    pub(crate) ignores_initial: bool,
+}
+
+/// What is said of two parts.
+#[derive(Clone, Debug)]
+pub(crate) struct Pair {
+    pub(crate) origin: Origin,
+    pub(crate) parts: [Placed<String>; 2],
+    pub(crate) interacts: bool,
+    pub(crate) friction: Option<f64>,
+}
+
+/// How thick contact is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Gap {
+    Default,
+    /// By the distance of the bodies.
+    Fit,
+    /// Over the smallest face dimension.
+    Fraction(f64, Origin),
+    Length(f64, Origin),
+    /// What could not be read.
+    Broken,
+}
+
+/// How far beyond the gap lists of contact look.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Slack {
+    Default,
+    Gaps(f64),
+    Length(f64),
+    /// What could not be read.
+    Broken,
+}
+
+/// Parts whose coincident nodes become one.
+#[derive(Clone, Debug)]
+pub(crate) struct Join {
+    pub(crate) at: Place,
+    pub(crate) parts: Parts,
+    /// Greatest distance of nodes that merge, over the smallest edge of the joined parts.
+    pub(crate) tolerance: f64,
+}

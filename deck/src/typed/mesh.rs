@@ -1,0 +1,90 @@
+//! The mesh of a part: a block, nodes and elements of its own, or a body of a mesh.
+
+use std::collections::BTreeMap;
+
+use crate::{
+    blocks::{Block, Shape},
+    mesh_file::MeshFile,
+    place::{Place, Placed},
+};
+
+/// Meshes by the name that the deck has for them; none where a file could not be read, which was reported.
+pub(crate) type Meshes = BTreeMap<String, Option<Mesh>>;
+
+/// A mesh with the places of its elements.
+#[derive(Clone, Debug)]
+pub(crate) struct Mesh {
+    pub(crate) file: MeshFile,
+    /// Of each element of each body, where the mesh is of a keyword deck; empty for a mesh file.
+    pub(crate) elements: Vec<Vec<Place>>,
+}
+
+impl From<MeshFile> for Mesh {
+    fn from(file: MeshFile) -> Self {
+        Self { file, elements: Vec::new() }
+    }
+}
+
+/// The mesh of a part.
+#[derive(Clone, Debug)]
+pub(crate) struct PartMesh {
+    pub(crate) at: Place,
+    /// What it is called in messages.
+    pub(crate) title: String,
+    pub(crate) source: Source,
+}
+
+/// Where nodes and elements come from.
+#[derive(Clone, Debug)]
+pub(crate) enum Source {
+    Shape(Shape),
+    Explicit(Box<Explicit>),
+    /// A body of a mesh; without a name that of the part.
+    Body {
+        mesh: Placed<String>,
+        body: Option<Placed<String>>,
+    },
+}
+
+/// Nodes and elements of a part's own. Numbers of each are different.
+#[derive(Clone, Debug)]
+pub(crate) struct Explicit {
+    pub(crate) block: Block,
+    pub(crate) numbers: Numbers,
+}
+
+/// The user's numbers of nodes and elements, and where they stand.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Numbers {
+    pub(crate) nodes: Vec<u32>,
+    pub(crate) elements: Vec<u32>,
+    pub(crate) node_places: Places,
+    pub(crate) element_places: Places,
+    /// The mesh they come from, whose parts share nodes.
+    pub(crate) mesh: Option<String>,
+}
+
+/// Places of a list.
+#[derive(Clone, Debug)]
+pub(crate) enum Places {
+    /// One for all.
+    All(Place),
+    /// Of each.
+    Each(Vec<Place>),
+}
+
+impl Default for Places {
+    fn default() -> Self {
+        Self::Each(Vec::new())
+    }
+}
+
+impl Places {
+    /// The place of an entry.
+    pub(crate) fn of(&self, index: usize) -> Place {
+        match self {
+            Self::All(place) => *place,
+            Self::Each(list) => list[index],
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Materials of a deck, and its parts.
+
+use mechanics::{erosion::Criteria, material::Material, mesh::Section};
+
+use super::mesh::PartMesh;
+use crate::{
+    place::{Origin, Place, Placed},
+    table::Range,
+};
+
+/// A material of the deck's own.
+#[derive(Clone, Debug)]
+pub(crate) struct Own {
+    pub(crate) name: String,
+    /// Where the name stands, if the user gave it one.
+    pub(crate) named: Option<Origin>,
+    /// None where its constants could not be read.
+    pub(crate) material: Option<Material>,
+}
+
+/// The material of a part.
+#[derive(Clone, Debug)]
+pub(crate) enum Choice {
+    /// By name, of the deck or of the library.
+    Named(Placed<String>),
+    /// Of its own.
+    Inline(Box<Material>),
+}
+
+/// A part.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    pub(crate) at: Place,
+    pub(crate) name: String,
+    /// Where the name stands, if the user gave it one.
+    pub(crate) named: Option<Origin>,
+    pub(crate) material: Option<Choice>,
+    /// Where the user asks for the fracture constants of the library.
+    pub(crate) fracture: Option<Origin>,
+    /// Initial velocity.
+    pub(crate) velocity: [f64; 3],
+    /// Layers of shells; none where the part is of solids.
+    pub(crate) shell: Option<Section>,
+    pub(crate) erosion: Option<Erosion>,
+    /// None where it could not be read.
+    pub(crate) mesh: Option<PartMesh>,
+    pub(crate) rotate: Option<Rotation>,
+    pub(crate) translate: Option<Placed<[f64; 3]>>,
+}
+
+/// A turn of a block before the run.
+#[derive(Clone, Debug)]
+pub(crate) struct Rotation {
+    pub(crate) origin: Origin,
+    pub(crate) point: [f64; 3],
+    /// Of any length above 0.
+    pub(crate) axis: [f64; 3],
+    pub(crate) degrees: f64,
+}
+
+/// When elements of a part leave: as soon as they meet one limit; without any by the default one.
+#[derive(Clone, Debug)]
+pub(crate) struct Erosion {
+    pub(crate) origin: Origin,
+    pub(crate) limits: Vec<(Criterion, Placed<f64>)>,
+    /// Whether they leave when the failure law of their material has broken them.
+    pub(crate) failure: Option<Placed<bool>>,
+}
+
+/// What an element is measured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Criterion {
+    GeometricStrain,
+    IncrementalStrain,
+    PlasticStrain,
+    ShearStrain,
+    PrincipalStrain,
+    CompressiveStrain,
+    Expansion,
+    Compaction,
+    Pressure,
+    Tension,
+    PrincipalStress,
+    VonMises,
+    TimeStep,
+}
+
+/// A limit of strain.
+const STRAIN: Range = Range::Within(0.0, 100.0, "a strain above 0 and at most 100");
+
+impl Criterion {
+    /// All of them.
+    pub(crate) const ALL: [Self; 13] = [
+        Self::GeometricStrain,
+        Self::IncrementalStrain,
+        Self::PlasticStrain,
+        Self::ShearStrain,
+        Self::PrincipalStrain,
+        Self::CompressiveStrain,
+        Self::Expansion,
+        Self::Compaction,
+        Self::Pressure,
+        Self::Tension,
+        Self::PrincipalStress,
+        Self::VonMises,
+        Self::TimeStep,
+    ];
+
+    /// Its key in a TOML deck.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::GeometricStrain => "geometric_strain",
+            Self::IncrementalStrain => "incremental_strain",
+            Self::PlasticStrain => "plastic_strain",
+            Self::ShearStrain => "shear_strain",
+            Self::PrincipalStrain => "principal_strain",
+            Self::CompressiveStrain => "compressive_strain",
+            Self::Expansion => "expansion",
+            Self::Compaction => "compaction",
+            Self::Pressure => "pressure",
+            Self::Tension => "tension",
+            Self::PrincipalStress => "principal_stress",
+            Self::VonMises => "von_mises",
+            Self::TimeStep => "time_step",
+        }
+    }
+
+    /// The limits that it takes.
+    pub(crate) fn range(self) -> Range {
+        match self {
+            Self::Pressure | Self::Tension | Self::PrincipalStress | Self::VonMises | Self::TimeStep => {
+                Range::Positive
+            }
+            _ => STRAIN,
+        }
+    }
+
+    /// Where the limit is kept for a run.
+    pub(crate) fn of(self, criteria: &mut Criteria) -> &mut Option<f64> {
+        match self {
+            Self::GeometricStrain => &mut criteria.geometric_strain,
+            Self::IncrementalStrain => &mut criteria.incremental_strain,
+            Self::PlasticStrain => &mut criteria.plastic_strain,
+            Self::ShearStrain => &mut criteria.shear_strain,
+            Self::PrincipalStrain => &mut criteria.principal_strain,
+            Self::CompressiveStrain => &mut criteria.compressive_strain,
+            Self::Expansion => &mut criteria.expansion,
+            Self::Compaction => &mut criteria.compaction,
+            Self::Pressure => &mut criteria.pressure,
+            Self::Tension => &mut criteria.tension,
+            Self::PrincipalStress => &mut criteria.principal_stress,
+            Self::VonMises => &mut criteria.von_mises,
+            Self::TimeStep => &mut criteria.time_step,
+        }
+    }
+}
