@@ -101,7 +101,7 @@ impl<'a> Faults<'a> {
             return;
         }
         let (line, column) = self.line_and_column(at);
-        let file = file_of(at);
+        let file = at.file();
         let fault = Fault {
             file: self.name(file).to_string(),
             line,
@@ -129,9 +129,9 @@ impl<'a> Faults<'a> {
     /// The line of a place, for a message about another place: with its file where that is another.
     pub(crate) fn line_seen_from(&self, at: Place, from: Place) -> String {
         let (line, _) = self.line_and_column(at);
-        match file_of(at) == file_of(from) {
+        match at.file() == from.file() {
             true => format!("line {line}"),
-            false => format!("line {line} of {}", self.name(file_of(at))),
+            false => format!("line {line} of {}", self.name(at.file())),
         }
     }
 
@@ -202,14 +202,6 @@ impl<'a> Faults<'a> {
             });
         }
         list
-    }
-}
-
-/// The file that a place is in.
-fn file_of(at: Place) -> u16 {
-    match at {
-        Place::Text(_) => 0,
-        Place::Card { file, .. } => file,
     }
 }
 

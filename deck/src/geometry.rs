@@ -36,6 +36,12 @@ pub(crate) fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// The direction of a vector; none where it has no length.
+pub(crate) fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+    let long = norm(v);
+    (long > 0.0 && long.is_finite()).then(|| v.map(|c| c / long))
+}
+
 pub(crate) use mechanics::element::hex8::volume;
 
 /// Which end of each axis a corner has.

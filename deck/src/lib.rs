@@ -25,12 +25,20 @@ pub mod table;
 mod toml_deck;
 mod typed;
 pub mod units;
+mod write;
 
 use bundle::{Bundle, Kind};
+use log::Log;
+use mesh_file::MeshFile;
+use typed::{
+    Deck,
+    mesh::{Mesh, Meshes},
+};
 
 pub use fault::{Fault, MAX_FAULTS};
-pub use keyword::{UNIT_NAMES, Warning};
+pub use keyword::UNIT_NAMES;
 pub use limits::{MAX_CONTACT_PARTS, MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT, MAX_TITLE};
+pub use log::Warning;
 pub use model::Model;
 pub use table::{MAX_NAME, MAX_NUMBER};
 
@@ -59,28 +67,58 @@ pub fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
 /// As [`read`].
 pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
     let bundle = Bundle::of(text, file_name)?;
-    let (name, deck) = bundle.files[0];
-    if Kind::of(deck) == Kind::Keyword {
-        let read = keyword::read(&bundle, None)?;
-        return Ok(Reading { model: read.model, warnings: read.warnings });
+    match Kind::of(bundle.files[0].1) {
+        Kind::Keyword => read_keyword(&bundle, MESH).map(|whole| whole.reading),
+        _ => read_toml(&bundle),
     }
-    let mut meshes = typed::mesh::Meshes::new();
+}
+
+/// Name of the mesh of a keyword deck that is not written.
+const MESH: &str = "keyword.mesh";
+
+/// Reads and checks a TOML deck with its mesh files.
+fn read_toml(bundle: &Bundle<'_>) -> Result<Reading, Vec<Fault>> {
+    let (name, text) = bundle.files[0];
+    let log = Log::toml(name, text);
+    let mut of_meshes = Vec::new();
+    let mut meshes = Meshes::new();
     for (path, text) in &bundle.files[1..] {
         // The deck names its meshes as it sees them.
         let folder = name.rsplit_once('/').map_or(String::new(), |(folder, _)| format!("{folder}/"));
         let seen = path.strip_prefix(&folder).unwrap_or(path);
-        meshes.insert(seen.to_string(), Some(mesh_file::parse(text, path)?.into()));
+        let mesh = mesh_file::parse(text, path).map_err(|faults| of_meshes.extend(faults));
+        meshes.insert(seen.to_string(), mesh.ok().map(Mesh::from));
     }
-    let model = read_toml(deck, name, &meshes)?;
-    Ok(Reading { model, warnings: Vec::new() })
+    let model = toml_deck::read(text, &log).and_then(|deck| make::model(&deck, &meshes, &log));
+    let mut reading = conclude(model, log);
+    if !of_meshes.is_empty() {
+        of_meshes.extend(reading.err().unwrap_or_default());
+        reading = Err(of_meshes);
+    }
+    reading
 }
 
-/// Reads and checks a TOML deck.
-fn read_toml(text: &str, name: &str, meshes: &typed::mesh::Meshes) -> Result<Model, Vec<Fault>> {
-    let log = log::Log::toml(name, text);
-    let model = toml_deck::read(text, &log).and_then(|deck| make::model(&deck, meshes, &log));
+/// A keyword deck that can run, as a typed deck too.
+struct WholeKeyword {
+    reading: Reading,
+    deck: Deck,
+    mesh: MeshFile,
+}
+
+/// Reads and checks a keyword deck.
+fn read_keyword(bundle: &Bundle<'_>, mesh_name: &str) -> Result<WholeKeyword, Vec<Fault>> {
+    let log = Log::keyword(&bundle.files);
+    let (deck, mesh) = keyword::read(bundle, mesh_name, &log);
+    let meshes = Meshes::from([(mesh_name.to_string(), Some(mesh))]);
+    let model = make::model(&deck, &meshes, &log);
+    let mesh = meshes.into_values().flatten().next().map(|mesh| mesh.file).unwrap_or_default();
+    Ok(WholeKeyword { reading: conclude(model, log)?, deck, mesh })
+}
+
+/// The model of a deck without a fault.
+fn conclude(model: Option<Model>, log: Log<'_>) -> Result<Reading, Vec<Fault>> {
     match model {
-        Some(model) if log.count() == 0 => Ok(model),
+        Some(model) if log.count() == 0 => Ok(Reading { model, warnings: log.into_lists().1 }),
         _ => {
             assert!(log.count() > 0, "a deck was refused without a fault");
             Err(log.into_lists().0)
@@ -111,8 +149,8 @@ pub fn convert(text: &str, file_name: &str, mesh_name: &str) -> Result<Converted
         faults.add(0, faults.quote(0, 60), "an LS-DYNA keyword deck", "run a TOML deck as it is");
         return Err(faults.into_list());
     }
-    let read = keyword::read(&bundle, Some(mesh_name))?;
-    Ok(Converted { deck: read.deck, mesh: read.mesh.text(), warnings: read.warnings })
+    let WholeKeyword { reading, deck, mesh } = read_keyword(&bundle, mesh_name)?;
+    Ok(Converted { deck: write::text(&deck), mesh: mesh.text(), warnings: reading.warnings })
 }
 
 /// Names of the library's materials.

@@ -96,15 +96,31 @@ pub(crate) fn read_material(table: Table<'_>, name: String) -> Option<Material> 
     };
     table.finish();
     let material = Material { name, density: density?, eos: eos?, strength: strength?, failure: failure? };
-    if material.is_gas() {
-        if let Some(value) = strength_value.filter(|_| material.strength != Strength::Hydro) {
-            value.fault("no strength in a gas or an explosive", "remove it");
-        }
-        if let Some(value) = failure_value {
-            value.fault("no failure in a gas or an explosive", "remove it");
+    for clash in clashes(&material) {
+        let (value, expected) = match clash {
+            Clash::Strength => (strength_value, "no strength in a gas or an explosive"),
+            Clash::Failure => (failure_value, "no failure in a gas or an explosive"),
+        };
+        if let Some(value) = value {
+            value.fault(expected, "remove it");
         }
     }
     Some(material)
+}
+
+/// What does not go with a gas or an explosive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Clash {
+    Strength,
+    Failure,
+}
+
+/// What of a material does not go together.
+pub(crate) fn clashes(material: &Material) -> impl Iterator<Item = Clash> + use<> {
+    let gas = material.is_gas();
+    let strength = (gas && material.strength != Strength::Hydro).then_some(Clash::Strength);
+    let failure = (gas && material.failure != Failure::None).then_some(Clash::Failure);
+    strength.into_iter().chain(failure)
 }
 
 /// The equations of state by the word a deck writes.

@@ -18,3 +18,5 @@ pub const MAX_ENTRIES: usize = 10_000;
 pub(crate) const MAX_CONTACT_FORCES: usize = 64;
 /// Greatest node or element number a deck may give; generated numbers go on above.
 pub(crate) const MAX_ID: u32 = 2_000_000_000;
+/// Most points of a curve.
+pub(crate) const MAX_CURVE_POINTS: usize = 100_000;

@@ -28,6 +28,14 @@ impl Place {
         Self::Card { file, line, column: 1 }
     }
 
+    /// Index of its file in the bundle.
+    pub fn file(self) -> u16 {
+        match self {
+            Self::Text(_) => 0,
+            Self::Card { file, .. } => file,
+        }
+    }
+
     /// The same line at another column, from 1.
     pub fn at_column(self, column: u32) -> Self {
         match self {

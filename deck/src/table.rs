@@ -18,6 +18,11 @@ pub const MAX_NAME: usize = 64;
 /// and energies stay inside what a number can hold.
 pub const MAX_NUMBER: f64 = 1e60;
 
+/// Whether a number is 0 or of a magnitude that a deck may give.
+pub(crate) fn holds(x: f64) -> bool {
+    x == 0.0 || (1.0 / MAX_NUMBER..=MAX_NUMBER).contains(&x.abs())
+}
+
 /// A table of the deck.
 pub struct Table<'a> {
     table: &'a DeTable<'a>,
@@ -223,7 +228,7 @@ impl<'a> Value<'a> {
         // Infinities and NaN are not numbers of a deck.
         let number = number.filter(|x| x.is_finite() && range.admits(*x));
         if let Some(x) = number
-            && (x.abs() > MAX_NUMBER || (x != 0.0 && x.abs() < 1.0 / MAX_NUMBER))
+            && !holds(x)
         {
             self.fault(&format!("a magnitude from 1e-60 to {MAX_NUMBER:e}, or 0"), "choose other units");
             return None;

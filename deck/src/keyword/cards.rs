@@ -6,11 +6,12 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{
-    log::{Log, Place},
-    parameter,
+use super::parameter;
+use crate::{
+    bundle::{Bundle, beside},
+    log::Log,
+    place::Place,
 };
-use crate::bundle::{Bundle, beside};
 
 /// Deepest nesting of includes.
 const MAX_DEPTH: usize = 16;
@@ -151,7 +152,7 @@ pub(super) struct Lines<'a> {
 /// A walk through the files of a bundle.
 struct Walk<'b, 'a> {
     bundle: &'b Bundle<'a>,
-    log: &'b Log,
+    log: &'b Log<'b>,
     folders: Vec<String>,
     blocks: Vec<Block<'a>>,
     parameters: BTreeMap<String, f64>,
@@ -167,7 +168,7 @@ struct Walk<'b, 'a> {
 }
 
 /// Reads every line of a bundle.
-pub(super) fn read<'a>(bundle: &Bundle<'a>, log: &Log) -> Lines<'a> {
+pub(super) fn read<'a>(bundle: &Bundle<'a>, log: &Log<'_>) -> Lines<'a> {
     let mut walk = Walk {
         bundle,
         log,
@@ -193,7 +194,7 @@ impl<'a> Walk<'_, 'a> {
         let mut block: Option<Block<'a>> = None;
         for (line, words) in lines(text) {
             self.n_lines += 1;
-            let at = Place { file: file as u16, line };
+            let at = Place::card(file as u16, line);
             if self.n_lines > MAX_LINES {
                 self.log.fault(
                     at,
@@ -287,7 +288,7 @@ impl<'a> Walk<'_, 'a> {
             "CASE" => self.case(&block),
             "INCLUDE" => self.include(&block, depth),
             "INCLUDE_PATH" | "INCLUDE_PATH_RELATIVE" => {
-                let name = self.bundle.files[usize::from(block.at.file)].0;
+                let name = self.bundle.files[usize::from(block.at.file())].0;
                 let mut before = String::new();
                 for card in &block.cards {
                     if let Some(path) = path_of(&card.text, &mut before) {
@@ -326,7 +327,7 @@ impl<'a> Walk<'_, 'a> {
     }
 
     fn include(&mut self, block: &Block<'a>, depth: usize) {
-        let name = self.bundle.files[usize::from(block.at.file)].0;
+        let name = self.bundle.files[usize::from(block.at.file())].0;
         let mut before = String::new();
         for card in &block.cards {
             let Some(path) = path_of(&card.text, &mut before) else { continue };
@@ -351,7 +352,7 @@ impl<'a> Walk<'_, 'a> {
     /// What cases were there and which was asked for.
     fn conclude(&self) {
         let list: Vec<String> = self.cases.keys().map(u32::to_string).collect();
-        let start = Place { file: 0, line: 1 };
+        let start = Place::card(0, 1);
         match (self.bundle.options.case, self.first_case) {
             (Some(case), _) if !self.cases.contains_key(&case) => self.log.fault(
                 self.first_case.unwrap_or(start),
@@ -399,14 +400,15 @@ mod tests {
 
     fn blocks(files: &[(&'static str, &'static str)], case: Option<u32>) -> (Vec<String>, Vec<String>) {
         let bundle = Bundle { options: Options { units: None, case }, files: files.to_vec() };
-        let log = Log::new(bundle.files.iter().map(|(name, _)| (*name).to_string()).collect());
+        let log = Log::keyword(&bundle.files);
         let lines = read(&bundle, &log);
         let words = lines
             .blocks
             .iter()
             .map(|b| {
                 let cards: Vec<&str> = b.cards.iter().map(|c| c.text.as_ref()).collect();
-                format!("{}@{}.{} {:?} {}", b.keyword, b.at.file, b.at.line, b.width, cards.join("|"))
+                let Place::Card { file, line, .. } = b.at else { panic!("a card") };
+                format!("{}@{file}.{line} {:?} {}", b.keyword, b.width, cards.join("|"))
             })
             .collect();
         let (faults, warnings) = log.into_lists();

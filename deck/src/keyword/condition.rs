@@ -3,8 +3,8 @@
 use super::{
     cards::Block,
     fields::{Context, Fields, TENS},
-    log::Place,
 };
+use crate::{geometry, place::Place};
 
 /// Which nodes something speaks of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,6 +145,11 @@ pub(super) struct Conditions {
 /// A time that means never.
 const NEVER: f64 = 1e15;
 
+/// Whether a second card belongs to a motion, with offsets or nodes.
+pub(super) fn goes_on(f: &Fields<'_>) -> bool {
+    matches!(f.words(1).parse::<i64>(), Ok(dof) if (9..=11).contains(&dof.abs())) || f.words(2) == "4"
+}
+
 /// Reports a birth or death time that is not from the start to the end.
 pub(super) fn all_along(f: &Fields<'_>, birth: usize, death: usize) {
     if f.real(birth, 0.0) != 0.0 {
@@ -205,10 +210,14 @@ impl Conditions {
             "INITIAL_VELOCITY_GENERATION" => self.generation(block, context),
             word if word.starts_with("RIGIDWALL") => self.wall(block, context),
             word => {
-                for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
-                    let widths: &[usize] = if word == "LOAD_SEGMENT" { &[10; 10] } else { &TENS };
+                let widths: &[usize] = if word == "LOAD_SEGMENT" { &[10; 10] } else { &TENS };
+                let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
+                while let Some(card) = cards.next() {
                     let f = context.fields(card, block.width, widths);
                     self.line(word, &f);
+                    if word.starts_with("BOUNDARY_PRESCRIBED") && goes_on(&f) {
+                        cards.next();
+                    }
                 }
             }
         }
@@ -331,7 +340,7 @@ impl Conditions {
                 if axis[0] == -999.0 {
                     g.fault(3, "an axis by its direction", "give NX, NY, NZ instead of nodes");
                 }
-                match super::problem::unit(axis) {
+                match geometry::unit(axis) {
                     Some(axis) => spin = axis.map(|c| omega * c),
                     None => g.fault(3, "an axis of some length", "give NX, NY, NZ"),
                 }
@@ -358,8 +367,8 @@ impl Conditions {
         all_along(&f, 4, 5);
         let point = g.vector(0);
         let head = g.vector(3);
-        let normal = super::problem::minus(head, point);
-        if super::problem::unit(normal).is_none() {
+        let normal = geometry::sub(head, point);
+        if geometry::unit(normal).is_none() {
             g.fault(3, "a head of the normal apart from its tail", "give XH, YH, ZH");
             return;
         }

@@ -1,14 +1,11 @@
 //! `*CONTACT_`: which parts meet.
 
-use std::collections::BTreeSet;
-
 use super::{
     cards::Block,
     condition::all_along,
     fields::{Context, Fields, TENS},
-    log::{Log, Place},
-    problem::Problem,
 };
+use crate::place::Place;
 
 /// One side of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,8 +92,12 @@ impl ContactCard {
         all_along(&g, 6, 7);
         let side = |i: usize| Side::read(&f, i, single);
         let (fixed, moving, decay) = (g.real(0, 0.0), g.real(1, 0.0), g.real(2, 0.0));
-        if fixed < 0.0 {
-            g.fault(0, "a coefficient of friction of 0 or above", "give the contact its own");
+        if fixed < 0.0 || (decay != 0.0 && moving < 0.0) {
+            g.fault(
+                if fixed < 0.0 { 0 } else { 1 },
+                "a coefficient of friction of 0 or above",
+                "give the contact its own",
+            );
             return None;
         }
         let decays = decay != 0.0 && fixed != moving;
@@ -126,81 +127,5 @@ impl ContactCard {
         }
         let second = if f.id(1) == 0 { None } else { Some(Side::read(&f, 1, false)?) };
         Some(Self { at: f.at, first: Side::read(&f, 0, true)?, second, friction: 0.0, erodes: false })
-    }
-
-    /// Pairs of different parts of a transducer among those that meet: one of its own, then the other.
-    pub(super) fn watched(&self, met: &BTreeSet<(u32, u32)>, problem: &Problem, log: &Log) -> Vec<[u32; 2]> {
-        let first: BTreeSet<u32> = self.parts(self.first, problem, log).into_iter().collect();
-        let second: Option<BTreeSet<u32>> =
-            self.second.map(|side| self.parts(side, problem, log).into_iter().collect());
-        let from = |part: &u32| second.as_ref().is_none_or(|second| second.contains(part));
-        let mut pairs = Vec::new();
-        for &(a, b) in met.iter().filter(|(a, b)| a != b) {
-            if first.contains(&a) && from(&b) {
-                pairs.push([a, b]);
-            } else if first.contains(&b) && from(&a) {
-                pairs.push([b, a]);
-            }
-        }
-        pairs
-    }
-
-    /// Pairs of parts that meet, lower number first, in order.
-    pub(super) fn pairs(&self, problem: &Problem, log: &Log) -> Vec<(u32, u32)> {
-        let first = self.parts(self.first, problem, log);
-        let mut pairs = Vec::new();
-        match self.second {
-            None => {
-                for (i, a) in first.iter().enumerate() {
-                    pairs.extend(first[i..].iter().map(|b| (*a, *b)));
-                }
-            }
-            Some(second) => {
-                let second = self.parts(second, problem, log);
-                for a in &first {
-                    pairs.extend(second.iter().map(|b| (*a.min(b), *a.max(b))));
-                }
-            }
-        }
-        pairs.sort_unstable();
-        pairs.dedup();
-        pairs
-    }
-
-    fn parts(&self, side: Side, problem: &Problem, log: &Log) -> Vec<u32> {
-        let holding = |nodes: Vec<u32>, what: &str| {
-            let held = |id: &u32| nodes.binary_search(id).is_ok();
-            let solids = problem.solids.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
-            let shells = problem.shells.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
-            let mut parts: Vec<u32> = solids.chain(shells).collect();
-            parts.sort_unstable();
-            parts.dedup();
-            log.warn(
-                self.at,
-                format!("a contact of a set of {what}: the parts that hold them meet as a whole"),
-            );
-            parts
-        };
-        match side {
-            Side::All => problem.parts.keys().copied().collect(),
-            Side::Part(id) => {
-                if !problem.parts.contains_key(&id) {
-                    log.fault(self.at, format!("part {id}"), "a part of the deck", "correct the number");
-                }
-                vec![id]
-            }
-            Side::PartSet(id) => problem.part_set(id, self.at, log),
-            Side::NotPartSet(id) => {
-                let out = problem.part_set(id, self.at, log);
-                problem.parts.keys().copied().filter(|p| out.binary_search(p).is_err()).collect()
-            }
-            Side::NodeSet(id) => holding(problem.node_set(id, self.at, log), "nodes"),
-            Side::SegmentSet(id) => {
-                let mut nodes: Vec<u32> =
-                    problem.segment_set(id, self.at, log).into_iter().flatten().collect();
-                nodes.sort_unstable();
-                holding(nodes, "segments")
-            }
-        }
     }
 }

@@ -3,8 +3,27 @@
 use super::{
     cards::Block,
     fields::{Context, TENS},
-    log::Place,
 };
+use crate::place::Place;
+
+/// Keywords that say how a computation is carried out or written, not what is computed here.
+const HARMLESS: [&str; 15] = [
+    "CONTROL_ACCURACY",
+    "CONTROL_CPU",
+    "CONTROL_DEBUG",
+    "CONTROL_FORMATTED_OUTPUT",
+    "CONTROL_LSDA",
+    "CONTROL_MEMORY",
+    "CONTROL_OUTPUT",
+    "CONTROL_PARALLEL",
+    "CONTROL_REQUIRE_REVISION",
+    "CONTROL_RIGID",
+    "CONTROL_SOLID",
+    "CONTROL_SPOTWELD_BEAM",
+    "CONTROL_STRUCTURED",
+    "CONTROL_STRUCTURED_TERM",
+    "CONTROL_SUBCYCLE",
+];
 
 /// What the control cards say; none is what no card said.
 #[derive(Default)]
@@ -19,6 +38,8 @@ pub(super) struct ControlCards {
     pub(super) hourglass: Option<(Place, i64, f64)>,
     /// Whether nodes without elements stay in the run.
     pub(super) freed_nodes: Option<(Place, bool)>,
+    /// The card of `*CONTROL_SHELL` by which shells keep their thickness.
+    pub(super) rigid_thickness: Option<Place>,
     pub(super) period: Option<(Place, f64)>,
     /// Nodes and sets of nodes whose motion is to be written.
     pub(super) gauges: Vec<(Place, u32)>,
@@ -112,7 +133,27 @@ impl ControlCards {
                 "Lagrangian mechanics",
                 "take the keyword out if the problem does without it",
             ),
-            word => log.ignore(block.at, word),
+            "CONTROL_SHELL" => match f.integer(3) {
+                1 | 4 => log.ignore(block.at, "CONTROL_SHELL"),
+                _ => self.rigid_thickness = Some(card.at),
+            },
+            "CONTROL_SOLUTION" => {
+                if f.integer(0) != 0 {
+                    f.fault(0, "SOLN 0, mechanics alone", "take it out if the problem does without heat");
+                }
+            }
+            word if HARMLESS.iter().any(|known| *known == word)
+                || word.starts_with("CONTROL_MPP_")
+                || word.starts_with("CONTROL_CHECK") =>
+            {
+                log.ignore(block.at, word);
+            }
+            word => log.fault(
+                block.at,
+                format!("*{}", log.quote(word)),
+                "a *CONTROL_ of the table in deck/README.md",
+                "take it out; leaving it out may change what is computed",
+            ),
         }
     }
 

@@ -6,45 +6,50 @@
 use super::{
     cards::Block,
     fields::{Context, Fields, TENS},
-    log::Place,
+};
+use crate::{
+    place::{Origin, Placed},
+    typed::part::{Criterion, Erosion},
 };
 
 /// From here on a limit stands for none.
 const NEVER: f64 = 1e15;
 
 /// When elements of a material leave.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Limits {
-    /// Keys of a TOML deck's `erosion`, each with its value and the line that asks for it.
-    list: Vec<(&'static str, Limit, Place)>,
-}
-
-/// The value of a criterion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Limit {
-    /// A strain, stress or time.
-    At(f64),
-    /// The failure law of the material.
-    Failure,
+    list: Vec<(Criterion, Placed<f64>)>,
+    /// The card that says that they leave when the failure law of the material has broken them.
+    failure: Option<Placed<bool>>,
 }
 
 impl Limits {
-    /// Elements leave as soon as `key` comes to `limit`; of several the lowest counts.
-    fn at(&mut self, key: &'static str, limit: f64, at: Place) {
-        match self.list.iter_mut().find(|(known, ..)| *known == key) {
-            Some((_, Limit::At(known), place)) if limit < *known => (*known, *place) = (limit, at),
+    /// Elements leave as soon as they come to a limit; of several of one criterion the lowest counts.
+    fn add(&mut self, criterion: Criterion, limit: Placed<f64>) {
+        match self.list.iter_mut().find(|(known, _)| *known == criterion) {
+            Some((_, known)) if limit.value < known.value => *known = limit,
             Some(_) => {}
-            None => self.list.push((key, Limit::At(limit), at)),
+            None => self.list.push((criterion, limit)),
+        }
+    }
+
+    /// The same with the limit in a field that is called `name`; one outside the range is reported.
+    fn read(&mut self, f: &Fields<'_>, i: usize, name: &'static str, criterion: Criterion) {
+        let limit = f.real(i, 0.0).abs();
+        if criterion.range().admits(limit) {
+            self.add(criterion, f.placed(i, name, limit));
+        } else {
+            f.fault(i, criterion.range().words(), "correct it");
         }
     }
 
     /// Elements leave when the failure law of their material has broken them.
-    pub(super) fn by_failure(&mut self, at: Place) {
-        self.list.push(("failure", Limit::Failure, at));
+    pub(super) fn by_failure(&mut self, origin: Origin) {
+        self.failure = Some(Placed::new(true, origin));
     }
 
     /// Reads a field of a `*MAT_` card that holds the plastic strain at which elements leave: 0 and huge for none.
-    pub(super) fn read_failure_strain(&mut self, f: &Fields<'_>, i: usize) {
+    pub(super) fn read_failure_strain(&mut self, f: &Fields<'_>, i: usize, name: &'static str) {
         let strain = f.real(i, 0.0);
         if strain < 0.0 {
             f.fault(
@@ -53,73 +58,65 @@ impl Limits {
                 "no routine of one's own decides on failure; leave it blank",
             );
         } else if strain > 0.0 && strain < NEVER {
-            self.at("plastic_strain", strain, f.at);
+            self.read(f, i, name, Criterion::PlasticStrain);
         }
     }
 
     /// Reads a field that holds the least time step of an element: 0 for none.
-    pub(super) fn read_time_step(&mut self, f: &Fields<'_>, i: usize) {
+    pub(super) fn read_time_step(&mut self, f: &Fields<'_>, i: usize, name: &'static str) {
         let step = f.real(i, 0.0);
         if step < 0.0 {
             f.fault(i, "a time step of 0 or above", "leave it blank");
         } else if step > 0.0 {
-            self.at("time_step", step, f.at);
+            self.read(f, i, name, Criterion::TimeStep);
         }
     }
 
     /// Takes what other cards say of the same material.
-    pub(super) fn merge(&mut self, other: &Limits) {
-        for (key, limit, at) in &other.list {
-            match limit {
-                Limit::At(limit) => self.at(key, *limit, *at),
-                Limit::Failure => self.by_failure(*at),
-            }
+    pub(super) fn merge(&mut self, other: Limits) {
+        for (criterion, limit) in other.list {
+            self.add(criterion, limit);
         }
+        self.failure = self.failure.take().or(other.failure);
     }
 
-    /// The line that first asks for erosion, and the value of `erosion` in a `[[part]]`; none where nothing does.
-    pub(super) fn words(&self) -> Option<(Place, String)> {
-        let at = self.list.iter().map(|(_, _, at)| *at).min()?;
-        let keys: Vec<String> = self
-            .list
-            .iter()
-            .map(|(key, limit, _)| match limit {
-                Limit::At(limit) => format!("{key} = {limit:?}"),
-                Limit::Failure => format!("{key} = true"),
-            })
-            .collect();
-        Some((at, format!("{{ {} }}", keys.join(", "))))
+    /// The `erosion` of a part, which stands where the first limit does; none without any.
+    pub(super) fn erosion(&self) -> Option<Erosion> {
+        let origins =
+            self.list.iter().map(|(_, limit)| limit.origin).chain(self.failure.as_ref().map(|f| f.origin));
+        let origin = origins.min_by_key(|origin| origin.at)?;
+        Some(Erosion { origin, limits: self.list.clone(), failure: self.failure.clone() })
     }
 }
 
-/// A limit of a card: its field, its name, and our keys for a value above 0 and for one below. Strains are logarithmic.
-struct Criterion {
+/// A limit of a card: its field, its name, and our criteria for a value above 0 and for one below. Strains are logarithmic.
+struct LimitField {
     /// Card and field.
     at: [usize; 2],
     name: &'static str,
-    above: Option<&'static str>,
-    below: Option<&'static str>,
+    above: Option<Criterion>,
+    below: Option<Criterion>,
 }
 
-const fn criterion(
+const fn field(
     at: [usize; 2],
     name: &'static str,
-    above: Option<&'static str>,
-    below: Option<&'static str>,
-) -> Criterion {
-    Criterion { at, name, above, below }
+    above: Option<Criterion>,
+    below: Option<Criterion>,
+) -> LimitField {
+    LimitField { at, name, above, below }
 }
 
-const CRITERIA: [Criterion; 9] = [
-    criterion([0, 2], "MXPRES", Some("pressure"), None),
-    criterion([0, 3], "MNEPS", None, Some("compressive_strain")),
-    criterion([0, 4], "EFFEPS", Some("geometric_strain"), Some("plastic_strain")),
-    criterion([0, 5], "VOLEPS", Some("expansion"), Some("compaction")),
-    criterion([1, 0], "MNPRES", None, Some("tension")),
-    criterion([1, 1], "SIGP1", Some("principal_stress"), None),
-    criterion([1, 2], "SIGVM", Some("von_mises"), None),
-    criterion([1, 3], "MXEPS", Some("principal_strain"), None),
-    criterion([1, 4], "EPSSH", Some("shear_strain"), None),
+const FIELDS: [LimitField; 9] = [
+    field([0, 2], "MXPRES", Some(Criterion::Pressure), None),
+    field([0, 3], "MNEPS", None, Some(Criterion::CompressiveStrain)),
+    field([0, 4], "EFFEPS", Some(Criterion::GeometricStrain), Some(Criterion::PlasticStrain)),
+    field([0, 5], "VOLEPS", Some(Criterion::Expansion), Some(Criterion::Compaction)),
+    field([1, 0], "MNPRES", None, Some(Criterion::Tension)),
+    field([1, 1], "SIGP1", Some(Criterion::PrincipalStress), None),
+    field([1, 2], "SIGVM", Some(Criterion::VonMises), None),
+    field([1, 3], "MXEPS", Some(Criterion::PrincipalStrain), None),
+    field([1, 4], "EPSSH", Some(Criterion::ShearStrain), None),
 ];
 
 /// Reads `*MAT_ADD_EROSION`: the number of its material, and its limits. Every criterion that is not one of ours is a fault at
@@ -134,16 +131,16 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
         let value = f[card].real(i, 0.0);
         (value != 0.0 && value != excluded && value.abs() < NEVER).then_some(value)
     };
-    for Criterion { at: [card, i], name, above, below } in CRITERIA {
+    for LimitField { at: [card, i], name, above, below } in FIELDS {
         let Some(value) = given(card, i) else { continue };
-        let (key, sign) = if value > 0.0 { (above, "above") } else { (below, "below") };
-        match key {
-            Some(key) => {
-                if key == "geometric_strain" {
+        let (criterion, sign) = if value > 0.0 { (above, "above") } else { (below, "below") };
+        match criterion {
+            Some(criterion) => {
+                if criterion == Criterion::GeometricStrain {
                     let words = "EFFEPS: the effective strain of the change of shape, in which that of the volume counts too";
                     context.log.warn(f[card].at, words);
                 }
-                limits.at(key, value.abs(), f[card].at);
+                limits.read(&f[card], i, name, criterion);
             }
             None => {
                 let expected = if value > 0.0 { "below" } else { "above" };
@@ -188,9 +185,9 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
         }
     }
     if given(4, 3).is_some() {
-        limits.read_time_step(&f[4], 3);
+        limits.read_time_step(&f[4], 3, "DTMIN");
     }
-    if context.log.count() == faults && limits.list.is_empty() {
+    if context.log.count() == faults && limits.erosion().is_none() {
         context.log.warn(block.at, "*MAT_ADD_EROSION without a criterion: nothing leaves by it");
     }
     (f[0].id(0), limits)

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use super::{
     cards::{Card, Width},
-    log::{Log, Place},
     parameter,
 };
-use crate::table::MAX_NUMBER;
+use crate::{
+    log::Log,
+    place::{Origin, Place, Placed},
+    table::{Range, holds},
+};
 
 /// Most fields of a card.
 const MAX_FIELDS: usize = 16;
@@ -19,7 +22,7 @@ pub(super) const EIGHTS: [usize; 10] = [8; 10];
 /// What reading fields needs of the deck.
 #[derive(Clone, Copy)]
 pub(super) struct Context<'d> {
-    pub(super) log: &'d Log,
+    pub(super) log: &'d Log<'d>,
     pub(super) parameters: &'d BTreeMap<String, f64>,
 }
 
@@ -83,21 +86,42 @@ impl<'c> Fields<'c> {
         (0..self.n).all(|i| self.blank(i))
     }
 
-    /// Number of fields up to the last that is not empty.
-    pub(super) fn used(&self) -> usize {
-        (0..self.n).rev().find(|i| !self.blank(*i)).map_or(0, |i| i + 1)
-    }
-
     /// Reports a field.
     pub(super) fn fault(&self, i: usize, expected: impl Into<String>, advice: impl Into<String>) {
         let log = self.context.log;
-        log.fault_in(
-            self.at,
-            self.cells[i.min(MAX_FIELDS - 1)].0,
-            log.quote(self.words(i)),
-            expected,
-            advice,
-        );
+        log.fault(self.place(i), log.quote(self.words(i)), expected, advice);
+    }
+
+    /// Where a field stands.
+    pub(super) fn place(&self, i: usize) -> Place {
+        self.at.at_column(self.cells[i.min(MAX_FIELDS - 1)].0)
+    }
+
+    /// The words of a field that is called `name`.
+    pub(super) fn origin(&self, i: usize, name: &'static str) -> Origin {
+        let column = self.cells[i.min(MAX_FIELDS - 1)].0;
+        Origin { at: self.place(i), end: column + self.words(i).len() as u32, word: name }
+    }
+
+    /// Something that was read from a field that is called `name`.
+    pub(super) fn placed<T>(&self, i: usize, name: &'static str, value: T) -> Placed<T> {
+        Placed::new(value, self.origin(i, name))
+    }
+
+    /// The number of a thing that a field called `name` refers to.
+    pub(super) fn reference(&self, i: usize, name: &'static str) -> Placed<u32> {
+        self.placed(i, name, self.id(i))
+    }
+
+    /// A number in a range; `default` where the field is empty, or faulty and reported.
+    pub(super) fn within(&self, i: usize, default: f64, range: Range) -> f64 {
+        match self.number(i) {
+            Some(value) if !range.admits(value) => {
+                self.fault(i, range.words(), "correct it");
+                default
+            }
+            value => value.unwrap_or(default),
+        }
     }
 
     /// A number; `default` where the field is empty, or faulty and reported.
@@ -114,14 +138,14 @@ impl<'c> Fields<'c> {
             match parameter::evaluate(words, self.context.parameters) {
                 Ok(value) => Some(value),
                 Err(why) => {
-                    self.fault(i, "a parameter that is defined", why);
+                    self.fault(i, "a parameter that is defined", why.to_string());
                     return None;
                 }
             }
         } else {
             parameter::real(words)
         };
-        let value = value.filter(|x| *x == 0.0 || (1.0 / MAX_NUMBER..=MAX_NUMBER).contains(&x.abs()));
+        let value = value.filter(|x| holds(*x));
         if value.is_none() {
             self.fault(
                 i,
@@ -182,9 +206,9 @@ mod tests {
     use super::*;
 
     fn with(text: &str, width: Width, widths: &[usize], check: impl Fn(&Fields<'_>)) -> Vec<String> {
-        let log = Log::new(vec!["a.k".to_string()]);
+        let log = Log::keyword(&[("a.k", "")]);
         let parameters = BTreeMap::from([("v".to_string(), 2.5)]);
-        let card = Card { at: Place { file: 0, line: 3 }, text: Cow::Borrowed(text) };
+        let card = Card { at: Place::card(0, 3), text: Cow::Borrowed(text) };
         check(&Context { log: &log, parameters: &parameters }.fields(&card, width, widths));
         log.into_lists().0.iter().map(ToString::to_string).collect()
     }
@@ -194,7 +218,7 @@ mod tests {
         let faults =
             with("       0.0       0.01.000000E8 0.000E+00-3.339E-02", Width::Standard, &TENS, |f| {
                 assert_eq!([0, 1, 2, 3, 4].map(|i| f.real(i, 9.0)), [0.0, 0.0, 1e8, 0.0, -0.03339]);
-                assert_eq!((f.real(5, 9.0), f.used()), (9.0, 5));
+                assert_eq!((f.real(5, 9.0), f.blank(5)), (9.0, true));
             });
         assert!(faults.is_empty(), "{faults:?}");
     }

@@ -1,14 +1,15 @@
-//! `*MAT_` and `*EOS_`: constants of a deck, and the same in the words of a TOML material.
+//! `*MAT_` and `*EOS_`: constants of a deck.
 
 use super::{
     cards::Block,
     condition::AXES_OF_CODE,
-    erosion::{self, Limits},
-    fields::{Context, TENS},
-    log::{Log, Place},
-    problem::{CurveCard, Problem},
+    erosion::Limits,
+    fields::{Context, Fields, TENS},
 };
-use mechanics::material::MAX_HARDENING;
+use crate::{
+    place::{Origin, Place, Placed},
+    table::Range,
+};
 
 /// A material of a deck.
 pub(super) struct MaterialCard {
@@ -27,13 +28,13 @@ pub(super) enum Law {
     /// Yield stress, tangent modulus, rate constants.
     Bilinear {
         yield_stress: f64,
-        tangent: f64,
+        tangent: Placed<f64>,
         rate: Option<[f64; 2]>,
     },
     /// Yield stress by plastic strain, of a curve of the deck where it has one.
     Tabulated {
         points: Vec<[f64; 2]>,
-        curve: u32,
+        curve: Placed<u32>,
         rate: Option<[f64; 2]>,
     },
     JohnsonCook {
@@ -48,7 +49,7 @@ pub(super) enum Law {
     },
     /// A fluid, with the pressure below which it does not go (negative), if any.
     Null {
-        cut_off: f64,
+        cut_off: Placed<f64>,
     },
     /// Axes along which and about which the part does not move.
     Rigid {
@@ -65,14 +66,14 @@ pub(super) enum EosCard {
     },
     /// C0 to C6 and E0.
     Polynomial {
-        at: Place,
+        origin: Origin,
         c: [f64; 7],
         energy: f64,
     },
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 8] = [
+const NUMBERS: [(&str, &str); 7] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
     ("MAT_009", "MAT_NULL"),
@@ -80,471 +81,264 @@ const NUMBERS: [(&str, &str); 8] = [
     ("MAT_020", "MAT_RIGID"),
     ("MAT_024", "MAT_PIECEWISE_LINEAR_PLASTICITY"),
     ("MAT_098", "MAT_SIMPLIFIED_JOHNSON_COOK"),
-    ("MAT_000", "MAT_ADD_EROSION"),
 ];
-
-impl Problem {
-    /// Reads a `*MAT_` keyword.
-    pub(super) fn read_material(&mut self, block: &Block<'_>, context: &Context<'_>) {
-        let log = context.log;
-        let word = NUMBERS
-            .iter()
-            .find(|(number, _)| *number == block.keyword)
-            .map_or(block.keyword.as_str(), |n| n.1);
-        let cards: [_; 8] = std::array::from_fn(|i| block.card(i));
-        let f: [_; 8] = std::array::from_fn(|i| context.fields(&cards[i], block.width, &TENS));
-        let id = f[0].id(0);
-        if word == "MAT_ADD_EROSION" {
-            let (id, limits) = erosion::read(block, context);
-            self.erosions.entry(id).or_default().merge(&limits);
-            return;
-        }
-        let density = f[0].positive(1, "a density");
-        let mut limits = Limits::default();
-        let moduli = |i: usize| {
-            let (young, poisson) = (f[0].positive(i, "Young's modulus"), f[0].real(i + 1, 0.0));
-            if !(-1.0 < poisson && poisson < 0.5) {
-                f[0].fault(i + 1, "Poisson's ratio above -1 and below 0.5", "correct it");
-                return None;
-            }
-            young.map(|young| (young, poisson))
-        };
-        // Cowper and Symonds: both constants or none.
-        let rate = |card: usize| {
-            let [c, p] = [0, 1].map(|i| f[card].real(i, 0.0));
-            (c > 0.0 && p > 0.0).then_some([c, p])
-        };
-        let mut needs_moduli = true;
-        let (elastic, law) = match word {
-            "MAT_ELASTIC" => {
-                for i in [4, 5].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
-                    f[0].fault(i, "no damping of bending and axial forces", "leave DA and DB blank");
-                }
-                (moduli(2), Some(Law::Elastic))
-            }
-            "MAT_PLASTIC_KINEMATIC" => {
-                if f[0].real(5, 0.0) != 0.0 && f[0].real(6, 0.0) != 1.0 {
-                    log.warn(
-                        cards[0].at,
-                        format!("BETA {}: hardening is isotropic, as with BETA 1", f[0].real(6, 0.0)),
-                    );
-                }
-                if f[1].real(3, 0.0) != 0.0 {
-                    log.warn(
-                        cards[1].at,
-                        "VP: the rate of the whole deviatoric strain is used, as with VP 0",
-                    );
-                }
-                limits.read_failure_strain(&f[1], 2);
-                let yield_stress = f[0].positive(4, "a yield stress");
-                let tangent = f[0].real(5, 0.0);
-                (
-                    moduli(2),
-                    yield_stress.map(|yield_stress| Law::Bilinear { yield_stress, tangent, rate: rate(1) }),
-                )
-            }
-            "MAT_PIECEWISE_LINEAR_PLASTICITY" => {
-                limits.read_time_step(&f[0], 7);
-                if f[1].integer(3) != 0 {
-                    f[1].fault(3, "no curve for the rate", "use C and P, Cowper and Symonds");
-                }
-                if f[1].real(4, 0.0) != 0.0 {
-                    log.warn(
-                        cards[1].at,
-                        "VP: the rate of the whole deviatoric strain is used, as with VP 0",
-                    );
-                }
-                limits.read_failure_strain(&f[0], 6);
-                let curve = f[1].integer(2);
-                let points: Vec<[f64; 2]> = (0..8)
-                    .map(|i| [f[2].real(i, 0.0), f[3].real(i, 0.0)])
-                    .take_while(|p| p[1] > 0.0)
-                    .collect();
-                let law = match u32::try_from(curve) {
-                    Ok(0) if points.is_empty() => f[0].positive(4, "a yield stress").map(|yield_stress| {
-                        Law::Bilinear { yield_stress, tangent: f[0].real(5, 0.0), rate: rate(1) }
-                    }),
-                    Ok(curve) => Some(Law::Tabulated { points, curve, rate: rate(1) }),
-                    Err(_) => {
-                        f[1].fault(2, "a curve of yield stress by plastic strain", "give its number");
-                        None
-                    }
-                };
-                (moduli(2), law)
-            }
-            "MAT_SIMPLIFIED_JOHNSON_COOK" => {
-                if f[0].real(4, 0.0) != 0.0 {
-                    log.warn(
-                        cards[0].at,
-                        "VP: the rate of the whole deviatoric strain is used, as with VP 0",
-                    );
-                }
-                for i in
-                    [5, 6].into_iter().filter(|i| (f64::MIN_POSITIVE..1e15).contains(&f[1].real(*i, 0.0)))
-                {
-                    f[1].fault(i, "no bound of the stress", "leave SIGMAX and SIGSAT blank");
-                }
-                limits.read_failure_strain(&f[1], 4);
-                let elastic = moduli(2);
-                let (a, n) = (f[1].positive(0, "A"), f[1].real(2, 0.0));
-                let law = elastic.zip(a).map(|((young, poisson), a)| Law::JohnsonCook {
-                    shear: young / (2.0 * (1.0 + poisson)),
-                    constants: [a, f[1].real(1, 0.0), if n > 0.0 { n } else { 1.0 }, f[1].real(3, 0.0), 1.0],
-                    // Without heat the temperature stays where the yield stress is whole.
-                    t_melt: COLD[1],
-                    t_room: COLD[0],
-                    rate0: Some(f[1].real(7, 1.0)).filter(|r| *r > 0.0).unwrap_or(1.0),
-                    specific_heat: COLD_HEAT,
-                    damage: None,
-                });
-                (elastic, law)
-            }
-            "MAT_JOHNSON_COOK" => {
-                let law = self.johnson_cook(&f, &mut needs_moduli);
-                // EROD other than 0 keeps broken elements in the mesh, without shear stress.
-                if matches!(&law, Some(Law::JohnsonCook { damage: Some(_), .. })) && f[3].integer(2) == 0 {
-                    limits.by_failure(cards[2].at);
-                }
-                (None, law)
-            }
-            "MAT_NULL" => {
-                needs_moduli = false;
-                let cut_off = f[0].real(2, 0.0);
-                if cut_off > 0.0 {
-                    f[0].fault(2, "a pressure cut-off of 0 or below", "give it as a negative pressure");
-                }
-                if f[0].real(3, 0.0) != 0.0 {
-                    log.warn(cards[0].at, "MU: fluids have no shear viscosity here");
-                }
-                for i in [4, 5].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
-                    f[0].fault(i, "no relative volume at which elements fail", "leave TEROD and CEROD blank");
-                }
-                (None, Some(Law::Null { cut_off }))
-            }
-            "MAT_RIGID" => {
-                if f[0].real(4, 0.0) != 0.0 {
-                    f[0].fault(4, "no coupling with another program", "leave N blank");
-                }
-                let frame = f[1].real(0, 0.0);
-                if frame < 0.0 {
-                    f[1].fault(0, "constraints along the axes of space", "give CMO 1 or 0");
-                }
-                let mut held = [[false; 3]; 2];
-                for (i, axes) in held.iter_mut().enumerate().filter(|_| frame > 0.0) {
-                    let code = f[1].integer(1 + i);
-                    match usize::try_from(code).ok().and_then(|code| AXES_OF_CODE.get(code)) {
-                        Some(known) => *axes = *known,
-                        None => f[1].fault(1 + i, "a number from 0 to 7", "correct it"),
-                    }
-                }
-                (moduli(2), Some(Law::Rigid { held }))
-            }
-            _ => {
-                log.fault(
-                    block.at,
-                    format!("*{}", log.quote(&block.keyword)),
-                    "a material of the table in deck/README.md",
-                    "choose the nearest of them",
-                );
-                return;
-            }
-        };
-        let (Some(density), Some(law)) = (density, law) else { return };
-        if elastic.is_none() && needs_moduli {
-            return;
-        }
-        let card = MaterialCard { at: cards[0].at, density, elastic, law, erosion: limits };
-        if let Some(first) = self.materials.insert(id, card) {
-            f[0].fault(
-                0,
-                format!("a number other than {id}, which line {} has", first.at.line),
-                "renumber one",
-            );
-        }
-    }
-
-    /// Five cards of `*MAT_JOHNSON_COOK`.
-    fn johnson_cook(&self, f: &[super::fields::Fields<'_>; 8], needs_moduli: &mut bool) -> Option<Law> {
-        *needs_moduli = false;
-        let g = f[0].real(2, 0.0);
-        let (young, poisson) = (f[0].real(3, 0.0), f[0].real(4, 0.0));
-        let shear = if g > 0.0 { g } else { young / (2.0 * (1.0 + poisson)) };
-        if shear <= 0.0 {
-            f[0].fault(2, "a shear modulus above 0", "give G, or E and PR");
-            return None;
-        }
-        if f[0].real(5, 0.0) != 0.0 {
-            f[0].fault(5, "no step at which elements fail", "leave DTF blank");
-        }
-        let (a, n, m) = (f[1].positive(0, "A"), f[1].real(2, 0.0), f[1].real(4, 0.0));
-        let (t_melt, t_room) = (f[1].real(5, 0.0), f[1].real(6, 0.0));
-        let heat = f[2].real(0, 0.0);
-        let d: [f64; 5] =
-            [f[2].real(4, 0.0), f[2].real(5, 0.0), f[2].real(6, 0.0), f[2].real(7, 0.0), f[3].real(0, 0.0)];
-        let cut_off = f[2].real(1, 0.0);
-        if cut_off < 0.0 && cut_off > -1e15 {
-            f[2].fault(1, "no pressure cut-off", "leave PC blank");
-        }
-        let warm = heat > 0.0 && m > 0.0 && t_melt > t_room;
-        if warm && t_room <= 0.0 {
-            f[1].fault(6, "a room temperature above 0 K", "give TR and TM in K");
-            return None;
-        }
-        Some(Law::JohnsonCook {
-            shear,
-            constants: [
-                a?,
-                f[1].real(1, 0.0),
-                if n > 0.0 { n } else { 1.0 },
-                f[1].real(3, 0.0),
-                if warm { m } else { 1.0 },
-            ],
-            t_melt: if warm { t_melt } else { COLD[1] },
-            t_room: if warm { t_room } else { COLD[0] },
-            rate0: Some(f[1].real(7, 1.0)).filter(|r| *r > 0.0).unwrap_or(1.0),
-            specific_heat: if warm { heat } else { COLD_HEAT },
-            damage: d.iter().any(|d| *d != 0.0).then_some(d),
-        })
-    }
-
-    /// Reads an `*EOS_` keyword.
-    pub(super) fn read_eos(&mut self, block: &Block<'_>, context: &Context<'_>) {
-        let log = context.log;
-        let cards = [block.card(0), block.card(1)];
-        let f = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
-        let id = f[0].id(0);
-        let eos = match block.keyword.as_str() {
-            "EOS_GRUNEISEN" | "EOS_004" => {
-                for i in [3, 4].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
-                    f[0].fault(i, "a straight Hugoniot", "leave S2 and S3 blank and fit S1");
-                }
-                if f[0].real(6, 0.0) != 0.0 {
-                    log.warn(cards[0].at, "A: gamma times the density is constant here; A is not used");
-                }
-                if f[0].real(7, 0.0) != 0.0 {
-                    f[0].fault(7, "no energy at the start", "leave E0 blank");
-                }
-                if !matches!(f[1].real(0, 0.0), 0.0 | 1.0) {
-                    f[1].fault(0, "a relative volume of 1 at the start", "leave V0 blank");
-                }
-                f[0].positive(1, "a sound speed").map(|c| EosCard::Grueneisen {
-                    c,
-                    s: f[0].real(2, 0.0),
-                    gamma: f[0].real(5, 0.0),
-                })
-            }
-            "EOS_LINEAR_POLYNOMIAL" | "EOS_001" => {
-                if !matches!(f[1].real(1, 0.0), 0.0 | 1.0) {
-                    f[1].fault(1, "a relative volume of 1 at the start", "leave V0 blank");
-                }
-                let c = std::array::from_fn(|i| f[0].real(i + 1, 0.0));
-                Some(EosCard::Polynomial { at: cards[0].at, c, energy: f[1].real(0, 0.0) })
-            }
-            _ => {
-                log.fault(
-                    block.at,
-                    format!("*{}", log.quote(&block.keyword)),
-                    "EOS_GRUNEISEN or EOS_LINEAR_POLYNOMIAL",
-                    "choose one of them",
-                );
-                None
-            }
-        };
-        if let Some(eos) = eos {
-            self.equations.insert(id, eos);
-        }
-    }
-}
 
 /// Temperatures (K) and specific heat of a material that is not warmed: whatever the units, it stays cold.
 const COLD: [f64; 2] = [300.0, 1e6];
 const COLD_HEAT: f64 = 1e40;
 
-/// The equation of state of a material in the words of a TOML deck; none after a fault.
-pub(super) fn eos_words(
-    material: &MaterialCard,
-    eos: Option<&EosCard>,
-    part: Place,
-    log: &Log,
-) -> Option<String> {
-    match (eos, material.elastic) {
-        (Some(EosCard::Grueneisen { c, s, gamma }), _) => {
-            Some(format!("{{ type = \"shock\", c0 = {c:?}, s = {s:?}, gamma = {gamma:?} }}"))
+/// Reads a `*MAT_` keyword; none after a fault without which nothing is known of it.
+pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialCard> {
+    let log = context.log;
+    let word =
+        NUMBERS.iter().find(|(number, _)| *number == block.keyword).map_or(block.keyword.as_str(), |n| n.1);
+    let cards: [_; 8] = std::array::from_fn(|i| block.card(i));
+    let f: [_; 8] = std::array::from_fn(|i| context.fields(&cards[i], block.width, &TENS));
+    let density = f[0].positive(1, "a density");
+    let mut limits = Limits::default();
+    let moduli = |i: usize| {
+        let (young, poisson) = (f[0].positive(i, "Young's modulus"), f[0].real(i + 1, 0.0));
+        if !(-1.0 < poisson && poisson < 0.5) {
+            f[0].fault(i + 1, "Poisson's ratio above -1 and below 0.5", "correct it");
+            return None;
         }
-        (Some(EosCard::Polynomial { at, c, energy }), _) => {
-            let refuse = |what: &str, advice: &str| {
-                log.fault(
-                    *at,
-                    what,
-                    "a polynomial that fits p = C1 mu + C2 mu^2 + C3 mu^3 + (C4 + C5 mu) E",
-                    advice,
+        young.map(|young| (young, poisson))
+    };
+    // Cowper and Symonds: both constants or none.
+    let rate = |card: usize| {
+        let [c, p] = [0, 1].map(|i| f[card].real(i, 0.0));
+        (c > 0.0 && p > 0.0).then_some([c, p])
+    };
+    let mut needs_moduli = true;
+    let (elastic, law) = match word {
+        "MAT_ELASTIC" => {
+            for i in [4, 5].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
+                f[0].fault(i, "no damping of bending and axial forces", "leave DA and DB blank");
+            }
+            (moduli(2), Some(Law::Elastic))
+        }
+        "MAT_PLASTIC_KINEMATIC" => {
+            if f[0].real(5, 0.0) != 0.0 && f[0].real(6, 0.0) != 1.0 {
+                log.warn(
+                    cards[0].at,
+                    format!("BETA {}: hardening is isotropic, as with BETA 1", f[0].real(6, 0.0)),
                 );
-                None
+            }
+            if f[1].real(3, 0.0) != 0.0 {
+                log.warn(cards[1].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
+            }
+            limits.read_failure_strain(&f[1], 2, "FS");
+            let yield_stress = f[0].positive(4, "a yield stress");
+            let tangent = f[0].placed(5, "ETAN", f[0].real(5, 0.0));
+            (
+                moduli(2),
+                yield_stress.map(|yield_stress| Law::Bilinear { yield_stress, tangent, rate: rate(1) }),
+            )
+        }
+        "MAT_PIECEWISE_LINEAR_PLASTICITY" => {
+            limits.read_time_step(&f[0], 7, "TDEL");
+            if f[1].integer(3) != 0 {
+                f[1].fault(3, "no curve for the rate", "use C and P, Cowper and Symonds");
+            }
+            if f[1].real(4, 0.0) != 0.0 {
+                log.warn(cards[1].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
+            }
+            limits.read_failure_strain(&f[0], 6, "FAIL");
+            let curve = f[1].integer(2);
+            let points: Vec<[f64; 2]> =
+                (0..8).map(|i| [f[2].real(i, 0.0), f[3].real(i, 0.0)]).take_while(|p| p[1] > 0.0).collect();
+            let law = match u32::try_from(curve) {
+                Ok(0) if points.is_empty() => {
+                    f[0].positive(4, "a yield stress").map(|yield_stress| Law::Bilinear {
+                        yield_stress,
+                        tangent: f[0].placed(5, "ETAN", f[0].real(5, 0.0)),
+                        rate: rate(1),
+                    })
+                }
+                Ok(curve) => {
+                    Some(Law::Tabulated { points, curve: f[1].placed(2, "LCSS", curve), rate: rate(1) })
+                }
+                Err(_) => {
+                    f[1].fault(2, "a curve of yield stress by plastic strain", "give its number");
+                    None
+                }
             };
-            let [c0, c1, c2, c3, c4, c5, c6] = *c;
-            if [c0, c1, c2, c3, c6].iter().all(|c| *c == 0.0) && c4 > 0.0 && c4 == c5 {
-                let energy = energy / material.density;
-                let gamma = c4 + 1.0;
-                return Some(format!("{{ type = \"ideal-gas\", gamma = {gamma:?}, energy = {energy:?} }}"));
-            }
-            if c0 != 0.0 || c6 != 0.0 {
-                return refuse("C0 or C6", "leave them blank");
-            }
-            if *energy != 0.0 {
-                return refuse("E0 of a condensed material", "leave it blank");
-            }
-            if c1 <= 0.0 {
-                return refuse("C1 that is not above 0", "give the bulk modulus");
-            }
-            Some(format!(
-                "{{ type = \"polynomial\", a1 = {c1:?}, a2 = {c2:?}, a3 = {c3:?}, b0 = {c4:?}, b1 = {c5:?} }}"
-            ))
+            (moduli(2), law)
         }
-        (None, Some((young, poisson))) => {
-            let bulk = young / (3.0 * (1.0 - 2.0 * poisson));
-            Some(format!("{{ type = \"linear\", bulk = {bulk:?} }}"))
+        "MAT_SIMPLIFIED_JOHNSON_COOK" => {
+            if f[0].real(4, 0.0) != 0.0 {
+                log.warn(cards[0].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
+            }
+            for i in [5, 6].into_iter().filter(|i| (f64::MIN_POSITIVE..1e15).contains(&f[1].real(*i, 0.0))) {
+                f[1].fault(i, "no bound of the stress", "leave SIGMAX and SIGSAT blank");
+            }
+            limits.read_failure_strain(&f[1], 4, "PSFAIL");
+            let elastic = moduli(2);
+            let (a, n) = (f[1].positive(0, "A"), f[1].real(2, 0.0));
+            let law = elastic.zip(a).map(|((young, poisson), a)| Law::JohnsonCook {
+                shear: young / (2.0 * (1.0 + poisson)),
+                constants: [
+                    a,
+                    not_negative(&f[1], 1),
+                    if n > 0.0 { n } else { 1.0 },
+                    not_negative(&f[1], 3),
+                    1.0,
+                ],
+                // Without heat the temperature stays where the yield stress is whole.
+                t_melt: COLD[1],
+                t_room: COLD[0],
+                rate0: Some(f[1].real(7, 1.0)).filter(|r| *r > 0.0).unwrap_or(1.0),
+                specific_heat: COLD_HEAT,
+                damage: None,
+            });
+            (elastic, law)
         }
-        (None, None) => {
+        "MAT_JOHNSON_COOK" => {
+            let law = johnson_cook(&f, &mut needs_moduli);
+            // EROD other than 0 keeps broken elements in the mesh, without shear stress.
+            if matches!(&law, Some(Law::JohnsonCook { damage: Some(_), .. })) && f[3].integer(2) == 0 {
+                limits.by_failure(f[2].origin(4, "D1"));
+            }
+            (None, law)
+        }
+        "MAT_NULL" => {
+            needs_moduli = false;
+            let cut_off = f[0].real(2, 0.0);
+            if cut_off > 0.0 {
+                f[0].fault(2, "a pressure cut-off of 0 or below", "give it as a negative pressure");
+            }
+            if f[0].real(3, 0.0) != 0.0 {
+                log.warn(cards[0].at, "MU: fluids have no shear viscosity here");
+            }
+            for i in [4, 5].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
+                f[0].fault(i, "no relative volume at which elements fail", "leave TEROD and CEROD blank");
+            }
+            (None, Some(Law::Null { cut_off: f[0].placed(2, "PC", cut_off) }))
+        }
+        "MAT_RIGID" => {
+            if f[0].real(4, 0.0) != 0.0 {
+                f[0].fault(4, "no coupling with another program", "leave N blank");
+            }
+            let frame = f[1].real(0, 0.0);
+            if frame < 0.0 {
+                f[1].fault(0, "constraints along the axes of space", "give CMO 1 or 0");
+            }
+            let mut held = [[false; 3]; 2];
+            for (i, axes) in held.iter_mut().enumerate().filter(|_| frame > 0.0) {
+                let code = f[1].integer(1 + i);
+                match usize::try_from(code).ok().and_then(|code| AXES_OF_CODE.get(code)) {
+                    Some(known) => *axes = *known,
+                    None => f[1].fault(1 + i, "a number from 0 to 7", "correct it"),
+                }
+            }
+            (moduli(2), Some(Law::Rigid { held }))
+        }
+        _ => {
             log.fault(
-                part,
-                "a part whose material needs an equation of state and which has none",
-                "the number of an *EOS",
-                "give EOSID in *PART",
+                block.at,
+                format!("*{}", log.quote(&block.keyword)),
+                "a material of the table in deck/README.md",
+                "choose the nearest of them",
+            );
+            return None;
+        }
+    };
+    if elastic.is_none() && needs_moduli {
+        return None;
+    }
+    Some(MaterialCard { at: cards[0].at, density: density?, elastic, law: law?, erosion: limits })
+}
+
+/// Five cards of `*MAT_JOHNSON_COOK`.
+fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool) -> Option<Law> {
+    *needs_moduli = false;
+    let g = f[0].real(2, 0.0);
+    let (young, poisson) = (f[0].real(3, 0.0), f[0].real(4, 0.0));
+    let shear = if g > 0.0 { g } else { young / (2.0 * (1.0 + poisson)) };
+    if shear <= 0.0 {
+        f[0].fault(2, "a shear modulus above 0", "give G, or E and PR");
+        return None;
+    }
+    if f[0].real(5, 0.0) != 0.0 {
+        f[0].fault(5, "no step at which elements fail", "leave DTF blank");
+    }
+    let (a, n, m) = (f[1].positive(0, "A"), f[1].real(2, 0.0), f[1].real(4, 0.0));
+    let (t_melt, t_room) = (f[1].real(5, 0.0), f[1].real(6, 0.0));
+    let heat = f[2].real(0, 0.0);
+    let d: [f64; 5] =
+        [f[2].real(4, 0.0), f[2].real(5, 0.0), f[2].real(6, 0.0), f[2].real(7, 0.0), f[3].real(0, 0.0)];
+    let cut_off = f[2].real(1, 0.0);
+    if cut_off < 0.0 && cut_off > -1e15 {
+        f[2].fault(1, "no pressure cut-off", "leave PC blank");
+    }
+    let warm = heat > 0.0 && m > 0.0 && t_melt > t_room;
+    if warm && t_room <= 0.0 {
+        f[1].fault(6, "a room temperature above 0 K", "give TR and TM in K");
+        return None;
+    }
+    Some(Law::JohnsonCook {
+        shear,
+        constants: [
+            a?,
+            not_negative(&f[1], 1),
+            if n > 0.0 { n } else { 1.0 },
+            not_negative(&f[1], 3),
+            if warm { m } else { 1.0 },
+        ],
+        t_melt: if warm { t_melt } else { COLD[1] },
+        t_room: if warm { t_room } else { COLD[0] },
+        rate0: Some(f[1].real(7, 1.0)).filter(|r| *r > 0.0).unwrap_or(1.0),
+        specific_heat: if warm { heat } else { COLD_HEAT },
+        damage: d.iter().any(|d| *d != 0.0).then_some(d),
+    })
+}
+
+/// Reads an `*EOS_` keyword; none after a fault.
+pub(super) fn read_eos(block: &Block<'_>, context: &Context<'_>) -> Option<EosCard> {
+    let log = context.log;
+    let cards = [block.card(0), block.card(1)];
+    let f = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+    match block.keyword.as_str() {
+        "EOS_GRUNEISEN" | "EOS_004" => {
+            for i in [3, 4].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
+                f[0].fault(i, "a straight Hugoniot", "leave S2 and S3 blank and fit S1");
+            }
+            if f[0].real(6, 0.0) != 0.0 {
+                log.warn(cards[0].at, "A: gamma times the density is constant here; A is not used");
+            }
+            if f[0].real(7, 0.0) != 0.0 {
+                f[0].fault(7, "no energy at the start", "leave E0 blank");
+            }
+            if !matches!(f[1].real(0, 0.0), 0.0 | 1.0) {
+                f[1].fault(0, "a relative volume of 1 at the start", "leave V0 blank");
+            }
+            f[0].positive(1, "a sound speed").map(|c| EosCard::Grueneisen {
+                c,
+                s: not_negative(&f[0], 2),
+                gamma: not_negative(&f[0], 5),
+            })
+        }
+        "EOS_LINEAR_POLYNOMIAL" | "EOS_001" => {
+            if !matches!(f[1].real(1, 0.0), 0.0 | 1.0) {
+                f[1].fault(1, "a relative volume of 1 at the start", "leave V0 blank");
+            }
+            let c = std::array::from_fn(|i| f[0].real(i + 1, 0.0));
+            let origin = f[0].origin(1, "C0");
+            Some(EosCard::Polynomial { origin, c, energy: f[1].real(0, 0.0) })
+        }
+        _ => {
+            log.fault(
+                block.at,
+                format!("*{}", log.quote(&block.keyword)),
+                "EOS_GRUNEISEN or EOS_LINEAR_POLYNOMIAL",
+                "choose one of them",
             );
             None
         }
     }
 }
 
-/// The strength of a material in the words of a TOML deck; none after a fault.
-pub(super) fn strength_words(
-    material: &MaterialCard,
-    curve_of: impl Fn(u32) -> Option<Vec<[f64; 2]>>,
-    log: &Log,
-) -> Option<String> {
-    let (young, poisson) = material.elastic.unwrap_or_default();
-    let shear = young / (2.0 * (1.0 + poisson));
-    let rate_words = |rate: &Option<[f64; 2]>| {
-        rate.map_or(String::new(), |[c, p]| {
-            format!(", cowper_symonds = {{ reference = {c:?}, exponent = {p:?} }}")
-        })
-    };
-    match &material.law {
-        Law::Elastic | Law::Rigid { .. } => Some(format!("{{ type = \"elastic\", shear = {shear:?} }}")),
-        Law::Null { .. } => Some("{ type = \"hydro\" }".to_string()),
-        Law::Bilinear { yield_stress, tangent, rate } => {
-            if !(0.0 <= *tangent && *tangent < young) {
-                let expected = format!("a tangent modulus from 0 to below Young's {young}");
-                log.fault(material.at, format!("ETAN {tangent}"), expected, "correct it");
-                return None;
-            }
-            // The tangent is of the total strain, hardening of the plastic one.
-            let hardening = young * tangent / (young - tangent);
-            Some(format!(
-                "{{ type = \"von-mises\", shear = {shear:?}, yield_stress = {yield_stress:?}, hardening = {hardening:?}{} }}",
-                rate_words(rate)
-            ))
-        }
-        Law::Tabulated { points, curve, rate } => {
-            let points = if *curve > 0 { curve_of(*curve)? } else { points.clone() };
-            let points = hardening(points, material.at, log)?;
-            let list: Vec<String> = points.iter().map(|[e, y]| format!("[{e:?}, {y:?}]")).collect();
-            Some(format!(
-                "{{ type = \"tabulated\", shear = {shear:?}, points = [{}]{} }}",
-                list.join(", "),
-                rate_words(rate)
-            ))
-        }
-        Law::JohnsonCook {
-            shear, constants: [a, b, n, c, m], t_melt, t_room, rate0, specific_heat, ..
-        } => Some(format!(
-            "{{ type = \"johnson-cook\", shear = {shear:?}, a = {a:?}, b = {b:?}, n = {n:?}, c = {c:?}, m = {m:?}, t_melt = {t_melt:?}, t_room = {t_room:?}, specific_heat = {specific_heat:?}, rate0 = {rate0:?} }}"
-        )),
-    }
-}
-
-/// Points of a yield curve as our law takes them: from strain 0, not descending, few; beyond the last the last slope
-/// goes on, as LS-DYNA continues curves.
-fn hardening(mut points: Vec<[f64; 2]>, at: Place, log: &Log) -> Option<Vec<[f64; 2]>> {
-    points.retain(|p| p[0] >= 0.0);
-    let bad = points.windows(2).find(|w| w[1][0] <= w[0][0] || w[1][1] < w[0][1]);
-    if points.is_empty() || points[0][1] <= 0.0 || bad.is_some() {
-        let read = bad.map_or("a yield curve without a positive stress".to_string(), |w| {
-            format!("a yield curve from {:?} to {:?}", w[0], w[1])
-        });
-        log.fault(at, read, "strains that ascend, stresses that do not descend", "flatten what softens");
-        return None;
-    }
-    points[0][0] = 0.0;
-    if let [.., a, b] = points[..] {
-        let slope = (b[1] - a[1]) / (b[0] - a[0]);
-        if slope > 0.0 {
-            let far = (2.0 * b[0]).max(10.0);
-            points.push([far, slope.mul_add(far - b[0], b[1])]);
-        }
-    }
-    let mut worst = 0.0f64;
-    while points.len() > MAX_HARDENING {
-        // The point that lies nearest to the line between its neighbours goes.
-        let off = |i: usize| {
-            let [a, p, b] = [points[i - 1], points[i], points[i + 1]];
-            let line = (b[1] - a[1]) / (b[0] - a[0]) * (p[0] - a[0]) + a[1];
-            ((p[1] - line) / p[1]).abs()
-        };
-        let least = (1..points.len() - 1).min_by(|i, j| off(*i).total_cmp(&off(*j)))?;
-        worst = worst.max(off(least));
-        points.remove(least);
-    }
-    if worst > 1e-3 {
-        log.warn(
-            at,
-            format!(
-                "the yield curve was reduced to {MAX_HARDENING} points, off by {:.2} % at most each",
-                100.0 * worst
-            ),
-        );
-    }
-    Some(points)
-}
-
-/// Failure without erosion that our laws have, in the words of a TOML deck.
-pub(super) fn failure_words(material: &MaterialCard) -> Option<String> {
-    match &material.law {
-        Law::Null { cut_off } if *cut_off < 0.0 => {
-            Some(format!("{{ type = \"hydrostatic\", tension = {:?}, heals = true }}", -cut_off))
-        }
-        Law::JohnsonCook { damage: Some(d), .. } => {
-            let [d1, d2, d3, d4, d5] = d;
-            Some(format!(
-                "{{ type = \"johnson-cook\", d1 = {d1:?}, d2 = {d2:?}, d3 = {d3:?}, d4 = {d4:?}, d5 = {d5:?} }}"
-            ))
-        }
-        _ => None,
-    }
-}
-
-/// The points of a curve.
-pub(super) fn points_of(curve: &CurveCard) -> Vec<[f64; 2]> {
-    curve.points.clone()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_yield_curve_is_cut_to_ten_points_and_goes_on_with_its_last_slope() {
-        let log = Log::new(vec!["a.k".to_string()]);
-        let at = Place::default();
-        assert_eq!(
-            hardening(vec![[0.0, 1.0], [1.0, 2.0]], at, &log),
-            Some(vec![[0.0, 1.0], [1.0, 2.0], [10.0, 11.0]])
-        );
-        let many: Vec<[f64; 2]> = (0..50).map(|i| f64::from(i) * 0.01).map(|e| [e, 1.0 + e.sqrt()]).collect();
-        let few = hardening(many, at, &log).expect("ascends");
-        assert_eq!(few.len(), MAX_HARDENING);
-        assert_eq!(few[0], [0.0, 1.0]);
-        assert!(hardening(vec![[0.0, 1.0], [1.0, 0.5]], at, &log).is_none());
-        assert!(hardening(vec![], at, &log).is_none());
-    }
+/// A constant of 0 or more.
+fn not_negative(f: &Fields<'_>, i: usize) -> f64 {
+    f.within(i, 0.0, Range::NotNegative)
 }

@@ -1,17 +1,44 @@
 //! `*PARAMETER` and `*PARAMETER_EXPRESSION`: named numbers, and the arithmetic between them.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt};
 
-use super::{
-    cards::{Block, Width},
-    log::Log,
-};
+use super::cards::{Block, Width};
+use crate::log::Log;
 
 /// Deepest nesting of brackets in an expression.
 const MAX_DEPTH: usize = 50;
 
+/// What is wrong with an expression. Displayed as what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Error {
+    /// Something stands behind its end.
+    Rest(char),
+    TooDeep,
+    Open,
+    Incomplete,
+    NoNumber(String),
+    Sign(char),
+    Unknown(String),
+    Function(String, usize),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rest(c) => write!(f, "remove what starts at \"{c}\""),
+            Self::TooDeep => write!(f, "use at most {MAX_DEPTH} brackets one in another"),
+            Self::Open => write!(f, "close the bracket"),
+            Self::Incomplete => write!(f, "complete the expression"),
+            Self::NoNumber(words) => write!(f, "{words} is no number"),
+            Self::Sign(c) => write!(f, "remove \"{c}\""),
+            Self::Unknown(name) => write!(f, "there is no parameter {name} before it"),
+            Self::Function(name, n) => write!(f, "there is no function {name} of {n} numbers"),
+        }
+    }
+}
+
 /// Reads the parameters of a block into `known`; a later value of a name replaces an earlier one.
-pub(super) fn read(block: &Block<'_>, known: &mut BTreeMap<String, f64>, log: &Log) {
+pub(super) fn read(block: &Block<'_>, known: &mut BTreeMap<String, f64>, log: &Log<'_>) {
     let expressions = block.keyword.contains("EXPRESSION");
     let width = if block.width == Width::Long { 20 } else { 10 };
     for card in &block.cards {
@@ -64,7 +91,9 @@ pub(super) fn read(block: &Block<'_>, known: &mut BTreeMap<String, f64>, log: &L
                     "a finite number",
                     "correct it",
                 ),
-                Err(why) => log.fault(card.at, log.quote(value), "a number or an expression", why),
+                Err(why) => {
+                    log.fault(card.at, log.quote(value), "a number or an expression", why.to_string())
+                }
             }
         }
     }
@@ -79,13 +108,13 @@ fn cut(text: &str, column: usize) -> (&str, &str) {
 ///
 /// # Errors
 /// What is wrong with it.
-pub(super) fn evaluate(text: &str, known: &BTreeMap<String, f64>) -> Result<f64, String> {
+pub(super) fn evaluate(text: &str, known: &BTreeMap<String, f64>) -> Result<f64, Error> {
     let mut reader = Reader { rest: text, known, depth: 0 };
     let value = reader.sum()?;
     reader.skip();
     match reader.rest.chars().next() {
         None => Ok(value),
-        Some(c) => Err(format!("remove what starts at \"{c}\"")),
+        Some(c) => Err(Error::Rest(c)),
     }
 }
 
@@ -107,10 +136,10 @@ impl Reader<'_> {
         rest.is_some()
     }
 
-    fn sum(&mut self) -> Result<f64, String> {
+    fn sum(&mut self) -> Result<f64, Error> {
         self.depth += 1;
         if self.depth > MAX_DEPTH {
-            return Err(format!("use at most {MAX_DEPTH} brackets one in another"));
+            return Err(Error::TooDeep);
         }
         let mut value = self.product()?;
         loop {
@@ -125,7 +154,7 @@ impl Reader<'_> {
         }
     }
 
-    fn product(&mut self) -> Result<f64, String> {
+    fn product(&mut self) -> Result<f64, Error> {
         let mut value = self.signed()?;
         loop {
             if self.rest.trim_start().starts_with("**") {
@@ -140,7 +169,7 @@ impl Reader<'_> {
         }
     }
 
-    fn signed(&mut self) -> Result<f64, String> {
+    fn signed(&mut self) -> Result<f64, Error> {
         let mut sign = 1.0;
         loop {
             if self.take("-") {
@@ -151,7 +180,7 @@ impl Reader<'_> {
         }
     }
 
-    fn power(&mut self) -> Result<f64, String> {
+    fn power(&mut self) -> Result<f64, Error> {
         let mut powers = vec![self.atom()?];
         while self.take("**") || self.take("^") {
             let negative = self.take("-");
@@ -166,26 +195,26 @@ impl Reader<'_> {
         Ok(value)
     }
 
-    fn atom(&mut self) -> Result<f64, String> {
+    fn atom(&mut self) -> Result<f64, Error> {
         self.skip();
         if self.take("(") {
             let value = self.sum()?;
-            return if self.take(")") { Ok(value) } else { Err("close the bracket".to_string()) };
+            return if self.take(")") { Ok(value) } else { Err(Error::Open) };
         }
         let _ = self.take("&");
         let starts_a_number = |c: char| c.is_ascii_digit() || c == '.';
-        let first = self.rest.chars().next().ok_or("complete the expression")?;
+        let first = self.rest.chars().next().ok_or(Error::Incomplete)?;
         if starts_a_number(first) {
             let length = number_length(self.rest);
             let (number, rest) = self.rest.split_at(length);
             self.rest = rest;
-            return real(number).ok_or_else(|| format!("{number} is no number"));
+            return real(number).ok_or_else(|| Error::NoNumber(number.to_string()));
         }
         let end =
             self.rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(self.rest.len());
         let (name, rest) = self.rest.split_at(end);
         if name.is_empty() {
-            return Err(format!("remove \"{first}\""));
+            return Err(Error::Sign(first));
         }
         self.rest = rest;
         let name = name.to_ascii_lowercase();
@@ -194,7 +223,7 @@ impl Reader<'_> {
             return match (value, name.as_str()) {
                 (Some(value), _) => Ok(value),
                 (None, "pi") => Ok(std::f64::consts::PI),
-                (None, _) => Err(format!("there is no parameter {name} before it")),
+                (None, _) => Err(Error::Unknown(name)),
             };
         }
         let mut given = vec![self.sum()?];
@@ -202,14 +231,14 @@ impl Reader<'_> {
             given.push(self.sum()?);
         }
         if !self.take(")") {
-            return Err("close the bracket".to_string());
+            return Err(Error::Open);
         }
         call(&name, &given)
     }
 }
 
 /// A function of one or two numbers.
-fn call(name: &str, given: &[f64]) -> Result<f64, String> {
+fn call(name: &str, given: &[f64]) -> Result<f64, Error> {
     let value = match (name, given) {
         ("sqrt", [x]) => x.sqrt(),
         ("abs", [x]) => x.abs(),
@@ -233,7 +262,7 @@ fn call(name: &str, given: &[f64]) -> Result<f64, String> {
         ("max", [a, b]) => a.max(*b),
         ("mod", [a, b]) => a % b,
         ("sign", [a, b]) => a.abs().copysign(*b),
-        _ => return Err(format!("there is no function {name} of {} numbers", given.len())),
+        _ => return Err(Error::Function(name.to_string(), given.len())),
     };
     Ok(value)
 }

@@ -2,10 +2,10 @@
 
 use super::{
     cards::Block,
-    condition::{Meaning, all_along, scale},
+    condition::{Meaning, all_along, goes_on, scale},
     fields::{Context, Fields, TENS},
-    log::Place,
 };
+use crate::place::Place;
 
 /// Parts by number, or by the number of their set.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,8 +93,13 @@ impl RigidCards {
                 "take it out, or convert the deck and give mass, centre and inertia in [[rigid]]",
             ),
             word => {
-                for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
-                    self.line(word, &context.fields(card, block.width, &TENS));
+                let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
+                while let Some(card) = cards.next() {
+                    let f = context.fields(card, block.width, &TENS);
+                    self.line(word, &f);
+                    if word.starts_with("BOUNDARY_PRESCRIBED") && goes_on(&f) {
+                        cards.next();
+                    }
                 }
             }
         }

@@ -5,12 +5,8 @@ use std::collections::BTreeMap;
 use super::{
     cards::Block,
     fields::{Context, Fields, TENS},
-    log::{Log, Place},
-    problem::Problem,
 };
-
-/// Most numbers that one range may name.
-const MAX_RANGE: u32 = 10_000_000;
+use crate::place::Place;
 
 /// One entry of a set of nodes or segments.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,7 +69,7 @@ impl Sets {
                 ("NODE" | "PART", "LIST_GENERATE" | "GENERATE") => {
                     for i in (0..8).step_by(2).filter(|i| !f.blank(*i)) {
                         let (first, last) = (f.id(i), f.id(i + 1));
-                        if last < first || last - first >= MAX_RANGE {
+                        if last < first {
                             f.fault(i + 1, "a last number not below the first", "correct the range");
                             continue;
                         }
@@ -109,7 +105,8 @@ impl Sets {
             }
             std::collections::btree_map::Entry::Occupied(known) => {
                 let words = format!("set {id}");
-                let expected = format!("a number that line {} does not have", known.get().0.line);
+                let line = context.log.line(known.get().0, head.at);
+                let expected = format!("a number that {line} does not have");
                 context.log.fault(head.at, words, expected, "renumber one");
             }
             std::collections::btree_map::Entry::Vacant(place) => {
@@ -144,112 +141,5 @@ fn general(kind: &str, f: &Fields<'_>, entries: &mut Vec<(Entry, bool)>) {
             "ALL, NODE, PART, BOX, SEG or one of them after D",
             "list the members in one of these ways",
         ),
-    }
-}
-
-/// Deepest nesting of sets of sets.
-const MAX_DEPTH: usize = 20;
-
-impl Problem {
-    /// Nodes of a set, ascending.
-    pub(super) fn node_set(&self, id: u32, by: Place, log: &Log) -> Vec<u32> {
-        self.members(id, by, log, true, 0)
-    }
-
-    /// Parts of a set, ascending.
-    pub(super) fn part_set(&self, id: u32, by: Place, log: &Log) -> Vec<u32> {
-        self.members(id, by, log, false, 0)
-    }
-
-    fn members(&self, id: u32, by: Place, log: &Log, of_nodes: bool, depth: usize) -> Vec<u32> {
-        let (sets, what) = if of_nodes { (&self.sets.nodes, "nodes") } else { (&self.sets.parts, "parts") };
-        let Some((at, entries)) = sets.get(&id) else {
-            log.fault(
-                by,
-                format!("set {id}"),
-                format!("a set of {what} of the deck"),
-                "define it, or name another",
-            );
-            return Vec::new();
-        };
-        if depth == MAX_DEPTH {
-            log.fault(by, format!("set {id}"), "sets that do not hold themselves", "list the members");
-            return Vec::new();
-        }
-        let mut members: Vec<u32> = Vec::new();
-        for (entry, out) in entries {
-            let mut found: Vec<u32> = match entry {
-                Entry::All if of_nodes => self.nodes.iter().map(|n| n.id).collect(),
-                Entry::All => self.parts.keys().copied().collect(),
-                Entry::Node(id) => vec![*id],
-                Entry::Range(first, last) if of_nodes => {
-                    self.nodes.iter().map(|n| n.id).filter(|id| (first..=last).contains(&id)).collect()
-                }
-                Entry::Range(first, last) => self.parts.range(first..=last).map(|(id, _)| *id).collect(),
-                Entry::Part(part) => self.nodes_of_part(*part),
-                Entry::Box(number) => {
-                    let inside = self.within(*number, *at, log);
-                    self.nodes.iter().filter(|n| inside(n.x)).map(|n| n.id).collect()
-                }
-                Entry::Set(other) => self.members(*other, *at, log, of_nodes, depth + 1),
-                Entry::Segment(_) => Vec::new(),
-            };
-            found.sort_unstable();
-            if *out {
-                members.retain(|id| found.binary_search(id).is_err());
-            } else {
-                members.append(&mut found);
-            }
-        }
-        members.sort_unstable();
-        members.dedup();
-        let known = |id: &u32| match of_nodes {
-            true => self.node_index.contains_key(id),
-            false => self.parts.contains_key(id),
-        };
-        let strange = members.iter().filter(|id| !known(id)).count();
-        if strange > 0 {
-            log.warn(*at, format!("set {id} names {strange} {what} that the deck does not have"));
-            members.retain(known);
-        }
-        members
-    }
-
-    /// Segments of a set. Parts and boxes stand for the outer faces there.
-    pub(super) fn segment_set(&self, id: u32, by: Place, log: &Log) -> Vec<[u32; 4]> {
-        let Some((at, entries)) = self.sets.segments.get(&id) else {
-            log.fault(by, format!("set {id}"), "a set of segments of the deck", "define it, or name another");
-            return Vec::new();
-        };
-        let mut list = Vec::new();
-        for (entry, out) in entries {
-            match entry {
-                Entry::Segment(face) if !out => list.push(*face),
-                _ => {
-                    log.fault(*at, format!("set {id}"), "segments by their nodes", "list them, *SET_SEGMENT")
-                }
-            }
-        }
-        list
-    }
-
-    /// Nodes of the elements of a part, ascending.
-    pub(super) fn nodes_of_part(&self, part: u32) -> Vec<u32> {
-        let solids = self.solids.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
-        let shells = self.shells.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
-        let mut nodes: Vec<u32> = solids.chain(shells).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        nodes
-    }
-
-    /// Whether a point lies in a box, with its sides.
-    pub(super) fn within(&self, number: u32, by: Place, log: &Log) -> impl Fn([f64; 3]) -> bool + use<> {
-        let bounds = self.boxes.get(&number).copied();
-        if bounds.is_none() {
-            log.fault(by, format!("box {number}"), "a *DEFINE_BOX of the deck", "define it, or name another");
-        }
-        let [low, high] = bounds.unwrap_or_default();
-        move |x| (0..3).all(|a| (low[a]..=high[a]).contains(&x[a]))
     }
 }

@@ -1,9 +1,10 @@
 //! Units of a keyword deck, which does not say them: chosen by `--units`, else guessed from its densities.
 
 use super::{
-    log::{Log, Place},
-    material::MaterialCard,
+    material::{Law, MaterialCard},
+    problem::UnitsCard,
 };
+use crate::{log::Log, place::Place};
 
 /// A set by its names, with the size of its density and stress in SI.
 struct Set {
@@ -13,17 +14,52 @@ struct Set {
     others: [&'static str; 2],
     density: f64,
     stress: f64,
+    /// Length, time and mass as `*CONTROL_UNITS` names them.
+    words: [&'static [&'static str]; 3],
 }
+
+const MILLIMETRE: &[&str] = &["mm"];
+const SECOND: &[&str] = &["s", "sec"];
 
 const INCHES: &str = "in-s-lbf";
 
 const SETS: [Set; 5] = [
-    Set { name: "mm-s-t", others: ["mm-s-tonne", "t-mm-s"], density: 1e12, stress: 1e6 },
-    Set { name: "mm-ms-kg", others: ["kg-mm-ms", "mm-kg-ms"], density: 1e9, stress: 1e9 },
-    Set { name: "cm-g-us", others: ["cm-us-g", "g-cm-us"], density: 1e3, stress: 1e11 },
+    Set {
+        name: "mm-s-t",
+        others: ["mm-s-tonne", "t-mm-s"],
+        density: 1e12,
+        stress: 1e6,
+        words: [MILLIMETRE, SECOND, &["mtrc_ton", "ton", "tonne", "t"]],
+    },
+    Set {
+        name: "mm-ms-kg",
+        others: ["kg-mm-ms", "mm-kg-ms"],
+        density: 1e9,
+        stress: 1e9,
+        words: [MILLIMETRE, &["ms"], &["kg"]],
+    },
+    Set {
+        name: "cm-g-us",
+        others: ["cm-us-g", "g-cm-us"],
+        density: 1e3,
+        stress: 1e11,
+        words: [&["cm"], &["micro_s", "us"], &["g", "gm"]],
+    },
     // The pound of force and the inch: 175.127 kg, 0.0254 m.
-    Set { name: INCHES, others: ["lbf-in-s", "in-lbf-s"], density: 1.068_688e7, stress: 6894.757 },
-    Set { name: "SI", others: ["m-s-kg", "kg-m-s"], density: 1.0, stress: 1.0 },
+    Set {
+        name: INCHES,
+        others: ["lbf-in-s", "in-lbf-s"],
+        density: 1.068_688e7,
+        stress: 6894.757,
+        words: [&["in"], SECOND, &["slinch"]],
+    },
+    Set {
+        name: "SI",
+        others: ["m-s-kg", "kg-m-s"],
+        density: 1.0,
+        stress: 1.0,
+        words: [&["m"], SECOND, &["kg"]],
+    },
 ];
 
 /// Names that `--units` takes.
@@ -36,11 +72,18 @@ const SPEEDS: std::ops::RangeInclusive<f64> = 10.0..=20_000.0;
 /// The name of the units in a TOML deck; the first set where nothing tells.
 pub(super) fn choose<'m>(
     asked: Option<&str>,
+    given: Option<&UnitsCard>,
     materials: impl Iterator<Item = &'m MaterialCard>,
-    log: &Log,
+    log: &Log<'_>,
 ) -> &'static str {
-    let start = Place { file: 0, line: 1 };
+    let start = Place::card(0, 1);
     let list: Vec<&MaterialCard> = materials.collect();
+    // Rigid bodies are often given the density that makes up their mass.
+    let is_rigid = |material: &&MaterialCard| matches!(material.law, Law::Rigid { .. });
+    let list: Vec<&MaterialCard> = match list.iter().all(is_rigid) {
+        true => list,
+        false => list.into_iter().filter(|material| !is_rigid(material)).collect(),
+    };
     let plausible = |set: &Set, material: &MaterialCard| {
         let density = material.density * set.density;
         let speed = material.elastic.map(|(young, _)| (young * set.stress / density).sqrt());
@@ -59,18 +102,21 @@ pub(super) fn choose<'m>(
             );
             return SETS[0].name;
         };
-        for material in list.iter().filter(|material| !plausible(set, material)) {
-            let modulus =
-                material.elastic.map_or(String::new(), |(young, _)| format!(" and Young's modulus {young}"));
-            log.warn(
-                material.at,
-                format!(
-                    "density {}{modulus} are those of no solid or liquid in {}; check --units",
-                    material.density, set.name
-                ),
-            );
-        }
+        doubt(set, "--units", &list, &plausible, log);
         return set.name;
+    }
+    if let Some(given) = given {
+        let named = |set: &&Set| (0..3).all(|i| set.words[i].contains(&given.words[i].as_str()));
+        match SETS.iter().find(named) {
+            Some(set) => {
+                doubt(set, "*CONTROL_UNITS", &list, &plausible, log);
+                return set.name;
+            }
+            None => log.warn(
+                given.at,
+                format!("*CONTROL_UNITS of {}: results know {NAMES}; give --units", given.words.join(", ")),
+            ),
+        }
     }
     // Foam in metric units could be steel in inches: those count only where no metric set fits.
     let fit = |metric: bool| -> Vec<&Set> {
@@ -103,21 +149,42 @@ pub(super) fn choose<'m>(
     }
 }
 
+/// Warns of densities and moduli that nothing has in these units, which `by` named.
+fn doubt(
+    set: &Set,
+    by: &str,
+    materials: &[&MaterialCard],
+    plausible: &impl Fn(&Set, &MaterialCard) -> bool,
+    log: &Log<'_>,
+) {
+    for material in materials.iter().filter(|material| !plausible(set, material)) {
+        let modulus =
+            material.elastic.map_or(String::new(), |(young, _)| format!(" and Young's modulus {young}"));
+        log.warn(
+            material.at,
+            format!(
+                "density {}{modulus} are those of no solid or liquid in {}; check {by}",
+                material.density, set.name
+            ),
+        );
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::keyword::{erosion::Limits, material::Law};
+    use crate::keyword::erosion::Limits;
 
     fn chosen(asked: Option<&str>, density: f64, young: f64) -> (&'static str, usize) {
-        let log = Log::new(vec!["a.k".to_string()]);
+        let log = Log::keyword(&[("a.k", "")]);
         let steel = MaterialCard {
-            at: Place::default(),
+            at: Place::card(0, 1),
             density,
             elastic: Some((young, 0.3)),
             law: Law::Elastic,
             erosion: Limits::default(),
         };
-        let name = choose(asked, std::iter::once(&steel), &log);
+        let name = choose(asked, None, std::iter::once(&steel), &log);
         let (faults, warnings) = log.into_lists();
         (name, faults.len() + warnings.len())
     }

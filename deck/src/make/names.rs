@@ -130,7 +130,10 @@ impl<'d> Curves<'d> {
     /// How a message writes a drive.
     pub(super) fn words(&self, drive: load::Drive) -> String {
         match self.index.iter().find(|(_, index)| Some(**index) == drive.curve) {
-            Some((name, _)) => format!("{} x curve \"{name}\"", drive.factor),
+            Some((name, _)) => {
+                let [before, after] = [self.log.say("curve \"", ""), self.log.say("\"", "")];
+                format!("{} x {before}{name}{after}", drive.factor)
+            }
             None => drive.factor.to_string(),
         }
     }

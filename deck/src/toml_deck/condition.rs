@@ -4,7 +4,7 @@ use mechanics::burn::Detonation;
 
 use super::entry::{AXES, components, direction, drive, faces, parts, parts_of, region, text};
 use crate::{
-    limits::MAX_ENTRIES,
+    limits::{MAX_CURVE_POINTS, MAX_ENTRIES},
     place::Place,
     table::{Range, Table, Value},
     typed::condition::{
@@ -12,9 +12,6 @@ use crate::{
         Wall, WallMotion, WallShape,
     },
 };
-
-/// Most points of a curve.
-const MAX_POINTS: usize = 100_000;
 
 const NO_COMPONENTS: Components = [const { None }; 3];
 
@@ -35,8 +32,8 @@ pub(super) fn read_curves(deck: &Table<'_>) -> Vec<Curve> {
 fn read_points(table: &Table<'_>) -> Option<Vec<[f64; 2]>> {
     let value = table.require("points", "[[time, value], ...]")?;
     let items = value.items()?;
-    if items.is_empty() || items.len() > MAX_POINTS {
-        value.fault(&format!("1 to {MAX_POINTS} points"), "write [[time, value], ...]");
+    if items.is_empty() || items.len() > MAX_CURVE_POINTS {
+        value.fault(&format!("1 to {MAX_CURVE_POINTS} points"), "write [[time, value], ...]");
         return None;
     }
     let mut points: Vec<[f64; 2]> = Vec::with_capacity(items.len());

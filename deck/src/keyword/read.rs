@@ -1,0 +1,153 @@
+//! Blocks of cards become a problem: this knows every keyword. What is read and cannot be honoured is a fault at its line;
+//! what changes nothing here goes into one warning.
+
+use super::{
+    cards::{Block, Lines},
+    condition::Conditions,
+    contact::ContactCard,
+    define, erosion,
+    fields::{Context, TENS},
+    material, mesh,
+    problem::{Problem, UnitsCard},
+    property,
+    rigid::RigidCards,
+};
+use crate::log::Log;
+
+/// Keywords of several sections, each with a heading of its own where the keyword ends in `_TITLE`; and the cards of a
+/// section.
+const HEADED: [(&str, usize); 4] =
+    [("SECTION_SOLID", 1), ("SECTION_SHELL", 2), ("HOURGLASS", 1), ("DEFINE_BOX", 1)];
+
+/// Reads all blocks.
+pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
+    let mut problem = Problem::default();
+    let mut blocks = std::mem::take(&mut lines.blocks);
+    let context = Context { log, parameters: &lines.parameters };
+    // Coordinate systems may name nodes, whatever stands first.
+    let mut later = Vec::new();
+    for block in &mut blocks {
+        while block.cards.last().is_some_and(|card| card.text.trim().is_empty()) {
+            block.cards.pop();
+        }
+        if block.keyword.starts_with("DEFINE_COORDINATE_NODES") {
+            later.push(block);
+        } else {
+            keyword(&mut problem, block, &context);
+        }
+    }
+    for block in later {
+        keyword(&mut problem, block, &context);
+    }
+    problem
+}
+
+/// Takes the headings of `_TITLE` out of a block.
+fn take_headings(block: &mut Block<'_>) {
+    let headed = !block.keyword.starts_with("CONTACT") && !block.keyword.starts_with("RIGIDWALL");
+    if !headed || !block.take("_TITLE") || block.cards.is_empty() {
+        return;
+    }
+    match HEADED.iter().find(|(word, _)| *word == block.keyword) {
+        Some((_, cards)) => {
+            let mut n = 0;
+            block.cards.retain(|_| {
+                n += 1;
+                (n - 1) % (cards + 1) != 0
+            });
+        }
+        None => {
+            block.cards.remove(0);
+        }
+    }
+}
+
+/// Reads one keyword.
+fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) {
+    let whole = block.keyword.clone();
+    take_headings(block);
+    let log = context.log;
+    match block.keyword.as_str() {
+        "KEYWORD" | "KEYWORD_ID" | "COMMENT" | "PARAMETER_DUPLICATION" => {}
+        "TITLE" => {
+            // That of the deck itself goes before those of its includes.
+            let own = block.at.file() == 0;
+            if own || problem.title.is_none() {
+                problem.title = Some(block.card(0).text.trim().to_string());
+            }
+        }
+        "NODE" => mesh::read_nodes(problem, block, context),
+        "ELEMENT_SOLID" => mesh::read_solids(problem, block, context),
+        "ELEMENT_SHELL" => mesh::read_shells(problem, block, context, false),
+        "ELEMENT_SHELL_THICKNESS" => mesh::read_shells(problem, block, context, true),
+        "PART" => property::read_parts(problem, block, context, false),
+        "PART_CONTACT" => property::read_parts(problem, block, context, true),
+        "SECTION_SOLID" => property::read_solid_sections(problem, block, context),
+        "SECTION_SHELL" => property::read_shell_sections(problem, block, context),
+        "HOURGLASS" => property::read_hourglass(problem, block, context),
+        "DEFINE_CURVE" => define::read_curve(problem, block, context),
+        "DEFINE_BOX" => define::read_box(problem, block, context),
+        "DEFINE_COORDINATE_SYSTEM" | "DEFINE_COORDINATE_NODES" | "DEFINE_COORDINATE_VECTOR" => {
+            define::read_system(problem, block, context);
+        }
+        "CONTROL_UNITS" => {
+            let card = block.card(0);
+            let f = context.fields(&card, block.width, &TENS);
+            let words = [0, 1, 2].map(|i| f.words(i).to_ascii_lowercase());
+            problem.units = Some(UnitsCard { at: card.at, words });
+        }
+        "MAT_ADD_EROSION" | "MAT_000" => {
+            let (id, limits) = erosion::read(block, context);
+            problem.erosions.entry(id).or_default().merge(limits);
+        }
+        word if RigidCards::knows(word) => problem.rigid.read(block, context),
+        word if word.starts_with("SET_") => problem.sets.read(block, context),
+        word if word.starts_with("MAT_") => read_material(problem, block, context),
+        word if word.starts_with("EOS_") => read_eos(problem, block, context),
+        word if word.starts_with("CONTACT_FORCE_TRANSDUCER") => {
+            problem.transducers.extend(ContactCard::read_transducer(block, context));
+        }
+        word if word.starts_with("CONTACT_") => problem.contacts.extend(ContactCard::read(block, context)),
+        word if word.starts_with("CONTROL_") => problem.control.read(block, context),
+        word if word.starts_with("DATABASE_") => problem.control.read_database(block, context),
+        word if Conditions::knows(word) => problem.conditions.read(block, context),
+        word if word.starts_with("DEFINE_") => define::read_other(problem, block, context),
+        _ => {
+            log.fault(
+                block.at,
+                format!("*{}", log.quote(&whole)),
+                "a keyword of the table in deck/README.md",
+                "take it out, or say it otherwise; leaving it out would change what is computed",
+            );
+        }
+    }
+}
+
+/// Reads a `*MAT_` keyword.
+fn read_material(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
+    let head = block.card(0);
+    let f = context.fields(&head, block.width, &TENS);
+    let id = f.id(0);
+    let Some(card) = material::read(block, context) else {
+        problem.refused_materials.insert(id);
+        return;
+    };
+    if let Some(first) = problem.materials.insert(id, card) {
+        let line = context.log.line(first.at, head.at);
+        f.fault(0, format!("a number other than {id}, which {line} has"), "renumber one");
+    }
+}
+
+/// Reads an `*EOS_` keyword.
+fn read_eos(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
+    let head = block.card(0);
+    let id = context.fields(&head, block.width, &TENS).id(0);
+    match material::read_eos(block, context) {
+        Some(eos) => {
+            problem.equations.insert(id, eos);
+        }
+        None => {
+            problem.refused_equations.insert(id);
+        }
+    }
+}

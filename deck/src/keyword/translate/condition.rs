@@ -1,0 +1,272 @@
+//! What holds, moves, pushes and stops nodes.
+
+use std::collections::{BTreeMap, HashMap};
+
+use mechanics::load::MAX_FORCES;
+
+use super::state::Translation;
+use crate::{
+    geometry::{dot, sub, unit},
+    keyword::condition::{AXES_OF_CODE, Meaning, Target},
+    place::Place,
+    typed::condition::{
+        Boundary, BoundaryKind, Components, Drive, Faces, Gravity, Load, LoadKind, Parts, Region, Wall,
+        WallMotion, WallShape, made,
+    },
+};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+const FREE: Components = [const { None }; 3];
+
+/// What is held at rest, by the axes that are.
+pub(super) fn write_held(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    // By node: translations, then rotations.
+    let mut of_node: BTreeMap<u32, ([[bool; 3]; 2], Place)> = BTreeMap::new();
+    let mut hold = |node: u32, axes: [[bool; 3]; 2], at: Place| {
+        let entry = of_node.entry(node).or_insert(([[false; 3]; 2], at));
+        for (all, new) in entry.0.iter_mut().flatten().zip(axes.iter().flatten()) {
+            *all |= new;
+        }
+    };
+    for node in problem.nodes.iter().filter(|node| node.held != [0; 2] && t.used.contains(&node.id)) {
+        hold(node.id, node.held.map(|code| AXES_OF_CODE[usize::from(code)]), node.at);
+    }
+    for given in &problem.conditions.held {
+        let [x, y, z, turn_x, turn_y, turn_z] = given.axes;
+        let directions = t.directions(given.system, given.at);
+        let axes = [[x, y, z], [turn_x, turn_y, turn_z]].map(|local| {
+            let Some(directions) = directions.filter(|_| local != [true; 3]) else { return local };
+            let mut axes = [false; 3];
+            for (direction, _) in directions.iter().zip(local).filter(|(_, held)| *held) {
+                match (0..3).find(|a| direction[*a].abs() > 1.0 - 1e-9) {
+                    Some(axis) => axes[axis] = true,
+                    None => log.fault(
+                        given.at,
+                        format!("nodes held along {direction:?}"),
+                        "a direction along x, y or z",
+                        "turn the mesh so that symmetry planes are those of the axes",
+                    ),
+                }
+            }
+            axes
+        });
+        for node in t.nodes(given.target, given.at) {
+            hold(node, axes, given.at);
+        }
+    }
+    let mut groups: BTreeMap<[[bool; 3]; 2], (Place, Vec<u32>)> = BTreeMap::new();
+    for (node, (axes, at)) in of_node {
+        // Only nodes of shells turn.
+        let axes = [axes[0], if t.turns.contains(&node) { axes[1] } else { [false; 3] }];
+        if axes == [[false; 3]; 2] {
+            continue;
+        }
+        let group = groups.entry(axes).or_insert((at, Vec::new()));
+        group.0 = group.0.min(at);
+        group.1.push(node);
+    }
+    for (axes, (at, nodes)) in groups {
+        let [letters, turns] =
+            axes.map(|axes| (0..3).filter(|a| axes[*a]).map(|a| AXES[a]).collect::<String>());
+        let name = match (letters.as_str(), turns.as_str()) {
+            (letters, "") => format!("held {letters}"),
+            (letters, turns) => format!("held {letters} turned {turns}"),
+        };
+        let velocity = axes[0].map(|held| held.then(|| Drive::constant(0.0)));
+        let clamped = (0..3).filter(|a| axes[1][*a]).fold(0, |bits, a| bits | 1 << a);
+        let nodes = Some(Region::Set(t.set(&name, nodes, at)));
+        push_boundary(t, at, "nodes that are held", BoundaryKind::Held { velocity, clamped, nodes });
+    }
+}
+
+fn push_boundary(t: &mut Translation<'_>, at: Place, title: &str, kind: BoundaryKind) {
+    t.deck.boundaries.push(Boundary { at, title: title.to_string(), parts: Parts::All, kind });
+}
+
+/// Motions by curve.
+pub(super) fn write_motions(t: &mut Translation<'_>) {
+    let problem = t.problem;
+    for (n, given) in problem.conditions.motions.iter().enumerate() {
+        let nodes = t.nodes(given.target, given.at);
+        let Some(curve) = t.curve(given.curve, given.meaning, given.at) else { continue };
+        if nodes.is_empty() {
+            t.log.warn(given.at, "a motion of no node that has an element");
+            continue;
+        }
+        let nodes = Some(Region::Set(t.set(&format!("motion {}", n + 1), nodes, given.at)));
+        let mut velocity = FREE;
+        velocity[given.axis] = Some(Drive { factor: given.factor + 0.0, curve: Some(curve) });
+        let kind = BoundaryKind::Held { velocity, clamped: 0, nodes };
+        push_boundary(t, given.at, "a motion", kind);
+    }
+}
+
+/// Forces, alike ones together.
+pub(super) fn write_forces(t: &mut Translation<'_>) {
+    let problem = t.problem;
+    // By curve, axis and factor: how often each node is named.
+    type Group = (Place, BTreeMap<u32, u32>);
+    let mut groups: BTreeMap<(u32, usize, u64), Group> = BTreeMap::new();
+    for given in &problem.conditions.forces {
+        let key = (given.curve, given.axis, given.factor.to_bits());
+        let nodes = t.nodes(given.target, given.at);
+        let group = groups.entry(key).or_insert((given.at, BTreeMap::new()));
+        for node in nodes {
+            *group.1.entry(node).or_default() += 1;
+        }
+    }
+    let mut n = 0;
+    for ((curve, axis, bits), (at, nodes)) in groups {
+        let Some(curve) = t.curve(curve, Meaning::Velocity, at) else { continue };
+        // A node that is named several times is pushed as often.
+        let most = nodes.values().copied().max().unwrap_or(0);
+        for times in 1..=most {
+            let list: Vec<u32> = nodes.iter().filter(|(_, t)| **t == times).map(|(node, _)| *node).collect();
+            if list.is_empty() {
+                continue;
+            }
+            n += 1;
+            if n == MAX_FORCES + 1 {
+                let expected =
+                    format!("at most {MAX_FORCES} forces that differ in curve, direction or factor");
+                t.log.fault(at, "more forces", expected, "give more nodes the same force");
+            }
+            if n > MAX_FORCES {
+                return;
+            }
+            let nodes = Some(Region::Set(t.set(&format!("force {n}"), list, at)));
+            let mut force = [0.0; 3];
+            force[axis] = f64::from_bits(bits) * f64::from(times);
+            let force = Some(t.vector(at, "a force of", force));
+            let drive = Drive { factor: 1.0, curve: Some(curve.clone()) };
+            push_load(t, at, "a force", LoadKind::Force { force, drive, nodes });
+        }
+    }
+}
+
+fn push_load(t: &mut Translation<'_>, at: Place, title: &str, kind: LoadKind) {
+    t.deck.loads.push(Load { at, title: title.to_string(), parts: Parts::All, kind });
+}
+
+/// Pressures, by whether segments are listed outward.
+pub(super) fn write_pressures(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    if problem.conditions.pressures.is_empty() {
+        return;
+    }
+    let mut outward: HashMap<[u32; 4], [u32; 4]> = HashMap::new();
+    for solid in &problem.solids {
+        for face in mechanics::mesh::FACES.map(|face| face.map(|c| solid.nodes[c])) {
+            let mut key = face;
+            key.sort_unstable();
+            // A face of two elements is inside, and no pressure acts there.
+            if outward.insert(key, face).is_some() {
+                outward.remove(&key);
+            }
+        }
+    }
+    // Faces by curve, factor and side.
+    type Group = (Place, Vec<[u32; 4]>);
+    let mut groups: BTreeMap<(u32, u64), Group> = BTreeMap::new();
+    for given in &problem.conditions.pressures {
+        let faces =
+            if given.set == 0 { given.faces.clone() } else { problem.segment_set(given.set, given.at, log) };
+        for face in faces {
+            let mut key = face;
+            key.sort_unstable();
+            let Some(out) = outward.get(&key) else {
+                log.fault(
+                    given.at,
+                    format!("segment {face:?}"),
+                    "an outer face of a solid",
+                    "name its four nodes",
+                );
+                continue;
+            };
+            let start = out.iter().position(|n| *n == face[0]).unwrap_or(0);
+            let same = out[(start + 1) % 4] == face[1];
+            let factor = if same { given.factor } else { -given.factor };
+            let group = groups.entry((given.curve, factor.to_bits())).or_insert((given.at, Vec::new()));
+            group.1.push(face);
+        }
+    }
+    for (n, ((curve, bits), (at, faces))) in groups.into_iter().enumerate() {
+        let Some(curve) = t.curve(curve, Meaning::Velocity, at) else { continue };
+        let name = format!("pressure {}", n + 1);
+        t.mesh.segments.insert(name.clone(), faces);
+        let pressure = Some(Drive { factor: f64::from_bits(bits) + 0.0, curve: Some(curve) });
+        let faces = Some(Faces::Segments(made(name, at)));
+        push_load(t, at, "a pressure", LoadKind::Pressure { pressure, faces });
+    }
+}
+
+/// One gravity: its axes must follow one curve.
+pub(super) fn write_gravity(t: &mut Translation<'_>) {
+    let problem = t.problem;
+    let bodies = &problem.conditions.bodies;
+    let Some(first) = bodies.first() else { return };
+    let mut acceleration = [0.0; 3];
+    for body in bodies {
+        if body.curve != first.curve {
+            t.log.fault(
+                body.at,
+                format!("curve {}", body.curve),
+                format!("curve {}, which {} has", first.curve, t.log.line(first.at, body.at)),
+                "let all axes follow one curve, each with its own SF",
+            );
+        }
+        // The load acts against the axis, as of a base that is accelerated along it.
+        acceleration[body.axis] -= body.factor;
+    }
+    let Some(curve) = t.curve(first.curve, Meaning::Velocity, first.at) else { return };
+    let acceleration = t.vector(first.at, "an acceleration of", acceleration);
+    t.deck.gravity = Some(Gravity { acceleration, drive: Drive { factor: 1.0, curve: Some(curve) } });
+}
+
+/// Rigid walls.
+pub(super) fn write_walls(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    for (n, wall) in problem.conditions.walls.iter().enumerate() {
+        let at = wall.at;
+        let some = wall.target != Target::All || wall.except != 0 || wall.inside != 0 || wall.offset != 0.0;
+        let normal = unit(wall.normal).unwrap_or_default();
+        let mut set = None;
+        if some {
+            let mut nodes = t.nodes(wall.target, at);
+            let inside = (wall.inside != 0).then(|| problem.within(wall.inside, at, log));
+            let except = if wall.except != 0 { problem.node_set(wall.except, at, log) } else { Vec::new() };
+            nodes.retain(|node| {
+                let x = problem.position(*node).unwrap_or_default();
+                let height = dot(sub(x, wall.point), normal);
+                except.binary_search(node).is_err()
+                    && inside.as_ref().is_none_or(|inside| inside(x))
+                    && (wall.offset <= 0.0 || height <= wall.offset)
+            });
+            if nodes.is_empty() {
+                log.warn(at, "a wall that no node with an element feels");
+                continue;
+            }
+            set = Some(Region::Set(t.set(&format!("wall {}", n + 1), nodes, at)));
+        }
+        let motion = match wall.moving {
+            None => WallMotion::Fixed,
+            Some([mass, speed]) => {
+                WallMotion::Free { mass, velocity: t.vector(at, "a velocity of", normal.map(|c| speed * c)) }
+            }
+        };
+        let shape = WallShape::Plane {
+            point: wall.point.map(|x| x + 0.0),
+            normal: t.vector(at, "a normal with", normal),
+        };
+        t.deck.walls.push(Wall {
+            at,
+            title: "a *RIGIDWALL".to_string(),
+            shape: Some(shape),
+            friction: wall.friction,
+            motion: Some(motion),
+            parts: Parts::All,
+            nodes: set,
+        });
+    }
+}

@@ -1,0 +1,167 @@
+//! Which parts meet, whose contact forces are written, and what becomes of nodes that erosion frees.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{part::first_erosion, state::Translation};
+use crate::{
+    keyword::contact::{ContactCard, Side},
+    limits::MAX_CONTACT_FORCES,
+    place::{Origin, Place, Placed},
+    typed::{
+        FreedNodes,
+        condition::made,
+        contact::{Contact, Gap, Pair, Slack},
+    },
+};
+
+/// Adds contact to the deck.
+pub(super) fn write(t: &mut Translation<'_>) {
+    let problem = t.problem;
+    let mut pairs: BTreeMap<(u32, u32), (Place, f64)> = BTreeMap::new();
+    for contact in &problem.contacts {
+        for (a, b) in pairs_of(contact, t) {
+            let known = t.names.contains_key(&a) && t.names.contains_key(&b);
+            if known && !t.bodies.same(a, b) {
+                pairs.entry((a, b)).or_insert((contact.at, contact.friction));
+            }
+        }
+    }
+    let Some(at) = problem.contacts.first().map(|contact| contact.at).filter(|_| !pairs.is_empty()) else {
+        return;
+    };
+    write_freed_nodes(t);
+    t.met = pairs.keys().copied().collect();
+    let pair = |((a, b), (at, friction)): ((u32, u32), (Place, f64))| Pair {
+        origin: Origin::card(at),
+        parts: [a, b].map(|id| made(t.names[&id].clone(), at)),
+        interacts: true,
+        friction: (friction != 0.0).then_some(friction),
+    };
+    let pairs = pairs.into_iter().map(pair).collect();
+    t.deck.has_contact = true;
+    t.deck.contact = Some(Contact {
+        at,
+        friction: 0.0,
+        default_interacts: false,
+        self_interaction: None,
+        pairs,
+        gap: Gap::Fit,
+        slack: Slack::Default,
+        stiffness: None,
+        friction_velocity: None,
+        edges: false,
+        ignores_initial: false,
+    });
+}
+
+/// Of a deck with contact: LS-DYNA drops freed nodes unless ENMASS keeps them.
+fn write_freed_nodes(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    let Some(first) = first_erosion(t) else { return };
+    let (at, keeps) = problem.control.freed_nodes.unwrap_or((first, false));
+    t.deck.erosion = Some(FreedNodes { at, retain_inertia: Some(Placed::new(keeps, Origin::card(at))) });
+    for contact in problem.contacts.iter().filter(|contact| !contact.erodes) {
+        log.warn(
+            contact.at,
+            "the faces that eroded elements uncover meet others too, as in an ERODING contact with EROSOP 1",
+        );
+    }
+}
+
+/// The pairs of all transducers, each once, and where the first transducer stands.
+pub(super) fn watched(t: &Translation<'_>) -> Option<(Place, Vec<[u32; 2]>)> {
+    let (problem, log) = (t.problem, t.log);
+    let mut pairs: Vec<[u32; 2]> = Vec::new();
+    for card in &problem.transducers {
+        let own = watched_by(card, t);
+        if own.is_empty() {
+            log.warn(card.at, "a force transducer of parts that meet no other: there is nothing to write");
+        }
+        for [a, b] in own {
+            if !pairs.contains(&[a, b]) && !pairs.contains(&[b, a]) {
+                pairs.push([a, b]);
+            }
+        }
+    }
+    let at = problem.transducers.first().map(|card| card.at).filter(|_| !pairs.is_empty())?;
+    if pairs.len() > MAX_CONTACT_FORCES {
+        let n = pairs.len();
+        let words =
+            format!("force transducers of {n} pairs of parts: the first {MAX_CONTACT_FORCES} are written");
+        log.warn(at, words);
+        pairs.truncate(MAX_CONTACT_FORCES);
+    }
+    Some((at, pairs))
+}
+
+/// Pairs of different parts of a transducer among those that meet: one of its own, then the other.
+fn watched_by(card: &ContactCard, t: &Translation<'_>) -> Vec<[u32; 2]> {
+    let first: BTreeSet<u32> = parts_of(card, card.first, t).into_iter().collect();
+    let second: Option<BTreeSet<u32>> = card.second.map(|side| parts_of(card, side, t).into_iter().collect());
+    let from = |part: &u32| second.as_ref().is_none_or(|second| second.contains(part));
+    let mut pairs = Vec::new();
+    for &(a, b) in t.met.iter().filter(|(a, b)| a != b) {
+        if first.contains(&a) && from(&b) {
+            pairs.push([a, b]);
+        } else if first.contains(&b) && from(&a) {
+            pairs.push([b, a]);
+        }
+    }
+    pairs
+}
+
+/// Pairs of parts that meet, lower number first, in order.
+fn pairs_of(card: &ContactCard, t: &Translation<'_>) -> Vec<(u32, u32)> {
+    let first = parts_of(card, card.first, t);
+    let mut pairs = Vec::new();
+    match card.second {
+        None => {
+            for (i, a) in first.iter().enumerate() {
+                pairs.extend(first[i..].iter().map(|b| (*a, *b)));
+            }
+        }
+        Some(second) => {
+            let second = parts_of(card, second, t);
+            for a in &first {
+                pairs.extend(second.iter().map(|b| (*a.min(b), *a.max(b))));
+            }
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+fn parts_of(card: &ContactCard, side: Side, t: &Translation<'_>) -> Vec<u32> {
+    let (problem, log) = (t.problem, t.log);
+    let holding = |nodes: Vec<u32>, what: &str| {
+        let held = |id: &u32| nodes.binary_search(id).is_ok();
+        let solids = problem.solids.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
+        let shells = problem.shells.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
+        let mut parts: Vec<u32> = solids.chain(shells).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        log.warn(card.at, format!("a contact of a set of {what}: the parts that hold them meet as a whole"));
+        parts
+    };
+    match side {
+        Side::All => problem.parts.keys().copied().collect(),
+        Side::Part(id) => {
+            if !problem.parts.contains_key(&id) {
+                log.fault(card.at, format!("part {id}"), "a part of the deck", "correct the number");
+            }
+            vec![id]
+        }
+        Side::PartSet(id) => problem.part_set(id, card.at, log),
+        Side::NotPartSet(id) => {
+            let out = problem.part_set(id, card.at, log);
+            problem.parts.keys().copied().filter(|p| out.binary_search(p).is_err()).collect()
+        }
+        Side::NodeSet(id) => holding(problem.node_set(id, card.at, log), "nodes"),
+        Side::SegmentSet(id) => {
+            let mut nodes: Vec<u32> = problem.segment_set(id, card.at, log).into_iter().flatten().collect();
+            nodes.sort_unstable();
+            holding(nodes, "segments")
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Elements by part, and the nodes that they use.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use super::state::Translation;
+use crate::{
+    fault::short,
+    geometry::{cross, norm, sub, volume},
+    keyword::problem::{Section, Shell},
+    mesh_file::Body,
+    place::Place,
+};
+
+/// The elements of a part, and their places.
+struct Found {
+    body: Body,
+    solids: Vec<Place>,
+    shells: Vec<Place>,
+}
+
+impl Found {
+    fn of(part: u32) -> Self {
+        let body = Body { name: format!("part {part}"), ..Body::default() };
+        Self { body, solids: Vec::new(), shells: Vec::new() }
+    }
+}
+
+/// Elements by part, nodes that they use.
+pub(super) fn read(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    let mut bodies: BTreeMap<u32, Found> = BTreeMap::new();
+    let mut seen: HashMap<u32, Place> = HashMap::with_capacity(problem.solids.len());
+    let mut missing: BTreeSet<u32> = BTreeSet::new();
+    // The first element whose corners coincide, and how many there are.
+    let mut collapsed: Option<(Place, usize)> = None;
+    for solid in &problem.solids {
+        let (id, at) = (solid.id, solid.at);
+        if let Some(first) = seen.insert(id, at) {
+            let expected = format!("a number other than {id}, which {} has", log.line(first, at));
+            log.fault(at, format!("element {id}"), expected, "renumber one");
+            continue;
+        }
+        if let Some(node) = solid.nodes.iter().find(|node| problem.position(**node).is_none()) {
+            log.fault(at, format!("element {id} with node {node}"), "nodes of the deck", "add the node");
+            continue;
+        }
+        let nodes = corners_of(solid.nodes);
+        let corners = nodes.map(|node| problem.position(node).unwrap_or_default());
+        if !problem.parts.contains_key(&solid.part) {
+            // Told once for all of its elements.
+            if missing.insert(solid.part) {
+                let read = format!("element {id} of part {}", solid.part);
+                log.fault(at, read, "a part of the deck", "add the *PART");
+            }
+            continue;
+        }
+        let distinct = solid.nodes.iter().collect::<BTreeSet<_>>().len();
+        if !matches!(distinct, 4 | 5 | 6 | 8) {
+            log.fault(
+                at,
+                format!("element {id} with {distinct} different corners"),
+                "eight, or six, five or four of a wedge, a pyramid or a tetrahedron",
+                "correct the element",
+            );
+            continue;
+        }
+        if distinct < 8 {
+            collapsed.get_or_insert((at, 0)).1 += 1;
+        }
+        let v = volume(&corners);
+        if !(v > 0.0 && v.is_finite()) {
+            log.fault(
+                at,
+                format!("element {id} with volume {}", short(v)),
+                "a volume above 0",
+                "number the first four corners so that their normal points to the other four",
+            );
+            continue;
+        }
+        t.used.extend(solid.nodes);
+        let found = bodies.entry(solid.part).or_insert_with(|| Found::of(solid.part));
+        found.body.solids.push((id, nodes));
+        found.solids.push(at);
+    }
+    if let Some((at, count)) = collapsed {
+        log.warn(
+            at,
+            format!("{count} wedges, pyramids or tetrahedra: computed as hexahedra whose corners coincide"),
+        );
+    }
+    let shells = read_shells(t, &mut bodies);
+    for (id, part) in &problem.parts {
+        let Some(found) = bodies.remove(id) else {
+            if !shells.contains(id) {
+                log.warn(part.at, format!("part {id} has no elements and is left out"));
+            }
+            continue;
+        };
+        check_section(t, *id, &found.body);
+        t.places.push(found.solids.into_iter().chain(found.shells).collect());
+        t.mesh.bodies.push(found.body);
+        t.names.insert(*id, String::new());
+    }
+    for node in problem.nodes.iter().filter(|node| t.used.contains(&node.id)) {
+        t.mesh.nodes.push((node.id, node.x));
+    }
+    if t.mesh.bodies.is_empty() && log.count() == 0 {
+        let expected = "*ELEMENT_SOLID or *ELEMENT_SHELL";
+        log.fault(Place::card(0, 1), "a deck without elements", expected, "add a mesh");
+    }
+}
+
+/// Looks at whether the section of a part goes with its elements.
+fn check_section(t: &mut Translation<'_>, id: u32, body: &Body) {
+    let (problem, log) = (t.problem, t.log);
+    let part = &problem.parts[&id];
+    match problem.sections.get(&part.section.value) {
+        Some((_, Section::Solid)) if body.shells.is_empty() => return,
+        Some((_, Section::Shell(_))) if body.solids.is_empty() => return,
+        Some((at, section)) => {
+            let (expected, other) = match section {
+                Section::Solid => ("a *SECTION_SHELL", "shells"),
+                Section::Shell(_) => ("a *SECTION_SOLID", "solids"),
+            };
+            let read = format!("part {id} with {other} and the section at {}", log.line(*at, part.at));
+            log.fault(part.at, read, expected, "correct SECID; a part has elements of one kind");
+        }
+        None => log.fault_of(part.section.origin, "a section of the deck", "add it"),
+    }
+    t.without_section.insert(id);
+}
+
+/// Shells by part, and the parts that have any.
+fn read_shells(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTreeSet<u32> {
+    let (problem, log) = (t.problem, t.log);
+    let mut parts = BTreeSet::new();
+    let mut seen: HashMap<u32, Place> = HashMap::with_capacity(problem.shells.len());
+    let (mut missing, mut thin) = (BTreeSet::new(), BTreeSet::new());
+    let mut triangles: Option<(Place, usize)> = None;
+    for shell in &problem.shells {
+        let Shell { id, part, nodes, thickness, at } = *shell;
+        parts.insert(part);
+        if let Some(first) = seen.insert(id, at) {
+            let expected = format!("a number other than {id}, which {} has", log.line(first, at));
+            log.fault(at, format!("shell {id}"), expected, "renumber one");
+            continue;
+        }
+        if let Some(node) = nodes.iter().find(|node| problem.position(**node).is_none()) {
+            log.fault(at, format!("shell {id} with node {node}"), "nodes of the deck", "add the node");
+            continue;
+        }
+        let Some(card) = problem.parts.get(&part) else {
+            if missing.insert(part) {
+                log.fault(at, format!("shell {id} of part {part}"), "a part of the deck", "add the *PART");
+            }
+            continue;
+        };
+        let distinct = nodes.iter().collect::<BTreeSet<_>>().len();
+        if distinct < 3 || (distinct == 3 && nodes[3] != nodes[2]) {
+            let read = format!("shell {id} with nodes {nodes:?}");
+            log.fault(at, read, "four different ones, or a triangle that repeats the third", "correct them");
+            continue;
+        }
+        if distinct == 3 {
+            triangles.get_or_insert((at, 0)).1 += 1;
+        }
+        let [a, b, c, d] = nodes.map(|node| problem.position(node).unwrap_or_default());
+        let area = 0.5 * norm(cross(sub(c, a), sub(d, b)));
+        if !(area > 0.0 && area.is_finite()) {
+            let read = format!("shell {id} with area {}", short(area));
+            log.fault(at, read, "an area above 0", "order its corners around it");
+            continue;
+        }
+        // A section that is none of shells is told with the part.
+        let of_section = match problem.sections.get(&card.section.value) {
+            Some((_, Section::Shell(shell))) => Some(shell.thickness).filter(|thickness| *thickness > 0.0),
+            _ => Some(1.0),
+        };
+        let Some(thickness) = thickness.or(of_section) else {
+            if thin.insert(part) {
+                let read = format!("shell {id} without a thickness");
+                log.fault(at, read, "T1 of its *SECTION_SHELL, or its own", "give one");
+            }
+            continue;
+        };
+        // Elements of a part differ by no more than rounding, or the part says so.
+        let common = *t.thicknesses.entry(part).or_insert(thickness);
+        if (thickness - common).abs() > 1e-6 * common {
+            log.fault(
+                at,
+                format!("shell {id} of thickness {}", short(thickness)),
+                format!("{}, that of the elements before it in part {part}", short(common)),
+                "make one part of the shells of each thickness",
+            );
+            continue;
+        }
+        t.used.extend(nodes);
+        t.turns.extend(nodes);
+        let found = bodies.entry(part).or_insert_with(|| Found::of(part));
+        found.body.shells.push((id, nodes));
+        found.shells.push(at);
+    }
+    if let Some((at, count)) = triangles {
+        log.warn(at, format!("{count} triangles: computed as quadrilaterals with two corners in one node"));
+    }
+    parts
+}
+
+/// Corners such that those which coincide are neighbours: a tetrahedron repeats its last node, which would leave a face
+/// of all four.
+fn corners_of(nodes: [u32; 8]) -> [u32; 8] {
+    let [a, b, c, d, rest @ ..] = nodes;
+    let tetrahedron = rest.iter().all(|node| *node == d) && a != b && b != c && c != d && a != c;
+    if tetrahedron { [a, b, c, c, d, d, d, d] } else { nodes }
+}

@@ -1,0 +1,272 @@
+//! Materials in use, each with the equation of state of its part.
+
+use std::collections::BTreeSet;
+
+use mechanics::material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength};
+
+use super::state::Translation;
+use crate::{
+    keyword::{
+        material::{EosCard, Law, MaterialCard},
+        problem::PartCard,
+    },
+    library::{Clash, clashes},
+    log::Log,
+    place::Place,
+    typed::part::Own,
+};
+
+/// The name of a material of the deck that is made.
+pub(super) fn material_name(material: u32, eos: u32) -> String {
+    match eos {
+        0 => format!("material {material}"),
+        _ => format!("material {material} eos {eos}"),
+    }
+}
+
+/// Adds the materials in use to the deck. One that could not be made keeps its name, so that it is no second fault.
+pub(super) fn write(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    let mut done = BTreeSet::new();
+    for id in t.names.keys() {
+        let part = &problem.parts[id];
+        if !done.insert((part.material.value, part.eos.value)) {
+            continue;
+        }
+        let Some(card) = problem.materials.get(&part.material.value) else {
+            if !problem.refused_materials.contains(&part.material.value) {
+                log.fault_of(part.material.origin, "a material of the deck", "add the *MAT");
+            }
+            continue;
+        };
+        let name = material_name(part.material.value, part.eos.value);
+        let material = make(t, card, part, name.clone());
+        t.deck.materials.push(Own { name, named: None, material });
+    }
+}
+
+/// A material; none after a fault.
+fn make(t: &Translation<'_>, card: &MaterialCard, part: &PartCard, name: String) -> Option<Material> {
+    let (problem, log) = (t.problem, t.log);
+    let eos = problem.equations.get(&part.eos.value);
+    let strength = strength_of(t, card);
+    if part.eos.value != 0 && eos.is_none() {
+        if !problem.refused_equations.contains(&part.eos.value) {
+            log.fault_of(part.eos.origin, "an *EOS of the deck", "add it");
+        }
+        return None;
+    }
+    let eos = eos_of(t, card, eos, part);
+    let failure = match &card.law {
+        Law::Null { cut_off } if cut_off.value < 0.0 => {
+            Failure::Hydrostatic { tension: -cut_off.value, heals: true }
+        }
+        Law::JohnsonCook { damage: Some(d), .. } => Failure::JohnsonCook { d: d.map(|d| d + 0.0) },
+        _ => Failure::None,
+    };
+    let material = Material { name, density: card.density, eos: eos?, strength: strength?, failure };
+    for clash in clashes(&material) {
+        match (clash, &card.law) {
+            (Clash::Failure, Law::Null { cut_off }) => {
+                log.fault_of(cut_off.origin, "no cut-off of the pressure in a gas", "leave PC blank");
+            }
+            (Clash::Strength, _) => {
+                log.fault_of(
+                    part.eos.origin,
+                    "no gas: the material has a strength",
+                    "take a *MAT_NULL with it",
+                );
+            }
+            // Told with the strength.
+            (Clash::Failure, _) => {}
+        }
+    }
+    Some(material)
+}
+
+/// The equation of state of a material; none after a fault.
+fn eos_of(
+    t: &Translation<'_>,
+    material: &MaterialCard,
+    eos: Option<&EosCard>,
+    part: &PartCard,
+) -> Option<Eos> {
+    let log = t.log;
+    match (eos, material.elastic) {
+        (Some(EosCard::Grueneisen { c, s, gamma }), _) => {
+            Some(Eos::Shock { c0: *c, s: s + 0.0, gamma: gamma + 0.0 })
+        }
+        (Some(EosCard::Polynomial { origin, c, energy }), _) => {
+            let refuse = |what: &str, advice: &str| {
+                let expected = "a polynomial that fits p = C1 mu + C2 mu^2 + C3 mu^3 + (C4 + C5 mu) E";
+                log.fault(origin.at.at_column(1), what, expected, advice);
+                None
+            };
+            let [c0, c1, c2, c3, c4, c5, c6] = c.map(|c| c + 0.0);
+            if [c0, c1, c2, c3, c6].iter().all(|c| *c == 0.0) && c4 > 0.0 && c4 == c5 {
+                if c4 > 9.0 {
+                    return refuse("C4 above 9", "give a gas of gamma - 1 at most 9");
+                }
+                if *energy <= 0.0 {
+                    return refuse("E0 that is not above 0", "give the energy of the gas at the start");
+                }
+                let energy = t.number(origin.at, "an energy by mass of", energy / material.density);
+                return Some(Eos::IdealGas { gamma: c4 + 1.0, energy });
+            }
+            if c0 != 0.0 || c6 != 0.0 {
+                return refuse("C0 or C6", "leave them blank");
+            }
+            if *energy != 0.0 {
+                return refuse("E0 of a condensed material", "leave it blank");
+            }
+            if c1 <= 0.0 {
+                return refuse("C1 that is not above 0", "give the bulk modulus");
+            }
+            if c4 < 0.0 || c5 < 0.0 {
+                return refuse("C4 or C5 below 0", "give them as 0 or above");
+            }
+            Some(Eos::Polynomial { a1: c1, a2: c2, a3: c3, b0: c4, b1: c5, t1: c1, t2: 0.0 })
+        }
+        (None, Some((young, poisson))) => {
+            let bulk = young / (3.0 * (1.0 - 2.0 * poisson));
+            Some(Eos::Linear { bulk: t.number(material.at, "a bulk modulus of", bulk) })
+        }
+        (None, None) => {
+            log.fault(
+                part.at,
+                "a part whose material needs an equation of state and which has none",
+                "the number of an *EOS",
+                "give EOSID in *PART",
+            );
+            None
+        }
+    }
+}
+
+/// The strength of a material; none after a fault.
+fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength> {
+    let log = t.log;
+    let (young, poisson) = material.elastic.unwrap_or_default();
+    let shear = young / (2.0 * (1.0 + poisson));
+    let shear = || t.number(material.at, "a shear modulus of", shear);
+    let rate_of =
+        |rate: &Option<[f64; 2]>| rate.map(|[reference, exponent]| CowperSymonds { reference, exponent });
+    Some(match &material.law {
+        Law::Elastic | Law::Rigid { .. } => Strength::Elastic { shear: shear() },
+        Law::Null { .. } => Strength::Hydro,
+        Law::Bilinear { yield_stress, tangent, rate } => {
+            if !(0.0 <= tangent.value && tangent.value < young) {
+                let expected = format!("a tangent modulus from 0 to below Young's {young}");
+                log.fault_of(tangent.origin, expected, "correct it");
+                return None;
+            }
+            // The tangent is of the total strain, hardening of the plastic one.
+            let hardening = young * tangent.value / (young - tangent.value);
+            Strength::VonMises {
+                shear: shear(),
+                yield_stress: *yield_stress,
+                hardening: t.number(tangent.origin.at, "a hardening of", hardening),
+                rate: rate_of(rate),
+            }
+        }
+        Law::Tabulated { points, curve, rate } => {
+            let points = match curve.value {
+                0 => points.clone(),
+                id => t.points(id, curve.origin.at)?.to_vec(),
+            };
+            let points = hardening(points, material.at, log)?;
+            let mut hardening = Hardening {
+                n_points: points.len() as u32,
+                strain: [0.0; MAX_HARDENING],
+                stress: [0.0; MAX_HARDENING],
+            };
+            for (i, [strain, stress]) in points.into_iter().enumerate() {
+                hardening.strain[i] = t.number(material.at, "a plastic strain of", strain);
+                hardening.stress[i] = t.number(material.at, "a yield stress of", stress);
+            }
+            Strength::Tabulated { shear: shear(), hardening, rate: rate_of(rate) }
+        }
+        Law::JohnsonCook {
+            shear, constants: [a, b, n, c, m], t_melt, t_room, rate0, specific_heat, ..
+        } => {
+            let shear = t.number(material.at, "a shear modulus of", *shear);
+            Strength::JohnsonCook {
+                shear,
+                a: *a,
+                b: b + 0.0,
+                n: *n,
+                c: c + 0.0,
+                m: *m,
+                t_melt: *t_melt,
+                t_room: *t_room,
+                specific_heat: *specific_heat,
+                rate0: *rate0,
+            }
+        }
+    })
+}
+
+/// Points of a yield curve as our law takes them: from strain 0, not descending, few; beyond the last the last slope
+/// goes on, as LS-DYNA continues curves.
+fn hardening(mut points: Vec<[f64; 2]>, at: Place, log: &Log<'_>) -> Option<Vec<[f64; 2]>> {
+    points.retain(|p| p[0] >= 0.0);
+    let bad = points.windows(2).find(|w| w[1][0] <= w[0][0] || w[1][1] < w[0][1]);
+    if points.is_empty() || points[0][1] <= 0.0 || bad.is_some() {
+        let read = bad.map_or("a yield curve without a positive stress".to_string(), |w| {
+            format!("a yield curve from {:?} to {:?}", w[0], w[1])
+        });
+        log.fault(at, read, "strains that ascend, stresses that do not descend", "flatten what softens");
+        return None;
+    }
+    points[0][0] = 0.0;
+    if let [.., a, b] = points[..] {
+        let slope = (b[1] - a[1]) / (b[0] - a[0]);
+        if slope > 0.0 {
+            let far = (2.0 * b[0]).max(10.0);
+            points.push([far, slope.mul_add(far - b[0], b[1])]);
+        }
+    }
+    let mut worst = 0.0f64;
+    while points.len() > MAX_HARDENING {
+        // The point that lies nearest to the line between its neighbours goes.
+        let off = |i: usize| {
+            let [a, p, b] = [points[i - 1], points[i], points[i + 1]];
+            let line = (b[1] - a[1]) / (b[0] - a[0]) * (p[0] - a[0]) + a[1];
+            ((p[1] - line) / p[1]).abs()
+        };
+        let least = (1..points.len() - 1).min_by(|i, j| off(*i).total_cmp(&off(*j)))?;
+        worst = worst.max(off(least));
+        points.remove(least);
+    }
+    if worst > 1e-3 {
+        log.warn(
+            at,
+            format!(
+                "the yield curve was reduced to {MAX_HARDENING} points, off by {:.2} % at most each",
+                100.0 * worst
+            ),
+        );
+    }
+    Some(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_yield_curve_is_cut_to_ten_points_and_goes_on_with_its_last_slope() {
+        let log = Log::keyword(&[("a.k", "")]);
+        let at = Place::card(0, 1);
+        assert_eq!(
+            hardening(vec![[0.0, 1.0], [1.0, 2.0]], at, &log),
+            Some(vec![[0.0, 1.0], [1.0, 2.0], [10.0, 11.0]])
+        );
+        let many: Vec<[f64; 2]> = (0..50).map(|i| f64::from(i) * 0.01).map(|e| [e, 1.0 + e.sqrt()]).collect();
+        let few = hardening(many, at, &log).expect("ascends");
+        assert_eq!(few.len(), MAX_HARDENING);
+        assert_eq!(few[0], [0.0, 1.0]);
+        assert!(hardening(vec![[0.0, 1.0], [1.0, 0.5]], at, &log).is_none());
+        assert!(hardening(vec![], at, &log).is_none());
+    }
+}

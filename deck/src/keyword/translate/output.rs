@@ -1,0 +1,42 @@
+//! What is written and when.
+
+use std::collections::BTreeMap;
+
+use super::{contact, state::Translation};
+use crate::{
+    place::{Origin, Place, Placed},
+    typed::{Gauge, Kind, Spot, condition::made},
+};
+
+/// Most gauges.
+const MAX_GAUGES: usize = 100;
+
+/// Adds what is to be written to the deck.
+pub(super) fn write(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    let control = &problem.control;
+    t.deck.output.period = control.period.map(|(_, period)| period);
+    if let Some((at, pairs)) = contact::watched(t) {
+        let named =
+            |pair: [u32; 2]| Placed::new(pair.map(|id| made(t.names[&id].clone(), at)), Origin::card(at));
+        let pairs = pairs.into_iter().map(named).collect();
+        t.deck.output.contact_forces = Some(Placed::new(pairs, Origin::card(at)));
+    }
+    let mut gauges: BTreeMap<u32, Place> = control.gauges.iter().map(|(at, id)| (*id, *at)).collect();
+    for (at, set) in &control.gauge_sets {
+        gauges.extend(problem.node_set(*set, *at, log).into_iter().map(|id| (id, *at)));
+    }
+    gauges.retain(|id, _| t.used.contains(id));
+    if let Some((_, at)) = gauges.iter().nth(MAX_GAUGES) {
+        let n = gauges.len();
+        log.warn(*at, format!("histories of {n} nodes: those of the first {MAX_GAUGES} are written"));
+    }
+    for (id, at) in gauges.into_iter().take(MAX_GAUGES) {
+        t.deck.gauges.push(Gauge {
+            name: Some(made(format!("node {id}"), at)),
+            of: Kind::Node,
+            spot: Some(Spot::Number(Placed::new(id, Origin::card(at)))),
+            part: None,
+        });
+    }
+}

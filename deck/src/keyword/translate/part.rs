@@ -1,0 +1,145 @@
+//! Parts with what they start with; the velocities of single nodes go into the mesh.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mechanics::{element::shell4::Rule, mesh};
+
+use super::{material::material_name, rigid, state::Translation};
+use crate::{
+    geometry::{cross, sub},
+    keyword::{material::Law, problem::Section},
+    place::Place,
+    table::MAX_NAME,
+    typed::{
+        condition::made,
+        mesh::{PartMesh, Source},
+        part::{Choice, Erosion, Part},
+    },
+};
+
+/// Vectors by node.
+type ByNode = BTreeMap<u32, [f64; 3]>;
+
+/// Gives each part with elements its name for results: the heading where it serves, else the number.
+pub(super) fn name_all(t: &mut Translation<'_>) {
+    let mut taken: BTreeSet<String> = BTreeSet::new();
+    for (id, name) in &mut t.names {
+        let plain: String = t.problem.parts[id]
+            .title
+            .chars()
+            .map(|c| if c.is_ascii_alphanumeric() || "-_ ".contains(c) { c } else { ' ' })
+            .collect();
+        let words: Vec<&str> = plain.split_whitespace().collect();
+        let mut title = words.join(" ");
+        title.truncate(MAX_NAME - 12);
+        let title = title.trim().to_string();
+        *name = match title.as_str() {
+            "" | "None" | "all" => format!("part {id}"),
+            _ if taken.contains(&title) => format!("{title} {id}"),
+            _ => title,
+        };
+        taken.insert(name.clone());
+    }
+}
+
+/// Adds the parts to the deck.
+pub(super) fn write(t: &mut Translation<'_>) {
+    let (mut velocity, mut spin) = velocities(t);
+    rigid::start_bodies(t, &mut velocity, &mut spin);
+    let problem = t.problem;
+    let mut turning: BTreeSet<u32> = BTreeSet::new();
+    let of = |node: &u32| velocity.get(node).copied().unwrap_or_default();
+    let mut apart: BTreeSet<u32> = BTreeSet::new();
+    let names: Vec<(u32, String)> = t.names.iter().map(|(id, name)| (*id, name.clone())).collect();
+    for (body, (id, name)) in names.into_iter().enumerate() {
+        let nodes: BTreeSet<u32> = t.mesh.bodies[body].corners().collect();
+        if !t.mesh.bodies[body].shells.is_empty() {
+            turning.extend(nodes.iter().filter(|node| spin.contains_key(node)));
+        }
+        let part = &problem.parts[&id];
+        let common = nodes.first().map(of).unwrap_or_default();
+        let common = if nodes.iter().all(|node| of(node) == common) { common } else { [0.0; 3] };
+        apart.extend(nodes.iter().filter(|node| of(node) != common));
+        let at = part.at;
+        let shell = match (t.thicknesses.get(&id), problem.sections.get(&part.section.value)) {
+            (Some(thickness), Some((_, Section::Shell(shell)))) => {
+                let rule =
+                    if shell.lobatto { Rule::Lobatto(shell.points) } else { Rule::Gauss(shell.points) };
+                let thickness = t.number(at, "a thickness of", *thickness);
+                Some(mesh::Section { thickness, rule })
+            }
+            _ => None,
+        };
+        let source = Source::Body {
+            mesh: made(t.mesh_name.to_string(), at),
+            body: Some(made(format!("part {id}"), at)),
+        };
+        let mesh = PartMesh { at, title: format!("the mesh of part {id}"), source };
+        let known = problem.materials.contains_key(&part.material.value);
+        let name_of = || made(material_name(part.material.value, part.eos.value), at);
+        let written = Part {
+            at,
+            name,
+            named: None,
+            material: known.then(|| Choice::Named(name_of())),
+            fracture: None,
+            velocity: t.vector(at, "a velocity of", common),
+            shell,
+            erosion: erosion_of(t, part.material.value),
+            mesh: (!t.without_section.contains(&id)).then_some(mesh),
+            rotate: None,
+            translate: None,
+        };
+        t.deck.parts.push(written);
+    }
+    // Nodes of several parts get theirs from the mesh wherever one part would give them another.
+    t.mesh.velocities = apart.iter().map(|node| (*node, of(node))).collect();
+    t.mesh.spins = turning.iter().map(|node| (*node, spin[node])).collect();
+}
+
+/// Initial velocities by node, and rotation rates that are not zero; later ones replace earlier ones.
+fn velocities(t: &Translation<'_>) -> (ByNode, ByNode) {
+    let (problem, log) = (t.problem, t.log);
+    let (mut list, mut spins) = (BTreeMap::new(), BTreeMap::new());
+    for given in &problem.conditions.velocities {
+        let turned = |v| t.turned(v, given.system, given.at);
+        let (v, spin) = (turned(given.velocity), turned(given.spin));
+        let own = turned(given.own_turn);
+        let inside = (given.inside != 0).then(|| problem.within(given.inside, given.at, log));
+        let except =
+            if given.except != 0 { problem.node_set(given.except, given.at, log) } else { Vec::new() };
+        for node in t.nodes(given.target, given.at) {
+            let Some(x) = problem.position(node) else { continue };
+            if except.binary_search(&node).is_ok() || inside.as_ref().is_some_and(|inside| !inside(x)) {
+                continue;
+            }
+            let round = cross(spin, sub(x, given.point));
+            list.insert(node, [0, 1, 2].map(|a| v[a] + round[a]));
+            let turn = [0, 1, 2].map(|a| spin[a] + own[a]);
+            if turn == [0.0; 3] {
+                spins.remove(&node);
+            } else {
+                spins.insert(node, turn);
+            }
+        }
+    }
+    (list, spins)
+}
+
+/// When elements of a material leave, by its own card and by `*MAT_ADD_EROSION`. Rigid ones do not erode.
+fn erosion_of(t: &Translation<'_>, material: u32) -> Option<Erosion> {
+    let card = t.problem.materials.get(&material)?;
+    if matches!(card.law, Law::Rigid { .. }) {
+        return None;
+    }
+    let mut limits = card.erosion.clone();
+    if let Some(added) = t.problem.erosions.get(&material) {
+        limits.merge(added.clone());
+    }
+    limits.erosion()
+}
+
+/// The first card that asks for erosion; none where nothing erodes.
+pub(super) fn first_erosion(t: &Translation<'_>) -> Option<Place> {
+    t.deck.parts.iter().filter_map(|part| Some(part.erosion.as_ref()?.origin.at)).min()
+}

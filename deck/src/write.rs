@@ -1,0 +1,176 @@
+//! A typed deck as the text of a TOML deck: reading it back gives the same model, to the bit.
+//!
+//! Keys whose values are the defaults are left out. Numbers are the shortest decimals that read back to the same bits.
+
+mod condition;
+mod part;
+mod value;
+
+use crate::typed::{
+    Control, Deck, Gauge, Kind, Output, Spot,
+    contact::{Contact, Gap, Slack},
+};
+use value::{Text, list, names, quoted, vector};
+
+/// The text of a deck.
+pub(crate) fn text(deck: &Deck) -> String {
+    let mut text = Text::default();
+    text.key("title", quoted(&deck.title));
+    text.key("units", quoted(deck.units.name));
+    if let Some(control) = &deck.control {
+        write_control(&mut text, control);
+    }
+    part::write(&mut text, deck);
+    for join in &deck.joins {
+        text.heading("[[join]]");
+        text.key("parts", names(&join.parts));
+        text.key("tolerance", format!("{:?}", join.tolerance));
+    }
+    condition::write(&mut text, deck);
+    if let Some(freed) = &deck.erosion {
+        text.heading("[erosion]");
+        text.some("retain_inertia", freed.retain_inertia.as_ref().map(|on| on.value));
+    }
+    if let Some(contact) = &deck.contact {
+        write_contact(&mut text, contact);
+    }
+    write_output(&mut text, &deck.output);
+    for gauge in &deck.gauges {
+        write_gauge(&mut text, gauge);
+    }
+    for (_, detonation) in &deck.detonations {
+        let Some(detonation) = detonation else { continue };
+        text.heading("[[detonation]]");
+        text.key("point", vector(detonation.point));
+        text.key("time", format!("{:?}", detonation.time));
+    }
+    text.into_string()
+}
+
+fn write_control(text: &mut Text, control: &Control) {
+    text.heading("[control]");
+    text.some("end_time", control.end_time);
+    text.some("end_cycle", control.end_cycle);
+    text.some("safety_factor", control.safety_factor);
+    text.some("growth", control.growth);
+    text.some("energy_error", control.energy_error);
+    text.some("time_step_floor", control.time_step_floor);
+    text.some("quadratic_viscosity", control.quadratic_viscosity);
+    text.some("linear_viscosity", control.linear_viscosity);
+    text.some("hourglass", control.hourglass);
+    text.some("sort_lag", control.sort_lag);
+    text.some("plan_interval", control.plan_interval);
+}
+
+fn write_contact(text: &mut Text, contact: &Contact) {
+    text.heading("[contact]");
+    match contact.gap {
+        Gap::Fit => text.key("gap_fraction", quoted("fit")),
+        Gap::Fraction(fraction, _) => text.key("gap_fraction", format!("{fraction:?}")),
+        Gap::Length(length, _) => text.key("gap_length", format!("{length:?}")),
+        Gap::Default | Gap::Broken => {}
+    }
+    match contact.slack {
+        Slack::Gaps(gaps) => text.key("slack_gaps", format!("{gaps:?}")),
+        Slack::Length(length) => text.key("slack_length", format!("{length:?}")),
+        Slack::Default | Slack::Broken => {}
+    }
+    text.some("friction", Some(contact.friction).filter(|friction| *friction != 0.0));
+    text.some("default_interacts", Some(contact.default_interacts).filter(|others| !others));
+    if let Some(parts) = &contact.self_interaction {
+        text.key("self_interaction", names(parts));
+    }
+    text.some("stiffness", contact.stiffness);
+    text.some("friction_velocity", contact.friction_velocity);
+    text.some("edges", Some(contact.edges).filter(|edges| *edges));
+    if contact.ignores_initial {
+        text.key("initial_penetration", quoted("ignore"));
+    }
+    for pair in &contact.pairs {
+        text.heading("[[contact.pair]]");
+        text.key("parts", list(pair.parts.iter().map(|part| quoted(&part.value))));
+        text.some("interacts", Some(pair.interacts).filter(|on| !on));
+        text.some("friction", pair.friction);
+    }
+}
+
+fn write_output(text: &mut Text, output: &Output) {
+    let defaults = Output::default();
+    text.heading("[output]");
+    text.some("period", output.period);
+    text.some("history_cycles", Some(output.history_cycles).filter(|n| *n != defaults.history_cycles));
+    text.some("snapshot_seconds", output.snapshot_seconds);
+    text.some("snapshot_cycles", output.snapshot_cycles);
+    if !output.fields.is_empty() {
+        text.key("fields", list(output.fields.iter().map(|field| quoted(field))));
+    }
+    text.some("compress", Some(output.compress).filter(|on| *on != defaults.compress));
+    text.some("workers", Some(output.workers).filter(|on| *on != defaults.workers));
+    text.some("contact_surface", output.contact_surface.as_ref().map(|on| on.value));
+    if let Some(pairs) = &output.contact_forces {
+        let pair = |pair: &[crate::place::Placed<String>; 2]| list(pair.iter().map(|p| quoted(&p.value)));
+        text.key("contact_forces", list(pairs.value.iter().map(|both| pair(&both.value))));
+    }
+    text.drop_heading();
+}
+
+fn write_gauge(text: &mut Text, gauge: &Gauge) {
+    text.heading("[[gauge]]");
+    if let Some(name) = &gauge.name {
+        text.key("name", quoted(&name.value));
+    }
+    let element = gauge.of == Kind::Element;
+    match &gauge.spot {
+        Some(Spot::Number(id)) => text.key(if element { "element" } else { "node" }, id.value.to_string()),
+        Some(Spot::Point(point)) => {
+            if element {
+                text.key("of", quoted("element"));
+            }
+            text.key("point", vector(point.value));
+        }
+        None => {}
+    }
+    if let Some(part) = &gauge.part {
+        text.key("part", quoted(&part.value));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::text;
+    use crate::{
+        log::Log,
+        make, toml_deck,
+        typed::{Deck, mesh::Meshes},
+    };
+
+    fn read(text: &str, name: &str) -> (Deck, String) {
+        let log = Log::toml(name, text);
+        let deck = toml_deck::read(text, &log).unwrap_or_else(|| panic!("{name} has no syntax\n{text}"));
+        let model = make::model(&deck, &Meshes::new(), &log);
+        let faults = log.into_lists().0;
+        assert!(faults.is_empty(), "{name}: {faults:?}\n{text}");
+        (deck, format!("{model:?}"))
+    }
+
+    #[test]
+    fn every_toml_deck_comes_back_from_its_typed_deck_to_the_bit() {
+        let mut seen = 0;
+        for folder in ["examples", "../tests/decks/good"] {
+            let path = format!("{}/{folder}", env!("CARGO_MANIFEST_DIR"));
+            for entry in std::fs::read_dir(path).expect("the folder is in the repository") {
+                let path = entry.expect("a file").path();
+                if path.extension().is_none_or(|e| e != "toml") {
+                    continue;
+                }
+                seen += 1;
+                let name = path.display().to_string();
+                let (deck, model) = read(&std::fs::read_to_string(&path).expect("a deck is text"), &name);
+                let written = text(&deck);
+                let (_, again) = read(&written, &name);
+                assert!(model == again, "{name}\n{written}");
+            }
+        }
+        assert!(seen >= 20, "only {seen} decks");
+    }
+}

@@ -1,0 +1,186 @@
+//! Curves, boundaries, walls, rigid bodies and loads.
+
+use super::value::{Text, components, drive, list, names, numbers, quoted, table, vector};
+use crate::typed::{
+    Deck,
+    condition::{
+        Boundary, BoundaryKind, Components, Drive, Faces, Load, LoadKind, Parts, Region, Rigid, Wall,
+        WallMotion, WallShape,
+    },
+};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Writes all of them.
+pub(super) fn write(text: &mut Text, deck: &Deck) {
+    for curve in &deck.curves {
+        text.heading("[[curve]]");
+        if let Some(name) = &curve.name {
+            text.key("name", quoted(&name.value));
+        }
+        text.key("points", list(curve.points.iter().map(|point| numbers(point))));
+    }
+    deck.rigid.iter().for_each(|rigid| write_rigid(text, rigid));
+    deck.boundaries.iter().for_each(|boundary| write_boundary(text, boundary));
+    deck.loads.iter().for_each(|load| write_load(text, load));
+    if let Some(gravity) = &deck.gravity {
+        text.heading("[gravity]");
+        text.key("acceleration", vector(gravity.acceleration));
+        write_curve(text, &gravity.drive);
+    }
+    if let Some(relaxation) = deck.relaxation {
+        text.heading("[relaxation]");
+        text.key("factor", format!("{:?}", relaxation.factor));
+        text.some("until", relaxation.until);
+    }
+    deck.walls.iter().for_each(|wall| write_wall(text, wall));
+}
+
+fn write_rigid(text: &mut Text, rigid: &Rigid) {
+    text.heading("[[rigid]]");
+    text.key("parts", names(&rigid.parts));
+    text.some("mass", rigid.mass);
+    if let Some((centre, [xx, yy, zz, xy, yz, zx])) = rigid.inertia {
+        text.key("centre", vector(centre));
+        let keys = [("xx", xx), ("yy", yy), ("zz", zz), ("xy", xy), ("yz", yz), ("zx", zx)];
+        text.key("inertia", table(&keys.map(|(key, value)| (key, format!("{value:?}")))));
+    }
+    if let Some(spin) = rigid.start_spin {
+        text.key("start_spin", vector(spin));
+    }
+    for (key, given) in [("velocity", &rigid.velocity), ("spin", &rigid.spin)] {
+        if given.iter().any(Option::is_some) {
+            text.key(key, components(given));
+        }
+    }
+}
+
+fn write_boundary(text: &mut Text, boundary: &Boundary) {
+    text.heading("[[boundary]]");
+    match &boundary.kind {
+        BoundaryKind::Transmit(faces) => {
+            text.key("type", quoted("transmit"));
+            write_faces(text, faces.as_ref());
+        }
+        BoundaryKind::Symmetry { axis, place } => {
+            text.key("type", quoted("symmetry"));
+            text.key("axis", quoted(AXES[*axis]));
+            text.key("at", format!("{place:?}"));
+        }
+        BoundaryKind::Held { velocity, clamped, nodes } => {
+            write_held(text, velocity, *clamped);
+            write_region(text, nodes.as_ref());
+        }
+    }
+    write_parts(text, &boundary.parts);
+}
+
+fn write_held(text: &mut Text, velocity: &Components, clamped: u8) {
+    let still = |drive: &Drive| drive.curve.is_none() && drive.factor.to_bits() == 0;
+    let letters = |holds: &dyn Fn(usize) -> bool| -> String {
+        (0..3).filter(|axis| holds(*axis)).map(|axis| AXES[axis]).collect()
+    };
+    if velocity.iter().flatten().all(still) {
+        text.key("type", quoted("fixed"));
+        text.key("axes", quoted(&letters(&|axis| velocity[axis].is_some())));
+    } else {
+        text.key("type", quoted("velocity"));
+        text.key("velocity", components(velocity));
+    }
+    if clamped != 0 {
+        text.key("rotations", quoted(&letters(&|axis| clamped >> axis & 1 == 1)));
+    }
+}
+
+fn write_parts(text: &mut Text, parts: &Parts) {
+    if let Parts::Named(_) = parts {
+        text.key("parts", names(parts));
+    }
+}
+
+fn write_region(text: &mut Text, region: Option<&Region>) {
+    match region {
+        None | Some(Region::All) => {}
+        Some(Region::Face(name)) => text.key("face", quoted(&name.value)),
+        Some(Region::Box { low, high }) => {
+            text.key("box", table(&[("min", vector(*low)), ("max", vector(*high))]));
+        }
+        Some(Region::Plane { point, normal }) => {
+            text.key("plane", table(&[("point", vector(*point)), ("normal", vector(*normal))]));
+        }
+        Some(Region::Set(name)) => text.key("nodes", quoted(&name.value)),
+        Some(Region::Numbers(numbers)) => {
+            text.key("nodes", list(numbers.iter().map(|id| id.value.to_string())));
+        }
+    }
+}
+
+fn write_faces(text: &mut Text, faces: Option<&Faces>) {
+    match faces {
+        None => {}
+        Some(Faces::Of(region)) => write_region(text, Some(region)),
+        Some(Faces::Segments(name)) => text.key("segments", quoted(&name.value)),
+    }
+}
+
+/// The curve under `curve`, if there is one.
+fn write_curve(text: &mut Text, drive: &Drive) {
+    if let Some(curve) = &drive.curve {
+        text.key("curve", quoted(&curve.value));
+    }
+}
+
+fn write_load(text: &mut Text, load: &Load) {
+    text.heading("[[load]]");
+    match &load.kind {
+        LoadKind::Pressure { pressure, faces } => {
+            text.key("type", quoted("pressure"));
+            write_faces(text, faces.as_ref());
+            if let Some(pressure) = pressure {
+                text.key("pressure", drive(pressure));
+            }
+        }
+        LoadKind::Force { force, drive, nodes } => {
+            text.key("type", quoted("force"));
+            write_region(text, nodes.as_ref());
+            if let Some(force) = force {
+                text.key("force", vector(*force));
+            }
+            write_curve(text, drive);
+        }
+    }
+    write_parts(text, &load.parts);
+}
+
+fn write_wall(text: &mut Text, wall: &Wall) {
+    text.heading("[[wall]]");
+    match wall.shape {
+        None => {}
+        Some(WallShape::Plane { point, normal }) => {
+            text.key("point", vector(point));
+            text.key("normal", vector(normal));
+        }
+        Some(WallShape::Cylinder { point, axis, radius }) => {
+            text.key("shape", quoted("cylinder"));
+            text.key("point", vector(point));
+            text.key("axis", vector(axis));
+            text.key("radius", format!("{radius:?}"));
+        }
+        Some(WallShape::Sphere { centre, radius }) => {
+            text.key("shape", quoted("sphere"));
+            text.key("point", vector(centre));
+            text.key("radius", format!("{radius:?}"));
+        }
+    }
+    text.some("friction", Some(wall.friction).filter(|friction| *friction != 0.0));
+    match &wall.motion {
+        None | Some(WallMotion::Fixed) => {}
+        Some(WallMotion::Driven(velocity)) => text.key("velocity", components(velocity)),
+        Some(WallMotion::Free { mass, velocity }) => {
+            text.key("mass", format!("{mass:?}"));
+            text.key("velocity", components(&velocity.map(|v| Some(Drive::constant(v)))));
+        }
+    }
+    write_region(text, wall.nodes.as_ref());
+    write_parts(text, &wall.parts);
+}
