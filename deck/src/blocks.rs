@@ -4,26 +4,17 @@
 //! deck allocates more than the limits allow. Every shape gives hexahedra of positive volume, which the
 //! whole-mesh check confirms again.
 
+mod block;
 mod o_grid;
 mod sheet;
 mod structured;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use block::{Block, Sector};
 pub(crate) use structured::graded;
 
-use mechanics::mesh::{Section, Topology};
-
-use crate::geometry::{add, cross, dot, scaled, sub};
-
-/// Nodes and elements of one part, before parts are put together.
-#[derive(Clone, Debug)]
-pub(crate) struct Block {
-    pub(crate) positions: Vec<[f64; 3]>,
-    pub(crate) topology: Topology,
-    /// Named outer faces: the local nodes of each.
-    pub(crate) faces: Vec<(&'static str, Vec<u32>)>,
-}
+use mechanics::mesh::Section;
 
 /// A shape with all its numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,18 +76,6 @@ pub(crate) enum Shape {
         cells: [u32; 2],
         section: Section,
     },
-}
-
-/// How much of a round body is meshed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
-pub(crate) enum Sector {
-    Full,
-    /// Where the second local axis is not negative (sphere: z).
-    Half,
-    /// Where both local axes are not negative (sphere: y and z).
-    Quarter,
-    /// Sphere only: where x, y and z are not negative.
-    Octant,
 }
 
 impl Shape {
@@ -179,39 +158,6 @@ impl Shape {
                 block.place(*axis, *base);
                 block
             }
-        }
-    }
-}
-
-impl Block {
-    /// Turns a block built along z so that its z axis becomes `axis` (x and y follow in cyclic order), then
-    /// moves its origin to `base`.
-    fn place(&mut self, axis: usize, base: [f64; 3]) {
-        for p in &mut self.positions {
-            let mut turned = [0.0; 3];
-            for (local, x) in p.iter().enumerate() {
-                turned[(local + axis + 1) % 3] = *x;
-            }
-            *p = add(turned, base);
-        }
-    }
-
-    /// Turns the block about an axis of unit length through `point` (Rodrigues), `degrees` counted by the
-    /// right hand.
-    pub(crate) fn rotate(&mut self, point: [f64; 3], axis: [f64; 3], degrees: f64) {
-        let [cosine, sine] = structured::cosine_and_sine(degrees);
-        for p in &mut self.positions {
-            let r = sub(*p, point);
-            let parallel = scaled(axis, dot(axis, r) * (1.0 - cosine));
-            let turned = add(add(scaled(r, cosine), scaled(cross(axis, r), sine)), parallel);
-            *p = add(turned, point);
-        }
-    }
-
-    /// Moves the block.
-    pub(crate) fn translate(&mut self, by: [f64; 3]) {
-        for p in &mut self.positions {
-            *p = add(*p, by);
         }
     }
 }

@@ -9,7 +9,7 @@ use toml::de::DeTable;
 
 use crate::{
     fault::{Fault, Faults},
-    keyword,
+    include::{beside, includes},
 };
 
 const FIRST: &str = "#bolide-bundle 1";
@@ -129,7 +129,7 @@ pub fn gather(
     while next < files.len() {
         let (name, text) = &files[next];
         let wanted = match Kind::of(text) {
-            Kind::Keyword => keyword::includes(name, text, &mut folders),
+            Kind::Keyword => includes(name, text, &mut folders),
             Kind::Toml if next == 0 => mesh_files(name, text),
             _ => Vec::new(),
         };
@@ -179,15 +179,6 @@ fn mesh_files(path: &str, text: &str) -> Vec<Vec<String>> {
         Some(beside(path, mesh.get("file")?.get_ref().as_str()?))
     };
     parts.into_iter().flatten().filter_map(file).map(|name| vec![name]).collect()
-}
-
-/// A path that a file says, as seen from where that file is seen from.
-pub(crate) fn beside(file: &str, name: &str) -> String {
-    let name = name.replace('\\', "/");
-    match file.rsplit_once('/') {
-        Some((folder, _)) if !name.starts_with('/') => format!("{folder}/{name}"),
-        _ => name,
-    }
 }
 
 #[cfg(test)]

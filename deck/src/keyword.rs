@@ -28,8 +28,6 @@ mod unit;
 
 pub use unit::NAMES as UNIT_NAMES;
 
-pub(crate) use cards::includes;
-
 use crate::{
     bundle::Bundle,
     log::Log,

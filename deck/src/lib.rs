@@ -13,6 +13,7 @@ mod blocks;
 pub mod bundle;
 pub mod fault;
 mod geometry;
+mod include;
 mod keyword;
 pub mod library;
 mod limits;

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use mechanics::mesh::Topology;
 
-use super::{Block, Sector};
+use super::block::{Block, Sector};
 use crate::geometry::norm;
 
 /// Distance of the core's diagonal corner per axis over its half width (cylinder): 0.42 R for 0.5 R.

@@ -2,7 +2,7 @@
 
 use mechanics::mesh::{Section, Topology};
 
-use super::{Block, structured::cosine_and_sine};
+use super::block::{Block, cosine_and_sine};
 use crate::geometry::{add, scaled};
 
 /// A parallelogram from `origin` over two sides.

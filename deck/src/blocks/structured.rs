@@ -2,7 +2,7 @@
 
 use mechanics::mesh::Topology;
 
-use super::Block;
+use super::block::{Block, cosine_and_sine};
 
 /// Coordinates of `cells + 1` node planes from `origin` over `size`, the last cell `ratio` times as long as
 /// the first, each cell longer than the one before by the same factor.
@@ -111,21 +111,4 @@ pub(super) fn tube(radii: [f64; 2], length: f64, degrees: [f64; 2], cells: [u32;
         ("k-max", side(&|_, k| k == nk)),
     ];
     Block { positions, topology: Topology::Explicit { hexahedra }, faces }
-}
-
-/// Cosine and sine of an angle in degrees, exact at multiples of 90, so that cut planes are planes.
-pub(super) fn cosine_and_sine(degrees: f64) -> [f64; 2] {
-    let turned = degrees.rem_euclid(360.0);
-    if turned == 0.0 {
-        [1.0, 0.0]
-    } else if turned == 90.0 {
-        [0.0, 1.0]
-    } else if turned == 180.0 {
-        [-1.0, 0.0]
-    } else if turned == 270.0 {
-        [0.0, -1.0]
-    } else {
-        let radians = turned.to_radians();
-        [radians.cos(), radians.sin()]
-    }
 }

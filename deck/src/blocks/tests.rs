@@ -2,8 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
+use mechanics::mesh::Topology;
+
 use super::*;
-use crate::geometry::{EDGES, norm, volume};
+use crate::geometry::{EDGES, cross, dot, norm, sub, volume};
 
 fn hexahedra(block: &Block) -> Vec<[[f64; 3]; 8]> {
     let part = mechanics::mesh::Part {

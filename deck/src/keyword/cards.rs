@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::parameter;
 use crate::{
-    bundle::{Bundle, beside},
+    bundle::Bundle,
+    include::{beside, candidates, lines, path_of},
     log::Log,
     place::Place,
 };
@@ -64,82 +65,6 @@ impl Block<'_> {
             text: Cow::Borrowed(""),
         })
     }
-}
-
-/// Lines of a text that matter, with their numbers from 1; what follows `*END` is left out.
-fn lines(text: &str) -> impl Iterator<Item = (u32, &str)> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    text.lines()
-        .zip(1..)
-        .map(|(line, number)| (number, line.trim_end()))
-        .filter(|(_, line)| !line.starts_with('$'))
-        .take_while(|(_, line)| !is_end(line))
-}
-
-fn is_end(line: &str) -> bool {
-    let word = line.split(|c: char| c.is_whitespace() || c == '$').next().unwrap_or_default();
-    word.eq_ignore_ascii_case("*END")
-}
-
-/// The paths at which a file looks for the includes it names, in the order in which they are tried.
-/// `folders` are those of `*INCLUDE_PATH` so far.
-pub(crate) fn includes(name: &str, text: &str, folders: &mut Vec<String>) -> Vec<Vec<String>> {
-    let mut found = Vec::new();
-    let mut kind = None;
-    let mut before = String::new();
-    for (_, line) in lines(text) {
-        if line.starts_with('*') {
-            kind = include_kind(line);
-            before.clear();
-            continue;
-        }
-        let Some(kind) = kind else { continue };
-        if let Some(path) = path_of(line, &mut before) {
-            match kind {
-                Include::File => found.push(candidates(name, &path, folders)),
-                Include::Folder => folders.push(path),
-                Include::FolderBeside => folders.push(beside(name, &path)),
-            }
-        }
-    }
-    found
-}
-
-/// What an include card names.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Include {
-    File,
-    Folder,
-    FolderBeside,
-}
-
-fn include_kind(line: &str) -> Option<Include> {
-    let word = line.split_whitespace().next().unwrap_or_default();
-    match word.to_ascii_uppercase().as_str() {
-        "*INCLUDE" => Some(Include::File),
-        "*INCLUDE_PATH" => Some(Include::Folder),
-        "*INCLUDE_PATH_RELATIVE" => Some(Include::FolderBeside),
-        _ => None,
-    }
-}
-
-/// The path that ends on this line; one that goes on ends in ` +`.
-fn path_of(line: &str, before: &mut String) -> Option<String> {
-    let line = line.trim();
-    match line.strip_suffix(" +") {
-        Some(start) => {
-            before.push_str(start.trim_end());
-            None
-        }
-        None if line.is_empty() && before.is_empty() => None,
-        None => Some(std::mem::take(before) + line),
-    }
-}
-
-fn candidates(file: &str, path: &str, folders: &[String]) -> Vec<String> {
-    let mut list = vec![beside(file, path)];
-    list.extend(folders.iter().map(|folder| format!("{}/{path}", folder.trim_end_matches('/'))));
-    list
 }
 
 /// What the lines of a deck hold.
