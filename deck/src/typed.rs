@@ -118,6 +118,9 @@ pub(crate) struct FreedNodes {
     pub(crate) retain_inertia: Option<Placed<bool>>,
 }
 
+/// Pairs of parts by name.
+pub(crate) type PartPairs = Vec<Placed<[Placed<String>; 2]>>;
+
 /// What to write and when.
 #[derive(Clone, Debug)]
 pub(crate) struct Output {
@@ -129,8 +132,8 @@ pub(crate) struct Output {
     pub(crate) compress: bool,
     pub(crate) workers: bool,
     pub(crate) contact_surface: Option<Placed<bool>>,
-    /// Pairs of names of parts whose contact force is wanted.
-    pub(crate) contact_forces: Option<Placed<Vec<Placed<[Placed<String>; 2]>>>>,
+    /// Pairs of parts whose contact force is wanted.
+    pub(crate) contact_forces: Option<Placed<PartPairs>>,
 }
 
 impl Default for Output {

@@ -142,7 +142,7 @@ impl ControlCards {
                     f.fault(0, "SOLN 0, mechanics alone", "take it out if the problem does without heat");
                 }
             }
-            word if HARMLESS.iter().any(|known| *known == word)
+            word if HARMLESS.contains(&word)
                 || word.starts_with("CONTROL_MPP_")
                 || word.starts_with("CONTROL_CHECK") =>
             {

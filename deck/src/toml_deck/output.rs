@@ -7,7 +7,7 @@ use crate::{
     model::FIELD_NAMES,
     place::Placed,
     table::{Range, Table},
-    typed::{Gauge, Kind, Output, Spot},
+    typed::{Gauge, Kind, Output, PartPairs, Spot},
 };
 
 /// Reads `[output]`.
@@ -29,7 +29,7 @@ pub(super) fn read(deck: &Table<'_>) -> Output {
 }
 
 /// Pairs of parts whose contact force is wanted.
-fn read_contact_forces(table: &Table<'_>) -> Option<Placed<Vec<Placed<[Placed<String>; 2]>>>> {
+fn read_contact_forces(table: &Table<'_>) -> Option<Placed<PartPairs>> {
     let value = table.get("contact_forces")?;
     let mut pairs = Vec::new();
     for item in value.items().unwrap_or_default() {
