@@ -29,9 +29,9 @@ use worker::compute::lowest_priority;
 use crate::{
     embedded::{Sink, Traffic, timed_sort},
     event::{Action, Event, Hand, Outcome},
-    job::{Bench, Job},
+    job::Job,
     peers,
-    sort::{Gathered, Sorted},
+    sort::{Gathered, SortBasis, Sorted},
 };
 
 /// Messages of one worker that may wait for the job's thread.
@@ -367,7 +367,7 @@ impl Driver {
         Ok(())
     }
 
-    fn sort(&self, bench: Arc<Bench>, x: Gathered) {
+    fn sort(&self, bench: Arc<SortBasis>, x: Gathered) {
         let (send, failed) = (self.send.clone(), self.send.clone());
         // On a thread of the lowest priority: a worker on this host computes first, the sort takes what is idle.
         let work = move || {

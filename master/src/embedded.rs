@@ -29,8 +29,8 @@ use worker::{
 
 use crate::{
     event::{Action, Event, Hand, Outcome},
-    job::{Bench, Job},
-    sort::{Gathered, Sorted},
+    job::Job,
+    sort::{Gathered, SortBasis, Sorted},
 };
 
 /// Where a run's outputs go.
@@ -430,7 +430,7 @@ impl Host {
         Ok(())
     }
 
-    fn sort(&mut self, bench: Arc<Bench>, x: Gathered) {
+    fn sort(&mut self, bench: Arc<SortBasis>, x: Gathered) {
         if self.threads == 1 && self.pool.is_none() {
             let (sorted, ns) = timed_sort(&bench, &x);
             self.queue.push_back(Arrival::Sorted(sorted, ns));
@@ -451,10 +451,10 @@ impl Host {
 }
 
 /// A sort and its thread-CPU time (ns).
-pub fn timed_sort(bench: &Bench, x: &Gathered) -> (Box<Sorted>, u64) {
+pub fn timed_sort(basis: &SortBasis, x: &Gathered) -> (Box<Sorted>, u64) {
     let clock = ThreadClock::default();
     let mark = clock.start();
-    let sorted = Box::new(bench.sort(x));
+    let sorted = Box::new(basis.sort(x));
     clock.stop(mark, true);
     (sorted, clock.work().contact_ns)
 }

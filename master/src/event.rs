@@ -7,14 +7,13 @@ use protocol::{
     message::{ToMaster, ToWorker, Work},
     phase::Report,
 };
-use serde::{Deserialize, Serialize};
 
 use crate::{
-    job::Bench,
+    incident::{Loss, Rebalance},
     ledger::Ledger,
     results::history::HistoryRow,
     snapshot::Snapshot,
-    sort::{Gathered, Sorted},
+    sort::{Gathered, SortBasis, Sorted},
 };
 
 /// A worker as the job sees it.
@@ -26,36 +25,6 @@ pub struct Hand {
     pub speed: f64,
     /// Compute threads.
     pub threads: u32,
-}
-
-/// Work was dealt out anew because speeds turned out to be others.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rebalance {
-    /// At the start of this cycle.
-    pub cycle: u64,
-    /// Names of the workers, in the order of the following.
-    pub workers: Vec<String>,
-    /// Speeds that work was dealt out by before.
-    pub speeds_before: Vec<f64>,
-    /// And after.
-    pub speeds_after: Vec<f64>,
-    /// Time of the slowest worker over that of a perfect cut, as measured before.
-    pub imbalance_before: f64,
-    /// The same as it is foreseen with the new cut.
-    pub imbalance_after: f64,
-}
-
-/// A worker was lost and the run went back.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Loss {
-    /// Name of the worker.
-    pub worker: String,
-    /// The first cycle that was not complete.
-    pub cycle: u64,
-    /// The cycle that the run went back to.
-    pub back_to: u64,
-    /// Why.
-    pub why: String,
 }
 
 /// What happens to a job. Workers have the index at which they came: first those of [`Job::new`](crate::job::Job::new),
@@ -82,7 +51,7 @@ pub enum Action {
     /// Send to a worker.
     Send(usize, ToWorker),
     /// Sort; exactly one [`Event::Sorted`] answers it. Positions by surface node.
-    Sort(Arc<Bench>, Gathered),
+    Sort(Arc<SortBasis>, Gathered),
     /// Send [`Event::Timer`] in so many seconds.
     Timer(f64),
     /// Append a row of history.
@@ -100,8 +69,8 @@ pub enum Action {
     Dealt(Vec<Deal>),
     /// Store the snapshot that was asked for.
     Snapshot(Box<Snapshot>),
-    /// A base, which the run could be gone on with from disk; the last one of a run that is stopped comes in any case.
-    Base {
+    /// A checkpoint, which the run could be gone on with from disk; the last one of a run that is stopped comes in any case.
+    Checkpoint {
         /// All of it but the states written.
         snapshot: Box<Snapshot>,
         /// The run stops here.

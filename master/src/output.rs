@@ -215,7 +215,7 @@ impl Sink for Output {
                 }
                 None => Err("a snapshot needs a results folder; leave out --no-output".to_owned()),
             },
-            Action::Base { mut snapshot, last } => {
+            Action::Checkpoint { mut snapshot, last } => {
                 let cycle = snapshot.state.cycle;
                 if self.keeper.as_ref().is_some_and(|keeper| last || keeper.is_due(cycle)) {
                     // A snapshot counts on the states that it names.

@@ -33,7 +33,7 @@ use crate::{
     balance::Costs,
     command::{Clock, SimulateArgs},
     deck_file::read_deck,
-    event::{Loss, Rebalance},
+    incident::{Loss, Rebalance},
 };
 
 use cluster::{Cluster, ElementCost};

@@ -152,3 +152,43 @@ impl Sorter {
         Sorted { epoch, gathered: of.cycle, exchange, census, interactions }
     }
 }
+
+/// What sorts work on: fixed for an epoch, but for the surface where elements erode.
+pub struct SortBasis {
+    /// Number of the epoch.
+    pub epoch: u32,
+    /// Surface, settings, speeds.
+    pub sorter: Sorter,
+    /// Who holds which nodes.
+    pub holdings: Arc<Holdings>,
+    /// Masses and constraints (positions are those of the epoch's start).
+    pub state: Arc<GlobalState>,
+    /// Nodes (global, ascending) that leave the run with the plan of the sort.
+    pub dropped: Vec<u32>,
+}
+
+impl SortBasis {
+    /// Does the sort that `Action::Sort` of a job asks for.
+    pub fn sort(&self, x: &Gathered) -> Sorted {
+        worker::failpoint::die("die-in-sort");
+        let mut sorted = self.sorter.run(self.epoch, x, &self.holdings, &self.state);
+        if !self.dropped.is_empty() {
+            for (worker, plan) in (0..).zip(&mut sorted.exchange.plans) {
+                plan.dropped =
+                    self.dropped.iter().copied().filter(|&node| self.holdings.holds(worker, node)).collect();
+            }
+        }
+        sorted
+    }
+
+    /// The same with another surface.
+    pub fn with_surface(&self, surface: Arc<Surface>, dropped: Vec<u32>) -> Self {
+        Self {
+            epoch: self.epoch,
+            sorter: self.sorter.with_surface(surface),
+            holdings: Arc::clone(&self.holdings),
+            state: Arc::clone(&self.state),
+            dropped,
+        }
+    }
+}

@@ -464,7 +464,7 @@ impl World {
                 }
                 Action::Row(row) => self.disk.rows.push(*row),
                 Action::State(state) => self.disk.states.push(*state),
-                Action::Snapshot(snapshot) | Action::Base { snapshot, .. } => {
+                Action::Snapshot(snapshot) | Action::Checkpoint { snapshot, .. } => {
                     self.disk.snapshot = Some(*snapshot);
                 }
                 Action::Rewind { rows, cycle } => {

@@ -285,14 +285,14 @@ fn each_criterion_takes_out_the_elements_that_meet_it_and_the_surface_is_that_of
         }
         for state in [&before, &run.state] {
             let standing = |e: usize| state.eroded[e].saturating_add(SURFACE_LAG) > state.cycle;
-            let faces = master::job::surface_of(&model, state).map(|surface| surface.faces.len());
+            let faces = master::erosion::surface_of(&model, state).map(|surface| surface.faces.len());
             let brute = lone_faces(&model, standing);
             assert!(
                 faces.is_none_or(|faces| faces == brute),
                 "{criterion}: {faces:?} faces, {brute} counted"
             );
         }
-        let settled = master::job::surface_of(&model, &whole.state).expect("some have eroded");
+        let settled = master::erosion::surface_of(&model, &whole.state).expect("some have eroded");
         let standing = |e: usize| whole.state.eroded[e].saturating_add(SURFACE_LAG) > whole.state.cycle;
         assert_eq!(settled.faces.len(), lone_faces(&model, standing), "{criterion}");
         println!("{criterion}: {n} of 360 eroded by cycle {last}, {} faces", settled.faces.len());

@@ -15,7 +15,7 @@ use crate::{
     sort::Gathered,
 };
 
-const DECK: &str = r#"
+pub(super) const DECK: &str = r#"
     title = "two cubes"
     units = "SI"
     [control]
@@ -37,7 +37,7 @@ fn hands(n: usize) -> Vec<Hand> {
     (0..n).map(|i| Hand { name: format!("worker-{i}"), speed: 1.0, threads: 1 }).collect()
 }
 
-fn job(n: usize) -> (Job, Vec<Action>) {
+pub(super) fn job(n: usize) -> (Job, Vec<Action>) {
     let model = deck::read(DECK, "two cubes").expect("a good deck");
     Job::new(Arc::new(model), &hands(n), SessionOptions::default(), None).expect("a good problem")
 }
@@ -191,12 +191,12 @@ fn a_job_without_workers_that_is_stopped_ends_with_the_state_it_went_back_to() {
 #[test]
 fn a_job_that_keeps_no_state_sorts_all_the_same_and_says_so_when_a_worker_is_lost() {
     let (mut job, _) = job(2);
-    let bench = job.epoch.bench.clone().expect("the cubes may meet");
+    let bench = job.epoch.sorts.basis().cloned().expect("the cubes may meet");
     let x = Gathered { cycle: 0, x: bench.sorter.positions_of(job.start_state()) };
     let interactions = bench.sort(&x).interactions;
     drop(bench);
     job.keep_no_state();
-    let bench = job.epoch.bench.clone().expect("as before");
+    let bench = job.epoch.sorts.basis().cloned().expect("as before");
     assert!(bench.state.is_static() && bench.sort(&x).interactions == interactions);
     let actions = job.apply(Event::Lost(0, "cable".into()));
     let says = |a: &Action| matches!(a, Action::Over(o) if o.failure.as_deref() == Some("no state of cycle 0 is kept to go back to"));
@@ -206,7 +206,7 @@ fn a_job_that_keeps_no_state_sorts_all_the_same_and_says_so_when_a_worker_is_los
 #[test]
 fn a_sort_of_an_epoch_that_is_over_is_of_no_use() {
     let (mut job, _) = job(2);
-    let bench = job.epoch.bench.clone().expect("the cubes may meet");
+    let bench = job.epoch.sorts.basis().cloned().expect("the cubes may meet");
     let x = Gathered { cycle: 0, x: bench.sorter.positions_of(job.start_state()) };
     let sorted = Box::new(bench.sort(&x));
     job.apply(Event::Lost(0, "cable".into()));
@@ -294,7 +294,7 @@ fn dealt_anew(cycles: u64, mut nanoseconds: impl FnMut(usize, u64) -> f64) -> Ve
                 if orders.next != cycle + 1 {
                     panic!("orders for {} after cycle {cycle}", orders.next);
                 }
-                let stops = job.epoch.stop_at == Some(cycle + 1);
+                let stops = job.epoch.schedule.stops_at(cycle + 1);
                 if stops {
                     let (pieces, work) = (Vec::new(), Work::default());
                     let last = vote();

@@ -1,14 +1,19 @@
-//! The verdict on a cycle: its vote is booked, and a run whose physics went wrong is stopped with its reason.
+//! The account of a run: each cycle's vote is booked, and a run whose physics went wrong fails with its reason.
 
 use std::sync::Arc;
 
 use mechanics::{
     contact::{edges::EDGE, reach},
     vote::Vote,
+    wall::{self, Pose},
 };
 
-use super::{Job, epoch::Step};
-use crate::event::{Action, Limit};
+use super::{checkpoints::Checkpoint, error::Error, problem::Problem, schedule::Step};
+use crate::{
+    event::{Action, Limit},
+    ledger::Ledger,
+    results::history::HistoryRow,
+};
 
 /// Deepest contact (gaps) before the run is stopped. Where elements erode, a face that they leave bare may have a node at any
 /// depth, and one that comes through is pushed on from the other side: there it is only reported.
@@ -19,14 +24,55 @@ const SETTLED: u64 = 20;
 /// Share of the first time step below which a run is stopped where the deck gives no floor.
 const FLOOR: f64 = 1e-4;
 
-impl Job {
+/// What has been booked so far, and the verdict on it.
+pub(super) struct Account {
+    pub(super) ledger: Ledger,
+    /// Poses of the walls of finite mass in the newest cycle that was ordered.
+    pub(super) walls: Vec<Pose>,
+    pub(super) rows: Vec<Arc<HistoryRow>>,
+    /// What went wrong first, in the physics.
+    pub(super) failure: Option<String>,
+}
+
+impl Account {
+    /// Up to a checkpoint, with the rows up to there.
+    pub(super) fn new(checkpoint: &Checkpoint, rows: Vec<Arc<HistoryRow>>) -> Self {
+        let rest = &checkpoint.rest;
+        Self { ledger: rest.ledger.clone(), walls: rest.walls.clone(), rows, failure: None }
+    }
+
+    /// Everything that was booked after a checkpoint is forgotten.
+    pub(super) fn go_back(&mut self, checkpoint: &Checkpoint) {
+        let rest = &checkpoint.rest;
+        self.ledger = rest.ledger.clone();
+        self.walls.clone_from(&rest.walls);
+        self.rows.truncate(rest.n_rows);
+        self.failure = None;
+    }
+
+    /// Moves the walls of finite mass on by a step, from what its vote says of them.
+    ///
+    /// # Errors
+    /// If the vote says something impossible of a wall.
+    pub(super) fn move_walls(&mut self, problem: &Problem, vote: &Vote, dt: f64) -> Result<(), Error> {
+        let walls = &problem.model.setup.walls;
+        wall::advance(walls, &vote.walls, dt, &mut self.walls).map_err(Error::Problem)
+    }
+
     /// Books the whole vote of a cycle, and stops the run where the physics went wrong.
-    pub(super) fn book(&mut self, cycle: u64, vote: &Vote, actions: &mut Vec<Action>) {
-        let Some(&Step { dt, time, .. }) = self.epoch.steps.get(&cycle) else { return };
-        let gap = self.model.setup.contact.as_ref().map(|c| c.gap);
+    /// `volumes` are those that elements began with.
+    pub(super) fn book(
+        &mut self,
+        (problem, volumes): (&Problem, &[f64]),
+        (cycle, step): (u64, Step),
+        vote: &Vote,
+        actions: &mut Vec<Action>,
+    ) {
+        let Step { dt, time, .. } = step;
+        let gap = problem.model.setup.contact.as_ref().map(|c| c.gap);
         self.ledger.book(vote, cycle, time, dt, gap);
-        self.ledger.book_eroded(vote, &self.model);
-        let written = cycle.is_multiple_of(u64::from(self.model.output.history_cycles.max(1)));
+        self.ledger.book_eroded(vote, &problem.model);
+        let written = cycle.is_multiple_of(u64::from(problem.model.output.history_cycles.max(1)));
         if written {
             self.row(actions);
         }
@@ -34,14 +80,14 @@ impl Job {
             return;
         }
         self.failure = if let Some((element, volume)) = vote.fault {
-            Some(self.element_fault(element, volume, cycle))
-        } else if vote.worst_depth >= DEEPEST && !self.model.setup.erosion.is_on() {
-            Some(self.contact_fault(vote, cycle))
+            Some(element_fault(problem, volumes, (element, volume), cycle))
+        } else if vote.worst_depth >= DEEPEST && !problem.model.setup.erosion.is_on() {
+            Some(contact_fault(problem, vote, cycle))
         } else if self.ledger.worst_courant > 1.0 {
             Some(format!(
                 "cycle {cycle}: time step {dt:e} above the Courant limit {:e} of element {}; lower control.safety_factor",
                 vote.courant,
-                self.element_name(vote.courant_element)
+                element_name(problem, vote.courant_element)
             ))
         } else if self.ledger.worst_gap_travel > 0.2 {
             Some(format!(
@@ -49,42 +95,26 @@ impl Job {
                 self.ledger.worst_gap_travel
             ))
         } else {
-            self.stale(vote, cycle).or_else(|| self.run_away(cycle))
+            stale(problem, vote, cycle).or_else(|| self.run_away(problem, cycle))
         };
         if self.failure.is_some() && !written {
             self.row(actions);
         }
     }
 
-    /// What a contact that is too deep says.
-    fn contact_fault(&self, vote: &Vote, cycle: u64) -> String {
-        let (node, other) = vote.worst_pair;
-        let id = |node: u32| self.model.mesh.node_ids.get(node as usize).copied().unwrap_or(node);
-        let (what, whose) = if other & EDGE == 0 {
-            ("node", format!("surface face {other}"))
-        } else {
-            ("an edge at node", format!("an edge at node {}", id(other & !EDGE)))
-        };
-        format!(
-            "{what} {} is {:.2} gaps into the contact zone of {whose} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap",
-            id(node),
-            vote.worst_depth
-        )
-    }
-
     /// Whether more energy appeared or vanished than the deck allows.
-    fn run_away(&self, cycle: u64) -> Option<String> {
-        let (error, limit) = (self.ledger.last.error, self.model.setup.control.energy_error);
+    fn run_away(&self, problem: &Problem, cycle: u64) -> Option<String> {
+        let (error, limit) = (self.ledger.last.error, problem.model.setup.control.energy_error);
         // Energies are sums of whole quanta, one rounding for each element and cycle: what lies below cannot be judged.
         let rounding =
-            0.5 * self.quanta.energy.value() * self.model.mesh.n_elements() as f64 * (cycle + 1) as f64;
+            0.5 * problem.quanta.energy.value() * problem.model.mesh.n_elements() as f64 * (cycle + 1) as f64;
         let settled = self.ledger.first_stirred.is_some_and(|first| cycle >= first + SETTLED);
         if !settled || error.abs() <= limit || self.ledger.unexplained().abs() <= rounding {
             return None;
         }
         let last = &self.ledger.last;
         let part = self.ledger.greediest_part().map(|(p, gain)| {
-            let name = self.model.mesh.parts.get(p).map_or("", |part| part.name.as_str());
+            let name = problem.model.mesh.parts.get(p).map_or("", |part| part.name.as_str());
             format!("; part `{name}` gained most, {gain:e}")
         });
         Some(format!(
@@ -99,15 +129,21 @@ impl Job {
     }
 
     /// Stops the run if the next time step is under its floor. `limit` is what holds it down.
-    pub(super) fn check_floor(&mut self, cycle: u64, dt: f64, limit: Limit, element: Option<u32>) {
-        let given = self.model.setup.control.time_step_floor;
+    pub(super) fn check_floor(
+        &mut self,
+        problem: &Problem,
+        (cycle, dt): (u64, f64),
+        limit: Limit,
+        element: Option<u32>,
+    ) {
+        let given = problem.model.setup.control.time_step_floor;
         let floor = if given > 0.0 { given } else { FLOOR * self.ledger.first_step.unwrap_or_default() };
         if self.failure.is_some() || limit == Limit::End || dt >= floor {
             return;
         }
         let why = match (limit, element) {
             (Limit::Courant, Some(element)) => {
-                format!("the Courant limit of element {}", self.element_name(element))
+                format!("the Courant limit of element {}", element_name(problem, element))
             }
             (Limit::Courant, None) => "the Courant limit".to_owned(),
             (Limit::Volume, _) => "the rate of volume of an element".to_owned(),
@@ -121,46 +157,70 @@ impl Job {
         ));
     }
 
-    pub(super) fn stale(&self, vote: &Vote, cycle: u64) -> Option<String> {
-        let settings = self.model.setup.contact.as_ref()?;
-        let (spread, [a, b]) = reach::worst_spread(&vote.extents, settings);
-        (spread > settings.slack).then(|| {
-            let name = |p: u32| self.model.mesh.parts[p as usize].name.as_str();
-            format!(
-                "cycle {cycle}: parts `{}` and `{}` moved {spread:e} against each other since the last sort, the slack is {:e}; raise contact.slack",
-                name(a),
-                name(b),
-                settings.slack
-            )
-        })
-    }
-
     pub(super) fn row(&mut self, actions: &mut Vec<Action>) {
         self.rows.push(Arc::new(self.ledger.last.clone()));
         actions.push(Action::Row(Box::new(self.ledger.last.clone())));
     }
+}
 
-    pub(super) fn element_name(&self, element: u32) -> String {
-        let mut left = element as usize;
-        for part in &self.model.mesh.parts {
-            let n = part.n_elements();
-            if left < n {
-                return format!(
-                    "{} of part `{}`",
-                    part.element_ids.get(left).copied().unwrap_or(left as u32),
-                    part.name
-                );
-            }
-            left -= n;
-        }
-        element.to_string()
-    }
+/// What a contact that is too deep says.
+fn contact_fault(problem: &Problem, vote: &Vote, cycle: u64) -> String {
+    let (node, other) = vote.worst_pair;
+    let id = |node: u32| problem.model.mesh.node_ids.get(node as usize).copied().unwrap_or(node);
+    let (what, whose) = if other & EDGE == 0 {
+        ("node", format!("surface face {other}"))
+    } else {
+        ("an edge at node", format!("an edge at node {}", id(other & !EDGE)))
+    };
+    format!(
+        "{what} {} is {:.2} gaps into the contact zone of {whose} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap",
+        id(node),
+        vote.worst_depth
+    )
+}
 
-    pub(super) fn element_fault(&self, element: u32, volume: f64, cycle: u64) -> String {
-        let was = self.base.state.initial_volume.get(element as usize).copied().unwrap_or(f64::NAN);
+/// Whether bodies moved further against each other than the slack allows.
+fn stale(problem: &Problem, vote: &Vote, cycle: u64) -> Option<String> {
+    let settings = problem.model.setup.contact.as_ref()?;
+    let (spread, [a, b]) = reach::worst_spread(&vote.extents, settings);
+    (spread > settings.slack).then(|| {
+        let name = |p: u32| problem.model.mesh.parts[p as usize].name.as_str();
         format!(
-            "element {}: volume {volume:e} at cycle {cycle}, at first {was:e}; refine the mesh, soften the load or add an erosion strain",
-            self.element_name(element)
+            "cycle {cycle}: parts `{}` and `{}` moved {spread:e} against each other since the last sort, the slack is {:e}; raise contact.slack",
+            name(a),
+            name(b),
+            settings.slack
         )
+    })
+}
+
+/// An element as users name it.
+fn element_name(problem: &Problem, element: u32) -> String {
+    let mut left = element as usize;
+    for part in &problem.model.mesh.parts {
+        let n = part.n_elements();
+        if left < n {
+            return format!(
+                "{} of part `{}`",
+                part.element_ids.get(left).copied().unwrap_or(left as u32),
+                part.name
+            );
+        }
+        left -= n;
     }
+    element.to_string()
+}
+
+/// What an element without volume says; `volumes` are those that elements began with.
+pub(super) fn element_fault(
+    problem: &Problem,
+    volumes: &[f64],
+    (element, volume): (u32, f64),
+    cycle: u64,
+) -> String {
+    let was = volumes.get(element as usize).copied().unwrap_or(f64::NAN);
+    format!(
+        "element {}: volume {volume:e} at cycle {cycle}, at first {was:e}; refine the mesh, soften the load or add an erosion strain",
+        element_name(problem, element)
+    )
 }

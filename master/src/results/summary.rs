@@ -10,7 +10,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{Error, Folder, SUMMARY, Units, write_whole};
-use crate::event::{Loss, Rebalance};
+use crate::incident::{Loss, Rebalance};
 
 /// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no
 /// others.

@@ -13,7 +13,7 @@ use mechanics::{
     state::GlobalState,
 };
 
-use crate::job::surface_of;
+use crate::erosion::surface_of;
 
 use super::{
     CONTACT_PVD, Error, Folder, contact_name,

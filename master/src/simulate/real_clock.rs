@@ -590,7 +590,7 @@ impl Clock<'_> {
                 Action::Row(_)
                 | Action::State(_)
                 | Action::Snapshot(_)
-                | Action::Base { .. }
+                | Action::Checkpoint { .. }
                 | Action::Dismiss(..)
                 | Action::Progress(_)
                 | Action::Dealt(_)

@@ -3,7 +3,7 @@
 use mechanics::cycle::Load;
 use worker::session::Task;
 
-use crate::event::{Loss, Rebalance};
+use crate::incident::{Loss, Rebalance};
 
 /// Seconds of a worker's cycle by what they went into, at the speed of its host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]

@@ -4,7 +4,7 @@
 //! sort of them, and from cycle `n + 4` on its plan acts, with a surface without those elements. That is counted from the
 //! cycle of erosion alone, so an epoch that begins in between goes on with it.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use deck::model::Model;
 use mechanics::{
@@ -14,10 +14,24 @@ use mechanics::{
     state::GlobalState,
 };
 
-use super::{Bench, Job, epoch::SortUnderWay};
+/// A vote names an element that there is not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnknownElement {
+    element: u32,
+    n: usize,
+}
+
+impl fmt::Display for UnknownElement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { element, n } = self;
+        write!(f, "element index {element} eroded, the problem has {n} elements")
+    }
+}
+
+impl std::error::Error for UnknownElement {}
 
 /// What has eroded, in one epoch.
-pub(super) struct Eroded {
+pub struct Eroded {
     /// Cycle of erosion by global element, or [`ALIVE`].
     cycles: Vec<u64>,
     /// Elements whose faces are still on the surface, by the cycle in which they eroded.
@@ -26,7 +40,7 @@ pub(super) struct Eroded {
 
 impl Eroded {
     /// What has eroded before the cycle that `state` begins; none where nothing can erode.
-    pub(super) fn new(state: &GlobalState) -> Option<Self> {
+    pub fn new(state: &GlobalState) -> Option<Self> {
         if state.eroded.is_empty() {
             return None;
         }
@@ -43,13 +57,10 @@ impl Eroded {
     ///
     /// # Errors
     /// If it names an element that there is not.
-    pub(super) fn note(&mut self, cycle: u64, elements: &[u32]) -> Result<(), String> {
+    pub fn note(&mut self, cycle: u64, elements: &[u32]) -> Result<(), UnknownElement> {
         for &element in elements {
             let n = self.cycles.len();
-            let known = self
-                .cycles
-                .get_mut(element as usize)
-                .ok_or_else(|| format!("element index {element} eroded, the problem has {n} elements"))?;
+            let known = self.cycles.get_mut(element as usize).ok_or(UnknownElement { element, n })?;
             if *known == ALIVE {
                 *known = cycle;
                 self.pending.entry(cycle).or_default().push(element);
@@ -59,32 +70,32 @@ impl Eroded {
     }
 
     /// Whether positions travel at the start of `cycle` for a surface that changes in the cycle after.
-    pub(super) fn changes_surface(&self, cycle: u64) -> bool {
+    pub fn changes_surface(&self, cycle: u64) -> bool {
         (cycle + 1).checked_sub(SURFACE_LAG).is_some_and(|eroded| self.pending.contains_key(&eroded))
     }
 
     /// The elements whose faces leave the surface in the cycle after `cycle` are on their way.
-    pub(super) fn settle(&mut self, cycle: u64) {
+    pub fn settle(&mut self, cycle: u64) {
         self.pending.retain(|&eroded, _| !leaves_before(eroded, cycle + 1));
     }
 
     /// Whether an element has a share in the surface at `cycle`.
-    pub(super) fn is_on_surface(&self, element: u32, cycle: u64) -> bool {
+    pub fn is_on_surface(&self, element: u32, cycle: u64) -> bool {
         self.cycles.get(element as usize).is_none_or(|&eroded| !leaves_before(eroded, cycle))
     }
 
     /// Which elements are alive, by global index.
-    pub(super) fn alive(&self) -> Vec<bool> {
+    pub fn alive(&self) -> Vec<bool> {
         self.cycles.iter().map(|&cycle| cycle == ALIVE).collect()
     }
 
     /// The surface in force at `cycle`.
-    pub(super) fn surface(&self, model: &Model, cycle: u64) -> Arc<Surface> {
+    pub fn surface(&self, model: &Model, cycle: u64) -> Arc<Surface> {
         surface(model, &|element| self.is_on_surface(element, cycle))
     }
 
     /// Nodes that have no element left at `cycle` (global indices, ascending), where those are dropped.
-    pub(super) fn dropped(&self, model: &Model, cycle: u64) -> Vec<u32> {
+    pub fn dropped(&self, model: &Model, cycle: u64) -> Vec<u32> {
         let erosion = &model.setup.erosion;
         if erosion.retain_inertia {
             return Vec::new();
@@ -103,49 +114,6 @@ impl Eroded {
     }
 }
 
-impl Job {
-    /// Whether positions travel at the start of `cycle` because elements have eroded.
-    pub(super) fn surface_changes_at(&self, cycle: u64) -> bool {
-        self.epoch.bench.is_some()
-            && self.epoch.eroded.as_ref().is_some_and(|eroded| eroded.changes_surface(cycle))
-    }
-
-    /// Enters a gathering at the start of `cycle`. A blocking one takes the place of sorts and plans that would act later than
-    /// it does: they know the old surface.
-    pub(super) fn gather_at(&mut self, cycle: u64, blocking: bool) {
-        let epoch = &mut self.epoch;
-        let lag = if blocking { 1 } else { u64::from(self.model.setup.control.sort_lag) };
-        if blocking {
-            // What comes of those that are begun is thrown away; the others are not asked for.
-            epoch.sorts_under_way.retain(|sort| sort.acts_at <= cycle);
-            while epoch.exchanges.back().is_some_and(|acting| acting.at > cycle) {
-                epoch.exchanges.pop_back();
-            }
-        }
-        let sort = SortUnderWay { gathered: cycle, acts_at: cycle + lag, blocking, done: None };
-        epoch.sorts_under_way.push_back(sort);
-        epoch.last_gather = cycle;
-    }
-
-    /// What the sort of the positions of `cycle` works on. The surface changes with a blocking one, for good.
-    pub(super) fn bench_for(&mut self, cycle: u64, blocking: bool) -> Option<Arc<Bench>> {
-        let bench = self.epoch.bench.clone()?;
-        let Some(eroded) = self.epoch.eroded.as_mut().filter(|_| blocking) else { return Some(bench) };
-        let surface = eroded.surface(&self.model, cycle + 1);
-        let mut dropped = eroded.dropped(&self.model, cycle + 1);
-        let before = eroded.dropped(&self.model, cycle);
-        dropped.retain(|node| before.binary_search(node).is_err());
-        eroded.settle(cycle);
-        self.epoch.bench = Some(Arc::new(bench.with_surface(Arc::clone(&surface), Vec::new())));
-        Some(Arc::new(bench.with_surface(surface, dropped)))
-    }
-
-    /// Which elements are alive by what is known in this epoch; none where nothing can erode.
-    pub(super) fn alive(&self) -> Option<Vec<bool>> {
-        self.epoch.eroded.as_ref().map(Eroded::alive)
-    }
-}
-
 /// Whether the faces of an element that eroded in cycle `eroded` have left the surface at `cycle`.
 fn leaves_before(eroded: u64, cycle: u64) -> bool {
     eroded.saturating_add(SURFACE_LAG) <= cycle
@@ -158,7 +126,7 @@ pub fn surface_of(model: &Model, state: &GlobalState) -> Option<Arc<Surface>> {
 }
 
 /// The surface of the elements for which `stands` holds, with the nodes of all parts that can erode.
-pub(super) fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Arc<Surface> {
+pub fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Arc<Surface> {
     let setup = &model.setup;
     let erodes: Vec<bool> = setup.erosion.parts.iter().map(Option::is_some).collect();
     let retain_inertia = setup.erosion.retain_inertia;

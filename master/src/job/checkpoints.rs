@@ -1,0 +1,281 @@
+//! Checkpoints: the whole state at the start of a cycle, which a run can go back to or be gone on with from disk.
+//!
+//! A checkpoint is all that the cycles after it depend on, so no bit of the run depends on how often, when and on whom it is
+//! begun anew. It is collected in two parts that come in any order: the state from the images of all workers, the rest from
+//! the frames of its cycle.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
+
+use super::{error::Error, problem::Problem};
+use crate::{ledger::Ledger, options::Keep, results::history::HistoryRow, snapshot::Snapshot};
+
+/// Where an epoch can begin.
+#[derive(Clone)]
+pub(super) struct Checkpoint {
+    pub(super) state: Arc<GlobalState>,
+    pub(super) rest: Rest,
+}
+
+/// What a checkpoint holds beside the state.
+#[derive(Clone)]
+pub(super) struct Rest {
+    /// `dt` of the cycle before (time).
+    pub(super) dt_previous: f64,
+    /// `dt` of the cycle to come; none at the start of a run, where the first vote gives it.
+    pub(super) dt: Option<f64>,
+    /// Quantum of forces in the cycle to come, and from the one after it on.
+    pub(super) quanta: [Quantum; 2],
+    /// The whole vote of the cycle before; none at the start of a run.
+    pub(super) vote: Option<Vote>,
+    /// Poses of the walls of finite mass in the cycle to come.
+    pub(super) walls: Vec<Pose>,
+    /// With the cycle before in it.
+    pub(super) ledger: Ledger,
+    /// Rows of history up to there.
+    pub(super) n_rows: usize,
+    /// The rate at which bodies move against each other, as it was known then (length per cycle).
+    pub(super) spread_rate: f64,
+}
+
+impl Checkpoint {
+    /// Of the start of a run.
+    pub(super) fn first(problem: &Problem, start: GlobalState) -> Self {
+        let model = &problem.model;
+        let rest = Rest {
+            dt_previous: 0.0,
+            dt: None,
+            quanta: [problem.quanta.force; 2],
+            vote: None,
+            walls: mechanics::wall::first_poses(&model.setup.walls),
+            ledger: Ledger::new(model, &start.mass),
+            n_rows: 0,
+            spread_rate: 0.0,
+        };
+        Self { state: Arc::new(start), rest }
+    }
+
+    /// From disk, with the rows of history up to there. `start` is the state that the deck gives.
+    ///
+    /// # Errors
+    /// If the snapshot is of another problem.
+    pub(super) fn restored(
+        snapshot: Snapshot,
+        problem: &Problem,
+        start: &GlobalState,
+    ) -> Result<(Self, Vec<Arc<HistoryRow>>), Error> {
+        let setup = &problem.model.setup;
+        if shape(&snapshot.state) != shape(start)
+            || snapshot.state.initial_volume != start.initial_volume
+            || snapshot.walls.len() != mechanics::wall::first_poses(&setup.walls).len()
+            || snapshot.vote.bodies.len() != setup.bodies.len()
+        {
+            return Err(Error::AnotherProblem);
+        }
+        let rest = Rest {
+            dt_previous: snapshot.dt_previous,
+            dt: Some(snapshot.dt),
+            quanta: snapshot.force_quanta,
+            vote: Some(snapshot.vote),
+            walls: snapshot.walls,
+            ledger: snapshot.ledger,
+            n_rows: snapshot.rows.len(),
+            spread_rate: snapshot.spread_rate,
+        };
+        Ok((Self { state: snapshot.state, rest }, snapshot.rows))
+    }
+
+    /// The cycle at whose start it is.
+    pub(super) fn cycle(&self) -> u64 {
+        self.state.cycle
+    }
+
+    /// As it is stored; none at the start of a run, which the deck gives as well.
+    pub(super) fn as_snapshot(&self, rows: &[Arc<HistoryRow>]) -> Option<Box<Snapshot>> {
+        let Self { state, rest } = self;
+        Some(Box::new(Snapshot {
+            state: Arc::clone(state),
+            dt_previous: rest.dt_previous,
+            dt: rest.dt?,
+            force_quanta: rest.quanta,
+            spread_rate: rest.spread_rate,
+            vote: rest.vote.clone()?,
+            walls: rest.walls.clone(),
+            ledger: rest.ledger.clone(),
+            rows: rows[..rest.n_rows].to_vec(),
+            states: Vec::new(),
+        }))
+    }
+}
+
+/// How long the arrays of a state are: what its mesh and its laws ask for.
+fn shape(state: &GlobalState) -> (Vec<usize>, Vec<usize>) {
+    let GlobalState { x, v, mass, constraint, initial_volume, elements, eroded, strain, shells, .. } = state;
+    let fixed =
+        [x.len(), v.len(), mass.len(), constraint.len(), initial_volume.len(), eroded.len(), strain.len()];
+    let of_shells =
+        [shells.spin.len(), shells.inertia.len()].into_iter().chain(shells.fields.iter().map(Vec::len));
+    (fixed.into_iter().chain(elements.iter().map(Vec::len)).collect(), of_shells.collect())
+}
+
+/// A checkpoint of which parts have come.
+#[derive(Default)]
+struct Parts {
+    state: Option<GlobalState>,
+    rest: Option<Rest>,
+}
+
+/// The newest checkpoint, and those on their way.
+pub(super) struct Checkpoints {
+    /// Where the next epoch begins if a worker is lost or wrong: where samples are computed again, all that led here
+    /// agreed.
+    newest: Arc<Checkpoint>,
+    keep: Keep,
+    /// The time for a new one has come.
+    is_time: bool,
+    /// The cycle of the last one that was asked for because it was due, or of the epoch's beginning.
+    last: u64,
+    /// By cycle.
+    on_their_way: BTreeMap<u64, Parts>,
+}
+
+impl Checkpoints {
+    /// Of a session that begins at `first`.
+    pub(super) fn new(first: Checkpoint, keep: Keep) -> Self {
+        let last = first.cycle();
+        Self { newest: Arc::new(first), keep, is_time: false, last, on_their_way: BTreeMap::new() }
+    }
+
+    /// The newest one that is whole, and proved where samples are computed again.
+    pub(super) fn newest(&self) -> &Arc<Checkpoint> {
+        &self.newest
+    }
+
+    /// Takes one as the newest.
+    pub(super) fn adopt(&mut self, checkpoint: Arc<Checkpoint>) {
+        self.newest = checkpoint;
+    }
+
+    /// An epoch begins at the newest one: those on their way never come.
+    pub(super) fn begin_epoch(&mut self) {
+        self.on_their_way.clear();
+        self.last = self.newest.cycle();
+    }
+
+    /// Keeps of the newest one only what never changes; gives that. For workers of which none can be lost.
+    pub(super) fn forget_state(&mut self) -> Arc<GlobalState> {
+        let state = Arc::new(self.newest.state.statics());
+        let rest = self.newest.rest.clone();
+        self.newest = Arc::new(Checkpoint { state: Arc::clone(&state), rest });
+        state
+    }
+
+    /// The timer has run out.
+    pub(super) fn time_has_come(&mut self) {
+        self.is_time = true;
+    }
+
+    /// Whether the state at the start of a cycle is to be kept, and for how long (s) the timer is to be set then.
+    pub(super) fn due(&mut self, cycle: u64, at_boundary: bool) -> (bool, Option<f64>) {
+        let in_cycles = self.keep.cycles().is_some_and(|n| cycle >= self.last.saturating_add(n));
+        if !((self.is_time || in_cycles) && at_boundary) {
+            return (false, None);
+        }
+        self.last = cycle;
+        match self.keep.seconds() {
+            Some(seconds) if self.is_time => {
+                self.is_time = false;
+                (true, Some(seconds))
+            }
+            _ => (true, None),
+        }
+    }
+
+    /// One is collected at the start of a cycle.
+    pub(super) fn expect(&mut self, cycle: u64) {
+        self.on_their_way.entry(cycle).or_default();
+    }
+
+    /// Whether one is collected at the start of a cycle.
+    pub(super) fn is_expected(&self, cycle: u64) -> bool {
+        self.on_their_way.contains_key(&cycle)
+    }
+
+    /// The state of one that is expected has come.
+    pub(super) fn take_state(&mut self, cycle: u64, state: GlobalState) {
+        self.on_their_way.entry(cycle).or_default().state = Some(state);
+    }
+
+    /// The rest of one that is expected has come.
+    pub(super) fn take_rest(&mut self, cycle: u64, rest: Rest) {
+        self.on_their_way.entry(cycle).or_default().rest = Some(rest);
+    }
+
+    /// Whether all of one is here.
+    pub(super) fn is_whole(&self, cycle: u64) -> bool {
+        matches!(self.on_their_way.get(&cycle), Some(Parts { state: Some(_), rest: Some(_) }))
+    }
+
+    /// One that is whole.
+    pub(super) fn take(&mut self, cycle: u64) -> Option<Checkpoint> {
+        if !self.is_whole(cycle) {
+            return None;
+        }
+        let Parts { state, rest } = self.on_their_way.remove(&cycle)?;
+        Some(Checkpoint { state: Arc::new(state?), rest: rest? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checkpoint() -> Checkpoint {
+        let model = deck::read(super::super::tests::DECK, "two cubes").expect("a good deck");
+        let (problem, start) = Problem::new(Arc::new(model)).expect("a good problem");
+        Checkpoint::first(&problem, start)
+    }
+
+    #[test]
+    fn one_is_whole_once_both_parts_are_here_in_any_order() {
+        let first = checkpoint();
+        for state_first in [true, false] {
+            let mut checkpoints = Checkpoints::new(first.clone(), Keep::Never);
+            checkpoints.expect(7);
+            let state = GlobalState { cycle: 7, ..GlobalState::clone(&first.state) };
+            let mut parts: Vec<Box<dyn Fn(&mut Checkpoints)>> = vec![
+                Box::new(move |all| all.take_state(7, state.clone())),
+                Box::new(|all| all.take_rest(7, checkpoint().rest)),
+            ];
+            if !state_first {
+                parts.reverse();
+            }
+            parts[0](&mut checkpoints);
+            assert!(checkpoints.is_expected(7) && !checkpoints.is_whole(7) && checkpoints.take(7).is_none());
+            parts[1](&mut checkpoints);
+            assert_eq!(checkpoints.take(7).map(|whole| whole.cycle()), Some(7));
+            assert!(!checkpoints.is_expected(7), "it has been taken");
+        }
+    }
+
+    #[test]
+    fn states_are_kept_at_boundaries_alone_and_the_timer_is_set_when_it_was_time() {
+        let mut checkpoints = Checkpoints::new(checkpoint(), Keep::Either(10.0, 50));
+        assert_eq!(checkpoints.due(20, true), (false, None), "neither cycles nor time");
+        checkpoints.time_has_come();
+        assert_eq!(checkpoints.due(23, false), (false, None), "no boundary");
+        assert_eq!(checkpoints.due(25, true), (true, Some(10.0)));
+        assert_eq!(checkpoints.due(74, true), (false, None), "49 cycles after the last");
+        assert_eq!(checkpoints.due(75, true), (true, None), "50 cycles; the timer still runs");
+    }
+
+    #[test]
+    fn an_epoch_begins_without_those_that_were_on_their_way() {
+        let mut checkpoints = Checkpoints::new(checkpoint(), Keep::Cycles(10));
+        checkpoints.expect(30);
+        checkpoints.begin_epoch();
+        assert!(!checkpoints.is_expected(30));
+        assert_eq!(checkpoints.due(10, true), (true, None), "counted from the epoch's beginning");
+    }
+}

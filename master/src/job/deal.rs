@@ -1,0 +1,289 @@
+//! From a problem and its workers to their assignments: at the start of a run, and of each epoch of it.
+
+use std::sync::Arc;
+
+use deck::model::Model;
+use mechanics::{
+    block::Piece,
+    cycle::Subdomain,
+    piece::{self, Region},
+    state::GlobalState,
+    vote::{Quanta, Watched},
+};
+use protocol::message::{Assign, ToWorker};
+
+use super::{
+    Ending, Job,
+    balancing::{Balancing, Meter, Shares},
+    checkpoints::{Checkpoint, Checkpoints},
+    epoch::Epoch,
+    error::Error,
+    frames::Inflow,
+    problem::{Problem, Touching},
+    samples::Samples,
+    tally::Tally,
+    verdict::Account,
+    workers::Workers,
+};
+use crate::{
+    balance::INTERACTIONS_PER_ELEMENT,
+    decompose::{self, Living, decompose, work},
+    event::{Action, Deal, Hand},
+    exchange::Exchange,
+    holdings::Holdings,
+    options::SessionOptions,
+    snapshot::Snapshot,
+    sort::{Gathered, SortBasis, Sorter},
+};
+
+impl Job {
+    /// Takes a problem to these workers: from its deck, or from a snapshot of it.
+    ///
+    /// # Errors
+    /// If the problem cannot start: elements without volume, contact zones that overlap, no worker.
+    pub fn new(
+        model: Arc<Model>,
+        hands: &[Hand],
+        options: SessionOptions,
+        resume: Option<Snapshot>,
+    ) -> Result<(Self, Vec<Action>), Error> {
+        if hands.is_empty() {
+            return Err(Error::NoWorker);
+        }
+        let (problem, start) = Problem::new(model)?;
+        let (first, rows) = match resume {
+            None => (Checkpoint::first(&problem, start), Vec::new()),
+            Some(snapshot) => Checkpoint::restored(snapshot, &problem, &start)?,
+        };
+        let keep = options.keep;
+        let mut job = Self {
+            epoch: Epoch::without_workers(0, &first, &problem.model),
+            account: Account::new(&first, rows),
+            first_cycle: first.cycle(),
+            checkpoints: Checkpoints::new(first, keep),
+            workers: Workers::new(hands),
+            balancing: Balancing::default(),
+            tally: Tally::new(),
+            ending: Ending::default(),
+            lean: false,
+            unfenced: false,
+            problem,
+            options,
+        };
+        let mut actions = Vec::new();
+        job.epoch = job.deal(0, (0..hands.len()).collect(), &mut actions)?;
+        job.tally.sorts = u64::from(job.tally.census.units > 0);
+        if let Some(seconds) = keep.seconds() {
+            actions.push(Action::Timer(seconds));
+        }
+        Ok((job, actions))
+    }
+
+    /// From now on no state is kept to go back to: for a crew of which nobody can be lost, as it shares this process.
+    pub fn keep_no_state(&mut self) {
+        self.lean = true;
+        self.forget_state();
+    }
+
+    /// Drops what only going back would need of the checkpoint that has been dealt out.
+    pub(super) fn forget_state(&mut self) {
+        let statics = self.checkpoints.forget_state();
+        self.epoch.sorts.forget_state(&statics);
+    }
+
+    /// Deals the newest checkpoint out to a crew, as epoch `number`.
+    pub(super) fn deal(
+        &mut self,
+        number: u32,
+        crew: Vec<usize>,
+        actions: &mut Vec<Action>,
+    ) -> Result<Epoch, Error> {
+        let checkpoint = Arc::clone(self.checkpoints.newest());
+        if checkpoint.state.is_static() {
+            return Err(Error::NotKept { cycle: checkpoint.cycle() });
+        }
+        let (problem, model) = (&self.problem, &self.problem.model);
+        let mut epoch = Epoch::without_workers(number, &checkpoint, model);
+        let n = crew.len();
+        if n == 0 {
+            actions.push(Action::Dealt(Vec::new()));
+            return Ok(epoch);
+        }
+        let state = &checkpoint.state;
+        let hands: Vec<&Hand> = crew.iter().map(|&index| self.workers.hand(index)).collect();
+        let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
+        let costs = self.options.costs;
+        let alive = alive_in(state);
+        let layout = decompose(&model.mesh, &speeds, costs.node, alive.as_deref());
+        if model.output.workers {
+            let owners: Arc<[u32]> = decompose::owners(&model.mesh, &layout).into();
+            actions.push(Action::Owners(Arc::clone(&owners)));
+            epoch.owners = Some(owners);
+        }
+        let threads: Vec<u32> = hands.iter().map(|hand| hand.threads).collect();
+        let held = work(&layout, n, costs.node, &Living::new(&model.mesh, alive.as_deref()));
+        let division = Division::new(model, state, (&layout, held), &threads, problem.touching.as_ref());
+        let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
+        let dropped =
+            epoch.sorts.eroded().map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
+        if self.options.replay {
+            epoch.samples = Samples::new(blocks_of(&layout, &threads));
+        }
+        let mut basis = None;
+        let (exchange, interactions) = match (&problem.touching, &model.setup.contact) {
+            (Some(touching), Some(settings)) => {
+                let surface = epoch.sorts.eroded().map(|eroded| eroded.surface(model, state.cycle));
+                let sorter = Sorter::new(
+                    surface.unwrap_or_else(|| Arc::clone(&touching.surface)),
+                    settings.clone(),
+                    Arc::clone(&touching.exclusions),
+                    speeds.clone(),
+                    self.options.route(),
+                    self.options.dealing,
+                    costs.pair,
+                    &division.gather,
+                );
+                let x = Gathered { cycle: state.cycle, x: sorter.positions_of(state) };
+                let whole = SortBasis {
+                    epoch: number,
+                    sorter,
+                    holdings: Arc::new(division.holdings),
+                    state: Arc::clone(state),
+                    dropped,
+                };
+                let sorted = whole.sort(&x);
+                basis = Some(Arc::new(SortBasis { dropped: Vec::new(), ..whole }));
+                self.tally.census = sorted.census;
+                (sorted.exchange, sorted.interactions)
+            }
+            _ => (Exchange::new(&division.holdings, vec![None; n], state, self.options.route()), vec![0; n]),
+        };
+        self.tally.imbalance = imbalance(&elements, &interactions, &speeds);
+        let exchange = Arc::new(exchange);
+        let bodies = match &checkpoint.rest.vote {
+            Some(vote) => vote.bodies.clone(),
+            None => model.setup.bodies.iter().map(|body| body.start).collect(),
+        };
+        let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
+        let watched = Watched {
+            elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
+            contacts: model.output.contact_forces.clone(),
+        };
+        for (position, subdomains) in division.by_worker.into_iter().enumerate() {
+            let assign = Assign {
+                epoch: number,
+                setup: model.setup.clone(),
+                n_parts: model.mesh.parts.len() as u32,
+                quanta: Quanta { force: checkpoint.rest.quanta[0], ..problem.quanta },
+                subdomains,
+                gauges: gauges.clone(),
+                watched: watched.clone(),
+                lanes: self.options.asked.lanes.clone(),
+                cycle: state.cycle,
+                dt_previous: checkpoint.rest.dt_previous,
+                route: self.options.route(),
+                plan: exchange.plans[position].clone(),
+                plan_hash: exchange.hash,
+                guest_state: exchange.guest_state_from(position, state),
+                bodies: bodies.clone(),
+            };
+            actions.push(Action::Send(crew[position], ToWorker::Assign(Box::new(assign))));
+        }
+        actions.push(Action::Dealt(
+            hands
+                .iter()
+                .zip(&elements)
+                .map(|(hand, &e)| Deal { name: hand.name.clone(), speed: hand.speed, elements: e as u64 })
+                .collect(),
+        ));
+        epoch.sorts.begin(state.cycle, basis, exchange);
+        epoch.inflow = Inflow::new(n, checkpoint.rest.vote.clone());
+        epoch.meter = Meter::new(n);
+        epoch.crew = crew;
+        epoch.shares = Shares { speeds, elements, layout };
+        Ok(epoch)
+    }
+}
+
+/// Which elements are alive in a state; none where nothing can erode.
+fn alive_in(state: &GlobalState) -> Option<Vec<bool>> {
+    (!state.eroded.is_empty()).then(|| (0..state.eroded.len()).map(|e| !state.is_eroded(e)).collect())
+}
+
+/// The sub-domains of a layout, and who holds what.
+struct Division {
+    by_worker: Vec<Vec<Subdomain>>,
+    holdings: Holdings,
+    /// By worker: surface nodes that it owns, in the order of its gathering.
+    gather: Vec<Vec<u32>>,
+}
+
+impl Division {
+    fn new(
+        model: &Model,
+        state: &GlobalState,
+        (layout, work): (&[decompose::Subdomain], Vec<f64>),
+        threads: &[u32],
+        touching: Option<&Touching>,
+    ) -> Self {
+        let n = threads.len();
+        let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
+        let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
+        for (id, subdomain) in layout.iter().enumerate() {
+            let pieces: Vec<Piece> = blocks(subdomain, threads)
+                .iter()
+                .map(|region| piece::cut(&model.mesh, state, subdomain.part, region))
+                .collect();
+            let mut nodes: Vec<u32> = pieces.iter().flat_map(|p| p.nodes.iter().copied()).collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            nodes_of.push(nodes);
+            subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
+        }
+        let holdings = Holdings::new(model.mesh.n_nodes(), work, layout, &nodes_of)
+            .with_bodies(model.setup.bodies.len());
+        let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
+        let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
+        for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {
+            let id = subdomain.id;
+            subdomain.unowned =
+                nodes.iter().copied().filter(|&node| holdings.owner_subdomain[node as usize] != id).collect();
+            if let Some(Touching { surface, .. }) = touching {
+                subdomain.surface =
+                    nodes.iter().copied().filter(|&node| surface.node_index(node).is_some()).collect();
+                gather[place.worker].extend(
+                    subdomain.surface.iter().filter(|&&node| holdings.owner_subdomain[node as usize] == id),
+                );
+            }
+            by_worker[place.worker].push(subdomain);
+        }
+        Self { by_worker, holdings, gather }
+    }
+}
+
+/// The blocks of a sub-domain, one for each thread of its worker.
+fn blocks(subdomain: &decompose::Subdomain, threads: &[u32]) -> Vec<Region> {
+    subdomain.region.split(threads[subdomain.worker].max(1) as usize)
+}
+
+/// By worker: part and elements of each of its blocks, in the worker's order.
+fn blocks_of(layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<(usize, Region)>> {
+    let mut by_worker = vec![Vec::new(); threads.len()];
+    for subdomain in layout {
+        let regions = blocks(subdomain, threads);
+        by_worker[subdomain.worker].extend(regions.into_iter().map(|region| (subdomain.part, region)));
+    }
+    by_worker
+}
+
+/// Largest over mean of cost over speed, workers without a speed aside.
+fn imbalance(elements: &[f64], interactions: &[u64], speeds: &[f64]) -> f64 {
+    let finish: Vec<f64> = elements
+        .iter()
+        .zip(interactions)
+        .zip(speeds)
+        .map(|((e, i), s)| (e + *i as f64 / INTERACTIONS_PER_ELEMENT) / s)
+        .collect();
+    let bound = finish.iter().zip(speeds).map(|(f, s)| f * s).sum::<f64>() / speeds.iter().sum::<f64>();
+    if bound > 0.0 { finish.iter().copied().fold(0.0, f64::max) / bound } else { 1.0 }
+}

@@ -1,0 +1,32 @@
+//! Whether what a worker sends are numbers.
+
+use mechanics::vote::Vote;
+
+/// What of a worker's frame is no number. A run that has blown up says so by the forces of its vote.
+pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<String> {
+    if let Some(vote) = vote {
+        if !vote.force_bound.is_finite() && !vote.force_bound.is_nan() {
+            return None;
+        }
+        if vote.bodies.iter().any(|body| !body.is_finite()) {
+            return Some("the state of a rigid body in its vote is no number".to_owned());
+        }
+        let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
+        let numbers =
+            energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external.whole()]);
+        let released = vote.released.iter().flat_map(|released| released.pairs()).map(|pair| pair.contact);
+        let numbers = numbers.chain(released);
+        let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);
+        let mut numbers = numbers
+            .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| *state)))
+            .chain([vote.force_bound, vote.contact_speed_squared]);
+        let bad = numbers.find(|v| !v.is_finite());
+        if let Some(value) = bad.or(Some(vote.courant).filter(|courant| courant.is_nan())) {
+            return Some(format!(
+                "an energy, momentum, force or limit of its vote is {value}, must be finite"
+            ));
+        }
+    }
+    let bad = partials.iter().find(|value| !value.is_finite());
+    bad.map(|value| format!("a partial force of its frame is {value}, must be finite"))
+}

@@ -1,0 +1,111 @@
+//! What a job computes, the same in all its epochs: the model with its walls bound, quanta of sums, the contact surface.
+
+use std::sync::Arc;
+
+use deck::model::Model;
+use mechanics::{
+    contact::{Exclusions, Surface, initial_edges, initial_pairs},
+    initial,
+    state::GlobalState,
+    vote::Quanta,
+};
+
+use super::error::{Error, Overlap, TooNear};
+use crate::erosion;
+
+/// What a job computes.
+pub(super) struct Problem {
+    /// With walls bound to their nodes.
+    pub(super) model: Arc<Model>,
+    /// Those of the start; the quantum of forces may grow with the epoch.
+    pub(super) quanta: Quanta,
+    /// None without contact.
+    pub(super) touching: Option<Touching>,
+}
+
+/// What of the contact stays the same in all epochs.
+pub(super) struct Touching {
+    pub(super) surface: Arc<Surface>,
+    pub(super) exclusions: Arc<Exclusions>,
+}
+
+impl Problem {
+    /// Of a deck, with the state that its run begins at.
+    ///
+    /// # Errors
+    /// If the problem cannot start: elements without volume, contact zones that overlap.
+    pub(super) fn new(mut model: Arc<Model>) -> Result<(Self, GlobalState), Error> {
+        let mut setup = model.setup.clone();
+        let mut constraint = model.constraint.clone();
+        initial::bind_walls(&model.mesh, &mut setup, &mut constraint).map_err(Error::Problem)?;
+        let start = initial::state(&model.mesh, &setup, &model.velocity, &constraint);
+        let mut start = start.map_err(Error::Problem)?;
+        initial::spin(&mut start, &setup.constraints, &model.spin);
+        let quanta = initial::quanta(&model.mesh, &setup, &start);
+        if setup != model.setup {
+            let mut with_walls = (*model).clone();
+            with_walls.setup = setup;
+            model = Arc::new(with_walls);
+        }
+        let touching = Touching::of(&model)?;
+        Ok((Self { model, quanta, touching }, start))
+    }
+}
+
+impl Touching {
+    /// None without contact.
+    fn of(model: &Model) -> Result<Option<Self>, Error> {
+        let Some(settings) = &model.setup.contact else { return Ok(None) };
+        let surface = erosion::surface(model, &|_| true);
+        let at_start: Vec<[f64; 3]> =
+            surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
+        let inside = initial_pairs(&surface, &at_start, settings);
+        let exclusions = if settings.ignores_initial {
+            Exclusions::around(&surface, &inside)
+        } else {
+            refuse_overlap(model, &surface, &inside, settings.gap)?;
+            Exclusions::new(&surface, &inside)
+        };
+        let crossing = if settings.edges { initial_edges(&surface, &at_start, settings) } else { Vec::new() };
+        if !settings.ignores_initial {
+            refuse_crossing(model, &surface, &crossing, settings.gap)?;
+        }
+        let exclusions = Arc::new(exclusions.with_edges(&surface, &crossing));
+        Ok(Some(Self { surface, exclusions }))
+    }
+}
+
+/// The external gap: nodes of one part may not start inside the zone of another.
+fn refuse_overlap(
+    model: &Model,
+    surface: &Surface,
+    inside: &[(u32, u32, f64)],
+    gap: f64,
+) -> Result<(), Error> {
+    let foreign = inside
+        .iter()
+        .find(|(node, face, _)| surface.node_part[*node as usize] != surface.faces[*face as usize].part);
+    let Some(&(node, face, distance)) = foreign else { return Ok(()) };
+    let part = |index: u32| model.mesh.parts[index as usize].name.clone();
+    let parts = [part(surface.node_part[node as usize]), part(surface.faces[face as usize].part)];
+    let what = TooNear::Node(model.mesh.node_ids[surface.nodes[node as usize] as usize]);
+    Err(Error::Zones(Box::new(Overlap { what, parts, distance, gap })))
+}
+
+/// Refuses edges of two parts that start nearer to each other than the gap.
+fn refuse_crossing(
+    model: &Model,
+    surface: &Surface,
+    crossing: &[([u32; 2], f64)],
+    gap: f64,
+) -> Result<(), Error> {
+    let edges = |pair: [u32; 2]| pair.map(|edge| &surface.edges[edge as usize]);
+    let mut foreign = crossing.iter().map(|&(pair, distance)| (edges(pair), distance));
+    let Some((near, distance)) = foreign.find(|([a, b], _)| a.part != b.part) else {
+        return Ok(());
+    };
+    let id = |n: u32| model.mesh.node_ids[surface.nodes[n as usize] as usize];
+    let what = TooNear::Edges(near.map(|edge| [id(edge.nodes[0]), id(edge.nodes[1])]));
+    let parts = near.map(|edge| model.mesh.parts[edge.part as usize].name.clone());
+    Err(Error::Zones(Box::new(Overlap { what, parts, distance, gap })))
+}

@@ -1,0 +1,199 @@
+//! Samples computed again: a worker whose numbers are wrong is found and dropped by name.
+//!
+//! In the first cycle of an epoch, in the cycle at whose start a base is collected, and where all stop, each worker sends
+//! a hash of what the elements of one of its blocks came to. It depends on the state of that block at the start of the cycle alone,
+//! which the base has, so the block is computed here once more: one block, once for each worker and base, which takes no
+//! longer than a worker's own cycle. A base from which a sample differs is not taken, and the run goes back to the
+//! newest one from which all agreed: between the two the worker's numbers were right at least where they were sampled.
+//!
+//! A sample sees arithmetic that is wrong again and again, not one flipped bit elsewhere; integration and contact are
+//! proved at the greeting only.
+
+use std::collections::BTreeMap;
+
+use mechanics::{
+    block::Piece,
+    cycle::{Domain, Sets, Subdomain},
+    exact::Quantum,
+    lanes::Width,
+    piece::{self, Region},
+    state::GlobalState,
+    vote::{Quanta, Vote},
+};
+use protocol::{message::sampled_block, token::hex};
+use worker::compute::ThreadClock;
+
+use super::{
+    error::{Breach, Error, Sent},
+    problem::Problem,
+};
+
+/// The cycle that samples are of, as workers computed it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moment {
+    /// `dt` of the cycle before (time).
+    pub(super) dt_previous: f64,
+    pub(super) quantum: Quantum,
+    /// What the workers' clock says at the start of the cycle, to the bit (time).
+    pub(super) time: f64,
+}
+
+/// All have stopped, and their images are here.
+pub(super) struct Stopped {
+    pub(super) state: GlobalState,
+    /// The last vote.
+    pub(super) vote: Vote,
+    /// The state is for the user.
+    pub(super) due: bool,
+}
+
+/// The samples of one epoch.
+#[derive(Default)]
+pub(super) struct Samples {
+    /// By worker: part and elements of each block; empty where no samples are computed again.
+    blocks: Vec<Vec<(usize, Region)>>,
+    /// By cycle, then by worker.
+    arrived: BTreeMap<u64, Vec<Option<[u8; 16]>>>,
+    /// What waits for the samples of the stop.
+    stopped: Option<Stopped>,
+}
+
+impl Samples {
+    /// Of workers with these blocks.
+    pub(super) fn new(blocks: Vec<Vec<(usize, Region)>>) -> Self {
+        Self { blocks, ..Self::default() }
+    }
+
+    /// Adds the sample of one of `n` workers.
+    ///
+    /// # Errors
+    /// If it came before.
+    pub(super) fn add(
+        &mut self,
+        (worker, n): (usize, usize),
+        cycle: u64,
+        hash: [u8; 16],
+    ) -> Result<(), Error> {
+        let samples = self.arrived.entry(cycle).or_insert_with(|| vec![None; n]);
+        match samples[worker].replace(hash) {
+            Some(_) => Err(Error::Worker(worker, Breach::Twice(Sent::Sample, cycle))),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether every worker's sample of a cycle is here.
+    pub(super) fn are_all_here(&self, cycle: u64) -> bool {
+        self.arrived.get(&cycle).is_some_and(|samples| samples.iter().all(Option::is_some))
+    }
+
+    /// Keeps what all stopped with until its samples are here.
+    pub(super) fn hold(&mut self, stopped: Stopped) {
+        self.stopped = Some(stopped);
+    }
+
+    /// What all stopped with, once its samples are here.
+    pub(super) fn take_stopped(&mut self, cycle: u64) -> Option<Stopped> {
+        if self.are_all_here(cycle) { self.stopped.take() } else { None }
+    }
+
+    /// The workers whose samples of the state's cycle are others than here, and how.
+    ///
+    /// # Errors
+    /// If all differ, of two or more: the master is the one to suspect.
+    pub(super) fn differing(
+        &mut self,
+        problem: &Problem,
+        state: &GlobalState,
+        moment: Moment,
+    ) -> Result<Vec<(usize, String)>, Error> {
+        let cycle = state.cycle;
+        let samples = self.arrived.remove(&cycle).unwrap_or_default();
+        let mesh = &problem.model.mesh;
+        let mut wrong = Vec::new();
+        for (worker, theirs) in samples.into_iter().enumerate() {
+            let blocks = &self.blocks[worker];
+            let block = sampled_block(cycle, blocks.len());
+            let Some((part, region)) = blocks.get(block) else { continue };
+            let pieces = vec![piece::cut(mesh, state, *part, region)];
+            let ours = replay(problem, (pieces, cycle), moment)?;
+            let theirs = theirs.unwrap_or_default();
+            if ours != theirs {
+                let why = format!(
+                    "block {block} of {} (part `{}`) came to {} in cycle {cycle}, computed again to {}; its processor does \
+                     not compute the fleet's bits, keep it out",
+                    blocks.len(),
+                    mesh.parts[*part].name,
+                    hex(&theirs),
+                    hex(&ours)
+                );
+                wrong.push((worker, why));
+            }
+        }
+        let workers = self.blocks.len();
+        match wrong.first() {
+            Some((_, first)) if workers > 1 && wrong.len() == workers => {
+                Err(Error::AllDiffer { workers, first: first.clone() })
+            }
+            _ => Ok(wrong),
+        }
+    }
+}
+
+/// Hash of what the elements of a block come to in a cycle.
+fn replay(problem: &Problem, (pieces, cycle): (Vec<Piece>, u64), moment: Moment) -> Result<[u8; 16], Error> {
+    let Moment { dt_previous, quantum, time } = moment;
+    let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: Vec::new() };
+    let quanta = Quanta { force: quantum, ..problem.quanta };
+    let (setup, n_parts) = (problem.model.setup.clone(), problem.model.mesh.parts.len());
+    let mut domain = Domain::new(setup, n_parts, quanta, (vec![subdomain], cycle), &[], Width::best());
+    let clock = ThreadClock::default();
+    domain.begin(quantum, time);
+    domain.contact(dt_previous, &clock);
+    domain.elements(Sets::All, dt_previous, &clock);
+    domain.sample(0).map_err(Error::Problem)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::tests::job, *};
+
+    /// Samples of two workers that have one block each: a cube.
+    fn samples() -> Samples {
+        let low = |part| (part, Region::Cells { low: [0; 3], high: [2; 3] });
+        Samples::new(vec![vec![low(0)], vec![low(1)]])
+    }
+
+    #[test]
+    fn the_worker_whose_sample_is_another_than_here_is_named_and_if_all_are_the_master_suspects_itself() {
+        let (job, _) = job(2);
+        let state = job.start_state();
+        let moment = Moment { dt_previous: 0.0, quantum: job.problem.quanta.force, time: 0.0 };
+        let of_part = |part| {
+            let region = Region::Cells { low: [0; 3], high: [2; 3] };
+            let piece = piece::cut(&job.problem.model.mesh, state, part, &region);
+            replay(&job.problem, (vec![piece], 0), moment).expect("it computes")
+        };
+        let right = [of_part(0), of_part(1)];
+        let differing = |hashes: [[u8; 16]; 2]| {
+            let mut samples = samples();
+            for (worker, hash) in hashes.into_iter().enumerate() {
+                assert!(!samples.are_all_here(0));
+                samples.add((worker, 2), 0, hash).expect("once");
+            }
+            assert!(samples.are_all_here(0));
+            samples.differing(&job.problem, state, moment)
+        };
+        assert_eq!(differing(right), Ok(Vec::new()));
+        let wrong = differing([right[0], [7; 16]]).expect("one is right");
+        assert!(wrong.len() == 1 && wrong[0].0 == 1 && wrong[0].1.contains("part `high`"), "{wrong:?}");
+        assert!(matches!(differing([[1; 16], [7; 16]]), Err(Error::AllDiffer { workers: 2, .. })));
+    }
+
+    #[test]
+    fn a_sample_comes_once() {
+        let mut samples = samples();
+        samples.add((1, 2), 5, [0; 16]).expect("the first");
+        let twice = samples.add((1, 2), 5, [0; 16]);
+        assert_eq!(twice, Err(Error::Worker(1, Breach::Twice(Sent::Sample, 5))));
+    }
+}

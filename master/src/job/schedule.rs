@@ -1,0 +1,348 @@
+//! The schedule of a run: which time step each cycle has, when states are due, and the cycle at whose start all stop.
+//!
+//! Time steps come from the votes of whole cycles: [`allowed`] is the largest one that a vote permits.
+
+use std::collections::BTreeMap;
+
+use deck::model::Model;
+use mechanics::{
+    exact::Quantum,
+    setup::{Control, Setup},
+    vote::Vote,
+    wall::{Motion, Pose},
+};
+
+use super::{checkpoints::Checkpoint, error::Error};
+use crate::event::Limit;
+
+/// Share of the gap that contact votes for per cycle; the lag may not take it past 20 %.
+const TRAVEL_VOTE: f64 = 0.16;
+/// Share of the allowed time step that a run begins with where bodies hold energy. Where a gas meets a thinner one, the
+/// first steps raise velocities from nothing, and viscosity with them, before a vote can tell.
+const START: f64 = 0.2;
+/// Cycles whose steps are remembered.
+const REMEMBERED: usize = 4;
+
+/// One cycle's step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Step {
+    /// Time step (time).
+    pub(super) dt: f64,
+    /// Time at its start.
+    pub(super) time: f64,
+    /// Quantum of its forces.
+    pub(super) quantum: Quantum,
+}
+
+/// The step after one that is over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Next {
+    pub(super) dt: f64,
+    pub(super) limit: Limit,
+    /// When it begins (time).
+    pub(super) time: f64,
+    /// When it ends (time).
+    pub(super) time_after: f64,
+}
+
+/// Where all stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stop {
+    /// At the start of this cycle.
+    at: u64,
+    /// For the next epoch, not for the end.
+    pauses: bool,
+    /// Samples come with it.
+    sampled: bool,
+}
+
+/// The schedule of one epoch.
+pub(super) struct Schedule {
+    first_cycle: u64,
+    /// The last complete cycle plus one.
+    completed: u64,
+    /// By cycle; a few cycles around the present.
+    steps: BTreeMap<u64, Step>,
+    /// Quantum of forces from the cycle after the last ordered one on.
+    quantum: Quantum,
+    /// Between two states for the user (time); none without.
+    period: Option<f64>,
+    /// When the next one is due (time).
+    next_state: Option<f64>,
+    stop: Option<Stop>,
+}
+
+impl Schedule {
+    /// Of an epoch that begins at a checkpoint, with states for the user every `period`.
+    pub(super) fn new(checkpoint: &Checkpoint, period: Option<f64>) -> Self {
+        let Checkpoint { state, rest } = checkpoint;
+        let (first, time) = (state.cycle, state.time);
+        let mut steps = BTreeMap::new();
+        if let Some(dt) = rest.dt {
+            let [now, _] = rest.quanta;
+            if let Some(before) = first.checked_sub(1) {
+                let dt = rest.dt_previous;
+                steps.insert(before, Step { dt, time: time - dt, quantum: now });
+            }
+            steps.insert(first, Step { dt, time, quantum: now });
+        }
+        Self {
+            first_cycle: first,
+            completed: first,
+            steps,
+            quantum: rest.quanta[1],
+            period,
+            next_state: period.map(|period| output_after(time, period)),
+            stop: None,
+        }
+    }
+
+    /// The cycle that the epoch begins with.
+    pub(super) fn first_cycle(&self) -> u64 {
+        self.first_cycle
+    }
+
+    /// The last complete cycle plus one.
+    pub(super) fn completed(&self) -> u64 {
+        self.completed
+    }
+
+    /// No frame of `cycle` or before will come any more.
+    pub(super) fn complete(&mut self, cycle: u64) {
+        self.completed = cycle + 1;
+    }
+
+    /// The step of a cycle that was ordered, of late.
+    pub(super) fn step(&self, cycle: u64) -> Option<Step> {
+        self.steps.get(&cycle).copied()
+    }
+
+    /// The same.
+    ///
+    /// # Errors
+    /// If the cycle was not ordered.
+    pub(super) fn ordered(&self, cycle: u64) -> Result<Step, Error> {
+        self.step(cycle).ok_or(Error::NotOrdered(cycle))
+    }
+
+    /// Quantum of forces from the cycle after the last ordered one on.
+    pub(super) fn quantum(&self) -> Quantum {
+        self.quantum
+    }
+
+    /// The step of the first cycle: the checkpoint's; at the start of a run a part of `allowed`, up to the end of the run.
+    pub(super) fn first_step(
+        &mut self,
+        time: f64,
+        control: &Control,
+        allowed: impl FnOnce() -> Result<f64, Error>,
+    ) -> Result<Step, Error> {
+        if let Some(step) = self.step(self.first_cycle) {
+            return Ok(step);
+        }
+        let dt = allowed()?.min(control.end_time - time).max(0.0);
+        let step = Step { dt, time, quantum: self.quantum };
+        self.steps.insert(self.first_cycle, step);
+        Ok(step)
+    }
+
+    /// Orders the step after `now`, at most as long as a limit allows, and to the end of the run where that is near.
+    pub(super) fn order_after(
+        &mut self,
+        cycle: u64,
+        now: Step,
+        (dt, limit): (f64, Limit),
+        control: &Control,
+    ) -> Next {
+        let time = now.time + now.dt;
+        let remaining = (control.end_time - time).max(0.0);
+        let (dt, limit) = if remaining < dt * 1.000_000_1 { (remaining, Limit::End) } else { (dt, limit) };
+        let time_after = if limit == Limit::End { control.end_time } else { time + dt };
+        self.steps.insert(cycle + 1, Step { dt, time, quantum: self.quantum });
+        while self.steps.len() > REMEMBERED {
+            self.steps.pop_first();
+        }
+        Next { dt, limit, time, time_after }
+    }
+
+    /// Forces nearing the bound of exact sums ask for a coarser quantum.
+    ///
+    /// # Errors
+    /// If they are past it.
+    pub(super) fn rescale(&mut self, vote: &Vote) -> Result<(), Error> {
+        let quantum = self.quantum;
+        if vote.force_bound > quantum.term_bound() || !vote.force_bound.is_finite() {
+            return Err(Error::Force { bound: vote.force_bound, quantum });
+        }
+        if vote.force_bound > quantum.rescale_bound() {
+            self.quantum = Quantum::for_reference(vote.force_bound, 42);
+        }
+        Ok(())
+    }
+
+    /// Whether a state is due for the user by a time; it counts as written then.
+    pub(super) fn state_due(&mut self, time: f64) -> bool {
+        let (Some(due), Some(period)) = (self.next_state, self.period) else { return false };
+        if time < due {
+            return false;
+        }
+        self.next_state = Some(output_after(time, period));
+        true
+    }
+
+    /// All stop at the start of a cycle, unless that was said before: for the next epoch (`pauses`), or for the end.
+    pub(super) fn stop_at(&mut self, cycle: u64, pauses: bool) {
+        self.stop.get_or_insert(Stop { at: cycle, pauses, sampled: false });
+    }
+
+    /// Samples come with the stop.
+    pub(super) fn sample_stop(&mut self) {
+        if let Some(stop) = &mut self.stop {
+            stop.sampled = true;
+        }
+    }
+
+    /// Whether a stop is ordered.
+    pub(super) fn is_stopping(&self) -> bool {
+        self.stop.is_some()
+    }
+
+    /// Whether all stop at the start of a cycle.
+    pub(super) fn stops_at(&self, cycle: u64) -> bool {
+        self.stop.is_some_and(|stop| stop.at == cycle)
+    }
+
+    /// Whether the stop is for the next epoch.
+    pub(super) fn pauses(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.pauses)
+    }
+
+    /// Whether samples come with the stop.
+    pub(super) fn stop_is_sampled(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.sampled)
+    }
+}
+
+/// The first multiple of `period` after `time`, to the bit: at whatever time it is asked between two of them, it is the
+/// same one.
+pub(super) fn output_after(time: f64, period: f64) -> f64 {
+    let mut count = (time / period).floor();
+    while count * period > time {
+        count -= 1.0;
+    }
+    while count * period <= time {
+        count += 1.0;
+    }
+    count * period
+}
+
+/// Share of the time step that `vote`, of the time before the first cycle, allows.
+pub(super) fn first_share(vote: &Vote) -> f64 {
+    if vote.parts.iter().any(|part| part.internal > 0.0) { START } else { 1.0 }
+}
+
+/// The step that a vote allows beside what the step before may have `grown` to, what limits it, and the element if one does.
+pub(super) fn allowed(model: &Model, walls: &[Pose], vote: &Vote, grown: f64) -> (f64, Limit, Option<u32>) {
+    let setup = &model.setup;
+    let mut best = (grown, Limit::Growth, None);
+    let mut offer = |dt: f64, limit: Limit, element: Option<u32>| {
+        if dt < best.0 {
+            best = (dt, limit, element);
+        }
+    };
+    offer(setup.control.safety_factor * vote.courant, Limit::Courant, Some(vote.courant_element));
+    offer(vote.volume_limit, Limit::Volume, None);
+    offer(vote.contact_limit, Limit::Contact, None);
+    if let Some(contact) = &setup.contact {
+        // A wall may bring a node to its own speed within a cycle.
+        let speed = vote.contact_speed_ahead.max(wall_speed(setup, walls));
+        if speed > 0.0 {
+            offer(TRAVEL_VOTE * contact.gap / speed, Limit::Travel, None);
+        }
+    }
+    best
+}
+
+/// The greatest speed of a wall: that prescribed at any time, or that of now.
+fn wall_speed(setup: &Setup, walls: &[Pose]) -> f64 {
+    let driven = setup.walls.iter().filter_map(|wall| match wall.motion {
+        Motion::Driven(velocity) => Some(velocity.map(|v| v.greatest(&setup.loads.curves))),
+        _ => None,
+    });
+    let free = walls.iter().map(|[_, velocity]| *velocity);
+    driven.chain(free).map(|v| v.iter().map(|c| c * c).sum::<f64>().sqrt()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::tests::job, *};
+
+    /// Of a run that has not begun.
+    fn schedule(period: Option<f64>) -> Schedule {
+        let (job, _) = job(1);
+        Schedule::new(job.checkpoints.newest(), period)
+    }
+
+    fn control() -> Control {
+        job(1).0.problem.model.setup.control
+    }
+
+    #[test]
+    fn an_output_time_is_the_same_multiple_whenever_it_is_asked_for() {
+        for time in [0.0, 0.05, 0.09999999999999999] {
+            assert_eq!(output_after(time, 0.1).to_bits(), 0.1_f64.to_bits(), "{time}");
+        }
+        assert_eq!(output_after(0.1, 0.1).to_bits(), 0.2_f64.to_bits(), "after, not at");
+    }
+
+    #[test]
+    fn states_are_due_once_for_each_period_that_a_step_crosses() {
+        let mut schedule = schedule(Some(1.0));
+        assert!(!schedule.state_due(0.5));
+        assert!(schedule.state_due(1.0) && !schedule.state_due(1.9));
+        assert!(schedule.state_due(3.5) && !schedule.state_due(3.9), "one for several periods in one step");
+    }
+
+    #[test]
+    fn steps_follow_each_other_without_a_gap_and_the_last_one_ends_at_the_end() {
+        let (mut schedule, control) = (schedule(None), Control { end_time: 1.0, ..control() });
+        let mut now = schedule.first_step(0.0, &control, || Ok(0.4)).expect("an allowed step");
+        let mut times = vec![now.time];
+        for cycle in 0..3 {
+            let next = schedule.order_after(cycle, now, (0.4, Limit::Courant), &control);
+            now = schedule.ordered(cycle + 1).expect("just ordered");
+            assert_eq!((now.time, now.dt), (next.time, next.dt));
+            times.push(now.time);
+        }
+        assert_eq!(times, [0.0, 0.4, 0.8, 1.0]);
+        assert_eq!(now.dt, 0.0, "nothing is left");
+        assert!(schedule.step(0).is_some() && schedule.ordered(9) == Err(Error::NotOrdered(9)));
+        schedule.order_after(3, now, (0.4, Limit::Courant), &control);
+        assert!(schedule.step(0).is_none() && schedule.step(1).is_some(), "four are remembered");
+    }
+
+    #[test]
+    fn the_first_stop_that_was_ordered_stands() {
+        let mut schedule = schedule(None);
+        schedule.sample_stop();
+        assert!(!schedule.is_stopping() && !schedule.stop_is_sampled());
+        schedule.stop_at(20, true);
+        schedule.stop_at(21, false);
+        assert!(schedule.stops_at(20) && !schedule.stops_at(21) && schedule.pauses());
+        schedule.sample_stop();
+        assert!(schedule.stop_is_sampled());
+    }
+
+    #[test]
+    fn forces_near_the_bound_of_exact_sums_coarsen_the_quantum_and_those_past_it_end_the_run() {
+        let mut schedule = schedule(None);
+        let before = schedule.quantum();
+        let vote = |force_bound| Vote { force_bound, ..Vote::empty(1) };
+        schedule.rescale(&vote(before.rescale_bound())).expect("not above");
+        assert_eq!(schedule.quantum(), before);
+        schedule.rescale(&vote(1.01 * before.rescale_bound())).expect("below the bound");
+        assert!(schedule.quantum().value() > before.value());
+        let past = vote(2.0 * schedule.quantum().term_bound());
+        assert!(matches!(schedule.rescale(&past), Err(Error::Force { .. })));
+    }
+}

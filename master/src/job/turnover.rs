@@ -1,0 +1,212 @@
+//! From one epoch to the next, and to the end: workers come, go, fail and are lost; a user stops the run; this process leaves.
+
+use std::sync::Arc;
+
+use mechanics::{state::GlobalState, vote::Vote};
+use protocol::message::ToWorker;
+
+use super::{Job, checkpoints::Checkpoint, error::Error, samples::Stopped};
+use crate::{
+    event::{Action, Hand},
+    incident::Loss,
+};
+
+impl Job {
+    /// A worker is gone.
+    pub(super) fn lost(&mut self, index: usize, why: String, actions: &mut Vec<Action>) -> Result<(), Error> {
+        let was_there = self.workers.lose(index)?;
+        if !was_there || !self.epoch.crew.contains(&index) {
+            return Ok(());
+        }
+        let worker = self.workers.hand(index).name.clone();
+        if !self.workers.is_any_alive() && !self.options.waits {
+            return Err(Error::LastLost { worker, why });
+        }
+        let (cycle, back_to) = (self.epoch.schedule.completed(), self.checkpoints.newest().cycle());
+        self.tally.losses.push(Loss { worker, cycle, back_to, why });
+        self.go_back(actions);
+        self.next_epoch(actions)
+    }
+
+    /// A worker has come: it is taken in at the next plan boundary, or at once by a job that waits.
+    pub(super) fn joined(&mut self, hand: Hand, actions: &mut Vec<Action>) -> Result<(), Error> {
+        self.workers.join(hand);
+        if self.epoch.crew.is_empty() { self.next_epoch(actions) } else { Ok(()) }
+    }
+
+    /// A worker cannot go on, or its numbers are none. Others may: it is dismissed by name, and the run goes back.
+    ///
+    /// # Errors
+    /// If it is the problem's fault, which ends the job.
+    pub(super) fn blame(
+        &mut self,
+        worker: usize,
+        cycle: u64,
+        reason: &str,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), Error> {
+        let index = self.epoch.crew[worker];
+        self.workers.fail(index, cycle, reason)?;
+        let why = format!("cycle {cycle}: {reason}");
+        actions.push(Action::Dismiss(index, why.clone()));
+        self.lost(index, why, actions)
+    }
+
+    /// Workers (by position) whose numbers cannot be trusted leave the job, which goes back to what is proved.
+    pub(super) fn expel(
+        &mut self,
+        wrong: Vec<(usize, String)>,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), Error> {
+        let (cycle, back_to) = (self.epoch.schedule.completed(), self.checkpoints.newest().cycle());
+        for (position, why) in wrong {
+            let index = self.epoch.crew[position];
+            self.workers.lose(index)?;
+            let worker = self.workers.hand(index).name.clone();
+            actions.push(Action::Dismiss(index, why.clone()));
+            self.tally.losses.push(Loss { worker, cycle, back_to, why });
+        }
+        if !self.options.waits && !self.workers.is_any_alive() {
+            let (worker, why) = self
+                .tally
+                .losses
+                .last()
+                .map(|loss| (loss.worker.clone(), loss.why.clone()))
+                .unwrap_or_default();
+            return Err(Error::LastDropped { worker, why });
+        }
+        self.go_back(actions);
+        self.next_epoch(actions)
+    }
+
+    /// Everything that was booked after the checkpoint is forgotten, here and in the results.
+    fn go_back(&mut self, actions: &mut Vec<Action>) {
+        let checkpoint = self.checkpoints.newest();
+        self.account.go_back(checkpoint);
+        self.balancing.go_back();
+        actions.push(Action::Rewind { rows: checkpoint.rest.n_rows, cycle: checkpoint.cycle() });
+    }
+
+    /// Deals the checkpoint out to all that are alive; with nobody, the job waits.
+    fn next_epoch(&mut self, actions: &mut Vec<Action>) -> Result<(), Error> {
+        let number = self.epoch.number.checked_add(1).ok_or(Error::Epochs)?;
+        let crew = self.workers.alive();
+        let nobody = crew.is_empty();
+        self.epoch = self.deal(number, crew, actions)?;
+        self.checkpoints.begin_epoch();
+        if self.lean {
+            self.forget_state();
+        }
+        if nobody && self.ending.leaves {
+            self.suspend_at_checkpoint(actions);
+        } else if nobody && self.ending.stop_asked {
+            self.finish_at_checkpoint(actions);
+        }
+        Ok(())
+    }
+
+    /// All have stopped: the epoch is over, or the run.
+    pub(super) fn all_stopped(&mut self, stopped: Stopped, actions: &mut Vec<Action>) -> Result<(), Error> {
+        let cycle = stopped.state.cycle;
+        if cycle > self.epoch.schedule.first_cycle() {
+            self.book(cycle - 1, &stopped.vote, actions);
+        }
+        if !self.epoch.schedule.pauses() {
+            return self.stopped(stopped, actions);
+        }
+        if self.account.failure.is_some() {
+            self.end_with(stopped.state, actions);
+            return Ok(());
+        }
+        if stopped.due {
+            actions.push(Action::State(Box::new(stopped.state.clone())));
+        }
+        self.paused(stopped, actions)
+    }
+
+    /// The epoch ends for another one, which begins with this state.
+    fn paused(&mut self, stopped: Stopped, actions: &mut Vec<Action>) -> Result<(), Error> {
+        let Stopped { state, vote, .. } = stopped;
+        let cycle = state.cycle;
+        self.adopt(state, vote)?;
+        self.store(cycle, actions);
+        let (crew, shares) = (&self.epoch.crew, &self.epoch.shares);
+        if let Some(rebalance) = self.balancing.adopt(cycle, self.workers.names(crew), shares) {
+            self.workers.set_speeds(crew, &rebalance.speeds_after);
+            self.tally.rebalances.push(rebalance);
+        }
+        for index in self.workers.release(crew) {
+            actions.push(Action::Send(index, ToWorker::Release));
+        }
+        self.next_epoch(actions)
+    }
+
+    /// The session ends with this state.
+    fn stopped(&mut self, stopped: Stopped, actions: &mut Vec<Action>) -> Result<(), Error> {
+        let Stopped { state, vote, due } = stopped;
+        let control = self.problem.model.setup.control;
+        let at_end = state.time >= control.end_time || state.cycle >= control.end_cycle;
+        let goes_on =
+            (self.ending.leaves || self.ending.stop_asked) && !at_end && self.account.failure.is_none();
+        if !goes_on || state.cycle == 0 {
+            if self.ending.leaves && goes_on {
+                self.finish(None, actions);
+            } else {
+                self.end_with(state, actions);
+            }
+            return Ok(());
+        }
+        self.adopt(state, vote)?;
+        if self.ending.leaves {
+            if due {
+                // The next session begins behind it.
+                let state = GlobalState::clone(&self.checkpoints.newest().state);
+                actions.push(Action::State(Box::new(state)));
+            }
+            self.suspend_at_checkpoint(actions);
+            return Ok(());
+        }
+        self.give_last_checkpoint(actions);
+        self.finish_at_checkpoint(actions);
+        Ok(())
+    }
+
+    /// Where all have stopped is the newest checkpoint.
+    fn adopt(&mut self, state: GlobalState, vote: Vote) -> Result<(), Error> {
+        let rest = self.rest_at(state.cycle, vote)?;
+        self.checkpoints.adopt(Arc::new(Checkpoint { state: Arc::new(state), rest }));
+        Ok(())
+    }
+
+    /// The run ends with this state; its last cycle has a row in any case.
+    fn end_with(&mut self, state: GlobalState, actions: &mut Vec<Action>) {
+        let last = self.account.rows.last().map(|row| row.cycle);
+        if state.cycle > self.first_cycle && last != Some(state.cycle - 1) {
+            self.account.row(actions);
+        }
+        if !self.options.asked.no_output {
+            actions.push(Action::State(Box::new(state.clone())));
+        }
+        self.finish(Some(state), actions);
+    }
+
+    /// Ends the run with the state of the checkpoint: the user does not want to wait any longer.
+    pub(super) fn finish_at_checkpoint(&mut self, actions: &mut Vec<Action>) {
+        let state = GlobalState::clone(&self.checkpoints.newest().state);
+        self.end_with(state, actions);
+    }
+
+    /// Ends this session of the run; another one begins at the checkpoint.
+    pub(super) fn suspend_at_checkpoint(&mut self, actions: &mut Vec<Action>) {
+        self.give_last_checkpoint(actions);
+        self.finish(None, actions);
+    }
+
+    fn give_last_checkpoint(&self, actions: &mut Vec<Action>) {
+        if self.options.store
+            && let Some(snapshot) = self.checkpoints.newest().as_snapshot(&self.account.rows)
+        {
+            actions.push(Action::Checkpoint { snapshot, last: true });
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! The workers that were ever given to a job: who is still there, who wants to go, who failed by itself.
+//!
+//! A worker's *index* is the number at which it came. In an epoch it is named by its position in the epoch's crew.
+
+use super::error::Error;
+use crate::event::Hand;
+
+/// Cycles that two workers' failures may lie apart and still be the same: one computes ahead of what the other has said.
+const SAME_FAULT: u64 = 2;
+
+struct Worker {
+    /// As it came; its speed is the one that it is dealt work by.
+    hand: Hand,
+    /// Not lost.
+    alive: bool,
+    /// It wants to go, at the next plan boundary.
+    leaves: bool,
+}
+
+/// All workers of a job, by index.
+pub(super) struct Workers {
+    all: Vec<Worker>,
+    /// Those that failed by themselves: index and cycle.
+    failed: Vec<(usize, u64)>,
+}
+
+impl Workers {
+    /// Those that a job begins with.
+    pub(super) fn new(hands: &[Hand]) -> Self {
+        let mut workers = Self { all: Vec::new(), failed: Vec::new() };
+        hands.iter().for_each(|hand| workers.join(hand.clone()));
+        workers
+    }
+
+    /// How many there ever were.
+    pub(super) fn n(&self) -> usize {
+        self.all.len()
+    }
+
+    /// One has come.
+    pub(super) fn join(&mut self, hand: Hand) {
+        self.all.push(Worker { hand, alive: true, leaves: false });
+    }
+
+    /// As it came.
+    pub(super) fn hand(&self, index: usize) -> &Hand {
+        &self.all[index].hand
+    }
+
+    /// Names of some.
+    pub(super) fn names(&self, crew: &[usize]) -> Vec<String> {
+        crew.iter().map(|&index| self.all[index].hand.name.clone()).collect()
+    }
+
+    /// Indices of those that are alive: the crew of the next epoch.
+    pub(super) fn alive(&self) -> Vec<usize> {
+        (0..self.all.len()).filter(|&index| self.all[index].alive).collect()
+    }
+
+    /// Whether anybody is.
+    pub(super) fn is_any_alive(&self) -> bool {
+        self.all.iter().any(|worker| worker.alive)
+    }
+
+    /// One is gone; gives whether it was there.
+    ///
+    /// # Errors
+    /// If there never was one of that index.
+    pub(super) fn lose(&mut self, index: usize) -> Result<bool, Error> {
+        let known = self.all.len();
+        let lost = self.all.get_mut(index).ok_or(Error::Unknown { worker: index, known })?;
+        Ok(std::mem::replace(&mut lost.alive, false))
+    }
+
+    /// One wants to go, at the next plan boundary.
+    pub(super) fn leave(&mut self, index: usize) {
+        self.all[index].leaves = true;
+    }
+
+    /// Whether somebody waits to be taken into the crew.
+    pub(super) fn has_newcomers(&self, crew: &[usize]) -> bool {
+        self.all.iter().filter(|worker| worker.alive && !worker.leaves).count()
+            > crew.iter().filter(|&&index| !self.all[index].leaves).count()
+    }
+
+    /// Whether somebody of the crew wants to go.
+    pub(super) fn has_leavers(&self, crew: &[usize]) -> bool {
+        crew.iter().any(|&index| self.all[index].leaves)
+    }
+
+    /// Lets those of the crew go that want to; gives their indices.
+    pub(super) fn release(&mut self, crew: &[usize]) -> Vec<usize> {
+        let leavers: Vec<usize> = crew.iter().copied().filter(|&index| self.all[index].leaves).collect();
+        leavers.iter().for_each(|&index| self.all[index].alive = false);
+        leavers
+    }
+
+    /// The crew is dealt work by other speeds from now on.
+    pub(super) fn set_speeds(&mut self, crew: &[usize], speeds: &[f64]) {
+        for (&index, &speed) in crew.iter().zip(speeds) {
+            self.all[index].hand.speed = speed;
+        }
+    }
+
+    /// One failed by itself at a cycle. If the same has happened to another at about the same cycle, or nobody else is left,
+    /// it is the problem's fault.
+    ///
+    /// # Errors
+    /// Then the reason, which ends the job.
+    pub(super) fn fail(&mut self, index: usize, cycle: u64, reason: &str) -> Result<(), Error> {
+        let worker = self.all[index].hand.name.clone();
+        if let Some(&(first, at)) = self.failed.iter().find(|(_, at)| at.abs_diff(cycle) <= SAME_FAULT) {
+            let first = self.all[first].hand.name.clone();
+            return Err(Error::FailedAgain { worker, cycle, reason: reason.to_owned(), first, at });
+        }
+        if !self.all.iter().enumerate().any(|(other, worker)| other != index && worker.alive) {
+            return Err(Error::Failed { worker, cycle, reason: reason.to_owned() });
+        }
+        self.failed.push((index, cycle));
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn three() -> Workers {
+        let hand = |name: &str| Hand { name: name.to_owned(), speed: 1.0, threads: 1 };
+        Workers::new(&["a", "b", "c"].map(hand))
+    }
+
+    #[test]
+    fn a_worker_is_lost_once_and_one_that_never_came_not_at_all() {
+        let mut workers = three();
+        assert_eq!(workers.lose(1), Ok(true));
+        assert_eq!(workers.lose(1), Ok(false));
+        assert_eq!(workers.lose(3), Err(Error::Unknown { worker: 3, known: 3 }));
+        assert_eq!(workers.alive(), [0, 2]);
+    }
+
+    #[test]
+    fn newcomers_are_those_beyond_the_crew_and_leavers_are_let_go_once() {
+        let mut workers = three();
+        assert!(!workers.has_newcomers(&[0, 1, 2]) && workers.has_newcomers(&[0, 1]));
+        workers.leave(1);
+        assert!(workers.has_leavers(&[0, 1, 2]) && !workers.has_newcomers(&[0, 1, 2]));
+        assert_eq!(workers.release(&[0, 1, 2]), [1]);
+        assert_eq!(workers.alive(), [0, 2]);
+    }
+
+    #[test]
+    fn the_first_failure_is_the_workers_a_second_at_the_same_cycle_the_problems() {
+        let mut workers = three();
+        assert_eq!(workers.fail(0, 40, "NaN"), Ok(()));
+        assert_eq!(workers.lose(0), Ok(true));
+        assert_eq!(workers.fail(1, 50, "NaN"), Ok(()), "far from the first");
+        let again = workers.fail(2, 42, "NaN").expect_err("near the first");
+        assert_eq!(
+            again.to_string(),
+            "worker c, cycle 42: NaN; worker a failed at cycle 40 as well, so it is not the worker's fault"
+        );
+        let alone = Workers::new(&[Hand { name: "a".into(), speed: 1.0, threads: 1 }]).fail(0, 3, "NaN");
+        assert_eq!(alone.map_err(|e| e.to_string()), Err("worker a, cycle 3: NaN".to_owned()));
+    }
+}
