@@ -21,8 +21,8 @@ use protocol::{
 
 use crate::{
     command::{ClientArgs, SubmitArgs},
-    daemon::host_name,
     deck_file::{self, gather_deck, warn},
+    machine::host_name,
     results::{Folder, create_anew},
 };
 

@@ -26,21 +26,23 @@ use protocol::{
 };
 use tokio::{
     io::{AsyncRead, AsyncWrite},
-    net::TcpStream,
+    net::{TcpListener, TcpStream},
     sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot},
     time::Instant,
 };
 use tracing::{info, warn};
 
 use crate::{
-    daemon::Event,
     desk,
-    drive::{Input, Route, Seat},
+    drive::{Delivery, Input, Seat},
     event::Hand,
     lab::Lab,
     newcomer,
+    notice::Notice,
 };
 
+/// Most connections at a time, those in their greeting included.
+pub const CONNECTIONS: usize = 4096;
 /// Connections that may be in their handshake or greeting at a time, each with some 200 kB of buffers.
 pub const GREETINGS: usize = 256;
 /// The longest that a connection waits for a place among them.
@@ -50,8 +52,8 @@ const SUSPECT: f64 = 0.3;
 
 /// What every connection needs of the daemon.
 pub struct Gate {
-    /// To the owner of hosts and queue.
-    events: mpsc::Sender<Event>,
+    /// To the scheduler.
+    notices: mpsc::Sender<Notice>,
     /// Who is taken in.
     roles: Vec<Role>,
     /// The secret that greetings must hold.
@@ -74,7 +76,7 @@ pub struct Gate {
 impl Gate {
     /// With nobody taken in yet.
     pub fn new(
-        events: mpsc::Sender<Event>,
+        notices: mpsc::Sender<Notice>,
         roles: Vec<Role>,
         token: Option<String>,
         tls: Option<Arc<ServerConfig>>,
@@ -82,7 +84,7 @@ impl Gate {
         let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
         let greetings = Arc::new(Semaphore::new(GREETINGS));
         let (lab, port, dead_after) = (None, None, Settings::default().silence);
-        Self { events, roles, token, tls, lab, greetings, port, dead_after, incarnations, ending }
+        Self { notices, roles, token, tls, lab, greetings, port, dead_after, incarnations, ending }
     }
 
     /// Newcomers may exchange tokens of this lab, and certificates on its list are not accepted.
@@ -215,7 +217,7 @@ impl Gate {
             return served;
         }
         drop(place);
-        match desk::serve(&self.events, &sender, &mut receiver, incarnation).await {
+        match desk::serve(&self.notices, &sender, &mut receiver, incarnation).await {
             // A client may go as it likes.
             Error::Closed | Error::Left { .. } | Error::Io { .. } => Ok(()),
             error => {
@@ -236,9 +238,9 @@ impl Gate {
     ) -> Result<()> {
         let (answer, answered) = oneshot::channel();
         let knock =
-            Event::Knock { hello: Box::new(hello.clone()), address: address.clone(), incarnation, answer };
+            Notice::Knock { hello: Box::new(hello.clone()), address: address.clone(), incarnation, answer };
         // The owner lives as long as the daemon.
-        let _ = self.events.send(knock).await;
+        let _ = self.notices.send(knock).await;
         let host = match answered.await {
             // A daemon that ends hangs up: the worker finds the next one by dialling again.
             Err(_) => return Err(Error::Message("the master is ending".to_owned())),
@@ -249,7 +251,7 @@ impl Gate {
                 return Err(Error::Message(reason));
             }
         };
-        let route = Arc::new(Route::default());
+        let delivery = Arc::new(Delivery::default());
         let welcome = Welcome { incarnation, host, heartbeat_ms: self.heartbeat_ms() };
         let error = match link::admit(server, &sender, &mut receiver, welcome) {
             Err(error) => error,
@@ -260,31 +262,37 @@ impl Gate {
                     peer: peer_address(&address, hello.peer_port),
                     incarnation,
                     outbox: Arc::new(Mutex::new(Outbox::new(sender.clone(), 0))),
-                    route: Arc::clone(&route),
+                    delivery: Arc::clone(&delivery),
                 };
-                let _ = self.events.send(Event::Joined(seat)).await;
-                self.listen(&mut receiver, hello, incarnation, &route).await
+                let _ = self.notices.send(Notice::Joined(seat)).await;
+                self.listen(&mut receiver, hello, incarnation, &delivery).await
             }
         };
-        let dropped = route.dismissal();
+        let dropped = delivery.dismissal();
         let words = dropped.clone().unwrap_or_else(|| error.to_string());
         if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
             leave(&sender, &words).await;
         }
         drop(receiver);
         let why = format!("{} at {address}: {words}", hello.name);
-        if let Some((index, send)) = route.lose(&why) {
+        if let Some((index, send)) = delivery.lose(&why) {
             // The job may be over by now.
             let _ = send.send(Input::Lost(index, why)).await;
         }
         let dropped = dropped.is_some();
-        let _ = self.events.send(Event::Left { incarnation, why: words, dropped }).await;
+        let _ = self.notices.send(Notice::Left { incarnation, why: words, dropped }).await;
         Err(error)
     }
 
     /// Hands a worker's messages to its job, and says when it has been silent; ends with the link, or when the job will
     /// have no more to do with the worker.
-    async fn listen(&self, receiver: &mut Receiver, hello: &Hello, incarnation: u32, route: &Route) -> Error {
+    async fn listen(
+        &self,
+        receiver: &mut Receiver,
+        hello: &Hello,
+        incarnation: u32,
+        delivery: &Delivery,
+    ) -> Error {
         let mut inbox = Inbox::new(incarnation, BULK_ON_THE_WAY);
         let mut look = tokio::time::interval(self.dead_after.mul_f64(SUSPECT) / 4);
         let mut silent_since = None;
@@ -292,11 +300,11 @@ impl Gate {
             let frame = tokio::select! {
                 biased;
                 frame = receiver.receive() => Some(frame),
-                () = route.dismissed() => return Error::Message("its job dropped it".to_owned()),
+                () = delivery.dismissed() => return Error::Message("its job dropped it".to_owned()),
                 _ = look.tick() => None,
             };
             let handed = match frame {
-                Some(Ok(frame)) => hand_on(frame, receiver, &mut inbox, route).await,
+                Some(Ok(frame)) => hand_on(frame, receiver, &mut inbox, delivery).await,
                 Some(Err(error)) => Err(error),
                 None => {
                     self.look_at(&hello.name, incarnation, receiver.last_seen(), &mut silent_since).await;
@@ -333,7 +341,7 @@ impl Gate {
             _ => return,
         };
         // The owner lives as long as the daemon.
-        let _ = self.events.send(Event::Suspect { incarnation, note }).await;
+        let _ = self.notices.send(Notice::Suspect { incarnation, note }).await;
     }
 }
 
@@ -343,15 +351,49 @@ fn peer_address(address: &str, port: u16) -> Option<SocketAddr> {
     Some(SocketAddr::new(caller.ip(), port))
 }
 
-async fn hand_on(frame: Frame, receiver: &mut Receiver, inbox: &mut Inbox, route: &Route) -> Result<()> {
+async fn hand_on(
+    frame: Frame,
+    receiver: &mut Receiver,
+    inbox: &mut Inbox,
+    delivery: &Delivery,
+) -> Result<()> {
     inbox.accept(frame)?;
     while let Some(letter) = inbox.take() {
         let header = letter.header;
-        let Some((index, send)) = route.find(&header)? else { continue };
+        let Some((index, send)) = delivery.find(&header)? else { continue };
         let message: ToMaster = wire::unpack_to_master(header.kind, &letter.bytes)?;
         receiver.recycle(letter.bytes);
         // The job may be over by now.
         let _ = send.send(Input::Message(index, header, message)).await;
     }
     Ok(())
+}
+
+/// Takes connections for ever; each fault of one is one line in the log.
+pub async fn listen(listener: TcpListener, gate: Arc<Gate>) {
+    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    loop {
+        let (stream, address) = match listener.accept().await {
+            Ok(taken) => taken,
+            Err(error) => {
+                // Out of file descriptors, most likely: connections that end give some back.
+                warn!("taking a connection: {error}");
+                tokio::time::sleep(Duration::from_millis(100)).await;
+                continue;
+            }
+        };
+        let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
+            warn!("connection from {address} not taken: {CONNECTIONS} stand, at most {CONNECTIONS}");
+            continue;
+        };
+        let gate = Arc::clone(&gate);
+        tokio::spawn(async move {
+            if let Err(error) = Arc::clone(&gate).take(stream, address.to_string()).await
+                && !gate.is_ending()
+            {
+                warn!("connection from {address}: {error}");
+            }
+            drop(place);
+        });
+    }
 }

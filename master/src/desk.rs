@@ -1,6 +1,6 @@
 //! DESK: answers the requests of one client after another.
 //!
-//! What concerns hosts and queue is asked of their owner; decks are read and files opened here, on blocking threads.
+//! What concerns hosts and queue is asked of the scheduler; decks are read and files opened here, on blocking threads.
 
 use std::{
     fs::File,
@@ -20,7 +20,7 @@ use protocol::{
 };
 use tokio::sync::{mpsc, oneshot};
 
-use crate::daemon::Event;
+use crate::notice::Notice;
 
 /// Bytes of a request around a deck.
 const AROUND_A_DECK: usize = 4096;
@@ -29,13 +29,13 @@ const REPORT_EVERY: Duration = Duration::from_millis(250);
 
 /// Serves a client until its connection ends; gives the reason.
 pub async fn serve(
-    events: &mpsc::Sender<Event>,
+    notices: &mpsc::Sender<Notice>,
     sender: &Sender,
     receiver: &mut Receiver,
     incarnation: u32,
 ) -> Error {
     let mut desk = Desk {
-        events,
+        notices,
         outbox: Outbox::new(sender.clone(), 0),
         inbox: Inbox::new(incarnation, (DECK_LIMIT + AROUND_A_DECK) as u64),
     };
@@ -47,7 +47,7 @@ pub async fn serve(
 }
 
 struct Desk<'a> {
-    events: &'a mpsc::Sender<Event>,
+    notices: &'a mpsc::Sender<Notice>,
     outbox: Outbox,
     inbox: Inbox,
 }
@@ -77,24 +77,24 @@ impl Desk<'_> {
         self.outbox.send(Place::default(), Packed { kind: Kind::Control, cycle: 0, bytes })
     }
 
-    /// Asks the owner of hosts and queue.
+    /// Asks the scheduler.
     async fn ask<T>(
         &self,
-        event: impl FnOnce(oneshot::Sender<T>) -> Event,
+        event: impl FnOnce(oneshot::Sender<T>) -> Notice,
     ) -> std::result::Result<T, String> {
         let (answer, answered) = oneshot::channel();
         let ending = "the master is ending".to_owned();
-        self.events.send(event(answer)).await.map_err(|_| ending.clone())?;
+        self.notices.send(event(answer)).await.map_err(|_| ending.clone())?;
         answered.await.map_err(|_| ending)
     }
 
     async fn answer(&self, request: Request) -> std::result::Result<Reply, String> {
         Ok(match request {
             Request::Submit { name, text, options } => self.submit(name, text, options).await?,
-            Request::Jobs => Reply::Jobs(self.ask(Event::Jobs).await?),
-            Request::Hosts => Reply::Hosts(self.ask(Event::Hosts).await?),
-            Request::Cancel { job } => Reply::Done(self.ask(|answer| Event::Cancel(job, answer)).await??),
-            Request::Resume { job } => Reply::Done(self.ask(|answer| Event::Resume(job, answer)).await??),
+            Request::Jobs => Reply::Jobs(self.ask(Notice::Jobs).await?),
+            Request::Hosts => Reply::Hosts(self.ask(Notice::Hosts).await?),
+            Request::Cancel { job } => Reply::Done(self.ask(|answer| Notice::Cancel(job, answer)).await??),
+            Request::Resume { job } => Reply::Done(self.ask(|answer| Notice::Resume(job, answer)).await??),
             Request::Files { job } => {
                 let folder = self.folder(job).await?;
                 Reply::Files(blocking(move || list(&folder)).await?)
@@ -109,7 +109,7 @@ impl Desk<'_> {
     }
 
     async fn folder(&self, job: u32) -> std::result::Result<PathBuf, String> {
-        self.ask(|answer| Event::Folder(job, answer)).await?
+        self.ask(|answer| Notice::Folder(job, answer)).await?
     }
 
     async fn submit(
@@ -131,7 +131,7 @@ impl Desk<'_> {
         match read.await? {
             Err(faults) => Ok(Reply::Faults(faults)),
             Ok((text, title)) => {
-                let submit = |answer| Event::Submit { name, title, text, options, answer };
+                let submit = |answer| Notice::Submit { name, title, text, options, answer };
                 Ok(Reply::Submitted { job: self.ask(submit).await?? })
             }
         }
@@ -139,7 +139,7 @@ impl Desk<'_> {
 
     /// Reports on a job until it has ended or the client leaves.
     async fn watch(&mut self, job: Option<u32>, receiver: &mut Receiver) -> Result<()> {
-        let mut status = match self.ask(|answer| Event::Watch(job, answer)).await.and_then(|s| s) {
+        let mut status = match self.ask(|answer| Notice::Watch(job, answer)).await.and_then(|s| s) {
             Ok(status) => status,
             Err(why) => return self.reply(&Reply::No(why)),
         };

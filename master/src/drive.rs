@@ -72,7 +72,7 @@ pub struct Seat {
     /// The way to it.
     pub outbox: Arc<Mutex<Outbox>>,
     /// The way from it.
-    pub route: Arc<Route>,
+    pub delivery: Arc<Delivery>,
 }
 
 impl Seat {
@@ -95,7 +95,7 @@ impl Seat {
 
 /// The way from a worker's connection to the job that it computes.
 #[derive(Default)]
-pub struct Route {
+pub struct Delivery {
     port: Mutex<Port>,
     /// The job will have no more to do with the worker.
     dismissed: Notify,
@@ -112,7 +112,7 @@ struct Port {
     dismissal: Option<String>,
 }
 
-impl Route {
+impl Delivery {
     fn port(&self) -> std::sync::MutexGuard<'_, Port> {
         self.port.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -208,7 +208,7 @@ pub fn drive(
     driver.introduce();
     let result = driver.run(first, sink, stop);
     for seat in &driver.seats {
-        seat.route.close();
+        seat.delivery.close();
         if result.is_err() {
             // A worker that cannot be reached is found lost by its connection's task.
             let _ = seat.send(driver.place, &ToWorker::Release);
@@ -243,7 +243,7 @@ impl Driver {
     fn seat(&mut self, seat: Seat) {
         let index = self.seats.len();
         self.bytes_before += seat.bytes();
-        if let Err(why) = seat.route.open(self.place.job, index, self.send.clone()) {
+        if let Err(why) = seat.delivery.open(self.place.job, index, self.send.clone()) {
             self.lost.push_back((index, why));
         }
         self.seats.push(seat);
@@ -358,7 +358,7 @@ impl Driver {
                 Action::Dismiss(worker, why) => {
                     let seat = &self.seats[worker];
                     warn!("worker {} at {} is dropped: {why}", seat.hand.name, seat.address);
-                    seat.route.dismiss(why);
+                    seat.delivery.dismiss(why);
                 }
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => sink.take(other)?,

@@ -1,8 +1,8 @@
 //! HTTP: the master's page, its JSON API, `/metrics` and `/healthz`, on an address of their own.
 //!
 //! Loopback speaks HTTP; elsewhere it is HTTPS with the cluster's certificate, which a browser believes once `ca.pem` is
-//! given to it. Every request passes the [`guard`], `/healthz` alone without a token. [`api`] asks the owner of
-//! hosts and queue as any client does; what runs show while they run stands on the [`board`].
+//! given to it. Every request passes the [`guard`], `/healthz` alone without a token. [`api`] asks the scheduler as
+//! any client does; what runs show while they run stands on the [`board`].
 
 use std::{
     net::SocketAddr,
@@ -28,17 +28,16 @@ use tokio::{
 use tokio_rustls::{TlsAcceptor, server::TlsStream};
 use tracing::{debug, warn};
 
-use crate::daemon::Event;
-
 pub mod api;
 pub mod assets;
 pub mod board;
 pub mod guard;
 pub mod metrics;
+pub mod office;
 pub mod surface;
 
-use board::Board;
-use guard::{Guard, Refusal};
+use guard::Refusal;
+use office::Office;
 
 /// Most connections at a time.
 pub const CONNECTIONS: usize = 256;
@@ -46,19 +45,6 @@ pub const CONNECTIONS: usize = 256;
 const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
 /// What pages may load: their own files and nothing else.
 const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
-
-/// What every request needs of the daemon.
-#[derive(Clone)]
-pub struct Office {
-    /// To the owner of hosts and queue.
-    pub events: mpsc::Sender<Event>,
-    /// What runs show.
-    pub board: Arc<Board>,
-    /// The line to paste on a new worker.
-    pub join: String,
-    /// Who may ask.
-    pub guard: Guard,
-}
 
 /// Where the page listens and by which certificate.
 pub struct Place {
@@ -127,7 +113,7 @@ async fn watchman(State(office): State<Office>, request: Request, next: Next) ->
     let answer = match guard.names(request.headers()) {
         Err(refusal) => refuse(refusal),
         Ok(()) if request.uri().path() == "/healthz" => {
-            let ending = office.events.is_closed();
+            let ending = office.notices.is_closed();
             if ending { (StatusCode::SERVICE_UNAVAILABLE, "ending\n") } else { (StatusCode::OK, "ok\n") }
                 .into_response()
         }

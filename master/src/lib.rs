@@ -1,8 +1,8 @@
 //! The master: owns the problem, decides, adds partial forces, writes results.
 //!
 //! [`job`] is the pure session of one run; [`embedded`] drives it with workers in the same process, [`drive`] with
-//! workers over links. [`daemon`] owns [`hosts`] and [`queue`]: each [`connection`] is one task that carries messages,
-//! the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
+//! workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`] and hears [`notice`]s: each
+//! [`connection`] is one task that carries messages, the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
 //! [`lab`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`processes`] starts workers as
 //! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster.
 
@@ -31,8 +31,10 @@ pub mod interrupt;
 pub mod job;
 pub mod lab;
 pub mod ledger;
+pub mod machine;
 pub mod memory;
 pub mod newcomer;
+pub mod notice;
 pub mod options;
 pub mod output;
 pub mod peers;
@@ -41,6 +43,7 @@ pub mod processes;
 pub mod queue;
 pub mod results;
 pub mod run;
+pub mod scheduler;
 pub mod service;
 pub mod shell;
 pub mod simulate;

@@ -14,7 +14,7 @@ use master::{
     command::{Bench, Certs, Cli, Command, WorkerArgs},
     convert, daemon, deck_file,
     lab::Lab,
-    memory, newcomer, picture, processes, run, simulate,
+    machine, memory, newcomer, picture, processes, run, simulate,
 };
 use protocol::{
     shape::{Shape, Wire},
@@ -74,7 +74,7 @@ fn work(args: WorkerArgs) -> Result<ExitCode, String> {
     if let (Some(token), Some(folder)) = (&args.join, &args.certs)
         && !tls::Paths::in_folder(folder).certificate.exists()
     {
-        let name = args.name.clone().unwrap_or_else(daemon::host_name);
+        let name = args.name.clone().unwrap_or_else(machine::host_name);
         newcomer::join(&args.master, token, &name, folder)?;
     }
     if let Some(pin) = &args.pin {
@@ -91,7 +91,7 @@ fn work(args: WorkerArgs) -> Result<ExitCode, String> {
     };
     let options = worker::daemon::Options {
         master: args.master,
-        name: args.name.unwrap_or_else(|| format!("{}-{}", daemon::host_name(), std::process::id())),
+        name: args.name.unwrap_or_else(|| format!("{}-{}", machine::host_name(), std::process::id())),
         speed,
         threads: args.threads.unwrap_or(cores),
         certs: args.certs,
@@ -123,7 +123,7 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
             println!("{}", daemon::line_to_paste(&master, &token.map_err(|e| e.to_string())?, role.role()));
         }
         Certs::Join { master, token, folder, name } => {
-            newcomer::join(&master, &token, &name.unwrap_or_else(daemon::host_name), &folder)?;
+            newcomer::join(&master, &token, &name.unwrap_or_else(machine::host_name), &folder)?;
             println!("made {}", tls::Paths::in_folder(&folder).certificate.display());
         }
         Certs::Revoke { folder, name } => {

@@ -14,12 +14,12 @@ use protocol::handshake::Role;
 use tokio::{net::TcpListener, runtime::Runtime, sync::mpsc};
 
 use crate::{
-    connection::Gate,
-    daemon::{Event, WAITING_EVENTS, listen},
+    connection::{Gate, listen},
     drive::{self, Seat, drive},
     embedded::{Sink, Traffic},
     event::{Action, Hand, Outcome},
     job::Job,
+    notice::{Notice, WAITING_NOTICES},
 };
 
 /// The environment variable that names the executable, where this process is another one.
@@ -58,7 +58,7 @@ impl Processes {
         let listener = runtime.block_on(TcpListener::bind((Ipv4Addr::LOCALHOST, 0))).map_err(fault)?;
         let address = listener.local_addr().map_err(fault)?;
         let token = format!("{:016x}{:016x}", worker::random(), worker::random());
-        let (events, mut heard) = mpsc::channel(WAITING_EVENTS);
+        let (events, mut heard) = mpsc::channel(WAITING_NOTICES);
         let gate = Arc::new(Gate::new(events, vec![Role::Worker], Some(token.clone()), None));
         runtime.spawn(listen(listener, Arc::clone(&gate)));
         let mut started = Self { gate, seats: Vec::new(), children: Vec::new(), runtime: None };
@@ -101,25 +101,25 @@ impl Processes {
 /// Waits until every hand has its seat, in the order of the hands.
 async fn join(
     hands: &[Hand],
-    heard: &mut mpsc::Receiver<Event>,
+    heard: &mut mpsc::Receiver<Notice>,
     children: &mut [Child],
 ) -> Result<Vec<Seat>, String> {
     let deadline = Instant::now() + JOIN_LIMIT;
     let mut seats: BTreeMap<usize, Seat> = BTreeMap::new();
     while seats.len() < hands.len() {
         match tokio::time::timeout(Duration::from_millis(100), heard.recv()).await {
-            Ok(Some(Event::Knock { hello, answer, .. })) => {
+            Ok(Some(Notice::Knock { hello, answer, .. })) => {
                 let place = hands.iter().position(|hand| hand.name == hello.name);
                 let place = place.ok_or_else(|| format!("no worker {:?} was started", hello.name));
                 // A child that has ended since is found below.
                 let _ = answer.send(place.map(|place| place as u32));
             }
-            Ok(Some(Event::Joined(seat))) => {
+            Ok(Some(Notice::Joined(seat))) => {
                 if let Some(place) = hands.iter().position(|hand| hand.name == seat.hand.name) {
                     seats.insert(place, seat);
                 }
             }
-            Ok(Some(Event::Left { why, .. })) => {
+            Ok(Some(Notice::Left { why, .. })) => {
                 return Err(format!("a worker left before the start: {why}"));
             }
             Ok(Some(_)) => {}

@@ -13,7 +13,7 @@ pub const ENDED_LIMIT: usize = 1000;
 
 /// What happens to a job in the queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
+pub enum Change {
     /// Workers were given to it.
     Start,
     /// It came to its end.
@@ -28,21 +28,21 @@ pub enum Event {
     Resume,
 }
 
-/// The state after an event.
+/// The state after a change.
 ///
 /// # Errors
-/// A sentence that names both, where the event cannot happen.
-pub fn after(state: State, event: Event) -> Result<State, String> {
-    match (state, event) {
-        (State::Queued, Event::Start) => Ok(State::Running),
-        (State::Queued | State::Running, Event::Cancel) => Ok(State::Cancelled),
-        (State::Running, Event::Finish) => Ok(State::Done),
-        (State::Running, Event::Fail) => Ok(State::Failed),
-        (State::Running, Event::Suspend) | (State::Failed, Event::Resume) => Ok(State::Queued),
-        (State::Queued, Event::Finish | Event::Fail | Event::Suspend | Event::Resume)
-        | (State::Running, Event::Start | Event::Resume)
+/// A sentence that names both, where the change cannot happen.
+pub fn after(state: State, change: Change) -> Result<State, String> {
+    match (state, change) {
+        (State::Queued, Change::Start) => Ok(State::Running),
+        (State::Queued | State::Running, Change::Cancel) => Ok(State::Cancelled),
+        (State::Running, Change::Finish) => Ok(State::Done),
+        (State::Running, Change::Fail) => Ok(State::Failed),
+        (State::Running, Change::Suspend) | (State::Failed, Change::Resume) => Ok(State::Queued),
+        (State::Queued, Change::Finish | Change::Fail | Change::Suspend | Change::Resume)
+        | (State::Running, Change::Start | Change::Resume)
         | (State::Done | State::Failed | State::Cancelled, _) => {
-            Err(format!("a job that is {} cannot {event:?}", state.name()).to_lowercase())
+            Err(format!("a job that is {} cannot {change:?}", state.name()).to_lowercase())
         }
     }
 }
@@ -95,7 +95,7 @@ impl Queue {
     /// # Errors
     /// As for [`Queue::apply`].
     pub fn resume(&mut self, id: u32, text: String) -> Result<State, String> {
-        let (state, _) = self.apply(id, Event::Resume)?;
+        let (state, _) = self.apply(id, Change::Resume)?;
         if let Some(job) = self.jobs.get_mut(&id) {
             job.text = Arc::new(text);
             // Any workers will do.
@@ -154,9 +154,9 @@ impl Queue {
     ///
     /// # Errors
     /// As for [`after`], or if there is no such job.
-    pub fn apply(&mut self, id: u32, event: Event) -> Result<(State, Vec<u32>), String> {
+    pub fn apply(&mut self, id: u32, change: Change) -> Result<(State, Vec<u32>), String> {
         let job = self.jobs.get_mut(&id).ok_or_else(|| format!("no job {id}"))?;
-        job.state = after(job.state, event)?;
+        job.state = after(job.state, change)?;
         let state = job.state;
         if is_over(state) {
             job.text = Arc::default();
@@ -180,15 +180,15 @@ mod tests {
     use super::*;
 
     const STATES: [State; 5] = [State::Queued, State::Running, State::Done, State::Failed, State::Cancelled];
-    const EVENTS: [Event; 6] =
-        [Event::Start, Event::Finish, Event::Fail, Event::Cancel, Event::Suspend, Event::Resume];
+    const CHANGES: [Change; 6] =
+        [Change::Start, Change::Finish, Change::Fail, Change::Cancel, Change::Suspend, Change::Resume];
 
     #[test]
     fn only_seven_changes_are_legal_and_none_leaves_an_end_but_that_of_a_failed_job() {
         let mut legal = Vec::new();
         for state in STATES {
-            for event in EVENTS {
-                match after(state, event) {
+            for change in CHANGES {
+                match after(state, change) {
                     Ok(next) => legal.push((state, next)),
                     Err(why) => assert!(why.contains(state.name()), "{why}"),
                 }
@@ -216,12 +216,12 @@ mod tests {
         let mut queue = Queue::new(5);
         assert_eq!((add(&mut queue), add(&mut queue), add(&mut queue)), (Ok(5), Ok(6), Ok(7)));
         assert_eq!(queue.first().map(|job| job.id), Some(5));
-        assert_eq!(queue.apply(6, Event::Cancel), Ok((State::Cancelled, vec![])));
-        assert_eq!(queue.apply(5, Event::Start), Ok((State::Running, vec![])));
+        assert_eq!(queue.apply(6, Change::Cancel), Ok((State::Cancelled, vec![])));
+        assert_eq!(queue.apply(5, Change::Start), Ok((State::Running, vec![])));
         assert_eq!(queue.first().map(|job| job.id), Some(7));
-        assert_eq!(queue.apply(5, Event::Fail), Ok((State::Failed, vec![])));
+        assert_eq!(queue.apply(5, Change::Fail), Ok((State::Failed, vec![])));
         assert_eq!(queue.get(5).map(|job| job.text.as_str()), Some(""), "the deck is not kept");
-        assert_eq!(queue.apply(9, Event::Start), Err("no job 9".to_owned()));
+        assert_eq!(queue.apply(9, Change::Start), Err("no job 9".to_owned()));
     }
 
     #[test]
@@ -237,7 +237,7 @@ mod tests {
         let mut order = Vec::new();
         while let Some(next) = queue.first().map(|job| job.id) {
             order.push(next);
-            queue.apply(next, Event::Start).expect("it waits");
+            queue.apply(next, Change::Start).expect("it waits");
         }
         assert_eq!(order, [9, 2, 3, 1, 5, 4]);
         assert_eq!(add(&mut queue), Ok(10), "numbers go on after those of an earlier master");
@@ -252,10 +252,10 @@ mod tests {
         let full = add(&mut queue).expect_err("full");
         assert!(full.contains("1000 jobs wait"), "{full}");
         for id in 1..=ENDED_LIMIT as u32 {
-            assert_eq!(queue.apply(id, Event::Cancel), Ok((State::Cancelled, vec![])));
+            assert_eq!(queue.apply(id, Change::Cancel), Ok((State::Cancelled, vec![])));
         }
         let next = add(&mut queue).expect("room again");
-        assert_eq!(queue.apply(next, Event::Cancel), Ok((State::Cancelled, vec![1])));
+        assert_eq!(queue.apply(next, Change::Cancel), Ok((State::Cancelled, vec![1])));
         assert!(queue.get(1).is_none() && queue.last() == Some(next));
     }
 }

@@ -27,7 +27,7 @@ use crate::{
     job::Job,
     options::{Keep, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
-    queue::Event,
+    queue::Change,
     results::{Folder, TRACE, report, trace},
     snapshot::{keeper::Keeper, store::Store},
     summarise::{SurfaceCensus, summarise},
@@ -67,7 +67,7 @@ pub struct Order {
 }
 
 /// Runs the job; gives how it ended. A bug becomes a failure of this job alone.
-pub fn serve(order: &Order) -> (Event, Ended) {
+pub fn serve(order: &Order) -> (Change, Ended) {
     let result = catch_unwind(AssertUnwindSafe(|| run(order)));
     let result = result.unwrap_or_else(|_| {
         for seat in &order.seats {
@@ -75,7 +75,7 @@ pub fn serve(order: &Order) -> (Event, Ended) {
         }
         Err("a bug in the master; its log has the words".to_owned())
     });
-    result.unwrap_or_else(|reason| (Event::Fail, Ended { failure: Some(reason), ..Ended::default() }))
+    result.unwrap_or_else(|reason| (Change::Fail, Ended { failure: Some(reason), ..Ended::default() }))
 }
 
 /// Whether an address is one of this machine: then it can be bound to.
@@ -100,7 +100,7 @@ fn share_with_sorts(model: &Model, hands: &mut [Hand], beside: &[bool]) {
     }
 }
 
-fn run(order: &Order) -> Result<(Event, Ended), String> {
+fn run(order: &Order) -> Result<(Change, Ended), String> {
     let mut model = deck::read(&order.text, &order.name)
         .map_err(|faults| faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
     bring_end_forward(&mut model, &order.options)?;
@@ -165,7 +165,7 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
         if outcome.suspended {
             let kept = keeper.flush();
             info!(job = order.number, cycle = kept.cycle, "the job is stored and waits for the next master");
-            return Ok((Event::Suspend, Ended::default()));
+            return Ok((Change::Suspend, Ended::default()));
         }
         keeper.discard();
     }
@@ -183,10 +183,10 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
         status.cycle = summary.cycles;
         status.time = summary.end_time;
     });
-    let event = match (&outcome.failure, outcome.stopped) {
-        (Some(_), _) => Event::Fail,
-        (None, true) => Event::Cancel,
-        (None, false) => Event::Finish,
+    let change = match (&outcome.failure, outcome.stopped) {
+        (Some(_), _) => Change::Fail,
+        (None, true) => Change::Cancel,
+        (None, false) => Change::Finish,
     };
     let ended = Ended {
         failure: outcome.failure,
@@ -194,7 +194,7 @@ fn run(order: &Order) -> Result<(Event, Ended), String> {
         summary: Some(serde_json::to_string(&summary).map_err(|e| e.to_string())?),
         table: Some(summary.table(&model.units)),
     };
-    Ok((event, ended))
+    Ok((change, ended))
 }
 
 /// Results to the disk, progress to watchers.

@@ -8,7 +8,7 @@ use std::{
 use deck::model::Model;
 use master::{
     connection::Gate,
-    daemon::Event,
+    notice::Notice,
     drive::{Seat, channel, drive},
     embedded::{self, Sink},
     event::{Action, Hand, Outcome},
@@ -113,12 +113,12 @@ where
     let mut seats: Vec<Seat> = Vec::new();
     while seats.len() < hands.len() {
         match heard.recv().await.expect("the gate stands") {
-            Event::Knock { hello, answer, .. } => {
+            Notice::Knock { hello, answer, .. } => {
                 let place = hands.iter().position(|hand| hand.name == hello.name).expect("one of ours");
                 answer.send(Ok(place as u32)).expect("it waits");
             }
-            Event::Joined(seat) => seats.push(seat),
-            Event::Left { why, .. } => panic!("a worker left: {why}"),
+            Notice::Joined(seat) => seats.push(seat),
+            Notice::Left { why, .. } => panic!("a worker left: {why}"),
             _ => panic!("no client is here"),
         }
     }

@@ -31,8 +31,8 @@ use serde_json::json;
 use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::{Office, board};
-use crate::daemon::Event;
+use super::{board, office::Office};
+use crate::notice::Notice;
 
 /// The shortest time between two events of the stream.
 const EVENT_EVERY: Duration = Duration::from_millis(500);
@@ -72,14 +72,14 @@ fn missing(what: String) -> Fault {
     Fault(StatusCode::NOT_FOUND, json!({ "error": what }))
 }
 
-/// Asks the owner of hosts and queue.
+/// Asks the scheduler.
 ///
 /// # Errors
 /// If the master is ending.
-pub async fn ask<T>(office: &Office, event: impl FnOnce(oneshot::Sender<T>) -> Event) -> Result<T, String> {
+pub async fn ask<T>(office: &Office, event: impl FnOnce(oneshot::Sender<T>) -> Notice) -> Result<T, String> {
     let (answer, answered) = oneshot::channel();
     let ending = "the master is ending".to_owned();
-    office.events.send(event(answer)).await.map_err(|_| ending.clone())?;
+    office.notices.send(event(answer)).await.map_err(|_| ending.clone())?;
     answered.await.map_err(|_| ending)
 }
 
@@ -95,8 +95,8 @@ fn listed(office: &Office, mut status: Status) -> serde_json::Value {
 }
 
 async fn all(office: &Office) -> Result<serde_json::Value, String> {
-    let jobs = ask(office, Event::Jobs).await?;
-    let hosts = ask(office, Event::Hosts).await?;
+    let jobs = ask(office, Notice::Jobs).await?;
+    let hosts = ask(office, Notice::Hosts).await?;
     let jobs: Vec<_> = jobs.into_iter().map(|status| listed(office, status)).collect();
     let host = |row: protocol::request::HostRow| {
         let load = if row.state == "busy" { office.board.load(&row.name) } else { None };
@@ -196,12 +196,12 @@ async fn submit(
         keep_every: Some(10.0),
         ..JobOptions::default()
     };
-    let job = ask(&office, |answer| Event::Submit { name, title, text, options, answer }).await??;
+    let job = ask(&office, |answer| Notice::Submit { name, title, text, options, answer }).await??;
     Ok(Json(json!({ "job": job })))
 }
 
 async fn job(State(office): State<Office>, Path(job): Path<u32>) -> Result<Json<serde_json::Value>, Fault> {
-    let watch = ask(&office, |answer| Event::Watch(Some(job), answer)).await?.map_err(missing)?;
+    let watch = ask(&office, |answer| Notice::Watch(Some(job), answer)).await?.map_err(missing)?;
     let status = watch.borrow().clone();
     Ok(Json(json!(status)))
 }
@@ -210,7 +210,7 @@ async fn cancel(
     State(office): State<Office>,
     Path(job): Path<u32>,
 ) -> Result<Json<serde_json::Value>, Fault> {
-    let done = ask(&office, |answer| Event::Cancel(job, answer)).await??;
+    let done = ask(&office, |answer| Notice::Cancel(job, answer)).await??;
     Ok(Json(json!({ "done": done })))
 }
 

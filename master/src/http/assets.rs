@@ -2,7 +2,7 @@
 
 use axum::{Router, http::header, routing::get};
 
-use super::Office;
+use super::office::Office;
 
 /// Path, type and text of every file.
 const FILES: [(&str, &str, &str); 8] = [

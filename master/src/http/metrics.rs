@@ -5,13 +5,13 @@ use std::fmt::Write;
 use axum::{extract::State, http::header, response::IntoResponse};
 use protocol::request::{HostRow, State as JobState, Status};
 
-use super::{Office, api::ask, board};
-use crate::daemon::Event;
+use super::{api::ask, board, office::Office};
+use crate::notice::Notice;
 
 /// The table.
 pub async fn text(State(office): State<Office>) -> impl IntoResponse {
-    let jobs = ask(&office, Event::Jobs).await.unwrap_or_default();
-    let hosts = ask(&office, Event::Hosts).await.unwrap_or_default();
+    let jobs = ask(&office, Notice::Jobs).await.unwrap_or_default();
+    let hosts = ask(&office, Notice::Hosts).await.unwrap_or_default();
     let content = [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")];
     (content, render(&office, &jobs, &hosts))
 }

@@ -1,0 +1,99 @@
+//! Which job may start, and which one a worker is given to that comes while jobs run. It decides and changes nothing.
+
+use std::time::Duration;
+
+use crate::queue::Entry;
+
+/// Most jobs that run at a time. A job takes all idle workers, so a second one would find only those that come later.
+const JOBS_AT_ONCE: usize = 1;
+/// How long an interrupted job waits for all of its workers before it goes on with those that are back; later ones are taken
+/// in at plan boundaries.
+const RETURN_LIMIT: Duration = Duration::from_secs(2);
+
+/// What becomes of the first job of the queue.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Allotment {
+    /// It starts on all idle workers.
+    Start,
+    /// It waits, for this.
+    Wait(String),
+}
+
+/// What becomes of a job beside those that are `running`, with workers of these names `idle`, so long after the master's
+/// start.
+pub(super) fn of(entry: &Entry, running: &[u32], idle: &[&str], since_start: Duration) -> Allotment {
+    if running.len() >= JOBS_AT_ONCE {
+        let jobs: Vec<String> = running.iter().map(|job| format!("job {job}")).collect();
+        return Allotment::Wait(jobs.join(", "));
+    }
+    let needed = entry.options.min_workers.max(1) as usize;
+    match &entry.before {
+        // Any worker will do for what was begun with enough of them.
+        Some(crew) => {
+            let all = crew.len();
+            let back = crew.iter().filter(|name| idle.contains(&name.as_str())).count();
+            if idle.is_empty() || back < all && since_start < RETURN_LIMIT {
+                return Allotment::Wait(format!("its workers: {back} of {all} are back"));
+            }
+        }
+        None if idle.len() < needed => {
+            return Allotment::Wait(format!("{needed} workers, {} are idle", idle.len()));
+        }
+        None => {}
+    }
+    Allotment::Start
+}
+
+/// The job that is given a worker which has just come: of those that run the first; none without any.
+pub(super) fn for_newcomer(mut running: impl Iterator<Item = u32>) -> Option<u32> {
+    running.next()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use protocol::{options::JobOptions, request::State};
+
+    use super::*;
+
+    fn job(min_workers: u32, before: Option<&[&str]>) -> Entry {
+        Entry {
+            id: 7,
+            name: "deck.toml".to_owned(),
+            text: Arc::new(String::new()),
+            options: JobOptions { min_workers, ..JobOptions::default() },
+            state: State::Queued,
+            folder: None,
+            before: before.map(|names| names.iter().map(|name| (*name).to_owned()).collect()),
+        }
+    }
+
+    fn waits_for(what: &str) -> Allotment {
+        Allotment::Wait(what.to_owned())
+    }
+
+    #[test]
+    fn a_job_starts_once_enough_workers_are_idle_and_no_other_runs() {
+        let (entry, late) = (job(2, None), Duration::from_secs(60));
+        assert_eq!(of(&entry, &[], &["a"], late), waits_for("2 workers, 1 are idle"));
+        assert_eq!(of(&entry, &[], &["a", "b"], Duration::ZERO), Allotment::Start);
+        assert_eq!(of(&entry, &[3], &["a", "b"], late), waits_for("job 3"));
+        assert_eq!(of(&job(0, None), &[], &[], late), waits_for("1 workers, 0 are idle"));
+    }
+
+    #[test]
+    fn an_interrupted_job_waits_for_its_workers_a_while_and_then_takes_any() {
+        let (entry, soon) = (job(5, Some(&["a", "b"])), Duration::from_secs(1));
+        assert_eq!(of(&entry, &[], &["a", "x"], soon), waits_for("its workers: 1 of 2 are back"));
+        assert_eq!(of(&entry, &[], &["b", "a"], soon), Allotment::Start);
+        assert_eq!(of(&entry, &[], &["x"], RETURN_LIMIT), Allotment::Start);
+        assert_eq!(of(&entry, &[], &[], RETURN_LIMIT), waits_for("its workers: 0 of 2 are back"));
+    }
+
+    #[test]
+    fn a_newcomer_is_given_to_a_job_that_runs() {
+        assert_eq!(for_newcomer([4, 9].into_iter()), Some(4));
+        assert_eq!(for_newcomer([].into_iter()), None);
+    }
+}
