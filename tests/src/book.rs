@@ -9,6 +9,7 @@ mod contact;
 mod element;
 mod erosion;
 mod fold;
+mod free;
 mod gas;
 mod girder;
 mod hexahedron;
@@ -52,6 +53,8 @@ macro_rules! each_case_of_the_book {
             modes: time_steps_are_those_of_the_thinnest_way_through quick;
             modes: an_isolated_cube_is_stable_to_its_own_limit_only quick;
             element: mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_for_ten_thousand_cycles quick;
+            free: small_free_bodies_do_not_gain_energy quick;
+            free: free_bodies_keep_their_energy_for_a_hundred_thousand_cycles long;
             wave: a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages quick;
             wave: of_two_equal_bars_the_first_stops_and_the_second_flies_on quick;
             wave: a_short_bar_stops_on_a_long_one_that_flies_on_slower quick;

@@ -16,7 +16,7 @@ use super::{
     place::{Bases, Nodal, PACKED, Packed, Place, Rows},
     rotation::rotated,
     vector::{Tensor, Vector},
-    viscosity::{Spread, frequency},
+    viscosity::{Spread, Swing},
 };
 use crate::{
     eos::EquationOfState,
@@ -357,11 +357,12 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
 
     // 8. Votes and energies.
     let double_inverse_square = L::splat(2.0 / 512.0) * inverse_volume * inverse_volume;
-    let damping = L::select(volume_rate.less(zero), damping, zero);
-    let bound = frequency(spread.eigenvalue_bound() * double_inverse_square, damping, sound_square);
+    let shear_square = L::splat(laws.strength.shear() / laws.density) * relative_volume;
+    let swing = Swing { damping, sound_square, shear_square, trace: spread.trace() * double_inverse_square };
+    let bound = swing.frequency(spread.eigenvalue_bound() * double_inverse_square);
     let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);
     if L::any(L::both(L::splat(to_beat).less(bound), active)) {
-        let exact = frequency(spread.largest_eigenvalue() * double_inverse_square, damping, sound_square);
+        let exact = swing.frequency(spread.largest_eigenvalue() * double_inverse_square);
         let (frequencies, limits) = (exact.to_array(), (one / exact).to_array());
         for lane in 0..L::N {
             if L::bits(active) >> lane & 1 == 1 {

@@ -3,6 +3,9 @@
 //! With `S = sum_I B_I B_I^T` (B the volume gradient) a cube of side h has `S = h^4/2 I`. Two lengths follow:
 //! `L_v = V / sqrt(2/3 tr S)`, an average, scales the viscosity; `L_e = V / sqrt(2 lambda_max(S))`, the thickness
 //! however flat the element, limits the step.
+//!
+//! Viscosity acts in compression only, but its linear term enters the limit of every element in every cycle. If it came and went with
+//! the sign of the rate of volume, the step would breathe with the vibration of a small free body and pump it.
 
 use super::vector::Vector;
 use crate::lanes::Lane;
@@ -98,7 +101,43 @@ impl<L: Lane> Spread<L> {
     }
 }
 
-/// The frequency whose inverse is the Courant limit `L_e / (Q + sqrt(Q^2 + c^2))` with
+/// Safety factors up to this one keep an element stable whose corners nothing else holds, see [`Swing`].
+pub(crate) const FREE: f64 = 0.7;
+
+/// What limits the step of an element, beside its largest eigenvalue.
+///
+/// In a mesh, the neighbours of an element hold its corners, and its fastest motion is a wave across its thickness, see
+/// [`frequency`]. An element alone can change its volume in all directions at once, which is faster: the corners, each with an
+/// eighth of the mass, swing at `omega^2 = 8/V^2 ((c^2 - 2 G/rho) tr S + 2 (G/rho) lambda_max(S))`, which is exact for a cube and for a
+/// flat element. The viscosity damps this motion at the rate `C = 8 damping tr S / V^2` while the volume shrinks and not while it
+/// grows. It acts with the velocity of half a step before, so the motion is bounded while `omega^2 dt^2 + C dt < 4`.
+#[derive(Clone, Copy)]
+pub(crate) struct Swing<L> {
+    /// Viscosity over density (length^2 / time).
+    pub damping: L,
+    /// `c^2`.
+    pub sound_square: L,
+    /// `G / rho`.
+    pub shear_square: L,
+    /// `2 tr S / V^2`.
+    pub trace: L,
+}
+
+impl<L: Lane> Swing<L> {
+    /// The frequency whose inverse is the limit of the step: the greater of that in a mesh and [`FREE`] times that of an element
+    /// alone. `largest` is `2 lambda_max(S) / V^2` or a bound of it; the frequency grows with it.
+    #[inline(always)]
+    pub fn frequency(&self, largest: L) -> L {
+        let two_shears = self.shear_square + self.shear_square;
+        let rate = L::splat(0.5 * FREE) * self.damping * self.trace;
+        let square = (self.sound_square - two_shears).mul_add(self.trace, two_shears * largest);
+        let square = (L::splat(FREE * FREE) * square).max(L::splat(0.0));
+        let alone = rate + rate.mul_add(rate, square).sqrt();
+        frequency(largest, self.damping, self.sound_square).max(alone)
+    }
+}
+
+/// The frequency whose inverse is the Courant limit in a mesh, `L_e / (Q + sqrt(Q^2 + c^2))` with
 /// `Q = damping / L_e`: `damping / L_e^2 + sqrt((damping / L_e^2)^2 + c^2 / L_e^2)`.
 #[inline(always)]
 pub(crate) fn frequency<L: Lane>(inverse_length_square: L, damping: L, sound_square: L) -> L {
