@@ -8,11 +8,11 @@ use std::{
 use deck::model::Model;
 use master::{
     connection::Gate,
-    notice::Notice,
     drive::{Seat, channel, drive},
     embedded::{self, Sink},
     event::{Action, Hand, Outcome},
     job::Job,
+    notice::Notice,
     options::SessionOptions,
     snapshot::Snapshot,
 };

@@ -111,6 +111,11 @@ fn strength(strength: &Strength) -> String {
                 ("rate0", *rate0),
             ]),
         ),
+        other => {
+            let (name, constants) =
+                other.declared().expect("a law that is not written by hand declares its constants");
+            law(name, plain(&constants))
+        }
     }
 }
 

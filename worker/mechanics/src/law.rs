@@ -86,6 +86,11 @@ macro_rules! declared {
                 Self { $($constant),* }
             }
 
+            /// The constants by key.
+            pub(crate) fn constants(&self) -> Vec<(&'static str, f64)> {
+                vec![$((stringify!($constant), self.$constant)),*]
+            }
+
             /// The law with each constant as `convert` makes it of its unit and value.
             pub(crate) fn converted(mut self, convert: &dyn Fn($crate::law::Unit, f64) -> f64) -> Self {
                 $(self.$constant = convert($crate::law::Unit::$unit, self.$constant);)*

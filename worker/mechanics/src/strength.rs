@@ -266,6 +266,14 @@ impl Strength {
         of: |values| Strength::Voce(Voce::of(values)),
     }];
 
+    /// The name and the constants by key of a law that declares them.
+    pub fn declared(&self) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
+        match self {
+            Strength::Voce(law) => Some((Voce::NAME, law.constants())),
+            _ => None,
+        }
+    }
+
     /// A law that declares its constants with each as `convert` makes it of its unit and value; any other law as it is.
     pub fn converted(self, convert: &dyn Fn(Unit, f64) -> f64) -> Self {
         match self {
