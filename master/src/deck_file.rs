@@ -50,8 +50,26 @@ pub fn gather_deck(path: &Path, options: &Reading) -> Result<String, Error> {
         Err(error) => return Err(Error::File { name, why: error.to_string() }),
     };
     let mut open =
-        |path: &str| std::fs::read(path).ok().map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        |path: &str| read_in_any_case(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     bundle::gather(&name, text, options, &mut open).map_err(Error::Bundle)
+}
+
+/// The bytes of a file that a deck refers to. Decks from machines that do not tell capitals from small letters name files in
+/// either: where no file has the name, the only one that differs from it in case is taken.
+fn read_in_any_case(path: &str) -> Option<Vec<u8>> {
+    if let Ok(bytes) = std::fs::read(path) {
+        return Some(bytes);
+    }
+    let path = Path::new(path);
+    let wanted = path.file_name()?.to_str()?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    let same = |entry: &std::fs::DirEntry| {
+        entry.file_name().to_str().is_some_and(|name| name.eq_ignore_ascii_case(wanted))
+    };
+    let mut found = entries.flatten().filter(same);
+    let only = found.next().filter(|_| found.next().is_none())?;
+    std::fs::read(only.path()).ok()
 }
 
 /// Why a deck cannot be used.
@@ -95,5 +113,28 @@ impl std::error::Error for Error {}
 impl From<Error> for String {
     fn from(error: Error) -> Self {
         error.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_include_is_found_in_any_case_where_only_one_file_fits() {
+        let folder = std::env::temp_dir().join(format!("bolide-include-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder of its own");
+        let path = |name: &str| folder.join(name);
+        for (name, text) in
+            [("main.k", "*KEYWORD\n*INCLUDE\nModel.k\n*END\n"), ("MODEL.K", "*TITLE\nfound\n")]
+        {
+            std::fs::write(path(name), text).expect("a new file");
+        }
+        let gathered = || gather_deck(&path("main.k"), &Reading::default()).expect("few files");
+        assert!(gathered().contains("*TITLE\nfound"), "{}", gathered());
+        std::fs::write(path("model.K"), "*TITLE\nanother\n").expect("a new file");
+        // Which of two is meant cannot be told.
+        assert!(!gathered().contains("*TITLE"), "{}", gathered());
+        std::fs::remove_dir_all(&folder).expect("the folder of this test");
     }
 }
