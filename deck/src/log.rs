@@ -63,7 +63,7 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// A fault at a place.
+    /// A fault at a place. Of a card of a keyword deck its keyword is told too.
     pub(crate) fn fault(
         &self,
         at: Place,
@@ -71,6 +71,25 @@ impl<'a> Log<'a> {
         expected: impl Into<String>,
         advice: impl Into<String>,
     ) {
+        let read: String = read.into();
+        let card = if read.starts_with('*') { None } else { self.card(at) };
+        let read = card.map_or(read.clone(), |card| format!("{read} ({card})"));
+        self.faults.add_at(at, read, expected, advice);
+    }
+
+    /// A fault of a field, from 0, of a card.
+    pub(crate) fn fault_in_field(
+        &self,
+        at: Place,
+        field: usize,
+        read: &str,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) {
+        let read = match self.card(at) {
+            Some(card) => format!("{read} (field {}, {card})", field + 1),
+            None => read.to_string(),
+        };
         self.faults.add_at(at, read, expected, advice);
     }
 
@@ -79,35 +98,31 @@ impl<'a> Log<'a> {
         self.fault(origin.at, self.quote_origin(origin), expected, advice);
     }
 
-    /// What a deck says at an origin: `key = value`, or `FIELD = value in card 2 of *KEYWORD`.
-    pub(crate) fn quote_origin(&self, origin: Origin) -> String {
+    /// What a deck says at an origin: `key = value`, or `FIELD = value`.
+    fn quote_origin(&self, origin: Origin) -> String {
         let value = self.faults.quote_origin(origin);
-        match origin.at {
-            Place::Text(_) => format!("{} = {value}", origin.word),
-            Place::Card { .. } => match (origin.word, value.as_str()) {
-                ("", _) => self.card(origin.at),
-                (word, "") => format!("{word} blank in {}", self.card(origin.at)),
-                (word, value) => format!("{word} = {value} in {}", self.card(origin.at)),
-            },
+        match (origin.word, value.as_str()) {
+            ("", _) => "this card".to_string(),
+            (word, "") => format!("{word} blank"),
+            (word, value) => format!("{word} = {value}"),
         }
     }
 
-    /// Which card of which keyword stands at a place of a keyword deck.
-    fn card(&self, at: Place) -> String {
-        let Place::Card { file, line, .. } = at else { return String::new() };
+    /// Which card of which keyword stands at a place of a keyword deck; none of a place that is no card, or far below its
+    /// keyword, as in a list of nodes.
+    fn card(&self, at: Place) -> Option<String> {
+        const FAR: u32 = 1000;
+        let Place::Card { file, line, .. } = at else { return None };
         let mut number = 0;
-        for line in (1..=line).rev() {
+        for line in (line.saturating_sub(FAR).max(1)..=line).rev() {
             let words = self.faults.line(file, line);
             if let Some(keyword) = words.strip_prefix('*') {
                 let keyword = keyword.split_whitespace().next().unwrap_or_default().to_ascii_uppercase();
-                return match number {
-                    0 => format!("*{keyword}"),
-                    _ => format!("card {number} of *{keyword}"),
-                };
+                return (number > 0).then(|| format!("card {number} of *{keyword}"));
             }
             number += u32::from(!words.starts_with('$'));
         }
-        format!("line {line}")
+        None
     }
 
     /// Of the same words in both formats those of the user's.

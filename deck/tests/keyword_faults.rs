@@ -77,7 +77,7 @@ fn keywords_that_do_nothing_here_are_read() {
     // In use it is not the curve of the run.
     let used = faults(&cube(&format!("{unused}*LOAD_BODY_Z\n7\n")));
     assert!(
-        used[0].starts_with("a.k:23:3: read SIDR = 1 in card 1 of *DEFINE_CURVE; expected SIDR 0 or 2"),
+        used[0].starts_with("a.k:23:3: read SIDR = 1 (card 1 of *DEFINE_CURVE); expected SIDR 0 or 2"),
         "{used:?}"
     );
     assert!(used[0].ends_with("correct it; line 27 takes this curve"), "{used:?}");
@@ -87,7 +87,10 @@ fn keywords_that_do_nothing_here_are_read() {
 fn keywords_that_matter_are_honoured_or_refused() {
     for (more, expected) in [
         ("*CONTROL_ADAPTIVE\n1e-6\n", "a.k:22:1: read *CONTROL_ADAPTIVE; expected a *CONTROL_ of the table"),
-        ("*CONTROL_SOLUTION\n1\n", "a.k:23:1: read 1; expected SOLN 0, mechanics alone"),
+        (
+            "*CONTROL_SOLUTION\n1\n",
+            "a.k:23:1: read 1 (field 1, card 1 of *CONTROL_SOLUTION); expected SOLN 0, mechanics alone",
+        ),
         ("*CONTROL_REMESHING\n1\n", "a.k:22:1: read *CONTROL_REMESHING; expected a *CONTROL_ of the table"),
         (
             "*DEFINE_ELEMENT_DEATH_SOLID\n1,1e-7\n",
@@ -136,7 +139,7 @@ fn what_is_missing_is_told_once_and_as_what_it_is() {
     let curve = "*DEFINE_TABLE\n100\n0.1,101\n*LOAD_BODY_Z\n100\n";
     assert!(
         faults(&cube(curve))[0]
-            .contains("read curve 100, which the *DEFINE_TABLE at line 23 makes; expected a *DEFINE_CURVE"),
+            .contains("read curve 100, which the *DEFINE_TABLE at line 23 makes (card 1 of *LOAD_BODY_Z); expected a *DEFINE_CURVE"),
         "{:?}",
         faults(&cube(curve))
     );
@@ -147,8 +150,8 @@ fn what_is_missing_is_told_once_and_as_what_it_is() {
     assert_eq!(
         faults(&text),
         [
-            "a.k:6:3: read SECID = 0 in card 2 of *PART; expected a section of the deck; add it",
-            "a.k:24:1: read shell 3 of part 9; expected a part of the deck; add the *PART",
+            "a.k:6:3: read SECID = 0 (card 2 of *PART); expected a section of the deck; add it",
+            "a.k:24:1: read shell 3 of part 9 (card 3 of *ELEMENT_SHELL); expected a part of the deck; add the *PART",
         ]
     );
     // A material that is refused is not missing too, and one that is missing is so once.
@@ -159,7 +162,7 @@ fn what_is_missing_is_told_once_and_as_what_it_is() {
     let missing = faults(&cube(second).replace("\n1,7.85e-9", "\n3,7.85e-9"));
     assert_eq!(
         missing,
-        ["a.k:6:5: read MID = 1 in card 2 of *PART; expected a material of the deck; add the *MAT"]
+        ["a.k:6:5: read MID = 1 (card 2 of *PART); expected a material of the deck; add the *MAT"]
     );
 }
 
@@ -189,7 +192,12 @@ fn the_title_is_that_of_the_deck_itself() {
 #[test]
 fn an_acceleration_by_a_curve_without_points_is_a_fault() {
     let found = faults(&cube("*DEFINE_CURVE\n3\n*BOUNDARY_PRESCRIBED_MOTION_NODE\n1,1,1,3\n"));
-    assert_eq!(found, ["a.k:23:1: read 3; expected a curve with points; give it at least one"]);
+    assert_eq!(
+        found,
+        [
+            "a.k:23:1: read 3 (field 1, card 1 of *DEFINE_CURVE); expected a curve with points; give it at least one"
+        ]
+    );
 }
 
 #[test]
@@ -205,11 +213,16 @@ fn constants_that_no_law_takes_are_told_at_their_field() {
     assert_eq!(
         gas(null, ideal),
         [
-            "a.k:8:11: read PC = -1.0 in card 1 of *MAT_NULL; expected no cut-off of the pressure in a gas; leave PC blank"
+            "a.k:8:11: read PC = -1.0 (card 1 of *MAT_NULL); expected no cut-off of the pressure in a gas; leave PC blank"
         ]
     );
     let shock = gas("*MAT_NULL\n1,7.85e-9\n", "*EOS_GRUNEISEN\n1,3.9e6,-1.49,,,2.0\n");
-    assert_eq!(shock, ["a.k:23:9: read -1.49; expected a number of 0 or more; correct it"]);
+    assert_eq!(
+        shock,
+        [
+            "a.k:23:9: read -1.49 (field 3, card 1 of *EOS_GRUNEISEN); expected a number of 0 or more; correct it"
+        ]
+    );
 }
 
 #[test]

@@ -46,12 +46,20 @@ fn good(third: &str, more: &str) -> Model {
     whole(third, more).model
 }
 
+/// A fault without the keyword and card that it names in brackets.
+fn without_card(fault: &str) -> String {
+    let Some((before, after)) = fault.split_once("; expected") else { return fault.to_string() };
+    let named = before.rfind(" (").filter(|at| before[*at..].contains("card "));
+    format!("{}; expected{after}", &before[..named.unwrap_or(before.len())])
+}
+
 /// The faults, with the line of each as an offset from the first line of `more`.
 fn faults(third: &str, more: &str) -> Vec<String> {
     let text = deck_of(third, more);
     let first = text[..text.len() - more.len() - "*END\n".len()].lines().count() as u32 + 1;
     let faults = deck::read(&text, "a.k").expect_err("a fault");
-    let told = |f: &Fault| format!("{}: {}", i64::from(f.line) - i64::from(first), f);
+    let told =
+        |f: &Fault| format!("{}: {}", i64::from(f.line) - i64::from(first), without_card(&f.to_string()));
     faults.iter().map(told).collect()
 }
 

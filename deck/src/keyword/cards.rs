@@ -363,7 +363,7 @@ mod tests {
         assert_eq!(
             said,
             [
-                "d/a.k:3:1: read none.k; expected a file that can be read (d/none.k); put it there, or correct the name"
+                "d/a.k:3:1: read none.k (card 1 of *INCLUDE); expected a file that can be read (d/none.k); put it there, or correct the name"
             ]
         );
         let (_, said) = blocks(&[("a.k", "*INCLUDE\na.k\n")], None);

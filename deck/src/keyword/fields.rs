@@ -89,7 +89,7 @@ impl<'c> Fields<'c> {
     /// Reports a field.
     pub(super) fn fault(&self, i: usize, expected: impl Into<String>, advice: impl Into<String>) {
         let log = self.context.log;
-        log.fault(self.place(i), log.quote(self.words(i)), expected, advice);
+        log.fault_in_field(self.place(i), i, &log.quote(self.words(i)), expected, advice);
     }
 
     /// Where a field stands.
