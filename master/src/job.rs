@@ -52,7 +52,7 @@ pub use error::Error;
 use frames::{Frame, Frames};
 use numbers::not_a_number;
 use problem::Problem;
-use schedule::{Step, allowed, first_share};
+use schedule::{Step, allowed, first_share, step_after};
 use tally::Tally;
 use verdict::{Account, element_fault};
 use workers::Workers;
@@ -302,7 +302,7 @@ impl Job {
             if let Some(fault) = vote.fault {
                 return Err(Error::Element(element_fault(problem, &start.initial_volume, fault, 0)));
             }
-            let (dt, _, _) = allowed(&problem.model, walls, vote, f64::INFINITY);
+            let (dt, _, _) = allowed(&problem.model, walls, vote);
             Ok(first_share(vote) * dt)
         })?;
         let at_end = time >= control.end_time || first >= control.end_cycle;
@@ -494,7 +494,7 @@ impl Job {
         }
         let control = self.model().setup.control;
         let walls = &self.account.walls;
-        let (dt, limit, element) = allowed(&self.problem.model, walls, &vote, control.growth * now.dt);
+        let (dt, limit, element) = step_after(&self.problem.model, walls, &vote, now.dt);
         let next = self.epoch.schedule.order_after(cycle, now, (dt, limit), &control);
         self.account.check_floor(&self.problem, (cycle + 1, next.dt), next.limit, element);
         self.epoch.schedule.rescale(&vote)?;

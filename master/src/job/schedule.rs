@@ -17,6 +17,9 @@ use crate::event::Limit;
 
 /// Share of the gap that contact votes for per cycle; the lag may not take it past 20 %.
 const TRAVEL_VOTE: f64 = 0.16;
+/// A step grows where its limits are longer than it by this factor. Limits follow the strains of elements, so a step that followed every
+/// rise of theirs would breathe with a body's vibration, two cycles late, and pump what nothing damps: shells.
+const ROOM_TO_GROW: f64 = 1.01;
 /// Share of the allowed time step that a run begins with where bodies hold energy. Where a gas meets a thinner one, the
 /// first steps raise velocities from nothing, and viscosity with them, before a vote can tell.
 const START: f64 = 0.2;
@@ -241,10 +244,28 @@ pub(super) fn first_share(vote: &Vote) -> f64 {
     if vote.parts.iter().any(|part| part.internal > 0.0) { START } else { 1.0 }
 }
 
-/// The step that a vote allows beside what the step before may have `grown` to, what limits it, and the element if one does.
-pub(super) fn allowed(model: &Model, walls: &[Pose], vote: &Vote, grown: f64) -> (f64, Limit, Option<u32>) {
+/// The step after one of `before`, what limits it, and the element if one does.
+pub(super) fn step_after(
+    model: &Model,
+    walls: &[Pose],
+    vote: &Vote,
+    before: f64,
+) -> (f64, Limit, Option<u32>) {
+    let (allowed, limit, element) = allowed(model, walls, vote);
+    let grown = model.setup.control.growth * before;
+    if before < allowed && allowed < ROOM_TO_GROW * before {
+        (before, limit, element)
+    } else if grown < allowed {
+        (grown, Limit::Growth, None)
+    } else {
+        (allowed, limit, element)
+    }
+}
+
+/// The step that a vote allows, what limits it, and the element if one does.
+pub(super) fn allowed(model: &Model, walls: &[Pose], vote: &Vote) -> (f64, Limit, Option<u32>) {
     let setup = &model.setup;
-    let mut best = (grown, Limit::Growth, None);
+    let mut best = (f64::INFINITY, Limit::Growth, None);
     let mut offer = |dt: f64, limit: Limit, element: Option<u32>| {
         if dt < best.0 {
             best = (dt, limit, element);
