@@ -252,12 +252,6 @@ pub struct SimulateArgs {
     /// How many sets of random speeds
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
-    /// What tells the time: a replay of costs and messages, or threads, links and a real clock
-    #[arg(long, value_enum, default_value = "virtual")]
-    pub clock: Clock,
-    /// Real seconds by emulated second, for --clock real [default: such that tasks rarely overrun]
-    #[arg(long, value_name = "X")]
-    pub dilation: Option<f64>,
     /// Use only so many hosts, the first of the file
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "table")]
     pub hosts: Option<u32>,
@@ -276,15 +270,6 @@ pub struct SimulateArgs {
     /// Print JSON on standard output
     #[arg(long)]
     pub json: bool,
-}
-
-/// What tells the time of an emulated cluster.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Clock {
-    /// Costs and messages, replayed: the same figures on every machine
-    Virtual,
-    /// Workers on threads, frames over shaped loopback links, both stretched to the emulated speed
-    Real,
 }
 
 /// Flags of `master`.

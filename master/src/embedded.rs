@@ -1,7 +1,6 @@
-//! Master and workers in one process: the same sessions over an in-memory pipe.
+//! Master and workers in one process: a [`World`] in which messages arrive in the order they are sent.
 //!
-//! Messages are packed and unpacked as on a wire, so that bytes are counted and nothing is shared by accident; but
-//! assignments and images of many elements are handed over as they are, since there need not be room for them twice. With one
+//! Assignments and images of many elements are handed over as they are, since there need not be room for them twice. With one
 //! worker everything runs in turn on the pool's own threads; with several, each worker's tasks run on one pool, one
 //! task of a worker at a time.
 
@@ -15,15 +14,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use mechanics::{block::Piece, cycle::Meter};
+use mechanics::cycle::Meter;
 use protocol::{
-    message::{ToMaster, ToPeer, ToWorker},
+    message::{ToMaster, Work},
     phase::{Phase, Report},
-    wire::{self, Packed},
 };
 use worker::{
     compute::{Machine, ThreadClock},
-    session::{self, Session, Task},
+    session::{self, Task},
     stopwatch::{Lap, Stopwatch},
 };
 
@@ -31,6 +29,7 @@ use crate::{
     event::{Action, Event, Hand, Outcome},
     job::Job,
     sort::{Gathered, SortBasis, Sorted},
+    world::{End, Error, Parcel, Sessions, Surroundings, World},
 };
 
 /// Where a run's outputs go.
@@ -67,17 +66,9 @@ pub enum Fate {
     Spoil(usize),
 }
 
-/// Something on its way between sessions, or a task's end.
+/// Something that has arrived, or a task's end.
 enum Arrival {
-    /// From, in which epoch.
-    ToMaster(usize, u32, Packed),
-    ToWorker(usize, Packed),
-    /// A large assignment.
-    Assign(usize, Box<ToWorker>),
-    /// A large image; from, in which epoch.
-    Image(usize, u32, Box<ToMaster>),
-    /// From, by its place in the epoch's crew; to; in which epoch.
-    ToPeer(u32, usize, u32, Packed),
+    Parcel(Parcel),
     Done(usize, Box<Machine>, session::Outcome),
     Sorted(Box<Sorted>, u64),
 }
@@ -85,12 +76,8 @@ enum Arrival {
 /// Elements from which on a message is handed over as it is.
 const WHOLE: usize = 50_000;
 
-fn n_elements(pieces: &[Piece]) -> usize {
-    pieces.iter().map(|piece| piece.elements.len()).sum()
-}
-
+/// A worker in this process.
 struct Place {
-    session: Session,
     /// Away while a task runs.
     machine: Option<Box<Machine>>,
     lost: bool,
@@ -103,22 +90,11 @@ struct Place {
 impl Place {
     fn new() -> Self {
         Self {
-            session: Session::new(),
             machine: Some(Box::default()),
             stopwatch: Stopwatch::new(),
             lost: false,
             spoilt: false,
             peers: (0, BTreeMap::new()),
-        }
-    }
-
-    fn report(&self) -> Report {
-        let (epoch, peers) = &self.peers;
-        let now = *epoch == self.session.epoch();
-        Report {
-            peer_bytes: peers.values().sum(),
-            linked: if now { peers.keys().copied().collect() } else { Vec::new() },
-            ..self.stopwatch.report()
         }
     }
 }
@@ -158,8 +134,8 @@ pub fn run_through(
         .map_err(|e| format!("compute threads: {e}"))?;
     let pool = Arc::new(pool);
     let (send, receive) = mpsc::channel();
-    let mut host = Host {
-        job,
+    let process = Process {
+        sink,
         places: (0..n_workers).map(|_| Place::new()).collect(),
         queue: VecDeque::new(),
         // With one worker, tasks run where the loop runs: on the pool.
@@ -169,18 +145,21 @@ pub fn run_through(
         receive,
         away: 0,
         timer: None,
+        send_began: Instant::now(),
         traffic: Traffic::default(),
-        outcome: None,
     };
-    if n_workers > 1 {
-        host.drive(first, sink, stop, fate)
+    let mut world = World::new(n_workers, process);
+    let ended = if n_workers > 1 {
+        drive(&mut world, job, first, stop, fate)
     } else {
-        pool.install(|| host.drive(first, sink, stop, fate))
-    }
+        pool.install(|| drive(&mut world, job, first, stop, fate))
+    };
+    Ok((ended?, world.surroundings.traffic))
 }
 
-struct Host {
-    job: Job,
+/// One process: its threads, and what is between the sessions.
+struct Process<'a> {
+    sink: &'a mut (dyn Sink + Send),
     places: Vec<Place>,
     queue: VecDeque<Arrival>,
     pool: Option<Arc<rayon::ThreadPool>>,
@@ -191,105 +170,88 @@ struct Host {
     away: usize,
     /// When the job is told that its time has passed.
     timer: Option<Instant>,
+    /// When the message that is being packed was begun.
+    send_began: Instant,
     traffic: Traffic,
-    outcome: Option<Outcome>,
 }
 
-impl Host {
-    fn drive(
-        &mut self,
-        first: Vec<Action>,
-        sink: &mut (dyn Sink + Send),
-        stop: &AtomicBool,
-        fate: &mut dyn FnMut(u64) -> Option<Fate>,
-    ) -> Result<(Outcome, Traffic), String> {
-        self.act(first, sink)?;
-        let mut stopping = false;
-        for number in 0.. {
-            if self.timer.is_some_and(|due| Instant::now() >= due) {
-                self.timer = None;
-                self.apply(Event::Timer, sink)?;
+fn drive(
+    world: &mut World<Process<'_>>,
+    job: Job,
+    first: Vec<Action>,
+    stop: &AtomicBool,
+    fate: &mut dyn FnMut(u64) -> Option<Fate>,
+) -> Result<Outcome, Error> {
+    let members = (0..world.surroundings.places.len()).collect();
+    world.begin(job, first, members)?;
+    let mut stopping = false;
+    for number in 0.. {
+        if world.surroundings.timer.take_if(|due| Instant::now() >= *due).is_some() {
+            world.apply(Event::Timer)?;
+        }
+        match fate(number) {
+            Some(Fate::Lose(host)) if !world.surroundings.places[host].lost => {
+                world.surroundings.places[host].lost = true;
+                if let Some(member) = world.sessions.part(host) {
+                    world.apply(Event::Lost(member, "it was to be lost".to_owned()))?;
+                }
             }
-            match fate(number) {
-                Some(Fate::Lose(worker)) if !self.places[worker].lost => {
-                    self.places[worker].lost = true;
-                    self.apply(Event::Lost(worker, "it was to be lost".to_owned()), sink)?;
-                }
-                Some(Fate::Spoil(worker)) => self.places[worker].spoilt = true,
-                Some(Fate::Join(hand)) => {
-                    self.places.push(Place::new());
-                    self.apply(Event::Joined(hand), sink)?;
-                }
-                _ => {}
+            Some(Fate::Spoil(host)) => world.surroundings.places[host].spoilt = true,
+            Some(Fate::Join(hand)) => {
+                world.surroundings.places.push(Place::new());
+                let host = world.sessions.add_host();
+                world.join(host, hand)?;
             }
-            if !stopping && stop.load(Ordering::Relaxed) {
-                stopping = true;
-                self.apply(Event::Stop, sink)?;
+            _ => {}
+        }
+        if !stopping && stop.load(Ordering::Relaxed) {
+            stopping = true;
+            world.apply(Event::Stop)?;
+        }
+        if let Some(outcome) = world.outcome() {
+            return Ok(outcome);
+        }
+        match world.surroundings.next()? {
+            Arrival::Parcel(parcel) => {
+                let letter = world.open(parcel)?;
+                world.hear(letter)?;
             }
-            if let Some(outcome) = self.outcome.take() {
-                return Ok((outcome, self.traffic));
+            Arrival::Done(host, mut machine, outcome) => {
+                let place = &mut world.surroundings.places[host];
+                let cycle = world.sessions.hosts[host].session.cycle();
+                machine.take_laps().for_each(|lap| place.stopwatch.book(cycle, lap));
+                if place.spoilt && matches!(outcome, session::Outcome::Computed) {
+                    machine.plant_fault();
+                }
+                place.machine = Some(machine);
+                world.step(host, session::Event::Done(outcome))?;
             }
-            let arrival = match self.queue.pop_front() {
-                Some(arrival) => arrival,
-                None => self.wait()?,
-            };
-            match arrival {
-                Arrival::ToMaster(worker, epoch, packed) => {
-                    let message =
-                        wire::unpack_to_master(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
-                    self.apply(Event::Message(worker, epoch, message), sink)?;
-                }
-                Arrival::ToWorker(worker, packed) => {
-                    let message =
-                        wire::unpack_to_worker(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
-                    self.step(worker, session::Event::Message(message))?;
-                }
-                Arrival::Assign(worker, message) => {
-                    self.step(worker, session::Event::Message(*message))?;
-                }
-                Arrival::Image(worker, epoch, message) => {
-                    self.apply(Event::Message(worker, epoch, *message), sink)?;
-                }
-                Arrival::ToPeer(from, worker, epoch, packed) => {
-                    let message =
-                        wire::unpack_to_peer(packed.kind, &packed.bytes).map_err(|e| e.to_string())?;
-                    if self.places[worker].session.epoch() == epoch {
-                        self.step(worker, session::Event::Peer(from, message))?;
-                    }
-                }
-                Arrival::Done(worker, mut machine, outcome) => {
-                    let place = &mut self.places[worker];
-                    for lap in machine.take_laps() {
-                        place.stopwatch.book(place.session.cycle(), lap);
-                    }
-                    if place.spoilt && matches!(outcome, session::Outcome::Computed) {
-                        machine.plant_fault();
-                    }
-                    place.machine = Some(machine);
-                    self.step(worker, session::Event::Done(outcome))?;
-                }
-                Arrival::Sorted(sorted, ns) => {
-                    self.traffic.sort_ns += ns;
-                    self.apply(Event::Sorted(sorted), sink)?;
-                }
+            Arrival::Sorted(sorted, ns) => {
+                world.surroundings.traffic.sort_ns += ns;
+                world.apply(Event::Sorted(sorted))?;
             }
         }
-        Err("2^64 arrivals in one run".to_owned())
     }
+    Err(Error::Stuck)
+}
 
-    fn apply(&mut self, event: Event, sink: &mut (dyn Sink + Send)) -> Result<(), String> {
-        let actions = self.job.apply(event);
-        self.act(actions, sink)
+impl Process<'_> {
+    /// What arrives next.
+    fn next(&mut self) -> Result<Arrival, Error> {
+        match self.queue.pop_front() {
+            Some(arrival) => Ok(arrival),
+            None => self.wait(),
+        }
     }
 
     /// The next end of a task or sort; nothing else can happen when the queue is empty.
-    fn wait(&mut self) -> Result<Arrival, String> {
+    fn wait(&mut self) -> Result<Arrival, Error> {
         if self.away == 0 {
-            return Err("nothing to do and the job is not over".to_owned());
+            return Err(Error::Stuck);
         }
         self.away -= 1;
         if self.pool.is_some() {
-            return self.receive.recv().map_err(|e| e.to_string());
+            return self.receive.recv().map_err(|e| Error::Surroundings(e.to_string()));
         }
         // On the pool's own thread: let it run what was spawned instead of sleeping on it.
         loop {
@@ -301,94 +263,31 @@ impl Host {
             }
         }
     }
+}
 
-    fn step(&mut self, worker: usize, event: session::Event) -> Result<(), String> {
-        let place = &mut self.places[worker];
-        if place.lost {
-            return Ok(());
-        }
-        let actions = place.session.apply(event);
-        let epoch = place.session.epoch();
-        for action in actions {
-            match action {
-                session::Action::Send(message) => self.timed(worker, |host| {
-                    if let ToMaster::Image { last: Some(_), .. } = message {
-                        let report = Box::new(host.places[worker].report());
-                        host.send(worker, epoch, ToMaster::Report(report))?;
-                    }
-                    let worked = host.places[worker].machine.as_ref().map(|m| m.work()).unwrap_or_default();
-                    host.send(worker, epoch, message.stamped(worked))
-                })?,
-                session::Action::SendPeer(to, message) => {
-                    self.timed(worker, |host| host.send_peer(worker, epoch, to, &message))?;
-                }
-                session::Action::Compute(task) => self.compute(worker, task)?,
-                session::Action::Forget => {
-                    if let Some(machine) = &mut self.places[worker].machine {
-                        machine.forget();
-                    }
-                }
+impl Surroundings for Process<'_> {
+    fn post(&mut self, sessions: &Sessions, parcel: Parcel) -> Result<(), Error> {
+        self.traffic.bytes += parcel.bytes;
+        if let (End::Host(from), End::Host(to)) = (parcel.from, parcel.to) {
+            self.traffic.peer_bytes += parcel.bytes;
+            let (of, sent) = &mut self.places[from].peers;
+            if std::mem::replace(of, parcel.epoch) != parcel.epoch {
+                sent.clear();
+            }
+            if let Some(position) = sessions.position(to) {
+                *sent.entry(position).or_default() += parcel.bytes;
             }
         }
+        self.queue.push_back(Arrival::Parcel(parcel));
         Ok(())
     }
 
-    fn send_peer(&mut self, worker: usize, epoch: u32, to: u32, message: &ToPeer) -> Result<(), String> {
-        // Of an epoch that is over, there is nobody to hear it.
-        if epoch != self.job.epoch() {
-            return Ok(());
-        }
-        let crew = self.job.crew();
-        let from = crew.iter().position(|&member| member == worker);
-        let (Some(from), Some(&member)) = (from, crew.get(to as usize)) else {
-            return Err(format!("worker {worker} writes to {to}, there are {}", crew.len()));
-        };
-        let packed = wire::pack_to_peer(message);
-        let bytes = packed.wire_bytes();
-        self.traffic.bytes += bytes;
-        self.traffic.peer_bytes += bytes;
-        let (of, sent) = &mut self.places[worker].peers;
-        if std::mem::replace(of, epoch) != epoch {
-            sent.clear();
-        }
-        *sent.entry(to).or_default() += bytes;
-        self.queue.push_back(Arrival::ToPeer(from as u32, member, epoch, packed));
-        Ok(())
-    }
-
-    fn send(&mut self, worker: usize, epoch: u32, message: ToMaster) -> Result<(), String> {
-        if let ToMaster::Image { pieces, .. } = &message
-            && n_elements(pieces) > WHOLE
-        {
-            self.traffic.bytes += wire::measure_to_master(&message).map_err(|e| e.to_string())?;
-            self.queue.push_back(Arrival::Image(worker, epoch, Box::new(message)));
-            return Ok(());
-        }
-        let packed = wire::pack_to_master(&message).map_err(|e| e.to_string())?;
-        self.traffic.bytes += packed.wire_bytes();
-        self.queue.push_back(Arrival::ToMaster(worker, epoch, packed));
-        Ok(())
-    }
-
-    /// Books what is done for a worker's messages as its sending.
-    fn timed(
-        &mut self,
-        worker: usize,
-        work: impl FnOnce(&mut Self) -> Result<(), String>,
-    ) -> Result<(), String> {
-        let (cycle, from) = (self.places[worker].session.cycle(), Instant::now());
-        let result = work(self);
-        let lap = Lap { phase: Phase::Send, from, to: Instant::now() };
-        self.places[worker].stopwatch.book(cycle, lap);
-        result
-    }
-
-    fn compute(&mut self, worker: usize, task: Task) -> Result<(), String> {
-        let mut machine = self.places[worker].machine.take().ok_or("a worker asked for two tasks at once")?;
+    fn compute(&mut self, _: &Sessions, host: usize, task: Task) -> Result<(), Error> {
+        let mut machine = self.places[host].machine.take().ok_or(Error::TwoTasks)?;
         match &self.pool {
             None => {
                 let outcome = machine.run(task);
-                self.queue.push_back(Arrival::Done(worker, machine, outcome));
+                self.queue.push_back(Arrival::Done(host, machine, outcome));
             }
             Some(pool) => {
                 let send = self.send.clone();
@@ -396,50 +295,23 @@ impl Host {
                 pool.spawn(move || {
                     let outcome = machine.run(task);
                     // The receiver is gone only when the run is over.
-                    let _ = send.send(Arrival::Done(worker, machine, outcome));
+                    let _ = send.send(Arrival::Done(host, machine, outcome));
                 });
             }
         }
         Ok(())
     }
 
-    fn act(&mut self, actions: Vec<Action>, sink: &mut (dyn Sink + Send)) -> Result<(), String> {
-        for action in actions {
-            match action {
-                Action::Send(worker, ToWorker::Assign(assign))
-                    if assign.subdomains.iter().map(|s| n_elements(&s.pieces)).sum::<usize>() > WHOLE =>
-                {
-                    let message = ToWorker::Assign(assign);
-                    self.traffic.bytes += wire::measure_to_worker(&message).map_err(|e| e.to_string())?;
-                    self.queue.push_back(Arrival::Assign(worker, Box::new(message)));
-                }
-                Action::Send(worker, message) => {
-                    let packed = wire::pack_to_worker(&message).map_err(|e| e.to_string())?;
-                    self.traffic.bytes += packed.wire_bytes();
-                    self.queue.push_back(Arrival::ToWorker(worker, packed));
-                }
-                Action::Sort(bench, x) => self.sort(bench, x),
-                Action::Timer(seconds) => {
-                    self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
-                }
-                Action::Dismiss(worker, _) => self.places[worker].lost = true,
-                Action::Over(outcome) => self.outcome = Some(*outcome),
-                other => sink.take(other)?,
-            }
-        }
-        Ok(())
-    }
-
-    fn sort(&mut self, bench: Arc<SortBasis>, x: Gathered) {
+    fn sort(&mut self, _: &Sessions, basis: Arc<SortBasis>, x: Gathered) -> Result<(), Error> {
         if self.threads == 1 && self.pool.is_none() {
-            let (sorted, ns) = timed_sort(&bench, &x);
+            let (sorted, ns) = timed_sort(&basis, &x);
             self.queue.push_back(Arrival::Sorted(sorted, ns));
-            return;
+            return Ok(());
         }
         let send = self.send.clone();
         self.away += 1;
         let work = move || {
-            let (sorted, ns) = timed_sort(&bench, &x);
+            let (sorted, ns) = timed_sort(&basis, &x);
             // The receiver is gone only when the run is over.
             let _ = send.send(Arrival::Sorted(sorted, ns));
         };
@@ -447,6 +319,56 @@ impl Host {
             Some(pool) => pool.spawn(work),
             None => rayon::spawn(work),
         }
+        Ok(())
+    }
+
+    fn timer(&mut self, seconds: f64) {
+        self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds));
+    }
+
+    fn take(&mut self, action: Action) -> Result<(), Error> {
+        self.sink.take(action).map_err(Error::Surroundings)
+    }
+
+    fn dismiss(&mut self, host: usize) {
+        self.places[host].lost = true;
+    }
+
+    fn forget(&mut self, host: usize) {
+        if let Some(machine) = &mut self.places[host].machine {
+            machine.forget();
+        }
+    }
+
+    fn is_alive(&self, host: usize) -> bool {
+        !self.places[host].lost
+    }
+
+    fn worked(&self, host: usize) -> Option<Work> {
+        Some(self.places[host].machine.as_ref().map(|machine| machine.work()).unwrap_or_default())
+    }
+
+    fn report(&self, sessions: &Sessions, host: usize) -> Option<Report> {
+        let Place { stopwatch, peers: (epoch, peers), .. } = &self.places[host];
+        let now = *epoch == sessions.hosts[host].session.epoch();
+        Some(Report {
+            peer_bytes: peers.values().sum(),
+            linked: if now { peers.keys().copied().collect() } else { Vec::new() },
+            ..stopwatch.report()
+        })
+    }
+
+    fn hands_over(&self, elements: usize) -> bool {
+        elements > WHOLE
+    }
+
+    fn send_begins(&mut self) {
+        self.send_began = Instant::now();
+    }
+
+    fn send_ends(&mut self, host: usize, cycle: u64) {
+        let lap = Lap { phase: Phase::Send, from: self.send_began, to: Instant::now() };
+        self.places[host].stopwatch.book(cycle, lap);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The master: owns the problem, decides, adds partial forces, writes results.
 //!
-//! [`job`] is the pure session of one run; [`embedded`] drives it with workers in the same process, [`drive`] with
-//! workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`] and hears [`notice`]s: each
+//! [`job`] is the pure session of one run; a [`world`] has it and the sessions of its workers in one process, in which
+//! [`embedded`] runs them, and [`drive`] has workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`] and hears [`notice`]s: each
 //! [`connection`] is one task that carries messages, the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
 //! [`lab`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`processes`] starts workers as
 //! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster.
@@ -51,3 +51,4 @@ pub mod snapshot;
 pub mod sort;
 pub mod spool;
 pub mod summarise;
+pub mod world;

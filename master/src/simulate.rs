@@ -1,8 +1,7 @@
 //! `bolide simulate`: what an emulated cluster would take for a deck, on one machine.
 //!
 //! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`machines`],
-//! [`processor`]) and wires ([`network`]), [`real_clock`] does so on threads, links and real time; [`timeline`] says what
-//! came of it. [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
+//! [`processor`]) and wires ([`network`]); [`timeline`] says what came of it. [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
 //! seconds of a cluster file into costs of work. [`table`] prints the tables of the paper ([`mod@paper`]) beside
 //! modelled ones, [`figure`] draws them. All figures are modelled, and say so.
 
@@ -10,7 +9,7 @@ use std::{path::Path, process::ExitCode, sync::Arc};
 
 use deck::model::Model;
 use mechanics::lanes::Width;
-use protocol::options::{Balance, Route};
+use protocol::options::Route;
 use serde::Serialize;
 
 pub mod calibrate;
@@ -22,7 +21,6 @@ pub mod mixed;
 pub mod network;
 pub mod paper;
 pub mod processor;
-pub mod real_clock;
 pub mod sweep;
 pub mod table;
 pub mod tape;
@@ -31,14 +29,13 @@ pub mod virtual_clock;
 
 use crate::{
     balance::Costs,
-    command::{Clock, SimulateArgs},
+    command::SimulateArgs,
     deck_file::read_deck,
     incident::{Loss, Rebalance},
 };
 
 use cluster::{Cluster, ElementCost};
 use machines::{Machines, Scheme, What};
-use real_clock::Strain;
 use timeline::{Phases, Timeline};
 
 /// Does what `bolide simulate` is asked for.
@@ -47,12 +44,6 @@ use timeline::{Phases, Timeline};
 /// Faults of the files, and whatever keeps a run from its end.
 pub fn run(args: &SimulateArgs) -> Result<ExitCode, String> {
     let cluster = cluster::read_file(&args.cluster)?;
-    if args.clock == Clock::Real && args.table {
-        return Err("the tables are run under the virtual clock; leave out --clock real".to_owned());
-    }
-    if args.clock == Clock::Virtual && args.dilation.is_some() {
-        return Err("--dilation is for --clock real; the virtual clock has none".to_owned());
-    }
     match &args.deck {
         None if args.decomposition => decomposition(args, &cluster),
         Some(deck) if args.measure_costs => measured(args, &cluster, deck),
@@ -176,10 +167,6 @@ struct Summary<'a> {
     /// Hosts that were lost.
     losses: &'a [Loss],
     digest: &'a str,
-    /// Under the real clock.
-    strain: Option<Strain>,
-    /// Whether too many tasks overran for the figures to be of use.
-    refused: bool,
 }
 
 fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, String> {
@@ -198,8 +185,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         }
     };
     let costs = calibrate::costs(cluster, &benchmarks, 1.0);
-    let (work, cpu_ns) = real_clock::cpu_time(|| calibrate::work(&model, cluster));
-    let work = work?;
+    let work = calibrate::work(&model, cluster)?;
     let machines = Machines {
         believed: calibrate::believed(
             &cluster.speeds,
@@ -215,30 +201,12 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
     };
     let route = Route::choose(args.route, cluster.speeds.len(), true);
     let scheme = Scheme { balance: args.balance, ..Scheme::bolide(route) };
-    if args.clock == Clock::Real && scheme.balance != Balance::Given {
-        return Err("--balance measured is followed under --clock virtual only".to_owned());
-    }
-    if args.clock == Clock::Real && machines.come_and_go() {
-        return Err("hosts that die, stop and join are followed under --clock virtual only".to_owned());
-    }
     let bound = calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>();
-    let (timeline, strain) = match args.clock {
-        Clock::Virtual => (virtual_clock::run(&model, &machines, scheme, None)?.0, None),
-        Clock::Real => {
-            let cpu = cpu_ns as f64 * 1e-9 / model.setup.control.end_cycle as f64;
-            let chosen =
-                || real_clock::choose_dilation(&machines, bound, cpu, calibrate::seconds(&costs, &work));
-            let (timeline, strain) = real(&model, &machines, route, args.dilation, chosen)?;
-            (timeline, Some(strain))
-        }
-    };
+    let (timeline, _) = virtual_clock::run(&model, &machines, scheme, None)?;
     let window = timeline.window();
     let summary = Summary {
         cluster: &cluster.title,
-        clock: match args.clock {
-            Clock::Virtual => "virtual",
-            Clock::Real => "real",
-        },
+        clock: "virtual",
         route: route.name(),
         elements: model.mesh.n_elements(),
         hosts: cluster.speeds.len(),
@@ -251,30 +219,15 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         rebalances: &timeline.rebalances,
         losses: &timeline.losses,
         digest: &timeline.digest,
-        strain,
-        refused: strain.is_some_and(|strain| strain.refused()),
     };
     if let Some(folder) = &args.out {
         pictures(folder, &cluster.title, &timeline)?;
     }
     if args.json {
         println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
-        return Ok(verdict(strain.as_ref()));
+        return Ok(ExitCode::SUCCESS);
     }
     println!("{}: modelled under a {} clock, route {}", summary.cluster, summary.clock, summary.route);
-    if let Some(s) = &strain {
-        println!(
-            "dilation {}: {:.1} s for {} cycles, computing stretched {:.1}-fold; {} of {} tasks overran ({:.2} %), by {:.4} s in all",
-            s.dilation,
-            s.wall_seconds,
-            summary.cycles,
-            s.stretch,
-            s.overruns,
-            s.tasks,
-            100.0 * s.share(),
-            s.late_seconds
-        );
-    }
     println!(
         "{} elements, {} hosts, cycles {} to {}: {:.6} s/cycle, {:.4} of the bound {:.6}; {:.0} bytes/cycle",
         summary.elements,
@@ -312,46 +265,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         println!("cycle {cycle}: {worker} is lost, {why}; back to cycle {back_to}");
     }
     println!("digest {}", summary.digest);
-    Ok(verdict(strain.as_ref()))
-}
-
-/// How often a dilation of our own choice is doubled after too many overruns.
-const DOUBLINGS: usize = 3;
-
-/// A run under the real clock; where no dilation is asked for, at one where few tasks overrun.
-fn real(
-    model: &Arc<Model>,
-    machines: &Machines,
-    route: Route,
-    asked: Option<f64>,
-    chosen: impl Fn() -> f64,
-) -> Result<(Timeline, Strain), String> {
-    let mut dilation = asked.unwrap_or_else(chosen);
-    for _ in 0..DOUBLINGS {
-        let (timeline, strain) = real_clock::run(model, machines, route, dilation)?;
-        if asked.is_some() || !strain.refused() {
-            return Ok((timeline, strain));
-        }
-        eprintln!("dilation {dilation}: {:.2} % of the tasks overran; doubled", 100.0 * strain.share());
-        dilation *= 2.0;
-    }
-    real_clock::run(model, machines, route, dilation)
-}
-
-/// Success, unless figures under the real clock are of no use; says so.
-fn verdict(strain: Option<&Strain>) -> ExitCode {
-    match strain {
-        Some(strain) if strain.refused() => {
-            eprintln!(
-                "refused: {:.2} % of the tasks overran, at most {} %; the figures are of no use. Raise --dilation above {}",
-                100.0 * strain.share(),
-                100.0 * real_clock::OVERRUN_LIMIT,
-                strain.dilation
-            );
-            ExitCode::FAILURE
-        }
-        _ => ExitCode::SUCCESS,
-    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Draws what a run shows.

@@ -64,14 +64,12 @@ pub struct Plot {
     faults: Vec<(u64, Fault)>,
     /// Sessions with a planted fault: the master takes messages of epochs that are over.
     pub(super) unfenced: bool,
-    /// Members that the job has had.
-    pub(super) members: usize,
 }
 
 impl Plot {
     /// Nothing goes wrong.
     pub fn quiet(workers: usize) -> Self {
-        Self { workers, members: workers, ..Self::default() }
+        Self { workers, ..Self::default() }
     }
 
     /// The fault that is due, if one is.

@@ -2,53 +2,23 @@
 
 use std::cmp::Ordering;
 
-use protocol::wire::Packed;
 use worker::session::Outcome;
 
 use super::super::timeline::Kind;
-use crate::sort::Sorted;
+use crate::{sort::Sorted, world::Parcel};
 
-/// One end of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// The master.
-    Master,
-    /// A worker, from 0.
-    Worker(usize),
-}
-
-impl End {
-    /// Its host, from 0.
-    pub fn host(self) -> usize {
-        match self {
-            Self::Master => 0,
-            Self::Worker(worker) => worker,
-        }
-    }
-}
-
-/// A message on its way.
-pub struct Parcel {
+/// A message on its way, as the clock knows it.
+pub struct Sent {
     /// Its number in the run.
     pub number: u64,
-    /// Sender.
-    pub from: End,
-    /// Receiver.
-    pub to: End,
     /// The message.
-    pub packed: Packed,
-    /// Its bytes with the frames' headers.
-    pub bytes: u64,
+    pub parcel: Parcel,
     /// Incarnations of the hosts at its ends: of one that died or was given up it never comes.
     pub incarnations: [u32; 2],
-    /// Index in the job of the worker at one of its ends; of its sender between workers.
-    pub member: usize,
-    /// The epoch of the worker at one of its ends.
-    pub epoch: u32,
     /// The cycle of the worker at one of its ends.
     pub cycle: u64,
     /// When it was handed to the sender's processor (s).
-    pub sent: f64,
+    pub at: f64,
 }
 
 /// What a processor works on.
@@ -58,9 +28,9 @@ pub enum Work {
     /// The master's sort, and what will come of it.
     Sort(Box<Sorted>),
     /// A message that leaves.
-    Send(Parcel),
+    Send(Sent),
     /// A message that comes in.
-    Receive(Parcel),
+    Receive(Sent),
 }
 
 /// Work with the time it began.
@@ -71,9 +41,9 @@ pub enum What {
     /// A processor may have ended something, if nothing changed since this version.
     Processor(usize, u64),
     /// The first bits of a message reach the receiver's port.
-    Enters(Parcel),
+    Enters(Sent),
     /// All of a message is there.
-    Arrives(Parcel),
+    Arrives(Sent),
     /// The time that the job asked for has passed.
     Timer,
     /// The master finds a worker lost: its index in the job, and why.
