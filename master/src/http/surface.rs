@@ -6,28 +6,78 @@
 //! (0) and the maximum (65535); the part of each face as `u16`.
 
 use deck::model::Model;
-use mechanics::{
-    contact::Surface,
-    state::{GlobalState, field},
-};
+use mechanics::state::{GlobalState, field};
 
-use crate::results::vtu::von_mises;
+use crate::{
+    picture::skin::{Cell, outside},
+    results::vtu::von_mises,
+};
 
 /// Fields of faces, in their order.
 pub const FIELDS: [&str; 6] = ["pressure", "von_mises", "plastic_strain", "temperature", "damage", "speed"];
 
-/// The outer faces of a model.
+/// The outer faces of the states of one run.
 pub struct Skin {
-    surface: Surface,
     parts: Vec<String>,
+    /// Those of the state that was packed last.
+    outer: Option<Outer>,
+}
+
+/// The outer faces of the elements that have not eroded.
+struct Outer {
+    /// How many had eroded. None comes back, so states of one run with as many have the same faces.
+    n_eroded: usize,
+    /// Global index of each node of a face, ascending.
+    nodes: Vec<u32>,
+    faces: Vec<Face>,
+}
+
+/// An outer face.
+struct Face {
+    /// Indices into [`Outer::nodes`], outward by the right-hand rule.
+    nodes: [u32; 4],
+    /// Global element index.
+    element: usize,
+    part: u16,
+}
+
+impl Outer {
+    fn new(model: &Model, state: &GlobalState) -> Self {
+        let mesh = &model.mesh;
+        let offsets = mesh.element_offsets();
+        let cells = mesh.parts.iter().zip(&offsets).flat_map(|(part, &first)| {
+            (0..part.n_elements()).filter(move |e| !state.is_eroded(first + e)).map(move |e| {
+                let corners = part.corners(e);
+                let [a, b, c, d, ..] = corners;
+                let shell = part.section().is_some();
+                (first + e, if shell { Cell::Face([a, b, c, d]) } else { Cell::Solid(corners) })
+            })
+        });
+        let seen = outside(mesh.n_nodes(), cells);
+        let mut index = vec![u32::MAX; mesh.n_nodes()];
+        seen.iter().for_each(|(_, corners)| corners.iter().for_each(|&n| index[n as usize] = 0));
+        let nodes: Vec<u32> = (0..mesh.n_nodes() as u32).filter(|&n| index[n as usize] == 0).collect();
+        (0..).zip(&nodes).for_each(|(i, &n)| index[n as usize] = i);
+        let mut part = 0;
+        let faces = seen
+            .into_iter()
+            .map(|(element, corners)| {
+                while element >= offsets[part + 1] {
+                    part += 1;
+                }
+                let nodes = corners.map(|n| index[n as usize]);
+                Face { nodes, element, part: part.min(usize::from(u16::MAX)) as u16 }
+            })
+            .collect();
+        Self { n_eroded: state.n_eroded(), nodes, faces }
+    }
 }
 
 impl Skin {
     /// Of a model, before its run.
     pub fn new(model: &Model) -> Self {
-        let surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
         let parts = model.mesh.parts.iter().map(|part| part.name.clone()).collect();
-        Self { surface, parts }
+        Self { parts, outer: None }
     }
 
     /// Names of the parts.
@@ -35,12 +85,14 @@ impl Skin {
         &self.parts
     }
 
-    /// A state of the model.
-    pub fn pack(&self, model: &Model, state: &GlobalState) -> Vec<u8> {
+    /// A state of the model: the faces that `bolide picture` draws of it.
+    pub fn pack(&mut self, model: &Model, state: &GlobalState) -> Vec<u8> {
         debug_assert_eq!(state.x.len(), model.mesh.n_nodes());
-        let Surface { nodes, faces, .. } = &self.surface;
-        let at = |index: usize, element: u32| state.elements[index][element as usize];
-        let value = |name: usize, face: &mechanics::contact::Face| match name {
+        let n_eroded = state.n_eroded();
+        let outer = self.outer.take().filter(|outer| outer.n_eroded == n_eroded);
+        let Outer { nodes, faces, .. } = self.outer.insert(outer.unwrap_or_else(|| Outer::new(model, state)));
+        let at = |index: usize, element: usize| state.elements[index][element];
+        let value = |name: usize, face: &Face| match name {
             0 => at(field::PRESSURE, face.element),
             1 => von_mises(
                 [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX].map(|f| at(f, face.element)),
@@ -69,10 +121,10 @@ impl Skin {
         out.extend_from_slice(&state.time.to_le_bytes());
         let ranges: Vec<[f32; 2]> = columns.iter().map(|column| range(column)).collect();
         ranges.iter().flatten().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
-        for &n in nodes {
+        for &n in &*nodes {
             state.x[n as usize].iter().for_each(|&c| out.extend_from_slice(&(c as f32).to_le_bytes()));
         }
-        for face in faces {
+        for face in &*faces {
             face.nodes.iter().for_each(|n| out.extend_from_slice(&n.to_le_bytes()));
         }
         for (column, [low, high]) in columns.iter().zip(ranges) {
@@ -83,7 +135,7 @@ impl Skin {
             }
         }
         for face in faces {
-            out.extend_from_slice(&(face.part.min(u32::from(u16::MAX)) as u16).to_le_bytes());
+            out.extend_from_slice(&face.part.to_le_bytes());
         }
         out
     }
@@ -99,24 +151,42 @@ fn range(column: &[f32]) -> [f32; 2] {
 
 #[cfg(test)]
 mod tests {
+    use mechanics::erosion::ALIVE;
+
     use super::*;
+    use crate::{
+        picture,
+        results::vtu::{Fields, read::Piece, write_vtu},
+    };
+
+    fn small() -> Model {
+        deck::read(include_str!("../../../tests/decks/plates-small.toml"), "small").expect("without faults")
+    }
+
+    /// Before the first cycle.
+    fn start(model: &Model) -> GlobalState {
+        GlobalState {
+            x: model.mesh.positions.clone(),
+            v: model.velocity.clone(),
+            mass: vec![1.0; model.mesh.n_nodes()],
+            elements: std::array::from_fn(|_| vec![0.0; model.mesh.n_elements()]),
+            eroded: vec![ALIVE; model.mesh.n_elements()],
+            ..GlobalState::default()
+        }
+    }
+
+    fn word(bytes: &[u8], at: usize) -> u32 {
+        u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
+    }
 
     #[test]
     fn a_packed_state_gives_back_its_faces_and_its_range() {
-        let text = include_str!("../../../tests/decks/plates-small.toml");
-        let model = deck::read(text, "small").expect("without faults");
-        let n = model.mesh.n_elements();
-        let mut state = GlobalState {
-            x: model.mesh.positions.clone(),
-            v: model.velocity.clone(),
-            elements: std::array::from_fn(|_| vec![0.0; n]),
-            time: 2.5,
-            ..GlobalState::default()
-        };
+        let model = small();
+        let mut state = GlobalState { time: 2.5, ..start(&model) };
         state.elements[field::PRESSURE][0] = 4.0;
-        let skin = Skin::new(&model);
+        let mut skin = Skin::new(&model);
         let bytes = skin.pack(&model, &state);
-        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+        let word = |at: usize| word(&bytes, at);
         let (nodes, faces) = (word(4) as usize, word(8) as usize);
         // Two boxes: 24 x 12 x 8 and 24 x 12 x 4 cells.
         assert_eq!(faces, 2 * (24 * 12 + 24 * 8 + 12 * 8) + 2 * (24 * 12 + 24 * 4 + 12 * 4));
@@ -130,14 +200,62 @@ mod tests {
     fn a_shell_is_one_face_of_the_surface() {
         let text = include_str!("../../../deck/examples/girder-crush.toml");
         let model = deck::read(text, "girder").expect("without faults");
-        let state = GlobalState {
-            x: model.mesh.positions.clone(),
-            v: model.velocity.clone(),
-            elements: std::array::from_fn(|_| vec![0.0; model.mesh.n_elements()]),
-            ..GlobalState::default()
-        };
-        let bytes = Skin::new(&model).pack(&model, &state);
-        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
-        assert_eq!((word(4), word(8)), (32 * 129, 32 * 128));
+        let bytes = Skin::new(&model).pack(&model, &start(&model));
+        assert_eq!((word(&bytes, 4), word(&bytes, 8)), (32 * 129, 32 * 128));
+    }
+
+    /// The corners of each face in single precision, the faces in an order of their own.
+    fn sorted(faces: impl Iterator<Item = [[f32; 3]; 4]>) -> Vec<[[u32; 3]; 4]> {
+        let mut faces: Vec<_> = faces.map(|face| face.map(|x| x.map(f32::to_bits))).collect();
+        faces.sort_unstable();
+        faces
+    }
+
+    #[test]
+    fn where_elements_erode_the_page_draws_the_faces_of_the_picture() {
+        let model = small();
+        let mut state = start(&model);
+        let mut skin = Skin::new(&model);
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("state.vtu");
+        let fields = Fields::select(&[]).expect("the usual fields");
+        let hole = |e: &usize| *e < 24 * 12 * 8 && e % (24 * 12) == 24 * 5 + 7;
+        let mut counts = Vec::new();
+        // Whole, a hole of one cell through the target, and scattered elements of both.
+        for (cycle, goes) in
+            [&|_: &usize| false, &hole as &dyn Fn(&usize) -> bool, &|e: &usize| e.is_multiple_of(7)]
+                .into_iter()
+                .enumerate()
+        {
+            let n = model.mesh.n_elements();
+            (0..n).filter(goes).for_each(|e| state.eroded[e] = state.eroded[e].min(cycle as u64));
+            // What has left may fly far.
+            state.x[0][2] += 1e3;
+            state.cycle = cycle as u64;
+            let bytes = skin.pack(&model, &state);
+            let (nodes, faces) = (word(&bytes, 4) as usize, word(&bytes, 8) as usize);
+            let corner = |f: usize, k: usize| {
+                let node = word(&bytes, 84 + 12 * nodes + 16 * f + 4 * k) as usize;
+                [0, 1, 2].map(|axis| f32::from_bits(word(&bytes, 84 + 12 * node + 4 * axis)))
+            };
+            let page = sorted((0..faces).map(|f| [0, 1, 2, 3].map(|k| corner(f, k))));
+            write_vtu(&path, &model, &state, &fields, None).expect("written");
+            let piece = Piece::open(&path).expect("a state");
+            let picture = picture::skin::Skin::new(&piece, "pressure", None, &[]).expect("a skin");
+            let corners = |face: &picture::skin::Face| {
+                face.corners.map(|n| picture.points[n as usize].map(|c| c as f32))
+            };
+            let picture = sorted(picture.faces.iter().map(corners));
+            assert!(
+                page == picture,
+                "cycle {cycle}: {} faces, the picture has {}",
+                page.len(),
+                picture.len()
+            );
+            counts.push(faces);
+        }
+        // The hole takes two faces away and has four walls of eight.
+        assert_eq!(counts[1], counts[0] - 2 + 4 * 8);
+        assert!(counts[2] > counts[1]);
     }
 }

@@ -1,4 +1,4 @@
-//! Skin: the faces of a state that are seen from outside, and what colours them.
+//! Skin: the faces of a state that are seen from outside, and what colours them. Pictures and the page share [`outside`].
 
 use super::camera::Cut;
 use crate::results::{
@@ -93,7 +93,9 @@ impl Skin {
             None => vec![true; cells.len()],
         };
         kept.iter_mut().zip(&part).for_each(|(kept, part)| *kept &= parts.is_empty() || parts.contains(part));
-        let faces: Vec<Face> = outside(&cells, &kept)
+        let shapes = cells.iter().zip(&kept).enumerate().filter(|(_, (_, kept))| **kept);
+        let shapes = shapes.filter_map(|(number, (corners, _))| Some((number, Cell::of(corners)?)));
+        let faces: Vec<Face> = outside(points.len(), shapes)
             .into_iter()
             .map(|(cell, corners)| Face {
                 corners,
@@ -130,32 +132,103 @@ fn start(piece: &Piece, points: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, Error> {
         .collect())
 }
 
-/// Cell and corners of every face that only one kept cell has; cells of four corners are faces themselves.
-fn outside(cells: &[Vec<u32>], kept: &[bool]) -> Vec<(usize, [u32; 4])> {
-    let mut sides: Vec<([u32; 4], usize, [u32; 4])> = Vec::new();
-    let mut seen = Vec::new();
-    for (cell, corners) in cells.iter().enumerate().filter(|(cell, _)| kept[*cell]) {
-        if let Ok(corners) = <[u32; 8]>::try_from(corners.as_slice()) {
-            for side in FACES.map(|side| side.map(|corner| corners[corner])) {
-                let mut key = side;
-                key.sort_unstable();
-                if 1 + key.windows(2).filter(|pair| pair[0] != pair[1]).count() >= 3 {
-                    sides.push((key, cell, side));
-                }
-            }
-        } else if let [first, .., last] = corners[..] {
-            seen.push((
-                cell,
-                std::array::from_fn(|i| corners.get(i).copied().unwrap_or(if i == 0 { first } else { last })),
-            ));
+/// A cell, by what it can show.
+#[derive(Clone, Copy, Debug)]
+pub enum Cell {
+    /// A hexahedron, its sides in the order of [`FACES`]; corners repeat in a collapsed one.
+    Solid([u32; 8]),
+    /// A face by itself, which nothing hides: a shell, or one of a contact surface.
+    Face([u32; 4]),
+}
+
+impl Cell {
+    /// Of as many corners as a file has; none of a cell that has no face.
+    fn of(corners: &[u32]) -> Option<Self> {
+        match *corners {
+            [a, b, c, d, e, f, g, h] => Some(Self::Solid([a, b, c, d, e, f, g, h])),
+            [first, .., last] => Some(Self::Face(std::array::from_fn(|i| {
+                corners.get(i).copied().unwrap_or(if i == 0 { first } else { last })
+            }))),
+            _ => None,
         }
     }
-    sides.sort_unstable();
-    seen.extend(
-        sides.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| (same[0].1, same[0].2)),
-    );
-    seen.sort_unstable_by_key(|(cell, _)| *cell);
-    seen
+}
+
+/// One side of a solid on its way to the skin.
+#[derive(Clone, Copy, Default)]
+struct Side {
+    /// The distinct corners but the lowest, ascending; `u32::MAX` in the place of a repeated one.
+    key: [u32; 3],
+    cell: u32,
+    side: u32,
+}
+
+/// Number and corners of every face that is seen of `cells` (ascending numbers below 2^32): those of solids that no second
+/// cell has, outward by the right-hand rule, and all that are faces by themselves. In the order of the cells, then of their
+/// sides.
+///
+/// Sides are bucketed by their lowest corner, of `n_points`, so that each is compared with a few others only.
+pub fn outside(
+    n_points: usize,
+    cells: impl Iterator<Item = (usize, Cell)> + Clone,
+) -> Vec<(usize, [u32; 4])> {
+    let for_each_side = |visit: &mut dyn FnMut(u32, Side)| {
+        for (cell, shape) in cells.clone() {
+            let Cell::Solid(corners) = shape else { continue };
+            for (side, local) in (0..).zip(&FACES) {
+                if let Some([lowest, key @ ..]) = distinct(local.map(|corner| corners[corner])) {
+                    visit(lowest, Side { key, cell: cell as u32, side });
+                }
+            }
+        }
+    };
+    let mut starts = vec![0_u32; n_points + 1];
+    for_each_side(&mut |lowest, _| starts[lowest as usize + 1] += 1);
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    let mut sides = vec![Side::default(); starts[n_points] as usize];
+    let mut next = starts.clone();
+    for_each_side(&mut |lowest, side| {
+        let place = &mut next[lowest as usize];
+        sides[*place as usize] = side;
+        *place += 1;
+    });
+    let mut seen = Vec::new();
+    for bucket in starts.windows(2) {
+        let bucket = &sides[bucket[0] as usize..bucket[1] as usize];
+        for (i, side) in bucket.iter().enumerate() {
+            if !bucket.iter().enumerate().any(|(j, other)| j != i && other.key == side.key) {
+                seen.push((side.cell, side.side));
+            }
+        }
+    }
+    seen.sort_unstable();
+    let mut seen = seen.into_iter().peekable();
+    let mut faces = Vec::new();
+    for (cell, shape) in cells {
+        match shape {
+            Cell::Face(corners) => faces.push((cell, corners)),
+            Cell::Solid(corners) => {
+                while let Some((_, side)) = seen.next_if(|(number, _)| *number as usize == cell) {
+                    faces.push((cell, FACES[side as usize].map(|corner| corners[corner])));
+                }
+            }
+        }
+    }
+    faces
+}
+
+/// The distinct corners of a side, ascending, and `u32::MAX` for each that repeats; none of a side without area.
+fn distinct(mut corners: [u32; 4]) -> Option<[u32; 4]> {
+    corners.sort_unstable();
+    for i in 1..4 {
+        if corners[i] == corners[i - 1] {
+            corners[i - 1] = u32::MAX;
+        }
+    }
+    corners.sort_unstable();
+    (corners[2] != u32::MAX).then_some(corners)
 }
 
 /// Unit normal of a face.
