@@ -11,6 +11,7 @@ const SERIES = [
   { key: 'internal', name: 'internal', colour: '--c1' },
   { key: 'hourglass', name: 'hourglass', colour: '--c2', dash: [2, 3] },
   { key: 'contact', name: 'contact and friction', colour: '--c3', dash: [6, 3] },
+  { key: 'eroded', name: 'eroded', colour: '--c5', dash: [10, 4] },
   { key: 'total', name: 'sum', colour: '--c4', dash: [9, 3, 2, 3] },
 ];
 const FIELD_NAMES = { von_mises: 'von Mises stress', plastic_strain: 'plastic strain', temperature: 'temperature (K)' };
@@ -145,14 +146,16 @@ function fields() {
 function panels() {
   const { energies, imbalance, units, workers, phases } = page.sheet;
   const latest = energies.at(-1);
+  // All shares of the sum; where nothing erodes one is zero throughout.
+  const series = SERIES.filter(s => s.key !== 'eroded' || energies.some(p => p.eroded));
   curves.draw($('energies'), {
     x: energies.map(p => p.time), xName: `time (${units.time})`, yName: units.energy,
-    series: SERIES.map(s => ({ ...s, y: energies.map(p => p[s.key]) })),
+    series: series.map(s => ({ ...s, y: energies.map(p => p[s.key]) })),
   });
   $('energies').setAttribute('aria-label', latest
-    ? `Energies in ${units.energy} at ${lists.number(latest.time)} ${units.time}: ${SERIES.map(s => `${s.name} ${lists.number(latest[s.key], 3)}`).join(', ')}`
+    ? `Energies in ${units.energy} at ${lists.number(latest.time)} ${units.time}: ${series.map(s => `${s.name} ${lists.number(latest[s.key], 3)}`).join(', ')}`
     : 'Energies: no points yet');
-  legend(latest);
+  legend(series, latest);
   const smooth = runningMedian(imbalance.map(p => p[1]));
   curves.draw($('balance'), {
     x: imbalance.map(p => p[0]), xName: 'cycle', yName: '', floor: [1, 1.2],
@@ -178,10 +181,11 @@ function runningMedian(list) {
   return list.map((_, i) => list.slice(Math.max(0, i - 2), i + 3).sort((a, b) => a - b)).map(w => w[w.length >> 1]);
 }
 
-function legend(latest) {
+function legend(series, latest) {
   const parent = $('legend');
-  if (!parent.children.length) {
-    for (const { name, colour, dash } of SERIES) {
+  if (parent.children.length !== series.length) {
+    parent.replaceChildren();
+    for (const { name, colour, dash } of series) {
       const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
       const line = document.createElementNS('http://www.w3.org/2000/svg', 'line');
       for (const [key, value] of Object.entries({ x1: 0, x2: 22, y1: 4, y2: 4, 'stroke-width': 2, 'stroke-dasharray': (dash ?? []).join(' ') })) line.setAttribute(key, value);
@@ -190,7 +194,7 @@ function legend(latest) {
       parent.append(lists.element('li', {}, svg, lists.element('span', { textContent: name })));
     }
   }
-  SERIES.forEach(({ key, name }, i) => {
+  series.forEach(({ key, name }, i) => {
     parent.children[i].lastChild.textContent = latest ? `${name} ${lists.number(latest[key], 3)}` : name;
   });
 }

@@ -10,6 +10,7 @@ mod erosion;
 mod fuzz;
 mod late;
 mod seeds;
+mod sums;
 
 /// A row that nobody computes would look like one that holds.
 #[test]

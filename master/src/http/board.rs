@@ -80,6 +80,8 @@ pub struct Point {
     pub hourglass: f64,
     /// Energy of contact springs and friction.
     pub contact: f64,
+    /// Energy that left with eroded elements.
+    pub eroded: f64,
     /// Their sum.
     pub total: f64,
 }
@@ -93,6 +95,7 @@ impl From<&HistoryRow> for Point {
             internal: row.internal,
             hourglass: row.hourglass,
             contact: row.contact + row.friction,
+            eroded: row.eroded,
             total: row.total,
         }
     }

@@ -62,6 +62,12 @@ pub struct HistoryRow {
     pub contacts: Vec<(u32, PairVote)>,
 }
 
+impl HistoryRow {
+    /// Columns of the energies whose sum is `total`.
+    pub const SHARES: [&'static str; 6] =
+        ["kinetic", "internal", "hourglass", "contact", "friction", "eroded"];
+}
+
 /// Energies of one part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartEnergy {

@@ -3,10 +3,15 @@
 //! Curves are drawn from `history.csv` as it stands on disk, tables from the summary; so a report says nothing that the
 //! other files do not.
 
+#![expect(clippy::disallowed_methods, reason = "ticks of a plot")]
+
 use std::fmt::Write as _;
 
 use super::{
-    Error, Folder, HISTORY, REPORT, Summary, Units, history::Table, summary::significant, write_whole,
+    Error, Folder, HISTORY, REPORT, Summary, Units,
+    history::{HistoryRow, Table},
+    summary::significant,
+    write_whole,
 };
 
 /// Points of a curve at most: more than a screen has columns.
@@ -41,9 +46,12 @@ fn page(history: &Table, summary: &Summary, units: &str) -> String {
         let all: Vec<[f64; 2]> = at.iter().zip(&values).map(|(&t, &v)| [t, v]).collect();
         values.iter().any(|&v| v != 0.0).then(|| Curve { name: name.to_owned(), points: thinned(all) })
     };
-    let energies = ["kinetic", "internal", "hourglass", "contact", "friction", "external", "total"];
+    let mut energies: Vec<Curve> = HistoryRow::SHARES.iter().filter_map(|name| curve(name)).collect();
+    energies.extend(curve("total"));
+    // It is what the total may change by, no share of it.
+    energies.extend(curve("external").map(|curve| Curve { name: "external work".to_owned(), ..curve }));
     let mut plots = vec![
-        ("Energies".to_owned(), energy.to_owned(), energies.iter().filter_map(|name| curve(name)).collect()),
+        ("Energies".to_owned(), energy.to_owned(), energies),
         ("Energy error".to_owned(), "relative".to_owned(), curve("error").into_iter().collect::<Vec<_>>()),
         ("Time step".to_owned(), time.to_owned(), curve("dt").into_iter().collect()),
     ];
