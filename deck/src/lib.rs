@@ -9,6 +9,8 @@
 //! Parts are built from blocks, by the material library or materials of the deck ([`library`]), in one
 //! named consistent set of units ([`units`]). Nothing is computed here that a cycle needs.
 
+#![cfg_attr(test, expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions"))]
+
 mod blocks;
 pub mod bundle;
 pub mod fault;

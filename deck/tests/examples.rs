@@ -1,5 +1,7 @@
 //! The example decks are what users copy: each must be read, and hold what its comments say.
 
+#![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
+
 use mechanics::{load::Drive, mesh::Topology};
 
 fn example(name: &str) -> deck::Model {

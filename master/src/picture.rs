@@ -4,6 +4,8 @@
 //! colour bar and a title. [`skin`] finds what is seen, [`camera`] where it lands, [`canvas`] draws, [`colour`] and
 //! [`legend`] say what the colours mean. It reads what `results` writes, nothing else.
 
+#![expect(clippy::disallowed_methods, reason = "angles and lengths of a picture")]
+
 use std::{
     fs::File,
     io::BufWriter,

@@ -1,5 +1,7 @@
 //! The results folder: what is written reads back to the same bits, and a disk that refuses loses nothing else.
 
+#![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
+
 use std::{
     fs,
     path::{Path, PathBuf},

@@ -2,6 +2,8 @@
 //! freed nodes keep colliding or leave with what they have, and none of it changes a bit with the cut, the route, the lanes, a
 //! restart or a loss.
 
+#![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
+
 use std::collections::BTreeMap;
 
 use deck::Model;

@@ -71,6 +71,6 @@ pub(super) fn cosine_and_sine(degrees: f64) -> [f64; 2] {
         [0.0, -1.0]
     } else {
         let radians = turned.to_radians();
-        [radians.cos(), radians.sin()]
+        [libm::cos(radians), libm::sin(radians)]
     }
 }

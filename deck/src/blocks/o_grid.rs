@@ -20,7 +20,11 @@ const CORNER: f64 = 0.74;
 
 /// Tangent of `i / n` times 45 degrees, exactly 1 at the end.
 fn tangent(i: i32, n: i32) -> f64 {
-    if i.abs() == n { 1.0 } else { (f64::from(i.abs()) / f64::from(n) * std::f64::consts::FRAC_PI_4).tan() }
+    if i.abs() == n {
+        1.0
+    } else {
+        libm::tan(f64::from(i.abs()) / f64::from(n) * std::f64::consts::FRAC_PI_4)
+    }
 }
 
 /// `x` with the sign of an index; zero for index zero.
@@ -115,7 +119,7 @@ fn disc_point(at: [i32; 2], ring: i32, n: i32, rings: i32, radius: f64, core: f6
         inner
     } else {
         let direction = at.map(|i| tangent(i, n));
-        let long = direction[0].hypot(direction[1]);
+        let long = libm::hypot(direction[0], direction[1]);
         [0, 1].map(|i| (1.0 - t) * inner[i] + t * radius * direction[i] / long)
     };
     [signed(position[0], at[0]), signed(position[1], at[1])]

@@ -8,14 +8,14 @@ use super::block::{Block, cosine_and_sine};
 /// the first, each cell longer than the one before by the same factor.
 pub(crate) fn graded(origin: f64, size: f64, cells: u32, ratio: f64) -> Vec<f64> {
     let n = f64::from(cells);
-    let factor = if cells > 1 { ratio.powf(1.0 / (n - 1.0)) } else { 1.0 };
+    let factor = if cells > 1 { libm::pow(ratio, 1.0 / (n - 1.0)) } else { 1.0 };
     let mut coordinates: Vec<f64> = (0..=cells)
         .map(|i| {
             let i = f64::from(i);
             let part = if (factor - 1.0).abs() < 1e-12 {
                 size * i / n
             } else {
-                size * ((factor.powf(i) - 1.0) / (factor.powf(n) - 1.0))
+                size * ((libm::pow(factor, i) - 1.0) / (libm::pow(factor, n) - 1.0))
             };
             origin + part
         })

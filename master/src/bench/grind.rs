@@ -5,6 +5,8 @@
 //! all in the figures, which are thread-CPU time. Of several rounds the median and the least are printed; on a machine
 //! that others use too the least is the steadier.
 
+#![expect(clippy::disallowed_methods, reason = "a size in cells is rounded")]
+
 use std::{
     process::ExitCode,
     str::FromStr,

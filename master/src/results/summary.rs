@@ -2,6 +2,8 @@
 //!
 //! Units and formulas of every field are stated in the deck reference.
 
+#![expect(clippy::disallowed_methods, reason = "digits of a table")]
+
 use std::{
     fmt::{self, Write as _},
     io::Write as _,

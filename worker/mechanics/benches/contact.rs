@@ -6,6 +6,8 @@
 //!
 //! `cargo bench -p mechanics --bench contact`.
 
+#![expect(clippy::disallowed_methods, reason = "bodies of measurements, whose digests nobody compares")]
+
 use mechanics::{
     contact::{Batch, Contact, Exclusions, Surface, WorkUnit, sort},
     exact::Quantum,

@@ -8,6 +8,8 @@
 //! `cargo bench -p mechanics --bench kernels`; after `--` a word chooses: `cycles`, `kernels`, `threads`, `quiet`, or a number of
 //! elements. `quiet` compares builds on a machine that others use: of each chunk of sets the least over many cycles. `4000000` is on request only, for its memory.
 
+#![expect(clippy::disallowed_methods, reason = "bodies of measurements, whose digests nobody compares")]
+
 use mechanics::{
     block::{Block, Piece},
     cycle::{Domain, Meter, Plan, Sets, Subdomain},

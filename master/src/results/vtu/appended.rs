@@ -5,6 +5,8 @@
 //! block, all of 64 bits, then the blocks, each a zlib stream by itself. Equal numbers give equal bytes on every
 //! machine: the compressor is pinned and has one code path.
 
+#![cfg_attr(test, expect(clippy::disallowed_methods, reason = "tests write waves"))]
+
 use std::{io, io::Write};
 
 use miniz_oxide::{deflate::compress_to_vec_zlib, inflate::decompress_to_vec_zlib_with_limit};

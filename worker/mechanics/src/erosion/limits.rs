@@ -8,7 +8,11 @@ use super::Criteria;
 use crate::{
     element::{vector::Tensor, viscosity::Spread},
     failure::principal_stress,
-    lanes::{Lane, functions::ln},
+    lanes::{
+        Lane,
+        functions::{exp, ln},
+        scalar::Scalar,
+    },
     strength::Deviator,
 };
 
@@ -98,7 +102,7 @@ impl Shape {
         let [effective, shear, longest, shortest] = given.map(|limit| limit.unwrap_or(f64::INFINITY));
         // sqrt(2/3 h:h) is at most sqrt(2) times the greatest magnitude of h, the others are at most that.
         let magnitude = (effective / SQRT_2).min(shear).min(longest).min(shortest);
-        let safe = (2.0 * magnitude).exp();
+        let safe = exp(Scalar(2.0 * magnitude)).0;
         given.iter().any(Option::is_some).then_some(Self { effective, shear, longest, shortest, safe })
     }
 
@@ -149,7 +153,7 @@ mod tests {
     use nalgebra::{Matrix3, Rotation3, Vector3};
 
     use super::*;
-    use crate::{element::vector::Vector, lanes::scalar::Scalar};
+    use crate::element::vector::Vector;
 
     fn draws() -> impl FnMut() -> f64 {
         let mut seed = 0x1234_5678_9abc_def1_u64;

@@ -1,5 +1,7 @@
 //! Contact: zone, joints, forces, edges, surface and sort. The verification book has more of it, in these worlds.
 
+#![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
+
 mod clouds;
 mod edges;
 mod force;

@@ -1,6 +1,8 @@
 //! Blocks of hexahedra against themselves on other widths, topologies and cuts, laws and waves in them. Closed forms of single
 //! elements are cases of the verification book, which has the bodies from here.
 
+#![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
+
 mod bits;
 #[expect(dead_code, reason = "the verification book uses more of them")]
 mod bodies;

@@ -1,5 +1,7 @@
 //! Four-node shells against closed forms and published answers, and against themselves on other lane widths.
 
+#![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
+
 use mechanics::{
     element::{
         ElementVote,
