@@ -3,7 +3,6 @@
 //! From each point the detonation runs at the speed D of the explosive in straight lines, whatever lies between, and
 //! the first arrival at the centroid lights the element. How it burns then stands in `eos/jwl.rs`.
 
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// A point where detonation starts.
@@ -17,7 +16,10 @@ pub struct Detonation {
 
 /// When the first of the detonations reaches a point at speed `speed`; never (infinity) without one.
 pub fn lighting_time(detonations: &[Detonation], at: [f64; 3], speed: f64) -> f64 {
-    let arrival = |d: &Detonation| d.time + (Vector3::from(at) - Vector3::from(d.point)).norm() / speed;
+    let arrival = |d: &Detonation| {
+        let [x, y, z] = [0, 1, 2].map(|axis| at[axis] - d.point[axis]);
+        d.time + (x * x + y * y + z * z).sqrt() / speed
+    };
     detonations.iter().map(arrival).fold(f64::INFINITY, f64::min)
 }
 

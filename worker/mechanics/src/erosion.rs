@@ -21,6 +21,7 @@ use crate::{
     element::{Step, group::Scanned, modes::modes_of},
     lanes::{Width, scalar::Scalar},
     material::Material,
+    rigid::{cross, dot},
     state::field,
 };
 
@@ -192,12 +193,16 @@ impl Eroding {
             if criteria.measures_shape() && state.initial.len() == block.nodes.len() {
                 let corners = block.corners(e).map(|n| state.initial[n as usize]);
                 let axis = |a: usize| modes_of(corners.map(|x| Scalar(x[a]))).map(|mode| mode.0);
-                let [x, y, z] = [axis(0), axis(1), axis(2)];
-                let jacobian = nalgebra::Matrix3::from_fn(|row, column| [x, y, z][row][column]);
-                // An element without volume does not pass the checks of a run.
-                let inverse = jacobian.try_inverse().unwrap_or_else(nalgebra::Matrix3::zeros);
+                let [x, y, z] = [0, 1, 2].map(|a| {
+                    let [xi, eta, zeta, ..] = axis(a);
+                    [xi, eta, zeta]
+                });
+                // Columns of the inverse of the matrix with these rows, times its determinant.
+                let adjugate = [cross(y, z), cross(z, x), cross(x, y)];
+                let determinant = dot(x, adjugate[0]);
                 for (i, row) in eroding.inverse.iter_mut().enumerate() {
-                    row[slot] = inverse[(i / 3, i % 3)];
+                    // An element without volume does not pass the checks of a run.
+                    row[slot] = if determinant == 0.0 { 0.0 } else { adjugate[i % 3][i / 3] / determinant };
                 }
             }
         }

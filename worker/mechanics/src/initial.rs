@@ -9,7 +9,7 @@ use crate::{
     exact::Quantum,
     load::{Drive, SurfaceKind},
     mesh::{Mesh, Part},
-    rigid::{Body, dot},
+    rigid::{Body, cross, dot},
     setup::{Constraint, MAX_WALLS, Setup},
     state::{GlobalState, N_FIELDS, ShellState, field},
     vote::Quanta,
@@ -217,12 +217,13 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
 
 /// Area of the largest face of a hexahedron.
 pub(crate) fn largest_face(x: &[[f64; 3]; 8]) -> f64 {
-    use nalgebra::Vector3;
     crate::mesh::FACES
         .iter()
         .map(|f| {
-            let p = f.map(|c| Vector3::from(x[c]));
-            0.5 * (p[2] - p[0]).cross(&(p[3] - p[1])).norm()
+            let [p, q, r, s] = f.map(|c| x[c]);
+            let (one, other) = (std::array::from_fn(|a| r[a] - p[a]), std::array::from_fn(|a| s[a] - q[a]));
+            let normal = cross(one, other);
+            0.5 * dot(normal, normal).sqrt()
         })
         .fold(0.0, f64::max)
 }

@@ -3,11 +3,16 @@
 //! A face is the bilinear surface through its corners; what acts on it goes to the corners by their shape functions. A
 //! uniform pressure on all faces of an element is then exactly its pressure times the volume gradient.
 
-use nalgebra::Vector3;
-
 use super::{Loads, SurfaceKind};
 use crate::{
-    block::Block, element::hex8, exact::Quantum, material::Material, mesh::FACES, setup::Control, vote::Work,
+    block::Block,
+    element::hex8,
+    exact::Quantum,
+    material::Material,
+    mesh::FACES,
+    rigid::{cross, dot},
+    setup::Control,
+    vote::Work,
 };
 
 /// A loaded face and what acted on it in this cycle.
@@ -67,13 +72,21 @@ pub(crate) fn faces_of(block: &Block, loads: &Loads, material: &Material) -> Vec
 }
 
 /// Area vectors of the corners of a bilinear face, outward: `integral of N_I n dA`.
-fn corner_areas(x: [Vector3<f64>; 4]) -> [Vector3<f64>; 4] {
-    let (a, b, c, d) = (x[1] - x[0], x[2] - x[1], x[2] - x[3], x[3] - x[0]);
-    let products = [a.cross(&d), a.cross(&b), c.cross(&b), c.cross(&d)];
+fn corner_areas(x: [[f64; 3]; 4]) -> [[f64; 3]; 4] {
+    let (a, b, c, d) = (minus(x[1], x[0]), minus(x[2], x[1]), minus(x[2], x[3]), minus(x[3], x[0]));
+    let products = [cross(a, d), cross(a, b), cross(c, b), cross(c, d)];
     std::array::from_fn(|i| {
         let [near, next, far, last] = [0, 1, 2, 3].map(|k| products[(i + k) % 4]);
-        near / 9.0 + (next + last) / 18.0 + far / 36.0
+        std::array::from_fn(|a| near[a] / 9.0 + (next[a] + last[a]) / 18.0 + far[a] / 36.0)
     })
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| a[axis] - b[axis])
+}
+
+fn norm(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
 }
 
 impl LoadedFace {
@@ -95,7 +108,7 @@ pub(crate) fn apply(
     let mut vote = FaceVote { force_bound: 0.0, limit: f64::INFINITY };
     for face in faces {
         let nodes = face.nodes();
-        let at = |values: &[Vec<f64>; 3], n: usize| Vector3::new(values[0][n], values[1][n], values[2][n]);
+        let at = |values: &[Vec<f64>; 3], n: usize| [values[0][n], values[1][n], values[2][n]];
         let areas = corner_areas(nodes.map(|n| at(&block.x, n)));
         let velocities = nodes.map(|n| at(&block.v, n));
         let kind = loads.surfaces[face.load as usize].kind;
@@ -103,22 +116,28 @@ pub(crate) fn apply(
         for (corner, &n) in nodes.iter().enumerate() {
             let (area, v) = (areas[corner], velocities[corner]);
             let force = match kind {
-                SurfaceKind::Pressure(drive) => area * -drive.at(&loads.curves, time),
+                SurfaceKind::Pressure(drive) => {
+                    let tension = -drive.at(&loads.curves, time);
+                    area.map(|c| c * tension)
+                }
                 SurfaceKind::Transmit => {
-                    let size = area.norm();
-                    let normal = if size > 0.0 { area / size } else { area };
-                    let across = normal * normal.dot(&v);
+                    let size = norm(area);
+                    let normal = if size > 0.0 { area.map(|c| c / size) } else { area };
+                    let speed = dot(normal, v);
                     let [longitudinal, shear, _] = face.impedance;
-                    (across * longitudinal + (v - across) * shear) * -size
+                    std::array::from_fn(|a| {
+                        let across = normal[a] * speed;
+                        (across * longitudinal + (v[a] - across) * shear) * -size
+                    })
                 }
             };
-            let force = [force.x, force.y, force.z].map(|c| quantum.round(c));
+            let force = force.map(|c| quantum.round(c));
             for a in 0..3 {
                 block.f[a][n] += force[a];
                 vote.force_bound = vote.force_bound.max(force[a].abs());
             }
             face.force[corner] = force;
-            face.power += force[0] * v.x + force[1] * v.y + force[2] * v.z;
+            face.power += force[0] * v[0] + force[1] * v[1] + force[2] * v[2];
         }
         if kind == SurfaceKind::Transmit {
             let x = face.corners.map(|n| at(&block.x, n as usize));
@@ -133,11 +152,11 @@ pub(crate) fn apply(
 /// `1 - dt C/(2m) - dt^2 K/(4m) > 0` in every mode; the largest of each term are added here:
 /// `1 - r dt (n + 8 h + 2 l) - (r dt)^2` with `r` the wave speed over the least height, `h` and `l` the coefficients of
 /// hourglass control and linear viscosity.
-fn damper_limit(x: &[Vector3<f64>; 8], together: f64, speed: f64, control: &Control) -> f64 {
-    let volume = hex8::volume(&x.map(|p| [p.x, p.y, p.z]));
+fn damper_limit(x: &[[f64; 3]; 8], together: f64, speed: f64, control: &Control) -> f64 {
+    let volume = hex8::volume(x);
     let area = |face: &[usize; 4]| {
         let p = face.map(|corner| x[corner]);
-        0.5 * (p[2] - p[0]).cross(&(p[3] - p[1])).norm()
+        0.5 * norm(cross(minus(p[2], p[0]), minus(p[3], p[1])))
     };
     let rate = speed * FACES.iter().map(area).fold(0.0, f64::max) / volume;
     let damped = rate * (together + 8.0 * control.hourglass + 2.0 * control.linear_viscosity);
@@ -179,7 +198,7 @@ mod tests {
         ];
         let mut sum = [[0.0; 3]; 8];
         for face in FACES {
-            let areas = corner_areas(face.map(|c| Vector3::from(x[c])));
+            let areas = corner_areas(face.map(|c| x[c]));
             for (corner, area) in face.into_iter().zip(areas) {
                 (0..3).for_each(|a| sum[corner][a] += area[a]);
             }
@@ -193,10 +212,9 @@ mod tests {
 
     #[test]
     fn a_damped_cube_steps_by_the_golden_section_of_its_crossing_time_less_what_else_damps_it() {
-        let corner = |c: usize| {
-            Vector3::new(f64::from([0, 1, 1, 0][c % 4]), f64::from([0, 0, 1, 1][c % 4]), (c / 4) as f64)
-        };
-        let x: [Vector3<f64>; 8] = std::array::from_fn(|c| corner(c) * 2.0);
+        let corner =
+            |c: usize| [f64::from([0, 2, 2, 0][c % 4]), f64::from([0, 0, 2, 2][c % 4]), 2.0 * (c / 4) as f64];
+        let x: [[f64; 3]; 8] = std::array::from_fn(corner);
         let mut control = Control {
             end_time: 1.0,
             end_cycle: 1,
