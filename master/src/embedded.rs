@@ -55,15 +55,15 @@ pub struct Traffic {
     pub sort_ns: u64,
 }
 
-/// What befalls the workers of a run, for tests.
-#[derive(Clone, Debug, PartialEq)]
+/// What befalls the workers of a run.
+#[derive(Clone, Debug)]
 pub enum Fate {
     /// A worker is gone, with all that it knew.
     Lose(usize),
     /// A worker comes.
     Join(Hand),
-    /// From here on a worker's elements are wrong by one unit in the last place.
-    Spoil(usize),
+    /// From here on this is done to what a worker holds whenever it has computed elements.
+    Touch(usize, fn(&mut Machine)),
 }
 
 /// Something that has arrived, or a task's end.
@@ -81,7 +81,7 @@ struct Place {
     /// Away while a task runs.
     machine: Option<Box<Machine>>,
     lost: bool,
-    spoilt: bool,
+    touch: Option<fn(&mut Machine)>,
     stopwatch: Stopwatch,
     /// Of this epoch: bytes sent to each neighbour.
     peers: (u32, BTreeMap<u32, u64>),
@@ -93,7 +93,7 @@ impl Place {
             machine: Some(Box::default()),
             stopwatch: Stopwatch::new(),
             lost: false,
-            spoilt: false,
+            touch: None,
             peers: (0, BTreeMap::new()),
         }
     }
@@ -196,7 +196,7 @@ fn drive(
                     world.apply(Event::Lost(member, "it was to be lost".to_owned()))?;
                 }
             }
-            Some(Fate::Spoil(host)) => world.surroundings.places[host].spoilt = true,
+            Some(Fate::Touch(host, touch)) => world.surroundings.places[host].touch = Some(touch),
             Some(Fate::Join(hand)) => {
                 world.surroundings.places.push(Place::new());
                 let host = world.sessions.add_host();
@@ -220,8 +220,8 @@ fn drive(
                 let place = &mut world.surroundings.places[host];
                 let cycle = world.sessions.hosts[host].session.cycle();
                 machine.take_laps().for_each(|lap| place.stopwatch.book(cycle, lap));
-                if place.spoilt && matches!(outcome, session::Outcome::Computed) {
-                    machine.plant_fault();
+                if let (Some(touch), session::Outcome::Computed) = (place.touch, &outcome) {
+                    touch(&mut machine);
                 }
                 place.machine = Some(machine);
                 world.step(host, session::Event::Done(outcome))?;

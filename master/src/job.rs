@@ -81,18 +81,9 @@ pub struct Job {
     tally: Tally,
     first_cycle: u64,
     ending: Ending,
-    /// See [`Job::plant_unfenced`].
-    unfenced: bool,
 }
 
 impl Job {
-    /// Plants a bug: messages of epochs that are over are taken as if they were of now. For the test that shows that the
-    /// seeded simulator finds such a bug.
-    #[doc(hidden)]
-    pub fn plant_unfenced(&mut self) {
-        self.unfenced = true;
-    }
-
     /// The state the run starts from.
     pub fn start_state(&self) -> &GlobalState {
         &self.checkpoints.newest().state
@@ -224,7 +215,6 @@ impl Job {
         actions: &mut Vec<Action>,
     ) -> Result<(), Error> {
         let now = self.epoch.number;
-        let epoch = if self.unfenced { epoch.max(now) } else { epoch };
         if epoch < now {
             return Ok(());
         }

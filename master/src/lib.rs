@@ -4,7 +4,7 @@
 //! [`embedded`] runs them, and [`drive`] has workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`] and hears [`notice`]s: each
 //! [`connection`] is one task that carries messages, the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
 //! [`lab`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`processes`] starts workers as
-//! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster.
+//! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster. [`program`] is the command line.
 
 pub mod add;
 pub mod balance;
@@ -40,6 +40,7 @@ pub mod output;
 pub mod peers;
 pub mod picture;
 pub mod processes;
+pub mod program;
 pub mod queue;
 pub mod results;
 pub mod run;

@@ -10,6 +10,7 @@ use mechanics::{
 };
 
 use protocol::options::Route;
+use tracing::trace;
 
 use crate::{
     balance::{self, Dealing},
@@ -170,7 +171,7 @@ pub struct SortBasis {
 impl SortBasis {
     /// Does the sort that `Action::Sort` of a job asks for.
     pub fn sort(&self, x: &Gathered) -> Sorted {
-        worker::failpoint::die("die-in-sort");
+        trace!(epoch = self.epoch, "sort begins");
         let mut sorted = self.sorter.run(self.epoch, x, &self.holdings, &self.state);
         if !self.dropped.is_empty() {
             for (worker, plan) in (0..).zip(&mut sorted.exchange.plans) {

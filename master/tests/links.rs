@@ -107,7 +107,11 @@ where
             let (sender, receiver) = split(far, Settings::default());
             let call = dial::greet(sender, receiver, &hello).await.expect("taken in");
             let pool = compute_pool(1).expect("threads");
-            worker::daemon::serve(call, Service { pool, peers }).await
+            worker::daemon::serve(
+                call,
+                Service { pool, peers, compute: |machine, task, _| machine.run(task) },
+            )
+            .await
         });
     }
     let mut seats: Vec<Seat> = Vec::new();

@@ -10,6 +10,7 @@ use tests::{
     bits::Fingerprint,
     solve::{Crew, Solved, model, solve, solve_through, without_states},
 };
+use worker::compute::Machine;
 
 const PLATES: &str = r#"
     title = "small plates"
@@ -69,7 +70,7 @@ fn one_unit_in_the_last_place_of_one_worker_is_found_by_name_and_leaves_no_trace
         for route in [Route::Master, Route::Direct] {
             // One joins as well: the run is dealt out anew from a state that nobody has proved yet.
             let mut fate = |number: u64| match number.checked_sub(at) {
-                Some(0) => Some(Fate::Spoil(1)),
+                Some(0) => Some(Fate::Touch(1, Machine::plant_fault)),
                 Some(25) => Some(Fate::Join(Hand { name: "late".into(), speed: 1.0, threads: 1 })),
                 _ => None,
             };
@@ -85,14 +86,14 @@ fn one_unit_in_the_last_place_of_one_worker_is_found_by_name_and_leaves_no_trace
 #[test]
 fn without_samples_the_same_fault_changes_the_bits() {
     let plain = solve(model(PLATES), crew(3, false, Route::Master)).expect("a good run");
-    let mut fate = |number: u64| (number == 333).then_some(Fate::Spoil(1));
+    let mut fate = |number: u64| (number == 333).then_some(Fate::Touch(1, Machine::plant_fault));
     let spoilt = run(crew(3, false, Route::Master), &mut fate).expect("nobody looks");
     assert_ne!(plain.outcome.digest, spoilt.outcome.digest);
 }
 
 #[test]
 fn when_all_workers_differ_the_master_is_suspected() {
-    let mut fate = |number: u64| (number < 2).then_some(Fate::Spoil(number as usize));
+    let mut fate = |number: u64| (number < 2).then_some(Fate::Touch(number as usize, Machine::plant_fault));
     let why = run(crew(2, true, Route::Master), &mut fate).err().expect("nobody agrees");
     assert!(why.contains("all 2 workers differ") && why.contains("look at its host"), "{why}");
 }

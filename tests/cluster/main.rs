@@ -13,8 +13,8 @@ use std::{process::Command, sync::OnceLock};
 
 use tests::cluster::{repository, said};
 
-/// The binary of this build.
-const BOLIDE: &str = env!("CARGO_BIN_EXE_bolide");
+/// The binary of this build, with faults to order.
+const BOLIDE: &str = env!("CARGO_BIN_EXE_bolide-under-test");
 
 /// Path of the small deck: 3,456 elements. To its end it runs for five seconds or more.
 fn small() -> String {
@@ -40,4 +40,13 @@ fn digest_of(summary: &serde_json::Value) -> String {
     let digest = summary["digest"].as_str().expect("a digest");
     assert_eq!(digest.len(), 32, "{digest}");
     digest.to_owned()
+}
+
+/// Else the test that the shipped binary has none of them would show nothing.
+#[test]
+fn the_binary_under_test_has_faults_to_order() {
+    let bytes = std::fs::read(BOLIDE).expect("the binary of this build");
+    for words in tests::cluster::FAULTS {
+        assert!(tests::cluster::holds(&bytes, words), "{words:?} is not found");
+    }
 }

@@ -17,6 +17,14 @@ pub const DEADLINE: Duration = Duration::from_secs(120);
 /// Between two looks at a condition that nothing announces.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
+/// Words of what belongs in no binary but `bolide-under-test`: variable, places and bugs of [`crate::failpoint`].
+pub const FAULTS: [&str; 5] = ["BOLIDE_FAIL", "die-in-", "die-before-", "a test has ordered", "plant_fault"];
+
+/// Whether a file's bytes have these words in them.
+pub fn holds(bytes: &[u8], words: &str) -> bool {
+    bytes.windows(words.len()).any(|window| window == words.as_bytes())
+}
+
 /// A folder of this repository, from its root.
 pub fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)

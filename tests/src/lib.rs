@@ -1,10 +1,10 @@
 //! What the tests of the whole system share.
 //!
 //! [`solve`] takes a deck through master and workers in this process; [`cluster`] runs real processes on loopback,
-//! [`proxy`] stands between them, [`sshd`] beside them, [`browser`] and [`terminal`] look at them; [`book`] holds the cases,
-//! [`case`] compares a figure with a published or derived one of `reference.toml` and says how it went; [`fuzz`] damages what
-//! comes from outside, [`seeds`] plays the pure sessions in a world that goes wrong; [`checker`] looks for nodes inside
-//! foreign bodies, without asking the contact code.
+//! [`failpoint`] harms them, [`proxy`] stands between them, [`sshd`] beside them, [`browser`] and [`terminal`] look at
+//! them; [`book`] holds the cases, [`case`] compares a figure with a published or derived one of `reference.toml` and says
+//! how it went; [`fuzz`] damages what comes from outside, [`seeds`] plays the pure sessions in a world that goes wrong;
+//! [`checker`] looks for nodes inside foreign bodies, without asking the contact code.
 
 pub mod bits;
 pub mod book;
@@ -12,6 +12,7 @@ pub mod browser;
 pub mod case;
 pub mod checker;
 pub mod cluster;
+pub mod failpoint;
 pub mod faults;
 pub mod fuzz;
 pub mod left;

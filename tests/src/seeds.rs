@@ -328,10 +328,7 @@ impl Play {
         let cycle = resume.as_ref().map_or(0, |snapshot| snapshot.state.cycle);
         let mut options = self.options.clone();
         options.asked.snapshot_at = self.plot.snapshot_at.filter(|at| *at > cycle);
-        let (mut job, actions) = Job::new(Arc::clone(&self.model), &hands, options, resume)?;
-        if self.plot.unfenced {
-            job.plant_unfenced();
-        }
+        let (job, actions) = Job::new(Arc::clone(&self.model), &hands, options, resume)?;
         weather.disk.rows = job.rows_before().iter().map(|row| HistoryRow::clone(row)).collect();
         weather.disk.states.retain(|state| state.cycle <= cycle);
         weather.life += 1;
@@ -426,7 +423,11 @@ impl Play {
         match self.world.open(parcel)? {
             Letter::ToWorker(host, message) => self.hear(host, message),
             Letter::ToPeer(host, frame) => self.hear_peer(host, frame),
-            letter => Ok(self.world.hear(letter)?),
+            Letter::ToMaster(member, epoch, message) => {
+                let now = self.world.sessions.job.as_ref().map_or(epoch, Job::epoch);
+                let epoch = if self.plot.unfenced { epoch.max(now) } else { epoch };
+                Ok(self.world.hear(Letter::ToMaster(member, epoch, message))?)
+            }
         }
     }
 

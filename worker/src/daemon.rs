@@ -29,7 +29,7 @@ use tracing::{info, warn};
 use crate::{
     notify,
     peers::{Peers, links::Links},
-    runner::{GOODBYE, Input, Runner},
+    runner::{Compute, GOODBYE, Input, Runner},
 };
 
 /// Messages that may wait for the compute thread: a master sends at most a few ahead, a neighbour two.
@@ -65,6 +65,8 @@ pub struct Options {
     pub port: Option<Shape>,
     /// Whether and where it takes other workers.
     pub peers: Listen,
+    /// What computes its tasks.
+    pub compute: Compute,
 }
 
 /// Whether and where a worker takes other workers, for links of their own.
@@ -88,6 +90,8 @@ pub struct Service {
     pub pool: Arc<ThreadPool>,
     /// Where other workers call; without it the master relays.
     pub peers: Option<Arc<Peers>>,
+    /// What computes a task.
+    pub compute: Compute,
 }
 
 /// Computes for a master until a signal, a refusal, or until the master has been away for too long.
@@ -176,7 +180,7 @@ async fn stay(
     pool: &Arc<ThreadPool>,
     mut leaving: watch::Receiver<bool>,
 ) -> std::result::Result<(), String> {
-    let mut service = Service { pool: Arc::clone(pool), peers: None };
+    let mut service = Service { pool: Arc::clone(pool), peers: None, compute: options.compute };
     let mut hello = hello.clone();
     let mut listening = None;
     let mut alone_since = Instant::now();
@@ -266,7 +270,7 @@ pub async fn serve(call: Call, service: Service) -> Error {
 /// [`serve`] until this process is told to leave and the master has released it.
 async fn serve_until(
     call: Call,
-    Service { pool, peers }: Service,
+    Service { pool, peers, compute }: Service,
     mut leaving: watch::Receiver<bool>,
 ) -> Error {
     let Call { sender, mut receiver, welcome } = call;
@@ -275,7 +279,7 @@ async fn serve_until(
     let outbox = Outbox::new(sender.clone(), welcome.incarnation);
     let links = Links::new(peers.as_deref(), send.downgrade());
     let computing = std::thread::Builder::new().name("session".to_owned()).spawn(move || {
-        let runner = Runner::new(outbox, links);
+        let runner = Runner::new(compute, outbox, links);
         if let Err(error) = pool.install(|| runner.run(messages)) {
             // The receiver is gone when the connection has ended already.
             let _ = fail.send(error);

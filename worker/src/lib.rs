@@ -9,7 +9,6 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 
 pub mod compute;
 pub mod daemon;
-pub mod failpoint;
 pub mod notify;
 pub mod peers;
 pub mod processors;

@@ -21,7 +21,6 @@ use tokio::sync::mpsc;
 
 use crate::{
     compute::Machine,
-    failpoint,
     peers::{
         Key, News,
         links::{Links, Step},
@@ -45,8 +44,12 @@ const REPORT_EVERY: Duration = Duration::from_secs(1);
 /// What a worker says that was asked to end and holds nothing any more.
 pub const GOODBYE: &str = "the worker was told to end";
 
+/// Computes a task of a cycle: [`Machine::run`], or in tests of real processes one that a fault befalls.
+pub type Compute = fn(&mut Machine, Task, u64) -> Outcome;
+
 /// The compute thread's own.
 pub struct Runner {
+    compute: Compute,
     outbox: Outbox,
     session: Session,
     machine: Machine,
@@ -64,8 +67,9 @@ pub struct Runner {
 
 impl Runner {
     /// Without a job.
-    pub fn new(outbox: Outbox, links: Links) -> Self {
+    pub fn new(compute: Compute, outbox: Outbox, links: Links) -> Self {
         Self {
+            compute,
             outbox,
             session: Session::new(),
             machine: Machine::new(),
@@ -198,9 +202,9 @@ impl Runner {
                     })?,
                     Action::SendPeer(to, message) => self.timed(|runner| runner.send_peer(to, message))?,
                     Action::Compute(task) => {
-                        let (machine, started) = (&mut self.machine, Instant::now());
+                        let (machine, compute, started) = (&mut self.machine, self.compute, Instant::now());
                         let cycle = self.session.cycle();
-                        let outcome = catch_unwind(AssertUnwindSafe(|| sabotaged(machine, task, cycle)));
+                        let outcome = catch_unwind(AssertUnwindSafe(|| compute(machine, task, cycle)));
                         self.busy += started.elapsed();
                         for lap in self.machine.take_laps() {
                             self.stopwatch.book(self.session.cycle(), lap);
@@ -224,42 +228,6 @@ impl Runner {
         self.stopwatch.book(cycle, Lap { phase: Phase::Send, from, to: Instant::now() });
         result
     }
-}
-
-/// A task, with the faults that a test has ordered for it.
-fn sabotaged(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
-    let name = match &task {
-        Task::Load { .. } => "die-in-load",
-        Task::Transfer { .. } => "die-in-transfer",
-        Task::Elements { .. } => "die-in-elements",
-        Task::Install { .. } => "die-in-install",
-        Task::Border { .. } => "die-in-border",
-        Task::Interior { .. } => "die-in-interior",
-        Task::Integrate { .. } => "die-in-integrate",
-        Task::Image { .. } => "die-in-image",
-        Task::Sample { .. } => "die-in-sample",
-    };
-    failpoint::die(name);
-    if let Task::Border { gather: true, .. } | Task::Install { gather: true, .. } = &task {
-        failpoint::die("die-in-gather");
-    }
-    if failpoint::in_cycle("panic", cycle) || failpoint::at_cycle("panic-always", cycle) {
-        panic!("a panic that a test has ordered");
-    }
-    let mut outcome = machine.run(task);
-    match &mut outcome {
-        Outcome::Computed if failpoint::from_cycle("ulp", cycle) => machine.plant_fault(),
-        Outcome::Integrated(vote) if failpoint::in_cycle("nan-vote", cycle) => {
-            vote.parts.iter_mut().for_each(|part| part.internal = f64::NAN);
-        }
-        Outcome::Forces { partials, .. }
-            if !partials.is_empty() && failpoint::in_cycle("nan-force", cycle) =>
-        {
-            partials[0] = f64::NAN;
-        }
-        _ => {}
-    }
-    outcome
 }
 
 /// What tasks took on this host, with the share of contact as the threads' own clocks have it. The wall clock tells that

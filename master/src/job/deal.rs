@@ -66,7 +66,6 @@ impl Job {
             tally: Tally::new(),
             ending: Ending::default(),
             lean: false,
-            unfenced: false,
             problem,
             options,
         };

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p tests --bin faults -- [--bolide PATH] [--cycles N] [--deck PATH]... [--only WORDS] [--tries N] [--out FILE]`
 //!
-//! Without `--bolide`, the binary beside this one; build it first with `cargo build --release -p master`. `--only` plays
+//! Without `--bolide`, `bolide-under-test` beside this one; build it first with `cargo build --release -p tests`. `--only` plays
 //! the faults with these words in their name, `--tries` each at most so often. The table goes to `--out`, without
 //! `--only` to `tests/FAULTS.md`. The program ends with failure if a run has other bytes.
 
@@ -28,7 +28,7 @@ fn asked() -> Result<Asked, String> {
     let here = std::env::current_exe().map_err(|e| format!("where this program is: {e}"))?;
     let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut asked = Asked {
-        bolide: here.with_file_name("bolide"),
+        bolide: here.with_file_name("bolide-under-test"),
         decks: Vec::new(),
         cycles: 700,
         only: None,

@@ -62,7 +62,7 @@ pub struct Plot {
     pub snapshot_at: Option<u64>,
     /// Latest first.
     faults: Vec<(u64, Fault)>,
-    /// Sessions with a planted fault: the master takes messages of epochs that are over.
+    /// A planted fault: messages of epochs that are over reach the master as if they were of now.
     pub(super) unfenced: bool,
 }
 
@@ -203,7 +203,7 @@ impl Stage {
         self.perform(seed, false)
     }
 
-    /// The same with a bug in the sessions: the master hears messages of epochs that are over.
+    /// The same with a bug: the master hears messages of epochs that are over.
     ///
     /// # Errors
     /// Where the bug shows.

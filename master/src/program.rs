@@ -1,0 +1,171 @@
+//! PROGRAM: what a binary does with its command line: exit codes, logging, and which module a command goes to.
+//!
+//! Exit codes: 0 a run to its end, 1 a fault (deck, disk, physics, peer), 2 wrong flags, 130 stopped by Ctrl-C.
+
+use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
+
+use clap::{CommandFactory, Parser};
+use deck::bundle::Options;
+use protocol::{
+    shape::{Shape, Wire},
+    tls,
+};
+use tracing::{Subscriber, level_filters::LevelFilter};
+use tracing_subscriber::{Layer, filter::Targets, registry::LookupSpan};
+use worker::{daemon::Listen, runner::Compute};
+
+use crate::{
+    add, bench,
+    bench::grind::Speed,
+    certs, client,
+    command::{Bench, Certs, Cli, Command, WorkerArgs},
+    convert, daemon, deck_file,
+    lab::Lab,
+    machine, memory, newcomer, picture, processes, run, simulate,
+};
+
+/// The log: to standard error, of the levels that `BOLIDE_LOG` says (`debug`, or by module `info,worker=debug`), else from
+/// `info` on.
+pub fn log<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
+    let asked = std::env::var("BOLIDE_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_target(false)
+        .with_filter(asked.unwrap_or_else(|| Targets::new().with_default(LevelFilter::INFO)))
+}
+
+/// Does what the command line says. `compute` is what computes the tasks of a worker.
+pub fn main(compute: Compute) -> ExitCode {
+    memory::return_large_arrays();
+    let result = match Cli::parse().command {
+        Command::Run(args) => run::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Master(args) => daemon::run(&args),
+        Command::Worker(args) => work(args, compute),
+        Command::Add(args) => add::run(&args),
+        Command::Submit(args) => client::submit(&args),
+        Command::Watch { job, at } => client::watch(job, &at),
+        Command::Jobs { at } => client::jobs(&at),
+        Command::Hosts { at } => client::hosts(&at),
+        Command::Cancel { job, at } => client::cancel(job, &at),
+        Command::Resume { job, at } => client::resume(job, &at),
+        Command::Results { job, out, force, at } => client::results(job, out, force, &at),
+        Command::Bench { what: Some(Bench::Messages(args)), .. } => bench::messages::run(&args),
+        Command::Bench { what: None, grind } => bench::grind::run(&grind),
+        Command::Certs { what } => make_certificates(what),
+        Command::Top { at } => client::top::run(&at),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "bolide", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Man { out } => manual(out.as_deref()),
+        Command::Check { deck, reading } => check(&deck, &reading.options()),
+        Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
+        Command::Picture(args) => picture::run(&args),
+        Command::Materials => {
+            for name in deck::materials() {
+                println!("{name}");
+            }
+            Ok(ExitCode::SUCCESS)
+        }
+    };
+    result.unwrap_or_else(|reason| {
+        eprintln!("bolide: {reason}");
+        ExitCode::FAILURE
+    })
+}
+
+fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
+    if let (Some(token), Some(folder)) = (&args.join, &args.certs)
+        && !tls::Paths::in_folder(folder).certificate.exists()
+    {
+        let name = args.name.clone().unwrap_or_else(machine::host_name);
+        newcomer::join(&args.master, token, &name, folder)?;
+    }
+    if let Some(pin) = &args.pin {
+        pin.apply()?;
+    }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from) as u32;
+    let speed = match args.speed {
+        Speed::Given(speed) => speed,
+        Speed::Auto => {
+            let speed = bench::grind::speed(args.threads.unwrap_or(cores))?;
+            tracing::info!(speed, "measured: 1 is a thread that takes 100 ns for an element-cycle");
+            speed
+        }
+    };
+    let options = worker::daemon::Options {
+        master: args.master,
+        name: args.name.unwrap_or_else(|| format!("{}-{}", machine::host_name(), std::process::id())),
+        speed,
+        threads: args.threads.unwrap_or(cores),
+        certs: args.certs,
+        patience: Duration::from_secs(args.patience),
+        once: args.once,
+        token: std::env::var(processes::TOKEN).ok(),
+        port: args.link.map(|rate| Shape::port(Wire::ethernet(rate))),
+        peers: if args.no_peers {
+            Listen::Nowhere
+        } else {
+            Listen::Port { port: args.peer_port, announce: args.peer_announce }
+        },
+        compute,
+    };
+    worker::daemon::run(&options).map(|()| ExitCode::SUCCESS)
+}
+
+fn make_certificates(what: Certs) -> Result<ExitCode, String> {
+    match what {
+        Certs::Ca { folder, force } => {
+            let path = certs::make_ca(&folder, force).map_err(|e| e.to_string())?;
+            println!("made {}", path.display());
+        }
+        Certs::Host { folder, name, address, role, force } => {
+            certs::make_host(&folder, &name, &address, role.role(), force).map_err(|e| e.to_string())?;
+            println!("made {}; copy this folder to {name}", folder.join(&name).display());
+        }
+        Certs::Token { folder, role, hours, master } => {
+            let token = Lab::open(&folder).and_then(|lab| lab.issue(role.role(), hours));
+            println!("{}", daemon::line_to_paste(&master, &token.map_err(|e| e.to_string())?, role.role()));
+        }
+        Certs::Join { master, token, folder, name } => {
+            newcomer::join(&master, &token, &name.unwrap_or_else(machine::host_name), &folder)?;
+            println!("made {}", tls::Paths::in_folder(&folder).certificate.display());
+        }
+        Certs::Revoke { folder, name } => {
+            let revoked = Lab::open(&folder).and_then(|lab| lab.revoke(&name)).map_err(|e| e.to_string())?;
+            println!(
+                "revoked {revoked} of {name}; a running master with --lab ends its links within seconds"
+            );
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn manual(folder: Option<&Path>) -> Result<ExitCode, String> {
+    let command = Cli::command();
+    match folder {
+        None => clap_mangen::Man::new(command)
+            .render(&mut std::io::stdout())
+            .map_err(|e| format!("standard output: {e}"))?,
+        Some(folder) => {
+            let fault = |e: std::io::Error| format!("{}: {e}", folder.display());
+            std::fs::create_dir_all(folder).map_err(fault)?;
+            clap_mangen::generate_to(command, folder).map_err(fault)?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn check(path: &Path, options: &Options) -> Result<ExitCode, String> {
+    let model = deck_file::read_deck_with(path, options)?;
+    println!(
+        "{}: no fault; {} parts, {} elements, {} nodes",
+        path.display(),
+        model.mesh.parts.len(),
+        model.mesh.n_elements(),
+        model.mesh.n_nodes()
+    );
+    Ok(ExitCode::SUCCESS)
+}
