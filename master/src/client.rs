@@ -26,6 +26,7 @@ use crate::{
     results::{Folder, create_anew},
 };
 
+pub mod screen;
 pub mod top;
 /// How long a master that has gone is dialled again while one of its jobs is followed.
 const RETURN_LIMIT: Duration = Duration::from_secs(60);

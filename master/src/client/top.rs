@@ -10,16 +10,12 @@ use std::{
 };
 
 use protocol::request::{HostRow, Reply, Request, Share, State, Status};
-use ratatui::{
-    Frame,
-    crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers},
-    layout::{Constraint, Layout},
-    style::{Color, Modifier, Style},
-    text::Line,
-    widgets::{Block, Borders, Cell, Row, Table},
-};
 
-use super::{Client, surprise};
+use super::{
+    Client,
+    screen::{Key, Screen, Tint},
+    surprise,
+};
 use crate::command::ClientArgs;
 
 /// Between two looks.
@@ -45,14 +41,11 @@ pub fn run(at: &ClientArgs) -> Result<ExitCode, String> {
         println!("{value}");
         return Ok(ExitCode::SUCCESS);
     }
-    if !std::io::stdout().is_terminal() {
+    if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
         print!("{}", plain(&seen));
         return Ok(ExitCode::SUCCESS);
     }
-    let mut terminal = ratatui::try_init().map_err(|e| format!("terminal: {e}"))?;
-    let result = show(&mut terminal, &mut client, seen, &at.master);
-    ratatui::restore();
-    result.map(|()| ExitCode::SUCCESS)
+    show(&mut client, seen, &at.master).map(|()| ExitCode::SUCCESS)
 }
 
 fn look(client: &mut Client) -> Result<Seen, String> {
@@ -61,25 +54,16 @@ fn look(client: &mut Client) -> Result<Seen, String> {
     Ok(Seen { jobs, hosts, rates: BTreeMap::new() })
 }
 
-fn show(
-    terminal: &mut ratatui::DefaultTerminal,
-    client: &mut Client,
-    mut seen: Seen,
-    master: &str,
-) -> Result<(), String> {
+fn show(client: &mut Client, mut seen: Seen, master: &str) -> Result<(), String> {
     let fault = |e: std::io::Error| format!("terminal: {e}");
+    let mut screen = Screen::open().map_err(fault)?;
     let mut looked = Instant::now();
     loop {
-        terminal.draw(|frame| draw(frame, &seen, master)).map_err(fault)?;
+        let size = screen.size().map_err(fault)?;
+        screen.show(&page(&seen, master, size)).map_err(fault)?;
         let left = LOOK_EVERY.saturating_sub(looked.elapsed());
-        if event::poll(left).map_err(fault)?
-            && let Event::Key(key) = event::read().map_err(fault)?
-            && key.kind == KeyEventKind::Press
-        {
-            let interrupt = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
-            if interrupt || matches!(key.code, KeyCode::Char('q') | KeyCode::Esc) {
-                return Ok(());
-            }
+        if screen.key(left).map_err(fault)? == Some(Key::Leave) {
+            return Ok(());
         }
         if looked.elapsed() >= LOOK_EVERY {
             let passed = looked.elapsed().as_secs_f64();
@@ -149,64 +133,64 @@ const JOB_TITLES: [&str; 7] = ["job", "state", "cycle", "cycles/s", "balance", "
 const HOST_TITLES: [&str; 7] = ["host", "state", "speed", "threads", "lanes", "elements", "note"];
 
 fn plain(seen: &Seen) -> String {
-    let hosts: Vec<_> = seen.hosts.iter().map(|host| host_cells(host, seen)).collect();
-    let jobs: Vec<_> = seen.jobs.iter().rev().map(|job| job_cells(job, seen)).collect();
-    format!("{}\n{}", columns(HOST_TITLES, &hosts), columns(JOB_TITLES, &jobs))
+    let all = |rows: &[[String; 7]], titles| columns(titles, rows, usize::MAX).join("\n");
+    format!("{}\n\n{}\n", all(&hosts(seen), HOST_TITLES), all(&jobs(seen), JOB_TITLES))
 }
 
-fn columns(titles: [&str; 7], rows: &[[String; 7]]) -> String {
+fn hosts(seen: &Seen) -> Vec<[String; 7]> {
+    seen.hosts.iter().map(|host| host_cells(host, seen)).collect()
+}
+
+/// The newest first.
+fn jobs(seen: &Seen) -> Vec<[String; 7]> {
+    seen.jobs.iter().rev().map(|job| job_cells(job, seen)).collect()
+}
+
+/// Titles and rows as lines of columns, cut where they are longer than `most` letters.
+fn columns(titles: [&str; 7], rows: &[[String; 7]], most: usize) -> Vec<String> {
     let widths: Vec<usize> = (0..7)
         .map(|i| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0).max(titles[i].len()))
         .collect();
     let line = |cells: Vec<&str>| {
         let padded: Vec<String> =
             cells.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}")).collect();
-        format!("{}\n", padded.join("  ").trim_end())
+        // What comes from others may hold letters that a terminal obeys.
+        padded.join("  ").trim_end().replace(char::is_control, " ").chars().take(most).collect()
     };
-    let body: String = rows.iter().map(|row| line(row.iter().map(String::as_str).collect())).collect();
-    line(titles.to_vec()) + &body
+    let body = rows.iter().map(|row| line(row.iter().map(String::as_str).collect()));
+    std::iter::once(line(titles.to_vec())).chain(body).collect()
 }
 
-fn colour(state: &str) -> Color {
+fn tint(state: &str) -> Tint {
     match state {
-        "running" | "busy" => Color::Cyan,
-        "done" | "idle" => Color::Green,
-        "failed" | "lost" => Color::Red,
-        _ => Color::Yellow,
+        "running" | "busy" => Tint::Cyan,
+        "done" | "idle" => Tint::Green,
+        "failed" | "lost" => Tint::Red,
+        _ => Tint::Yellow,
     }
 }
 
-fn table<'a>(name: String, titles: [&'a str; 7], rows: Vec<[String; 7]>, wide: u16) -> Table<'a> {
-    let soft = Style::default().add_modifier(Modifier::DIM);
-    let rows = rows.into_iter().map(|cells| {
-        let state = colour(&cells[1]);
-        Row::new(cells.into_iter().enumerate().map(move |(i, text)| {
-            Cell::from(text).style(if i == 1 { Style::default().fg(state) } else { Style::default() })
-        }))
+/// A table under its name, at most `height` lines of `width` letters; states are coloured.
+fn table(
+    name: &str,
+    titles: [&str; 7],
+    rows: &[[String; 7]],
+    (width, height): (usize, usize),
+) -> Vec<String> {
+    let lines = columns(titles, rows, width);
+    let rule = format!(" {name} {}", "\u{2500}".repeat(width.saturating_sub(name.chars().count() + 2)));
+    let states = rows.iter().map(|row| row[1].as_str());
+    let coloured = lines.iter().skip(1).zip(states).map(|(line, state)| {
+        // The first place where it stands alone is its column: what is before it is the name of a host or a number.
+        let at = format!("  {state}");
+        line.replacen(&at, &format!("  {}", tint(state).on(state)), 1)
     });
-    let widths = [
-        Constraint::Length(wide),
-        Constraint::Length(10),
-        Constraint::Length(9),
-        Constraint::Length(9),
-        Constraint::Length(8),
-        Constraint::Length(if wide > 6 { 10 } else { 40 }),
-        Constraint::Min(10),
-    ];
-    Table::new(rows, widths)
-        .header(Row::new(titles).style(soft))
-        .block(Block::new().borders(Borders::TOP).title(name))
+    let titles = Tint::Soft.on(&lines[0]);
+    std::iter::once(rule).chain([titles]).chain(coloured).take(height).collect()
 }
 
-fn draw(frame: &mut Frame<'_>, seen: &Seen, master: &str) {
-    let n_hosts = seen.hosts.len().max(1) as u16;
-    let [head, hosts, jobs, foot] = Layout::vertical([
-        Constraint::Length(1),
-        Constraint::Length((n_hosts + 2).min(frame.area().height / 2)),
-        Constraint::Min(3),
-        Constraint::Length(1),
-    ])
-    .areas(frame.area());
+/// What the terminal shows, at most as many lines as it has.
+fn page(seen: &Seen, master: &str, (width, height): (usize, usize)) -> Vec<String> {
     let count = |state| seen.jobs.iter().filter(|job| job.state == state).count();
     let summary = format!(
         "bolide at {master}: {} hosts, {} jobs running, {} queued",
@@ -214,19 +198,19 @@ fn draw(frame: &mut Frame<'_>, seen: &Seen, master: &str) {
         count(State::Running),
         count(State::Queued)
     );
-    frame.render_widget(Line::from(summary), head);
-    let rows = seen.hosts.iter().map(|host| host_cells(host, seen)).collect();
-    frame.render_widget(table(" Hosts ".to_owned(), HOST_TITLES, rows, 24), hosts);
-    let rows = seen.jobs.iter().rev().map(|job| job_cells(job, seen)).collect();
-    frame.render_widget(table(" Jobs ".to_owned(), JOB_TITLES, rows, 5), jobs);
-    let help = Line::from("q leaves").style(Style::default().add_modifier(Modifier::DIM));
-    frame.render_widget(help, foot);
+    let of_hosts = (seen.hosts.len().max(1) + 2).min(height / 2);
+    let mut lines = vec![summary.chars().take(width).collect()];
+    lines.extend(table("Hosts", HOST_TITLES, &hosts(seen), (width, of_hosts)));
+    let left = height.saturating_sub(lines.len() + 1);
+    lines.extend(table("Jobs", JOB_TITLES, &jobs(seen), (width, left)));
+    lines.push(Tint::Soft.on("q leaves"));
+    lines.truncate(height.max(1));
+    lines
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ratatui::{Terminal, backend::TestBackend};
 
     fn seen() -> Seen {
         let share = |host: &str, speed, elements| Share { host: host.to_owned(), speed, elements };
@@ -265,11 +249,27 @@ mod tests {
         assert_eq!(imbalance(&seen.jobs[0].shares), Some(130.0 / 120.0));
         let text = plain(&seen);
         assert!(text.contains("50.0") && text.contains("1.083"), "{text}");
-        let mut terminal = Terminal::new(TestBackend::new(100, 20)).expect("a terminal in memory");
-        terminal.draw(|frame| draw(frame, &seen, "m:1")).expect("drawn");
-        let drawn = terminal.backend().to_string();
-        for words in ["bolide at m:1: 1 hosts", "Hosts", "Jobs", "plates", "50.0", "busy"] {
+        let lines = page(&seen, "m:1", (100, 20));
+        let drawn = lines.join("\n");
+        for words in ["bolide at m:1: 1 hosts", "Hosts", "Jobs", "plates", "50.0", "\x1b[36mbusy\x1b[0m"] {
             assert!(drawn.contains(words), "{words} in\n{drawn}");
+        }
+    }
+    #[test]
+    fn a_page_fits_its_terminal_and_obeys_nobody_else() {
+        let mut seen = seen();
+        seen.jobs[0].title = "\x1b[2J".repeat(40);
+        seen.jobs = vec![seen.jobs[0].clone(); 50];
+        for (width, height) in [(100, 20), (20, 5), (1, 1), (0, 0)] {
+            let lines = page(&seen, "m:1", (width, height));
+            assert!(lines.len() <= height.max(1), "{} lines of {height}", lines.len());
+            for line in &lines {
+                let plain = ["\x1b[36m", "\x1b[2m", "\x1b[0m"]
+                    .iter()
+                    .fold(line.clone(), |l, code| l.replace(code, ""));
+                assert!(!plain.contains('\x1b'), "{line:?}");
+                assert!(plain.chars().count() <= width.max(9), "{plain:?} in {width}");
+            }
         }
     }
 }
