@@ -7,7 +7,7 @@
 use std::{net::IpAddr, path::Path};
 
 use axum::http::{HeaderMap, header};
-use rustls::crypto::aws_lc_rs;
+use rustls::crypto::ring;
 
 /// File with the token in the spool folder: a restarted master keeps it, and open pages go on.
 const FILE: &str = "http-token";
@@ -136,7 +136,7 @@ impl Guard {
 fn make(path: &Path) -> Result<String, String> {
     use std::{io::Write, os::unix::fs::OpenOptionsExt};
     let mut bytes = [0u8; 16];
-    aws_lc_rs::default_provider()
+    ring::default_provider()
         .secure_random
         .fill(&mut bytes)
         .map_err(|_| "the system has no random bytes".to_owned())?;
