@@ -77,7 +77,7 @@ enum Arrival {
 const WHOLE: usize = 50_000;
 
 /// A worker in this process.
-struct Place {
+struct LocalWorker {
     /// Away while a task runs.
     machine: Option<Box<Machine>>,
     lost: bool,
@@ -87,7 +87,7 @@ struct Place {
     peers: (u32, BTreeMap<u32, u64>),
 }
 
-impl Place {
+impl LocalWorker {
     fn new() -> Self {
         Self {
             machine: Some(Box::default()),
@@ -136,7 +136,7 @@ pub fn run_through(
     let (send, receive) = mpsc::channel();
     let process = Process {
         sink,
-        places: (0..n_workers).map(|_| Place::new()).collect(),
+        places: (0..n_workers).map(|_| LocalWorker::new()).collect(),
         queue: VecDeque::new(),
         // With one worker, tasks run where the loop runs: on the pool.
         pool: (n_workers > 1).then(|| Arc::clone(&pool)),
@@ -160,7 +160,7 @@ pub fn run_through(
 /// One process: its threads, and what is between the sessions.
 struct Process<'a> {
     sink: &'a mut (dyn Sink + Send),
-    places: Vec<Place>,
+    places: Vec<LocalWorker>,
     queue: VecDeque<Arrival>,
     pool: Option<Arc<rayon::ThreadPool>>,
     threads: usize,
@@ -198,7 +198,7 @@ fn drive(
             }
             Some(Fate::Touch(host, touch)) => world.surroundings.places[host].touch = Some(touch),
             Some(Fate::Join(hand)) => {
-                world.surroundings.places.push(Place::new());
+                world.surroundings.places.push(LocalWorker::new());
                 let host = world.sessions.add_host();
                 world.join(host, hand)?;
             }
@@ -349,7 +349,7 @@ impl Surroundings for Process<'_> {
     }
 
     fn report(&self, sessions: &Sessions, host: usize) -> Option<Report> {
-        let Place { stopwatch, peers: (epoch, peers), .. } = &self.places[host];
+        let LocalWorker { stopwatch, peers: (epoch, peers), .. } = &self.places[host];
         let now = *epoch == sessions.hosts[host].session.epoch();
         Some(Report {
             peer_bytes: peers.values().sum(),

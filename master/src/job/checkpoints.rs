@@ -244,16 +244,18 @@ mod tests {
             let mut checkpoints = Checkpoints::new(first.clone(), Keep::Never);
             checkpoints.expect(7);
             let state = GlobalState { cycle: 7, ..GlobalState::clone(&first.state) };
-            let mut parts: Vec<Box<dyn Fn(&mut Checkpoints)>> = vec![
-                Box::new(move |all| all.take_state(7, state.clone())),
-                Box::new(|all| all.take_rest(7, checkpoint().rest)),
-            ];
-            if !state_first {
-                parts.reverse();
+            let rest = first.rest.clone();
+            if state_first {
+                checkpoints.take_state(7, state.clone());
+            } else {
+                checkpoints.take_rest(7, rest.clone());
             }
-            parts[0](&mut checkpoints);
             assert!(checkpoints.is_expected(7) && !checkpoints.is_whole(7) && checkpoints.take(7).is_none());
-            parts[1](&mut checkpoints);
+            if state_first {
+                checkpoints.take_rest(7, rest);
+            } else {
+                checkpoints.take_state(7, state);
+            }
             assert_eq!(checkpoints.take(7).map(|whole| whole.cycle()), Some(7));
             assert!(!checkpoints.is_expected(7), "it has been taken");
         }

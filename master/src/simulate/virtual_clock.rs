@@ -45,7 +45,7 @@ const KEEP_SECONDS: f64 = 10.0;
 const STANDSTILL: f64 = 1e-12;
 
 /// A host's worker beside its session.
-struct Place {
+struct EmulatedWorker {
     player: Player,
     /// What its tasks took so far, at the speeds that its host had (virtual ns).
     busy: message::Work,
@@ -61,7 +61,7 @@ struct Clock<'a> {
     overlap: bool,
     /// Of the machines' changes: those that have happened, which a run that goes back does not repeat.
     happened: Vec<bool>,
-    places: Vec<Place>,
+    places: Vec<EmulatedWorker>,
     sorts: VecDeque<Sorted>,
     sorts_kept: Vec<Sorted>,
     sort_ns: Vec<f64>,
@@ -121,7 +121,12 @@ pub fn run(
         overlap: scheme.overlap,
         places: players
             .into_iter()
-            .map(|player| Place { player, busy: Default::default(), held: Vec::new(), incarnation: 0 })
+            .map(|player| EmulatedWorker {
+                player,
+                busy: Default::default(),
+                held: Vec::new(),
+                incarnation: 0,
+            })
             .collect(),
         happened: vec![false; machines.changes.len()],
         sorts: tape.map(|tape| tape.sorts.iter().cloned().collect()).unwrap_or_default(),
@@ -448,7 +453,7 @@ impl Surroundings for Clock<'_> {
         // Host 0 keeps some of its time for the master's sorts; it is slower by that.
         let kept = if host == 0 { self.machines.believed[0] / self.machines.speeds[0] } else { 1.0 };
         let speed = self.processors[host].speed() * kept;
-        let Place { busy, incarnation, .. } = &mut self.places[host];
+        let EmulatedWorker { busy, incarnation, .. } = &mut self.places[host];
         busy.compute_ns += (costs.busy() / speed * 1e9) as u64;
         busy.contact_ns += (costs.contact / speed * 1e9) as u64;
         let work = Work::Task(host, *incarnation, kind, outcome);
