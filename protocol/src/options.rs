@@ -127,7 +127,7 @@ pub struct JobOptions {
     #[arg(long, value_enum, default_value = "given")]
     pub balance: Balance,
     /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for no oftener than on disk
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = period)]
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = period, allow_negative_numbers = true)]
     pub keep_every: std::option::Option<f64>,
     /// Store the run on disk every so many seconds, to be gone on with by --resume; 0 for never [default: the deck's; else a
     /// master's jobs every 10, `run` only when it is interrupted]
