@@ -12,7 +12,7 @@
 
 use mechanics::{
     block::{Block, Piece},
-    cycle::{Domain, Meter, Plan, Sets, Subdomain},
+    cycle::{self, Domain, Interval, Meter, Plan, Subdomain},
     element::{
         ElementVote, Step, hex8,
         shell4::{Rule, ShellStep, Shells},
@@ -188,7 +188,7 @@ fn plates(
     kind: Kind,
     width: Width,
     n_pieces: usize,
-) -> (Domain, usize) {
+) -> (Domain, Quantum, usize) {
     let row = side + 1;
     let plane = row * row;
     let n_nodes = plane * (below + above + 1);
@@ -296,7 +296,7 @@ fn plates(
     let mut domain = Domain::new(setup, n_parts, quanta, (subdomains, 0), &[], width);
     let plan = Plan { moments: kind == Kind::Shells, ..Plan::default() };
     domain.install(&plan, &[]).expect("a plan without other workers");
-    (domain, n_elements)
+    (domain, quanta.force, n_elements)
 }
 
 /// Books nothing: the bench reads the clock itself.
@@ -313,7 +313,7 @@ impl Meter for Silent {
 /// Median and least over `n_cycles` cycles of the nanoseconds per element of a whole cycle by `clock` (seconds), from the
 /// impact on.
 fn whole_cycle(
-    (mut domain, n_elements): (Domain, usize),
+    (mut domain, quantum, n_elements): (Domain, Quantum, usize),
     n_cycles: usize,
     clock: &dyn Fn() -> f64,
 ) -> [f64; 2] {
@@ -323,13 +323,10 @@ fn whole_cycle(
         .map(|cycle| {
             let limit = 0.6666 * vote.courant.min(vote.volume_limit);
             let dt = if cycle == 0 { 0.5 * limit } else { limit.min(1.05 * dt_previous) };
+            let now = Interval { time: 0.0, dt_previous, dt, quantum };
             let start = clock();
-            domain.contact(dt_previous, &Silent);
-            domain.elements(Sets::Border, dt_previous, &Silent);
-            let partials = domain.partials(&Silent);
-            domain.elements(Sets::Interior, dt_previous, &Silent);
-            vote =
-                domain.integrate(&partials, dt_previous, dt, &[], &Silent).expect("totals of the exchange");
+            vote = cycle::step(&mut domain, &now, &[], |_, partials| partials, &Silent)
+                .expect("totals of the exchange");
             let spent = clock() - start;
             assert!(vote.fault.is_none(), "fault {:?}", vote.fault);
             dt_previous = dt;

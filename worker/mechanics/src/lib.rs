@@ -10,7 +10,7 @@
 //! tension, pressure positive in compression. Hexahedron corners are numbered
 //! 0(000) 1(100) 2(110) 3(010) 4(001) 5(101) 6(111) 7(011).
 //!
-//! One cycle `n`, as [`setup::Control`] and the worker's session step through it:
+//! One cycle `n`, as [`cycle::step`] and the worker's session go through it:
 //! 1. contact forces of this worker's work units at `x_n`;
 //! 2. forces of the element sets that touch shared nodes (border);
 //! 3. partial forces of shared nodes travel;

@@ -7,7 +7,7 @@
 use crate::{
     block::{Block, Piece},
     contact::{Batch, BatchFace, BatchNode, BatchUnit, Contact, Settings},
-    cycle::{Domain, Meter, Sets, Subdomain},
+    cycle::{self, Domain, Interval, Meter, Subdomain},
     element::{ElementVote, hex8},
     erosion::Erosion,
     exact::Quantum,
@@ -274,12 +274,13 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
     let quanta = Quanta { force, energy, momentum: energy, arm: 1.0 };
     let subdomain = Subdomain { id: 0, pieces: vec![piece], unowned: Vec::new(), surface: Vec::new() };
     let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], width);
-    for cycle in 0..3 {
-        domain.begin(force, DT * f64::from(cycle));
-        domain.elements(Sets::All, DT, &Unmeasured);
-        let hash = domain.sample(0);
-        hasher.update(&hash.expect("there is one block"));
-        let vote = domain.integrate(&[], DT, DT, &[], &Unmeasured);
+    for n in 0..3 {
+        let now = Interval { time: DT * f64::from(n), dt_previous: DT, dt: DT, quantum: force };
+        let hashed = |domain: &Domain, partials| {
+            hasher.update(&domain.sample(0).expect("there is one block"));
+            partials
+        };
+        let vote = cycle::step(&mut domain, &now, &[], hashed, &Unmeasured);
         let vote = vote.expect("no node is exchanged");
         put(hasher, [vote.external.whole(), vote.courant].into_iter().chain(vote.momentum));
     }

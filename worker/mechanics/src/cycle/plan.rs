@@ -8,7 +8,11 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{ContactRoom, Domain, Guests, NONE, Room, Shared, bodies, pack, positions};
+use super::{
+    Domain, NONE, bodies,
+    guests::{ContactRoom, Guests, pack, positions},
+    room::Room,
+};
 use crate::{
     contact::{Batch, Contact, PairEnergies},
     lanes::SET,
@@ -93,6 +97,9 @@ impl Domain {
             constraint,
             sets,
         };
+        if let Some(guest) = plan.guests.iter().find(|guest| !self.home.get(guest.node).is_empty()) {
+            return Err(format!("guest {} is held here, must be a node of other workers alone", guest.node));
+        }
         let guest_of: HashMap<u32, u32> =
             self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
         let contact_nodes = plan.batch.as_ref().map_or(&[][..], |batch| &batch.nodes);
@@ -122,21 +129,19 @@ impl Domain {
         }
         // Every node with more than one copy, here or elsewhere, and every contact node.
         self.moments = plan.moments;
-        self.copies.clear();
         self.exchange.clear();
-        self.local.clear();
-        self.seams.clear();
+        self.groups.clear();
         let mut exchanged = HashSet::with_capacity(plan.exchange.len());
         let n_entries = bodies::entries_of(&plan.exchange, self.bodies.len())?;
         self.sends_pushes = n_entries > 0;
         for &node in &plan.exchange[..plan.exchange.len() - n_entries] {
             exchanged.insert(node);
             let contact = contact_nodes.binary_search_by_key(&node, |n| n.global);
-            let shared = self.shared(node, contact.map_or(NONE, |i| i as u32), &guest_of);
-            if shared.copies.is_empty() && shared.guest == NONE {
+            let (copies, guest) = (self.home.get(node), guest_of.get(&node).copied().unwrap_or(NONE));
+            if copies.is_empty() && guest == NONE {
                 return Err(format!("node {node} of the exchange is neither held nor a guest"));
             }
-            self.exchange.push(shared);
+            self.exchange.push(copies, contact.map_or(NONE, |i| i as u32), guest);
         }
         if !self.bodies.is_empty() {
             let nodes: Vec<u32> = contact_nodes.iter().map(|node| node.global).collect();
@@ -146,14 +151,14 @@ impl Domain {
         let (mut next, n_several) = (0, self.home.several().len());
         for (i, node) in (0_u32..).zip(contact_nodes.iter().map(|n| n.global)) {
             while next < n_several && self.home.several()[next] < node {
-                self.share_locally(self.home.several()[next], NONE, &exchanged, &guest_of);
+                self.share_locally(self.home.several()[next], NONE, &exchanged);
                 next += 1;
             }
             next += usize::from(next < n_several && self.home.several()[next] == node);
-            self.share_locally(node, i, &exchanged, &guest_of);
+            self.share_locally(node, i, &exchanged);
         }
         for i in next..n_several {
-            self.share_locally(self.home.several()[i], NONE, &exchanged, &guest_of);
+            self.share_locally(self.home.several()[i], NONE, &exchanged);
         }
         for room in &mut self.rooms {
             (room.border, room.interior) = if exchanged.is_empty() {
@@ -213,35 +218,11 @@ impl Domain {
         room.contact.energies().of_springs()
     }
 
-    /// Books the copies of a held node that is not exchanged.
-    fn share_locally(
-        &mut self,
-        node: u32,
-        contact: u32,
-        exchanged: &HashSet<u32>,
-        guest_of: &HashMap<u32, u32>,
-    ) {
-        if exchanged.contains(&node) {
-            return;
-        }
+    /// Adds a node to the groups, if it is held here and not exchanged.
+    fn share_locally(&mut self, node: u32, contact: u32, exchanged: &HashSet<u32>) {
         let copies = self.home.get(node);
-        // Moments go the general way, and so does a node that a guest stands for here.
-        let simple = !self.moments && !guest_of.contains_key(&node);
-        let contact_node = (contact != NONE).then_some(contact);
-        if copies.is_empty() || (simple && self.seams.take(copies, contact_node)) {
-            return;
-        }
-        let shared = self.shared(node, contact, guest_of);
-        self.local.push(shared);
-    }
-
-    fn shared(&mut self, node: u32, contact: u32, guest_of: &HashMap<u32, u32>) -> Shared {
-        let first = self.copies.len() as u32;
-        self.copies.extend_from_slice(self.home.get(node));
-        Shared {
-            copies: first..self.copies.len() as u32,
-            contact,
-            guest: guest_of.get(&node).copied().unwrap_or(NONE),
+        if !copies.is_empty() && !exchanged.contains(&node) {
+            self.groups.push(copies, contact);
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::{
     piece::{Region, cut},
     setup::{Constraint, Control},
     state::field,
+    vote::Watched,
 };
 
 /// No clock.

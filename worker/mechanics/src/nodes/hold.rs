@@ -1,0 +1,73 @@
+//! Nodes that something holds or pushes: forces on nodes, prescribed velocities, rigid walls.
+
+use super::{Advance, NodeSet, Nodes};
+use crate::{
+    lanes::SET,
+    vote::Work,
+    wall::{Motion, touched_quantum},
+};
+
+impl Advance<'_> {
+    /// Corrects the free velocities of held nodes from `at` on; gives the work of what holds the booked ones.
+    pub(super) fn hold(
+        &self,
+        nodes: &mut Nodes<'_>,
+        set: NodeSet,
+        at: usize,
+        velocity: &mut [[f64; SET]; 3],
+    ) -> Work {
+        let mut external = Work::default();
+        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        let curves = &self.loads.curves;
+        for lane in (0..SET).filter(|lane| set.held >> lane & 1 == 1) {
+            let i = at + lane;
+            let old = [nodes.v[0][i], nodes.v[1][i], nodes.v[2][i]];
+            let free = [velocity[0][lane], velocity[1][lane], velocity[2][lane]];
+            let mut new = free;
+            let mass = nodes.mass[i];
+            let booked = set.booked >> lane & 1 == 1;
+            let held = &self.constraints[nodes.constraint[i] as usize];
+            let mut forces = held.forces;
+            while forces != 0 {
+                let load = &self.loads.forces[forces.trailing_zeros() as usize];
+                let scale = half_steps * load.drive.at(curves, self.time) / mass;
+                for a in 0..3 {
+                    new[a] += load.force[a] * scale;
+                }
+                forces &= forces - 1;
+            }
+            for (component, prescribed) in new.iter_mut().zip(held.velocity) {
+                if let Some(velocity) = prescribed {
+                    *component = velocity.at(curves, 0.5f64.mul_add(self.dt, self.time));
+                }
+            }
+            let mut walls = held.walls;
+            while walls != 0 {
+                let w = walls.trailing_zeros() as usize;
+                let x = [nodes.x[0][i], nodes.x[1][i], nodes.x[2][i]];
+                let before = new;
+                if self.walls[w].stop(&self.poses[w], x, &mut new, self.dt) && booked {
+                    let quantum = self.quanta.momentum;
+                    for a in 0..3 {
+                        nodes.walls[w].impulse[a] += quantum.round(mass * (before[a] - new[a]));
+                    }
+                    if let Motion::Free { mass: own, .. } = self.walls[w].motion {
+                        nodes.walls[w].touched += touched_quantum(own).round(mass);
+                    }
+                }
+                walls &= walls - 1;
+            }
+            if booked && new != free {
+                let with = |v: [f64; 3]| {
+                    let work = (0..3).map(|a| 0.5 * mass * (new[a] - free[a]) * v[a]).sum::<f64>();
+                    self.quanta.energy.round(work)
+                };
+                external.merge(Work { before: with(old), after: with(new) });
+            }
+            for a in 0..3 {
+                velocity[a][lane] = new[a];
+            }
+        }
+        external
+    }
+}

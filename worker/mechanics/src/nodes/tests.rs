@@ -1,0 +1,202 @@
+use super::*;
+use crate::{
+    exact::Quantum,
+    load::{Curve, Drive, Gravity, NodalForce, Relaxation},
+    wall::{Motion, Shape},
+};
+
+const FLOOR: Shape = Shape::Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
+
+fn advance_one(
+    v: [f64; 3],
+    f: [f64; 3],
+    constraint: Constraint,
+    walls: &[RigidWall],
+) -> ([f64; 3], [f64; 3], Booked) {
+    let (x, v, booked, _) = loaded_one(v, f, constraint, walls, &Loads::default());
+    (x, v, booked)
+}
+
+fn loaded_one(
+    v: [f64; 3],
+    f: [f64; 3],
+    constraint: Constraint,
+    walls: &[RigidWall],
+    loads: &Loads,
+) -> ([f64; 3], [f64; 3], Booked, Vec<WallVote>) {
+    let padded = |c: f64| [c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0].to_vec();
+    let mut x = [0.0, 0.0, 0.001].map(padded);
+    let mut vel = v.map(padded);
+    let mut force = f.map(padded);
+    let mut votes = vec![WallVote::default(); walls.len()];
+    let q = Quantum::for_reference(1e3, 46);
+    let constraints = [Constraint::default(), constraint];
+    let advance = Advance {
+        dt_previous: 1e-3,
+        dt: 1e-3,
+        time: 0.5,
+        constraints: &constraints,
+        walls,
+        poses: &vec![Pose::default(); walls.len()],
+        loads,
+        quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
+    };
+    let mut nodes = Nodes {
+        x: &mut x,
+        v: &mut vel,
+        f: &mut force,
+        mass: &[2.0; SET],
+        constraint: &[1],
+        sets: &[NodeSet { held: 1, booked: 1, surface: 0 }],
+        reference: &Default::default(),
+        walls: &mut votes,
+    };
+    let booked = advance.run(&mut nodes, Width::best());
+    assert!(force.iter().flatten().all(|&f| f == 0.0), "forces are cleared");
+    (x.map(|c| c[0]), vel.map(|c| c[0]), booked, votes)
+}
+
+#[test]
+fn free_node_gains_force_over_mass_times_dt() {
+    let (x, v, booked) = advance_one([1.0, 0.0, 0.0], [4.0, 0.0, 0.0], Constraint::default(), &[]);
+    assert!((v[0] - 1.002).abs() < 1e-15 && (x[0] - 1.002e-3).abs() < 1e-15);
+    assert!((booked.kinetic - 1.002).abs() < 1e-9 && booked.external == Work::default());
+}
+
+#[test]
+fn prescribed_velocity_books_the_work_of_its_support() {
+    let hold = Constraint { velocity: [Some(Drive::constant(1.0)), None, None], ..Constraint::default() };
+    let (_, v, booked) = advance_one([1.0, 0.0, 0.0], [4.0, 0.0, 0.0], hold, &[]);
+    assert_eq!(v[0], 1.0);
+    // As fast before as after: half of the work is done by t_n.
+    let Work { before, after } = booked.external;
+    assert!((before + 2.0e-3).abs() < 1e-9 && (after + 2.0e-3).abs() < 1e-9, "{before} {after}");
+}
+
+#[test]
+fn wall_stops_the_node_on_its_plane_and_friction_follows_coulomb() {
+    let touches = Constraint { walls: 1, ..Constraint::default() };
+    let mut wall = RigidWall { shape: FLOOR, motion: Motion::Fixed, friction: 0.0, parts: vec![true] };
+    let (x, v, _) = advance_one([10.0, 0.0, -10.0], [0.0; 3], touches, std::slice::from_ref(&wall));
+    assert!(x[2].abs() < 1e-15 && v[0] == 10.0);
+    wall.friction = 0.3;
+    let (_, v, _) = advance_one([10.0, 0.0, -10.0], [0.0; 3], touches, std::slice::from_ref(&wall));
+    // normal velocity goes from -10 to -1 (it still closes one millimetre): tangential loses 0.3 * 9
+    assert!((v[0] - 7.3).abs() < 1e-12, "{}", v[0]);
+}
+
+#[test]
+fn what_a_node_loses_the_wall_gets_and_a_light_wall_counts_the_mass_on_it() {
+    let touches = Constraint { walls: 1, ..Constraint::default() };
+    let motion = Motion::Free { mass: 100.0, velocity: [0.0; 3] };
+    let wall = RigidWall { shape: FLOOR, motion, friction: 0.3, parts: vec![true] };
+    let before = [10.0, 0.0, -10.0];
+    let (_, v, _, votes) = loaded_one(before, [0.0; 3], touches, &[wall], &Loads::default());
+    for a in 0..3 {
+        assert!((votes[0].impulse[a] - 2.0 * (before[a] - v[a])).abs() < 1e-9, "{:?}", votes[0]);
+    }
+    assert_eq!(votes[0].touched, 2.0);
+}
+
+#[test]
+fn gravity_relaxation_and_nodal_force_change_the_velocity_and_book_their_work() {
+    let curves = vec![Curve { points: vec![[0.0, 0.0], [1.0, 2.0]] }];
+    let drive = Drive { factor: 3.0, curve: Some(0) };
+    let force = NodalForce { force: [8.0, 0.0, 0.0], drive: Drive { factor: 1.0, curve: Some(0) } };
+    let loads = Loads {
+        curves,
+        forces: vec![force],
+        gravity: Some(Gravity { acceleration: [0.0, 0.0, -10.0], drive }),
+        surfaces: Vec::new(),
+        relaxation: Some(Relaxation { factor: 0.9, until: 0.6 }),
+    };
+    let pushed = Constraint { forces: 1, ..Constraint::default() };
+    let run = |loads| loaded_one([1.0, 2.0, 0.0], [0.0; 3], pushed, &[], loads);
+    // At 0.5 the curve is 1; a step of 1e-3, mass 2: 8/2 e-3 along x, -30e-3 along z.
+    let (_, v, booked, _) = run(&loads);
+    let expected: [f64; 3] = [0.9 + 4e-3, 1.8, -30e-3];
+    assert!((0..3).all(|a| (v[a] - expected[a]).abs() < 1e-15), "{v:?}");
+    let energy = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>();
+    assert!(
+        (booked.external.whole() - (energy(v) - energy([1.0, 2.0, 0.0]))).abs() < 1e-9,
+        "{:?}",
+        booked.external
+    );
+    let late = Loads { relaxation: Some(Relaxation { factor: 0.9, until: 0.5 }), ..loads.clone() };
+    assert!((run(&late).1[1] - 2.0).abs() < 1e-15, "relaxation is over");
+}
+
+#[test]
+fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
+    let n = 21;
+    let mut seed = 5_u64;
+    let mut numbers = |n: usize, low: f64, high: f64| -> Vec<f64> {
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            low + (high - low) * (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..n).map(|_| draw()).collect()
+    };
+    let padded = usize::next_multiple_of(n, SET);
+    let mut vectors = |size: f64| -> [Vec<f64>; 3] { [0; 3].map(|_| numbers(padded, -size, size)) };
+    let (x, v, f, reference) = (vectors(1e-3), vectors(10.0), vectors(1e4), vectors(1e-3));
+    let mass = numbers(padded, 1.0, 2.0);
+    let constraint: Vec<u16> = (0..n as u16).map(|i| [0, 0, 1, 0, 2][i as usize % 5]).collect();
+    let mut sets = NodeSet::all(&constraint);
+    for (i, set) in (0..n).map(|i| (i, i / SET)).filter(|(i, _)| i % 3 != 1) {
+        sets[set].booked |= 1 << (i % SET);
+        if !(8..=17).contains(&i) {
+            sets[set].surface |= 1 << (i % SET);
+        }
+    }
+    let quantum = Quantum::for_reference(1e6, 46);
+    let constraints = [
+        Constraint::default(),
+        Constraint {
+            velocity: [Some(Drive::constant(1.0)), None, Some(Drive::constant(0.0))],
+            ..Constraint::default()
+        },
+        Constraint { walls: 1, forces: 1, ..Constraint::default() },
+    ];
+    let motion = Motion::Free { mass: 50.0, velocity: [0.0; 3] };
+    let wall = RigidWall { shape: FLOOR, motion, friction: 0.2, parts: vec![true] };
+    let loads = Loads {
+        forces: vec![NodalForce { force: [1e3, 0.0, 5e2], drive: Drive::constant(1.0) }],
+        gravity: Some(Gravity { acceleration: [0.0, 3.0, -10.0], drive: Drive::constant(1.0) }),
+        relaxation: Some(Relaxation { factor: 0.95, until: 1.0 }),
+        ..Loads::default()
+    };
+    let advance = Advance {
+        dt_previous: 1e-4,
+        dt: 1.1e-4,
+        time: 0.0,
+        constraints: &constraints,
+        walls: &[wall],
+        poses: &[Pose::default()],
+        loads: &loads,
+        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
+    };
+    let run = |width: Width| {
+        let (mut x, mut v, mut f) = (x.clone(), v.clone(), f.clone());
+        let mut votes = [WallVote::default()];
+        let mut nodes = Nodes {
+            x: &mut x,
+            v: &mut v,
+            f: &mut f,
+            mass: &mass,
+            constraint: &constraint,
+            sets: &sets,
+            reference: &reference,
+            walls: &mut votes,
+        };
+        let booked = advance.run(&mut nodes, width);
+        assert!(booked.external != Work::default() && booked.speed_ahead > booked.speed_squared.sqrt());
+        let bits: Vec<u64> = x.iter().chain(&v).flatten().map(|c| c.to_bits()).collect();
+        assert!(votes[0].touched > 0.0);
+        (booked, votes, bits)
+    };
+    let reference = run(Width::Scalar);
+    for width in Width::ALL.into_iter().filter(|width| width.available()) {
+        assert_eq!(run(width), reference, "{width}");
+    }
+}
