@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     fn unit(i: i32, nodes: Vec<u32>, interactions: u64) -> WorkUnit {
-        WorkUnit { cube: [i, 0, 0], nodes, faces: vec![0], edges: Vec::new(), interactions }
+        WorkUnit { cube: [i, 0, 0], nodes, faces: vec![0], interactions, ..WorkUnit::default() }
     }
 
     #[test]

@@ -5,17 +5,18 @@
 //! holds the nodes inside it and every face those may meet before the next sort. When that next sort is due
 //! is a rule on displacements ([`reach`]). A worker gets a *batch* of units and each cycle
 //! ([`cycle`]):
-//! 1. takes the node-face pairs that can meet before the next sort ([`search`], once per batch);
+//! 1. takes the pairs that can meet before the next sort ([`search`], once per batch);
 //! 2. drops those whose boxes are apart ([`search`]), most of them for several cycles at once;
 //! 3. finds the closest point of each face to its node: the contact detection zone ([`zone`]), many nodes at a time
 //!    (`slots`);
 //! 4. reduces the hits of a node to distinct closest features with a side ([`joint`]);
 //! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
 //!
-//! Nodes meet faces: two edges that cross while no node is in a zone are not seen, unless the deck has them meet too
-//! ([`edges`]).
+//! That is a node against a face. Two edges that cross while no node is in a zone are not seen so; where the deck has them meet
+//! too, they are a kind of pairs of their own ([`edges`]). What a kind does for the sort, the batch and the cycle is said in `pair`;
+//! `kinds` lists them.
 //!
-//! Search, geometry (zone and joint) and force know nothing of each other; only [`cycle`] knows all three.
+//! Search, geometry (zone and joint) and force know nothing of each other; only `node_face` knows all three.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,9 +25,12 @@ pub mod cycle;
 pub mod edges;
 pub mod force;
 pub mod joint;
+mod kinds;
 pub mod map;
+mod near_pairs;
+mod node_face;
+mod pair;
 mod pair_energy;
-mod pairs;
 pub mod reach;
 pub mod search;
 mod slots;
@@ -37,14 +41,16 @@ mod watch;
 pub mod work_unit;
 pub mod zone;
 
-pub use cycle::{Contact, initial_pairs};
+pub use cycle::Contact;
 pub use edges::{BatchEdge, BatchEdges, Edge, initial_edges};
 pub use force::ContactVote;
+pub use kinds::{Listed, sort};
 pub use map::Map;
+pub use node_face::initial_pairs;
+pub use pair::Kind;
 pub use pair_energy::{PairEnergies, PairEnergy};
 pub use reach::Extent;
 pub use search::{Exclusions, cull};
-pub use sort::sort;
 pub use surface::{Face, Surface};
 pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
 
@@ -54,8 +60,8 @@ pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
 /// needs five cycles to its first push.
 pub const WARNING: f64 = 2.0;
 
-/// Contact settings of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Contact settings of a run. By default nothing meets.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Radius of the contact detection zone (length).
     pub gap: f64,

@@ -322,8 +322,7 @@ fn of_contact(friction: f64, width: Width, hasher: &mut blake3::Hasher) {
         interacts: vec![false, true, true, false],
         stiffness: 0.5,
         friction_velocity: 1e-3,
-        ignores_initial: false,
-        edges: false,
+        ..Settings::default()
     };
     let mut contact = Contact::new(&batch, &settings, &x, width);
     let v = [x[1].clone(), x[2].clone(), x[0].clone()];

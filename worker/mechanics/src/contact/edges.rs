@@ -18,6 +18,8 @@ pub(super) mod zone;
 
 use serde::{Deserialize, Serialize};
 
+use super::{pair::Kind, surface::Surface, work_unit::WorkUnit};
+
 pub use sort::initial_edges;
 
 /// In a pair of [`ContactVote::worst_pair`](super::ContactVote::worst_pair): the second number without this bit is a node of the
@@ -60,6 +62,26 @@ pub struct BatchEdges {
 }
 
 impl BatchEdges {
+    /// Edges of units and their pairs. `node_index` gives the batch node of a surface node.
+    pub(super) fn gather(surface: &Surface, units: &[&WorkUnit], node_index: &[u32]) -> Self {
+        let pairs = || units.iter().filter(|unit| unit.kind == Kind::EdgeEdge).flat_map(|unit| &unit.pairs);
+        let mut used: Vec<u32> = pairs().flatten().copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        let place = |edge: u32| used.partition_point(|&other| other < edge) as u32;
+        let edge = |&edge: &u32| {
+            let edge = &surface.edges[edge as usize];
+            let [a, b] = edge.nodes.map(|n| n as usize);
+            BatchEdge {
+                nodes: [a, b].map(|n| node_index[n]),
+                part: edge.part,
+                stiffness: 0.5 * (surface.node_stiffness[a] + surface.node_stiffness[b]),
+                share: (surface.node_share[a] + surface.node_share[b]).min(1.0),
+            }
+        };
+        Self { edges: used.iter().map(edge).collect(), pairs: pairs().map(|pair| pair.map(place)).collect() }
+    }
+
     /// Whether every index is in range, of `n_nodes` and `n_parts`.
     pub fn is_sound(&self, n_nodes: usize, n_parts: usize) -> bool {
         let n = self.edges.len();

@@ -6,7 +6,7 @@
 use super::{
     Batch, Contact, Exclusions, Face, Settings, Surface, WARNING, WorkUnit,
     search::{Bounds, candidates},
-    sort::sort,
+    sort,
     zone::Frame,
 };
 use crate::{exact::Quantum, lanes::Width};

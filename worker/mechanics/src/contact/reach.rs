@@ -96,8 +96,7 @@ mod tests {
             interacts: interacts.to_vec(),
             stiffness: 0.5,
             friction_velocity: 1.0,
-            ignores_initial: false,
-            edges: false,
+            ..Settings::default()
         }
     }
 

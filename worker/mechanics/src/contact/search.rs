@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Settings, WARNING,
+    pair::Kind,
     surface::Surface,
     work_unit::{Batch, WorkUnit},
 };
@@ -192,8 +193,8 @@ pub fn cull(
     let mut boxes: Vec<Bounds> = Vec::new();
     let (mut at, mut met) = (Vec::new(), Vec::new());
     let of_unit = |unit: &mut WorkUnit| {
-        if !unit.edges.is_empty() {
-            return unit.edges.len() as u64;
+        if unit.kind != Kind::NodeFace {
+            return unit.pairs.len() as u64;
         }
         let WorkUnit { nodes, faces, .. } = unit;
         at.clear();

@@ -14,7 +14,8 @@
 //! bodies that touch, most of the surface.
 
 use super::{
-    Settings, edges,
+    Settings,
+    pair::Kind,
     search::Exclusions,
     surface::{Face, Surface},
     work_unit::WorkUnit,
@@ -23,28 +24,8 @@ use super::{
 /// Greatest cube index along an axis: three of them fit one key.
 const MAX_CUBE: f64 = 2_097_000.0;
 
-/// Sorts a surface into work units, in the order in which its nodes first touch them. `x` by surface node.
-///
-/// Every pair that interacts and of which the node lies in the face's box grown by the reach is in exactly one
-/// unit. Nodes and faces that can meet nothing are left out. Pairs of edges follow in units of their own, if asked for.
-///
-/// # Panics
-/// If the settings know fewer parts than the surface.
-pub fn sort(
-    surface: &Surface,
-    x: &[[f64; 3]],
-    settings: &Settings,
-    exclusions: &Exclusions,
-) -> Vec<WorkUnit> {
-    let mut units = nodes_and_faces(surface, x, settings, exclusions);
-    if settings.edges {
-        units.extend(edges::sort::units(surface, x, settings, exclusions));
-    }
-    units
-}
-
-/// The units of nodes and faces.
-fn nodes_and_faces(
+/// The units of nodes and faces, in the order in which nodes first touch them; see [`super::sort()`].
+pub(super) fn units(
     surface: &Surface,
     x: &[[f64; 3]],
     settings: &Settings,
@@ -444,7 +425,8 @@ fn assemble(
             cube: cubes[unit],
             nodes: nodes[slice(node_starts, unit)].to_vec(),
             faces: faces[slice(&face_starts, unit)].to_vec(),
-            edges: Vec::new(),
+            pairs: Vec::new(),
+            kind: Kind::NodeFace,
             interactions: interactions[unit],
         })
         .collect()

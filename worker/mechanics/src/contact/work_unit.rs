@@ -5,24 +5,22 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    edges::{BatchEdge, BatchEdges},
-    search::Exclusions,
-    surface::Surface,
-};
+use super::{kinds::Listed, pair::Kind, search::Exclusions, surface::Surface};
 
-/// One cube that holds nodes, and what is to be tested in it. Every interacting node is in exactly one unit of nodes and faces,
-/// every pair of edges in exactly one of edges.
+/// One cube that holds nodes, and what is to be tested in it: pairs of one kind. Every interacting node is in exactly one unit
+/// of nodes and faces, every pair of another kind in exactly one of its kind.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WorkUnit {
+    /// What its pairs are.
+    pub kind: Kind,
     /// Cube along each axis, counted from the lowest corner of all interacting nodes.
     pub cube: [i32; 3],
     /// Surface node indices, ascending.
     pub nodes: Vec<u32>,
-    /// Surface face indices, ascending.
+    /// Surface face indices, ascending; of nodes against faces only.
     pub faces: Vec<u32>,
-    /// Pairs of surface edges to be tested; a unit has these or faces.
-    pub edges: Vec<[u32; 2]>,
+    /// Pairs that are listed one by one, of the other kinds: two surface edges.
+    pub pairs: Vec<[u32; 2]>,
     /// Pairs to be tested: the unit's weight in the balance.
     pub interactions: u64,
 }
@@ -30,7 +28,7 @@ pub struct WorkUnit {
 impl WorkUnit {
     /// Whether there is nothing to be tested.
     pub fn is_empty(&self) -> bool {
-        self.faces.is_empty() && self.edges.is_empty()
+        self.faces.is_empty() && self.pairs.is_empty()
     }
 }
 
@@ -76,8 +74,8 @@ pub struct Batch {
     pub units: Vec<BatchUnit>,
     /// Pairs (global node, face id) that never interact, ascending.
     pub excluded: Vec<(u32, u32)>,
-    /// Pairs of edges, where the deck asks for them.
-    pub edges: BatchEdges,
+    /// Pairs that are listed one by one.
+    pub listed: Listed,
 }
 
 /// One node of a batch.
@@ -185,14 +183,14 @@ impl Batch {
         let units_of = units;
         let units = units
             .iter()
-            .filter(|unit| unit.edges.is_empty())
+            .filter(|unit| unit.kind == Kind::NodeFace)
             .map(|unit| BatchUnit {
                 nodes: unit.nodes.iter().map(|&n| node_index[n as usize]).collect(),
                 faces: unit.faces.iter().map(|&f| face_index[f as usize]).collect(),
             })
             .collect();
-        let edges = edges_of(surface, units_of, &node_index);
-        Self { nodes, faces, units, excluded, edges }
+        let listed = Listed::gather(surface, units_of, &node_index);
+        Self { nodes, faces, units, excluded, listed }
     }
 
     /// Whether every index is in range, parts among `n_parts`, masses positive and nodes and faces in order: what a batch
@@ -206,26 +204,6 @@ impl Batch {
             && self.nodes.is_sorted_by(|a, b| a.global < b.global)
             && self.faces.is_sorted_by(|a, b| a.id < b.id)
             && self.excluded.is_sorted()
-            && self.edges.is_sound(n_nodes, n_parts)
+            && self.listed.is_sound(n_nodes, n_parts)
     }
-}
-
-/// Edges of units and their pairs. `node_index` gives the batch node of a surface node.
-fn edges_of(surface: &Surface, units: &[&WorkUnit], node_index: &[u32]) -> BatchEdges {
-    let mut used: Vec<u32> = units.iter().flat_map(|unit| &unit.edges).flatten().copied().collect();
-    used.sort_unstable();
-    used.dedup();
-    let place = |edge: u32| used.partition_point(|&other| other < edge) as u32;
-    let pairs = units.iter().flat_map(|unit| &unit.edges).map(|pair| pair.map(place)).collect();
-    let edge = |&edge: &u32| {
-        let edge = &surface.edges[edge as usize];
-        let [a, b] = edge.nodes.map(|n| n as usize);
-        BatchEdge {
-            nodes: [a, b].map(|n| node_index[n]),
-            part: edge.part,
-            stiffness: 0.5 * (surface.node_stiffness[a] + surface.node_stiffness[b]),
-            share: (surface.node_share[a] + surface.node_share[b]).min(1.0),
-        }
-    };
-    BatchEdges { edges: used.iter().map(edge).collect(), pairs }
 }

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use mechanics::{
     contact::{
-        Batch, Contact, ContactVote, Exclusions, Settings, Surface, WorkUnit, edges::EDGE, initial_edges,
-        sort,
+        Batch, Contact, ContactVote, Exclusions, Kind, Settings, Surface, WorkUnit, edges::EDGE,
+        initial_edges, sort,
     },
     element::shell4::Rule,
     lanes::Width,
@@ -183,8 +183,8 @@ fn each_pair_of_edges_that_brute_force_finds_is_in_one_unit_wherever_the_bodies_
                 on_surface(&surface, &mesh.positions).into_iter().map(|x| x.map(|c| c + by)).collect();
             let mut pairs = BTreeSet::new();
             for unit in sort(&surface, &x, &settings, &Exclusions::default()) {
-                assert!(unit.edges.is_empty() || unit.faces.is_empty());
-                for pair in unit.edges {
+                assert!(unit.pairs.is_empty() || unit.faces.is_empty());
+                for pair in unit.pairs {
                     assert!(pair[0] < pair[1] && pairs.insert(pair), "{pair:?} twice");
                 }
             }
@@ -448,7 +448,7 @@ fn pairs_dealt_out_to_any_workers_add_to_the_same_bits() {
             let mine: Vec<&WorkUnit> = units
                 .iter()
                 .enumerate()
-                .filter(|(i, unit)| i * 7 % n == worker && (!only_edges || !unit.edges.is_empty()))
+                .filter(|(i, unit)| i * 7 % n == worker && (!only_edges || unit.kind == Kind::EdgeEdge))
                 .map(|(_, unit)| unit)
                 .collect();
             let batch = Batch::gather(&surface, &mine, &|n| 1.0 + f64::from(n % 3), &Exclusions::default());

@@ -81,8 +81,7 @@ pub fn settings(n_parts: usize, gap: f64, slack: f64) -> Settings {
         interacts: vec![true; n_parts * n_parts],
         stiffness: 0.5,
         friction_velocity: 1e-3,
-        ignores_initial: false,
-        edges: false,
+        ..Settings::default()
     }
 }
 

@@ -1,11 +1,15 @@
 //! Edge pairs of a batch in one cycle: from positions to forces, votes and energies.
 
 use super::{
-    super::{ContactVote, Settings, WARNING, force, pair_energy::ByPair, work_unit::Batch, zone::Vector},
+    super::{
+        Settings, WARNING, force,
+        pair::{Books, Cycle, Pairs},
+        work_unit::Batch,
+        zone::Vector,
+    },
     EDGE,
     zone::{self, Closest},
 };
-use crate::exact::Quantum;
 
 /// An edge with what its pairs need.
 #[derive(Clone, Copy, Debug)]
@@ -35,21 +39,11 @@ pub(in super::super) struct Edges {
     friction_velocity: f64,
 }
 
-/// Arrays of one cycle, by batch node.
-pub(in super::super) struct Motion<'a> {
-    pub(in super::super) x: &'a [Vec<f64>; 3],
-    /// Half a step ago, with the step `dt` that led to `x`.
-    pub(in super::super) v: &'a [Vec<f64>; 3],
-    pub(in super::super) dt: f64,
-    pub(in super::super) force_quantum: Quantum,
-    pub(in super::super) energy_quantum: Quantum,
-    pub(in super::super) f: &'a mut [Vec<f64>; 3],
-}
-
 impl Edges {
     /// Those of a batch, which must be sound.
     pub(in super::super) fn new(batch: &Batch, settings: &Settings) -> Self {
         let sides: Vec<Side> = batch
+            .listed
             .edges
             .edges
             .iter()
@@ -62,7 +56,7 @@ impl Edges {
             .collect();
         let n_parts = settings.n_parts();
         let pair = |&sides: &[u32; 2]| {
-            let [a, b] = sides.map(|side| &batch.edges.edges[side as usize]);
+            let [a, b] = sides.map(|side| &batch.listed.edges.edges[side as usize]);
             let factor = settings.stiffness * a.share.min(b.share);
             Pair {
                 sides,
@@ -70,45 +64,8 @@ impl Edges {
                 friction: settings.friction[a.part as usize * n_parts + b.part as usize],
             }
         };
-        let pairs = batch.edges.pairs.iter().map(pair).collect();
+        let pairs = batch.listed.edges.pairs.iter().map(pair).collect();
         Self { sides, pairs, gap: settings.gap, friction_velocity: settings.friction_velocity }
-    }
-
-    pub(in super::super) fn n_pairs(&self) -> usize {
-        self.pairs.len()
-    }
-
-    /// Adds forces; gives the greatest squared frequency of the springs that act or soon may.
-    #[inline(always)]
-    pub(in super::super) fn forces(
-        &self,
-        motion: &mut Motion,
-        vote: &mut ContactVote,
-        by_pair: &mut ByPair,
-    ) -> f64 {
-        let warning = WARNING * self.gap;
-        let mut frequency2 = 0.0_f64;
-        for pair in &self.pairs {
-            let sides = [&self.sides[pair.sides[0] as usize], &self.sides[pair.sides[1] as usize]];
-            let [[a, b], [c, d]] = [sides[0].nodes, sides[1].nodes];
-            let nodes = [a as usize, b as usize, c as usize, d as usize];
-            if are_apart(motion.x, nodes, warning) {
-                continue;
-            }
-            let x = nodes.map(|n| at(motion.x, n));
-            let Some(closest) = zone::closest(&x) else { continue };
-            if closest.distance2 >= warning * warning {
-                continue;
-            }
-            let inverse_mass = self.inverse_mass(&closest, sides);
-            let stiffness = pair.stiffness * closest.weight_ahead(self.gap);
-            let voted = force::frequency2(stiffness, 1.0, inverse_mass);
-            frequency2 = if voted > frequency2 { voted } else { frequency2 };
-            if closest.crosses && closest.distance2 < self.gap * self.gap {
-                self.push(pair, sides, nodes, &closest, motion, vote, by_pair);
-            }
-        }
-        frequency2
     }
 
     /// Inverse of the mass that a pair moves, where the closest points may be soon: a gap nearer to the ends.
@@ -127,16 +84,14 @@ impl Edges {
 
     /// Force, energy and depth of a pair in its zone.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "one pair with all that it touches")]
     fn push(
         &self,
         pair: &Pair,
         sides: [&Side; 2],
         nodes: [usize; 4],
         closest: &Closest,
-        motion: &mut Motion,
-        vote: &mut ContactVote,
-        by_pair: &mut ByPair,
+        cycle: &mut Cycle<'_>,
+        Books { vote, by_pair }: &mut Books<'_>,
     ) {
         let weight = closest.weight(self.gap);
         if weight.value <= 0.0 {
@@ -151,10 +106,10 @@ impl Edges {
             return;
         }
         let n = closest.vector.map(|c| c / distance);
-        let velocity = relative(motion.v, nodes, shares);
-        let closing = dot(n, velocity) * motion.dt;
+        let velocity = relative(cycle.v, nodes, shares);
+        let closing = dot(n, velocity) * cycle.dt;
         let mut depth = self.gap - distance;
-        if closing > distance && crossed(motion, nodes) {
+        if closing > distance && crossed(cycle, nodes) {
             depth = self.gap + distance;
         }
         vote.hits += 1;
@@ -171,13 +126,13 @@ impl Edges {
                 regular: self.friction_velocity,
                 velocity,
                 inverse_mass,
-                dt: motion.dt,
+                dt: cycle.dt,
             };
             if let Some((drag, v, taken)) = sliding.drag(normal, n) {
                 for a in 0..3 {
                     force[a] = (-drag).mul_add(v[a], force[a]);
                 }
-                friction = motion.energy_quantum.round(taken);
+                friction = cycle.energy_quantum.round(taken);
             }
         }
         let half = 0.5 * pair.stiffness * depth * depth;
@@ -189,7 +144,7 @@ impl Edges {
                 of_v[a] = -(half * by_v[a]);
             }
         }
-        let quantum = motion.force_quantum;
+        let quantum = cycle.force_quantum;
         let mut on_first = [0.0; 3];
         for a in 0..3 {
             let terms = [
@@ -199,7 +154,7 @@ impl Edges {
             ];
             let last = -((terms[0] + terms[1]) + terms[2]);
             on_first[a] = terms[0] + terms[1];
-            let f = &mut motion.f[a];
+            let f = &mut cycle.f[a];
             f[nodes[0]] += terms[0];
             f[nodes[1]] += terms[1];
             f[nodes[2]] += terms[2];
@@ -209,13 +164,54 @@ impl Edges {
                 vote.force_bound = if magnitude > vote.force_bound { magnitude } else { vote.force_bound };
             }
         }
-        let energy = motion.energy_quantum.round(weight.value * half);
+        let energy = cycle.energy_quantum.round(weight.value * half);
         vote.energy += energy;
         vote.friction += friction;
         by_pair.energies.add(sides[0].part, sides[1].part, energy, friction);
         if let Some(tally) = &mut by_pair.forces {
             tally.add((sides[0].part, sides[1].part), on_first);
         }
+    }
+}
+
+impl Pairs for Edges {
+    fn n_listed(&self) -> usize {
+        self.pairs.len()
+    }
+
+    fn n_looked_at(&self) -> usize {
+        self.pairs.len()
+    }
+
+    fn reads_velocities(&self) -> bool {
+        !self.pairs.is_empty()
+    }
+
+    #[inline(always)]
+    fn forces(&mut self, cycle: &mut Cycle<'_>, books: &mut Books<'_>) -> f64 {
+        let warning = WARNING * self.gap;
+        let mut frequency2 = 0.0_f64;
+        for pair in &self.pairs {
+            let sides = [&self.sides[pair.sides[0] as usize], &self.sides[pair.sides[1] as usize]];
+            let [[a, b], [c, d]] = [sides[0].nodes, sides[1].nodes];
+            let nodes = [a as usize, b as usize, c as usize, d as usize];
+            if are_apart(cycle.x, nodes, warning) {
+                continue;
+            }
+            let x = nodes.map(|n| at(cycle.x, n));
+            let Some(closest) = zone::closest(&x) else { continue };
+            if closest.distance2 >= warning * warning {
+                continue;
+            }
+            let inverse_mass = self.inverse_mass(&closest, sides);
+            let stiffness = pair.stiffness * closest.weight_ahead(self.gap);
+            let voted = force::frequency2(stiffness, 1.0, inverse_mass);
+            frequency2 = if voted > frequency2 { voted } else { frequency2 };
+            if closest.crosses && closest.distance2 < self.gap * self.gap {
+                self.push(pair, sides, nodes, &closest, cycle, books);
+            }
+        }
+        frequency2
     }
 }
 
@@ -257,10 +253,10 @@ fn relative(v: &[Vec<f64>; 3], nodes: [usize; 4], shares: [f64; 4]) -> Vector {
 /// Whether two edges whose closest points have passed each other in the last step crossed before it too: then one has gone
 /// through the other. The motion before may have been beside the ends of one.
 #[inline(never)]
-fn crossed(motion: &Motion, nodes: [usize; 4]) -> bool {
+fn crossed(cycle: &Cycle<'_>, nodes: [usize; 4]) -> bool {
     let before = nodes.map(|n| {
-        let (x, v) = (at(motion.x, n), at(motion.v, n));
-        [0, 1, 2].map(|a| (-motion.dt).mul_add(v[a], x[a]))
+        let (x, v) = (at(cycle.x, n), at(cycle.v, n));
+        [0, 1, 2].map(|a| (-cycle.dt).mul_add(v[a], x[a]))
     });
     zone::closest(&before).is_some_and(|closest| closest.crosses)
 }

@@ -6,7 +6,7 @@
 //! touch; a pair belongs to the one cube that holds the lowest corner of what both boxes share.
 
 use super::{
-    super::{Settings, search::Exclusions, surface::Surface, work_unit::WorkUnit},
+    super::{Settings, pair::Kind, search::Exclusions, surface::Surface, work_unit::WorkUnit},
     Edge, zone,
 };
 
@@ -19,13 +19,17 @@ const MAX_CUBE: f64 = 2_097_000.0;
 /// A box: lowest and highest corner.
 type Bounds = [[f64; 3]; 2];
 
-/// Units of edges that may meet before the next sort: pairs and their nodes, by cube; `x` by surface node.
+/// Units of edges that may meet before the next sort: pairs and their nodes, by cube; none where the deck does not ask for them.
+/// `x` by surface node.
 pub(in super::super) fn units(
     surface: &Surface,
     x: &[[f64; 3]],
     settings: &Settings,
     exclusions: &Exclusions,
 ) -> Vec<WorkUnit> {
+    if !settings.edges {
+        return Vec::new();
+    }
     let excluded = exclusions.edges_on(surface);
     let mut units: Vec<WorkUnit> = Vec::new();
     for_each_near(surface, x, settings, settings.reach(), &mut |cube, [a, b]| {
@@ -33,16 +37,21 @@ pub(in super::super) fn units(
             return;
         }
         match units.last_mut() {
-            Some(unit) if unit.cube == cube => unit.edges.push([a, b]),
-            _ => units.push(WorkUnit { cube, edges: vec![[a, b]], ..WorkUnit::default() }),
+            Some(unit) if unit.cube == cube => unit.pairs.push([a, b]),
+            _ => units.push(WorkUnit {
+                kind: Kind::EdgeEdge,
+                cube,
+                pairs: vec![[a, b]],
+                ..WorkUnit::default()
+            }),
         }
     });
     for unit in &mut units {
-        let nodes = unit.edges.iter().flatten().flat_map(|&edge| surface.edges[edge as usize].nodes);
+        let nodes = unit.pairs.iter().flatten().flat_map(|&edge| surface.edges[edge as usize].nodes);
         unit.nodes = nodes.collect();
         unit.nodes.sort_unstable();
         unit.nodes.dedup();
-        unit.interactions = unit.edges.len() as u64;
+        unit.interactions = unit.pairs.len() as u64;
     }
     units
 }

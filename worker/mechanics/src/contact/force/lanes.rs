@@ -4,7 +4,7 @@ use super::BOTH_SIDES;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
-    contact::pairs::Pairs,
+    contact::near_pairs::NearPairs,
     exact::{Quantum, rounded},
     lanes::{Lane, SET, Width, scalar::Scalar},
 };
@@ -22,7 +22,7 @@ pub(in crate::contact) struct Statics {
     pub(in crate::contact) face_stiffness: Vec<f64>,
 }
 
-/// Features near nodes, by pair of a [`Pairs`]; those beyond the gap have depth zero.
+/// Features near nodes, by pair of a [`NearPairs`]; those beyond the gap have depth zero.
 #[derive(Clone, Copy)]
 pub(in crate::contact) struct Pushes<'a> {
     /// Index of the face among the static data.
@@ -62,7 +62,7 @@ pub(in crate::contact) struct Sums {
 pub(in crate::contact) fn push(
     width: Width,
     statics: &Statics,
-    pairs: &Pairs,
+    pairs: &NearPairs,
     pushes: Pushes,
     (force_quantum, energy_quantum): (Quantum, Quantum),
     terms: &mut Terms,
@@ -96,7 +96,7 @@ pub(in crate::contact) fn push(
 #[target_feature(enable = "avx2,fma")]
 unsafe fn on_avx2(
     statics: &Statics,
-    pairs: &Pairs,
+    pairs: &NearPairs,
     pushes: Pushes,
     magic: [f64; 2],
     terms: &mut Terms,
@@ -109,7 +109,7 @@ unsafe fn on_avx2(
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
 unsafe fn on_avx512(
     statics: &Statics,
-    pairs: &Pairs,
+    pairs: &NearPairs,
     pushes: Pushes,
     magic: [f64; 2],
     terms: &mut Terms,
@@ -123,7 +123,7 @@ unsafe fn on_avx512(
 #[inline(always)]
 unsafe fn kernel<L: Lane>(
     statics: &Statics,
-    pairs: &Pairs,
+    pairs: &NearPairs,
     pushes: Pushes,
     magic: [f64; 2],
     terms: &mut Terms,

@@ -8,7 +8,7 @@ use super::{
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
-    contact::pairs::Pairs,
+    contact::near_pairs::NearPairs,
     lanes::{Lane, SET, Width, scalar::Scalar},
 };
 
@@ -56,7 +56,7 @@ pub(in crate::contact) fn approach(
     width: Width,
     rows: &[[f64; 4]],
     gap: f64,
-    pairs: &Pairs,
+    pairs: &NearPairs,
     closest: &Closest,
     found: &mut Approach,
 ) {
@@ -83,7 +83,13 @@ pub(in crate::contact) fn approach(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn near_on_avx2(rows: &[[f64; 4]], gap: f64, pairs: &Pairs, closest: &Closest, found: &mut Approach) {
+unsafe fn near_on_avx2(
+    rows: &[[f64; 4]],
+    gap: f64,
+    pairs: &NearPairs,
+    closest: &Closest,
+    found: &mut Approach,
+) {
     // SAFETY: the caller's.
     unsafe { near::<Avx2>(rows, gap, pairs, closest, found) }
 }
@@ -93,7 +99,7 @@ unsafe fn near_on_avx2(rows: &[[f64; 4]], gap: f64, pairs: &Pairs, closest: &Clo
 unsafe fn near_on_avx512(
     rows: &[[f64; 4]],
     gap: f64,
-    pairs: &Pairs,
+    pairs: &NearPairs,
     closest: &Closest,
     found: &mut Approach,
 ) {
@@ -104,7 +110,13 @@ unsafe fn near_on_avx512(
 /// # Safety
 /// Pairs and indices checked, all lists of `found` as long as the pairs.
 #[inline(always)]
-unsafe fn near<L: Lane>(rows: &[[f64; 4]], gap: f64, pairs: &Pairs, closest: &Closest, found: &mut Approach) {
+unsafe fn near<L: Lane>(
+    rows: &[[f64; 4]],
+    gap: f64,
+    pairs: &NearPairs,
+    closest: &Closest,
+    found: &mut Approach,
+) {
     let (zero, gap) = (L::splat(0.0), L::splat(gap));
     let mut at = 0;
     while at < pairs.node().len() {

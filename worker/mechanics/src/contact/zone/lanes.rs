@@ -14,7 +14,7 @@ use super::{
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
-    contact::{pairs::Pairs, slots::Slots},
+    contact::{near_pairs::NearPairs, slots::Slots},
     lanes::{Lane, SET, Width, scalar::Scalar},
 };
 
@@ -39,7 +39,7 @@ pub(in crate::contact) struct Closest {
 /// The pairs of which the closest point is not plainly on the rim, gathered so that every lane has one.
 #[derive(Clone, Debug, Default)]
 pub(in crate::contact) struct Rest {
-    pairs: Pairs,
+    pairs: NearPairs,
     /// Where among all closest points each belongs.
     at: Vec<u32>,
     points: Closest,
@@ -353,7 +353,7 @@ mod tests {
         }
         let held: Vec<u32> = (0..nodes.len() as u32).collect();
         let starts: Vec<u32> = (0..=nodes.len() as u32).collect();
-        let (mut slots, mut pairs) = (Slots::default(), Pairs::default());
+        let (mut slots, mut pairs) = (Slots::default(), NearPairs::default());
         slots.take(&Candidates { nodes, starts, faces: held.clone() }, &faces);
         // One face each: slots and lanes are numbered as the pairs are.
         pairs.choose(&slots, &held, 0, &held);

@@ -6,14 +6,14 @@ use crate::lanes::{SET, Width};
 
 /// Pairs by batch node indices. All lists are equally long.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Pairs {
+pub(super) struct NearPairs {
     node: Vec<u32>,
     corners: [Vec<u32>; 4],
     /// No index is higher.
     highest: u32,
 }
 
-impl Pairs {
+impl NearPairs {
     /// The node of each pair.
     pub(super) fn node(&self) -> &[u32] {
         &self.node

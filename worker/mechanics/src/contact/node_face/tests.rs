@@ -1,7 +1,10 @@
 //! The forces of a batch against one pair at a time, over all candidates.
 
 use super::*;
-use crate::contact::{BatchFace, BatchNode, BatchUnit};
+use crate::{
+    contact::{BatchFace, BatchNode, BatchUnit, Contact, ContactVote},
+    exact::Quantum,
+};
 
 /// A random number from 0 to 1.
 struct Random(u64);
@@ -64,13 +67,12 @@ fn settings(friction: f64) -> Settings {
         interacts: vec![false, true, true, false],
         stiffness: 0.5,
         friction_velocity: 1e-3,
-        ignores_initial: false,
-        edges: false,
+        ..Settings::default()
     }
 }
 
 /// The same one pair at a time: a frame for each face, the whole reduction for each node.
-fn slowly(contact: &Contact, cycle: Cycle) -> ContactVote {
+fn slowly(contact: &NodeFace, cycle: Cycle<'_>) -> ContactVote {
     let warning = WARNING * contact.settings.gap;
     let at = |n: u32| cycle.x.each_ref().map(|x| x[n as usize]);
     let frame = |f: u32| Frame::new(&contact.faces[f as usize].map(at));
@@ -140,10 +142,10 @@ fn lanes_of_every_width_have_the_bits_of_one_pair_at_a_time() {
                 Cycle { x: &x, v: &v, dt: 0.1, force_quantum: quantum, energy_quantum: quantum, f: &mut f };
             let vote = match width {
                 Some(width) => {
-                    contact.width = width;
+                    contact.kinds.faces.width = width;
                     contact.forces(&x, &v, 0.1, quantum, quantum, cycle.f)
                 }
-                None => slowly(&contact, cycle),
+                None => slowly(&contact.kinds.faces, cycle),
             };
             (vote, f.iter().flatten().map(|f| f.to_bits()).collect::<Vec<u64>>())
         };
@@ -152,7 +154,7 @@ fn lanes_of_every_width_have_the_bits_of_one_pair_at_a_time() {
         for width in Width::ALL.into_iter().filter(|width| width.available()) {
             assert_eq!(run(Some(width)), slow, "{width}, bump {bump}, friction {friction}");
         }
-        long_way += usize::from(!contact.work.hits.is_empty());
+        long_way += usize::from(!contact.kinds.faces.work.hits.is_empty());
     }
     assert!(long_way > 0, "no node went the long way");
 }
@@ -169,7 +171,7 @@ fn watching_few_pairs_for_several_cycles_loses_no_bit_of_bodies_that_move() {
     // The first list is taken with the candidates.
     let (mut taken, mut fewest, mut hits) = (1, usize::MAX, Vec::new());
     for cycle in 0..40 {
-        let before = contact.watch.taken_at(0);
+        let before = contact.kinds.faces.watch.taken_at(0);
         let mut run = |fast: bool| {
             let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
             let quanta = (quantum, quantum);
@@ -177,15 +179,18 @@ fn watching_few_pairs_for_several_cycles_loses_no_bit_of_bodies_that_move() {
                 contact.forces(&x, &x, 0.1, quanta.0, quanta.1, &mut f)
             } else {
                 let (force_quantum, energy_quantum) = quanta;
-                slowly(&contact, Cycle { x: &x, v: &x, dt: 0.1, force_quantum, energy_quantum, f: &mut f })
+                slowly(
+                    &contact.kinds.faces,
+                    Cycle { x: &x, v: &x, dt: 0.1, force_quantum, energy_quantum, f: &mut f },
+                )
             };
             (vote, f.iter().flatten().map(|f| f.to_bits()).collect::<Vec<u64>>())
         };
         let (fast, slow) = (run(true), run(false));
         assert_eq!(fast, slow, "cycle {cycle}");
         hits.push(slow.0.hits);
-        taken += u32::from(contact.watch.taken_at(0) != before);
-        fewest = fewest.min(contact.watch.candidates.faces.len());
+        taken += u32::from(contact.kinds.faces.watch.taken_at(0) != before);
+        fewest = fewest.min(contact.kinds.faces.watch.candidates.faces.len());
         for (i, node) in batch.nodes.iter().enumerate() {
             let slide = f64::from(node.part);
             x[0][i] += 0.3 + 0.06 * slide + 0.01 * random.next();
@@ -194,7 +199,7 @@ fn watching_few_pairs_for_several_cycles_loses_no_bit_of_bodies_that_move() {
         }
     }
     assert!((4..20).contains(&taken), "{taken} lists in 40 cycles");
-    let all = contact.candidates.faces.len();
+    let all = contact.kinds.faces.candidates.faces.len();
     assert!(4 * fewest < 3 * all, "{fewest} of {all} pairs");
     assert!(hits.iter().any(|&n| n != hits[0]), "nothing changed: {hits:?}");
 }

@@ -1,0 +1,80 @@
+//! The kinds of pairs that there are ([`pair`](super::pair)). A new one is a line in each of these functions.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BatchEdges, Settings, edges,
+    edges::cycle::Edges,
+    node_face::NodeFace,
+    pair::{Books, Cycle, Pairs},
+    search::Exclusions,
+    sort as by_cubes,
+    surface::Surface,
+    work_unit::{Batch, WorkUnit},
+};
+use crate::lanes::Width;
+
+/// Sorts a surface into work units: those of nodes and faces in the order in which its nodes first touch them, then those of
+/// other kinds. `x` by surface node.
+///
+/// Every pair of a node and a face that interact and of which the node lies in the face's box grown by the reach is in exactly
+/// one unit. Nodes and faces that can meet nothing are left out.
+///
+/// # Panics
+/// If the settings know fewer parts than the surface.
+pub fn sort(
+    surface: &Surface,
+    x: &[[f64; 3]],
+    settings: &Settings,
+    exclusions: &Exclusions,
+) -> Vec<WorkUnit> {
+    let mut units = by_cubes::units(surface, x, settings, exclusions);
+    units.extend(edges::sort::units(surface, x, settings, exclusions));
+    units
+}
+
+/// What a batch has of the pairs that are listed one by one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Listed {
+    /// Pairs of edges, where the deck asks for them.
+    pub edges: BatchEdges,
+}
+
+impl Listed {
+    /// Of some units; `node_index` gives the batch node of a surface node.
+    pub(super) fn gather(surface: &Surface, units: &[&WorkUnit], node_index: &[u32]) -> Self {
+        Self { edges: BatchEdges::gather(surface, units, node_index) }
+    }
+
+    /// Whether every index is in range, of `n_nodes` and `n_parts`.
+    pub(super) fn is_sound(&self, n_nodes: usize, n_parts: usize) -> bool {
+        self.edges.is_sound(n_nodes, n_parts)
+    }
+}
+
+/// All pairs of a batch, by kind.
+#[derive(Clone, Debug)]
+pub(super) struct Kinds {
+    pub(super) faces: NodeFace,
+    edges: Edges,
+}
+
+impl Kinds {
+    /// Takes the pairs of a batch; see [`super::Contact::new`].
+    pub(super) fn new(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3], width: Width) -> Self {
+        Self { faces: NodeFace::new(batch, settings, x, width), edges: Edges::new(batch, settings) }
+    }
+
+    /// Each of them.
+    pub(super) fn each(&self) -> [&dyn Pairs; 2] {
+        [&self.faces, &self.edges]
+    }
+
+    /// The forces of all. Gives the greatest squared frequency.
+    #[inline(always)]
+    pub(super) fn forces(&mut self, cycle: &mut Cycle<'_>, books: &mut Books<'_>) -> f64 {
+        let faces = self.faces.forces(cycle, books);
+        let edges = self.edges.forces(cycle, books);
+        if edges > faces { edges } else { faces }
+    }
+}
