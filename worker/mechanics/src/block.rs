@@ -260,7 +260,9 @@ impl Block {
 
     /// See [`crate::cycle::Domain::plant_fault`].
     pub(crate) fn plant_fault(&mut self) {
-        self.group.plant_fault();
+        if let Some(stress) = self.group.first_stress() {
+            *stress = stress.next_up();
+        }
     }
 
     /// Sets all forces and moments to zero.

@@ -97,8 +97,8 @@ pub(crate) trait Group: Send + Sync {
         None
     }
 
-    /// Makes a stress of the first element wrong by one unit in the last place, see [`crate::cycle::Domain::plant_fault`].
-    fn plant_fault(&mut self);
+    /// A number of the stress of the first element, for tests that change it; none without elements.
+    fn first_stress(&mut self) -> Option<&mut f64>;
 }
 
 /// The elements of a piece, whose element arrays they take, and the rotations of its nodes where its kind turns them.

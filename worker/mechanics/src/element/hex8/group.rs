@@ -185,10 +185,7 @@ impl Group for Solids {
         Some(Scanned { layout: &self.layout, reach: self.reach, alive: &self.alive, fields })
     }
 
-    fn plant_fault(&mut self) {
-        if let Some(&slot) = self.slots.first() {
-            let pressure = &mut self.fields[PRESSURE][slot as usize];
-            *pressure = pressure.next_up();
-        }
+    fn first_stress(&mut self) -> Option<&mut f64> {
+        self.slots.first().map(|&slot| &mut self.fields[PRESSURE][slot as usize])
     }
 }

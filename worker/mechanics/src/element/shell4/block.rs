@@ -298,10 +298,8 @@ impl Group for Core {
         (self.elements[slot], self.state[kernel::INTERNAL][slot])
     }
 
-    fn plant_fault(&mut self) {
-        if let Some(stress) = self.layers.first_mut().and_then(|layer| layer.first_mut()) {
-            *stress = stress.next_up();
-        }
+    fn first_stress(&mut self) -> Option<&mut f64> {
+        self.layers.first_mut().and_then(|layer| layer.first_mut())
     }
 }
 
