@@ -87,7 +87,6 @@ fn setup(friction: f64) -> Setup {
             friction_velocity: 1e-3,
             ignores_initial: true,
             edges: true,
-            ..Settings::default()
         }),
         constraints: vec![Constraint::default()],
         walls: Vec::new(),
