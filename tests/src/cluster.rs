@@ -17,12 +17,21 @@ pub const DEADLINE: Duration = Duration::from_secs(120);
 /// Between two looks at a condition that nothing announces.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
-/// Words of what belongs in no binary but `bolide-under-test`: variable, places and bugs of [`crate::failpoint`].
+/// What belongs in no binary but `bolide-under-test`: words of [`crate::failpoint`] and the name of the function behind its bug.
 pub const FAULTS: [&str; 5] = ["BOLIDE_FAIL", "die-in-", "die-before-", "a test has ordered", "plant_fault"];
 
-/// Whether a file's bytes have these words in them.
-pub fn holds(bytes: &[u8], words: &str) -> bool {
-    bytes.windows(words.len()).any(|window| window == words.as_bytes())
+/// Whether a program's code or data have these words in them, or one of its functions has them in its name. Debug information does
+/// not count: it also speaks of functions that the linker has left out.
+///
+/// # Panics
+/// If the bytes are no ELF file.
+pub fn holds(program: &[u8], words: &str) -> bool {
+    use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, elf::SHF_ALLOC};
+    let file = object::File::parse(program).expect("a program");
+    let loaded = |flags| matches!(flags, SectionFlags::Elf { sh_flags } if sh_flags & u64::from(SHF_ALLOC) != 0);
+    let said = |bytes: &[u8]| bytes.windows(words.len()).any(|window| window == words.as_bytes());
+    file.sections().filter(|section| loaded(section.flags())).any(|section| section.data().is_ok_and(said))
+        || file.symbols().any(|symbol| symbol.name_bytes().is_ok_and(said))
 }
 
 /// A folder of this repository, from its root.
