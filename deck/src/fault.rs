@@ -113,7 +113,6 @@ impl<'a> Faults<'a> {
         self.list.borrow_mut().push((file, fault));
     }
 
-    /// Name of a file.
     fn name(&self, file: u16) -> &'a str {
         self.files.get(usize::from(file)).map_or("deck", |file| file.name)
     }
@@ -175,7 +174,6 @@ impl<'a> Faults<'a> {
         file.text[*from..to].trim_end()
     }
 
-    /// Number of faults so far.
     pub fn count(&self) -> usize {
         self.list.borrow().len() + self.more.get()
     }
@@ -198,7 +196,7 @@ impl<'a> Faults<'a> {
                 column: 1,
                 read: format!("{rest} more faults"),
                 expected: "none".to_string(),
-                advice: "mend those above and check again".to_string(),
+                advice: "fix those above and check again".to_string(),
             });
         }
         list

@@ -132,7 +132,6 @@ fn conclude(model: Option<Model>, log: Log<'_>) -> Result<Reading, Vec<Fault>> {
 /// A keyword deck as a TOML deck and a mesh file.
 #[derive(Clone, Debug)]
 pub struct Converted {
-    /// Text of the deck.
     pub deck: String,
     /// Text of the mesh file.
     pub mesh: String,

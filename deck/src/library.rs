@@ -17,7 +17,6 @@ use crate::{
 /// The library as it stands in the repository, SI.
 const TEXT: &str = include_str!("../materials.toml");
 
-/// A library entry.
 struct Entry {
     material: Material,
     /// Failure that a part has to ask for.

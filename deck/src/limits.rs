@@ -10,7 +10,6 @@ pub const MAX_ELEMENTS: u64 = 64_000_000;
 pub const MAX_TITLE: usize = 200;
 /// Most parts of a deck with contact, whose settings hold a matrix of parts.
 pub const MAX_CONTACT_PARTS: usize = 2_000;
-/// Most parts.
 pub const MAX_PARTS: usize = 10_000;
 /// Most entries of any other array of tables.
 pub const MAX_ENTRIES: usize = 10_000;
@@ -18,5 +17,4 @@ pub const MAX_ENTRIES: usize = 10_000;
 pub(crate) const MAX_CONTACT_FORCES: usize = 64;
 /// Greatest node or element number a deck may give; generated numbers go on above.
 pub(crate) const MAX_ID: u32 = 2_000_000_000;
-/// Most points of a curve.
 pub(crate) const MAX_CURVE_POINTS: usize = 100_000;

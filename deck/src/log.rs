@@ -138,7 +138,6 @@ impl<'a> Log<'a> {
         self.faults.line_seen_from(at, from)
     }
 
-    /// A warning.
     pub(crate) fn warn(&self, at: Place, words: impl Into<String>) {
         let warning = (at.at_column(1), words.into());
         let mut warnings = self.warnings.borrow_mut();

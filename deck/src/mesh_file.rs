@@ -78,7 +78,6 @@ impl Body {
 }
 
 impl MeshFile {
-    /// The body of that name.
     pub fn body(&self, name: &str) -> Option<&Body> {
         self.bodies.iter().find(|body| body.name == name)
     }

@@ -61,7 +61,6 @@ pub struct Output {
     pub history_cycles: u32,
     /// Seconds of real time between snapshots on disk, of a run that stores any; none: what the command says.
     pub snapshot_seconds: Option<f64>,
-    /// The same in cycles.
     pub snapshot_cycles: Option<u64>,
     /// Element and node fields to write, by name; empty means the default set.
     pub fields: Vec<String>,

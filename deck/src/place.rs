@@ -68,7 +68,6 @@ impl Origin {
 /// A value and the words that it was read from.
 #[derive(Clone, Debug)]
 pub struct Placed<T> {
-    /// The value.
     pub value: T,
     /// The words.
     pub origin: Origin,

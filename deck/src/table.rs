@@ -252,7 +252,6 @@ impl<'a> Value<'a> {
         number
     }
 
-    /// A text.
     pub fn text(&self) -> Option<&'a str> {
         match self.value {
             DeValue::String(text) => Some(text.as_ref()),
@@ -364,12 +363,10 @@ impl<'a> Value<'a> {
         matches!(self.value, DeValue::String(_))
     }
 
-    /// Whether this is a list.
     pub fn is_list(&self) -> bool {
         matches!(self.value, DeValue::Array(_))
     }
 
-    /// Whether this is a table.
     pub fn is_table(&self) -> bool {
         matches!(self.value, DeValue::Table(_))
     }

@@ -21,7 +21,6 @@ use condition::{Boundary, Curve, Gravity, Load, Relaxation, Rigid, Wall};
 use contact::{Contact, Join};
 use part::{Own, Part};
 
-/// A deck.
 #[derive(Clone, Debug)]
 pub(crate) struct Deck {
     pub(crate) title: String,

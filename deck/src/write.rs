@@ -12,7 +12,6 @@ use crate::typed::{
 };
 use value::{Text, list, names, quoted, vector};
 
-/// The text of a deck.
 pub(crate) fn text(deck: &Deck) -> String {
     let mut text = Text::default();
     text.key("title", quoted(&deck.title));

@@ -49,7 +49,6 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// One line.
     pub fn line(&self) -> String {
         let Self { host, outcome, process, words } = self;
         let process = process.unwrap_or_default();
@@ -66,14 +65,14 @@ impl Answer {
 /// # Errors
 /// Faults of the host file, no master, or how many hosts failed.
 pub fn run(args: &AddArgs) -> Result<ExitCode, String> {
-    let lab = file::read_file(&args.hosts)?;
-    let Some(master) = args.master.as_ref().or(lab.master.as_ref()) else {
+    let host_file = file::read_file(&args.hosts)?;
+    let Some(master) = args.master.as_ref().or(host_file.master.as_ref()) else {
         return Err(format!(
             "{} names no master; write master = \"HOST:PORT\" into it, or --master",
             args.hosts.display()
         ));
     };
-    let chosen = lab.choose(&args.names)?;
+    let chosen = host_file.choose(&args.names)?;
     if args.dry_run {
         for host in &chosen {
             println!("# {}", host.name);

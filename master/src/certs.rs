@@ -34,14 +34,12 @@ pub enum Error {
     NoAuthority(PathBuf),
     /// A name or an address that no certificate can hold.
     Name {
-        /// As it was given.
         given: String,
         /// What it must be.
         expected: &'static str,
     },
     /// The system would not read or write a file.
     Io {
-        /// The file or folder.
         path: PathBuf,
         /// The system's words.
         error: std::io::Error,
@@ -50,7 +48,6 @@ pub enum Error {
     Rule(String),
     /// A key that is no key, or a certificate that cannot be made of it.
     Unusable {
-        /// The file.
         path: PathBuf,
         /// What is wrong.
         error: rcgen::Error,

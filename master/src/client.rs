@@ -1,4 +1,4 @@
-//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel`, `resume` and `results`, the other end of the [`desk`](crate::desk).
+//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel`, `resume` and `results`, the other end of the [`client_requests`](crate::client_requests).
 
 use std::{
     io::Write,

@@ -36,7 +36,7 @@ pub struct Cli {
 pub enum Command {
     /// Run a deck here: master and workers in one process
     Run(RunArgs),
-    /// Say what an emulated cluster would take for a deck, or for the benchmark tables
+    /// Predict how long a deck or the benchmark tables take on an emulated cluster
     Simulate(SimulateArgs),
     /// Listen for workers and clients, and run the jobs of the queue
     Master(MasterArgs),
@@ -66,7 +66,7 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Take a job from the queue, or end it with the results so far
+    /// Remove a job from the queue, or end it with the results so far
     Cancel {
         /// The job
         job: u32,
@@ -74,7 +74,7 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Put a job that failed back into the queue, to go on where it was stored
+    /// Put a failed job back into the queue, to resume from its last checkpoint
     Resume {
         /// The job
         job: u32,
@@ -96,7 +96,7 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Measure what this machine takes for elements, contact, sorts and messages, and its --speed
+    /// Measure the speed of this machine: elements, contact, sorts, messages, and its --speed
     #[command(args_conflicts_with_subcommands = true)]
     Bench {
         /// What to measure instead
@@ -112,7 +112,7 @@ pub enum Command {
         #[command(subcommand)]
         what: Certs,
     },
-    /// Report every fault of a deck without running it
+    /// List every error of a deck without running it
     Check {
         /// The deck
         deck: PathBuf,
@@ -137,18 +137,18 @@ pub enum Command {
     },
     /// List the material library
     Materials,
-    /// Show hosts and jobs of a master, looked at once a second
+    /// Show hosts and jobs of a master, updated once a second
     Top {
         /// The master
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Print what a shell needs to complete commands and flags
+    /// Print shell completions
     Completions {
         /// The shell
         shell: clap_complete::Shell,
     },
-    /// Print the manual page, or write one for each command
+    /// Print the manual page, or write a page for each command
     Man {
         /// Folder for all of them
         #[arg(long, value_name = "FOLDER")]
@@ -195,10 +195,10 @@ pub struct RunArgs {
     /// A process for each worker, over loopback TCP
     #[arg(long)]
     pub processes: bool,
-    /// Run on these processors only, as in 0,2-3
+    /// Use only these processors, as in 0,2-3
     #[arg(long, value_name = "LIST")]
     pub pin: Option<Processors>,
-    /// Go on from a snapshot: this file, or the newest whole one of this results folder, which is then written on
+    /// Resume from a checkpoint: this file, or the newest valid one of this results folder, which the run continues to write
     #[arg(long, value_name = "FILE|FOLDER")]
     pub resume: Option<PathBuf>,
     /// Results folder [default: the one resumed from, else results/<deck name>]
@@ -207,7 +207,7 @@ pub struct RunArgs {
     /// Replace the results in an existing folder
     #[arg(long)]
     pub force: bool,
-    /// Write what every worker did in its last cycles as a trace that Perfetto opens
+    /// Write a trace of the last cycles of every worker for Perfetto
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
     /// Print the summary alone, as JSON, on standard output
@@ -261,7 +261,7 @@ pub struct SimulateArgs {
     /// Route of the shared-node forces
     #[arg(long, value_parser = options::routes(), default_value = "direct")]
     pub route: std::option::Option<Route>,
-    /// Speeds that work is dealt out by, in a run of one deck
+    /// Speeds by which work is distributed, in a run of one deck
     #[arg(long, value_enum, default_value = "given", conflicts_with = "table")]
     pub balance: Balance,
     /// Folder for pictures and the trace; without it none are drawn
@@ -285,13 +285,13 @@ pub struct MasterArgs {
     /// revoked count no more
     #[arg(long, value_name = "FOLDER", requires = "certs")]
     pub lab: Option<PathBuf>,
-    /// Folder for jobs, their results and snapshots; a restarted master goes on with what it finds there
+    /// Folder for jobs, their results and checkpoints; a restarted master continues the jobs in it
     #[arg(long, default_value = "results/spool")]
     pub spool: PathBuf,
     /// Serve a page and a JSON API there, 127.0.0.1:7118 for example; other than loopback only with --certs, by HTTPS
     #[arg(long, value_name = "ADDRESS")]
     pub http: Option<SocketAddr>,
-    /// Seconds without a byte after which a worker counts as lost; it is suspect after three tenths of that
+    /// Seconds of silence after which a worker is lost; it is suspect after three tenths of that
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = deadline)]
     pub dead_after: f64,
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
@@ -315,7 +315,7 @@ pub struct WorkerArgs {
     /// Speed relative to the other workers; auto measures it: 1 is a thread that takes 100 ns for an element-cycle
     #[arg(long, default_value = "1", value_name = "NUMBER|auto")]
     pub speed: Speed,
-    /// Run on these processors only, as in 0,2-3
+    /// Use only these processors, as in 0,2-3
     #[arg(long, value_name = "LIST")]
     pub pin: Option<Processors>,
     /// Compute threads [default: all cores]
@@ -327,10 +327,10 @@ pub struct WorkerArgs {
     /// Folder with this host's certificates, as `bolide certs host` makes it
     #[arg(long, value_name = "FOLDER")]
     pub certs: Option<PathBuf>,
-    /// Seconds to go on dialling a master that is not there
+    /// Seconds to keep trying to reach a master that does not answer
     #[arg(long, default_value_t = 300)]
     pub patience: u64,
-    /// End when the master ends the connection, instead of dialling again
+    /// End when the master closes the connection, instead of reconnecting
     #[arg(long)]
     pub once: bool,
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
@@ -342,10 +342,10 @@ pub struct WorkerArgs {
     /// Port for other workers, on the interface that leads to the master [default: any]
     #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
     pub peer_port: u16,
-    /// Port that other workers dial, where it is forwarded to --peer-port
+    /// Port to which other workers connect, if it is forwarded to --peer-port
     #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
     pub peer_announce: Option<u16>,
-    /// Take no other workers and dial none: what it exchanges with them passes the master
+    /// Make no connections to other workers: everything passes through the master
     #[arg(long, conflicts_with_all = ["peer_port", "peer_announce"])]
     pub no_peers: bool,
 }
@@ -391,10 +391,10 @@ pub struct SubmitArgs {
     /// What a keyword deck does not say
     #[command(flatten)]
     pub reading: ReadingArgs,
-    /// Start when so many workers are there
+    /// Wait for at least this many workers
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub min_workers: u32,
-    /// Jobs of a higher priority start first; of the same, the first come
+    /// Jobs of a higher priority start first; among equals, the oldest
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     pub priority: i32,
     /// Follow the job until it ends, then print its summary
@@ -423,7 +423,7 @@ pub struct GrindArgs {
     /// Lane width; the widest by default
     #[arg(long, value_parser = options::lanes())]
     pub lanes: Option<String>,
-    /// Run on these processors only, as in 0,2-3
+    /// Use only these processors, as in 0,2-3
     #[arg(long, value_name = "LIST")]
     pub pin: Option<Processors>,
     /// Print JSON

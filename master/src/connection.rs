@@ -1,7 +1,7 @@
 //! CONNECTION: one task per connection, from its first byte to its end. It carries, and decides nothing.
 //!
 //! TLS if there are certificates, the greeting, then messages of a worker to its job's thread, or requests of a client
-//! to the [`crate::desk`]. Every fault ends this connection with one line in the log, and nothing else.
+//! to the [`crate::client_requests`]. Every fault ends this connection with one line in the log, and nothing else.
 
 use std::{
     net::SocketAddr,
@@ -33,10 +33,10 @@ use tokio::{
 use tracing::{info, warn};
 
 use crate::{
-    desk,
-    drive::{Delivery, Input, Seat},
-    event::Hand,
-    lab::Lab,
+    ca_folder::CaFolder,
+    client_requests,
+    drive::{Delivery, Input, WorkerLink},
+    event::WorkerSpec,
     newcomer,
     notice::Notice,
 };
@@ -51,7 +51,7 @@ const PLACE_LIMIT: Duration = Duration::from_secs(30);
 const SUSPECT: f64 = 0.3;
 
 /// What every connection needs of the daemon.
-pub struct Gate {
+pub struct Acceptor {
     /// To the scheduler.
     notices: mpsc::Sender<Notice>,
     /// Who is taken in.
@@ -61,7 +61,7 @@ pub struct Gate {
     /// Certificates; none on loopback.
     tls: Option<Arc<ServerConfig>>,
     /// Where newcomers exchange their tokens, and the certificates that count no more.
-    lab: Option<(Lab, Revoked)>,
+    ca_folder: Option<(CaFolder, Revoked)>,
     /// Places for connections that are not welcomed yet.
     greetings: Arc<Semaphore>,
     /// This host's emulated port, which all connections pass.
@@ -73,7 +73,7 @@ pub struct Gate {
     ending: AtomicBool,
 }
 
-impl Gate {
+impl Acceptor {
     /// With nobody taken in yet.
     pub fn new(
         notices: mpsc::Sender<Notice>,
@@ -83,14 +83,14 @@ impl Gate {
     ) -> Self {
         let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
         let greetings = Arc::new(Semaphore::new(GREETINGS));
-        let (lab, port, dead_after) = (None, None, Settings::default().silence);
-        Self { notices, roles, token, tls, lab, greetings, port, dead_after, incarnations, ending }
+        let (ca_folder, port, dead_after) = (None, None, Settings::default().silence);
+        Self { notices, roles, token, tls, ca_folder, greetings, port, dead_after, incarnations, ending }
     }
 
     /// Newcomers may exchange tokens of this lab, and certificates on its list are not accepted.
     #[must_use]
-    pub fn of(mut self, lab: Option<(Lab, Revoked)>) -> Self {
-        self.lab = lab;
+    pub fn of(mut self, ca_folder: Option<(CaFolder, Revoked)>) -> Self {
+        self.ca_folder = ca_folder;
         self
     }
 
@@ -123,7 +123,7 @@ impl Gate {
         self.ending.store(true, Ordering::Relaxed);
     }
 
-    /// Whether [`Gate::end`] was called.
+    /// Whether [`Acceptor::end`] was called.
     pub fn is_ending(&self) -> bool {
         self.ending.load(Ordering::Relaxed)
     }
@@ -151,7 +151,11 @@ impl Gate {
                 let (sender, receiver) = link::split(stream, self.settings());
                 let policy = self.policy_for(identity.as_ref());
                 if let Some(identity) = identity {
-                    tls::watch(&sender, identity, self.lab.as_ref().map(|(_, revoked)| revoked.clone()));
+                    tls::watch(
+                        &sender,
+                        identity,
+                        self.ca_folder.as_ref().map(|(_, revoked)| revoked.clone()),
+                    );
                 }
                 self.greet(sender, receiver, address, policy, Some(place)).await
             }
@@ -160,7 +164,7 @@ impl Gate {
 
     /// Whom to take on a connection with this certificate: without one, newcomers only.
     fn policy_for(&self, identity: Option<&tls::Identity>) -> Policy {
-        let revoked = self.lab.as_ref().map(|(_, revoked)| revoked);
+        let revoked = self.ca_folder.as_ref().map(|(_, revoked)| revoked);
         match identity {
             None => Policy { roles: vec![Role::Newcomer], ..Policy::default() },
             Some(identity) => Policy {
@@ -175,7 +179,7 @@ impl Gate {
     /// Serves any stream to its end; `certificate` is the role that its certificate proved.
     ///
     /// # Errors
-    /// As for [`Gate::take`].
+    /// As for [`Acceptor::take`].
     pub async fn serve<S>(
         self: Arc<Self>,
         stream: S,
@@ -210,14 +214,15 @@ impl Gate {
         let welcome = Welcome { incarnation, host: 0, heartbeat_ms: self.heartbeat_ms() };
         link::admit(server, &sender, &mut receiver, welcome)?;
         if newcomer {
-            let (lab, _) = self.lab.as_ref().ok_or_else(|| Error::Message("no lab to join here".into()))?;
+            let (ca_folder, _) =
+                self.ca_folder.as_ref().ok_or_else(|| Error::Message("no lab to join here".into()))?;
             // It keeps its place: nobody knows it yet.
-            let served = newcomer::serve(lab, &hello, &address, &sender, &mut receiver).await;
+            let served = newcomer::serve(ca_folder, &hello, &address, &sender, &mut receiver).await;
             drop(place);
             return served;
         }
         drop(place);
-        match desk::serve(&self.notices, &sender, &mut receiver, incarnation).await {
+        match client_requests::serve(&self.notices, &sender, &mut receiver, incarnation).await {
             // A client may go as it likes.
             Error::Closed | Error::Left { .. } | Error::Io { .. } => Ok(()),
             error => {
@@ -256,15 +261,15 @@ impl Gate {
         let error = match link::admit(server, &sender, &mut receiver, welcome) {
             Err(error) => error,
             Ok(()) => {
-                let seat = Seat {
-                    hand: Hand { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
+                let worker_link = WorkerLink {
+                    spec: WorkerSpec { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
                     address: address.clone(),
                     peer: peer_address(&address, hello.peer_port),
                     incarnation,
                     outbox: Arc::new(Mutex::new(Outbox::new(sender.clone(), 0))),
                     delivery: Arc::clone(&delivery),
                 };
-                let _ = self.notices.send(Notice::Joined(seat)).await;
+                let _ = self.notices.send(Notice::Joined(worker_link)).await;
                 self.listen(&mut receiver, hello, incarnation, &delivery).await
             }
         };
@@ -370,7 +375,7 @@ async fn hand_on(
 }
 
 /// Takes connections for ever; each fault of one is one line in the log.
-pub async fn listen(listener: TcpListener, gate: Arc<Gate>) {
+pub async fn listen(listener: TcpListener, acceptor: Arc<Acceptor>) {
     let places = Arc::new(Semaphore::new(CONNECTIONS));
     loop {
         let (stream, address) = match listener.accept().await {
@@ -386,10 +391,10 @@ pub async fn listen(listener: TcpListener, gate: Arc<Gate>) {
             warn!("connection from {address} not taken: {CONNECTIONS} stand, at most {CONNECTIONS}");
             continue;
         };
-        let gate = Arc::clone(&gate);
+        let acceptor = Arc::clone(&acceptor);
         tokio::spawn(async move {
-            if let Err(error) = Arc::clone(&gate).take(stream, address.to_string()).await
-                && !gate.is_ending()
+            if let Err(error) = Arc::clone(&acceptor).take(stream, address.to_string()).await
+                && !acceptor.is_ending()
             {
                 warn!("connection from {address}: {error}");
             }

@@ -13,11 +13,11 @@ use tokio::{net::TcpListener, sync::mpsc};
 use worker::notify;
 
 use crate::{
+    ca_folder::CaFolder,
     command::MasterArgs,
-    connection::{Gate, listen},
+    connection::{Acceptor, listen},
     http::{self, board::Board},
     interrupt::stop_on_interrupt,
-    lab::Lab,
     machine::host_name,
     notice::{Notice, WAITING_NOTICES},
     scheduler::Scheduler,
@@ -31,9 +31,10 @@ const FIRST_TOKEN_HOURS: u64 = 24;
 /// # Errors
 /// If it cannot listen there, or the certificates cannot be used.
 pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
-    let lab = args.lab.as_ref().map(|folder| Lab::open(folder)).transpose().map_err(|e| e.to_string())?;
+    let ca_folder =
+        args.lab.as_ref().map(|folder| CaFolder::open(folder)).transpose().map_err(|e| e.to_string())?;
     let tls = args.certs.as_ref().map(|folder| tls::Paths::in_folder(folder));
-    let config = if lab.is_some() { tls::open_server_config } else { tls::server_config };
+    let config = if ca_folder.is_some() { tls::open_server_config } else { tls::server_config };
     let tls = tls.map(|paths| config(&paths)).transpose().map_err(|e| e.to_string())?;
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
@@ -50,21 +51,22 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     let result = runtime.block_on(async {
         let listener = TcpListener::bind(args.listen).await.map_err(|e| format!("{}: {e}", args.listen))?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
-        let join = announce(address, tls.is_some(), lab.as_ref())?;
-        let lab = lab.map(|lab| lab.follow().map(|revoked| (lab, revoked))).transpose();
-        let lab = lab.map_err(|e| e.to_string())?;
+        let join = announce(address, tls.is_some(), ca_folder.as_ref())?;
+        let ca_folder =
+            ca_folder.map(|ca_folder| ca_folder.follow().map(|revoked| (ca_folder, revoked))).transpose();
+        let ca_folder = ca_folder.map_err(|e| e.to_string())?;
         let (notices, heard) = mpsc::channel(WAITING_NOTICES);
-        let gate = Arc::new(
-            Gate::new(notices.clone(), vec![Role::Worker, Role::Client], None, tls)
+        let acceptor = Arc::new(
+            Acceptor::new(notices.clone(), vec![Role::Worker, Role::Client], None, tls)
                 .behind(port)
-                .of(lab)
+                .of(ca_folder)
                 .patient_for(dead_after),
         );
-        tokio::spawn(listen(listener, Arc::clone(&gate)));
+        tokio::spawn(listen(listener, Arc::clone(&acceptor)));
         let board = open_page(args, join, &notices).await?;
         let stop = stop_on_interrupt("ending; the job under way is stored for the next master");
         notify::say(&format!("READY=1\nSTATUS=listening on {address}"));
-        Scheduler::new(args.spool.clone(), spool, left, notices, board).run(heard, &stop, &gate).await;
+        Scheduler::new(args.spool.clone(), spool, left, notices, board).run(heard, &stop, &acceptor).await;
         Ok(ExitCode::SUCCESS)
     });
     runtime.shutdown_background();
@@ -85,21 +87,22 @@ async fn open_page(
     let scheme = if secure { "https" } else { "http" };
     println!("page: {scheme}://{}/?token={}", reachable(address), guard.token());
     let board = Arc::new(Board::default());
-    let office = http::office::Office { notices: notices.clone(), board: Arc::clone(&board), join, guard };
-    tokio::spawn(http::serve(place, office));
+    let api_state =
+        http::api_state::ApiState { notices: notices.clone(), board: Arc::clone(&board), join, guard };
+    tokio::spawn(http::serve(place, api_state));
     Ok(Some(board))
 }
 
 /// Says where it listens and how workers join; gives the line for workers. The page shows it as well, to whoever may submit
 /// jobs, so the line with a token is printed here only.
-fn announce(address: SocketAddr, certificates: bool, lab: Option<&Lab>) -> Result<String, String> {
+fn announce(address: SocketAddr, certificates: bool, ca_folder: Option<&CaFolder>) -> Result<String, String> {
     let host = reachable(address);
     let certs = if certificates { " --certs FOLDER" } else { "" };
     let join = format!("bolide worker --master {host}{certs}");
     println!("listening on {address}");
     println!("workers join with: {join}");
-    if let Some(lab) = lab {
-        let token = lab.issue(tls::Role::Worker, FIRST_TOKEN_HOURS).map_err(|e| e.to_string())?;
+    if let Some(ca_folder) = ca_folder {
+        let token = ca_folder.issue(tls::Role::Worker, FIRST_TOKEN_HOURS).map_err(|e| e.to_string())?;
         println!("a new PC joins with: {}", line_to_paste(&host, &token, tls::Role::Worker));
         println!("more such lines: bolide certs token LAB --master {host}");
     }

@@ -77,7 +77,6 @@ fn read_in_any_case(path: &str) -> Option<Vec<u8>> {
 pub enum Error {
     /// Its file cannot be opened, or is no text.
     File {
-        /// The file.
         name: String,
         /// The system's reason.
         why: String,

@@ -28,7 +28,7 @@ use worker::compute::lowest_priority;
 
 use crate::{
     embedded::{Sink, Traffic, timed_sort},
-    event::{Action, Event, Hand, Outcome},
+    event::{Action, Event, Outcome, WorkerSpec},
     job::Job,
     peers,
     sort::{Gathered, SortBasis, Sorted},
@@ -46,7 +46,7 @@ pub enum Input {
     /// A sort is done, with its thread-CPU time (ns); or the sort had a bug.
     Sorted(Result<(Box<Sorted>, u64), String>),
     /// A worker has come while the job runs.
-    Joined(Seat),
+    Joined(WorkerLink),
     /// Look at what is to be stopped.
     Wake,
     /// This process has to leave.
@@ -60,9 +60,9 @@ pub fn channel(n_workers: usize) -> (mpsc::Sender<Input>, mpsc::Receiver<Input>)
 
 /// A connected worker, as those see it who send to it.
 #[derive(Clone)]
-pub struct Seat {
+pub struct WorkerLink {
     /// The host.
-    pub hand: Hand,
+    pub spec: WorkerSpec,
     /// Where it calls from.
     pub address: String,
     /// Where it takes other workers, if it does.
@@ -75,7 +75,7 @@ pub struct Seat {
     pub delivery: Arc<Delivery>,
 }
 
-impl Seat {
+impl WorkerLink {
     /// Queues a message to it.
     pub(crate) fn send(&self, place: Place, message: &ToWorker) -> protocol::Result<()> {
         let packed = wire::pack_to_worker(message)?;
@@ -184,7 +184,7 @@ pub fn drive(
     job: Job,
     first: Vec<Action>,
     number: u32,
-    seats: &[Seat],
+    worker_links: &[WorkerLink],
     line: (mpsc::Sender<Input>, mpsc::Receiver<Input>),
     sink: &mut dyn Sink,
     stop: &AtomicBool,
@@ -193,7 +193,7 @@ pub fn drive(
     let mut driver = Driver {
         place: Place { job: number, epoch: job.epoch(), plan: 0 },
         job,
-        seats: Vec::new(),
+        worker_links: Vec::new(),
         bytes_before: 0,
         send,
         input,
@@ -202,19 +202,19 @@ pub fn drive(
         sort_ns: 0,
         outcome: None,
     };
-    for seat in seats {
-        driver.seat(seat.clone());
+    for worker_link in worker_links {
+        driver.worker_link(worker_link.clone());
     }
     driver.introduce();
     let result = driver.run(first, sink, stop);
-    for seat in &driver.seats {
-        seat.delivery.close();
+    for worker_link in &driver.worker_links {
+        worker_link.delivery.close();
         if result.is_err() {
             // A worker that cannot be reached is found lost by its connection's task.
-            let _ = seat.send(driver.place, &ToWorker::Release);
+            let _ = worker_link.send(driver.place, &ToWorker::Release);
         }
     }
-    let bytes = driver.seats.iter().map(Seat::bytes).sum::<u64>() - driver.bytes_before;
+    let bytes = driver.worker_links.iter().map(WorkerLink::bytes).sum::<u64>() - driver.bytes_before;
     result.map(|outcome| {
         let peer_bytes = outcome.reports.iter().map(|report| report.peer_bytes).sum();
         (outcome, Traffic { bytes: bytes + peer_bytes, peer_bytes, sort_ns: driver.sort_ns })
@@ -225,8 +225,8 @@ struct Driver {
     job: Job,
     place: Place,
     /// In the order they came.
-    seats: Vec<Seat>,
-    /// On the links of the seats, before they were the job's.
+    worker_links: Vec<WorkerLink>,
+    /// On the links of the links, before they were the job's.
     bytes_before: u64,
     send: mpsc::Sender<Input>,
     input: mpsc::Receiver<Input>,
@@ -240,21 +240,21 @@ struct Driver {
 
 impl Driver {
     /// Takes a worker in.
-    fn seat(&mut self, seat: Seat) {
-        let index = self.seats.len();
-        self.bytes_before += seat.bytes();
-        if let Err(why) = seat.delivery.open(self.place.job, index, self.send.clone()) {
+    fn worker_link(&mut self, worker_link: WorkerLink) {
+        let index = self.worker_links.len();
+        self.bytes_before += worker_link.bytes();
+        if let Err(why) = worker_link.delivery.open(self.place.job, index, self.send.clone()) {
             self.lost.push_back((index, why));
         }
-        self.seats.push(seat);
+        self.worker_links.push(worker_link);
     }
 
     /// Tells the epoch's workers where they find each other, before they are dealt their work.
     fn introduce(&mut self) {
         if self.job.route() == protocol::options::Route::Direct {
-            let crew: Vec<(usize, &Seat)> =
-                self.job.crew().iter().map(|&index| (index, &self.seats[index])).collect();
-            self.lost.extend(peers::introduce(&crew, self.place));
+            let at_work: Vec<(usize, &WorkerLink)> =
+                self.job.at_work().iter().map(|&index| (index, &self.worker_links[index])).collect();
+            self.lost.extend(peers::introduce(&at_work, self.place));
         }
     }
 
@@ -281,14 +281,14 @@ impl Driver {
                 Input::Message(worker, header, message) => match self.check(&header, &message) {
                     Ok(()) => {
                         if header.epoch == self.job.epoch() {
-                            sink.heard(&self.seats[worker].hand.name, &message);
+                            sink.heard(&self.worker_links[worker].spec.name, &message);
                         }
                         self.apply(Event::Message(worker, header.epoch, message), sink)?;
                     }
                     Err(why) => {
-                        let seat = &self.seats[worker];
-                        let why = format!("{} at {}: {why}", seat.hand.name, seat.address);
-                        seat.sender().abort(Error::Message(why.clone()));
+                        let worker_link = &self.worker_links[worker];
+                        let why = format!("{} at {}: {why}", worker_link.spec.name, worker_link.address);
+                        worker_link.sender().abort(Error::Message(why.clone()));
                         self.apply(Event::Lost(worker, why), sink)?;
                     }
                 },
@@ -298,10 +298,10 @@ impl Driver {
                     self.sort_ns += ns;
                     self.apply(Event::Sorted(sorted), sink)?;
                 }
-                Input::Joined(seat) => {
-                    let hand = seat.hand.clone();
-                    self.seat(seat);
-                    self.apply(Event::Joined(hand), sink)?;
+                Input::Joined(worker_link) => {
+                    let spec = worker_link.spec.clone();
+                    self.worker_link(worker_link);
+                    self.apply(Event::Joined(spec), sink)?;
                 }
                 Input::Wake => {}
                 Input::Suspend => self.apply(Event::Suspend, sink)?,
@@ -345,9 +345,9 @@ impl Driver {
         for action in actions {
             match action {
                 Action::Send(worker, message) => {
-                    let seat = &self.seats[worker];
-                    if let Err(error) = seat.send(self.place, &message) {
-                        let why = format!("{} at {}: {error}", seat.hand.name, seat.address);
+                    let worker_link = &self.worker_links[worker];
+                    if let Err(error) = worker_link.send(self.place, &message) {
+                        let why = format!("{} at {}: {error}", worker_link.spec.name, worker_link.address);
                         self.lost.push_back((worker, why));
                     }
                 }
@@ -356,9 +356,9 @@ impl Driver {
                     self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
                 }
                 Action::Dismiss(worker, why) => {
-                    let seat = &self.seats[worker];
-                    warn!("worker {} at {} is dropped: {why}", seat.hand.name, seat.address);
-                    seat.delivery.dismiss(why);
+                    let worker_link = &self.worker_links[worker];
+                    warn!("worker {} at {} is dropped: {why}", worker_link.spec.name, worker_link.address);
+                    worker_link.delivery.dismiss(why);
                 }
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => sink.take(other)?,

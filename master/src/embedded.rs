@@ -1,6 +1,6 @@
 //! Master and workers in one process: a [`World`] in which messages arrive in the order they are sent.
 //!
-//! Assignments and images of many elements are handed over as they are, since there need not be room for them twice. With one
+//! Assignments and states of many elements are handed over as they are, since there need not be room for them twice. With one
 //! worker everything runs in turn on the pool's own threads; with several, each worker's tasks run on one pool, one
 //! task of a worker at a time.
 
@@ -26,7 +26,7 @@ use worker::{
 };
 
 use crate::{
-    event::{Action, Event, Hand, Outcome},
+    event::{Action, Event, Outcome, WorkerSpec},
     job::Job,
     sort::{Gathered, SortBasis, Sorted},
     world::{End, Error, Parcel, Sessions, Surroundings, World},
@@ -61,7 +61,7 @@ pub enum Fate {
     /// A worker is gone, with all that it knew.
     Lose(usize),
     /// A worker comes.
-    Join(Hand),
+    Join(WorkerSpec),
     /// From here on this is done to what a worker holds whenever it has computed elements.
     Touch(usize, fn(&mut Machine)),
 }
@@ -197,10 +197,10 @@ fn drive(
                 }
             }
             Some(Fate::Touch(host, touch)) => world.surroundings.places[host].touch = Some(touch),
-            Some(Fate::Join(hand)) => {
+            Some(Fate::Join(spec)) => {
                 world.surroundings.places.push(LocalWorker::new());
                 let host = world.sessions.add_host();
-                world.join(host, hand)?;
+                world.join(host, spec)?;
             }
             _ => {}
         }

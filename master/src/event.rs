@@ -10,20 +10,19 @@ use protocol::{
 
 use crate::{
     incident::{Loss, Rebalance},
-    ledger::Ledger,
     results::history::HistoryRow,
+    run_totals::RunTotals,
     snapshot::Snapshot,
     sort::{Gathered, SortBasis, Sorted},
 };
 
 /// A worker as the job sees it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Hand {
+pub struct WorkerSpec {
     /// Name for messages.
     pub name: String,
     /// Relative speed, user-given.
     pub speed: f64,
-    /// Compute threads.
     pub threads: u32,
 }
 
@@ -41,14 +40,13 @@ pub enum Event {
     /// A worker is gone for good.
     Lost(usize, String),
     /// A worker has come; it has the next index.
-    Joined(Hand),
+    Joined(WorkerSpec),
     /// The time that [`Action::Timer`] asked for has passed.
     Timer,
 }
 
 /// What a job wants done.
 pub enum Action {
-    /// Send to a worker.
     Send(usize, ToWorker),
     /// Sort; exactly one [`Event::Sorted`] answers it. Positions by surface node.
     Sort(Arc<SortBasis>, Gathered),
@@ -90,11 +88,9 @@ pub enum Action {
 /// What a worker was dealt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deal {
-    /// Its name.
     pub name: String,
     /// The speed that it was dealt work by.
     pub speed: f64,
-    /// Its elements.
     pub elements: u64,
 }
 
@@ -109,7 +105,6 @@ pub struct Progress {
     pub dt: f64,
     /// Global index of the element that limits it; none where something else does.
     pub element: Option<u32>,
-    /// What limits it.
     pub limit: Limit,
 }
 
@@ -142,8 +137,7 @@ pub struct Outcome {
     pub state: Option<GlobalState>,
     /// Digest of the final state.
     pub digest: String,
-    /// The ledger.
-    pub ledger: Ledger,
+    pub run_totals: RunTotals,
     /// Sorts that took effect.
     pub sorts: u64,
     /// Census of the last sort.

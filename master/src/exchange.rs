@@ -1,18 +1,18 @@
 //! Builds the exchange plan of each worker and adds partial forces on route master.
 //!
-//! A node that more than one worker holds (in a sub-domain, or as a guest of its work units) is in the exchange: its
+//! A node that more than one worker holds (in a sub-domain, or as a ghost of its work units) is in the exchange: its
 //! holders' partial forces are added here and the total goes back to each of them. What sub-domains share stays from
-//! plan to plan ([`Holdings`]); a plan adds what its guests bring.
+//! plan to plan ([`NodeOwners`]); a plan adds what its ghosts bring.
 
 use mechanics::{
     contact::Batch,
-    cycle::{Guest, Plan},
+    cycle::{Ghost, Plan},
     state::GlobalState,
 };
 
 use protocol::options::Route;
 
-use crate::holdings::{Holdings, Standing, share};
+use crate::node_owners::{NodeOwners, Standing, share};
 
 /// The exchange of all workers from one plan boundary to the next.
 #[derive(Clone)]
@@ -28,52 +28,57 @@ pub struct Exchange {
     n_slots: usize,
     /// By worker: the slot of each node of its exchange list; empty on route direct.
     slots: Vec<Vec<u32>>,
-    /// By worker: where each guest's state comes from, (worker, position in its send list).
+    /// By worker: where each ghost's state comes from, (worker, position in its send list).
     sources: Vec<Vec<(u32, u32)>>,
 }
 
 impl Exchange {
     /// Plans for these batches (one per worker, none where there is no contact).
-    pub fn new(holdings: &Holdings, batches: Vec<Option<Batch>>, state: &GlobalState, route: Route) -> Self {
+    pub fn new(
+        node_owners: &NodeOwners,
+        batches: Vec<Option<Batch>>,
+        state: &GlobalState,
+        route: Route,
+    ) -> Self {
         let moments = !state.shells.inertia.is_empty();
         let stride = if moments { 6 } else { 3 };
         let mut plans: Vec<Plan> =
-            (0..holdings.n_workers()).map(|_| Plan { moments, ..Plan::default() }).collect();
-        // Guests: node and worker.
-        let mut guests: Vec<(u32, u32)> = Vec::new();
+            (0..node_owners.n_workers()).map(|_| Plan { moments, ..Plan::default() }).collect();
+        // Ghosts: node and worker.
+        let mut ghosts: Vec<(u32, u32)> = Vec::new();
         for (worker, batch) in (0..).zip(&batches) {
             let nodes = batch.iter().flat_map(|batch| &batch.nodes).map(|node| node.global);
-            guests.extend(nodes.filter(|&node| !holdings.holds(worker, node)).map(|node| (node, worker)));
+            ghosts.extend(nodes.filter(|&node| !node_owners.holds(worker, node)).map(|node| (node, worker)));
         }
-        guests.sort_unstable();
+        ghosts.sort_unstable();
         let mut added = vec![Added::default(); plans.len()];
-        let mut n_slots = holdings.n_shared() as u32;
-        for guests in guests.chunk_by(|one, other| one.0 == other.0) {
-            let node = guests[0].0;
-            let owner = holdings.owner_worker[node as usize];
+        let mut n_slots = node_owners.n_shared() as u32;
+        for ghosts in ghosts.chunk_by(|one, other| one.0 == other.0) {
+            let node = ghosts[0].0;
+            let owner = node_owners.owner_worker[node as usize];
             plans[owner as usize].send.push(node);
-            let slot = holdings.slot(node).unwrap_or_else(|| {
+            let slot = node_owners.slot(node).unwrap_or_else(|| {
                 added[owner as usize].nodes.push((node, n_slots));
                 n_slots += 1;
                 n_slots - 1
             });
-            for &(_, guest) in guests {
-                plans[guest as usize].guests.push(Guest {
+            for &(_, ghost) in ghosts {
+                plans[ghost as usize].ghosts.push(Ghost {
                     node,
                     mass: state.mass[node as usize],
                     constraint: state.constraint[node as usize],
                 });
-                added[guest as usize].nodes.push((node, slot));
-                for holder in holdings.holders(node) {
-                    added[guest as usize].with.push((node, holder));
-                    added[holder as usize].with.push((node, guest));
+                added[ghost as usize].nodes.push((node, slot));
+                for holder in node_owners.holders(node) {
+                    added[ghost as usize].with.push((node, holder));
+                    added[holder as usize].with.push((node, ghost));
                 }
-                let others = guests.iter().filter(|&&(_, other)| other != guest);
-                added[guest as usize].with.extend(others);
+                let others = ghosts.iter().filter(|&&(_, other)| other != ghost);
+                added[ghost as usize].with.extend(others);
             }
         }
         let mut slots = Vec::with_capacity(plans.len());
-        for (plan, (standing, added)) in plans.iter_mut().zip(holdings.standing.iter().zip(added)) {
+        for (plan, (standing, added)) in plans.iter_mut().zip(node_owners.standing.iter().zip(added)) {
             let whole = added.to(standing, route);
             plan.exchange = whole.nodes;
             plan.neighbours = whole.neighbours;
@@ -82,11 +87,11 @@ impl Exchange {
         let sources = plans
             .iter()
             .map(|plan| {
-                plan.guests
+                plan.ghosts
                     .iter()
-                    .map(|guest| {
-                        let owner = holdings.owner_worker[guest.node as usize];
-                        let at = plans[owner as usize].send.partition_point(|&n| n < guest.node);
+                    .map(|ghost| {
+                        let owner = node_owners.owner_worker[ghost.node as usize];
+                        let at = plans[owner as usize].send.partition_point(|&n| n < ghost.node);
                         (owner, at as u32)
                     })
                     .collect()
@@ -142,8 +147,8 @@ impl Exchange {
         out
     }
 
-    /// State of a worker's guests out of what the owners sent.
-    pub fn guest_state(&self, worker: usize, sent: &[Vec<f64>]) -> Vec<f64> {
+    /// State of a worker's ghosts out of what the owners sent.
+    pub fn ghost_state(&self, worker: usize, sent: &[Vec<f64>]) -> Vec<f64> {
         let mut out = Vec::with_capacity(6 * self.sources[worker].len());
         for &(owner, at) in &self.sources[worker] {
             out.extend_from_slice(&sent[owner as usize][6 * at as usize..6 * at as usize + 6]);
@@ -151,18 +156,18 @@ impl Exchange {
         out
     }
 
-    /// State of a worker's guests out of the global state.
-    pub fn guest_state_from(&self, worker: usize, state: &GlobalState) -> Vec<f64> {
-        let mut out = Vec::with_capacity(6 * self.plans[worker].guests.len());
-        for guest in &self.plans[worker].guests {
-            out.extend_from_slice(&state.x[guest.node as usize]);
-            out.extend_from_slice(&state.v[guest.node as usize]);
+    /// State of a worker's ghosts out of the global state.
+    pub fn ghost_state_from(&self, worker: usize, state: &GlobalState) -> Vec<f64> {
+        let mut out = Vec::with_capacity(6 * self.plans[worker].ghosts.len());
+        for ghost in &self.plans[worker].ghosts {
+            out.extend_from_slice(&state.x[ghost.node as usize]);
+            out.extend_from_slice(&state.v[ghost.node as usize]);
         }
         out
     }
 }
 
-/// What the guests of a plan add to the exchange of a worker.
+/// What the ghosts of a plan add to the exchange of a worker.
 #[derive(Clone, Default)]
 struct Added {
     /// Nodes and their slots, ascending.
@@ -223,8 +228,8 @@ fn hash(plans: &[Plan]) -> u64 {
         plan.exchange.iter().copied().for_each(&mut eat);
         eat(plan.send.len() as u32);
         plan.send.iter().copied().for_each(&mut eat);
-        eat(plan.guests.len() as u32);
-        plan.guests.iter().for_each(|guest| eat(guest.node));
+        eat(plan.ghosts.len() as u32);
+        plan.ghosts.iter().for_each(|ghost| eat(ghost.node));
     }
     hash
 }
@@ -252,21 +257,21 @@ mod tests {
             let mut random = random(seed);
             let n = 2 + random(5) as usize;
             let mut nodes: Vec<Vec<u32>> = vec![Vec::new(); n];
-            let mut guests = nodes.clone();
+            let mut ghosts = nodes.clone();
             for node in 0..NODES {
                 nodes[random(n as u32) as usize].push(node);
                 for worker in 0..n {
                     if random(4) == 0 && !nodes[worker].contains(&node) {
                         nodes[worker].push(node);
                     } else if random(5) == 0 {
-                        guests[worker].push(node);
+                        ghosts[worker].push(node);
                     }
                 }
             }
             let subdomains: Vec<Subdomain> = (0..n)
                 .map(|worker| Subdomain { part: 0, region: Region::List(Vec::new()), worker })
                 .collect();
-            let holdings = Holdings::new(NODES as usize, vec![1.0; n], &subdomains, &nodes);
+            let node_owners = NodeOwners::new(NODES as usize, vec![1.0; n], &subdomains, &nodes);
             let batch = |nodes: &Vec<u32>| {
                 let node = |&global| BatchNode { global, part: 0, mass: 1.0, stiffness: 1.0, share: 1.0 };
                 Some(Batch { nodes: nodes.iter().map(node).collect(), ..Batch::default() })
@@ -282,10 +287,10 @@ mod tests {
                 state.shells.inertia = vec![1.0; NODES as usize];
             }
             let holds =
-                |worker: usize, node: u32| nodes[worker].contains(&node) || guests[worker].contains(&node);
-            let batches: Vec<_> = guests.iter().map(batch).collect();
-            let direct = Exchange::new(&holdings, batches.clone(), &state, Route::Direct);
-            let master = Exchange::new(&holdings, batches, &state, Route::Master);
+                |worker: usize, node: u32| nodes[worker].contains(&node) || ghosts[worker].contains(&node);
+            let batches: Vec<_> = ghosts.iter().map(batch).collect();
+            let direct = Exchange::new(&node_owners, batches.clone(), &state, Route::Direct);
+            let master = Exchange::new(&node_owners, batches, &state, Route::Master);
             for worker in 0..n {
                 let plan = &direct.plans[worker];
                 let wanted: Vec<u32> = (0..NODES)

@@ -20,7 +20,6 @@ pub enum State {
     Lost(String),
 }
 
-/// One host.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Host {
     /// Its number, from 0; a host that returns keeps it.
@@ -29,7 +28,6 @@ pub struct Host {
     pub name: String,
     /// Relative speed.
     pub speed: f64,
-    /// Compute threads.
     pub threads: u32,
     /// Lane set.
     pub lanes: String,

@@ -29,15 +29,15 @@ use tokio_rustls::{TlsAcceptor, server::TlsStream};
 use tracing::{debug, warn};
 
 pub mod api;
+pub mod api_state;
 pub mod assets;
 pub mod board;
 pub mod guard;
 pub mod metrics;
-pub mod office;
 pub mod surface;
 
+use api_state::ApiState;
 use guard::Refusal;
-use office::Office;
 
 /// Most connections at a time.
 pub const CONNECTIONS: usize = 256;
@@ -87,33 +87,33 @@ impl Place {
 }
 
 /// Serves for ever.
-pub async fn serve(place: Place, office: Office) {
+pub async fn serve(place: Place, api_state: ApiState) {
     let Ok(address) = place.address() else { return };
     let (send, ready) = mpsc::channel(16);
     tokio::spawn(take(place, send));
     let door = Door { ready, address };
-    if let Err(error) = axum::serve(door, router(office)).await {
+    if let Err(error) = axum::serve(door, router(api_state)).await {
         warn!("the page: {error}");
     }
 }
 
-fn router(office: Office) -> Router {
+fn router(api_state: ApiState) -> Router {
     Router::new()
         .merge(assets::routes())
         .nest("/api", api::routes())
         .route("/metrics", axum::routing::get(metrics::text))
         .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
-        .layer(middleware::from_fn_with_state(office.clone(), watchman))
-        .with_state(office)
+        .layer(middleware::from_fn_with_state(api_state.clone(), check_request))
+        .with_state(api_state)
 }
 
 /// Every request passes here.
-async fn watchman(State(office): State<Office>, request: Request, next: Next) -> Response {
-    let guard = &office.guard;
+async fn check_request(State(api_state): State<ApiState>, request: Request, next: Next) -> Response {
+    let guard = &api_state.guard;
     let answer = match guard.names(request.headers()) {
         Err(refusal) => refuse(refusal),
         Ok(()) if request.uri().path() == "/healthz" => {
-            let ending = office.notices.is_closed();
+            let ending = api_state.notices.is_closed();
             if ending { (StatusCode::SERVICE_UNAVAILABLE, "ending\n") } else { (StatusCode::OK, "ok\n") }
                 .into_response()
         }

@@ -11,7 +11,6 @@ pub struct Rebalance {
     pub workers: Vec<String>,
     /// Speeds that work was dealt out by before.
     pub speeds_before: Vec<f64>,
-    /// And after.
     pub speeds_after: Vec<f64>,
     /// Time of the slowest worker over that of a perfect cut, as measured before.
     pub imbalance_before: f64,
@@ -28,6 +27,5 @@ pub struct Loss {
     pub cycle: u64,
     /// The cycle that the run went back to.
     pub back_to: u64,
-    /// Why.
     pub why: String,
 }

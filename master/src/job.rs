@@ -1,12 +1,12 @@
 //! The job's session on the master: a pure state machine, `apply(event) -> actions`.
 //!
-//! It decides time steps, sorts, images and the end from the votes of whole cycles, adds partial forces, and keeps the
-//! ledger. It knows no socket, clock, disk or thread: those are events and actions.
+//! It decides time steps, sorts, states and the end from the votes of whole cycles, adds partial forces, and keeps the
+//! totals. It knows no socket, clock, disk or thread: those are events and actions.
 //!
 //! What it knows is in parts that know nothing of each other's insides, each tested by itself: `problem` is the same for the
 //! whole job; `workers`, `checkpoints`, `balancing`, the account (`verdict`) and the `tally` live as long as the job; an
-//! `epoch` has a `schedule`, `sorts`, frames of cycles (`frames`), `images` and `samples`. Here they are brought
-//! together: this file takes events and completes cycles, `collect` what comes of images and samples, `deal` begins an epoch,
+//! `epoch` has a `schedule`, `sorts`, frames of cycles (`frames`), `worker_states` and `samples`. Here they are brought
+//! together: this file takes events and completes cycles, `collect` what comes of states and samples, `deal` begins an epoch,
 //! `turnover` ends one.
 
 mod balancing;
@@ -16,7 +16,6 @@ mod deal;
 mod epoch;
 mod error;
 mod frames;
-mod images;
 mod numbers;
 mod problem;
 mod samples;
@@ -27,6 +26,7 @@ mod tally;
 mod tests;
 mod turnover;
 mod verdict;
+mod worker_states;
 mod workers;
 
 use std::sync::Arc;
@@ -34,7 +34,7 @@ use std::sync::Arc;
 use deck::model::Model;
 use mechanics::{contact::Surface, digest, state::GlobalState, vote::Vote};
 use protocol::{
-    message::{IMAGE_VERSION, Orders, ToMaster, ToWorker},
+    message::{Orders, ToMaster, ToWorker, WORKER_STATE_VERSION},
     options::{Balance, Route},
 };
 
@@ -128,8 +128,8 @@ impl Job {
     }
 
     /// Workers of the present epoch, in the order by which peers and plans name them.
-    pub fn crew(&self) -> &[usize] {
-        &self.epoch.crew
+    pub fn at_work(&self) -> &[usize] {
+        &self.epoch.at_work
     }
 
     /// Hash of the plan that frames of a cycle follow; none for a cycle without one.
@@ -160,17 +160,17 @@ impl Job {
             Event::Message(index, epoch, message) => return self.receive(index, epoch, message, actions),
             Event::Sorted(sorted) => return self.sorted(*sorted, actions),
             Event::Lost(index, why) => return self.lost(index, why, actions),
-            Event::Joined(hand) => return self.joined(hand, actions),
+            Event::Joined(spec) => return self.joined(spec, actions),
             Event::Timer => self.checkpoints.time_has_come(),
             Event::Stop => {
                 self.ending.stop_asked = true;
-                if self.epoch.crew.is_empty() {
+                if self.epoch.at_work.is_empty() {
                     self.finish_at_checkpoint(actions);
                 }
             }
             Event::Suspend => {
                 self.ending.leaves = true;
-                if self.epoch.crew.is_empty() {
+                if self.epoch.at_work.is_empty() {
                     self.suspend_at_checkpoint(actions);
                 }
             }
@@ -184,23 +184,23 @@ impl Job {
         self.epoch.send_all(actions, |_| ToWorker::Release);
         let digest = state.as_ref().map(digest::digest).unwrap_or_default();
         let last = state.as_ref().map_or(self.epoch.schedule.completed(), |s| s.cycle);
-        let (crew, tally) = (&self.epoch.crew, &mut self.tally);
+        let (at_work, tally) = (&self.epoch.at_work, &mut self.tally);
         actions.push(Action::Over(Box::new(Outcome {
             stopped: self.ending.stop_asked,
             suspended: self.ending.leaves && state.is_none() && failure.is_none(),
             failure,
             state,
             digest,
-            ledger: self.account.ledger.clone(),
+            run_totals: self.account.run_totals.clone(),
             sorts: tally.sorts,
             census: tally.census,
             work: tally.work(self.workers.n()),
-            reports: tally.reports(crew),
+            reports: tally.reports(at_work),
             imbalance: tally.imbalance,
             lanes: tally.lanes().to_owned(),
             route: self.options.route().name(),
             cycles_run: last - self.first_cycle,
-            workers: self.workers.names(crew),
+            workers: self.workers.names(at_work),
             rebalances: std::mem::take(&mut tally.rebalances),
             losses: std::mem::take(&mut tally.losses),
         })));
@@ -224,7 +224,7 @@ impl Job {
         }
     }
 
-    /// From here on a worker is its position in the epoch's crew.
+    /// From here on a worker is its position in the epoch's workers.
     fn take(
         &mut self,
         (worker, index): (usize, usize),
@@ -243,7 +243,7 @@ impl Job {
                 self.arrived(worker, cycle, Frame { vote, partials, gathered }, actions)
             }
             ToMaster::Relay { to, message } => {
-                let member = self.epoch.crew.get(to as usize).copied();
+                let member = self.epoch.at_work.get(to as usize).copied();
                 let breach = Breach::Address { to, workers: n };
                 let member = member.ok_or(Error::Worker(worker, breach))?;
                 actions.push(Action::Send(member, ToWorker::Relayed { from: worker as u32, message }));
@@ -257,18 +257,18 @@ impl Job {
             ToMaster::Transfer { cycle, state } => {
                 let exchange = self.epoch.sorts.beginning_at(cycle);
                 for (to, state) in self.epoch.inflow.transfer(worker, cycle, state, exchange)? {
-                    actions.push(Action::Send(self.epoch.crew[to], ToWorker::Transfer { cycle, state }));
+                    actions.push(Action::Send(self.epoch.at_work[to], ToWorker::Transfer { cycle, state }));
                 }
                 Ok(())
             }
-            ToMaster::Image { cycle, version, pieces, last, work } => {
-                if version != IMAGE_VERSION {
+            ToMaster::WorkerState { cycle, version, pieces, last, work } => {
+                if version != WORKER_STATE_VERSION {
                     return Err(Error::Worker(worker, Breach::ImageVersion(version)));
                 }
                 self.tally.note_work((index, self.workers.n()), work);
                 let before = Arc::clone(&self.checkpoints.newest().state);
-                match self.epoch.images.add((worker, n), cycle, (pieces, last), &before)? {
-                    Some(image) => self.collected(image, actions),
+                match self.epoch.worker_states.add((worker, n), cycle, (pieces, last), &before)? {
+                    Some(worker_state) => self.collected(worker_state, actions),
                     None => Ok(()),
                 }
             }
@@ -314,7 +314,7 @@ impl Job {
             sample: self.options.replay && !at_end,
         };
         if before.collect {
-            self.epoch.images.order(first, time, false);
+            self.epoch.worker_states.order(first, time, false);
         }
         if at_end {
             self.epoch.schedule.stop_at(first, false);
@@ -357,7 +357,7 @@ impl Job {
         }
         let collect = stop || due || keep;
         if collect {
-            self.epoch.images.order(after, time_after, due);
+            self.epoch.worker_states.order(after, time_after, due);
         }
         let blocking = !stop && self.epoch.sorts.surface_changes_at(after);
         let gather = blocking || (!stop && self.sort_due(after, vote));
@@ -380,10 +380,10 @@ impl Job {
 
     /// Whether the epoch is to end at a boundary.
     fn wants_next_epoch(&mut self, boundary: u64) -> bool {
-        let crew = &self.epoch.crew;
+        let at_work = &self.epoch.at_work;
         boundary > self.epoch.schedule.first_cycle()
-            && (self.workers.has_newcomers(crew)
-                || self.workers.has_leavers(crew)
+            && (self.workers.has_newcomers(at_work)
+                || self.workers.has_leavers(at_work)
                 || self.wants_other_speeds(boundary))
     }
 
@@ -478,8 +478,8 @@ impl Job {
             }
         }
         if self.checkpoints.is_expected(cycle) {
-            let rest = self.rest_at(cycle, vote.clone())?;
-            self.checkpoints.take_rest(cycle, rest);
+            let continuation = self.rest_at(cycle, vote.clone())?;
+            self.checkpoints.take_rest(cycle, continuation);
             self.complete_checkpoint(cycle, actions)?;
         }
         let control = self.model().setup.control;

@@ -2,38 +2,37 @@
 //!
 //! [`job`] is the pure session of one run; a [`world`] has it and the sessions of its workers in one process, in which
 //! [`embedded`] runs them, and [`drive`] has workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`] and hears [`notice`]s: each
-//! [`connection`] is one task that carries messages, the [`desk`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the desk;
-//! [`lab`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`processes`] starts workers as
+//! [`connection`] is one task that carries messages, the [`client_requests`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the client requests;
+//! [`ca_folder`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`processes`] starts workers as
 //! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster. [`program`] is the command line.
 
 pub mod add;
 pub mod balance;
 pub mod bench;
+pub mod ca_folder;
 pub mod certs;
 pub mod client;
+pub mod client_requests;
 pub mod command;
 pub mod connection;
 pub mod convert;
 pub mod daemon;
 pub mod deck_file;
 pub mod decompose;
-pub mod desk;
 pub mod drive;
 pub mod embedded;
 pub mod erosion;
 pub mod event;
 pub mod exchange;
-pub mod holdings;
 pub mod hosts;
 pub mod http;
 pub mod incident;
 pub mod interrupt;
 pub mod job;
-pub mod lab;
-pub mod ledger;
 pub mod machine;
 pub mod memory;
 pub mod newcomer;
+pub mod node_owners;
 pub mod notice;
 pub mod options;
 pub mod output;
@@ -44,6 +43,7 @@ pub mod program;
 pub mod queue;
 pub mod results;
 pub mod run;
+pub mod run_totals;
 pub mod scheduler;
 pub mod service;
 pub mod shell;

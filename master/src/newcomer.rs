@@ -18,11 +18,11 @@ use protocol::{
 };
 use tracing::info;
 
-use crate::{certs, lab::Lab};
+use crate::{ca_folder::CaFolder, certs};
 
 /// Master's side, after Welcome: takes the request, exchanges the token, ends the connection.
 pub(crate) async fn serve(
-    lab: &Lab,
+    ca_folder: &CaFolder,
     hello: &Hello,
     address: &str,
     sender: &Sender,
@@ -31,10 +31,10 @@ pub(crate) async fn serve(
     receiver.set_limit(JOINING_LIMIT);
     let frame = receive(receiver).await?;
     let joining: Joining = codec::decode(&frame.payload, JOINING_LIMIT as usize)?;
-    let (lab, name) = (lab.clone(), hello.name.clone());
+    let (ca_folder, name) = (ca_folder.clone(), hello.name.clone());
     let token = hello.token.clone().unwrap_or_default();
     let ip = address.parse().map(|address: SocketAddr| address.ip()).ok();
-    let exchange = move || lab.redeem(&token, &name, ip, &joining.request).map_err(|e| e.to_string());
+    let exchange = move || ca_folder.redeem(&token, &name, ip, &joining.request).map_err(|e| e.to_string());
     let exchanged = tokio::task::spawn_blocking(exchange).await;
     let exchanged =
         exchanged.unwrap_or_else(|_| Err("a bug in the master; its log has the words".to_owned()));

@@ -9,7 +9,7 @@ use protocol::{
 };
 use tokio::sync::{oneshot, watch};
 
-use crate::{drive::Seat, queue::Change};
+use crate::{drive::WorkerLink, queue::Change};
 
 /// Notices that may wait for the scheduler.
 pub const WAITING_NOTICES: usize = 1024;
@@ -28,12 +28,11 @@ pub enum Notice {
         answer: oneshot::Sender<Result<u32, String>>,
     },
     /// It was welcomed and can be given jobs.
-    Joined(Seat),
+    Joined(WorkerLink),
     /// Its connection has ended.
     Left {
         /// The connection.
         incarnation: u32,
-        /// Why.
         why: String,
         /// Its job dropped the worker: it may not come back.
         dropped: bool,
@@ -49,9 +48,7 @@ pub enum Notice {
     Submit {
         /// Name of its file.
         name: String,
-        /// Its title.
         title: String,
-        /// The deck.
         text: String,
         /// What is asked beside the deck.
         options: JobOptions,

@@ -20,7 +20,7 @@ pub struct SessionOptions {
     /// What work costs on the workers, relative to an element.
     pub costs: Costs,
     /// How often the state is kept in memory, to go back to when a worker is lost.
-    pub keep: Keep,
+    pub keep: CheckpointEvery,
     /// Give every checkpoint to the sink, for snapshots on disk.
     pub store: bool,
     /// With no worker left, wait for one instead of ending.
@@ -45,7 +45,7 @@ impl SessionOptions {
 
 /// How often the state is kept in memory, always at a plan boundary.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Keep {
+pub enum CheckpointEvery {
     /// Only where an epoch begins.
     #[default]
     Never,
@@ -57,7 +57,7 @@ pub enum Keep {
     Either(f64, u64),
 }
 
-impl Keep {
+impl CheckpointEvery {
     /// Often enough for memory, which asks for so many seconds, and for the disk.
     pub fn for_both(memory: Option<f64>, disk: Interval) -> Self {
         let seconds = match (memory, disk.seconds) {
@@ -72,7 +72,6 @@ impl Keep {
         }
     }
 
-    /// Its seconds.
     pub const fn seconds(self) -> Option<f64> {
         match self {
             Self::Seconds(seconds) | Self::Either(seconds, _) => Some(seconds),
@@ -80,7 +79,6 @@ impl Keep {
         }
     }
 
-    /// Its cycles.
     pub const fn cycles(self) -> Option<u64> {
         match self {
             Self::Cycles(cycles) | Self::Either(_, cycles) => Some(cycles),
@@ -181,10 +179,16 @@ mod tests {
     #[test]
     fn the_state_is_kept_as_often_as_memory_or_the_disk_asks() {
         let disk = |seconds, cycles| Interval { seconds, cycles };
-        assert_eq!(Keep::for_both(None, disk(None, None)), Keep::Never);
-        assert_eq!(Keep::for_both(Some(10.0), disk(Some(60.0), None)), Keep::Seconds(10.0));
-        assert_eq!(Keep::for_both(Some(10.0), disk(Some(2.0), Some(5))), Keep::Either(2.0, 5));
-        assert_eq!(Keep::for_both(None, disk(None, Some(5))), Keep::Cycles(5));
+        assert_eq!(CheckpointEvery::for_both(None, disk(None, None)), CheckpointEvery::Never);
+        assert_eq!(
+            CheckpointEvery::for_both(Some(10.0), disk(Some(60.0), None)),
+            CheckpointEvery::Seconds(10.0)
+        );
+        assert_eq!(
+            CheckpointEvery::for_both(Some(10.0), disk(Some(2.0), Some(5))),
+            CheckpointEvery::Either(2.0, 5)
+        );
+        assert_eq!(CheckpointEvery::for_both(None, disk(None, Some(5))), CheckpointEvery::Cycles(5));
     }
 
     #[test]

@@ -80,7 +80,6 @@ pub fn run(args: &PictureArgs) -> Result<ExitCode, String> {
 
 /// A state to draw.
 pub struct Shot {
-    /// Its file.
     pub path: PathBuf,
     /// Its number from 0 and how many there are; none of a single file.
     pub place: Option<(usize, usize)>,

@@ -14,10 +14,10 @@ use protocol::handshake::Role;
 use tokio::{net::TcpListener, runtime::Runtime, sync::mpsc};
 
 use crate::{
-    connection::{Gate, listen},
-    drive::{self, Seat, drive},
+    connection::{Acceptor, listen},
+    drive::{self, WorkerLink, drive},
     embedded::{Sink, Traffic},
-    event::{Action, Hand, Outcome},
+    event::{Action, Outcome, WorkerSpec},
     job::Job,
     notice::{Notice, WAITING_NOTICES},
 };
@@ -31,19 +31,19 @@ const JOIN_LIMIT: Duration = Duration::from_secs(60);
 
 /// Children that have joined. They are ended with this value.
 pub struct Processes {
-    gate: Arc<Gate>,
-    seats: Vec<Seat>,
+    acceptor: Arc<Acceptor>,
+    worker_links: Vec<WorkerLink>,
     children: Vec<Child>,
     /// Carries the links; taken only when this value is dropped.
     runtime: Option<Runtime>,
 }
 
 impl Processes {
-    /// Starts a worker for each hand and waits until all have joined.
+    /// Starts a worker for each specification and waits until all have joined.
     ///
     /// # Errors
     /// If the executable cannot be started, a child ends, or not all join in time.
-    pub fn start(hands: &[Hand]) -> Result<Self, String> {
+    pub fn start(specs: &[WorkerSpec]) -> Result<Self, String> {
         let binary = match std::env::var_os(BINARY) {
             Some(path) => PathBuf::from(path),
             None => std::env::current_exe().map_err(|e| format!("the path of this program: {e}"))?,
@@ -59,13 +59,13 @@ impl Processes {
         let address = listener.local_addr().map_err(fault)?;
         let token = format!("{:016x}{:016x}", worker::random(), worker::random());
         let (events, mut heard) = mpsc::channel(WAITING_NOTICES);
-        let gate = Arc::new(Gate::new(events, vec![Role::Worker], Some(token.clone()), None));
-        runtime.spawn(listen(listener, Arc::clone(&gate)));
-        let mut started = Self { gate, seats: Vec::new(), children: Vec::new(), runtime: None };
-        for hand in hands {
+        let acceptor = Arc::new(Acceptor::new(events, vec![Role::Worker], Some(token.clone()), None));
+        runtime.spawn(listen(listener, Arc::clone(&acceptor)));
+        let mut started = Self { acceptor, worker_links: Vec::new(), children: Vec::new(), runtime: None };
+        for spec in specs {
             let child = Command::new(&binary)
-                .args(["worker", "--once", "--master", &address.to_string(), "--name", &hand.name])
-                .args(["--speed", &hand.speed.to_string(), "--threads", &hand.threads.to_string()])
+                .args(["worker", "--once", "--master", &address.to_string(), "--name", &spec.name])
+                .args(["--speed", &spec.speed.to_string(), "--threads", &spec.threads.to_string()])
                 .env(TOKEN, &token)
                 .env("BOLIDE_LOG", std::env::var("BOLIDE_LOG").unwrap_or_else(|_| "warn".to_owned()))
                 .stdin(Stdio::null())
@@ -76,7 +76,7 @@ impl Processes {
                 .map_err(|e| format!("starting {} worker: {e}", binary.display()))?;
             started.children.push(child);
         }
-        started.seats = runtime.block_on(join(hands, &mut heard, &mut started.children))?;
+        started.worker_links = runtime.block_on(join(specs, &mut heard, &mut started.children))?;
         // What happens to the links from now on is told to the job by their own tasks.
         runtime.spawn(async move { while heard.recv().await.is_some() {} });
         started.runtime = Some(runtime);
@@ -94,29 +94,29 @@ impl Processes {
         sink: &mut dyn Sink,
         stop: &AtomicBool,
     ) -> Result<(Outcome, Traffic), String> {
-        drive(job, first, 1, &self.seats, drive::channel(self.seats.len()), sink, stop)
+        drive(job, first, 1, &self.worker_links, drive::channel(self.worker_links.len()), sink, stop)
     }
 }
 
-/// Waits until every hand has its seat, in the order of the hands.
+/// Waits until every specification has its link, in the order of the workers.
 async fn join(
-    hands: &[Hand],
+    specs: &[WorkerSpec],
     heard: &mut mpsc::Receiver<Notice>,
     children: &mut [Child],
-) -> Result<Vec<Seat>, String> {
+) -> Result<Vec<WorkerLink>, String> {
     let deadline = Instant::now() + JOIN_LIMIT;
-    let mut seats: BTreeMap<usize, Seat> = BTreeMap::new();
-    while seats.len() < hands.len() {
+    let mut worker_links: BTreeMap<usize, WorkerLink> = BTreeMap::new();
+    while worker_links.len() < specs.len() {
         match tokio::time::timeout(Duration::from_millis(100), heard.recv()).await {
             Ok(Some(Notice::Knock { hello, answer, .. })) => {
-                let place = hands.iter().position(|hand| hand.name == hello.name);
+                let place = specs.iter().position(|spec| spec.name == hello.name);
                 let place = place.ok_or_else(|| format!("no worker {:?} was started", hello.name));
                 // A child that has ended since is found below.
                 let _ = answer.send(place.map(|place| place as u32));
             }
-            Ok(Some(Notice::Joined(seat))) => {
-                if let Some(place) = hands.iter().position(|hand| hand.name == seat.hand.name) {
-                    seats.insert(place, seat);
+            Ok(Some(Notice::Joined(worker_link))) => {
+                if let Some(place) = specs.iter().position(|spec| spec.name == worker_link.spec.name) {
+                    worker_links.insert(place, worker_link);
                 }
             }
             Ok(Some(Notice::Left { why, .. })) => {
@@ -125,28 +125,28 @@ async fn join(
             Ok(Some(_)) => {}
             Ok(None) => return Err("the listener has ended".to_owned()),
             Err(_) => {
-                for (child, hand) in children.iter_mut().zip(hands) {
+                for (child, spec) in children.iter_mut().zip(specs) {
                     if let Ok(Some(status)) = child.try_wait() {
-                        return Err(format!("{} ended before it joined: {status}", hand.name));
+                        return Err(format!("{} ended before it joined: {status}", spec.name));
                     }
                 }
                 if Instant::now() >= deadline {
-                    let (joined, all, limit) = (seats.len(), hands.len(), JOIN_LIMIT.as_secs());
+                    let (joined, all, limit) = (worker_links.len(), specs.len(), JOIN_LIMIT.as_secs());
                     return Err(format!("{joined} of {all} workers joined within {limit} s"));
                 }
             }
         }
     }
-    Ok(seats.into_values().collect())
+    Ok(worker_links.into_values().collect())
 }
 
 impl Drop for Processes {
     fn drop(&mut self) {
-        self.gate.end();
+        self.acceptor.end();
         if let Some(runtime) = self.runtime.take() {
             runtime.block_on(async {
-                for seat in &self.seats {
-                    protocol::dial::leave(&seat.sender(), "the run is over").await;
+                for worker_link in &self.worker_links {
+                    protocol::dial::leave(&worker_link.sender(), "the run is over").await;
                 }
             });
             runtime.shutdown_background();

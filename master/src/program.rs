@@ -17,11 +17,10 @@ use worker::{daemon::Listen, runner::Compute};
 use crate::{
     add, bench,
     bench::grind::Speed,
+    ca_folder::CaFolder,
     certs, client,
     command::{Bench, Certs, Cli, Command, WorkerArgs},
-    convert, daemon, deck_file,
-    lab::Lab,
-    machine, memory, newcomer, picture, processes, run, simulate,
+    convert, daemon, deck_file, machine, memory, newcomer, picture, processes, run, simulate,
 };
 
 /// The log: to standard error, of the levels that `BOLIDE_LOG` says (`debug`, or by module `info,worker=debug`), else from
@@ -126,7 +125,7 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
             println!("made {}; copy this folder to {name}", folder.join(&name).display());
         }
         Certs::Token { folder, role, hours, master } => {
-            let token = Lab::open(&folder).and_then(|lab| lab.issue(role.role(), hours));
+            let token = CaFolder::open(&folder).and_then(|ca| ca.issue(role.role(), hours));
             println!("{}", daemon::line_to_paste(&master, &token.map_err(|e| e.to_string())?, role.role()));
         }
         Certs::Join { master, token, folder, name } => {
@@ -134,7 +133,8 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
             println!("made {}", tls::Paths::in_folder(&folder).certificate.display());
         }
         Certs::Revoke { folder, name } => {
-            let revoked = Lab::open(&folder).and_then(|lab| lab.revoke(&name)).map_err(|e| e.to_string())?;
+            let revoked =
+                CaFolder::open(&folder).and_then(|ca| ca.revoke(&name)).map_err(|e| e.to_string())?;
             println!(
                 "revoked {revoked} of {name}; a running master with --lab ends its links within seconds"
             );

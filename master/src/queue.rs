@@ -105,9 +105,9 @@ impl Queue {
     }
 
     /// A job begins with these workers.
-    pub fn set_crew(&mut self, id: u32, crew: Vec<String>) {
+    pub fn set_at_work(&mut self, id: u32, at_work: Vec<String>) {
         if let Some(job) = self.jobs.get_mut(&id) {
-            job.before = Some(crew);
+            job.before = Some(at_work);
         }
     }
 

@@ -43,22 +43,17 @@ pub use summary::Summary;
 #[derive(Debug)]
 pub enum Error {
     /// The folder holds something and may not be written over.
-    NotEmpty {
-        /// The folder.
-        path: PathBuf,
-    },
+    NotEmpty { path: PathBuf },
     /// The operating system refused: disk full, no permission, not a folder.
     Io {
         /// What was tried, as a verb: `create`, `write`, `read`, `rename`, `remove`.
         action: &'static str,
-        /// The file or folder.
         path: PathBuf,
         /// The system's reason.
         source: io::Error,
     },
     /// A file is not what a run writes.
     Malformed {
-        /// The file.
         path: PathBuf,
         /// Line, counted from 1.
         line: usize,
@@ -173,12 +168,10 @@ impl Folder {
         Ok(())
     }
 
-    /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Path of a file of this folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }

@@ -14,10 +14,10 @@ use crate::{
     command::RunArgs,
     deck_file::read_deck_with,
     embedded::{self, Traffic},
-    event::{Hand, Outcome},
+    event::{Outcome, WorkerSpec},
     interrupt::stop_on_interrupt,
     job::Job,
-    options::{Keep, SessionOptions, bring_end_forward, interval_for, speeds_for},
+    options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     processes::Processes,
     results::{Folder, report, trace},
@@ -53,10 +53,10 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let n = args.workers as usize;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = args.threads.map_or(cores, |t| t as usize);
-    let hands: Vec<Hand> = speeds_for(n, &args.speeds)?
+    let specs: Vec<WorkerSpec> = speeds_for(n, &args.speeds)?
         .into_iter()
         .enumerate()
-        .map(|(i, speed)| Hand { name: format!("worker-{i}"), speed, threads: threads as u32 })
+        .map(|(i, speed)| WorkerSpec { name: format!("worker-{i}"), speed, threads: threads as u32 })
         .collect();
     let resume = args.resume.as_deref().map(resumed_from).transpose()?;
     let path = (!asked.no_output).then(|| folder_for(args));
@@ -74,14 +74,14 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     // Nobody is lost who shares this process.
     let memory = asked.keep_every.filter(|_| args.processes);
     let options = SessionOptions {
-        keep: Keep::for_both(memory, interval),
+        keep: CheckpointEvery::for_both(memory, interval),
         store: folder.is_some(),
         ..SessionOptions::of(asked, n, true)
     };
     let states = resume.as_ref().filter(|_| in_place).map(|snapshot| snapshot.states.clone());
     // Without contact the surface is found for its census alone, before there are states beside it.
     let bare = model.setup.contact.is_none().then(|| SurfaceCensus::without_contact(&model));
-    let (mut job, first) = Job::new(Arc::clone(&model), &hands, options, resume)?;
+    let (mut job, first) = Job::new(Arc::clone(&model), &specs, options, resume)?;
     let census = bare.unwrap_or_else(|| SurfaceCensus::of(&job, &model));
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     if let Some(folder) = &output.folder {
@@ -98,7 +98,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         job.keep_no_state();
     }
     let stop = stop_on_interrupt("stopping after this cycle");
-    let children = args.processes.then(|| Processes::start(&hands)).transpose()?;
+    let children = args.processes.then(|| Processes::start(&specs)).transpose()?;
     let started = Instant::now();
     let (outcome, traffic) = match &children {
         Some(children) => children.run(job, first, &mut output, &stop)?,

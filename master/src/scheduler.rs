@@ -23,8 +23,8 @@ use tracing::{info, warn};
 use worker::notify;
 
 use crate::{
-    connection::Gate,
-    drive::{self, Input, Seat},
+    connection::Acceptor,
+    drive::{self, Input, WorkerLink},
     hosts::Hosts,
     http::board::Board,
     notice::Notice,
@@ -50,7 +50,7 @@ pub struct Scheduler {
     notices: mpsc::Sender<Notice>,
     hosts: Hosts,
     /// By connection: those that were welcomed and have not left.
-    seats: BTreeMap<u32, Seat>,
+    worker_links: BTreeMap<u32, WorkerLink>,
     queue: Queue,
     status: BTreeMap<u32, watch::Sender<Status>>,
     /// By the number of the job.
@@ -91,7 +91,7 @@ impl Scheduler {
             proof: mechanics::proof::of_this_machine(),
             notices,
             hosts: Hosts::default(),
-            seats: BTreeMap::new(),
+            worker_links: BTreeMap::new(),
             queue: Queue::new(left.first),
             status: BTreeMap::new(),
             running: BTreeMap::new(),
@@ -108,7 +108,7 @@ impl Scheduler {
 
     /// A job of an earlier master; one that was under way goes on.
     fn restore(&mut self, record: Record, text: String) {
-        let Record { job, name, title, state, options, crew, cycle, time, ended } = record;
+        let Record { job, name, title, state, options, at_work, cycle, time, ended } = record;
         let interrupted = state == State::Running;
         let state = if interrupted { State::Queued } else { state };
         if !is_over(state) {
@@ -119,7 +119,7 @@ impl Scheduler {
             watch::Sender::new(Status { state, cycle, time, ended, ..Status::queued(job, title) }),
         );
         let folder = (!options.no_output).then(|| self.spool.results(job));
-        let before = interrupted.then_some(crew);
+        let before = interrupted.then_some(at_work);
         self.queue.restore(Entry { id: job, name, text: Arc::new(text), options, state, folder, before });
     }
 
@@ -135,7 +135,7 @@ impl Scheduler {
                 title: status.title.clone(),
                 state: if begun { State::Running } else { entry.state },
                 options: entry.options.clone(),
-                crew: entry.before.clone().unwrap_or_default(),
+                at_work: entry.before.clone().unwrap_or_default(),
                 cycle: status.cycle,
                 time: status.time,
                 ended,
@@ -146,7 +146,7 @@ impl Scheduler {
     }
 
     /// Hears notices until it is to stop, then lets the jobs under way be stored.
-    pub async fn run(mut self, mut heard: mpsc::Receiver<Notice>, stop: &AtomicBool, gate: &Gate) {
+    pub async fn run(mut self, mut heard: mpsc::Receiver<Notice>, stop: &AtomicBool, acceptor: &Acceptor) {
         let mut look = tokio::time::interval(Duration::from_millis(100));
         let (alive, mut said) = (notify::interval(), Instant::now());
         while !stop.load(Ordering::Relaxed) {
@@ -167,11 +167,11 @@ impl Scheduler {
         notify::say("STOPPING=1\nSTATUS=storing the job under way");
         // From here on END_LIMIT bounds what it waits for.
         tokio::spawn(notify::live());
-        self.end(&mut heard, gate).await;
+        self.end(&mut heard, acceptor).await;
     }
 
     /// Lets the jobs under way be stored, and says good-bye.
-    async fn end(&mut self, heard: &mut mpsc::Receiver<Notice>, gate: &Gate) {
+    async fn end(&mut self, heard: &mut mpsc::Receiver<Notice>, acceptor: &Acceptor) {
         for running in self.running.values() {
             let line = running.line.clone();
             // Beside what is heard below: the line may be full.
@@ -185,9 +185,9 @@ impl Scheduler {
             }
         })
         .await;
-        gate.end();
-        let leaving = self.seats.values().map(|seat| {
-            let sender = seat.sender();
+        acceptor.end();
+        let leaving = self.worker_links.values().map(|worker_link| {
+            let sender = worker_link.sender();
             tokio::spawn(async move { protocol::dial::leave(&sender, "the master is ending").await })
         });
         for left in leaving.collect::<Vec<_>>() {
@@ -202,14 +202,14 @@ impl Scheduler {
             Notice::Knock { hello, address, incarnation, answer } => {
                 let _ = answer.send(self.admit(&hello, &address, incarnation));
             }
-            Notice::Joined(seat) => {
-                let Seat { hand, address, .. } = &seat;
-                info!(address, speed = hand.speed, threads = hand.threads, "worker {} joined", hand.name);
-                self.offer(&seat);
-                self.seats.insert(seat.incarnation, seat);
+            Notice::Joined(worker_link) => {
+                let WorkerLink { spec, address, .. } = &worker_link;
+                info!(address, speed = spec.speed, threads = spec.threads, "worker {} joined", spec.name);
+                self.offer(&worker_link);
+                self.worker_links.insert(worker_link.incarnation, worker_link);
             }
             Notice::Left { incarnation, why, dropped } => {
-                self.seats.remove(&incarnation);
+                self.worker_links.remove(&incarnation);
                 match dropped {
                     true => self.hosts.drop_out(incarnation, &why),
                     false => self.hosts.lose(incarnation, &why),
@@ -253,20 +253,20 @@ impl Scheduler {
     }
 
     /// A worker that comes while jobs run is given to one of them.
-    fn offer(&mut self, seat: &Seat) {
+    fn offer(&mut self, worker_link: &WorkerLink) {
         let job = allotment::for_newcomer(self.running.keys().copied());
         if let Some((job, Running { line, .. })) = job.and_then(|job| self.running.get_key_value(&job)) {
-            self.hosts.occupy(&[seat.incarnation], *job);
-            let (line, seat) = (line.clone(), seat.clone());
+            self.hosts.occupy(&[worker_link.incarnation], *job);
+            let (line, worker_link) = (line.clone(), worker_link.clone());
             // A job that is over by then gives all its hosts back.
-            tokio::spawn(async move { line.send(Input::Joined(seat)).await.is_ok() });
+            tokio::spawn(async move { line.send(Input::Joined(worker_link)).await.is_ok() });
         }
     }
 
     fn admit(&mut self, hello: &Hello, address: &str, incarnation: u32) -> Result<u32, String> {
         hello.proves(&self.proof)?;
         let (number, ghost) = self.hosts.admit(hello, address, incarnation)?;
-        if let Some(ghost) = ghost.and_then(|ghost| self.seats.remove(&ghost)) {
+        if let Some(ghost) = ghost.and_then(|ghost| self.worker_links.remove(&ghost)) {
             ghost.sender().abort(protocol::Error::Message("its process called again".into()));
         }
         Ok(number)
@@ -286,7 +286,7 @@ impl Scheduler {
             title: title.clone(),
             state: State::Queued,
             options,
-            crew: Vec::new(),
+            at_work: Vec::new(),
             cycle: 0,
             time: 0.0,
             ended: None,
@@ -360,29 +360,29 @@ impl Scheduler {
     /// Starts the first job in the queue, if it may start on the workers that are idle.
     fn start_next(&mut self) {
         let Some(entry) = self.queue.first() else { return };
-        let idle: Vec<&Seat> =
-            self.hosts.idle().filter_map(|host| self.seats.get(&host.incarnation)).collect();
-        let names: Vec<&str> = idle.iter().map(|seat| seat.hand.name.as_str()).collect();
+        let idle: Vec<&WorkerLink> =
+            self.hosts.idle().filter_map(|host| self.worker_links.get(&host.incarnation)).collect();
+        let names: Vec<&str> = idle.iter().map(|worker_link| worker_link.spec.name.as_str()).collect();
         let running: Vec<u32> = self.running.keys().copied().collect();
         match allotment::of(entry, &running, &names, self.started.elapsed()) {
             Allotment::Wait(what) => self.wait_for(entry.id, what),
             Allotment::Start => {
-                let (job, seats) = (entry.id, idle.into_iter().cloned().collect());
-                self.start(job, seats);
+                let (job, worker_links) = (entry.id, idle.into_iter().cloned().collect());
+                self.start(job, worker_links);
             }
         }
     }
 
     /// Starts a job on these workers, on a thread of its own.
-    fn start(&mut self, job: u32, seats: Vec<Seat>) {
+    fn start(&mut self, job: u32, worker_links: Vec<WorkerLink>) {
         let (Some(entry), Some(status)) = (self.queue.get(job), self.status.get(&job).cloned()) else {
             return;
         };
         let stop = Arc::new(AtomicBool::new(false));
-        let line = drive::channel(seats.len());
+        let line = drive::channel(worker_links.len());
         let running = Running { stop: Arc::clone(&stop), line: line.0.clone() };
-        let incarnations: Vec<u32> = seats.iter().map(|seat| seat.incarnation).collect();
-        let crew = seats.iter().map(|seat| seat.hand.name.clone()).collect();
+        let incarnations: Vec<u32> = worker_links.iter().map(|worker_link| worker_link.incarnation).collect();
+        let at_work = worker_links.iter().map(|worker_link| worker_link.spec.name.clone()).collect();
         let order = Order {
             number: job,
             name: entry.name.clone(),
@@ -390,8 +390,8 @@ impl Scheduler {
             options: entry.options.clone(),
             folder: entry.folder.clone(),
             snapshots: self.spool.snapshots(job),
-            crew_before: entry.before.as_ref().map(Vec::len),
-            seats,
+            at_work_before: entry.before.as_ref().map(Vec::len),
+            worker_links,
             line: Mutex::new(Some(line)),
             stop,
             status,
@@ -399,7 +399,7 @@ impl Scheduler {
         };
         self.hosts.occupy(&incarnations, job);
         self.running.insert(job, running);
-        self.queue.set_crew(job, crew);
+        self.queue.set_at_work(job, at_work);
         info!(job, workers = incarnations.len(), "job starts");
         if let Err(why) = self.change(job, Change::Start, None) {
             warn!(job, "{why}");

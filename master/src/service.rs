@@ -20,12 +20,12 @@ use tracing::{info, warn};
 
 use crate::{
     balance,
-    drive::{self, Input, Seat, drive},
+    drive::{self, Input, WorkerLink, drive},
     embedded::Sink,
-    event::{Action, Deal, Hand},
-    http::board::{self, Board, Sheet},
+    event::{Action, Deal, WorkerSpec},
+    http::board::{self, Board, JobView},
     job::Job,
-    options::{Keep, SessionOptions, bring_end_forward, interval_for},
+    options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
     queue::Change,
     results::{Folder, TRACE, report, trace},
@@ -40,11 +40,9 @@ const REPORT_EVERY: Duration = Duration::from_millis(100);
 
 /// A job that was given workers.
 pub struct Order {
-    /// Its number.
     pub number: u32,
     /// Name of the deck's file.
     pub name: String,
-    /// The deck.
     pub text: Arc<String>,
     /// What is asked beside the deck.
     pub options: JobOptions,
@@ -53,9 +51,8 @@ pub struct Order {
     /// Where it is stored while it runs.
     pub snapshots: PathBuf,
     /// Of a job that an earlier session has begun: how many workers it had.
-    pub crew_before: Option<usize>,
-    /// Its workers.
-    pub seats: Vec<Seat>,
+    pub at_work_before: Option<usize>,
+    pub worker_links: Vec<WorkerLink>,
     /// The way to its thread; taken when it is driven.
     pub line: Mutex<Option<(mpsc::Sender<Input>, mpsc::Receiver<Input>)>>,
     /// Set to end it with the results so far.
@@ -70,8 +67,8 @@ pub struct Order {
 pub fn serve(order: &Order) -> (Change, Ended) {
     let result = catch_unwind(AssertUnwindSafe(|| run(order)));
     let result = result.unwrap_or_else(|_| {
-        for seat in &order.seats {
-            seat.sender().abort(protocol::Error::Message("a bug ended the job".into()));
+        for worker_link in &order.worker_links {
+            worker_link.sender().abort(protocol::Error::Message("a bug ended the job".into()));
         }
         Err("a bug in the master; its log has the words".to_owned())
     });
@@ -85,18 +82,18 @@ fn is_here(address: &str) -> bool {
 }
 
 /// Workers on this machine are dealt less, for sorts run beside them ([`balance::beside_sorts`]).
-fn share_with_sorts(model: &Model, hands: &mut [Hand], beside: &[bool]) {
+fn share_with_sorts(model: &Model, specs: &mut [WorkerSpec], beside: &[bool]) {
     if model.setup.contact.is_none() || !beside.contains(&true) {
         return;
     }
     let surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
-    let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
+    let speeds: Vec<f64> = specs.iter().map(|spec| spec.speed).collect();
     let sort = balance::SORT_ELEMENTS * surface.nodes.len() as f64;
     let elements = model.mesh.n_elements() as f64;
     let lag = model.setup.control.sort_lag;
     let left = balance::beside_sorts(&speeds, beside, elements, sort, lag);
-    for (hand, speed) in hands.iter_mut().zip(left) {
-        hand.speed = speed;
+    for (spec, speed) in specs.iter_mut().zip(left) {
+        spec.speed = speed;
     }
 }
 
@@ -105,14 +102,15 @@ fn run(order: &Order) -> Result<(Change, Ended), String> {
         .map_err(|faults| faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
     bring_end_forward(&mut model, &order.options)?;
     let model = Arc::new(model);
-    let mut hands: Vec<_> = order.seats.iter().map(|seat| seat.hand.clone()).collect();
-    let beside: Vec<bool> = order.seats.iter().map(|seat| is_here(&seat.address)).collect();
-    share_with_sorts(&model, &mut hands, &beside);
-    let all_take_peers = order.seats.iter().all(|seat| seat.peer.is_some());
+    let mut specs: Vec<_> = order.worker_links.iter().map(|worker_link| worker_link.spec.clone()).collect();
+    let beside: Vec<bool> =
+        order.worker_links.iter().map(|worker_link| is_here(&worker_link.address)).collect();
+    share_with_sorts(&model, &mut specs, &beside);
+    let all_take_peers = order.worker_links.iter().all(|worker_link| worker_link.peer.is_some());
     let interval = interval_for(&order.options, &model, Some(SNAPSHOT_SECONDS));
-    let keep = Keep::for_both(order.options.keep_every, interval);
+    let keep = CheckpointEvery::for_both(order.options.keep_every, interval);
     // The others will be back.
-    let workers = hands.len().max(order.crew_before.unwrap_or_default());
+    let workers = specs.len().max(order.at_work_before.unwrap_or_default());
     let options = SessionOptions::of(&order.options, workers, all_take_peers);
     let options = SessionOptions { waits: true, keep, store: true, replay: true, ..options };
     if let Some(path) = order.folder.as_ref().filter(|path| path.is_symlink()) {
@@ -123,26 +121,26 @@ fn run(order: &Order) -> Result<(Change, Ended), String> {
         warn!(job = order.number, "{why}");
     }
     let states = found.snapshot.as_ref().map(|snapshot| snapshot.states.clone());
-    let (job, first) = Job::new(Arc::clone(&model), &hands, options, found.snapshot)?;
-    if order.crew_before.is_some() {
+    let (job, first) = Job::new(Arc::clone(&model), &specs, options, found.snapshot)?;
+    if order.at_work_before.is_some() {
         info!(job = order.number, cycle = job.start_state().cycle, "the job goes on");
     }
     let line = order.line.lock().unwrap_or_else(PoisonError::into_inner).take();
-    let line = line.unwrap_or_else(|| drive::channel(order.seats.len()));
+    let line = line.unwrap_or_else(|| drive::channel(order.worker_links.len()));
     let folder = order.folder.as_ref().map(|path| match &states {
         Some(_) => Folder::reopen(path),
-        None => Folder::create(path, order.crew_before.is_some()),
+        None => Folder::create(path, order.at_work_before.is_some()),
     });
     let folder = folder.transpose().map_err(|e| e.to_string())?;
     let mut output = Output::new(Arc::clone(&model), folder, true)?;
     let results = output.folder.as_ref().map(|folder| folder.path().to_owned());
     output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     output.go_on(&job, states)?;
-    let sheet = order.board.as_ref().map(|board| board.begin(order.number, &model));
-    if let Some(sheet) = &sheet {
-        let mut sheet = board::lock(sheet);
-        job.rows_before().iter().for_each(|row| sheet.row(row));
-        sheet.state(&model, job.start_state());
+    let job_view = order.board.as_ref().map(|board| board.begin(order.number, &model));
+    if let Some(job_view) = &job_view {
+        let mut job_view = board::lock(job_view);
+        job.rows_before().iter().for_each(|row| job_view.row(row));
+        job_view.state(&model, job.start_state());
     }
     let census = SurfaceCensus::of(&job, &model);
     let started = Instant::now();
@@ -153,12 +151,13 @@ fn run(order: &Order) -> Result<(Change, Ended), String> {
         status: &order.status,
         started,
         last: None,
-        sheet: sheet.clone(),
+        job_view: job_view.clone(),
     };
-    let (outcome, traffic) = drive(job, first, order.number, &order.seats, line, &mut reporter, &order.stop)?;
+    let (outcome, traffic) =
+        drive(job, first, order.number, &order.worker_links, line, &mut reporter, &order.stop)?;
     reporter.output.flush()?;
-    if let Some(sheet) = &sheet {
-        board::lock(sheet).over(outcome.failure.is_none() && !outcome.stopped);
+    if let Some(job_view) = &job_view {
+        board::lock(job_view).over(outcome.failure.is_none() && !outcome.stopped);
     }
     let wall = started.elapsed().as_secs_f64();
     if let Some(keeper) = reporter.output.keeper.take() {
@@ -169,7 +168,7 @@ fn run(order: &Order) -> Result<(Change, Ended), String> {
         }
         keeper.discard();
     }
-    let threads = hands.iter().map(|hand| hand.threads).sum();
+    let threads = specs.iter().map(|spec| spec.threads).sum();
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
@@ -207,20 +206,20 @@ struct Reporter<'a> {
     started: Instant,
     last: Option<Instant>,
     /// What the page shows.
-    sheet: Option<Arc<Mutex<Sheet>>>,
+    job_view: Option<Arc<Mutex<JobView>>>,
 }
 
 impl Reporter<'_> {
     /// What the page shows of an action.
     fn show(&self, action: &Action) {
-        let Some(sheet) = &self.sheet else { return };
-        let mut sheet = board::lock(sheet);
+        let Some(job_view) = &self.job_view else { return };
+        let mut job_view = board::lock(job_view);
         match action {
-            Action::Row(row) => sheet.row(row),
-            Action::State(state) => sheet.state(self.model, state),
-            Action::Dealt(deals) => sheet.dealt(deals),
-            Action::Rewind { cycle, .. } => sheet.rewind(*cycle),
-            Action::Progress(progress) => sheet.progress(progress),
+            Action::Row(row) => job_view.row(row),
+            Action::State(state) => job_view.state(self.model, state),
+            Action::Dealt(deals) => job_view.dealt(deals),
+            Action::Rewind { cycle, .. } => job_view.rewind(*cycle),
+            Action::Progress(progress) => job_view.progress(progress),
             _ => {}
         }
     }
@@ -241,8 +240,8 @@ impl Reporter<'_> {
 
 impl Sink for Reporter<'_> {
     fn heard(&mut self, worker: &str, message: &ToMaster) {
-        if let Some(sheet) = &self.sheet {
-            board::lock(sheet).heard(worker, message);
+        if let Some(job_view) = &self.job_view {
+            board::lock(job_view).heard(worker, message);
         }
     }
 

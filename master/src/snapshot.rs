@@ -1,7 +1,7 @@
 //! Snapshots: the whole run at the start of a cycle, and how it gets to the disk and back.
 //!
 //! [`mod@file`] is the form of one on disk, [`store`] a folder of two generations, [`keeper`] the thread that writes beside
-//! the run. What a snapshot holds is decided by the job: it is one of its bases.
+//! the run. What a snapshot holds is decided by the job: it is one of its checkpoints.
 
 pub mod file;
 pub mod keeper;
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 pub use file::{read, write};
 
-use crate::{ledger::Ledger, results::history::HistoryRow};
+use crate::{results::history::HistoryRow, run_totals::RunTotals};
 
 /// All that a run needs to go on with the same bits, on any workers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,8 +34,7 @@ pub struct Snapshot {
     /// Poses of the walls of finite mass in the cycle to come.
     pub walls: Vec<Pose>,
     /// Energies and worst ratios so far.
-    pub ledger: Ledger,
-    /// Rows of history so far.
+    pub run_totals: RunTotals,
     pub rows: Vec<Arc<HistoryRow>>,
     /// Cycle and time of each state file so far; filled in by whoever writes those.
     pub states: Vec<(u64, f64)>,

@@ -15,7 +15,7 @@ use tracing::trace;
 use crate::{
     balance::{self, Dealing},
     exchange::Exchange,
-    holdings::Holdings,
+    node_owners::NodeOwners,
 };
 
 /// All that a sort needs and that stays the same between two decompositions.
@@ -96,7 +96,6 @@ impl Sorter {
         }
     }
 
-    /// The surface it sorts.
     pub fn surface(&self) -> &Surface {
         &self.surface
     }
@@ -123,15 +122,15 @@ impl Sorter {
     }
 
     /// Sorts, balances, plans. `x` by surface node; of `state` only masses and constraints are read.
-    pub fn run(&self, epoch: u32, of: &Gathered, holdings: &Holdings, state: &GlobalState) -> Sorted {
+    pub fn run(&self, epoch: u32, of: &Gathered, node_owners: &NodeOwners, state: &GlobalState) -> Sorted {
         let x = &of.x;
         let mut units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
         let census = Census::of(&units);
-        let owner = |node: u32| holdings.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
+        let owner = |node: u32| node_owners.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
         let worker_of = match self.dealing {
             Dealing::Owners => {
                 let weights = contact::cull(&mut units, &self.surface, x, &self.settings, &self.exclusions);
-                balance::assign(&units, (&weights, self.pair), &self.speeds, &holdings.work, &owner)
+                balance::assign(&units, (&weights, self.pair), &self.speeds, &node_owners.work, &owner)
             }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
         };
@@ -149,7 +148,7 @@ impl Sorter {
                 (!units.is_empty()).then(|| Batch::gather(&self.surface, units, &mass, &self.exclusions))
             })
             .collect();
-        let exchange = Exchange::new(holdings, batches, state, self.route);
+        let exchange = Exchange::new(node_owners, batches, state, self.route);
         Sorted { epoch, gathered: of.cycle, exchange, census, interactions }
     }
 }
@@ -161,7 +160,7 @@ pub struct SortBasis {
     /// Surface, settings, speeds.
     pub sorter: Sorter,
     /// Who holds which nodes.
-    pub holdings: Arc<Holdings>,
+    pub node_owners: Arc<NodeOwners>,
     /// Masses and constraints (positions are those of the epoch's start).
     pub state: Arc<GlobalState>,
     /// Nodes (global, ascending) that leave the run with the plan of the sort.
@@ -172,11 +171,15 @@ impl SortBasis {
     /// Does the sort that `Action::Sort` of a job asks for.
     pub fn sort(&self, x: &Gathered) -> Sorted {
         trace!(epoch = self.epoch, "sort begins");
-        let mut sorted = self.sorter.run(self.epoch, x, &self.holdings, &self.state);
+        let mut sorted = self.sorter.run(self.epoch, x, &self.node_owners, &self.state);
         if !self.dropped.is_empty() {
             for (worker, plan) in (0..).zip(&mut sorted.exchange.plans) {
-                plan.dropped =
-                    self.dropped.iter().copied().filter(|&node| self.holdings.holds(worker, node)).collect();
+                plan.dropped = self
+                    .dropped
+                    .iter()
+                    .copied()
+                    .filter(|&node| self.node_owners.holds(worker, node))
+                    .collect();
             }
         }
         sorted
@@ -187,7 +190,7 @@ impl SortBasis {
         Self {
             epoch: self.epoch,
             sorter: self.sorter.with_surface(surface),
-            holdings: Arc::clone(&self.holdings),
+            node_owners: Arc::clone(&self.node_owners),
             state: Arc::clone(&self.state),
             dropped,
         }

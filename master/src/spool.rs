@@ -42,12 +42,12 @@ pub struct Record {
     /// What is asked beside the deck.
     pub options: JobOptions,
     /// Names of the workers that it was last started with.
-    pub crew: Vec<String>,
+    #[serde(rename = "crew")]
+    pub at_work: Vec<String>,
     /// Cycles completed, where it is over.
     pub cycle: u64,
     /// Time reached (deck's unit), where it is over.
     pub time: f64,
-    /// How it ended.
     pub ended: Option<Ended>,
 }
 

@@ -10,11 +10,11 @@ use crate::{
     embedded::Traffic,
     event::Outcome,
     job::Job,
-    ledger::PairSums,
     results::{
         history::PartEnergy,
         summary::{Energies, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
     },
+    run_totals::PairSums,
 };
 
 /// Counts of the surface, taken before the run.
@@ -53,8 +53,8 @@ pub fn summarise(
     threads: u32,
     wall_s: f64,
 ) -> Summary {
-    let ledger = &outcome.ledger;
-    let cycles = outcome.state.as_ref().map_or(ledger.last.cycle, |s| s.cycle);
+    let run_totals = &outcome.run_totals;
+    let cycles = outcome.state.as_ref().map_or(run_totals.last.cycle, |s| s.cycle);
     let elements = model.mesh.n_elements() as u64;
     let compute: u64 = outcome.work.iter().map(|w| w.compute_ns).sum::<u64>() + traffic.sort_ns;
     let contact: u64 = outcome.work.iter().map(|w| w.contact_ns).sum::<u64>() + traffic.sort_ns;
@@ -75,7 +75,7 @@ pub fn summarise(
         relayed_pairs: pairs(&outcome.reports).1,
         lanes: outcome.lanes.clone(),
         cycles,
-        end_time: outcome.state.as_ref().map_or(ledger.last.time, |s| s.time),
+        end_time: outcome.state.as_ref().map_or(run_totals.last.time, |s| s.time),
         wall_s,
         grind_ns: per(compute as f64, elements as f64 * run_cycles),
         contact_share: per(contact as f64, compute as f64),
@@ -94,25 +94,25 @@ pub fn summarise(
         bytes_per_cycle: per(traffic.bytes as f64, run_cycles),
         master_bytes_per_cycle: per((traffic.bytes - traffic.peer_bytes) as f64, run_cycles),
         worker_times: worker_times(&outcome.workers, &outcome.reports),
-        eroded_elements: ledger.eroded_elements,
-        eroded_mass: ledger.eroded_mass,
-        eroded_energy: ledger.eroded,
+        eroded_elements: run_totals.eroded_elements,
+        eroded_mass: run_totals.eroded_mass,
+        eroded_energy: run_totals.eroded,
         energies: Energies {
-            kinetic: ledger.last.kinetic,
-            internal: ledger.last.internal,
-            hourglass: ledger.hourglass,
-            viscosity: ledger.viscosity,
-            contact: ledger.last.contact + ledger.friction,
-            friction: ledger.friction,
-            external: ledger.external,
-            error: ledger.last.error,
-            parts: named_parts(model, &ledger.last.parts, outcome.state.as_ref()),
-            contacts: ledger.contacts.iter().map(|pair| named_pair(model, pair)).collect(),
+            kinetic: run_totals.last.kinetic,
+            internal: run_totals.last.internal,
+            hourglass: run_totals.hourglass,
+            viscosity: run_totals.viscosity,
+            contact: run_totals.last.contact + run_totals.friction,
+            friction: run_totals.friction,
+            external: run_totals.external,
+            error: run_totals.last.error,
+            parts: named_parts(model, &run_totals.last.parts, outcome.state.as_ref()),
+            contacts: run_totals.contacts.iter().map(|pair| named_pair(model, pair)).collect(),
         },
-        momentum_error: ledger.momentum_error(),
-        worst_courant: ledger.worst_courant,
-        worst_gap_travel: ledger.worst_gap_travel,
-        worst_penetration: ledger.worst_penetration,
+        momentum_error: run_totals.momentum_error(),
+        worst_courant: run_totals.worst_courant,
+        worst_gap_travel: run_totals.worst_gap_travel,
+        worst_penetration: run_totals.worst_penetration,
         rebalances: outcome.rebalances.clone(),
         losses: outcome.losses.clone(),
         digest: outcome.digest.clone(),

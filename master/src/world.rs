@@ -21,7 +21,7 @@ use protocol::{
 use worker::session::{self, Session, Task};
 
 use crate::{
-    event::{Action, Event, Hand, Outcome},
+    event::{Action, Event, Outcome, WorkerSpec},
     job::Job,
     sort::{Gathered, SortBasis},
 };
@@ -29,7 +29,6 @@ use crate::{
 /// One end of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The master.
     Master,
     /// A host, from 0.
     Host(usize),
@@ -57,7 +56,7 @@ impl Parcel {
             Body::ToMaster(_, packed) | Body::ToWorker(packed) | Body::ToPeer { packed, .. } => {
                 packed.kind != Kind::Control
             }
-            Body::Image(..) | Body::Assign(_) => false,
+            Body::WorkerState(..) | Body::Assign(_) => false,
         }
     }
 }
@@ -66,14 +65,14 @@ enum Body {
     /// To the master, from a member.
     ToMaster(usize, Packed),
     ToWorker(Packed),
-    /// From a member, which has this position in the crew, under this plan.
+    /// From a member, which has this position in the workers, under this plan.
     ToPeer {
         position: u32,
         plan: u64,
         packed: Packed,
     },
-    /// Handed over as it is: an image from a member, an assignment.
-    Image(usize, Box<ToMaster>),
+    /// Handed over as it is: a state from a member, an assignment.
+    WorkerState(usize, Box<ToMaster>),
     Assign(Box<ToWorker>),
 }
 
@@ -91,11 +90,10 @@ pub enum Letter {
 pub struct PeerFrame {
     /// The sender's epoch.
     pub epoch: u32,
-    /// Its position in the crew.
+    /// Its position in the workers.
     pub from: u32,
     /// Hash of its plan; none for what the master relayed.
     pub plan: Option<u64>,
-    /// The frame.
     pub message: ToPeer,
 }
 
@@ -172,13 +170,11 @@ pub trait Surroundings {
 
 /// A host as the world knows it.
 pub struct Host {
-    /// Its session.
     pub session: Session,
     /// Its index in the job; none once the master has given it up, or has not met it.
     pub member: Option<usize>,
 }
 
-/// All sessions.
 #[derive(Default)]
 pub struct Sessions {
     /// The master's; none while it is away.
@@ -206,10 +202,10 @@ impl Sessions {
         self.hosts[host].member.take()
     }
 
-    /// A host's position in the crew.
+    /// A host's position in the workers.
     pub fn position(&self, host: usize) -> Option<u32> {
         let (job, member) = (self.job.as_ref()?, self.hosts[host].member?);
-        job.crew().iter().position(|&index| index == member).map(|position| position as u32)
+        job.at_work().iter().position(|&index| index == member).map(|position| position as u32)
     }
 
     fn cycle(&self, host: usize) -> u64 {
@@ -219,7 +215,6 @@ impl Sessions {
 
 /// Sessions in their surroundings.
 pub struct World<S> {
-    /// The sessions.
     pub sessions: Sessions,
     /// What they stand in.
     pub surroundings: S,
@@ -254,10 +249,10 @@ impl<S: Surroundings> World<S> {
     ///
     /// # Errors
     /// What ends the run.
-    pub fn join(&mut self, host: usize, hand: Hand) -> Result<(), Error> {
+    pub fn join(&mut self, host: usize, spec: WorkerSpec) -> Result<(), Error> {
         self.sessions.hosts[host].member = Some(self.sessions.members.len());
         self.sessions.members.push(host);
-        self.apply(Event::Joined(hand))
+        self.apply(Event::Joined(spec))
     }
 
     /// How the job ended, once it has.
@@ -332,7 +327,7 @@ impl<S: Surroundings> World<S> {
                 session::Action::Compute(task) => self.surroundings.compute(&self.sessions, host, task)?,
                 session::Action::Forget => self.surroundings.forget(host),
                 session::Action::Send(message) => self.timed(host, |world| {
-                    if let ToMaster::Image { last: Some(_), .. } = message
+                    if let ToMaster::WorkerState { last: Some(_), .. } = message
                         && let Some(report) = world.surroundings.report(&world.sessions, host)
                     {
                         world.post_to_master(host, ToMaster::Report(Box::new(report)), computes)?;
@@ -376,11 +371,11 @@ impl<S: Surroundings> World<S> {
         let Some(member) = *member else { return Ok(()) };
         let epoch = session.epoch();
         let elements = match &message {
-            ToMaster::Image { pieces, .. } => n_elements(pieces),
+            ToMaster::WorkerState { pieces, .. } => n_elements(pieces),
             _ => 0,
         };
         let (bytes, body) = if elements > 0 && self.surroundings.hands_over(elements) {
-            (wire::measure_to_master(&message)?, Body::Image(member, Box::new(message)))
+            (wire::measure_to_master(&message)?, Body::WorkerState(member, Box::new(message)))
         } else {
             let packed = wire::pack_to_master(&message)?;
             (packed.wire_bytes(), Body::ToMaster(member, packed))
@@ -401,8 +396,8 @@ impl<S: Surroundings> World<S> {
         // Of an epoch that is over, there is nobody to hear it.
         let Some(job) = job.as_ref().filter(|job| job.epoch() == epoch) else { return Ok(()) };
         let Some(position) = self.sessions.position(host) else { return Ok(()) };
-        let n = job.crew().len();
-        let member = job.crew().get(to as usize).ok_or(Error::NoNeighbour { host, to, n })?;
+        let n = job.at_work().len();
+        let member = job.at_work().get(to as usize).ok_or(Error::NoNeighbour { host, to, n })?;
         let to = End::Host(members[*member]);
         let packed = wire::pack_to_peer(message);
         let (bytes, body) = (packed.wire_bytes(), Body::ToPeer { position, plan, packed });
@@ -431,7 +426,7 @@ impl<S: Surroundings> World<S> {
                 let message = wire::unpack_to_peer(kind, &bytes)?;
                 Letter::ToPeer(host, PeerFrame { epoch, from: position, plan: Some(plan), message })
             }
-            Body::Image(member, message) => Letter::ToMaster(member, epoch, *message),
+            Body::WorkerState(member, message) => Letter::ToMaster(member, epoch, *message),
             Body::Assign(message) => Letter::ToWorker(host, *message),
         })
     }
@@ -465,7 +460,6 @@ pub enum Error {
     Message(protocol::Error),
     /// A host writes to a neighbour that there is not.
     NoNeighbour {
-        /// The host.
         host: usize,
         /// The neighbour's position.
         to: u32,

@@ -2,13 +2,13 @@
 
 use master::{
     embedded::Fate,
-    event::Hand,
-    options::{Keep, SessionOptions},
+    event::WorkerSpec,
+    options::{CheckpointEvery, SessionOptions},
 };
 use protocol::options::{Balance, JobOptions, Route};
 use tests::{
     bits::Fingerprint,
-    solve::{Crew, Solved, model, solve, solve_through},
+    solve::{Solved, Workers, model, solve, solve_through},
 };
 
 use deck::Model;
@@ -60,14 +60,14 @@ fn plates() -> Model {
     )
 }
 
-fn options(keep: Keep, route: Route) -> SessionOptions {
+fn options(keep: CheckpointEvery, route: Route) -> SessionOptions {
     // Sorts at one cycle in four: losses hit them, their transfers and their plans.
     let asked = JobOptions { route: Some(route), sort_seed: Some(11), ..JobOptions::default() };
     SessionOptions { asked, keep, ..SessionOptions::default() }
 }
 
-fn crew(workers: usize, options: SessionOptions) -> Crew {
-    Crew { options, ..Crew::of(workers) }
+fn at_work(workers: usize, options: SessionOptions) -> Workers {
+    Workers { options, ..Workers::of(workers) }
 }
 
 /// What a user sees of a run, beside its fingerprint: the states that were written.
@@ -77,13 +77,14 @@ fn states(solved: &Solved) -> Vec<(u64, u64)> {
 
 fn undisturbed() -> (Fingerprint, Vec<(u64, u64)>, u64) {
     let arrivals = std::sync::atomic::AtomicU64::new(0);
-    let solved = solve_through(plates(), crew(3, options(Keep::Never, Route::Master)), &mut |number| {
-        arrivals.store(number, std::sync::atomic::Ordering::Relaxed);
-        None
-    });
+    let solved =
+        solve_through(plates(), at_work(3, options(CheckpointEvery::Never, Route::Master)), &mut |number| {
+            arrivals.store(number, std::sync::atomic::Ordering::Relaxed);
+            None
+        });
     let solved = solved.unwrap_or_else(|e| panic!("{e}"));
     assert!(solved.states.len() > 3, "{} states", solved.states.len());
-    assert!(solved.outcome.ledger.worst_penetration > 0.0, "no contact");
+    assert!(solved.outcome.run_totals.worst_penetration > 0.0, "no contact");
     (Fingerprint::of(&solved), states(&solved), arrivals.into_inner())
 }
 
@@ -105,7 +106,8 @@ fn a_loss_at_any_instant_changes_no_bit() {
     for seed in 0..60 {
         let mut draw = random(seed);
         let route = [Route::Master, Route::Direct][draw(2) as usize];
-        let keep = [Keep::Never, Keep::Cycles(10), Keep::Cycles(1)][draw(3) as usize];
+        let keep = [CheckpointEvery::Never, CheckpointEvery::Cycles(10), CheckpointEvery::Cycles(1)]
+            [draw(3) as usize];
         let workers = 2 + draw(3) as usize;
         // Two losses, near each other in one case of three: in the rollback of the first.
         let first = draw(arrivals * workers as u64 / 3);
@@ -118,13 +120,13 @@ fn a_loss_at_any_instant_changes_no_bit() {
         let name = format!("seed {seed}: {workers} workers, {route:?}, {keep:?}, losses {losses:?}");
         let mut fate =
             |number: u64| losses.iter().find(|(at, _)| *at == number).map(|&(_, worker)| Fate::Lose(worker));
-        let solved = solve_through(plates(), crew(workers, options(keep, route)), &mut fate);
+        let solved = solve_through(plates(), at_work(workers, options(keep, route)), &mut fate);
         let solved = solved.unwrap_or_else(|e| panic!("{name}: {e}"));
         one.assert_equal(&Fingerprint::of(&solved), &name);
         assert_eq!(states(&solved), written, "{name}: states");
         for loss in &solved.outcome.losses {
             assert!(loss.back_to <= loss.cycle, "{name}: {loss:?}");
-            if keep == Keep::Cycles(1) {
+            if keep == CheckpointEvery::Cycles(1) {
                 assert!(loss.cycle - loss.back_to < 20, "{name}: {loss:?}");
             }
             lost += 1;
@@ -144,12 +146,12 @@ fn a_worker_that_joins_is_used_from_the_next_boundary_and_changes_no_bit() {
         let (at, lost_at) = (draw(arrivals / 4), draw(arrivals / 4));
         let route = [Route::Master, Route::Direct][draw(2) as usize];
         let mut fate = |number: u64| match number {
-            n if n == at => Some(Fate::Join(Hand { name: "late".into(), speed: 2.0, threads: 1 })),
+            n if n == at => Some(Fate::Join(WorkerSpec { name: "late".into(), speed: 2.0, threads: 1 })),
             n if n == lost_at && seed % 2 == 0 => Some(Fate::Lose(0)),
             _ => None,
         };
-        let options = options(Keep::Cycles(10), route);
-        let solved = solve_through(plates(), crew(2, options), &mut fate);
+        let options = options(CheckpointEvery::Cycles(10), route);
+        let solved = solve_through(plates(), at_work(2, options), &mut fate);
         let solved = solved.unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         one.assert_equal(&Fingerprint::of(&solved), &format!("seed {seed}"));
         assert_eq!(states(&solved), written, "seed {seed}: states");
@@ -160,20 +162,25 @@ fn a_worker_that_joins_is_used_from_the_next_boundary_and_changes_no_bit() {
 #[test]
 fn with_no_worker_left_a_job_that_waits_goes_on_with_the_next_and_another_ends() {
     let (one, written, arrivals) = undisturbed();
-    let hand = || Hand { name: "late".into(), speed: 1.0, threads: 1 };
+    let spec = || WorkerSpec { name: "late".into(), speed: 1.0, threads: 1 };
     for seed in 0..8 {
         let at = 100 + random(seed)(arrivals / 2);
         let mut fate = |number: u64| match number.checked_sub(at) {
             Some(after @ (0 | 1)) => Some(Fate::Lose(after as usize)),
-            Some(2) => Some(Fate::Join(hand())),
+            Some(2) => Some(Fate::Join(spec())),
             _ => None,
         };
-        let waiting = SessionOptions { waits: true, ..options(Keep::Cycles(10), Route::Master) };
-        let solved = solve_through(plates(), crew(2, waiting), &mut fate).unwrap_or_else(|e| panic!("{e}"));
+        let waiting = SessionOptions { waits: true, ..options(CheckpointEvery::Cycles(10), Route::Master) };
+        let solved =
+            solve_through(plates(), at_work(2, waiting), &mut fate).unwrap_or_else(|e| panic!("{e}"));
         one.assert_equal(&Fingerprint::of(&solved), &format!("seed {seed}"));
         assert_eq!(states(&solved), written, "seed {seed}: states");
         assert_eq!((solved.outcome.losses.len(), solved.outcome.workers.len()), (2, 1));
-        let ends = solve_through(plates(), crew(2, options(Keep::Cycles(10), Route::Master)), &mut fate);
+        let ends = solve_through(
+            plates(),
+            at_work(2, options(CheckpointEvery::Cycles(10), Route::Master)),
+            &mut fate,
+        );
         let why = ends.err().expect("nobody is left");
         assert!(why.contains("is lost") && why.contains("no other is left"), "{why}");
     }
@@ -183,9 +190,9 @@ fn with_no_worker_left_a_job_that_waits_goes_on_with_the_next_and_another_ends()
 fn measured_balance_on_workers_of_given_speeds_that_are_wrong_changes_no_bit() {
     let (one, written, _) = undisturbed();
     for route in [Route::Master, Route::Direct] {
-        let mut options = options(Keep::Cycles(25), route);
+        let mut options = options(CheckpointEvery::Cycles(25), route);
         options.asked.balance = Balance::Measured;
-        let solved = solve(plates(), Crew { speeds: vec![1.0, 4.0, 1.0], options, ..Crew::default() });
+        let solved = solve(plates(), Workers { speeds: vec![1.0, 4.0, 1.0], options, ..Workers::default() });
         let solved = solved.unwrap_or_else(|e| panic!("{e}"));
         one.assert_equal(&Fingerprint::of(&solved), &format!("{route:?}"));
         assert_eq!(states(&solved), written, "{route:?}: states");

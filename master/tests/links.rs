@@ -7,10 +7,10 @@ use std::{
 
 use deck::model::Model;
 use master::{
-    connection::Gate,
-    drive::{Seat, channel, drive},
+    connection::Acceptor,
+    drive::{WorkerLink, channel, drive},
     embedded::{self, Sink},
-    event::{Action, Hand, Outcome},
+    event::{Action, Outcome, WorkerSpec},
     job::Job,
     notice::Notice,
     options::SessionOptions,
@@ -63,8 +63,8 @@ fn model(text: &str, cycles: u64) -> Arc<Model> {
     Arc::new(model)
 }
 
-fn hands(n: usize) -> Vec<Hand> {
-    (0..n).map(|i| Hand { name: format!("worker-{i}"), speed: 1.0 + i as f64, threads: 1 }).collect()
+fn specs(n: usize) -> Vec<WorkerSpec> {
+    (0..n).map(|i| WorkerSpec { name: format!("worker-{i}"), speed: 1.0 + i as f64, threads: 1 }).collect()
 }
 
 fn digest(outcome: &Outcome) -> String {
@@ -73,26 +73,26 @@ fn digest(outcome: &Outcome) -> String {
     outcome.digest.clone()
 }
 
-fn embedded_run(model: &Arc<Model>, hands: &[Hand]) -> (String, Option<Box<Snapshot>>) {
-    let (job, first) = Job::new(Arc::clone(model), hands, options(Route::Master), None).expect("it starts");
+fn embedded_run(model: &Arc<Model>, specs: &[WorkerSpec]) -> (String, Option<Box<Snapshot>>) {
+    let (job, first) = Job::new(Arc::clone(model), specs, options(Route::Master), None).expect("it starts");
     let (stop, mut sink) = (AtomicBool::new(false), Keep::default());
-    let run = embedded::run(job, first, hands.len(), 2, &mut sink, &stop).expect("it runs");
+    let run = embedded::run(job, first, specs.len(), 2, &mut sink, &stop).expect("it runs");
     (digest(&run.0), sink.0)
 }
 
-/// Runs the plates over these pairs of streams: the master's end and the worker's. Assignments and images are long
+/// Runs the plates over these pairs of streams: the master's end and the worker's. Assignments and states are long
 /// enough to travel in bulk, which frames of cycles overtake.
 async fn run_over<S>(pairs: Vec<(S, S)>, route: Route)
 where
     S: AsyncRead + AsyncWrite + Send + 'static,
 {
     let model = model(PLATES, CYCLES);
-    let hands = hands(pairs.len());
-    let (expected, snapshot) = embedded_run(&model, &hands);
+    let specs = specs(pairs.len());
+    let (expected, snapshot) = embedded_run(&model, &specs);
     let (events, mut heard) = mpsc::channel(16);
-    let gate = Arc::new(Gate::new(events, vec![Role::Worker], None, None));
-    for (i, ((near, far), hand)) in pairs.into_iter().zip(&hands).enumerate() {
-        let mut hello = Hello::new(Role::Worker, &hand.name, hand.speed, 1, "any", i as u64);
+    let acceptor = Arc::new(Acceptor::new(events, vec![Role::Worker], None, None));
+    for (i, ((near, far), spec)) in pairs.into_iter().zip(&specs).enumerate() {
+        let mut hello = Hello::new(Role::Worker, &spec.name, spec.speed, 1, "any", i as u64);
         let peers = match route {
             Route::Master => None,
             Route::Direct => {
@@ -102,7 +102,7 @@ where
                 Some(Arc::new(Peers::start(listener, None, None).expect("no certificates")))
             }
         };
-        tokio::spawn(Arc::clone(&gate).serve(near, format!("127.0.0.1:{}", i + 1), None));
+        tokio::spawn(Arc::clone(&acceptor).serve(near, format!("127.0.0.1:{}", i + 1), None));
         tokio::spawn(async move {
             let (sender, receiver) = split(far, Settings::default());
             let call = dial::greet(sender, receiver, &hello).await.expect("taken in");
@@ -114,24 +114,32 @@ where
             .await
         });
     }
-    let mut seats: Vec<Seat> = Vec::new();
-    while seats.len() < hands.len() {
+    let mut worker_links: Vec<WorkerLink> = Vec::new();
+    while worker_links.len() < specs.len() {
         match heard.recv().await.expect("the gate stands") {
             Notice::Knock { hello, answer, .. } => {
-                let place = hands.iter().position(|hand| hand.name == hello.name).expect("one of ours");
+                let place = specs.iter().position(|spec| spec.name == hello.name).expect("one of ours");
                 answer.send(Ok(place as u32)).expect("it waits");
             }
-            Notice::Joined(seat) => seats.push(seat),
+            Notice::Joined(worker_link) => worker_links.push(worker_link),
             Notice::Left { why, .. } => panic!("a worker left: {why}"),
             _ => panic!("no client is here"),
         }
     }
-    seats.sort_by(|a, b| a.hand.name.cmp(&b.hand.name));
+    worker_links.sort_by(|a, b| a.spec.name.cmp(&b.spec.name));
     let running = tokio::task::spawn_blocking(move || {
         let options = options(route);
-        let (job, first) = Job::new(model, &hands, options, None).expect("it starts");
+        let (job, first) = Job::new(model, &specs, options, None).expect("it starts");
         let mut sink = Keep::default();
-        let ran = drive(job, first, 1, &seats, channel(seats.len()), &mut sink, &AtomicBool::new(false));
+        let ran = drive(
+            job,
+            first,
+            1,
+            &worker_links,
+            channel(worker_links.len()),
+            &mut sink,
+            &AtomicBool::new(false),
+        );
         ran.map(|(outcome, traffic)| (outcome, traffic, sink.0))
     });
     let ran = tokio::time::timeout(DEADLINE, running).await.expect("nobody waits for the other");
@@ -189,5 +197,5 @@ async fn a_job_finishes_over_links_between_workers_of_four_kilobytes() {
 fn two_hundred_workers_start_in_one_process_and_give_the_digest_of_one() {
     let model = model(PLATES, 6);
     assert_eq!(model.mesh.n_elements(), 27_000);
-    assert_eq!(embedded_run(&model, &hands(200)), embedded_run(&model, &hands(1)));
+    assert_eq!(embedded_run(&model, &specs(200)), embedded_run(&model, &specs(1)));
 }

@@ -2,13 +2,13 @@
 
 use master::{
     embedded::Fate,
-    event::Hand,
-    options::{Keep, SessionOptions},
+    event::WorkerSpec,
+    options::{CheckpointEvery, SessionOptions},
 };
 use protocol::options::{JobOptions, Route};
 use tests::{
     bits::Fingerprint,
-    solve::{Crew, Solved, model, solve, solve_through, without_states},
+    solve::{Solved, Workers, model, solve, solve_through, without_states},
 };
 use worker::compute::Machine;
 
@@ -40,22 +40,22 @@ const PLATES: &str = r#"
     history_cycles = 3
 "#;
 
-fn crew(workers: usize, replay: bool, route: Route) -> Crew {
+fn at_work(workers: usize, replay: bool, route: Route) -> Workers {
     let options = without_states(JobOptions { route: Some(route), ..JobOptions::default() });
-    let options = SessionOptions { keep: Keep::Cycles(10), replay, ..options };
-    Crew { options, ..Crew::of(workers) }
+    let options = SessionOptions { keep: CheckpointEvery::Cycles(10), replay, ..options };
+    Workers { options, ..Workers::of(workers) }
 }
 
-fn run(crew: Crew, fate: &mut (dyn FnMut(u64) -> Option<Fate> + Send)) -> Result<Solved, String> {
-    solve_through(model(PLATES), crew, fate)
+fn run(at_work: Workers, fate: &mut (dyn FnMut(u64) -> Option<Fate> + Send)) -> Result<Solved, String> {
+    solve_through(model(PLATES), at_work, fate)
 }
 
 #[test]
 fn samples_of_right_numbers_agree_on_any_workers_and_threads_and_change_no_bit() {
-    let plain = Fingerprint::of(&solve(model(PLATES), crew(1, false, Route::Master)).expect("a good run"));
+    let plain = Fingerprint::of(&solve(model(PLATES), at_work(1, false, Route::Master)).expect("a good run"));
     for (workers, threads) in [(1, 1), (2, 3), (5, 1)] {
         for route in [Route::Master, Route::Direct] {
-            let solved = solve(model(PLATES), Crew { threads, ..crew(workers, true, route) });
+            let solved = solve(model(PLATES), Workers { threads, ..at_work(workers, true, route) });
             let solved = solved.unwrap_or_else(|e| panic!("{workers} workers: {e}"));
             plain.assert_equal(&Fingerprint::of(&solved), &format!("{workers} workers, {route:?}"));
             assert!(solved.outcome.losses.is_empty(), "{:?}", solved.outcome.losses);
@@ -65,16 +65,16 @@ fn samples_of_right_numbers_agree_on_any_workers_and_threads_and_change_no_bit()
 
 #[test]
 fn one_unit_in_the_last_place_of_one_worker_is_found_by_name_and_leaves_no_trace() {
-    let plain = Fingerprint::of(&solve(model(PLATES), crew(3, false, Route::Master)).expect("a good run"));
+    let plain = Fingerprint::of(&solve(model(PLATES), at_work(3, false, Route::Master)).expect("a good run"));
     for at in [0, 40, 333, 700, 1100] {
         for route in [Route::Master, Route::Direct] {
             // One joins as well: the run is dealt out anew from a state that nobody has proved yet.
             let mut fate = |number: u64| match number.checked_sub(at) {
                 Some(0) => Some(Fate::Touch(1, Machine::plant_fault)),
-                Some(25) => Some(Fate::Join(Hand { name: "late".into(), speed: 1.0, threads: 1 })),
+                Some(25) => Some(Fate::Join(WorkerSpec { name: "late".into(), speed: 1.0, threads: 1 })),
                 _ => None,
             };
-            let solved = run(crew(3, true, route), &mut fate).unwrap_or_else(|e| panic!("at {at}: {e}"));
+            let solved = run(at_work(3, true, route), &mut fate).unwrap_or_else(|e| panic!("at {at}: {e}"));
             plain.assert_equal(&Fingerprint::of(&solved), &format!("spoilt at {at}, {route:?}"));
             let [loss] = &solved.outcome.losses[..] else { panic!("{:?}", solved.outcome.losses) };
             assert_eq!(loss.worker, "worker-1");
@@ -85,15 +85,15 @@ fn one_unit_in_the_last_place_of_one_worker_is_found_by_name_and_leaves_no_trace
 
 #[test]
 fn without_samples_the_same_fault_changes_the_bits() {
-    let plain = solve(model(PLATES), crew(3, false, Route::Master)).expect("a good run");
+    let plain = solve(model(PLATES), at_work(3, false, Route::Master)).expect("a good run");
     let mut fate = |number: u64| (number == 333).then_some(Fate::Touch(1, Machine::plant_fault));
-    let spoilt = run(crew(3, false, Route::Master), &mut fate).expect("nobody looks");
+    let spoilt = run(at_work(3, false, Route::Master), &mut fate).expect("nobody looks");
     assert_ne!(plain.outcome.digest, spoilt.outcome.digest);
 }
 
 #[test]
 fn when_all_workers_differ_the_master_is_suspected() {
     let mut fate = |number: u64| (number < 2).then_some(Fate::Touch(number as usize, Machine::plant_fault));
-    let why = run(crew(2, true, Route::Master), &mut fate).err().expect("nobody agrees");
+    let why = run(at_work(2, true, Route::Master), &mut fate).err().expect("nobody agrees");
     assert!(why.contains("all 2 workers differ") && why.contains("look at its host"), "{why}");
 }

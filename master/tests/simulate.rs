@@ -9,7 +9,7 @@ use deck::model::Model;
 use master::{
     deck_file::read_deck,
     embedded::{self, Sink},
-    event::{Action, Hand},
+    event::{Action, WorkerSpec},
     job::Job,
     options::SessionOptions,
     simulate::{
@@ -141,9 +141,9 @@ impl Sink for Nowhere {
 }
 
 fn embedded_digest(model: &Arc<Model>) -> String {
-    let hand = Hand { name: "worker".into(), speed: 1.0, threads: 1 };
+    let spec = WorkerSpec { name: "worker".into(), speed: 1.0, threads: 1 };
     let (job, first) =
-        Job::new(Arc::clone(model), &[hand], SessionOptions::default(), None).expect("the deck starts");
+        Job::new(Arc::clone(model), &[spec], SessionOptions::default(), None).expect("the deck starts");
     let (outcome, _) =
         embedded::run(job, first, 1, 1, &mut Nowhere, &AtomicBool::new(false)).expect("the deck runs");
     outcome.digest
@@ -390,7 +390,7 @@ fn elements_lost_to_erosion_are_followed_within_two_boundaries() {
     let model = Arc::new(half_a_bar_erodes());
     let (job, first) = Job::new(
         Arc::clone(&model),
-        &[Hand { name: "worker".into(), speed: 1.0, threads: 1 }],
+        &[WorkerSpec { name: "worker".into(), speed: 1.0, threads: 1 }],
         SessionOptions::default(),
         None,
     )

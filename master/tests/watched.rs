@@ -9,7 +9,7 @@ use std::{
 
 use deck::Model;
 use master::{
-    event::Hand,
+    event::WorkerSpec,
     job::Job,
     results::{self, Folder, vtu::read::Piece},
 };
@@ -17,7 +17,7 @@ use mechanics::state::field;
 use protocol::options::JobOptions;
 use tests::{
     bits::Fingerprint,
-    solve::{Crew, Solved, model, run, solve, without_states},
+    solve::{Solved, Workers, model, run, solve, without_states},
 };
 
 const PARTS: &str = r#"
@@ -75,16 +75,16 @@ fn watching_changes_no_bit_and_sees_the_same_on_any_workers() {
         assert!(unwatched.rows.iter().all(|row| row.contacts.is_empty() && row.element_gauges.is_empty()));
         let one = Fingerprint::of(&alone);
         for workers in [2, 5] {
-            let crew = Crew { threads: 2, ..Crew::of(workers) };
-            let many = solve(plates(friction, true), crew).unwrap_or_else(|e| panic!("{e}"));
+            let at_work = Workers { threads: 2, ..Workers::of(workers) };
+            let many = solve(plates(friction, true), at_work).unwrap_or_else(|e| panic!("{e}"));
             one.assert_equal(&Fingerprint::of(&many), &format!("{workers} workers, friction {friction}"));
         }
         // From a snapshot, on other workers.
         let options = without_states(JobOptions { snapshot_at: Some(33), ..JobOptions::default() });
-        let stored = solve(plates(friction, true), Crew { options, ..Crew::default() });
+        let stored = solve(plates(friction, true), Workers { options, ..Workers::default() });
         let resume = stored.unwrap_or_else(|e| panic!("{e}")).snapshot;
         assert!(resume.is_some(), "no snapshot at cycle 33");
-        let resumed = solve(plates(friction, true), Crew { resume, ..Crew::of(3) });
+        let resumed = solve(plates(friction, true), Workers { resume, ..Workers::of(3) });
         one.assert_equal(&Fingerprint::of(&resumed.unwrap_or_else(|e| panic!("{e}"))), "resumed");
     }
 }
@@ -163,8 +163,8 @@ fn contact_surface_carries_the_force_of_the_history_as_pressure_where_bodies_tou
     assert!(hits > 10, "{row:?}");
     deck.setup.control.end_cycle = 60;
     let solved = run(deck);
-    let hand = Hand { name: "one".into(), speed: 1.0, threads: 1 };
-    let (job, _) = Job::new(Arc::clone(&solved.model), &[hand], without_states(JobOptions::default()), None)
+    let spec = WorkerSpec { name: "one".into(), speed: 1.0, threads: 1 };
+    let (job, _) = Job::new(Arc::clone(&solved.model), &[spec], without_states(JobOptions::default()), None)
         .expect("it has run");
     let probe = job.probe().expect("there is contact");
     let (surface, map) = probe.map(&solved.model, &solved.state);

@@ -14,7 +14,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The largest message that [`decode`] takes, whatever limit it is given: 1 GiB, a state image of some
+/// The largest message that [`decode`] takes, whatever limit it is given: 1 GiB, a state of some
 /// four million elements.
 pub const MESSAGE_LIMIT: usize = 1 << 30;
 
@@ -295,7 +295,6 @@ pub struct Message {
     pub stream: u64,
     /// The header of its first chunk.
     pub header: Header,
-    /// The message.
     pub bytes: Vec<u8>,
 }
 

@@ -79,9 +79,7 @@ impl fmt::Display for Role {
 /// Where a peer stands in a job, as the master told it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Membership {
-    /// The job.
     pub job: u32,
-    /// Its epoch.
     pub epoch: u32,
     /// The caller's index among the workers of the job.
     pub index: u32,

@@ -115,19 +115,16 @@ pub enum Error {
     NotFinite {
         /// The name of the number.
         what: String,
-        /// Its value.
         value: f64,
     },
     /// A chunk that does not continue its stream.
     Chunk {
-        /// The stream.
         stream: u64,
         /// What is wrong with it, naming both values.
         why: String,
     },
     /// A queue toward a peer is full: the peer does not read, or is sent more than it was promised.
     QueueFull {
-        /// The queue.
         queue: &'static str,
         /// What it would have held, frames or bytes.
         length: u64,
@@ -172,10 +169,7 @@ pub enum Error {
     /// A certificate or key that cannot be used, or a peer's that is not accepted.
     Certificate(String),
     /// An address that may not be used without certificates.
-    Address {
-        /// The address.
-        address: std::net::SocketAddr,
-    },
+    Address { address: std::net::SocketAddr },
 }
 
 impl Error {

@@ -107,7 +107,6 @@ pub struct Counters {
     pub bytes_sent: u64,
     /// Whole frames received.
     pub frames_received: u64,
-    /// Bytes received.
     pub bytes_received: u64,
 }
 

@@ -1,8 +1,8 @@
 //! Every message: who sends it, when, and what comes back.
 //!
 //! A run, seen from one worker: `Assign` -> `Ready`; `Start`; then per cycle `Cycle` -> `Totals`; at a sort,
-//! `Plan` arrives ahead of its cycle and `Transfer` goes both ways at that cycle; `Image` when asked; at the end
-//! `Report` and `Image` with `last`, then `Release`. On route direct `Peers` comes before `Assign`, and partial forces go
+//! `Plan` arrives ahead of its cycle and `Transfer` goes both ways at that cycle; `WorkerState` when asked; at the end
+//! `Report` and `WorkerState` with `last`, then `Release`. On route direct `Peers` comes before `Assign`, and partial forces go
 //! from worker to worker as [`ToPeer`].
 //!
 //! A job that is dealt out anew - a worker was lost, one joined, speeds turned out to be others - sends a further
@@ -48,18 +48,17 @@ pub enum ToWorker {
     },
     /// The answer to every worker's `Cycle` of one cycle.
     Totals {
-        /// The cycle.
         cycle: u64,
         /// What comes next.
         orders: Orders,
         /// Total forces of this worker's exchange nodes, three numbers each, and of its entries for rigid bodies.
         totals: Vec<f64>,
     },
-    /// State of the guests of a plan that starts to act, six numbers each.
+    /// State of the ghosts of a plan that starts to act, six numbers each.
     Transfer {
         /// The cycle at which the plan acts.
         cycle: u64,
-        /// x, y, z, vx, vy, vz by guest.
+        /// x, y, z, vx, vy, vz by ghost.
         state: Vec<f64>,
     },
     /// Partial forces of another worker that has no link of its own to this one (route direct, relayed).
@@ -83,12 +82,12 @@ pub struct Introduction {
     /// Known to the workers of this epoch alone; whoever dials shows it.
     pub secret: String,
     /// By index.
-    pub members: Vec<Member>,
+    pub peer_workers: Vec<PeerWorker>,
 }
 
 /// A worker as the others see it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Member {
+pub struct PeerWorker {
     /// Name of the host, for messages.
     pub name: String,
     /// Where it takes peers: the host as the master saw it, and its own word for the port; none where it takes none.
@@ -100,7 +99,6 @@ pub struct Member {
 /// From one worker to another, on route direct: once per cycle to each neighbour of the plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ToPeer {
-    /// The cycle.
     pub cycle: u64,
     /// Partial forces of the nodes that both hold, three numbers each.
     pub partials: Vec<f64>,
@@ -133,10 +131,8 @@ pub struct Assign {
     pub route: Route,
     /// The first plan.
     pub plan: Plan,
-    /// Its hash.
     pub plan_hash: u64,
-    /// State of its guests.
-    pub guest_state: Vec<f64>,
+    pub ghost_state: Vec<f64>,
     /// Where the rigid bodies are and how they move: all of them, on every worker.
     pub bodies: Vec<rigid::State>,
 }
@@ -160,7 +156,7 @@ pub struct Orders {
     /// With `gather`: elements have eroded. The plan sorted from these positions has the new surface and acts in the cycle
     /// after, for which all wait; plans of earlier gatherings that would act later than cycle `next + 1` do not come any more.
     pub blocking: bool,
-    /// At the start of cycle `next + 1`, images are sent.
+    /// At the start of cycle `next + 1`, states are sent.
     pub collect: bool,
     /// The run ends at the start of cycle `next + 1`.
     pub stop: bool,
@@ -188,7 +184,6 @@ pub enum ToMaster {
     },
     /// Once per cycle, when contact and border elements are done.
     Cycle {
-        /// The cycle.
         cycle: u64,
         /// The vote of the whole of the cycle before; none in the first cycle.
         vote: Option<Box<Vote>>,
@@ -207,7 +202,7 @@ pub enum ToMaster {
         /// What to pass on.
         message: ToPeer,
     },
-    /// State of the nodes that others will have as guests.
+    /// State of the nodes that others will have as ghosts.
     Transfer {
         /// The cycle at which the plan acts.
         cycle: u64,
@@ -215,8 +210,7 @@ pub enum ToMaster {
         state: Vec<f64>,
     },
     /// State of all sub-domains at the start of a cycle.
-    Image {
-        /// The cycle.
+    WorkerState {
         cycle: u64,
         /// Version of the form of a piece.
         version: u32,
@@ -229,16 +223,14 @@ pub enum ToMaster {
     },
     /// What the elements of one block came to in a cycle, to be computed again by the master.
     Sample {
-        /// The cycle.
         cycle: u64,
         /// `mechanics::cycle::Domain::sample` of the block that [`sampled_block`] names; zeros of a worker without any.
         hash: [u8; 16],
     },
-    /// Before the last `Image`, and about once a second: how the worker's time went, from its runtime.
+    /// Before the last `WorkerState`, and about once a second: how the worker's time went, from its runtime.
     Report(Box<Report>),
     /// The worker cannot go on.
     Failed {
-        /// The cycle.
         cycle: u64,
         /// Why: a sentence for the user.
         reason: String,
@@ -260,9 +252,9 @@ impl ToMaster {
 
 /// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
 /// 2: with damage and the time until an explosive is lit behind them. 3: with what has eroded.
-pub const IMAGE_VERSION: u32 = 3;
+pub const WORKER_STATE_VERSION: u32 = 3;
 
-/// Time that a worker has computed for (ns): of its threads in an image, of its host in the frame of a cycle.
+/// Time that a worker has computed for (ns): of its threads in a state, of its host in the frame of a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Work {
     /// All phases.

@@ -46,10 +46,10 @@ impl Route {
 /// What speeds work is dealt out by. No bit of a result depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 pub enum Balance {
-    /// Those that workers were started with
+    /// Those with which workers were started
     #[default]
     Given,
-    /// Those, corrected by what the workers take
+    /// Those, corrected by measured times
     Measured,
 }
 
@@ -111,29 +111,29 @@ pub struct JobOptions {
     /// Write no results folder
     #[arg(long)]
     pub no_output: bool,
-    /// Store the run at the start of this cycle, as snapshot.bolide in the results folder
+    /// Write a checkpoint at the start of this cycle, as snapshot.bolide in the results folder
     #[arg(long, value_name = "CYCLE")]
     pub snapshot_at: Option<u64>,
-    /// Extra sorts every so many cycles, to test that they change nothing
+    /// Extra sorts every this many cycles, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_every: Option<u64>,
     /// Extra sorts at pseudo-random cycles of this seed, to test that they change nothing
     #[arg(long, hide = true)]
     pub sort_seed: Option<u64>,
-    /// Start when so many workers are there.
+    /// Wait for at least this many workers.
     #[arg(skip)]
     pub min_workers: u32,
-    /// Speeds that work is dealt out by
+    /// Speeds by which work is distributed
     #[arg(long, value_enum, default_value = "given")]
     pub balance: Balance,
-    /// Keep the state in memory every so many seconds, to go back to when a worker is lost; 0 for no oftener than on disk
+    /// Keep a checkpoint in memory every this many seconds, to return to when a worker is lost; 0 for none beside those on disk
     #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = period, allow_negative_numbers = true)]
     pub keep_every: std::option::Option<f64>,
-    /// Store the run on disk every so many seconds, to be gone on with by --resume; 0 for never [default: the deck's; else a
+    /// Write a checkpoint to disk every this many seconds, for --resume; 0 for never [default: the deck's; else a
     /// master's jobs every 10, `run` only when it is interrupted]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub snapshot_every: Option<f64>,
-    /// The same every so many cycles
+    /// The same every this many cycles
     #[arg(long, value_name = "CYCLES", value_parser = clap::value_parser!(u64).range(1..))]
     pub snapshot_cycles: Option<u64>,
     /// Jobs of a higher one go first.

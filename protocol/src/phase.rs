@@ -24,7 +24,7 @@ pub enum Phase {
     Wait,
     /// Integration of all nodes, and the vote.
     Integrate,
-    /// Images, transfers.
+    /// States, transfers.
     Other,
 }
 
@@ -52,7 +52,6 @@ impl Phase {
 pub struct Span {
     /// What was done.
     pub phase: Phase,
-    /// In which cycle.
     pub cycle: u64,
     /// Its start on the host's clock (ns since 1970).
     pub start_ns: u64,

@@ -22,7 +22,6 @@ pub enum Request {
     Submit {
         /// Name of the deck's file, for the places of faults.
         name: String,
-        /// The deck.
         text: String,
         /// What is asked of the run beside the deck.
         options: JobOptions,
@@ -32,34 +31,21 @@ pub enum Request {
     /// Answered by [`Reply::Hosts`].
     Hosts,
     /// Follow a job; the newest without a number.
-    Watch {
-        /// The job.
-        job: Option<u32>,
-    },
+    Watch { job: Option<u32> },
     /// Take a job from the queue, or end it after its present cycle. Answered by [`Reply::Done`].
-    Cancel {
-        /// The job.
-        job: u32,
-    },
+    Cancel { job: u32 },
     /// Answered by [`Reply::Files`].
-    Files {
-        /// The job.
-        job: u32,
-    },
+    Files { job: u32 },
     /// Answered by [`Reply::Piece`].
     File {
-        /// The job.
         job: u32,
         /// One of the names in [`Reply::Files`].
         name: String,
         /// Where to start (bytes).
         offset: u64,
     },
-    /// Put a job that failed back into the queue, to go on where it was stored. Answered by [`Reply::Done`].
-    Resume {
-        /// The job.
-        job: u32,
-    },
+    /// Put a failed job back into the queue, to resume from its last checkpoint. Answered by [`Reply::Done`].
+    Resume { job: u32 },
 }
 
 /// Most bytes of [`Joining`] and [`Joined`] as they travel.
@@ -86,10 +72,7 @@ pub struct Joined {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply {
     /// The deck is in the queue under this number.
-    Submitted {
-        /// The job.
-        job: u32,
-    },
+    Submitted { job: u32 },
     /// The deck has these faults, one line each; it is not in the queue.
     Faults(Vec<String>),
     /// Every job the master knows, oldest first.
@@ -208,12 +191,10 @@ pub struct Ended {
 pub struct HostRow {
     /// Its number in the virtual machine, from 0.
     pub host: u32,
-    /// Its name.
     pub name: String,
     /// Speed relative to the reference host.
     #[serde(deserialize_with = "finite")]
     pub speed: f64,
-    /// Compute threads.
     pub threads: u32,
     /// Lane set.
     pub lanes: String,

@@ -52,7 +52,6 @@ impl Rate {
         (slowest..=fastest).contains(&bits_per_second).then_some(Self(bits_per_second))
     }
 
-    /// Bits per second.
     pub const fn bits_per_second(self) -> f64 {
         self.0
     }

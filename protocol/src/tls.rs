@@ -51,7 +51,6 @@ pub enum Role {
 }
 
 impl Role {
-    /// Every role.
     pub const ALL: [Self; 3] = [Self::Master, Self::Worker, Self::Client];
 
     /// The role's name, as certificates and messages spell it.

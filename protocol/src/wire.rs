@@ -1,6 +1,6 @@
 //! Messages of a run as payloads, and back.
 //!
-//! Large arrays (partial forces, totals, positions, states of guests) follow a small bincode head as raw little-endian
+//! Large arrays (partial forces, totals, positions, states of ghosts) follow a small bincode head as raw little-endian
 //! `f64`; everything else is bincode throughout.
 
 use mechanics::vote::Vote;

@@ -14,28 +14,28 @@ pub struct Fingerprint {
     rows: Vec<(u64, Vec<u64>)>,
     /// Bits of hourglass, viscosity, friction and external energy, momentum error, worst ratios, and energies of contact by pair of
     /// parts.
-    ledger: Vec<u64>,
+    run_totals: Vec<u64>,
 }
 
 impl Fingerprint {
     /// Of a run that came to its end.
     pub fn of(solved: &Solved) -> Self {
-        let ledger = &solved.outcome.ledger;
+        let run_totals = &solved.outcome.run_totals;
         Self {
             digest: solved.outcome.digest.clone(),
             rows: solved.rows.iter().map(|row| (row.cycle, numbers(row))).collect(),
-            ledger: [
-                ledger.hourglass,
-                ledger.viscosity,
-                ledger.friction,
-                ledger.external,
-                ledger.momentum_error(),
-                ledger.worst_courant,
-                ledger.worst_gap_travel,
-                ledger.worst_penetration,
+            run_totals: [
+                run_totals.hourglass,
+                run_totals.viscosity,
+                run_totals.friction,
+                run_totals.external,
+                run_totals.momentum_error(),
+                run_totals.worst_courant,
+                run_totals.worst_gap_travel,
+                run_totals.worst_penetration,
             ]
             .into_iter()
-            .chain(ledger.contacts.iter().flat_map(|pair| [pair.contact, pair.friction, pair.eroded]))
+            .chain(run_totals.contacts.iter().flat_map(|pair| [pair.contact, pair.friction, pair.eroded]))
             .map(f64::to_bits)
             .collect(),
         }
@@ -52,11 +52,10 @@ impl Fingerprint {
         }
         assert_eq!(self.rows.len(), other.rows.len(), "{name}: rows of history");
         assert_eq!(self.digest, other.digest, "{name}: digest");
-        assert_eq!(self.ledger, other.ledger, "{name}: sums over cycles");
+        assert_eq!(self.run_totals, other.run_totals, "{name}: sums over cycles");
     }
 }
 
-/// All numbers of a row.
 fn numbers(row: &HistoryRow) -> Vec<u64> {
     [row.time, row.dt, row.kinetic, row.internal, row.hourglass, row.contact, row.friction]
         .into_iter()

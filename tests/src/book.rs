@@ -1,6 +1,6 @@
 //! The verification book: what the whole system gives beside closed forms and published figures.
 //!
-//! A case computes figures and adds them to a [`Sheet`], which compares them with rows of `reference.toml`. The quick
+//! A case computes figures and adds them to a [`Figures`], which compares them with rows of `reference.toml`. The quick
 //! cases are tests of the suite; `cargo run --release -p tests --bin book` runs all of them, or those whose names contain
 //! a word, and writes the table of `VERIFICATION.md`. To add a case, write a function beside its neighbours, its rows into
 //! `reference.toml`, and its name into the list below.
@@ -38,7 +38,7 @@ mod clouds;
 #[expect(dead_code, reason = "those tests use more of it")]
 mod world;
 
-use crate::case::Sheet;
+use crate::case::Figures;
 
 /// Calls a macro with every case as `room: case kind;`, kind `quick` or `long`: the one list of the book.
 #[macro_export]
@@ -117,7 +117,7 @@ macro_rules! each_case_of_the_book {
             load: a_wall_gives_the_impulse_that_bodies_lack_and_rubs_after_coulomb quick;
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
             erosion: an_element_that_leaves_a_block_uncovers_its_neighbours quick;
-            erosion: a_rod_goes_through_a_plate_and_the_ledger_closes long;
+            erosion: a_rod_goes_through_a_plate_and_energies_add_up long;
             erosion: a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked quick;
             rigid: a_free_top_precesses_after_euler quick;
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
@@ -150,7 +150,7 @@ pub struct Entry {
     pub name: &'static str,
     /// Short enough for every run of the tests.
     pub quick: bool,
-    compute: fn(&mut Sheet),
+    compute: fn(&mut Figures),
 }
 
 impl Entry {
@@ -158,10 +158,10 @@ impl Entry {
     ///
     /// # Panics
     /// If the case has no figures: its run failed, or what must be was not.
-    pub fn run(&self) -> Sheet {
-        let mut sheet = Sheet::default();
-        (self.compute)(&mut sheet);
-        sheet
+    pub fn run(&self) -> Figures {
+        let mut figures = Figures::default();
+        (self.compute)(&mut figures);
+        figures
     }
 }
 

@@ -1,7 +1,7 @@
 //! Cases: a figure of ours beside a published or derived one, the tolerance, and the verdict.
 //!
 //! References stand in `reference.toml`, one row per case, with the source of each number. A test hands its figures
-//! to a [`Sheet`], which prints every row (seen with `--nocapture`) and then fails if one is outside its tolerance.
+//! to a [`Figures`], which prints every row (seen with `--nocapture`) and then fails if one is outside its tolerance.
 
 use std::{collections::BTreeMap, fmt, sync::LazyLock};
 
@@ -148,11 +148,11 @@ impl fmt::Display for Case {
 
 /// The cases of one test.
 #[derive(Clone, Debug, Default)]
-pub struct Sheet {
+pub struct Figures {
     cases: Vec<Case>,
 }
 
-impl Sheet {
+impl Figures {
     /// Compares and prints a figure.
     pub fn add(&mut self, name: &str, ours: f64) {
         let case = Case::new(name, ours);
@@ -160,7 +160,7 @@ impl Sheet {
         self.cases.push(case);
     }
 
-    /// Figures by name, as they were added: what [`Sheet::of`] takes back.
+    /// Figures by name, as they were added: what [`Figures::of`] takes back.
     pub fn figures(&self) -> Vec<(String, f64)> {
         self.cases.iter().map(|case| (case.name.clone(), case.ours)).collect()
     }
@@ -178,7 +178,6 @@ impl Sheet {
         self.cases.iter().all(Case::is_as_stated)
     }
 
-    /// The cases so far.
     pub fn cases(&self) -> &[Case] {
         &self.cases
     }

@@ -28,7 +28,8 @@ pub const FAULTS: [&str; 5] = ["BOLIDE_FAIL", "die-in-", "die-before-", "a test 
 pub fn holds(program: &[u8], words: &str) -> bool {
     use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, elf::SHF_ALLOC};
     let file = object::File::parse(program).expect("a program");
-    let loaded = |flags| matches!(flags, SectionFlags::Elf { sh_flags } if sh_flags & u64::from(SHF_ALLOC) != 0);
+    let loaded =
+        |flags| matches!(flags, SectionFlags::Elf { sh_flags } if sh_flags & u64::from(SHF_ALLOC) != 0);
     let said = |bytes: &[u8]| bytes.windows(words.len()).any(|window| window == words.as_bytes());
     file.sections().filter(|section| loaded(section.flags())).any(|section| section.data().is_ok_and(said))
         || file.symbols().any(|symbol| symbol.name_bytes().is_ok_and(said))
@@ -110,7 +111,6 @@ impl Process {
         self.printed.lines().join("\n")
     }
 
-    /// Its id.
     pub fn id(&self) -> u32 {
         self.child.id()
     }
@@ -199,7 +199,6 @@ pub struct Said {
 pub struct Cluster {
     binary: PathBuf,
     folder: tempfile::TempDir,
-    /// The master.
     pub master: Process,
     /// Where it listens.
     pub address: String,
@@ -276,12 +275,10 @@ impl Cluster {
         self.master.wait_for("listening on ");
     }
 
-    /// The folder of the results of a job.
     pub fn results(&self, job: u32) -> PathBuf {
         self.folder().join(format!("spool/job-{job}"))
     }
 
-    /// The folder of the snapshots of a job.
     pub fn snapshots(&self, job: u32) -> PathBuf {
         self.folder().join(format!("spool/queue/job-{job}.snapshots"))
     }

@@ -81,7 +81,7 @@ pub fn compute(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
         Task::Border { .. } => "die-in-border",
         Task::Interior { .. } => "die-in-interior",
         Task::Integrate { .. } => "die-in-integrate",
-        Task::Image { .. } => "die-in-image",
+        Task::WorkerState { .. } => "die-in-image",
         Task::Sample { .. } => "die-in-sample",
     };
     die(name);

@@ -29,7 +29,6 @@ pub mod workers;
 pub struct Scene {
     /// The binary.
     pub bolide: PathBuf,
-    /// The deck.
     pub deck: PathBuf,
     /// Cycles of the job.
     pub cycles: u64,
@@ -40,7 +39,6 @@ pub struct Scene {
     undisturbed: Left,
 }
 
-/// A fault.
 pub struct Case {
     /// What happens, for the table.
     pub name: &'static str,

@@ -17,7 +17,7 @@ use std::{
 
 use deck::Model;
 use master::{
-    event::{Action, Event, Hand, Outcome},
+    event::{Action, Event, Outcome, WorkerSpec},
     job::Job,
     options::SessionOptions,
     results::history::HistoryRow,
@@ -45,7 +45,6 @@ pub struct Draws {
 }
 
 impl Draws {
-    /// Of a seed.
     pub fn new(seed: u64) -> Self {
         Self { state: seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1, given: Vec::new() }
     }
@@ -269,7 +268,6 @@ impl Surroundings for Weather {
     }
 }
 
-/// One seed as it is played.
 struct Play {
     world: World<Weather>,
     model: Arc<Model>,
@@ -314,21 +312,21 @@ pub fn play(model: &Arc<Model>, options: &SessionOptions, seed: u64, plot: Plot)
     play.run()
 }
 
-fn hand(number: usize) -> Hand {
-    Hand { name: format!("host-{number}"), speed: 1.0 + (number % 3) as f64, threads: 1 }
+fn spec(number: usize) -> WorkerSpec {
+    WorkerSpec { name: format!("host-{number}"), speed: 1.0 + (number % 3) as f64, threads: 1 }
 }
 
 impl Play {
     /// The master starts, with so many workers that have called; the disk tells it where to go on.
     fn begin(&mut self, workers: usize) -> Result<(), String> {
         let members: Vec<usize> = (0..workers).map(|_| self.come()).collect();
-        let hands: Vec<Hand> = members.iter().map(|&host| hand(host)).collect();
+        let specs: Vec<WorkerSpec> = members.iter().map(|&host| spec(host)).collect();
         let weather = &mut self.world.surroundings;
         let resume = weather.disk.snapshot.clone();
         let cycle = resume.as_ref().map_or(0, |snapshot| snapshot.state.cycle);
         let mut options = self.options.clone();
         options.asked.snapshot_at = self.plot.snapshot_at.filter(|at| *at > cycle);
-        let (job, actions) = Job::new(Arc::clone(&self.model), &hands, options, resume)?;
+        let (job, actions) = Job::new(Arc::clone(&self.model), &specs, options, resume)?;
         weather.disk.rows = job.rows_before().iter().map(|row| HistoryRow::clone(row)).collect();
         weather.disk.states.retain(|state| state.cycle <= cycle);
         weather.life += 1;
@@ -383,8 +381,8 @@ impl Play {
     /// Nothing is on its way: a job that waits for a worker gets one, anything else is stuck.
     fn nothing_left(&mut self) -> Result<(), String> {
         match &self.world.sessions.job {
-            Some(job) if job.crew().is_empty() => self.happen(What::Comes),
-            Some(job) => Err(format!("stuck in epoch {} with {} workers", job.epoch(), job.crew().len())),
+            Some(job) if job.at_work().is_empty() => self.happen(What::Comes),
+            Some(job) => Err(format!("stuck in epoch {} with {} workers", job.epoch(), job.at_work().len())),
             None => self.happen(What::MasterReturns),
         }
     }
@@ -401,7 +399,7 @@ impl Play {
             What::Comes => {
                 if self.world.sessions.job.as_ref().is_some_and(|job| !job.is_over()) {
                     let host = self.come();
-                    self.world.join(host, hand(host))?;
+                    self.world.join(host, spec(host))?;
                 }
             }
             What::MasterReturns if self.world.sessions.job.is_none() => {

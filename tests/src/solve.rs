@@ -5,7 +5,7 @@ use std::sync::{Arc, atomic::AtomicBool};
 use deck::Model;
 use master::{
     embedded::{self, Fate, Sink},
-    event::{Action, Hand, Outcome},
+    event::{Action, Outcome, WorkerSpec},
     job::Job,
     options::SessionOptions,
     results::history::{GaugeRow, HistoryRow},
@@ -45,10 +45,9 @@ pub fn keyword(name: &str) -> Model {
 
 /// Who computes, and what is asked beside the deck.
 #[derive(Clone, Debug)]
-pub struct Crew {
+pub struct Workers {
     /// Relative speed of each worker.
     pub speeds: Vec<f64>,
-    /// Compute threads of each worker.
     pub threads: u32,
     /// Options of the job.
     pub options: SessionOptions,
@@ -56,14 +55,14 @@ pub struct Crew {
     pub resume: Option<Snapshot>,
 }
 
-impl Default for Crew {
+impl Default for Workers {
     /// One worker of one thread.
     fn default() -> Self {
         Self { speeds: vec![1.0], threads: 1, options: without_states(JobOptions::default()), resume: None }
     }
 }
 
-impl Crew {
+impl Workers {
     /// So many workers of one thread and equal speed.
     pub fn of(workers: usize) -> Self {
         Self { speeds: vec![1.0; workers], ..Self::default() }
@@ -83,7 +82,7 @@ pub struct Solved {
     pub state: GlobalState,
     /// Rows of the history, with those before a snapshot that the run went on from.
     pub rows: Vec<HistoryRow>,
-    /// States at the output period, where the crew's options ask for them; the last is the final one.
+    /// States at the output period, where the workers's options ask for them; the last is the final one.
     pub states: Vec<GlobalState>,
     /// The snapshot, where one was asked for.
     pub snapshot: Option<Snapshot>,
@@ -203,12 +202,12 @@ impl Sink for Keep {
     }
 }
 
-/// Runs a problem to its end on this crew.
+/// Runs a problem to its end on this workers.
 ///
 /// # Errors
 /// Whatever kept it from its end.
-pub fn solve(model: Model, crew: Crew) -> Result<Solved, String> {
-    solve_through(model, crew, &mut |_| None)
+pub fn solve(model: Model, at_work: Workers) -> Result<Solved, String> {
+    solve_through(model, at_work, &mut |_| None)
 }
 
 /// [`solve`] with workers that come and go; see [`embedded::run_through`].
@@ -217,23 +216,23 @@ pub fn solve(model: Model, crew: Crew) -> Result<Solved, String> {
 /// Whatever kept it from its end.
 pub fn solve_through(
     model: Model,
-    crew: Crew,
+    at_work: Workers,
     fate: &mut (dyn FnMut(u64) -> Option<Fate> + Send),
 ) -> Result<Solved, String> {
     let model = Arc::new(model);
-    let hands: Vec<Hand> = crew
+    let specs: Vec<WorkerSpec> = at_work
         .speeds
         .iter()
         .enumerate()
-        .map(|(i, &speed)| Hand { name: format!("worker-{i}"), speed, threads: crew.threads })
+        .map(|(i, &speed)| WorkerSpec { name: format!("worker-{i}"), speed, threads: at_work.threads })
         .collect();
-    let (job, first) = Job::new(Arc::clone(&model), &hands, crew.options, crew.resume)?;
+    let (job, first) = Job::new(Arc::clone(&model), &specs, at_work.options, at_work.resume)?;
     let mut keep = Keep {
         rows: job.rows_before().iter().map(|row| HistoryRow::clone(row)).collect(),
         ..Keep::default()
     };
     let stop = AtomicBool::new(false);
-    let (n, threads) = (hands.len(), crew.threads as usize);
+    let (n, threads) = (specs.len(), at_work.threads as usize);
     let (mut outcome, _) = embedded::run_through(job, first, n, threads, &mut keep, &stop, fate)?;
     if let Some(failure) = outcome.failure.take() {
         return Err(failure);
@@ -248,7 +247,7 @@ pub fn solve_through(
 /// # Panics
 /// If the run fails.
 pub fn run(model: Model) -> Solved {
-    solve(model, Crew::default()).unwrap_or_else(|e| panic!("{e}"))
+    solve(model, Workers::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// [`run`] that keeps the states at the output period of the deck.
@@ -257,5 +256,5 @@ pub fn run(model: Model) -> Solved {
 /// If the run fails.
 pub fn run_with_states(model: Model) -> Solved {
     let options = SessionOptions::default();
-    solve(model, Crew { options, ..Crew::default() }).unwrap_or_else(|e| panic!("{e}"))
+    solve(model, Workers { options, ..Workers::default() }).unwrap_or_else(|e| panic!("{e}"))
 }

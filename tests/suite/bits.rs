@@ -7,52 +7,56 @@ use std::sync::Arc;
 use mechanics::{lanes::Width, state::GlobalState};
 use tests::{
     bits::{Fingerprint, forced_sorts},
-    solve::{Crew, example, keyword, model, solve, solve_through, without_states},
+    solve::{Workers, example, keyword, model, solve, solve_through, without_states},
 };
 
 use deck::Model;
 use master::{
     embedded::Fate,
-    options::{Keep, SessionOptions},
+    options::{CheckpointEvery, SessionOptions},
 };
 use protocol::options::{JobOptions, Route};
 
-pub(crate) fn fingerprint(model: &Model, crew: Crew) -> Fingerprint {
-    Fingerprint::of(&solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}")))
+pub(crate) fn fingerprint(model: &Model, at_work: Workers) -> Fingerprint {
+    Fingerprint::of(&solve(model.clone(), at_work).unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// A crew with these options.
-pub(crate) fn asked(workers: usize, options: SessionOptions) -> Crew {
-    Crew { options, ..Crew::of(workers) }
+/// A set of workers with these options.
+pub(crate) fn asked(workers: usize, options: SessionOptions) -> Workers {
+    Workers { options, ..Workers::of(workers) }
 }
 
-/// Every crew whose bits are compared with those of one worker of one thread.
-fn crews() -> Vec<(String, Crew)> {
-    let mut crews = Vec::new();
+/// Every workers whose bits are compared with those of one worker of one thread.
+fn worker_sets() -> Vec<(String, Workers)> {
+    let mut worker_sets = Vec::new();
     for workers in [2, 3, 5, 7] {
-        crews.push((format!("{workers} workers"), Crew::of(workers)));
+        worker_sets.push((format!("{workers} workers"), Workers::of(workers)));
     }
     for workers in [1, 2] {
-        crews.push((format!("{workers} workers of 2 threads"), Crew { threads: 2, ..Crew::of(workers) }));
+        worker_sets.push((
+            format!("{workers} workers of 2 threads"),
+            Workers { threads: 2, ..Workers::of(workers) },
+        ));
     }
-    crews.push(("speeds 1, 2, 0.5".to_owned(), Crew { speeds: vec![1.0, 2.0, 0.5], ..Crew::default() }));
+    worker_sets
+        .push(("speeds 1, 2, 0.5".to_owned(), Workers { speeds: vec![1.0, 2.0, 0.5], ..Workers::default() }));
     for width in Width::ALL.into_iter().filter(|width| width.available()) {
         let options = without_states(JobOptions { lanes: Some(width.to_string()), ..JobOptions::default() });
-        crews.push((format!("{width}, 2 workers"), asked(2, options)));
+        worker_sets.push((format!("{width}, 2 workers"), asked(2, options)));
     }
-    crews
+    worker_sets
 }
 
-/// Compares runs of a problem on all crews, with sorts forced, and over a snapshot.
+/// Compares runs of a problem on all sets of workers, with sorts forced, and over a snapshot.
 pub(crate) fn same_bits(model: &Model) {
     let cycles = model.setup.control.end_cycle;
-    let alone = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
     let one = Fingerprint::of(&alone);
     assert_eq!(alone.state.cycle, cycles);
-    let met = alone.outcome.ledger.worst_penetration > 0.0;
+    let met = alone.outcome.run_totals.worst_penetration > 0.0;
     assert_eq!(met, model.setup.contact.is_some(), "contact without a hit compares nothing");
-    for (name, crew) in crews() {
-        one.assert_equal(&fingerprint(model, crew), &name);
+    for (name, at_work) in worker_sets() {
+        one.assert_equal(&fingerprint(model, at_work), &name);
     }
     if model.setup.contact.is_some() {
         for sorts in forced_sorts() {
@@ -64,7 +68,7 @@ pub(crate) fn same_bits(model: &Model) {
         }
         let mut slack = model.clone();
         slack.setup.contact.as_mut().expect("just asked").slack *= 2.0;
-        one.assert_equal(&fingerprint(&slack, Crew::of(2)), "doubled slack");
+        one.assert_equal(&fingerprint(&slack, Workers::of(2)), "doubled slack");
     }
     let options = without_states(JobOptions { snapshot_at: Some(cycles / 2), ..JobOptions::default() });
     let whole = solve(model.clone(), asked(2, options)).unwrap_or_else(|e| panic!("{e}"));
@@ -73,8 +77,8 @@ pub(crate) fn same_bits(model: &Model) {
     assert_eq!(snapshot.state.cycle, cycles / 2);
     for workers in [1, 3] {
         let options = without_states(JobOptions { sort_seed: Some(5), ..JobOptions::default() });
-        let crew = Crew { resume: Some(snapshot.clone()), ..asked(workers, options) };
-        one.assert_equal(&fingerprint(model, crew), &format!("restored on {workers} workers"));
+        let at_work = Workers { resume: Some(snapshot.clone()), ..asked(workers, options) };
+        one.assert_equal(&fingerprint(model, at_work), &format!("restored on {workers} workers"));
     }
 }
 
@@ -88,17 +92,17 @@ pub(crate) fn same_bits_on_route_direct(model: &Model, one: &Fingerprint) {
 
 /// Loses each of three workers at several moments of a run, on either route.
 pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
-    let one = fingerprint(model, Crew::default());
+    let one = fingerprint(model, Workers::default());
     let mut arrivals = 0;
     let mut count = |number: u64| {
         arrivals = number;
         None
     };
-    solve_through(model.clone(), Crew::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
+    solve_through(model.clone(), Workers::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
     let mut midway = 0;
     for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
         let options = without_states(JobOptions { route: Some(route), ..JobOptions::default() });
-        let options = SessionOptions { keep: Keep::Cycles(10), ..options };
+        let options = SessionOptions { keep: CheckpointEvery::Cycles(10), ..options };
         let at = arrivals * (seed as u64 + 4) / 12;
         let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
         let solved = solve_through(model.clone(), asked(3, options), &mut fate)
@@ -127,8 +131,8 @@ fn a_snapshot_whose_arrays_are_not_as_long_as_the_problems_is_refused() {
     for (number, spoil) in spoils.into_iter().enumerate() {
         let mut snapshot = snapshot.clone();
         spoil(Arc::make_mut(&mut snapshot.state));
-        let crew = Crew { resume: Some(snapshot), ..Crew::of(2) };
-        let error = solve(model.clone(), crew).err().unwrap_or_else(|| panic!("{number} is taken"));
+        let at_work = Workers { resume: Some(snapshot), ..Workers::of(2) };
+        let error = solve(model.clone(), at_work).err().unwrap_or_else(|| panic!("{number} is taken"));
         assert!(error.to_string().contains("of another problem"), "{number}: {error}");
     }
 }
@@ -288,13 +292,13 @@ fn every_load_and_wall_has_the_same_bits_on_both_routes() {
         "#,
     );
     same_bits(&model);
-    let one = Fingerprint::of(&solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}")));
+    let one = Fingerprint::of(&solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}")));
     same_bits_on_route_direct(&model, &one);
     // Nothing of it is idle: without any one of them the bits are others.
     let without = |change: &dyn Fn(&mut Model)| {
         let mut other = model.clone();
         change(&mut other);
-        fingerprint(&other, Crew::default()).digest
+        fingerprint(&other, Workers::default()).digest
     };
     for wall in 0..3 {
         let idle = without(&|m| m.setup.walls[wall].parts.fill(false));
@@ -373,7 +377,7 @@ fn cut_up(model: &mut Model, cut: &[[usize; 8]]) {
 #[test]
 fn wedges_and_tetrahedra_have_the_same_bits_and_keep_their_energy() {
     let whole = keyword("block-on-plate");
-    let solved = solve(whole.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    let solved = solve(whole.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
     let of_block = |solved: &tests::solve::Solved| {
         let row = solved.rows.last().expect("rows");
         assert!(row.error.abs() < 2e-3, "{}", row.error);
@@ -387,7 +391,7 @@ fn wedges_and_tetrahedra_have_the_same_bits_and_keep_their_energy() {
     for (cut, apart) in [(&wedges[..], 0.1), (&tetrahedra[..], f64::INFINITY)] {
         let mut model = whole.clone();
         cut_up(&mut model, cut);
-        let kinetic = of_block(&solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}")));
+        let kinetic = of_block(&solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}")));
         assert!((kinetic / reference - 1.0).abs() < apart, "{kinetic} of {reference}");
         model.setup.control.end_cycle = 150;
         same_bits(&model);
@@ -399,7 +403,7 @@ fn nodes_that_a_wall_names_have_the_same_bits_and_the_others_pass() {
     let mut model = keyword("bar-on-wall");
     model.velocity.iter_mut().for_each(|v| v[2] = -190e3);
     model.setup.control.end_cycle = 100;
-    let whole = fingerprint(&model, Crew::default());
+    let whole = fingerprint(&model, Workers::default());
     let at_foot = |x: &[f64; 3]| x[2] < 1e-9 && x[0] < 1.5;
     // The wall by nodes of its own instead of by parts.
     model.setup.walls[0].parts.fill(false);
@@ -412,7 +416,7 @@ fn nodes_that_a_wall_names_have_the_same_bits_and_the_others_pass() {
         model.setup.constraints.push(mechanics::setup::Constraint { walls: 1, ..free });
     }
     same_bits(&model);
-    let solved = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    let solved = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
     assert_ne!(Fingerprint::of(&solved).digest, whole.digest);
     let lowest = |named: bool| {
         let nodes = (0..model.mesh.n_nodes()).filter(|n| at_foot(&model.mesh.positions[*n]) == named);
@@ -488,7 +492,7 @@ fn shells_and_solids() -> Model {
 fn shells_and_solids_in_contact_have_the_same_bits_on_both_routes() {
     let model = shells_and_solids();
     same_bits(&model);
-    let alone = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
     let row = alone.rows.last().expect("rows");
     assert!(row.error.abs() < 0.02, "energy error {}", row.error);
     // Shells turn, layers yield, and bodies of both kinds meet: without the ball the bits are others.
@@ -502,7 +506,7 @@ fn shells_and_solids_in_contact_have_the_same_bits_on_both_routes() {
         for [a, b] in [pair, [pair[1], pair[0]]] {
             contact.interacts[a * n + b] = false;
         }
-        assert_ne!(fingerprint(&other, Crew::default()).digest, one.digest, "parts {pair:?} never meet");
+        assert_ne!(fingerprint(&other, Workers::default()).digest, one.digest, "parts {pair:?} never meet");
     }
 }
 
@@ -596,12 +600,12 @@ fn rigid_bodies_have_the_same_bits_on_both_routes() {
         "#,
     );
     same_bits(&model);
-    let one = Fingerprint::of(&solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}")));
+    let one = Fingerprint::of(&solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}")));
     same_bits_on_route_direct(&model, &one);
     let without = |change: &dyn Fn(&mut Model)| {
         let mut other = model.clone();
         change(&mut other);
-        fingerprint(&other, Crew::default()).digest
+        fingerprint(&other, Workers::default()).digest
     };
     for body in 0..2 {
         assert_ne!(without(&|m| m.setup.bodies[body].mass *= 1.001), one.digest, "mass of body {body}");
@@ -670,7 +674,7 @@ fn crossing_edges() -> Model {
 fn edges_that_meet_edges_have_the_same_bits_on_both_routes() {
     let model = crossing_edges();
     same_bits(&model);
-    let alone = solve(model.clone(), Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
     let row = alone.rows.last().expect("rows");
     assert!(row.error.abs() < 0.02, "energy error {}", row.error);
     for pair in 0..2 {
@@ -678,13 +682,13 @@ fn edges_that_meet_edges_have_the_same_bits_on_both_routes() {
             alone.rows.iter().any(|row| row.contacts.iter().any(|(p, vote)| *p == pair && vote.hits > 0));
         assert!(met, "pair {pair} never met");
     }
-    println!("{} eroded, energy error {}", alone.outcome.ledger.eroded_elements, row.error);
-    assert!(alone.outcome.ledger.eroded_elements > 0, "nothing eroded");
+    println!("{} eroded, energy error {}", alone.outcome.run_totals.eroded_elements, row.error);
+    assert!(alone.outcome.run_totals.eroded_elements > 0, "nothing eroded");
     let one = Fingerprint::of(&alone);
     same_bits_on_route_direct(&model, &one);
     let mut without = model.clone();
     without.setup.contact.as_mut().expect("the deck has contact").edges = false;
-    let without = solve(without, Crew::default()).unwrap_or_else(|e| panic!("{e}"));
+    let without = solve(without, Workers::default()).unwrap_or_else(|e| panic!("{e}"));
     assert_ne!(without.outcome.digest, one.digest, "edges change nothing");
 }
 
@@ -699,8 +703,8 @@ fn a_worker_with_edges_that_is_lost_changes_no_bit() {
 fn another_problem_has_other_bits() {
     let mut model = example("two-bars");
     model.setup.control.end_cycle = 20;
-    let one = fingerprint(&model, Crew::default());
+    let one = fingerprint(&model, Workers::default());
     model.velocity[0][0] = f64::from_bits(model.velocity[0][0].to_bits() + 1);
-    let other = fingerprint(&model, Crew::default());
+    let other = fingerprint(&model, Workers::default());
     assert_ne!(one.digest, other.digest);
 }

@@ -1,17 +1,17 @@
-//! Rigid bodies of shells: the same bits on any crew, what is joined to them feels them as it should, nothing is lost.
+//! Rigid bodies of shells: the same bits on any workers, what is joined to them feels them as it should, nothing is lost.
 
 use deck::Model;
 use master::snapshot::file;
 use protocol::options::JobOptions;
 use tests::{
     bits::Fingerprint,
-    solve::{Crew, Solved, cross, keyword, model, solve, without_states},
+    solve::{Solved, Workers, cross, keyword, model, solve, without_states},
 };
 
 use crate::bits::{losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
 
-fn run(model: &Model, crew: Crew) -> Solved {
-    solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}"))
+fn run(model: &Model, at_work: Workers) -> Solved {
+    solve(model.clone(), at_work).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The pipe whip from shortly before the pipes meet.
@@ -35,7 +35,7 @@ fn whip() -> Model {
 fn a_pipe_between_rigid_shells_has_the_same_bits_on_both_routes() {
     let model = whip();
     same_bits(&model);
-    let one = Fingerprint::of(&run(&model, Crew::default()));
+    let one = Fingerprint::of(&run(&model, Workers::default()));
     same_bits_on_route_direct(&model, &one);
 }
 
@@ -50,16 +50,17 @@ fn a_worker_of_rigid_shells_that_is_lost_changes_no_bit() {
 fn a_snapshot_of_rigid_shells_goes_on_from_its_file_with_the_same_bits() {
     let mut model = whip();
     model.setup.control.end_cycle = 120;
-    let one = Fingerprint::of(&run(&model, Crew::default()));
+    let one = Fingerprint::of(&run(&model, Workers::default()));
     let options = without_states(JobOptions { snapshot_at: Some(70), ..JobOptions::default() });
-    let taken = run(&model, Crew { options, ..Crew::of(2) }).snapshot.expect("a snapshot was asked for");
+    let taken =
+        run(&model, Workers { options, ..Workers::of(2) }).snapshot.expect("a snapshot was asked for");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("snapshot.bolide");
     file::write(&path, &taken).expect("a disk with room");
     for workers in [1, 3, 5] {
         let resume = Some(file::read(&path).expect("a whole file"));
-        let crew = Crew { resume, ..Crew::of(workers) };
-        one.assert_equal(&Fingerprint::of(&run(&model, crew)), &format!("resumed on {workers} workers"));
+        let at_work = Workers { resume, ..Workers::of(workers) };
+        one.assert_equal(&Fingerprint::of(&run(&model, at_work)), &format!("resumed on {workers} workers"));
     }
 }
 
@@ -111,11 +112,11 @@ fn a_strip_on_a_body_that_is_held_bends_as_one_that_is_clamped() {
         &strip(
             "[[rigid]]\nparts = [\"root\"]\nvelocity = { x = 0, y = 0, z = 0 }\nspin = { x = 0, y = 0, z = 0 }",
         ),
-        Crew::default(),
+        Workers::default(),
     );
     let clamped = run(
         &strip("[[boundary]]\ntype = \"fixed\"\nparts = [\"root\"]\naxes = \"xyz\"\nrotations = \"xyz\""),
-        Crew::default(),
+        Workers::default(),
     );
     let tips = held.gauge(0).zip(clamped.gauge(0));
     let most = clamped.gauge(0).map(|(_, row)| row.x[2].abs()).fold(0.0, f64::max);
@@ -135,15 +136,15 @@ fn a_free_body_takes_the_moments_of_the_shells_on_it() {
         model
     };
     let model = pushed("[[rigid]]\nparts = [\"root\"]");
-    let solved = run(&model, Crew::default());
+    let solved = run(&model, Workers::default());
     let row = solved.rows.last().expect("rows");
     // A force that sets in at once costs shells 0.3 % with or without a body among them.
-    let without = run(&pushed(""), Crew::default()).rows.last().expect("rows").error;
+    let without = run(&pushed(""), Workers::default()).rows.last().expect("rows").error;
     assert!(row.external > 0.0 && (row.error - without).abs() < 2e-4, "{} and {without}", row.error);
     // Angular momentum is the moment of the impulse: three forces of 40 N push the tip for the time that was run.
     let state = &solved.state;
     let body = &model.setup.bodies[0];
-    let moved = solved.outcome.ledger.bodies[0];
+    let moved = solved.outcome.run_totals.bodies[0];
     let mut total = cross(moved.centre, moved.velocity.map(|v| body.mass * v));
     (0..3).for_each(|a| total[a] += moved.momentum[a]);
     for n in (0..state.x.len()).filter(|n| body.nodes.binary_search(&(*n as u32)).is_err()) {

@@ -16,7 +16,7 @@ use protocol::options::{JobOptions, Route};
 use tests::{
     bits::Fingerprint,
     checker::intruders,
-    solve::{Crew, Solved, cross, keyword, model, solve, without_states},
+    solve::{Solved, Workers, cross, keyword, model, solve, without_states},
 };
 
 use crate::bits::{asked, fingerprint, losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
@@ -41,15 +41,15 @@ fn cycles_of_erosion(state: &GlobalState) -> Vec<u64> {
     cycles
 }
 
-fn solved(model: &Model, crew: Crew) -> Solved {
-    solve(model.clone(), crew).unwrap_or_else(|e| panic!("{e}"))
+fn solved(model: &Model, at_work: Workers) -> Solved {
+    solve(model.clone(), at_work).unwrap_or_else(|e| panic!("{e}"))
 }
 
 #[test]
 fn a_punch_that_erodes_a_plate_has_the_same_bits_on_any_crew() {
     for retain_inertia in [false, true] {
         let model = punch(retain_inertia);
-        let alone = solved(&model, Crew::default());
+        let alone = solved(&model, Workers::default());
         let of_part = |part: usize| {
             let first = model.mesh.element_offsets()[part];
             (first..first + model.mesh.parts[part].n_elements())
@@ -67,10 +67,10 @@ fn a_punch_that_erodes_a_plate_has_the_same_bits_on_any_crew() {
 fn sorts_that_end_in_any_order_change_no_bit() {
     for retain_inertia in [true, false] {
         let model = punch(retain_inertia);
-        let one = fingerprint(&model, Crew::default());
+        let one = fingerprint(&model, Workers::default());
         for round in 0..6 {
-            let crew = Crew { threads: 2 + round % 3, ..Crew::of(1) };
-            one.assert_equal(&fingerprint(&model, crew), &format!("round {round}"));
+            let at_work = Workers { threads: 2 + round % 3, ..Workers::of(1) };
+            one.assert_equal(&fingerprint(&model, at_work), &format!("round {round}"));
         }
     }
 }
@@ -84,7 +84,7 @@ fn a_snapshot_while_an_element_has_eroded_and_its_faces_still_stand_changes_no_b
 
 /// Snapshots in each cycle between an erosion and the new surface, in which freed nodes are dropped, and runs from them.
 fn snapshots_after_an_erosion(model: &Model) {
-    let alone = solved(model, Crew::default());
+    let alone = solved(model, Workers::default());
     let one = Fingerprint::of(&alone);
     let cycles = cycles_of_erosion(&alone.state);
     assert!(cycles.len() > 5, "{cycles:?}");
@@ -97,12 +97,12 @@ fn snapshots_after_an_erosion(model: &Model) {
         let snapshot = whole.snapshot.expect("a snapshot was asked for");
         assert!(snapshot.state.eroded.contains(&eroded));
         for (workers, route) in [(1, Route::Master), (3, Route::Direct)] {
-            let crew = Crew {
+            let at_work = Workers {
                 resume: Some(snapshot.clone()),
                 ..asked(workers, without_states(JobOptions { route: Some(route), ..JobOptions::default() }))
             };
             one.assert_equal(
-                &fingerprint(model, crew),
+                &fingerprint(model, at_work),
                 &format!("resumed {after} cycles after on {workers}"),
             );
         }
@@ -258,7 +258,7 @@ fn each_criterion_takes_out_the_elements_that_meet_it_and_the_surface_is_that_of
             format!("{criterion} = {limit}")
         };
         let mut model = struck(&words, material);
-        let whole = solved(&model, Crew::default());
+        let whole = solved(&model, Workers::default());
         let cycles = cycles_of_erosion(&whole.state);
         let last = *cycles.last().unwrap_or_else(|| panic!("nothing erodes by {criterion}"));
         // The state that the last pass with an erosion looked at, and that after it.
@@ -320,14 +320,14 @@ fn sacrificed(retain_inertia: bool) -> Model {
 fn what_springs_lose_with_their_surface_is_booked_with_erosion() {
     for (retain_inertia, most) in [(true, 0.007), (false, 0.011)] {
         let model = sacrificed(retain_inertia);
-        let run = solved(&model, Crew::default());
-        let ledger = &run.outcome.ledger;
-        let released: f64 = ledger.contacts.iter().map(|pair| pair.eroded).sum();
-        let without = ledger.last.error - released / ledger.greatest_kinetic;
+        let run = solved(&model, Workers::default());
+        let run_totals = &run.outcome.run_totals;
+        let released: f64 = run_totals.contacts.iter().map(|pair| pair.eroded).sum();
+        let without = run_totals.last.error - released / run_totals.greatest_kinetic;
         let worst = run.rows.iter().map(|row| row.error.abs()).fold(0.0, f64::max);
         println!(
             "retained {retain_inertia}: energy error {:.2e}, at most {worst:.2e}; without the springs {without:.2e}",
-            ledger.last.error
+            run_totals.last.error
         );
         assert!(worst < most, "energy error {worst}, nodes retained: {retain_inertia}");
         // Where nodes stay, they go on pushing the faces of the plate.
@@ -344,7 +344,7 @@ fn nodes_that_lost_all_elements_keep_colliding_or_leave_with_what_they_have() {
     let momentum = |solved: &Solved| solved.rows.last().expect("rows").momentum;
     for retain_inertia in [true, false] {
         let model = sacrificed(retain_inertia);
-        let run = solved(&model, Crew::of(2));
+        let run = solved(&model, Workers::of(2));
         let block = &model.mesh.parts[0].nodes;
         let freed: Vec<u32> = block
             .iter()
@@ -356,10 +356,10 @@ fn nodes_that_lost_all_elements_keep_colliding_or_leave_with_what_they_have() {
             })
             .collect();
         assert!(freed.len() > 20, "{} freed", freed.len());
-        let ledger = &run.outcome.ledger;
-        assert!(ledger.last.error.abs() < 0.01, "energy error {}", ledger.last.error);
-        assert!(ledger.eroded > 0.0 && ledger.eroded_elements as usize == run.state.n_eroded());
-        let start = ledger.initial_momentum;
+        let run_totals = &run.outcome.run_totals;
+        assert!(run_totals.last.error.abs() < 0.01, "energy error {}", run_totals.last.error);
+        assert!(run_totals.eroded > 0.0 && run_totals.eroded_elements as usize == run.state.n_eroded());
+        let start = run_totals.initial_momentum;
         let now = momentum(&run);
         let scale = start[2].abs();
         if retain_inertia {
@@ -378,10 +378,10 @@ fn nodes_that_lost_all_elements_keep_colliding_or_leave_with_what_they_have() {
             };
             let most = (1..=20).map(|i| inside(&straight(run.state.time * f64::from(i) / 20.0))).max();
             assert!(most > Some(10), "{most:?} of {}", freed.len());
-            assert_eq!(ledger.eroded_momentum, [0.0; 3]);
+            assert_eq!(run_totals.eroded_momentum, [0.0; 3]);
             assert!((0..3).all(|a| (now[a] - start[a]).abs() < 1e-10 * scale), "{start:?} {now:?}");
         } else {
-            let with = [0, 1, 2].map(|a| now[a] + ledger.eroded_momentum[a]);
+            let with = [0, 1, 2].map(|a| now[a] + run_totals.eroded_momentum[a]);
             assert!((0..3).all(|a| (with[a] - start[a]).abs() < 1e-10 * scale), "{start:?} {with:?}");
             assert!((now[2] - start[2]).abs() > 1e-3 * scale, "what was dropped is missing: {now:?}");
         }
@@ -392,7 +392,7 @@ fn nodes_that_lost_all_elements_keep_colliding_or_leave_with_what_they_have() {
                 one.setup.control.end_cycle = 1;
                 one
             },
-            Crew::default(),
+            Workers::default(),
         )
         .unwrap_or_else(|e| panic!("{e}"));
         let masses = |state: &GlobalState| state.mass.iter().map(|m| m.to_bits()).collect::<Vec<_>>();

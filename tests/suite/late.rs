@@ -1,4 +1,4 @@
-//! Bodies at rest that are loaded late: their ledger closes, and nothing stops them.
+//! Bodies at rest that are loaded late: their totals closes, and nothing stops them.
 //!
 //! Work from outside and the total of a row speak of the same instant, however long the body was at rest before.
 
@@ -20,7 +20,6 @@ struct Body {
     deck: &'static str,
     /// Its top (m).
     height: f64,
-    /// The face there.
     face: &'static str,
     /// The faces that are pressed.
     pressed: &'static str,

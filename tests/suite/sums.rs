@@ -11,7 +11,7 @@ use master::{
         report,
     },
 };
-use tests::solve::{Crew, solve};
+use tests::solve::{Workers, solve};
 
 /// Cycles of examples of which nothing can erode.
 const CYCLES: u64 = 20;
@@ -61,7 +61,7 @@ fn energies_add_up_wherever_they_are_shown() {
         let erodes = model.setup.erosion.is_on();
         model.setup.control.end_cycle = if erodes { ERODED } else { CYCLES };
         model.output.history_cycles = if erodes { 20 } else { 1 };
-        let solved = solve(model, Crew::of(2)).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let solved = solve(model, Workers::of(2)).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         let scratch = tempfile::tempdir().expect("a folder");
         let out = Folder::create(scratch.path(), true).expect("a results folder");
         let mut history = History::create(&out, &solved.model).expect("a history");

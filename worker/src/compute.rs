@@ -145,10 +145,10 @@ impl Machine {
         if let Task::Load { assign, prepare } = task {
             return self.build(*assign, prepare);
         }
-        if let Task::Image { last: true } = task {
+        if let Task::WorkerState { last: true } = task {
             let domain = self.domain.take().ok_or("an image without an assignment")?;
             let pieces = self.laps.time(Phase::Other, || domain.into_pieces());
-            return Ok(Outcome::Image { pieces, work: self.clock.work() });
+            return Ok(Outcome::WorkerState { pieces, work: self.clock.work() });
         }
         let (clock, laps) = (&self.clock, &mut self.laps);
         let domain = self.domain.as_mut().ok_or("a task without an assignment")?;
@@ -162,10 +162,10 @@ impl Machine {
                 laps.time(Phase::Interior, || domain.elements(Sets::All, dt_previous, clock));
                 Outcome::Computed
             }
-            Task::Install { plan, guest_state, dt_previous, gather, blocking } => {
+            Task::Install { plan, ghost_state, dt_previous, gather, blocking } => {
                 laps.time(Phase::Contact, || {
                     let mark = clock.start();
-                    domain.install(&plan, &guest_state)?;
+                    domain.install(&plan, &ghost_state)?;
                     clock.stop(mark, true);
                     let gathered = gathered(domain, gather, blocking);
                     domain.contact(dt_previous, clock);
@@ -197,9 +197,8 @@ impl Machine {
                 0 => Ok::<_, String>(Outcome::Sampled([0; 16])),
                 n => Ok(Outcome::Sampled(domain.sample(sampled_block(cycle, n))?)),
             })?,
-            Task::Image { .. } => {
-                laps.time(Phase::Other, || Outcome::Image { pieces: domain.pieces(), work: clock.work() })
-            }
+            Task::WorkerState { .. } => laps
+                .time(Phase::Other, || Outcome::WorkerState { pieces: domain.pieces(), work: clock.work() }),
         })
     }
 
@@ -226,7 +225,7 @@ impl Machine {
         );
         domain.place_bodies(&assign.bodies)?;
         domain.watch(&assign.watched);
-        domain.install(&assign.plan, &assign.guest_state)?;
+        domain.install(&assign.plan, &assign.ghost_state)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
         if !further_epoch {
             self.clock = ThreadClock::default();

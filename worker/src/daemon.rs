@@ -51,7 +51,6 @@ pub struct Options {
     pub name: String,
     /// Relative speed.
     pub speed: f64,
-    /// Compute threads.
     pub threads: u32,
     /// Folder with this host's certificates.
     pub certs: Option<PathBuf>,
@@ -86,7 +85,6 @@ pub enum Listen {
 /// What computing for a master needs beside the connection.
 #[derive(Clone)]
 pub struct Service {
-    /// Compute threads.
     pub pool: Arc<ThreadPool>,
     /// Where other workers call; without it the master relays.
     pub peers: Option<Arc<Peers>>,

@@ -9,7 +9,7 @@
 //! Tasks here carry frames to and from the compute thread and decide nothing; which way a frame goes is decided in
 //! [`links`].
 
-mod gate;
+mod connect;
 pub mod links;
 pub mod pairs;
 
@@ -88,7 +88,7 @@ impl Peers {
             circle: watch::Sender::new(None),
             runtime: Handle::current(),
         });
-        let accepting = tokio::spawn(gate::listen(listener, Arc::clone(&shared)));
+        let accepting = tokio::spawn(connect::listen(listener, Arc::clone(&shared)));
         Ok(Self { shared, accepting })
     }
 
@@ -112,9 +112,7 @@ impl Drop for Peers {
 /// The job and its epoch that links belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Key {
-    /// The job.
     pub job: u32,
-    /// Its epoch.
     pub epoch: u32,
 }
 
@@ -158,7 +156,7 @@ impl Circle {
         if header.kind == Kind::Bye {
             return Err(Error::Left { reason: handshake::reason(&frame)? });
         }
-        let incarnation = self.who.members.get(from as usize).map_or(0, |member| member.incarnation);
+        let incarnation = self.who.peer_workers.get(from as usize).map_or(0, |member| member.incarnation);
         for (what, found, expected) in [
             ("job", header.job, self.key.job),
             ("epoch", header.epoch, self.key.epoch),
@@ -189,7 +187,6 @@ pub struct News {
     pub key: Key,
     /// The other worker's index.
     pub from: u32,
-    /// What.
     pub what: What,
 }
 

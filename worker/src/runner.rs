@@ -189,7 +189,7 @@ impl Runner {
                 match action {
                     Action::Send(ready @ ToMaster::Ready { .. }) => self.ready = Some(ready),
                     Action::Send(message) => self.timed(|runner| {
-                        let last = matches!(message, ToMaster::Image { last: Some(_), .. });
+                        let last = matches!(message, ToMaster::WorkerState { last: Some(_), .. });
                         let due = runner.reported.elapsed() > REPORT_EVERY;
                         if last || (due && matches!(message, ToMaster::Cycle { .. })) {
                             runner.reported = Instant::now();

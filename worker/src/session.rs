@@ -2,7 +2,7 @@
 //!
 //! It knows no socket, clock or thread. Computation is an action whose outcome comes back as an event; at most one
 //! is under way. An assignment of a later epoch replaces the one in hand at any time: the outcome of the task under way
-//! is then thrown away, and the new domain is built when it has come. The steps of a cycle, in order: images if ordered; at a plan boundary transfer, all elements, install;
+//! is then thrown away, and the new domain is built when it has come. The steps of a cycle, in order: states if ordered; at a plan boundary transfer, all elements, install;
 //! else contact and border; send; interior; a sample if ordered; totals; integrate.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -15,7 +15,7 @@ use mechanics::{
     wall::Pose,
 };
 use protocol::{
-    message::{Assign, IMAGE_VERSION, Orders, ToMaster, ToPeer, ToWorker, Work},
+    message::{Assign, Orders, ToMaster, ToPeer, ToWorker, WORKER_STATE_VERSION, Work},
     options::Route,
 };
 
@@ -33,7 +33,6 @@ pub enum Event {
 /// What a session wants done.
 #[derive(Debug)]
 pub enum Action {
-    /// Send to the master.
     Send(ToMaster),
     /// Send to another worker of the job, over a link of our own or through the master.
     SendPeer(u32, ToPeer),
@@ -69,10 +68,9 @@ pub enum Task {
     },
     /// Install a plan; contact; partial forces.
     Install {
-        /// The plan.
         plan: Box<Plan>,
-        /// Six numbers by guest.
-        guest_state: Vec<f64>,
+        /// Six numbers by ghost.
+        ghost_state: Vec<f64>,
         /// The step before.
         dt_previous: f64,
         /// Gather positions then.
@@ -110,21 +108,17 @@ pub enum Task {
         walls: Vec<Pose>,
     },
     /// State of all sub-domains.
-    Image {
+    WorkerState {
         /// Nothing is computed on them after that.
         last: bool,
     },
     /// What elements came to in this cycle, in one block.
-    Sample {
-        /// The cycle.
-        cycle: u64,
-    },
+    Sample { cycle: u64 },
 }
 
 /// What came of a task.
 #[derive(Debug)]
 pub enum Outcome {
-    /// Of `Load`.
     Loaded {
         /// Of the preparing pass, if one was asked for.
         vote: Option<Box<Vote>>,
@@ -133,25 +127,20 @@ pub enum Outcome {
     },
     /// Of `Transfer`: six numbers by node.
     Transferred(Vec<f64>),
-    /// Of `Elements` and `Interior`.
     Computed,
-    /// Of `Install` and `Border`.
     Forces {
         /// Three numbers by node of the exchange.
         partials: Vec<f64>,
         /// Three numbers by owned surface node, if asked for.
         gathered: Vec<f64>,
     },
-    /// Of `Integrate`.
     Integrated(Box<Vote>),
-    /// Of `Image`.
-    Image {
+    WorkerState {
         /// The state.
         pieces: Vec<Piece>,
         /// Compute time so far.
         work: Work,
     },
-    /// Of `Sample`.
     Sampled([u8; 16]),
     /// The task failed: a sentence for the user.
     Failed(String),
@@ -166,14 +155,14 @@ enum Phase {
     Loading,
     /// Waiting for `Start`.
     Ready,
-    /// Computing images at the start of the cycle; more of the cycle follows unless it is the last.
-    Imaging,
+    /// Computing states at the start of the cycle; more of the cycle follows unless it is the last.
+    SendingState,
     /// At a plan boundary: packing the transfer.
     Packing,
     /// At a plan boundary: all elements.
     Elements,
-    /// At a plan boundary: waiting for the plan or the guests.
-    AwaitGuests,
+    /// At a plan boundary: waiting for the plan or the ghosts.
+    AwaitGhosts,
     /// Contact and border, or install and contact.
     Border,
     /// Interior elements.
@@ -184,7 +173,6 @@ enum Phase {
     Sampling,
     /// After the last image: computing the elements of the cycle that will not be, for a sample of them.
     Proving,
-    /// Integrating.
     Integrating,
     /// Failed or finished; only `Release` or `Assign` is heard.
     Over,
@@ -216,7 +204,7 @@ pub struct Session {
     /// Cycles of gatherings and at which their plans act, and the plans that have come: cycle at which one acts, hash, plan.
     boundaries: VecDeque<(u64, u64)>,
     plans: VecDeque<(u64, u64, Box<Plan>)>,
-    guests: Option<(u64, Vec<f64>)>,
+    ghosts: Option<(u64, Vec<f64>)>,
     n_exchange: usize,
     route: Route,
     neighbours: Vec<Neighbour>,
@@ -260,7 +248,7 @@ impl Session {
             totals: VecDeque::new(),
             boundaries: VecDeque::new(),
             plans: VecDeque::new(),
-            guests: None,
+            ghosts: None,
             n_exchange: 0,
             route: Route::Master,
             neighbours: Vec::new(),
@@ -281,7 +269,6 @@ impl Session {
         self.phase == Phase::Idle
     }
 
-    /// The cycle it is in.
     pub fn cycle(&self) -> u64 {
         self.cycle
     }
@@ -424,7 +411,7 @@ impl Session {
                 self.resume_waiting(actions)
             }
             ToWorker::Transfer { cycle, state } => {
-                self.guests = Some((cycle, state));
+                self.ghosts = Some((cycle, state));
                 self.resume_waiting(actions)
             }
             ToWorker::Totals { cycle, orders, totals } => {
@@ -463,7 +450,7 @@ impl Session {
 
     fn resume_waiting(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
         match self.phase {
-            Phase::AwaitGuests => self.try_boundary(actions),
+            Phase::AwaitGhosts => self.try_boundary(actions),
             Phase::AwaitTotals => self.try_integrate(actions),
             _ => Ok(()),
         }
@@ -477,16 +464,16 @@ impl Session {
                 actions.push(Action::Send(ToMaster::Ready { vote, lanes }));
                 Ok(())
             }
-            (Phase::Imaging, Outcome::Image { pieces, work }) => {
+            (Phase::SendingState, Outcome::WorkerState { pieces, work }) => {
                 let stop = self.flags()?.stop;
                 let last = if stop {
                     Some(self.vote.take().unwrap_or_else(|| Box::new(Vote::empty(0))))
                 } else {
                     None
                 };
-                actions.push(Action::Send(ToMaster::Image {
+                actions.push(Action::Send(ToMaster::WorkerState {
                     cycle: self.cycle,
-                    version: IMAGE_VERSION,
+                    version: WORKER_STATE_VERSION,
                     pieces,
                     last,
                     work,
@@ -523,7 +510,7 @@ impl Session {
                 Ok(())
             }
             (Phase::Elements, Outcome::Computed) => {
-                self.phase = Phase::AwaitGuests;
+                self.phase = Phase::AwaitGhosts;
                 self.whole = true;
                 self.try_boundary(actions)
             }
@@ -607,8 +594,8 @@ impl Session {
             entry.remove();
         }
         if (stop || collect) && !self.imaged {
-            self.phase = Phase::Imaging;
-            actions.push(Action::Compute(Task::Image { last: stop && !sample }));
+            self.phase = Phase::SendingState;
+            actions.push(Action::Compute(Task::WorkerState { last: stop && !sample }));
             return Ok(());
         }
         if gather {
@@ -621,7 +608,7 @@ impl Session {
             self.boundaries.push_back((self.cycle, acts_at));
         }
         if self.boundaries.front().is_some_and(|(_, at)| *at == self.cycle) {
-            self.phase = Phase::AwaitGuests;
+            self.phase = Phase::AwaitGhosts;
             self.whole = false;
             return self.try_boundary(actions);
         }
@@ -632,7 +619,7 @@ impl Session {
         Ok(())
     }
 
-    /// At a plan boundary: with the plan in hand the transfer and the elements go first, then, with the guests in hand,
+    /// At a plan boundary: with the plan in hand the transfer and the elements go first, then, with the ghosts in hand,
     /// the plan is installed.
     fn try_boundary(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
         let Some((acts_at, _, plan)) = self.plans.front() else { return Ok(()) };
@@ -644,9 +631,9 @@ impl Session {
             actions.push(Action::Compute(Task::Transfer { nodes: plan.send.clone() }));
             return Ok(());
         }
-        let guest_state = match (&self.guests, plan.guests.is_empty()) {
+        let ghost_state = match (&self.ghosts, plan.ghosts.is_empty()) {
             (_, true) => Vec::new(),
-            (Some((cycle, _)), false) if *cycle == self.cycle => match self.guests.take() {
+            (Some((cycle, _)), false) if *cycle == self.cycle => match self.ghosts.take() {
                 Some((_, state)) => state,
                 None => return Ok(()),
             },
@@ -662,7 +649,7 @@ impl Session {
             self.phase = Phase::Border;
             actions.push(Action::Compute(Task::Install {
                 plan,
-                guest_state,
+                ghost_state,
                 dt_previous: self.dt_previous,
                 gather,
                 blocking,

@@ -15,7 +15,6 @@ const SHORTEST_SPAN: Duration = Duration::from_micros(1);
 /// Something done, from when to when.
 #[derive(Clone, Copy, Debug)]
 pub struct Lap {
-    /// What.
     pub phase: Phase,
     /// Its start.
     pub from: Instant,

@@ -92,7 +92,6 @@ struct Walk<'b, 'a> {
     left_out: usize,
 }
 
-/// Reads every line of a bundle.
 pub(super) fn read<'a>(bundle: &Bundle<'a>, log: &Log<'_>) -> Lines<'a> {
     let mut walk = Walk {
         bundle,

@@ -190,7 +190,6 @@ impl Conditions {
         )
     }
 
-    /// Reads one of them.
     pub(super) fn read(&mut self, block: &mut Block<'_>, context: &Context<'_>) {
         let named = block.take("_ID");
         let per_card = block.keyword.starts_with("BOUNDARY") || block.keyword.starts_with("LOAD");

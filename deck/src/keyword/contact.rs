@@ -7,7 +7,6 @@ use super::{
 };
 use crate::place::Place;
 
-/// One side of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Side {
     /// Every part.

@@ -71,7 +71,6 @@ impl<'d> Context<'d> {
 }
 
 impl<'c> Fields<'c> {
-    /// The words of a field.
     pub(super) fn words(&self, i: usize) -> &'c str {
         if i < self.n { self.cells[i].1 } else { "" }
     }

@@ -22,7 +22,6 @@ pub(super) struct MaterialCard {
     pub(super) erosion: Limits,
 }
 
-/// The law of a material.
 pub(super) enum Law {
     Elastic,
     /// Yield stress, tangent modulus, rate constants.

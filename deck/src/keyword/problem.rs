@@ -13,7 +13,6 @@ use super::{
 };
 use crate::place::{Origin, Place, Placed};
 
-/// A node.
 pub(super) struct Node {
     pub(super) id: u32,
     pub(super) x: [f64; 3],

@@ -62,7 +62,6 @@ fn take_headings(block: &mut Block<'_>) {
     }
 }
 
-/// Reads one keyword.
 fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) {
     let whole = block.keyword.clone();
     take_headings(block);

@@ -69,7 +69,6 @@ impl RigidCards {
         )
     }
 
-    /// Reads one of them.
     pub(super) fn read(&mut self, block: &mut Block<'_>, context: &Context<'_>) {
         if block.take("_ID") {
             // A card with a number and a heading stands before each.

@@ -38,7 +38,6 @@ pub(super) fn make(given: &typed::Control, log: &Log<'_>) -> Control {
     }
 }
 
-/// The sort lag for this contact.
 pub(super) fn sort_lag(given: &typed::Control, lag: u32, contact: Option<&Settings>, log: &Log<'_>) -> u32 {
     let Some(contact) = contact else { return lag };
     let longest = contact.longest_lag();

@@ -25,7 +25,6 @@ pub(super) struct LoadDraft {
     pub(super) forces: BTreeMap<u32, u32>,
 }
 
-/// Makes them.
 pub(super) fn make(
     deck: &Deck,
     names: &Names<'_>,

@@ -11,7 +11,6 @@ use crate::{
     typed::{self, Deck, Kind, Spot},
 };
 
-/// Makes the output of a deck.
 pub(super) fn make(deck: &Deck, names: &Names<'_>, assembly: &Assembly, log: &Log<'_>) -> Output {
     let given = &deck.output;
     let surface = given.contact_surface.as_ref().filter(|on| on.value);

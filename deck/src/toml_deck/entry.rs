@@ -9,7 +9,6 @@ use crate::{
 
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A text with its place.
 pub(super) fn text(value: Value<'_>) -> Option<Placed<String>> {
     value.text().map(|text| value.placed(text.to_string()))
 }

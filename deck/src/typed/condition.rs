@@ -19,7 +19,6 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
-    /// A constant.
     pub(crate) fn constant(factor: f64) -> Self {
         Self { factor, curve: None }
     }

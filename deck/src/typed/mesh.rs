@@ -25,7 +25,6 @@ impl From<MeshFile> for Mesh {
     }
 }
 
-/// The mesh of a part.
 #[derive(Clone, Debug)]
 pub(crate) struct PartMesh {
     pub(crate) at: Place,
@@ -67,9 +66,7 @@ pub(crate) struct Numbers {
 /// Places of a list.
 #[derive(Clone, Debug)]
 pub(crate) enum Places {
-    /// One for all.
     All(Place),
-    /// Of each.
     Each(Vec<Place>),
 }
 

@@ -23,11 +23,9 @@ pub(crate) struct Own {
 pub(crate) enum Choice {
     /// By name, of the deck or of the library.
     Named(Placed<String>),
-    /// Of its own.
     Inline(Box<Material>),
 }
 
-/// A part.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) at: Place,
@@ -89,7 +87,6 @@ pub(crate) enum Criterion {
 const STRAIN: Range = Range::Within(0.0, 100.0, "a strain above 0 and at most 100");
 
 impl Criterion {
-    /// All of them.
     pub(crate) const ALL: [Self; 13] = [
         Self::GeometricStrain,
         Self::IncrementalStrain,

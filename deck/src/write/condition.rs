@@ -11,7 +11,6 @@ use crate::typed::{
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Writes all of them.
 pub(super) fn write(text: &mut Text, deck: &Deck) {
     for curve in &deck.curves {
         text.heading("[[curve]]");

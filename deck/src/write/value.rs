@@ -37,7 +37,6 @@ impl Text {
         self.text.push('\n');
     }
 
-    /// The same where there is a value.
     pub(super) fn some(&mut self, key: &str, value: Option<impl Debug>) {
         if let Some(value) = value {
             self.key(key, format!("{value:?}"));
@@ -74,7 +73,6 @@ pub(super) fn table(keys: &[(&str, String)]) -> String {
     format!("{{ {} }}", keys.join(", "))
 }
 
-/// A vector.
 pub(super) fn vector(v: [f64; 3]) -> String {
     numbers(&v)
 }
@@ -84,7 +82,6 @@ pub(super) fn numbers(numbers: &[f64]) -> String {
     list(numbers.iter().map(|x| format!("{x:?}")))
 }
 
-/// Parts by name.
 pub(super) fn names(parts: &Parts) -> String {
     match parts {
         Parts::All | Parts::Broken => quoted("all"),

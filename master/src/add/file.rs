@@ -12,7 +12,6 @@ use toml::de::DeTable;
 
 /// Longest host file (bytes).
 const MAX_TEXT: u64 = 1 << 20;
-/// Most hosts.
 const MAX_HOSTS: usize = 10_000;
 /// Most words of a list.
 const MAX_WORDS: usize = 100;
@@ -21,7 +20,7 @@ const MAX_WORD: usize = 1000;
 
 /// What a host file says.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lab {
+pub struct HostFile {
     /// The master as the hosts reach it, where the file names one.
     pub master: Option<String>,
     /// Every host, in the order of the file.
@@ -77,7 +76,7 @@ impl Default for Way {
     }
 }
 
-impl Lab {
+impl HostFile {
     /// The hosts of these names, deferred ones too; without names all that are not deferred.
     ///
     /// # Errors
@@ -102,7 +101,7 @@ impl Lab {
 ///
 /// # Errors
 /// That the file cannot be read, or every fault in it, one per line.
-pub fn read_file(path: &Path) -> Result<Lab, String> {
+pub fn read_file(path: &Path) -> Result<HostFile, String> {
     let size = std::fs::metadata(path).map_err(|e| format!("{}: {e}", path.display()))?.len();
     if size > MAX_TEXT {
         return Err(format!("{}: {size} bytes, at most {MAX_TEXT}", path.display()));
@@ -118,7 +117,7 @@ pub fn read_file(path: &Path) -> Result<Lab, String> {
 ///
 /// # Errors
 /// Every fault in it, by place. Faults of syntax hide all others.
-pub fn read(text: &str, file_name: &str) -> Result<Lab, Vec<Fault>> {
+pub fn read(text: &str, file_name: &str) -> Result<HostFile, Vec<Fault>> {
     let faults = Faults::new(file_name, text);
     let (document, errors) = DeTable::parse_recoverable(text);
     for error in &errors {
@@ -129,11 +128,11 @@ pub fn read(text: &str, file_name: &str) -> Result<Lab, Vec<Fault>> {
     if faults.count() > 0 {
         return Err(faults.into_list());
     }
-    let lab = read_document(document.get_ref(), &faults);
-    if faults.count() > 0 { Err(faults.into_list()) } else { Ok(lab) }
+    let host_file = read_document(document.get_ref(), &faults);
+    if faults.count() > 0 { Err(faults.into_list()) } else { Ok(host_file) }
 }
 
-fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Lab {
+fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> HostFile {
     let file = Table::new(document, 0, "the host file".to_owned(), faults);
     let master = file.get("master").and_then(|value| word(&value));
     let (mut defaults, mut address) = (Way::default(), None);
@@ -158,7 +157,7 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Lab {
         faults.add(0, "no [[host]]", "at least one", "add [[host]]");
     }
     file.finish();
-    Lab { master, hosts }
+    HostFile { master, hosts }
 }
 
 fn read_host(table: &Table<'_>, defaults: &Way, address: Option<&str>) -> Option<Host> {
@@ -268,9 +267,9 @@ deferred = true
 
     #[test]
     fn a_host_takes_what_it_does_not_say_from_the_defaults() {
-        let lab = read(LAB, "hosts.toml").expect("no fault");
-        assert_eq!(lab.master.as_deref(), Some("pc1:7117"));
-        let [two, three] = &lab.hosts[..] else { panic!("{lab:?}") };
+        let host_file = read(LAB, "hosts.toml").expect("no fault");
+        assert_eq!(host_file.master.as_deref(), Some("pc1:7117"));
+        let [two, three] = &host_file.hosts[..] else { panic!("{host_file:?}") };
         let way = &two.way;
         assert_eq!((two.address.as_str(), two.deferred), ("pc2", false));
         assert_eq!(
@@ -287,21 +286,24 @@ deferred = true
 
     #[test]
     fn the_example_has_no_fault() {
-        let lab = read(include_str!("../../../deploy/hosts/hosts.toml"), "hosts.toml").expect("no fault");
-        assert_eq!((lab.hosts.len(), lab.choose(&[]).map(|hosts| hosts.len())), (3, Ok(2)));
+        let host_file =
+            read(include_str!("../../../deploy/hosts/hosts.toml"), "hosts.toml").expect("no fault");
+        assert_eq!((host_file.hosts.len(), host_file.choose(&[]).map(|hosts| hosts.len())), (3, Ok(2)));
     }
 
     #[test]
     fn deferred_hosts_are_started_by_name_only() {
-        let lab = read(LAB, "hosts.toml").expect("no fault");
+        let host_file = read(LAB, "hosts.toml").expect("no fault");
         let names = |asked: &[&str]| {
             let asked: Vec<String> = asked.iter().map(|&name| name.to_owned()).collect();
-            lab.choose(&asked).map(|hosts| hosts.iter().map(|host| host.name.clone()).collect::<Vec<_>>())
+            host_file
+                .choose(&asked)
+                .map(|hosts| hosts.iter().map(|host| host.name.clone()).collect::<Vec<_>>())
         };
         assert_eq!(names(&[]), Ok(vec!["pc2".to_owned()]));
         assert_eq!(names(&["pc3"]), Ok(vec!["pc3".to_owned()]));
         assert_eq!(names(&["pc4"]), Err("no host \"pc4\" in the host file; it has pc2, pc3".to_owned()));
-        let mut all_deferred = lab.clone();
+        let mut all_deferred = host_file.clone();
         all_deferred.hosts.iter_mut().for_each(|host| host.deferred = true);
         assert!(all_deferred.choose(&[]).is_err());
     }

@@ -23,7 +23,7 @@ use crate::{
     command::GrindArgs,
     deck_file,
     embedded::{self, Sink},
-    event::{Action, Hand},
+    event::{Action, WorkerSpec},
     job::Job,
     options::SessionOptions,
     simulate::measure::{self, Measured},
@@ -100,7 +100,7 @@ const LAWS: [(&str, &str); 4] = [
     ),
 ];
 
-/// A sheet of about as many shells with five points, half of which runs against the other and yields.
+/// A view of about as many shells with five points, half of which runs against the other and yields.
 fn shells(side: u32) -> String {
     let along = f64::from(side).powf(1.5).round() as u32;
     let half = (along / 2).max(1);
@@ -170,11 +170,11 @@ struct Taken {
 }
 
 fn once(model: &Arc<Model>, threads: u32, lanes: Option<Width>) -> Result<Taken, String> {
-    let hands = [Hand { name: "bench".to_owned(), speed: 1.0, threads }];
+    let specs = [WorkerSpec { name: "bench".to_owned(), speed: 1.0, threads }];
     let lanes = lanes.map(|width| width.to_string());
     let asked = JobOptions { lanes, no_output: true, ..JobOptions::default() };
     let options = SessionOptions { asked, ..SessionOptions::default() };
-    let (mut job, first) = Job::new(Arc::clone(model), &hands, options, None)?;
+    let (mut job, first) = Job::new(Arc::clone(model), &specs, options, None)?;
     job.keep_no_state();
     let surface_nodes = job.surface().map_or(0, |surface| surface.nodes.len());
     let started = Instant::now();
@@ -199,7 +199,6 @@ fn once(model: &Arc<Model>, threads: u32, lanes: Option<Width>) -> Result<Taken,
 pub struct Spread {
     /// Median of the rounds.
     pub median: f64,
-    /// Least of them.
     pub least: f64,
 }
 
@@ -375,9 +374,9 @@ mod tests {
             let taken = once(&model(&plates(6, Some(laws), 0.0), false).expect("a sound deck"), 1, None);
             assert!(taken.expect("a run to its end").element_ns > 0.0);
         }
-        let sheet = model(&shells(6), false).expect("a sound deck");
-        assert_eq!(sheet.mesh.n_elements(), 7 * 2 * 15);
-        assert!(once(&sheet, 1, None).expect("a run to its end").element_ns > 0.0);
+        let job_view = model(&shells(6), false).expect("a sound deck");
+        assert_eq!(job_view.mesh.n_elements(), 7 * 2 * 15);
+        assert!(once(&job_view, 1, None).expect("a run to its end").element_ns > 0.0);
         let [grid, list] = [false, true].map(|explicit| {
             let model = model(&plates(6, None, 0.1), explicit).expect("a sound deck");
             let parts = &model.mesh.parts;

@@ -32,11 +32,10 @@ const HEARTBEAT_MS: u32 = 1000;
 /// One line of the table.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// How the message travelled: `frame`, one frame as partial forces do, or `bulk`, in chunks as decks and images.
+    /// How the message travelled: `frame`, one frame as partial forces do, or `bulk`, in chunks as decks and states.
     pub kind: &'static str,
     /// Whether TLS was on.
     pub tls: bool,
-    /// Bytes of the message.
     pub bytes: usize,
     /// Half of a round trip (us), the median of the rounds.
     pub half_round_trip_us: f64,

@@ -22,13 +22,9 @@ const LEAVE: &str = "\x1b[?7h\x1b[?25h\x1b[?1049l";
 pub enum Tint {
     /// Less bright than the rest.
     Soft = 2,
-    /// Red.
     Red = 31,
-    /// Green.
     Green = 32,
-    /// Yellow.
     Yellow = 33,
-    /// Cyan.
     Cyan = 36,
 }
 
@@ -44,7 +40,6 @@ impl Tint {
 pub enum Key {
     /// `q`, Escape, Ctrl-C, or the end of the keyboard.
     Leave,
-    /// Any other.
     Other,
 }
 

@@ -31,7 +31,7 @@ use serde_json::json;
 use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::{board, office::Office};
+use super::{api_state::ApiState, board};
 use crate::notice::Notice;
 
 /// The shortest time between two events of the stream.
@@ -40,7 +40,7 @@ const EVENT_EVERY: Duration = Duration::from_millis(500);
 const NAME_LIMIT: usize = 200;
 
 /// The routes below `/api`.
-pub fn routes() -> Router<Office> {
+pub fn routes() -> Router<ApiState> {
     Router::new()
         .route("/overview", get(overview))
         .route("/events", get(events))
@@ -48,7 +48,7 @@ pub fn routes() -> Router<Office> {
         .route("/jobs", post(submit))
         .route("/jobs/{job}", get(job))
         .route("/jobs/{job}/cancel", post(cancel))
-        .route("/jobs/{job}/sheet", get(sheet))
+        .route("/jobs/{job}/sheet", get(job_view))
         .route("/jobs/{job}/surface/{index}", get(surface))
         .layer(DefaultBodyLimit::max(DECK_LIMIT))
 }
@@ -76,47 +76,50 @@ fn missing(what: String) -> Fault {
 ///
 /// # Errors
 /// If the master is ending.
-pub async fn ask<T>(office: &Office, event: impl FnOnce(oneshot::Sender<T>) -> Notice) -> Result<T, String> {
+pub async fn ask<T>(
+    api_state: &ApiState,
+    event: impl FnOnce(oneshot::Sender<T>) -> Notice,
+) -> Result<T, String> {
     let (answer, answered) = oneshot::channel();
     let ending = "the master is ending".to_owned();
-    office.notices.send(event(answer)).await.map_err(|_| ending.clone())?;
+    api_state.notices.send(event(answer)).await.map_err(|_| ending.clone())?;
     answered.await.map_err(|_| ending)
 }
 
 /// A job as the page lists it: a finished one without the text of its summary.
-fn listed(office: &Office, mut status: Status) -> serde_json::Value {
+fn listed(api_state: &ApiState, mut status: Status) -> serde_json::Value {
     if let Some(ended) = &mut status.ended {
         (ended.summary, ended.table) = (None, None);
     }
-    let brief = office.board.sheet(status.job).map(|sheet| board::lock(&sheet).brief().clone());
+    let brief = api_state.board.job_view(status.job).map(|job_view| board::lock(&job_view).brief().clone());
     let mut value = json!(status);
     value["brief"] = json!(brief);
     value
 }
 
-async fn all(office: &Office) -> Result<serde_json::Value, String> {
-    let jobs = ask(office, Notice::Jobs).await?;
-    let hosts = ask(office, Notice::Hosts).await?;
-    let jobs: Vec<_> = jobs.into_iter().map(|status| listed(office, status)).collect();
+async fn all(api_state: &ApiState) -> Result<serde_json::Value, String> {
+    let jobs = ask(api_state, Notice::Jobs).await?;
+    let hosts = ask(api_state, Notice::Hosts).await?;
+    let jobs: Vec<_> = jobs.into_iter().map(|status| listed(api_state, status)).collect();
     let host = |row: protocol::request::HostRow| {
-        let load = if row.state == "busy" { office.board.load(&row.name) } else { None };
+        let load = if row.state == "busy" { api_state.board.load(&row.name) } else { None };
         let mut value = json!(row);
         value["load"] = json!(load);
         value
     };
     let hosts: Vec<_> = hosts.into_iter().map(host).collect();
-    Ok(json!({ "version": env!("CARGO_PKG_VERSION"), "join": office.join, "jobs": jobs, "hosts": hosts }))
+    Ok(json!({ "version": env!("CARGO_PKG_VERSION"), "join": api_state.join, "jobs": jobs, "hosts": hosts }))
 }
 
-async fn overview(State(office): State<Office>) -> Result<Json<serde_json::Value>, Fault> {
-    Ok(Json(all(&office).await?))
+async fn overview(State(api_state): State<ApiState>) -> Result<Json<serde_json::Value>, Fault> {
+    Ok(Json(all(&api_state).await?))
 }
 
-async fn events(State(office): State<Office>) -> impl IntoResponse {
+async fn events(State(api_state): State<ApiState>) -> impl IntoResponse {
     let (send, receive) = mpsc::channel::<Result<sse::Event, Infallible>>(1);
     tokio::spawn(async move {
         let mut before = serde_json::Value::Null;
-        while let Ok(now) = all(&office).await {
+        while let Ok(now) = all(&api_state).await {
             if now != before {
                 let event = sse::Event::default().event("overview").data(now.to_string());
                 if send.send(Ok(event)).await.is_err() {
@@ -182,7 +185,7 @@ async fn check(Query(asked): Query<Asked>, text: String) -> Result<Json<serde_js
 }
 
 async fn submit(
-    State(office): State<Office>,
+    State(api_state): State<ApiState>,
     Query(asked): Query<Asked>,
     text: String,
 ) -> Result<Json<serde_json::Value>, Fault> {
@@ -196,27 +199,33 @@ async fn submit(
         keep_every: Some(10.0),
         ..JobOptions::default()
     };
-    let job = ask(&office, |answer| Notice::Submit { name, title, text, options, answer }).await??;
+    let job = ask(&api_state, |answer| Notice::Submit { name, title, text, options, answer }).await??;
     Ok(Json(json!({ "job": job })))
 }
 
-async fn job(State(office): State<Office>, Path(job): Path<u32>) -> Result<Json<serde_json::Value>, Fault> {
-    let watch = ask(&office, |answer| Notice::Watch(Some(job), answer)).await?.map_err(missing)?;
+async fn job(
+    State(api_state): State<ApiState>,
+    Path(job): Path<u32>,
+) -> Result<Json<serde_json::Value>, Fault> {
+    let watch = ask(&api_state, |answer| Notice::Watch(Some(job), answer)).await?.map_err(missing)?;
     let status = watch.borrow().clone();
     Ok(Json(json!(status)))
 }
 
 async fn cancel(
-    State(office): State<Office>,
+    State(api_state): State<ApiState>,
     Path(job): Path<u32>,
 ) -> Result<Json<serde_json::Value>, Fault> {
-    let done = ask(&office, |answer| Notice::Cancel(job, answer)).await??;
+    let done = ask(&api_state, |answer| Notice::Cancel(job, answer)).await??;
     Ok(Json(json!({ "done": done })))
 }
 
-async fn sheet(State(office): State<Office>, Path(job): Path<u32>) -> Result<Json<serde_json::Value>, Fault> {
-    let sheet = office.board.sheet(job).ok_or_else(|| not_kept(job))?;
-    let value = board::lock(&sheet).json();
+async fn job_view(
+    State(api_state): State<ApiState>,
+    Path(job): Path<u32>,
+) -> Result<Json<serde_json::Value>, Fault> {
+    let job_view = api_state.board.job_view(job).ok_or_else(|| not_kept(job))?;
+    let value = board::lock(&job_view).json();
     Ok(Json(value))
 }
 
@@ -225,11 +234,11 @@ fn not_kept(job: u32) -> Fault {
 }
 
 async fn surface(
-    State(office): State<Office>,
+    State(api_state): State<ApiState>,
     Path((job, index)): Path<(u32, usize)>,
 ) -> Result<impl IntoResponse, Fault> {
-    let sheet = office.board.sheet(job).ok_or_else(|| not_kept(job))?;
-    let bytes = board::lock(&sheet).surface(index);
+    let job_view = api_state.board.job_view(job).ok_or_else(|| not_kept(job))?;
+    let bytes = board::lock(&job_view).surface(index);
     let bytes = bytes.ok_or_else(|| missing(format!("job {job} has no state {index}")))?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], bytes.as_ref().clone()))
 }

@@ -2,7 +2,7 @@
 
 use axum::{Router, http::header, routing::get};
 
-use super::office::Office;
+use super::api_state::ApiState;
 
 /// Path, type and text of every file.
 const FILES: [(&str, &str, &str); 8] = [
@@ -17,8 +17,7 @@ const FILES: [(&str, &str, &str); 8] = [
 ];
 const JS: &str = "text/javascript; charset=utf-8";
 
-/// A route for each.
-pub fn routes() -> Router<Office> {
+pub fn routes() -> Router<ApiState> {
     FILES.iter().fold(Router::new(), |router, &(path, kind, text)| {
         router.route(path, get(move || async move { ([(header::CONTENT_TYPE, kind)], text) }))
     })

@@ -1,6 +1,6 @@
 //! BOARD: what the page shows of jobs while they run: energies, progress, load, phases, surfaces. In memory, bounded.
 //!
-//! A job's thread writes its [`Sheet`], requests read it. Nothing here decides anything, and a master without a page has
+//! A job's thread writes its [`JobView`], requests read it. Nothing here decides anything, and a master without a page has
 //! no board.
 
 use std::{
@@ -23,7 +23,7 @@ use crate::{
     results::{Units, history::HistoryRow},
 };
 
-/// Jobs whose sheets are kept.
+/// Jobs whose views are kept.
 pub const SHEETS_LIMIT: usize = 16;
 /// Most points of a curve; beyond that every second one is dropped.
 pub const POINTS_LIMIT: usize = 2000;
@@ -32,9 +32,9 @@ pub const SURFACES_LIMIT: usize = 32 << 20;
 /// Over how long the load of a host is averaged.
 const LOAD_WINDOW: Duration = Duration::from_secs(2);
 
-/// The sheets of the newest jobs.
+/// The views of the newest jobs.
 #[derive(Default)]
-pub struct Board(Mutex<BTreeMap<u32, Arc<Mutex<Sheet>>>>);
+pub struct Board(Mutex<BTreeMap<u32, Arc<Mutex<JobView>>>>);
 
 /// Locks; a reader or writer that panicked leaves numbers to show all the same.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -42,26 +42,26 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Board {
-    /// A sheet for a job that starts; the oldest goes when there are too many.
-    pub fn begin(&self, job: u32, model: &Model) -> Arc<Mutex<Sheet>> {
-        let sheet = Arc::new(Mutex::new(Sheet::new(model)));
-        let mut sheets = lock(&self.0);
-        sheets.insert(job, Arc::clone(&sheet));
-        while sheets.len() > SHEETS_LIMIT {
-            sheets.pop_first();
+    /// A view for a job that starts; the oldest goes when there are too many.
+    pub fn begin(&self, job: u32, model: &Model) -> Arc<Mutex<JobView>> {
+        let job_view = Arc::new(Mutex::new(JobView::new(model)));
+        let mut job_views = lock(&self.0);
+        job_views.insert(job, Arc::clone(&job_view));
+        while job_views.len() > SHEETS_LIMIT {
+            job_views.pop_first();
         }
-        sheet
+        job_view
     }
 
-    /// A job's sheet.
-    pub fn sheet(&self, job: u32) -> Option<Arc<Mutex<Sheet>>> {
+    /// A job's view.
+    pub fn job_view(&self, job: u32) -> Option<Arc<Mutex<JobView>>> {
         lock(&self.0).get(&job).cloned()
     }
 
     /// The part of its time that a host computed lately (0 to 1), in the newest job it is seen in.
     pub fn load(&self, host: &str) -> Option<f64> {
-        let sheets: Vec<_> = lock(&self.0).values().rev().cloned().collect();
-        sheets.iter().find_map(|sheet| lock(sheet).workers.get(host).map(|worker| worker.load))
+        let job_views: Vec<_> = lock(&self.0).values().rev().cloned().collect();
+        job_views.iter().find_map(|job_view| lock(job_view).workers.get(host).map(|worker| worker.load))
     }
 }
 
@@ -72,9 +72,7 @@ pub struct Point {
     pub cycle: u64,
     /// Time (time).
     pub time: f64,
-    /// Kinetic energy.
     pub kinetic: f64,
-    /// Internal energy.
     pub internal: f64,
     /// Energy taken by hourglass forces.
     pub hourglass: f64,
@@ -141,7 +139,7 @@ struct Kept {
 }
 
 /// What is known of one job.
-pub struct Sheet {
+pub struct JobView {
     units: Units,
     end_time: f64,
     end_cycle: u64,
@@ -157,7 +155,7 @@ pub struct Sheet {
     states: Vec<Kept>,
 }
 
-impl Sheet {
+impl JobView {
     fn new(model: &Model) -> Self {
         let control = &model.setup.control;
         Self {
@@ -177,7 +175,6 @@ impl Sheet {
         }
     }
 
-    /// How far it is.
     pub fn brief(&self) -> &Brief {
         &self.brief
     }
@@ -362,9 +359,9 @@ fn halve<T>(list: &mut Vec<T>) {
 mod tests {
     use super::*;
 
-    fn sheet() -> Sheet {
+    fn job_view() -> JobView {
         let text = include_str!("../../../tests/decks/plates-small.toml");
-        Sheet::new(&deck::read(text, "small").expect("without faults"))
+        JobView::new(&deck::read(text, "small").expect("without faults"))
     }
 
     fn frame(cycle: u64, compute_ns: u64) -> ToMaster {
@@ -374,27 +371,27 @@ mod tests {
 
     #[test]
     fn curves_are_thinned_and_keep_their_ends() {
-        let mut sheet = sheet();
+        let mut job_view = job_view();
         for cycle in 0..10 * POINTS_LIMIT as u64 {
-            sheet.row(&HistoryRow { cycle, ..HistoryRow::default() });
+            job_view.row(&HistoryRow { cycle, ..HistoryRow::default() });
         }
-        assert!(sheet.points.len() <= POINTS_LIMIT + 1);
-        assert_eq!(sheet.points[0].cycle, 0);
-        assert!(sheet.points.last().is_some_and(|p| p.cycle > 9 * POINTS_LIMIT as u64));
-        sheet.rewind(100);
-        assert!(sheet.points.iter().all(|point| point.cycle <= 100));
+        assert!(job_view.points.len() <= POINTS_LIMIT + 1);
+        assert_eq!(job_view.points[0].cycle, 0);
+        assert!(job_view.points.last().is_some_and(|p| p.cycle > 9 * POINTS_LIMIT as u64));
+        job_view.rewind(100);
+        assert!(job_view.points.iter().all(|point| point.cycle <= 100));
     }
 
     #[test]
     fn imbalance_is_the_slowest_over_the_mean_of_whole_cycles() {
-        let mut sheet = sheet();
+        let mut job_view = job_view();
         let deal = |name: &str| Deal { name: name.to_owned(), speed: 1.0, elements: 1 };
-        sheet.dealt(&[deal("a"), deal("b")]);
+        job_view.dealt(&[deal("a"), deal("b")]);
         for cycle in 1..=3 {
-            sheet.heard("a", &frame(cycle, 100 * cycle));
-            sheet.heard("b", &frame(cycle, 300 * cycle));
+            job_view.heard("a", &frame(cycle, 100 * cycle));
+            job_view.heard("b", &frame(cycle, 300 * cycle));
         }
-        assert_eq!(sheet.balance, [(2, 1.5), (3, 1.5)]);
-        assert_eq!(sheet.brief.imbalance, Some(1.5));
+        assert_eq!(job_view.balance, [(2, 1.5), (3, 1.5)]);
+        assert_eq!(job_view.brief.imbalance, Some(1.5));
     }
 }

@@ -65,12 +65,10 @@ impl Guard {
         Ok(Self { token, cookie: format!("bolide-{port}"), loopback, scheme, name })
     }
 
-    /// The token.
     pub fn token(&self) -> &str {
         &self.token
     }
 
-    /// What sets the cookie.
     pub fn set_cookie(&self) -> String {
         let secure = if self.scheme == "https" { "; Secure" } else { "" };
         format!("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age=31536000{secure}", self.cookie, self.token)

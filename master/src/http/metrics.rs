@@ -5,18 +5,18 @@ use std::fmt::Write;
 use axum::{extract::State, http::header, response::IntoResponse};
 use protocol::request::{HostRow, State as JobState, Status};
 
-use super::{api::ask, board, office::Office};
+use super::{api::ask, api_state::ApiState, board};
 use crate::notice::Notice;
 
 /// The table.
-pub async fn text(State(office): State<Office>) -> impl IntoResponse {
-    let jobs = ask(&office, Notice::Jobs).await.unwrap_or_default();
-    let hosts = ask(&office, Notice::Hosts).await.unwrap_or_default();
+pub async fn text(State(api_state): State<ApiState>) -> impl IntoResponse {
+    let jobs = ask(&api_state, Notice::Jobs).await.unwrap_or_default();
+    let hosts = ask(&api_state, Notice::Hosts).await.unwrap_or_default();
     let content = [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")];
-    (content, render(&office, &jobs, &hosts))
+    (content, render(&api_state, &jobs, &hosts))
 }
 
-fn render(office: &Office, jobs: &[Status], hosts: &[HostRow]) -> String {
+fn render(api_state: &ApiState, jobs: &[Status], hosts: &[HostRow]) -> String {
     let mut out = String::new();
     family(&mut out, "bolide_jobs", "gauge", "Jobs by state.");
     for state in [JobState::Queued, JobState::Running, JobState::Done, JobState::Failed, JobState::Cancelled]
@@ -35,14 +35,14 @@ fn render(office: &Office, jobs: &[Status], hosts: &[HostRow]) -> String {
     }
     family(&mut out, "bolide_host_load", "gauge", "Part of its time that a busy host computes.");
     for host in hosts.iter().filter(|host| host.state == "busy") {
-        if let Some(load) = office.board.load(&host.name) {
+        if let Some(load) = api_state.board.load(&host.name) {
             sample(&mut out, "bolide_host_load", &[("host", &host.name)], load);
         }
     }
     let running: Vec<_> = jobs.iter().filter(|job| job.state == JobState::Running).collect();
     let briefs: Vec<_> = running
         .iter()
-        .filter_map(|job| office.board.sheet(job.job).map(|s| (job, board::lock(&s).brief().clone())))
+        .filter_map(|job| api_state.board.job_view(job.job).map(|s| (job, board::lock(&s).brief().clone())))
         .collect();
     family(&mut out, "bolide_job_cycle", "gauge", "Cycles completed by a running job.");
     for job in &running {

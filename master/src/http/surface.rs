@@ -32,7 +32,6 @@ struct Outer {
     faces: Vec<Face>,
 }
 
-/// An outer face.
 struct Face {
     /// Indices into [`Outer::nodes`], outward by the right-hand rule.
     nodes: [u32; 4],

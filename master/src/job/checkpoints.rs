@@ -1,7 +1,7 @@
 //! Checkpoints: the whole state at the start of a cycle, which a run can go back to or be gone on with from disk.
 //!
 //! A checkpoint is all that the cycles after it depend on, so no bit of the run depends on how often, when and on whom it is
-//! begun anew. It is collected in two parts that come in any order: the state from the images of all workers, the rest from
+//! begun anew. It is collected in two parts that come in any order: the state from the states of all workers, the rest from
 //! the frames of its cycle.
 
 use std::{collections::BTreeMap, sync::Arc};
@@ -9,18 +9,20 @@ use std::{collections::BTreeMap, sync::Arc};
 use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
 
 use super::{error::Error, problem::Problem};
-use crate::{ledger::Ledger, options::Keep, results::history::HistoryRow, snapshot::Snapshot};
+use crate::{
+    options::CheckpointEvery, results::history::HistoryRow, run_totals::RunTotals, snapshot::Snapshot,
+};
 
 /// Where an epoch can begin.
 #[derive(Clone)]
 pub(super) struct Checkpoint {
     pub(super) state: Arc<GlobalState>,
-    pub(super) rest: Rest,
+    pub(super) continuation: Continuation,
 }
 
 /// What a checkpoint holds beside the state.
 #[derive(Clone)]
-pub(super) struct Rest {
+pub(super) struct Continuation {
     /// `dt` of the cycle before (time).
     pub(super) dt_previous: f64,
     /// `dt` of the cycle to come; none at the start of a run, where the first vote gives it.
@@ -32,7 +34,7 @@ pub(super) struct Rest {
     /// Poses of the walls of finite mass in the cycle to come.
     pub(super) walls: Vec<Pose>,
     /// With the cycle before in it.
-    pub(super) ledger: Ledger,
+    pub(super) run_totals: RunTotals,
     /// Rows of history up to there.
     pub(super) n_rows: usize,
     /// The rate at which bodies move against each other, as it was known then (length per cycle).
@@ -43,17 +45,17 @@ impl Checkpoint {
     /// Of the start of a run.
     pub(super) fn first(problem: &Problem, start: GlobalState) -> Self {
         let model = &problem.model;
-        let rest = Rest {
+        let continuation = Continuation {
             dt_previous: 0.0,
             dt: None,
             quanta: [problem.quanta.force; 2],
             vote: None,
             walls: mechanics::wall::first_poses(&model.setup.walls),
-            ledger: Ledger::new(model, &start.mass),
+            run_totals: RunTotals::new(model, &start.mass),
             n_rows: 0,
             spread_rate: 0.0,
         };
-        Self { state: Arc::new(start), rest }
+        Self { state: Arc::new(start), continuation }
     }
 
     /// From disk, with the rows of history up to there. `start` is the state that the deck gives.
@@ -73,17 +75,17 @@ impl Checkpoint {
         {
             return Err(Error::AnotherProblem);
         }
-        let rest = Rest {
+        let continuation = Continuation {
             dt_previous: snapshot.dt_previous,
             dt: Some(snapshot.dt),
             quanta: snapshot.force_quanta,
             vote: Some(snapshot.vote),
             walls: snapshot.walls,
-            ledger: snapshot.ledger,
+            run_totals: snapshot.run_totals,
             n_rows: snapshot.rows.len(),
             spread_rate: snapshot.spread_rate,
         };
-        Ok((Self { state: snapshot.state, rest }, snapshot.rows))
+        Ok((Self { state: snapshot.state, continuation }, snapshot.rows))
     }
 
     /// The cycle at whose start it is.
@@ -93,17 +95,17 @@ impl Checkpoint {
 
     /// As it is stored; none at the start of a run, which the deck gives as well.
     pub(super) fn as_snapshot(&self, rows: &[Arc<HistoryRow>]) -> Option<Box<Snapshot>> {
-        let Self { state, rest } = self;
+        let Self { state, continuation } = self;
         Some(Box::new(Snapshot {
             state: Arc::clone(state),
-            dt_previous: rest.dt_previous,
-            dt: rest.dt?,
-            force_quanta: rest.quanta,
-            spread_rate: rest.spread_rate,
-            vote: rest.vote.clone()?,
-            walls: rest.walls.clone(),
-            ledger: rest.ledger.clone(),
-            rows: rows[..rest.n_rows].to_vec(),
+            dt_previous: continuation.dt_previous,
+            dt: continuation.dt?,
+            force_quanta: continuation.quanta,
+            spread_rate: continuation.spread_rate,
+            vote: continuation.vote.clone()?,
+            walls: continuation.walls.clone(),
+            run_totals: continuation.run_totals.clone(),
+            rows: rows[..continuation.n_rows].to_vec(),
             states: Vec::new(),
         }))
     }
@@ -123,7 +125,7 @@ fn shape(state: &GlobalState) -> (Vec<usize>, Vec<usize>) {
 #[derive(Default)]
 struct Parts {
     state: Option<GlobalState>,
-    rest: Option<Rest>,
+    continuation: Option<Continuation>,
 }
 
 /// The newest checkpoint, and those on their way.
@@ -131,7 +133,7 @@ pub(super) struct Checkpoints {
     /// Where the next epoch begins if a worker is lost or wrong: where samples are computed again, all that led here
     /// agreed.
     newest: Arc<Checkpoint>,
-    keep: Keep,
+    keep: CheckpointEvery,
     /// The time for a new one has come.
     is_time: bool,
     /// The cycle of the last one that was asked for because it was due, or of the epoch's beginning.
@@ -142,7 +144,7 @@ pub(super) struct Checkpoints {
 
 impl Checkpoints {
     /// Of a session that begins at `first`.
-    pub(super) fn new(first: Checkpoint, keep: Keep) -> Self {
+    pub(super) fn new(first: Checkpoint, keep: CheckpointEvery) -> Self {
         let last = first.cycle();
         Self { newest: Arc::new(first), keep, is_time: false, last, on_their_way: BTreeMap::new() }
     }
@@ -166,8 +168,8 @@ impl Checkpoints {
     /// Keeps of the newest one only what never changes; gives that. For workers of which none can be lost.
     pub(super) fn forget_state(&mut self) -> Arc<GlobalState> {
         let state = Arc::new(self.newest.state.statics());
-        let rest = self.newest.rest.clone();
-        self.newest = Arc::new(Checkpoint { state: Arc::clone(&state), rest });
+        let continuation = self.newest.continuation.clone();
+        self.newest = Arc::new(Checkpoint { state: Arc::clone(&state), continuation });
         state
     }
 
@@ -208,13 +210,12 @@ impl Checkpoints {
     }
 
     /// The rest of one that is expected has come.
-    pub(super) fn take_rest(&mut self, cycle: u64, rest: Rest) {
-        self.on_their_way.entry(cycle).or_default().rest = Some(rest);
+    pub(super) fn take_rest(&mut self, cycle: u64, continuation: Continuation) {
+        self.on_their_way.entry(cycle).or_default().continuation = Some(continuation);
     }
 
-    /// Whether all of one is here.
     pub(super) fn is_whole(&self, cycle: u64) -> bool {
-        matches!(self.on_their_way.get(&cycle), Some(Parts { state: Some(_), rest: Some(_) }))
+        matches!(self.on_their_way.get(&cycle), Some(Parts { state: Some(_), continuation: Some(_) }))
     }
 
     /// One that is whole.
@@ -222,8 +223,8 @@ impl Checkpoints {
         if !self.is_whole(cycle) {
             return None;
         }
-        let Parts { state, rest } = self.on_their_way.remove(&cycle)?;
-        Some(Checkpoint { state: Arc::new(state?), rest: rest? })
+        let Parts { state, continuation } = self.on_their_way.remove(&cycle)?;
+        Some(Checkpoint { state: Arc::new(state?), continuation: continuation? })
     }
 }
 
@@ -241,18 +242,18 @@ mod tests {
     fn one_is_whole_once_both_parts_are_here_in_any_order() {
         let first = checkpoint();
         for state_first in [true, false] {
-            let mut checkpoints = Checkpoints::new(first.clone(), Keep::Never);
+            let mut checkpoints = Checkpoints::new(first.clone(), CheckpointEvery::Never);
             checkpoints.expect(7);
             let state = GlobalState { cycle: 7, ..GlobalState::clone(&first.state) };
-            let rest = first.rest.clone();
+            let continuation = first.continuation.clone();
             if state_first {
                 checkpoints.take_state(7, state.clone());
             } else {
-                checkpoints.take_rest(7, rest.clone());
+                checkpoints.take_rest(7, continuation.clone());
             }
             assert!(checkpoints.is_expected(7) && !checkpoints.is_whole(7) && checkpoints.take(7).is_none());
             if state_first {
-                checkpoints.take_rest(7, rest);
+                checkpoints.take_rest(7, continuation);
             } else {
                 checkpoints.take_state(7, state);
             }
@@ -263,7 +264,7 @@ mod tests {
 
     #[test]
     fn states_are_kept_at_boundaries_alone_and_the_timer_is_set_when_it_was_time() {
-        let mut checkpoints = Checkpoints::new(checkpoint(), Keep::Either(10.0, 50));
+        let mut checkpoints = Checkpoints::new(checkpoint(), CheckpointEvery::Either(10.0, 50));
         assert_eq!(checkpoints.due(20, true), (false, None), "neither cycles nor time");
         checkpoints.time_has_come();
         assert_eq!(checkpoints.due(23, false), (false, None), "no boundary");
@@ -274,7 +275,7 @@ mod tests {
 
     #[test]
     fn an_epoch_begins_without_those_that_were_on_their_way() {
-        let mut checkpoints = Checkpoints::new(checkpoint(), Keep::Cycles(10));
+        let mut checkpoints = Checkpoints::new(checkpoint(), CheckpointEvery::Cycles(10));
         checkpoints.expect(30);
         checkpoints.begin_epoch();
         assert!(!checkpoints.is_expected(30));

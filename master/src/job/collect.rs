@@ -1,4 +1,4 @@
-//! What is collected from all workers at the start of a cycle: images and samples. They become a state for the user, a
+//! What is collected from all workers at the start of a cycle: states and samples. They become a state for the user, a
 //! checkpoint that is proved, or the end of the epoch.
 
 use std::sync::Arc;
@@ -7,17 +7,21 @@ use mechanics::vote::Vote;
 
 use super::{
     Job,
-    checkpoints::{Checkpoint, Rest},
+    checkpoints::{Checkpoint, Continuation},
     error::{Breach, Error, Sent},
-    images::Collected,
     samples::{Moment, Stopped},
+    worker_states::Collected,
 };
 use crate::event::Action;
 
 impl Job {
-    /// All images of a cycle are here.
-    pub(super) fn collected(&mut self, image: Collected, actions: &mut Vec<Action>) -> Result<(), Error> {
-        let Collected { state, vote, due } = image;
+    /// All states of a cycle are here.
+    pub(super) fn collected(
+        &mut self,
+        worker_state: Collected,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), Error> {
+        let Collected { state, vote, due } = worker_state;
         let cycle = state.cycle;
         if let Some(vote) = vote {
             let stopped = Stopped { state, vote, due };
@@ -85,8 +89,12 @@ impl Job {
     /// Computes the samples of the checkpoint's cycle again. Gives whether all agree; else workers are dropped, and the run
     /// has gone back.
     fn prove(&mut self, checkpoint: &Checkpoint, actions: &mut Vec<Action>) -> Result<bool, Error> {
-        let Checkpoint { state, rest } = checkpoint;
-        let moment = Moment { dt_previous: rest.dt_previous, quantum: rest.quanta[0], time: state.time };
+        let Checkpoint { state, continuation } = checkpoint;
+        let moment = Moment {
+            dt_previous: continuation.dt_previous,
+            quantum: continuation.quanta[0],
+            time: state.time,
+        };
         let wrong = self.epoch.samples.differing(&self.problem, state, moment)?;
         let agree = wrong.is_empty();
         if !agree {
@@ -95,14 +103,14 @@ impl Job {
         Ok(agree)
     }
 
-    /// Goes on with a stop once its samples and images are here and agree.
+    /// Goes on with a stop once its samples and states are here and agree.
     fn prove_stop(&mut self, cycle: u64, actions: &mut Vec<Action>) -> Result<(), Error> {
         let Some(stopped) = self.epoch.samples.take_stopped(cycle) else { return Ok(()) };
         let schedule = &self.epoch.schedule;
         let now = schedule.ordered(cycle)?;
         let (dt_previous, time) = match cycle.checked_sub(1).and_then(|cycle| schedule.step(cycle)) {
             Some(before) => (before.dt, before.time + before.dt),
-            None => (self.checkpoints.newest().rest.dt_previous, now.time),
+            None => (self.checkpoints.newest().continuation.dt_previous, now.time),
         };
         let moment = Moment { dt_previous, quantum: now.quantum, time };
         let wrong = self.epoch.samples.differing(&self.problem, &stopped.state, moment)?;
@@ -110,17 +118,17 @@ impl Job {
     }
 
     /// What a checkpoint at the start of a cycle holds beside the state, once the cycle before is booked with this vote.
-    pub(super) fn rest_at(&self, cycle: u64, vote: Vote) -> Result<Rest, Error> {
+    pub(super) fn rest_at(&self, cycle: u64, vote: Vote) -> Result<Continuation, Error> {
         let schedule = &self.epoch.schedule;
         let step = schedule.ordered(cycle)?;
         let before = cycle.checked_sub(1).and_then(|cycle| schedule.step(cycle));
-        Ok(Rest {
+        Ok(Continuation {
             dt_previous: before.map_or(0.0, |step| step.dt),
             dt: Some(step.dt),
             quanta: [step.quantum, schedule.quantum()],
             vote: Some(vote),
             walls: self.account.walls.clone(),
-            ledger: self.account.ledger.clone(),
+            run_totals: self.account.run_totals.clone(),
             n_rows: self.account.rows.len(),
             spread_rate: self.epoch.sorts.spread_rate(),
         })

@@ -28,9 +28,9 @@ use super::{
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
     decompose::{self, Living, decompose, work},
-    event::{Action, Deal, Hand},
+    event::{Action, Deal, WorkerSpec},
     exchange::Exchange,
-    holdings::Holdings,
+    node_owners::NodeOwners,
     options::SessionOptions,
     snapshot::Snapshot,
     sort::{Gathered, SortBasis, Sorter},
@@ -43,11 +43,11 @@ impl Job {
     /// If the problem cannot start: elements without volume, contact zones that overlap, no worker.
     pub fn new(
         model: Arc<Model>,
-        hands: &[Hand],
+        specs: &[WorkerSpec],
         options: SessionOptions,
         resume: Option<Snapshot>,
     ) -> Result<(Self, Vec<Action>), Error> {
-        if hands.is_empty() {
+        if specs.is_empty() {
             return Err(Error::NoWorker);
         }
         let (problem, start) = Problem::new(model)?;
@@ -61,7 +61,7 @@ impl Job {
             account: Account::new(&first, rows),
             first_cycle: first.cycle(),
             checkpoints: Checkpoints::new(first, keep),
-            workers: Workers::new(hands),
+            workers: Workers::new(specs),
             balancing: Balancing::default(),
             tally: Tally::new(),
             ending: Ending::default(),
@@ -70,7 +70,7 @@ impl Job {
             options,
         };
         let mut actions = Vec::new();
-        job.epoch = job.deal(0, (0..hands.len()).collect(), &mut actions)?;
+        job.epoch = job.deal(0, (0..specs.len()).collect(), &mut actions)?;
         job.tally.sorts = u64::from(job.tally.census.units > 0);
         if let Some(seconds) = keep.seconds() {
             actions.push(Action::Timer(seconds));
@@ -78,7 +78,7 @@ impl Job {
         Ok((job, actions))
     }
 
-    /// From now on no state is kept to go back to: for a crew of which nobody can be lost, as it shares this process.
+    /// From now on no state is kept to go back to: for a set of workers of which nobody can be lost, as it shares this process.
     pub fn keep_no_state(&mut self) {
         self.lean = true;
         self.forget_state();
@@ -90,11 +90,11 @@ impl Job {
         self.epoch.sorts.forget_state(&statics);
     }
 
-    /// Deals the newest checkpoint out to a crew, as epoch `number`.
+    /// Deals the newest checkpoint out to a set of workers, as epoch `number`.
     pub(super) fn deal(
         &mut self,
         number: u32,
-        crew: Vec<usize>,
+        at_work: Vec<usize>,
         actions: &mut Vec<Action>,
     ) -> Result<Epoch, Error> {
         let checkpoint = Arc::clone(self.checkpoints.newest());
@@ -103,14 +103,14 @@ impl Job {
         }
         let (problem, model) = (&self.problem, &self.problem.model);
         let mut epoch = Epoch::without_workers(number, &checkpoint, model);
-        let n = crew.len();
+        let n = at_work.len();
         if n == 0 {
             actions.push(Action::Dealt(Vec::new()));
             return Ok(epoch);
         }
         let state = &checkpoint.state;
-        let hands: Vec<&Hand> = crew.iter().map(|&index| self.workers.hand(index)).collect();
-        let speeds: Vec<f64> = hands.iter().map(|hand| hand.speed).collect();
+        let specs: Vec<&WorkerSpec> = at_work.iter().map(|&index| self.workers.spec(index)).collect();
+        let speeds: Vec<f64> = specs.iter().map(|spec| spec.speed).collect();
         let costs = self.options.costs;
         let alive = alive_in(state);
         let layout = decompose(&model.mesh, &speeds, costs.node, alive.as_deref());
@@ -119,7 +119,7 @@ impl Job {
             actions.push(Action::Owners(Arc::clone(&owners)));
             epoch.owners = Some(owners);
         }
-        let threads: Vec<u32> = hands.iter().map(|hand| hand.threads).collect();
+        let threads: Vec<u32> = specs.iter().map(|spec| spec.threads).collect();
         let held = work(&layout, n, costs.node, &Living::new(&model.mesh, alive.as_deref()));
         let division = Division::new(model, state, (&layout, held), &threads, problem.touching.as_ref());
         let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
@@ -146,7 +146,7 @@ impl Job {
                 let whole = SortBasis {
                     epoch: number,
                     sorter,
-                    holdings: Arc::new(division.holdings),
+                    node_owners: Arc::new(division.node_owners),
                     state: Arc::clone(state),
                     dropped,
                 };
@@ -155,11 +155,13 @@ impl Job {
                 self.tally.census = sorted.census;
                 (sorted.exchange, sorted.interactions)
             }
-            _ => (Exchange::new(&division.holdings, vec![None; n], state, self.options.route()), vec![0; n]),
+            _ => {
+                (Exchange::new(&division.node_owners, vec![None; n], state, self.options.route()), vec![0; n])
+            }
         };
         self.tally.imbalance = imbalance(&elements, &interactions, &speeds);
         let exchange = Arc::new(exchange);
-        let bodies = match &checkpoint.rest.vote {
+        let bodies = match &checkpoint.continuation.vote {
             Some(vote) => vote.bodies.clone(),
             None => model.setup.bodies.iter().map(|body| body.start).collect(),
         };
@@ -173,32 +175,32 @@ impl Job {
                 epoch: number,
                 setup: model.setup.clone(),
                 n_parts: model.mesh.parts.len() as u32,
-                quanta: Quanta { force: checkpoint.rest.quanta[0], ..problem.quanta },
+                quanta: Quanta { force: checkpoint.continuation.quanta[0], ..problem.quanta },
                 subdomains,
                 gauges: gauges.clone(),
                 watched: watched.clone(),
                 lanes: self.options.asked.lanes.clone(),
                 cycle: state.cycle,
-                dt_previous: checkpoint.rest.dt_previous,
+                dt_previous: checkpoint.continuation.dt_previous,
                 route: self.options.route(),
                 plan: exchange.plans[position].clone(),
                 plan_hash: exchange.hash,
-                guest_state: exchange.guest_state_from(position, state),
+                ghost_state: exchange.ghost_state_from(position, state),
                 bodies: bodies.clone(),
             };
-            actions.push(Action::Send(crew[position], ToWorker::Assign(Box::new(assign))));
+            actions.push(Action::Send(at_work[position], ToWorker::Assign(Box::new(assign))));
         }
         actions.push(Action::Dealt(
-            hands
+            specs
                 .iter()
                 .zip(&elements)
-                .map(|(hand, &e)| Deal { name: hand.name.clone(), speed: hand.speed, elements: e as u64 })
+                .map(|(spec, &e)| Deal { name: spec.name.clone(), speed: spec.speed, elements: e as u64 })
                 .collect(),
         ));
         epoch.sorts.begin(state.cycle, basis, exchange);
-        epoch.inflow = Inflow::new(n, checkpoint.rest.vote.clone());
+        epoch.inflow = Inflow::new(n, checkpoint.continuation.vote.clone());
         epoch.meter = Meter::new(n);
-        epoch.crew = crew;
+        epoch.at_work = at_work;
         epoch.shares = Shares { speeds, elements, layout };
         Ok(epoch)
     }
@@ -212,7 +214,7 @@ fn alive_in(state: &GlobalState) -> Option<Vec<bool>> {
 /// The sub-domains of a layout, and who holds what.
 struct Division {
     by_worker: Vec<Vec<Subdomain>>,
-    holdings: Holdings,
+    node_owners: NodeOwners,
     /// By worker: surface nodes that it owns, in the order of its gathering.
     gather: Vec<Vec<u32>>,
 }
@@ -239,24 +241,30 @@ impl Division {
             nodes_of.push(nodes);
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
         }
-        let holdings = Holdings::new(model.mesh.n_nodes(), work, layout, &nodes_of)
+        let node_owners = NodeOwners::new(model.mesh.n_nodes(), work, layout, &nodes_of)
             .with_bodies(model.setup.bodies.len());
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
         for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {
             let id = subdomain.id;
-            subdomain.unowned =
-                nodes.iter().copied().filter(|&node| holdings.owner_subdomain[node as usize] != id).collect();
+            subdomain.unowned = nodes
+                .iter()
+                .copied()
+                .filter(|&node| node_owners.owner_subdomain[node as usize] != id)
+                .collect();
             if let Some(Touching { surface, .. }) = touching {
                 subdomain.surface =
                     nodes.iter().copied().filter(|&node| surface.node_index(node).is_some()).collect();
                 gather[place.worker].extend(
-                    subdomain.surface.iter().filter(|&&node| holdings.owner_subdomain[node as usize] == id),
+                    subdomain
+                        .surface
+                        .iter()
+                        .filter(|&&node| node_owners.owner_subdomain[node as usize] == id),
                 );
             }
             by_worker[place.worker].push(subdomain);
         }
-        Self { by_worker, holdings, gather }
+        Self { by_worker, node_owners, gather }
     }
 }
 

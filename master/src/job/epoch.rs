@@ -1,12 +1,12 @@
 //! An epoch: from one dealing out of the problem to the next.
 //!
-//! An epoch begins at a [`Checkpoint`], the whole state at the start of a cycle, on a crew of workers and with speeds for
+//! An epoch begins at a [`Checkpoint`], the whole state at the start of a cycle, on a set of workers and with speeds for
 //! them. It ends with the job, or by one of two ways to the next:
 //!
-//! - *A worker is lost.* The run goes back to the newest checkpoint on those that are left: rows, ledger and the schedule of
+//! - *A worker is lost.* The run goes back to the newest checkpoint on those that are left: rows, totals and the schedule of
 //!   output are those of the checkpoint, and sinks are told to drop what lies behind it.
 //! - *A worker has joined, or speeds turned out to be others.* At the next plan boundary the workers stop at the start
-//!   of a cycle with their images and the last vote; that is the checkpoint of the next epoch, and nothing is lost.
+//!   of a cycle with their states and the last vote; that is the checkpoint of the next epoch, and nothing is lost.
 
 use std::sync::Arc;
 
@@ -17,42 +17,42 @@ use super::{
     balancing::{Meter, Shares},
     checkpoints::Checkpoint,
     frames::Inflow,
-    images::Images,
     samples::Samples,
     schedule::Schedule,
     sorts::Sorts,
+    worker_states::WorkerStates,
 };
 use crate::event::Action;
 
-/// All that is fixed for one epoch or counted in it. Workers are named by their position in its crew.
+/// All that is fixed for one epoch or counted in it. Workers are named by their position in its workers.
 pub(super) struct Epoch {
     /// Its number; frames carry it.
     pub(super) number: u32,
     /// Indices of the workers, by position; nobody while the job waits for a worker.
-    pub(super) crew: Vec<usize>,
+    pub(super) at_work: Vec<usize>,
     pub(super) shares: Shares,
     /// The worker of every element, where the deck wants states to say it.
     pub(super) owners: Option<Arc<[u32]>>,
     pub(super) schedule: Schedule,
     pub(super) sorts: Sorts,
     pub(super) inflow: Inflow,
-    pub(super) images: Images,
+    pub(super) worker_states: WorkerStates,
     pub(super) samples: Samples,
     pub(super) meter: Meter,
 }
 
 impl Epoch {
-    /// Of a checkpoint, before its crew is there.
+    /// Of a checkpoint, before its workers is there.
     pub(super) fn without_workers(number: u32, checkpoint: &Checkpoint, model: &Model) -> Self {
         Self {
             number,
-            crew: Vec::new(),
+            at_work: Vec::new(),
             shares: Shares::default(),
             owners: None,
             schedule: Schedule::new(checkpoint, model.output.period),
-            sorts: Sorts::new(&checkpoint.state, checkpoint.rest.spread_rate),
-            inflow: Inflow::new(0, checkpoint.rest.vote.clone()),
-            images: Images::default(),
+            sorts: Sorts::new(&checkpoint.state, checkpoint.continuation.spread_rate),
+            inflow: Inflow::new(0, checkpoint.continuation.vote.clone()),
+            worker_states: WorkerStates::default(),
             samples: Samples::default(),
             meter: Meter::new(0),
         }
@@ -60,17 +60,16 @@ impl Epoch {
 
     /// Number of workers.
     pub(super) fn n(&self) -> usize {
-        self.crew.len()
+        self.at_work.len()
     }
 
     /// The position of a worker.
     pub(super) fn position(&self, index: usize) -> Option<usize> {
-        self.crew.iter().position(|&member| member == index)
+        self.at_work.iter().position(|&member| member == index)
     }
 
-    /// Sends to the whole crew.
     pub(super) fn send_all(&self, actions: &mut Vec<Action>, message: impl Fn(usize) -> ToWorker) {
-        for (position, &index) in self.crew.iter().enumerate() {
+        for (position, &index) in self.at_work.iter().enumerate() {
             actions.push(Action::Send(index, message(position)));
         }
     }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use mechanics::exact::Quantum;
-use protocol::message::IMAGE_VERSION;
+use protocol::message::WORKER_STATE_VERSION;
 
 use crate::erosion::UnknownElement;
 
@@ -31,12 +31,10 @@ pub enum Error {
     LastLost {
         /// Its name.
         worker: String,
-        /// Why.
         why: String,
     },
     /// The last workers were dropped, for numbers that are wrong.
     LastDropped {
-        /// One of them.
         worker: String,
         /// What was wrong.
         why: String,
@@ -45,7 +43,6 @@ pub enum Error {
     Failed {
         /// Its name.
         worker: String,
-        /// The cycle.
         cycle: u64,
         /// Why.
         reason: String,
@@ -54,11 +51,9 @@ pub enum Error {
     FailedAgain {
         /// Its name.
         worker: String,
-        /// The cycle.
         cycle: u64,
         /// Why.
         reason: String,
-        /// The first one.
         first: String,
         /// Its cycle.
         at: u64,
@@ -119,7 +114,7 @@ pub enum Breach {
     },
     /// A report with numbers that cannot be.
     Report(String),
-    /// Images of another version.
+    /// States of another version.
     ImageVersion(u32),
     /// It says twice that it is ready.
     ReadyTwice,
@@ -131,7 +126,6 @@ pub enum Breach {
     Unasked(Sent, u64),
     /// So many numbers of partial forces in a cycle where the plan has others.
     Partials {
-        /// The cycle.
         cycle: u64,
         /// Numbers that came.
         numbers: usize,
@@ -149,7 +143,6 @@ pub enum Breach {
     TransferWithoutPlan(u64),
     /// So many numbers of such state.
     Transfer {
-        /// The cycle.
         cycle: u64,
         /// Numbers that came.
         numbers: usize,
@@ -161,11 +154,8 @@ pub enum Breach {
 /// What a worker sends of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sent {
-    /// Its frame.
     Frame,
-    /// Its image.
-    Image,
-    /// Its sample.
+    WorkerState,
     Sample,
 }
 
@@ -251,14 +241,14 @@ impl Breach {
             Self::Report(why) => write!(f, "worker {worker}: {why}"),
             Self::ImageVersion(version) => write!(
                 f,
-                "worker {worker} sends images of version {version}, this master reads {IMAGE_VERSION}"
+                "worker {worker} sends images of version {version}, this master reads {WORKER_STATE_VERSION}"
             ),
             Self::ReadyTwice => write!(f, "worker {worker} is ready twice"),
             Self::BeforeStart(cycle) => write!(f, "worker {worker} sends cycle {cycle} before the start"),
             Self::Twice(sent, cycle) => {
                 let what = match sent {
                     Sent::Frame => "",
-                    Sent::Image => "its image of ",
+                    Sent::WorkerState => "its image of ",
                     Sent::Sample => "its sample of ",
                 };
                 write!(f, "worker {worker} sends {what}cycle {cycle} twice")
@@ -266,7 +256,7 @@ impl Breach {
             Self::Unasked(sent, cycle) => {
                 let what = match sent {
                     Sent::Frame => "a frame",
-                    Sent::Image => "an image",
+                    Sent::WorkerState => "an image",
                     Sent::Sample => "a sample",
                 };
                 write!(f, "worker {worker} sends {what} of cycle {cycle}, which nobody asked for")

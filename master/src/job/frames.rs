@@ -151,7 +151,7 @@ impl Inflow {
         }
         let sent = self.transfers.remove(&cycle).unwrap_or_default();
         let sent: Vec<Vec<f64>> = sent.into_iter().map(Option::unwrap_or_default).collect();
-        let arrives = (0..n).map(|w| (w, exchange.guest_state(w, &sent)));
+        let arrives = (0..n).map(|w| (w, exchange.ghost_state(w, &sent)));
         Ok(arrives.filter(|(_, state)| !state.is_empty()).collect())
     }
 }

@@ -1,9 +1,9 @@
 //! Samples computed again: a worker whose numbers are wrong is found and dropped by name.
 //!
-//! In the first cycle of an epoch, in the cycle at whose start a base is collected, and where all stop, each worker sends
+//! In the first cycle of an epoch, in the cycle at whose start a checkpoint is collected, and where all stop, each worker sends
 //! a hash of what the elements of one of its blocks came to. It depends on the state of that block at the start of the cycle alone,
-//! which the base has, so the block is computed here once more: one block, once for each worker and base, which takes no
-//! longer than a worker's own cycle. A base from which a sample differs is not taken, and the run goes back to the
+//! which the checkpoint has, so the block is computed here once more: one block, once for each worker and checkpoint, which takes no
+//! longer than a worker's own cycle. A checkpoint from which a sample differs is not taken, and the run goes back to the
 //! newest one from which all agreed: between the two the worker's numbers were right at least where they were sampled.
 //!
 //! A sample sees arithmetic that is wrong again and again, not one flipped bit elsewhere; integration and contact are
@@ -38,7 +38,7 @@ pub(super) struct Moment {
     pub(super) time: f64,
 }
 
-/// All have stopped, and their images are here.
+/// All have stopped, and their states are here.
 pub(super) struct Stopped {
     pub(super) state: GlobalState,
     /// The last vote.

@@ -48,7 +48,6 @@ pub(super) struct Next {
     pub(super) time_after: f64,
 }
 
-/// Where all stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stop {
     /// At the start of this cycle.
@@ -78,13 +77,13 @@ pub(super) struct Schedule {
 impl Schedule {
     /// Of an epoch that begins at a checkpoint, with states for the user every `period`.
     pub(super) fn new(checkpoint: &Checkpoint, period: Option<f64>) -> Self {
-        let Checkpoint { state, rest } = checkpoint;
+        let Checkpoint { state, continuation } = checkpoint;
         let (first, time) = (state.cycle, state.time);
         let mut steps = BTreeMap::new();
-        if let Some(dt) = rest.dt {
-            let [now, _] = rest.quanta;
+        if let Some(dt) = continuation.dt {
+            let [now, _] = continuation.quanta;
             if let Some(before) = first.checked_sub(1) {
-                let dt = rest.dt_previous;
+                let dt = continuation.dt_previous;
                 steps.insert(before, Step { dt, time: time - dt, quantum: now });
             }
             steps.insert(first, Step { dt, time, quantum: now });
@@ -93,7 +92,7 @@ impl Schedule {
             first_cycle: first,
             completed: first,
             steps,
-            quantum: rest.quanta[1],
+            quantum: continuation.quanta[1],
             period,
             next_state: period.map(|period| output_after(time, period)),
             stop: None,

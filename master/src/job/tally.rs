@@ -63,9 +63,9 @@ impl Tally {
         self.reports[index] = report;
     }
 
-    /// How the time of each of the crew went.
-    pub(super) fn reports(&self, crew: &[usize]) -> Vec<Report> {
-        crew.iter().map(|&index| self.reports.get(index).cloned().unwrap_or_default()).collect()
+    /// How the time of each of the workers went.
+    pub(super) fn reports(&self, at_work: &[usize]) -> Vec<Report> {
+        at_work.iter().map(|&index| self.reports.get(index).cloned().unwrap_or_default()).collect()
     }
 }
 

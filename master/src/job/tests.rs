@@ -4,13 +4,13 @@ use std::{collections::VecDeque, sync::Arc};
 
 use mechanics::vote::Vote;
 use protocol::{
-    message::{IMAGE_VERSION, ToMaster, ToWorker, Work},
+    message::{ToMaster, ToWorker, WORKER_STATE_VERSION, Work},
     options::{Balance, JobOptions},
 };
 
 use super::Job;
 use crate::{
-    event::{Action, Event, Hand},
+    event::{Action, Event, WorkerSpec},
     options::SessionOptions,
     sort::Gathered,
 };
@@ -33,13 +33,13 @@ pub(super) const DECK: &str = r#"
     gap_fraction = 0.1
 "#;
 
-fn hands(n: usize) -> Vec<Hand> {
-    (0..n).map(|i| Hand { name: format!("worker-{i}"), speed: 1.0, threads: 1 }).collect()
+fn specs(n: usize) -> Vec<WorkerSpec> {
+    (0..n).map(|i| WorkerSpec { name: format!("worker-{i}"), speed: 1.0, threads: 1 }).collect()
 }
 
 pub(super) fn job(n: usize) -> (Job, Vec<Action>) {
     let model = deck::read(DECK, "two cubes").expect("a good deck");
-    Job::new(Arc::new(model), &hands(n), SessionOptions::default(), None).expect("a good problem")
+    Job::new(Arc::new(model), &specs(n), SessionOptions::default(), None).expect("a good problem")
 }
 
 /// A job whose workers are ready and have their first orders, and the number of exchange nodes of each.
@@ -140,7 +140,7 @@ fn the_work_of_a_lost_worker_is_dealt_to_the_others_in_a_new_epoch() {
     let actions = job.apply(Event::Lost(1, "closed by peer".into()));
     assert_eq!(assigned(&actions), [(0, 1, 0), (2, 1, 0)]);
     assert!(actions.iter().any(|a| matches!(a, Action::Rewind { rows: 0, cycle: 0 })));
-    assert_eq!((job.epoch(), job.crew()), (1, &[0, 2][..]));
+    assert_eq!((job.epoch(), job.at_work()), (1, &[0, 2][..]));
     assert!(job.apply(Event::Lost(1, "a second time".into())).is_empty());
     assert!(job.apply(Event::Message(2, 0, cycle(0, exchange[2]))).is_empty(), "of the epoch before");
     assert!(job.apply(Event::Message(1, 0, cycle(0, exchange[1]))).is_empty(), "of the lost one");
@@ -166,7 +166,7 @@ fn the_last_worker_lost_ends_a_job_that_does_not_wait() {
 fn waiting(n: usize) -> Job {
     let model = Arc::new(deck::read(DECK, "two cubes").expect("a good deck"));
     let options = SessionOptions { waits: true, ..SessionOptions::default() };
-    let (mut job, _) = Job::new(model, &hands(n), options, None).expect("a good problem");
+    let (mut job, _) = Job::new(model, &specs(n), options, None).expect("a good problem");
     for worker in 0..n {
         job.apply(Event::Lost(worker, "power cut".into()));
     }
@@ -176,8 +176,8 @@ fn waiting(n: usize) -> Job {
 #[test]
 fn a_job_without_workers_deals_itself_out_to_the_first_that_comes() {
     let mut job = waiting(2);
-    assert!(!job.is_over() && job.crew().is_empty());
-    let actions = job.apply(Event::Joined(Hand { name: "new".into(), speed: 1.0, threads: 1 }));
+    assert!(!job.is_over() && job.at_work().is_empty());
+    let actions = job.apply(Event::Joined(WorkerSpec { name: "new".into(), speed: 1.0, threads: 1 }));
     assert_eq!(assigned(&actions), [(2, 3, 0)]);
 }
 
@@ -230,9 +230,14 @@ fn a_contact_deeper_than_nine_tenths_of_the_gap_stops_the_run_with_its_node() {
     let stops = |a: &Action| matches!(a, Action::Send(_, ToWorker::Totals { orders, .. }) if orders.stop && orders.collect);
     assert!(actions.iter().any(stops), "the state up to there is still gathered");
     let last = Some(Box::new(Vote { courant: 1e-4, ..Vote::empty(2) }));
-    let image =
-        ToMaster::Image { cycle: 3, version: IMAGE_VERSION, pieces: Vec::new(), last, work: Work::default() };
-    let actions = job.apply(Event::Message(0, 0, image));
+    let worker_state = ToMaster::WorkerState {
+        cycle: 3,
+        version: WORKER_STATE_VERSION,
+        pieces: Vec::new(),
+        last,
+        work: Work::default(),
+    };
+    let actions = job.apply(Event::Message(0, 0, worker_state));
     let reason = failure(&actions);
     assert!(
         reason.contains("node 4") && reason.contains("0.95") && reason.contains("contact.stiffness"),
@@ -243,16 +248,19 @@ fn a_contact_deeper_than_nine_tenths_of_the_gap_stops_the_run_with_its_node() {
 #[test]
 fn images_of_another_version_are_refused_with_both_versions() {
     let (mut job, _) = started(1);
-    let image = ToMaster::Image {
+    let worker_state = ToMaster::WorkerState {
         cycle: 1,
-        version: IMAGE_VERSION + 1,
+        version: WORKER_STATE_VERSION + 1,
         pieces: Vec::new(),
         last: None,
         work: Work::default(),
     };
-    let actions = job.apply(Event::Message(0, 0, image));
+    let actions = job.apply(Event::Message(0, 0, worker_state));
     let reason = failure(&actions).to_owned();
-    assert!(reason.contains(&IMAGE_VERSION.to_string()) && reason.contains(&(IMAGE_VERSION + 1).to_string()));
+    assert!(
+        reason.contains(&WORKER_STATE_VERSION.to_string())
+            && reason.contains(&(WORKER_STATE_VERSION + 1).to_string())
+    );
 }
 
 #[test]
@@ -271,7 +279,7 @@ fn dealt_anew(cycles: u64, mut nanoseconds: impl FnMut(usize, u64) -> f64) -> Ve
     let model = Arc::new(deck::read(&text, "bar").expect("a good deck"));
     let asked = JobOptions { balance: Balance::Measured, ..JobOptions::default() };
     let options = SessionOptions { asked, ..SessionOptions::default() };
-    let (mut job, first) = Job::new(model, &hands(4), options, None).expect("a good problem");
+    let (mut job, first) = Job::new(model, &specs(4), options, None).expect("a good problem");
     let vote = || Some(Box::new(Vote { courant: 1e-9, ..Vote::empty(1) }));
     let mut busy = [0.0; 4];
     let mut actions: VecDeque<Action> = first.into();
@@ -298,7 +306,16 @@ fn dealt_anew(cycles: u64, mut nanoseconds: impl FnMut(usize, u64) -> f64) -> Ve
                 if stops {
                     let (pieces, work) = (Vec::new(), Work::default());
                     let last = vote();
-                    (worker, ToMaster::Image { cycle: cycle + 1, version: IMAGE_VERSION, pieces, last, work })
+                    (
+                        worker,
+                        ToMaster::WorkerState {
+                            cycle: cycle + 1,
+                            version: WORKER_STATE_VERSION,
+                            pieces,
+                            last,
+                            work,
+                        },
+                    )
                 } else {
                     (worker, frame(cycle + 1, false, exchange[worker], busy[worker]))
                 }

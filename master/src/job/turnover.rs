@@ -7,7 +7,7 @@ use protocol::message::ToWorker;
 
 use super::{Job, checkpoints::Checkpoint, error::Error, samples::Stopped};
 use crate::{
-    event::{Action, Hand},
+    event::{Action, WorkerSpec},
     incident::Loss,
 };
 
@@ -15,10 +15,10 @@ impl Job {
     /// A worker is gone.
     pub(super) fn lost(&mut self, index: usize, why: String, actions: &mut Vec<Action>) -> Result<(), Error> {
         let was_there = self.workers.lose(index)?;
-        if !was_there || !self.epoch.crew.contains(&index) {
+        if !was_there || !self.epoch.at_work.contains(&index) {
             return Ok(());
         }
-        let worker = self.workers.hand(index).name.clone();
+        let worker = self.workers.spec(index).name.clone();
         if !self.workers.is_any_alive() && !self.options.waits {
             return Err(Error::LastLost { worker, why });
         }
@@ -29,9 +29,9 @@ impl Job {
     }
 
     /// A worker has come: it is taken in at the next plan boundary, or at once by a job that waits.
-    pub(super) fn joined(&mut self, hand: Hand, actions: &mut Vec<Action>) -> Result<(), Error> {
-        self.workers.join(hand);
-        if self.epoch.crew.is_empty() { self.next_epoch(actions) } else { Ok(()) }
+    pub(super) fn joined(&mut self, spec: WorkerSpec, actions: &mut Vec<Action>) -> Result<(), Error> {
+        self.workers.join(spec);
+        if self.epoch.at_work.is_empty() { self.next_epoch(actions) } else { Ok(()) }
     }
 
     /// A worker cannot go on, or its numbers are none. Others may: it is dismissed by name, and the run goes back.
@@ -45,7 +45,7 @@ impl Job {
         reason: &str,
         actions: &mut Vec<Action>,
     ) -> Result<(), Error> {
-        let index = self.epoch.crew[worker];
+        let index = self.epoch.at_work[worker];
         self.workers.fail(index, cycle, reason)?;
         let why = format!("cycle {cycle}: {reason}");
         actions.push(Action::Dismiss(index, why.clone()));
@@ -60,9 +60,9 @@ impl Job {
     ) -> Result<(), Error> {
         let (cycle, back_to) = (self.epoch.schedule.completed(), self.checkpoints.newest().cycle());
         for (position, why) in wrong {
-            let index = self.epoch.crew[position];
+            let index = self.epoch.at_work[position];
             self.workers.lose(index)?;
-            let worker = self.workers.hand(index).name.clone();
+            let worker = self.workers.spec(index).name.clone();
             actions.push(Action::Dismiss(index, why.clone()));
             self.tally.losses.push(Loss { worker, cycle, back_to, why });
         }
@@ -84,15 +84,15 @@ impl Job {
         let checkpoint = self.checkpoints.newest();
         self.account.go_back(checkpoint);
         self.balancing.go_back();
-        actions.push(Action::Rewind { rows: checkpoint.rest.n_rows, cycle: checkpoint.cycle() });
+        actions.push(Action::Rewind { rows: checkpoint.continuation.n_rows, cycle: checkpoint.cycle() });
     }
 
     /// Deals the checkpoint out to all that are alive; with nobody, the job waits.
     fn next_epoch(&mut self, actions: &mut Vec<Action>) -> Result<(), Error> {
         let number = self.epoch.number.checked_add(1).ok_or(Error::Epochs)?;
-        let crew = self.workers.alive();
-        let nobody = crew.is_empty();
-        self.epoch = self.deal(number, crew, actions)?;
+        let at_work = self.workers.alive();
+        let nobody = at_work.is_empty();
+        self.epoch = self.deal(number, at_work, actions)?;
         self.checkpoints.begin_epoch();
         if self.lean {
             self.forget_state();
@@ -130,12 +130,12 @@ impl Job {
         let cycle = state.cycle;
         self.adopt(state, vote)?;
         self.store(cycle, actions);
-        let (crew, shares) = (&self.epoch.crew, &self.epoch.shares);
-        if let Some(rebalance) = self.balancing.adopt(cycle, self.workers.names(crew), shares) {
-            self.workers.set_speeds(crew, &rebalance.speeds_after);
+        let (at_work, shares) = (&self.epoch.at_work, &self.epoch.shares);
+        if let Some(rebalance) = self.balancing.adopt(cycle, self.workers.names(at_work), shares) {
+            self.workers.set_speeds(at_work, &rebalance.speeds_after);
             self.tally.rebalances.push(rebalance);
         }
-        for index in self.workers.release(crew) {
+        for index in self.workers.release(at_work) {
             actions.push(Action::Send(index, ToWorker::Release));
         }
         self.next_epoch(actions)
@@ -173,8 +173,8 @@ impl Job {
 
     /// Where all have stopped is the newest checkpoint.
     fn adopt(&mut self, state: GlobalState, vote: Vote) -> Result<(), Error> {
-        let rest = self.rest_at(state.cycle, vote)?;
-        self.checkpoints.adopt(Arc::new(Checkpoint { state: Arc::new(state), rest }));
+        let continuation = self.rest_at(state.cycle, vote)?;
+        self.checkpoints.adopt(Arc::new(Checkpoint { state: Arc::new(state), continuation }));
         Ok(())
     }
 

@@ -11,8 +11,8 @@ use mechanics::{
 use super::{checkpoints::Checkpoint, error::Error, problem::Problem, schedule::Step};
 use crate::{
     event::{Action, Limit},
-    ledger::Ledger,
     results::history::HistoryRow,
+    run_totals::RunTotals,
 };
 
 /// Deepest contact (gaps) before the run is stopped. Where elements erode, a face that they leave bare may have a node at any
@@ -26,7 +26,7 @@ const FLOOR: f64 = 1e-4;
 
 /// What has been booked so far, and the verdict on it.
 pub(super) struct Account {
-    pub(super) ledger: Ledger,
+    pub(super) run_totals: RunTotals,
     /// Poses of the walls of finite mass in the newest cycle that was ordered.
     pub(super) walls: Vec<Pose>,
     pub(super) rows: Vec<Arc<HistoryRow>>,
@@ -37,16 +37,21 @@ pub(super) struct Account {
 impl Account {
     /// Up to a checkpoint, with the rows up to there.
     pub(super) fn new(checkpoint: &Checkpoint, rows: Vec<Arc<HistoryRow>>) -> Self {
-        let rest = &checkpoint.rest;
-        Self { ledger: rest.ledger.clone(), walls: rest.walls.clone(), rows, failure: None }
+        let continuation = &checkpoint.continuation;
+        Self {
+            run_totals: continuation.run_totals.clone(),
+            walls: continuation.walls.clone(),
+            rows,
+            failure: None,
+        }
     }
 
     /// Everything that was booked after a checkpoint is forgotten.
     pub(super) fn go_back(&mut self, checkpoint: &Checkpoint) {
-        let rest = &checkpoint.rest;
-        self.ledger = rest.ledger.clone();
-        self.walls.clone_from(&rest.walls);
-        self.rows.truncate(rest.n_rows);
+        let continuation = &checkpoint.continuation;
+        self.run_totals = continuation.run_totals.clone();
+        self.walls.clone_from(&continuation.walls);
+        self.rows.truncate(continuation.n_rows);
         self.failure = None;
     }
 
@@ -70,8 +75,8 @@ impl Account {
     ) {
         let Step { dt, time, .. } = step;
         let gap = problem.model.setup.contact.as_ref().map(|c| c.gap);
-        self.ledger.book(vote, cycle, time, dt, gap);
-        self.ledger.book_eroded(vote, &problem.model);
+        self.run_totals.book(vote, cycle, time, dt, gap);
+        self.run_totals.book_eroded(vote, &problem.model);
         let written = cycle.is_multiple_of(u64::from(problem.model.output.history_cycles.max(1)));
         if written {
             self.row(actions);
@@ -83,16 +88,16 @@ impl Account {
             Some(element_fault(problem, volumes, (element, volume), cycle))
         } else if vote.worst_depth >= DEEPEST && !problem.model.setup.erosion.is_on() {
             Some(contact_fault(problem, vote, cycle))
-        } else if self.ledger.worst_courant > 1.0 {
+        } else if self.run_totals.worst_courant > 1.0 {
             Some(format!(
                 "cycle {cycle}: time step {dt:e} above the Courant limit {:e} of element {}; lower control.safety_factor",
                 vote.courant,
                 element_name(problem, vote.courant_element)
             ))
-        } else if self.ledger.worst_gap_travel > 0.2 {
+        } else if self.run_totals.worst_gap_travel > 0.2 {
             Some(format!(
                 "cycle {cycle}: a contact node travelled {:.3} gaps in one cycle, at most 0.2; lower control.safety_factor or control.growth",
-                self.ledger.worst_gap_travel
+                self.run_totals.worst_gap_travel
             ))
         } else {
             stale(problem, vote, cycle).or_else(|| self.run_away(problem, cycle))
@@ -104,16 +109,16 @@ impl Account {
 
     /// Whether more energy appeared or vanished than the deck allows.
     fn run_away(&self, problem: &Problem, cycle: u64) -> Option<String> {
-        let (error, limit) = (self.ledger.last.error, problem.model.setup.control.energy_error);
+        let (error, limit) = (self.run_totals.last.error, problem.model.setup.control.energy_error);
         // Energies are sums of whole quanta, one rounding for each element and cycle: what lies below cannot be judged.
         let rounding =
             0.5 * problem.quanta.energy.value() * problem.model.mesh.n_elements() as f64 * (cycle + 1) as f64;
-        let settled = self.ledger.first_stirred.is_some_and(|first| cycle >= first + SETTLED);
-        if !settled || error.abs() <= limit || self.ledger.unexplained().abs() <= rounding {
+        let settled = self.run_totals.first_stirred.is_some_and(|first| cycle >= first + SETTLED);
+        if !settled || error.abs() <= limit || self.run_totals.unexplained().abs() <= rounding {
             return None;
         }
-        let last = &self.ledger.last;
-        let part = self.ledger.greediest_part().map(|(p, gain)| {
+        let last = &self.run_totals.last;
+        let part = self.run_totals.greediest_part().map(|(p, gain)| {
             let name = problem.model.mesh.parts.get(p).map_or("", |part| part.name.as_str());
             format!("; part `{name}` gained most, {gain:e}")
         });
@@ -123,7 +128,7 @@ impl Account {
             limit,
             last.total,
             last.external,
-            self.ledger.initial_total.unwrap_or_default(),
+            self.run_totals.initial_total.unwrap_or_default(),
             part.unwrap_or_default()
         ))
     }
@@ -137,7 +142,7 @@ impl Account {
         element: Option<u32>,
     ) {
         let given = problem.model.setup.control.time_step_floor;
-        let floor = if given > 0.0 { given } else { FLOOR * self.ledger.first_step.unwrap_or_default() };
+        let floor = if given > 0.0 { given } else { FLOOR * self.run_totals.first_step.unwrap_or_default() };
         if self.failure.is_some() || limit == Limit::End || dt >= floor {
             return;
         }
@@ -158,8 +163,8 @@ impl Account {
     }
 
     pub(super) fn row(&mut self, actions: &mut Vec<Action>) {
-        self.rows.push(Arc::new(self.ledger.last.clone()));
-        actions.push(Action::Row(Box::new(self.ledger.last.clone())));
+        self.rows.push(Arc::new(self.run_totals.last.clone()));
+        actions.push(Action::Row(Box::new(self.run_totals.last.clone())));
     }
 }
 

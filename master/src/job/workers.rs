@@ -1,16 +1,16 @@
 //! The workers that were ever given to a job: who is still there, who wants to go, who failed by itself.
 //!
-//! A worker's *index* is the number at which it came. In an epoch it is named by its position in the epoch's crew.
+//! A worker's *index* is the number at which it came. In an epoch it is named by its position in the epoch's workers.
 
 use super::error::Error;
-use crate::event::Hand;
+use crate::event::WorkerSpec;
 
 /// Cycles that two workers' failures may lie apart and still be the same: one computes ahead of what the other has said.
 const SAME_FAULT: u64 = 2;
 
 struct Worker {
     /// As it came; its speed is the one that it is dealt work by.
-    hand: Hand,
+    spec: WorkerSpec,
     /// Not lost.
     alive: bool,
     /// It wants to go, at the next plan boundary.
@@ -26,9 +26,9 @@ pub(super) struct Workers {
 
 impl Workers {
     /// Those that a job begins with.
-    pub(super) fn new(hands: &[Hand]) -> Self {
+    pub(super) fn new(specs: &[WorkerSpec]) -> Self {
         let mut workers = Self { all: Vec::new(), failed: Vec::new() };
-        hands.iter().for_each(|hand| workers.join(hand.clone()));
+        specs.iter().for_each(|spec| workers.join(spec.clone()));
         workers
     }
 
@@ -38,21 +38,20 @@ impl Workers {
     }
 
     /// One has come.
-    pub(super) fn join(&mut self, hand: Hand) {
-        self.all.push(Worker { hand, alive: true, leaves: false });
+    pub(super) fn join(&mut self, spec: WorkerSpec) {
+        self.all.push(Worker { spec, alive: true, leaves: false });
     }
 
     /// As it came.
-    pub(super) fn hand(&self, index: usize) -> &Hand {
-        &self.all[index].hand
+    pub(super) fn spec(&self, index: usize) -> &WorkerSpec {
+        &self.all[index].spec
     }
 
-    /// Names of some.
-    pub(super) fn names(&self, crew: &[usize]) -> Vec<String> {
-        crew.iter().map(|&index| self.all[index].hand.name.clone()).collect()
+    pub(super) fn names(&self, at_work: &[usize]) -> Vec<String> {
+        at_work.iter().map(|&index| self.all[index].spec.name.clone()).collect()
     }
 
-    /// Indices of those that are alive: the crew of the next epoch.
+    /// Indices of those that are alive: the workers of the next epoch.
     pub(super) fn alive(&self) -> Vec<usize> {
         (0..self.all.len()).filter(|&index| self.all[index].alive).collect()
     }
@@ -77,28 +76,28 @@ impl Workers {
         self.all[index].leaves = true;
     }
 
-    /// Whether somebody waits to be taken into the crew.
-    pub(super) fn has_newcomers(&self, crew: &[usize]) -> bool {
+    /// Whether somebody waits to be taken into the workers.
+    pub(super) fn has_newcomers(&self, at_work: &[usize]) -> bool {
         self.all.iter().filter(|worker| worker.alive && !worker.leaves).count()
-            > crew.iter().filter(|&&index| !self.all[index].leaves).count()
+            > at_work.iter().filter(|&&index| !self.all[index].leaves).count()
     }
 
-    /// Whether somebody of the crew wants to go.
-    pub(super) fn has_leavers(&self, crew: &[usize]) -> bool {
-        crew.iter().any(|&index| self.all[index].leaves)
+    /// Whether somebody of the workers wants to go.
+    pub(super) fn has_leavers(&self, at_work: &[usize]) -> bool {
+        at_work.iter().any(|&index| self.all[index].leaves)
     }
 
-    /// Lets those of the crew go that want to; gives their indices.
-    pub(super) fn release(&mut self, crew: &[usize]) -> Vec<usize> {
-        let leavers: Vec<usize> = crew.iter().copied().filter(|&index| self.all[index].leaves).collect();
+    /// Lets those of the workers go that want to; gives their indices.
+    pub(super) fn release(&mut self, at_work: &[usize]) -> Vec<usize> {
+        let leavers: Vec<usize> = at_work.iter().copied().filter(|&index| self.all[index].leaves).collect();
         leavers.iter().for_each(|&index| self.all[index].alive = false);
         leavers
     }
 
-    /// The crew is dealt work by other speeds from now on.
-    pub(super) fn set_speeds(&mut self, crew: &[usize], speeds: &[f64]) {
-        for (&index, &speed) in crew.iter().zip(speeds) {
-            self.all[index].hand.speed = speed;
+    /// The workers is dealt work by other speeds from now on.
+    pub(super) fn set_speeds(&mut self, at_work: &[usize], speeds: &[f64]) {
+        for (&index, &speed) in at_work.iter().zip(speeds) {
+            self.all[index].spec.speed = speed;
         }
     }
 
@@ -108,9 +107,9 @@ impl Workers {
     /// # Errors
     /// Then the reason, which ends the job.
     pub(super) fn fail(&mut self, index: usize, cycle: u64, reason: &str) -> Result<(), Error> {
-        let worker = self.all[index].hand.name.clone();
+        let worker = self.all[index].spec.name.clone();
         if let Some(&(first, at)) = self.failed.iter().find(|(_, at)| at.abs_diff(cycle) <= SAME_FAULT) {
-            let first = self.all[first].hand.name.clone();
+            let first = self.all[first].spec.name.clone();
             return Err(Error::FailedAgain { worker, cycle, reason: reason.to_owned(), first, at });
         }
         if !self.all.iter().enumerate().any(|(other, worker)| other != index && worker.alive) {
@@ -126,8 +125,8 @@ mod tests {
     use super::*;
 
     fn three() -> Workers {
-        let hand = |name: &str| Hand { name: name.to_owned(), speed: 1.0, threads: 1 };
-        Workers::new(&["a", "b", "c"].map(hand))
+        let spec = |name: &str| WorkerSpec { name: name.to_owned(), speed: 1.0, threads: 1 };
+        Workers::new(&["a", "b", "c"].map(spec))
     }
 
     #[test]
@@ -160,7 +159,8 @@ mod tests {
             again.to_string(),
             "worker c, cycle 42: NaN; worker a failed at cycle 40 as well, so it is not the worker's fault"
         );
-        let alone = Workers::new(&[Hand { name: "a".into(), speed: 1.0, threads: 1 }]).fail(0, 3, "NaN");
+        let alone =
+            Workers::new(&[WorkerSpec { name: "a".into(), speed: 1.0, threads: 1 }]).fail(0, 3, "NaN");
         assert_eq!(alone.map_err(|e| e.to_string()), Err("worker a, cycle 3: NaN".to_owned()));
     }
 }

@@ -124,7 +124,6 @@ fn fitting(text: &str, size: RasterHeight, room: i64) -> String {
 }
 
 impl Legend {
-    /// Draws all of it.
     pub fn draw(&self, image: &mut Image, camera: &Camera) {
         let (width, height) = (i64::from(image.width), i64::from(image.height));
         let [left, top, wide, _] = frame((image.width, image.height)).map(|x| x as i64);

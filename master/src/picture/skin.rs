@@ -17,14 +17,12 @@ pub struct Skin {
     pub lines: Vec<([u32; 2], bool)>,
 }
 
-/// A face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Face {
     /// Corners; the last is repeated in a triangle.
     pub corners: [u32; 4],
     /// The field at each corner.
     pub values: [f64; 4],
-    /// Part.
     part: u32,
 }
 

@@ -28,7 +28,6 @@ pub struct HistoryRow {
     pub time: f64,
     /// Time step of the cycle (time).
     pub dt: f64,
-    /// Kinetic energy.
     pub kinetic: f64,
     /// Internal energy, with what artificial viscosity put in.
     pub internal: f64,
@@ -42,7 +41,6 @@ pub struct HistoryRow {
     pub eroded: f64,
     /// Elements that have eroded.
     pub eroded_elements: u64,
-    /// Their mass.
     pub eroded_mass: f64,
     /// Work done on the bodies from outside, by prescribed velocities and walls.
     pub external: f64,
@@ -71,7 +69,6 @@ impl HistoryRow {
 /// Energies of one part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartEnergy {
-    /// Kinetic energy.
     pub kinetic: f64,
     /// Internal energy, with what artificial viscosity put in.
     pub internal: f64,

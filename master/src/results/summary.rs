@@ -26,7 +26,6 @@ pub struct Summary {
     pub nodes: u64,
     /// Elements with at least one surface face.
     pub surface_elements: u64,
-    /// Surface faces.
     pub surface_faces: u64,
     /// Nodes of surface faces.
     pub surface_nodes: u64,
@@ -105,7 +104,7 @@ pub struct WorkerTimes {
     pub wait_s: f64,
     /// Integration of all nodes, and the vote.
     pub integrate_s: f64,
-    /// Images and transfers.
+    /// States and transfers.
     pub other_s: f64,
     /// Bytes that it sent to other workers over links of its own.
     pub peer_bytes: u64,
@@ -140,9 +139,7 @@ const NAMED_PARTS: usize = 4;
 pub struct NamedPart {
     /// Its name in the deck.
     pub name: String,
-    /// Kinetic energy.
     pub kinetic: f64,
-    /// Internal energy.
     pub internal: f64,
     /// Energy taken by hourglass forces.
     pub hourglass: f64,
@@ -172,9 +169,7 @@ pub struct NamedPair {
 /// Energies of the whole problem in the deck's unit of energy; `error` is relative.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energies {
-    /// Kinetic energy.
     pub kinetic: f64,
-    /// Internal energy.
     pub internal: f64,
     /// Energy taken by hourglass forces.
     pub hourglass: f64,

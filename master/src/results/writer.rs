@@ -21,7 +21,7 @@ use super::{Error, vtu::Series};
 type Task = (Box<GlobalState>, Option<Arc<[u32]>>);
 
 #[derive(Default)]
-struct Desk {
+struct WriteQueue {
     waiting: Option<Task>,
     writing: bool,
     ended: bool,
@@ -29,7 +29,7 @@ struct Desk {
 }
 
 struct Shared {
-    desk: Mutex<Desk>,
+    write_queue: Mutex<WriteQueue>,
     changed: Condvar,
     /// Locked while a state is written.
     series: Mutex<Series>,
@@ -38,12 +38,12 @@ struct Shared {
 }
 
 impl Shared {
-    fn desk(&self) -> MutexGuard<'_, Desk> {
-        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+    fn write_queue(&self) -> MutexGuard<'_, WriteQueue> {
+        self.write_queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn wait<'a>(&self, desk: MutexGuard<'a, Desk>) -> MutexGuard<'a, Desk> {
-        self.changed.wait(desk).unwrap_or_else(PoisonError::into_inner)
+    fn wait<'a>(&self, write_queue: MutexGuard<'a, WriteQueue>) -> MutexGuard<'a, WriteQueue> {
+        self.changed.wait(write_queue).unwrap_or_else(PoisonError::into_inner)
     }
 
     fn series(&self) -> MutexGuard<'_, Series> {
@@ -64,7 +64,7 @@ impl Writer {
     /// If it cannot start.
     pub fn start(series: Series, model: Arc<Model>) -> Result<Self, String> {
         let shared = Arc::new(Shared {
-            desk: Mutex::default(),
+            write_queue: Mutex::default(),
             changed: Condvar::new(),
             series: Mutex::new(series),
             failed: AtomicBool::new(false),
@@ -82,15 +82,15 @@ impl Writer {
     /// # Errors
     /// What the disk refused before.
     pub fn put(&self, state: Box<GlobalState>, workers: Option<Arc<[u32]>>) -> Result<(), Error> {
-        let mut desk = self.shared.desk();
-        while desk.waiting.is_some() {
-            desk = self.shared.wait(desk);
+        let mut write_queue = self.shared.write_queue();
+        while write_queue.waiting.is_some() {
+            write_queue = self.shared.wait(write_queue);
         }
-        if let Some(fault) = desk.fault.take() {
+        if let Some(fault) = write_queue.fault.take() {
             return Err(fault);
         }
-        desk.waiting = Some((state, workers));
-        drop(desk);
+        write_queue.waiting = Some((state, workers));
+        drop(write_queue);
         self.shared.changed.notify_all();
         Ok(())
     }
@@ -103,7 +103,7 @@ impl Writer {
         if !self.shared.failed.load(Ordering::Relaxed) {
             return Ok(());
         }
-        self.shared.desk().fault.take().map_or(Ok(()), Err)
+        self.shared.write_queue().fault.take().map_or(Ok(()), Err)
     }
 
     /// Waits until everything that was handed over is on disk.
@@ -111,11 +111,11 @@ impl Writer {
     /// # Errors
     /// What the disk refused.
     pub fn flush(&self) -> Result<(), Error> {
-        let mut desk = self.shared.desk();
-        while desk.writing || desk.waiting.is_some() {
-            desk = self.shared.wait(desk);
+        let mut write_queue = self.shared.write_queue();
+        while write_queue.writing || write_queue.waiting.is_some() {
+            write_queue = self.shared.wait(write_queue);
         }
-        desk.fault.take().map_or(Ok(()), Err)
+        write_queue.fault.take().map_or(Ok(()), Err)
     }
 
     /// Works on the series, which stands still meanwhile, with everything written.
@@ -130,7 +130,7 @@ impl Writer {
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        self.shared.desk().ended = true;
+        self.shared.write_queue().ended = true;
         self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
             // Its panic would be a bug that has printed its words.
@@ -144,23 +144,23 @@ struct Busy<'a>(&'a Shared);
 
 impl Drop for Busy<'_> {
     fn drop(&mut self) {
-        self.0.desk().writing = false;
+        self.0.write_queue().writing = false;
         self.0.changed.notify_all();
     }
 }
 
 fn serve(shared: &Shared, model: &Model) {
     loop {
-        let mut desk = shared.desk();
+        let mut write_queue = shared.write_queue();
         let (state, workers) = loop {
-            match desk.waiting.take() {
+            match write_queue.waiting.take() {
                 Some(task) => break task,
-                None if desk.ended => return,
-                None => desk = shared.wait(desk),
+                None if write_queue.ended => return,
+                None => write_queue = shared.wait(write_queue),
             }
         };
-        desk.writing = true;
-        drop(desk);
+        write_queue.writing = true;
+        drop(write_queue);
         // There is room for the next to wait.
         shared.changed.notify_all();
         let _busy = Busy(shared);
@@ -168,7 +168,7 @@ fn serve(shared: &Shared, model: &Model) {
             continue;
         }
         if let Err(fault) = shared.series().write(model, &state, workers.as_deref()) {
-            shared.desk().fault = Some(fault);
+            shared.write_queue().fault = Some(fault);
             shared.failed.store(true, Ordering::Relaxed);
         }
     }

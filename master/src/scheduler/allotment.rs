@@ -29,9 +29,9 @@ pub(super) fn of(entry: &Entry, running: &[u32], idle: &[&str], since_start: Dur
     let needed = entry.options.min_workers.max(1) as usize;
     match &entry.before {
         // Any worker will do for what was begun with enough of them.
-        Some(crew) => {
-            let all = crew.len();
-            let back = crew.iter().filter(|name| idle.contains(&name.as_str())).count();
+        Some(at_work) => {
+            let all = at_work.len();
+            let back = at_work.iter().filter(|name| idle.contains(&name.as_str())).count();
             if idle.is_empty() || back < all && since_start < RETURN_LIMIT {
                 return Allotment::Wait(format!("its workers: {back} of {all} are back"));
             }

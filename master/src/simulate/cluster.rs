@@ -18,7 +18,6 @@ use super::{
 
 /// Longest cluster file (bytes).
 const MAX_TEXT: u64 = 1 << 20;
-/// Most hosts.
 const MAX_HOSTS: u64 = 10_000;
 /// Most entries of an array of tables.
 const MAX_ENTRIES: usize = 1_000;
@@ -30,7 +29,6 @@ pub struct Cluster {
     pub title: String,
     /// Relative speed of each host.
     pub speeds: Vec<f64>,
-    /// What an element costs.
     pub element: ElementCost,
     /// Integrating a node, in element-cycles.
     pub node: f64,
@@ -40,7 +38,6 @@ pub struct Cluster {
     pub search: f64,
     /// A surface node in a sort, in pairs.
     pub sort: f64,
-    /// The network.
     pub network: Network,
     /// What happens to hosts.
     pub changes: Vec<Change>,
@@ -51,7 +48,6 @@ pub struct Cluster {
 /// What an element-cycle costs on a host of speed 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ElementCost {
-    /// Seconds.
     Seconds(f64),
     /// Such that one host takes these seconds per cycle (or per k cycles) without and with contact.
     Calibrated([f64; 2]),

@@ -20,7 +20,7 @@ fn colour(kind: Kind) -> &'static str {
         Kind::Sort => "#b5179e",
         Kind::Send => "#c1121f",
         Kind::Receive => "#f28482",
-        Kind::Load | Kind::Transfer | Kind::Image => "#adb5bd",
+        Kind::Load | Kind::Transfer | Kind::WorkerState => "#adb5bd",
     }
 }
 
@@ -33,7 +33,7 @@ fn name(kind: Kind) -> &'static str {
         Kind::Border => "contact and border",
         Kind::Interior => "interior",
         Kind::Integrate => "integrate",
-        Kind::Image => "image",
+        Kind::WorkerState => "image",
         Kind::Sort => "sort",
         Kind::Send => "send",
         Kind::Receive => "receive",

@@ -42,7 +42,7 @@ impl Costs {
             Kind::Border => Phases { contact, border: elements(load.border), ..none },
             Kind::Interior => Phases { interior: elements(load.interior), ..none },
             Kind::Integrate => Phases { integrate: self.node * load.nodes as f64, ..none },
-            Kind::Transfer | Kind::Image | Kind::Sort | Kind::Send | Kind::Receive => none,
+            Kind::Transfer | Kind::WorkerState | Kind::Sort | Kind::Send | Kind::Receive => none,
         }
     }
 }
@@ -56,7 +56,6 @@ pub struct Machines {
     pub believed: Vec<f64>,
     /// Costs of work.
     pub costs: Costs,
-    /// The network.
     pub network: Network,
     /// What happens to hosts, by cycle.
     pub changes: Vec<Change>,
@@ -79,7 +78,6 @@ impl Machines {
 pub struct Change {
     /// Host, from 0.
     pub host: usize,
-    /// The cycle.
     pub cycle: u64,
     /// What happens.
     pub what: What,
@@ -95,7 +93,6 @@ pub enum What {
     /// It stands still for so long (s), as a stopped process does. Silent for longer than [`SILENCE`] it is given up; when it
     /// goes on, it dials again and joins anew.
     Stop(f64),
-    /// It joins.
     Join,
 }
 

@@ -37,7 +37,6 @@ pub struct Row {
     pub elements: usize,
     /// Which speeds; 0 are equal ones.
     pub seed: u64,
-    /// Hosts.
     pub hosts: usize,
     /// Relative speed of each host.
     pub speeds: Vec<f64>,

@@ -1,6 +1,5 @@
 //! The paper's tables 1 and 2: what stands beside the modelled figures.
 
-/// One table.
 pub struct PaperTable {
     /// Numbers of machines.
     pub hosts: &'static [usize],
@@ -26,7 +25,6 @@ const TABLE_2: PaperTable = PaperTable {
     ],
 };
 
-/// A table by its number.
 pub fn table(number: u64) -> Option<&'static PaperTable> {
     match number {
         1 => Some(&TABLE_1),

@@ -8,7 +8,6 @@ use std::collections::VecDeque;
 /// How urgent work is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rank {
-    /// Messages.
     Message = 0,
     /// The tasks of a worker.
     Compute = 1,

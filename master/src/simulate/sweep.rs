@@ -26,7 +26,6 @@ pub struct Row {
     pub benchmark: usize,
     /// Elements of the problem.
     pub elements: usize,
-    /// Hosts.
     pub hosts: usize,
     /// `direct` or `master`.
     pub route: &'static str,
@@ -42,7 +41,6 @@ pub struct Row {
     pub bytes_per_cycle: f64,
     /// What is busy for which share of a cycle.
     pub busy: Busy,
-    /// What is busiest.
     pub busiest: &'static str,
     /// Digest of the final state.
     pub digest: String,
@@ -55,7 +53,6 @@ pub struct Busy {
     pub computing: f64,
     /// The processor of host 1 with messages to and from other hosts.
     pub messages: f64,
-    /// The same with sorts.
     pub sorts: f64,
     /// The wire out of host 1.
     pub wire_out: f64,

@@ -25,7 +25,6 @@ pub struct Row {
     pub benchmark: usize,
     /// Elements of the problem.
     pub elements: usize,
-    /// Hosts.
     pub hosts: usize,
     /// `direct`, `master` or `control`.
     pub route: &'static str,

@@ -64,7 +64,7 @@ enum Kept {
     Computed,
     Forces(usize, usize),
     Integrated(Box<Vote>),
-    Image,
+    WorkerState,
     Sampled([u8; 16]),
 }
 
@@ -78,7 +78,7 @@ impl Kept {
                 | (Self::Computed, Task::Elements { .. } | Task::Interior { .. })
                 | (Self::Forces(..), Task::Install { .. } | Task::Border { .. })
                 | (Self::Integrated(_), Task::Integrate { .. })
-                | (Self::Image, Task::Image { .. })
+                | (Self::WorkerState, Task::WorkerState { .. })
                 | (Self::Sampled(_), Task::Sample { .. })
         )
     }
@@ -100,7 +100,6 @@ pub enum Player {
 }
 
 impl Player {
-    /// One that computes.
     pub fn live() -> Self {
         Self::Live { machine: Box::default(), load: Load::default(), kept: Vec::new() }
     }
@@ -146,7 +145,7 @@ fn keep(outcome: &Outcome) -> Result<Kept, String> {
         Outcome::Computed => Kept::Computed,
         Outcome::Forces { partials, gathered } => Kept::Forces(partials.len(), gathered.len()),
         Outcome::Integrated(vote) => Kept::Integrated(vote.clone()),
-        Outcome::Image { .. } => Kept::Image,
+        Outcome::WorkerState { .. } => Kept::WorkerState,
         Outcome::Sampled(hash) => Kept::Sampled(*hash),
         Outcome::Failed(reason) => return Err(reason.clone()),
     })
@@ -162,6 +161,6 @@ fn give(kept: Kept) -> Outcome {
         }
         Kept::Integrated(vote) => Outcome::Integrated(vote),
         Kept::Sampled(hash) => Outcome::Sampled(hash),
-        Kept::Image => Outcome::Image { pieces: Vec::new(), work: Work::default() },
+        Kept::WorkerState => Outcome::WorkerState { pieces: Vec::new(), work: Work::default() },
     }
 }

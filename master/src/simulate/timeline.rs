@@ -10,13 +10,11 @@ use crate::incident::{Loss, Rebalance};
 pub struct Phases {
     /// Elements before the partial forces leave.
     pub border: f64,
-    /// Contact.
     pub contact: f64,
     /// Elements while partial forces travel.
     pub interior: f64,
     /// Processor time of messages, at both ends.
     pub send: f64,
-    /// Integrating.
     pub integrate: f64,
     /// Everything else: waiting, and on host 1 the master's work.
     pub wait: f64,
@@ -44,10 +42,9 @@ pub enum Kind {
     Border,
     /// Interior elements.
     Interior,
-    /// Integrating.
     Integrate,
-    /// An image, or a sample of what elements came to.
-    Image,
+    /// A state, or a sample of what elements came to.
+    WorkerState,
     /// The master sorts.
     Sort,
     /// A message leaves.
@@ -57,7 +54,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// What a task is.
     pub fn of(task: &Task) -> Self {
         match task {
             Task::Load { .. } => Kind::Load,
@@ -67,7 +63,7 @@ impl Kind {
             Task::Border { .. } => Kind::Border,
             Task::Interior { .. } => Kind::Interior,
             Task::Integrate { .. } => Kind::Integrate,
-            Task::Image { .. } | Task::Sample { .. } => Kind::Image,
+            Task::WorkerState { .. } | Task::Sample { .. } => Kind::WorkerState,
         }
     }
 }
@@ -79,7 +75,6 @@ pub struct Span {
     pub host: usize,
     /// The master's work, not the worker's.
     pub master: bool,
-    /// What.
     pub kind: Kind,
     /// The worker's cycle.
     pub cycle: u64,
@@ -107,11 +102,9 @@ pub struct Flight {
 /// What was worked on in one cycle, by all workers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
-    /// Elements.
     pub elements: u64,
     /// Nodes, copies included.
     pub nodes: u64,
-    /// Pairs.
     pub pairs: u64,
     /// Pairs of plans that start to act.
     pub searched: u64,
@@ -159,7 +152,7 @@ impl Timeline {
         phases.contact += costs.contact / speed;
         phases.interior += costs.interior / speed;
         phases.integrate += costs.integrate / speed;
-        if kind == Kind::Image {
+        if kind == Kind::WorkerState {
             return;
         }
         let counts = counts_at(&mut self.counts, cycle);

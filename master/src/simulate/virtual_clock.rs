@@ -31,9 +31,9 @@ use super::{
 };
 use crate::{
     embedded::timed_sort,
-    event::{Action, Event, Hand, Outcome},
+    event::{Action, Event, Outcome, WorkerSpec},
     job::Job,
-    options::{Keep, SessionOptions},
+    options::{CheckpointEvery, SessionOptions},
     sort::{Gathered, SortBasis, Sorted},
     world::{End, Error, Letter, Parcel, Sessions, Surroundings, World},
 };
@@ -71,7 +71,6 @@ struct Clock<'a> {
     /// By host: when its last message was handled (s).
     message_ended: Vec<f64>,
     heap: BinaryHeap<Due>,
-    /// Messages so far.
     messages: u64,
     order: u64,
     now: f64,
@@ -89,8 +88,8 @@ pub fn run(
     tape: Option<&Tape>,
 ) -> Result<(Timeline, Option<Tape>), Error> {
     let n = machines.speeds.len();
-    let first_crew: Vec<usize> = (0..n).filter(|&host| !machines.comes_later(host)).collect();
-    let hands: Vec<Hand> = first_crew.iter().map(|&host| hand(machines, host)).collect();
+    let first_at_work: Vec<usize> = (0..n).filter(|&host| !machines.comes_later(host)).collect();
+    let specs: Vec<WorkerSpec> = first_at_work.iter().map(|&host| spec(machines, host)).collect();
     let come_and_go = machines.come_and_go();
     let options = SessionOptions {
         asked: JobOptions {
@@ -101,14 +100,14 @@ pub fn run(
             no_output: true,
             ..JobOptions::default()
         },
-        keep: if come_and_go { Keep::Seconds(KEEP_SECONDS) } else { Keep::Never },
+        keep: if come_and_go { CheckpointEvery::Seconds(KEEP_SECONDS) } else { CheckpointEvery::Never },
         waits: come_and_go,
         dealing: scheme.dealing,
         costs: machines.costs.relative(),
         ..SessionOptions::default()
     };
     let (job, first) =
-        Job::new(Arc::clone(model), &hands, options, None).map_err(|e| Error::Surroundings(e.to_string()))?;
+        Job::new(Arc::clone(model), &specs, options, None).map_err(|e| Error::Surroundings(e.to_string()))?;
     let players: Vec<Player> = match tape {
         None => (0..n).map(|_| Player::live()).collect(),
         Some(tape) => tape.workers.iter().map(|kept| Player::Tape(kept.iter().cloned().collect())).collect(),
@@ -143,7 +142,7 @@ pub fn run(
         timeline: Timeline { ends: vec![Vec::new(); n], phases: vec![Vec::new(); n], ..Timeline::default() },
     };
     let mut world = World::new(n, clock);
-    world.begin(job, first, first_crew)?;
+    world.begin(job, first, first_at_work)?;
     let outcome = world.drive()?;
     if let Some(reason) = outcome.failure {
         return Err(Error::Surroundings(reason));
@@ -169,8 +168,8 @@ pub fn run(
 }
 
 /// A host as the job sees it.
-fn hand(machines: &Machines, host: usize) -> Hand {
-    Hand { name: format!("host-{}", host + 1), speed: machines.believed[host], threads: 1 }
+fn spec(machines: &Machines, host: usize) -> WorkerSpec {
+    WorkerSpec { name: format!("host-{}", host + 1), speed: machines.believed[host], threads: 1 }
 }
 
 /// The machine of an end: the master is on the first.
@@ -239,8 +238,8 @@ impl World<Clock<'_>> {
     }
 
     fn join_host(&mut self, host: usize) -> Result<(), Error> {
-        let hand = hand(self.surroundings.machines, host);
-        self.join(host, hand)
+        let spec = spec(self.surroundings.machines, host);
+        self.join(host, spec)
     }
 
     /// A processor is done with something.

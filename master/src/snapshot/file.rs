@@ -20,7 +20,6 @@ pub const CHUNK: usize = 1 << 20;
 /// Magic, length, cycle.
 const HEADER: usize = 24;
 
-/// What a file was written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Written {
     /// Length of the file (bytes).

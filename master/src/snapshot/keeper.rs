@@ -1,7 +1,7 @@
 //! KEEPER: writes snapshots on a thread of its own, at most one at a time, the newest first.
 //!
-//! Whoever runs a job hands over a base and goes on; encoding, checksums and the disk cost it nothing. A disk that
-//! cannot keep up loses bases, not cycles. A disk that refuses is a warning: the run goes on with the older ones.
+//! Whoever runs a job hands over a checkpoint and goes on; encoding, checksums and the disk cost it nothing. A disk that
+//! cannot keep up loses checkpoints, not cycles. A disk that refuses is a warning: the run goes on with the older ones.
 
 use std::{
     fs::File,
@@ -15,7 +15,7 @@ use tracing::{debug, warn};
 
 use super::{Snapshot, store::Store};
 
-/// A base that comes this much early counts as in time: bases are taken by a clock of the same period.
+/// A checkpoint that comes this much early counts as in time: checkpoints are taken by a clock of the same period.
 const EARLY: f64 = 0.8;
 
 /// How often a run is stored.
@@ -48,7 +48,7 @@ pub struct Kept {
 }
 
 #[derive(Default)]
-struct Desk {
+struct WriteQueue {
     waiting: Option<Box<Snapshot>>,
     writing: bool,
     ended: bool,
@@ -57,13 +57,13 @@ struct Desk {
 
 #[derive(Default)]
 struct Shared {
-    desk: Mutex<Desk>,
+    write_queue: Mutex<WriteQueue>,
     changed: Condvar,
 }
 
 impl Shared {
-    fn desk(&self) -> MutexGuard<'_, Desk> {
-        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+    fn write_queue(&self) -> MutexGuard<'_, WriteQueue> {
+        self.write_queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -89,7 +89,7 @@ impl Keeper {
         results: Option<PathBuf>,
     ) -> Result<Self, String> {
         let shared = Arc::new(Shared::default());
-        shared.desk().kept.cycle = store.generations().first().map(|g| g.cycle);
+        shared.write_queue().kept.cycle = store.generations().first().map(|g| g.cycle);
         let of_thread = Arc::clone(&shared);
         let thread = std::thread::Builder::new().name("snapshots".to_owned()).spawn(move || {
             worker::compute::lowest_priority();
@@ -99,7 +99,7 @@ impl Keeper {
         Ok(Self { shared, thread: Some(thread), interval, last: (Instant::now(), first_cycle) })
     }
 
-    /// Whether the base of a cycle is due.
+    /// Whether the checkpoint of a cycle is due.
     pub fn is_due(&self, cycle: u64) -> bool {
         let (at, last) = self.last;
         self.interval.seconds.is_some_and(|s| at.elapsed().as_secs_f64() >= EARLY * s)
@@ -109,33 +109,33 @@ impl Keeper {
     /// Hands a snapshot over; one that still waits is replaced.
     pub fn put(&mut self, snapshot: Box<Snapshot>) {
         self.last = (Instant::now(), snapshot.state.cycle);
-        self.shared.desk().waiting = Some(snapshot);
+        self.shared.write_queue().waiting = Some(snapshot);
         self.shared.changed.notify_all();
     }
 
     /// What has been stored so far.
     pub fn kept(&self) -> Kept {
-        self.shared.desk().kept.clone()
+        self.shared.write_queue().kept.clone()
     }
 
     /// Waits until everything that was handed over is on disk, or was refused by it.
     pub fn flush(&self) -> Kept {
-        let mut desk = self.shared.desk();
-        while desk.writing || desk.waiting.is_some() {
-            desk = self.shared.changed.wait(desk).unwrap_or_else(PoisonError::into_inner);
+        let mut write_queue = self.shared.write_queue();
+        while write_queue.writing || write_queue.waiting.is_some() {
+            write_queue = self.shared.changed.wait(write_queue).unwrap_or_else(PoisonError::into_inner);
         }
-        desk.kept.clone()
+        write_queue.kept.clone()
     }
 
     /// Forgets what waits, and ends with the snapshot under way.
     pub fn discard(self) {
-        self.shared.desk().waiting = None;
+        self.shared.write_queue().waiting = None;
     }
 }
 
 impl Drop for Keeper {
     fn drop(&mut self) {
-        self.shared.desk().ended = true;
+        self.shared.write_queue().ended = true;
         self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
             // Its panic would be a bug that has printed its words.
@@ -146,28 +146,30 @@ impl Drop for Keeper {
 
 fn serve(shared: &Shared, mut store: Store, results: Option<&Path>) {
     loop {
-        let mut desk = shared.desk();
+        let mut write_queue = shared.write_queue();
         let snapshot = loop {
-            match desk.waiting.take() {
+            match write_queue.waiting.take() {
                 Some(snapshot) => break snapshot,
-                None if desk.ended => return,
-                None => desk = shared.changed.wait(desk).unwrap_or_else(PoisonError::into_inner),
+                None if write_queue.ended => return,
+                None => {
+                    write_queue = shared.changed.wait(write_queue).unwrap_or_else(PoisonError::into_inner)
+                }
             }
         };
-        desk.writing = true;
-        drop(desk);
+        write_queue.writing = true;
+        drop(write_queue);
         let (cycle, started) = (snapshot.state.cycle, Instant::now());
         let synced = results.map_or(Ok(()), |folder| File::open(folder)?.sync_all());
         let result = synced.map_err(|e| format!("results folder: {e}")).and_then(|()| store.put(&snapshot));
         drop(snapshot);
         let took = started.elapsed();
-        let mut desk = shared.desk();
-        desk.writing = false;
+        let mut write_queue = shared.write_queue();
+        write_queue.writing = false;
         match result {
-            Ok(()) => stored(&mut desk.kept, cycle, took),
-            Err(why) => refused(&mut desk.kept, cycle, why),
+            Ok(()) => stored(&mut write_queue.kept, cycle, took),
+            Err(why) => refused(&mut write_queue.kept, cycle, why),
         }
-        drop(desk);
+        drop(write_queue);
         shared.changed.notify_all();
     }
 }

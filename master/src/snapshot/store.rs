@@ -136,7 +136,6 @@ impl Store {
         &self.generations
     }
 
-    /// The folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -252,7 +251,7 @@ mod tests {
     use mechanics::{exact::Quantum, state::GlobalState, vote::Vote};
 
     use super::*;
-    use crate::ledger::Ledger;
+    use crate::run_totals::RunTotals;
 
     const DECK: &str = "title = \"a cube\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"cube\"\nmaterial = \"AL_2024_T351\"\nbox = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }\n";
 
@@ -269,7 +268,7 @@ mod tests {
             spread_rate: 0.0,
             vote: Vote::empty(1),
             walls: Vec::new(),
-            ledger: Ledger::new(&model, &vec![1.0; model.mesh.n_nodes()]),
+            run_totals: RunTotals::new(&model, &vec![1.0; model.mesh.n_nodes()]),
             rows: Vec::new(),
             states: vec![(0, 0.0), (cycle, 0.5)],
         }

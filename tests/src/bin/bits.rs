@@ -256,7 +256,6 @@ fn on_clusters(asked: &Asked, deck: &Path, first: &str) -> Result<usize, String>
 enum Event {
     /// None to wait for: nothing meets or leaves in it, or it runs onto a wall at once.
     None,
-    /// Contact.
     Contact,
     /// Contact, and elements that left.
     Erosion,

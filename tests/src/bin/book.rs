@@ -22,14 +22,14 @@ use std::{
 
 use tests::{
     book::{ENTRIES, Entry},
-    case::{Case, Sheet, number},
+    case::{Case, Figures, number},
 };
 
 /// What is said of a case of which there are no figures.
 const NOT_COMPUTED: &str = "it was not computed when this file was written";
 
 /// What came of an entry: its figures, or what it said when it broke off.
-type Done = Result<Sheet, String>;
+type Done = Result<Figures, String>;
 
 fn main() -> ExitCode {
     let (flags, words): (Vec<String>, Vec<String>) =
@@ -104,17 +104,17 @@ impl Shelf {
     }
 
     /// What was kept of a case.
-    fn take(&self, entry: &Entry) -> Option<Sheet> {
+    fn take(&self, entry: &Entry) -> Option<Figures> {
         let text = std::fs::read(self.path(entry)).ok()?;
         // Bits, because a figure may be no number.
         let kept: Vec<(String, u64)> = serde_json::from_slice(&text).ok()?;
-        Some(Sheet::of(
+        Some(Figures::of(
             &kept.into_iter().map(|(name, bits)| (name, f64::from_bits(bits))).collect::<Vec<_>>(),
         ))
     }
 
     /// Keeps the figures of a case. A disk that does not take them costs computing them again.
-    fn keep(&self, entry: &Entry, sheet: &Sheet) {
+    fn keep(&self, entry: &Entry, sheet: &Figures) {
         let bits: Vec<(String, u64)> =
             sheet.figures().into_iter().map(|(name, ours)| (name, ours.to_bits())).collect();
         let text = serde_json::to_vec(&bits).expect("names and numbers");

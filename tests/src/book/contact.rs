@@ -1,9 +1,9 @@
 //! Contact through the whole system: debris, bodies thrown at each other, meshes that do not match, plates.
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     checker::{crossed, intruders},
-    solve::{Crew, Solved, example, mean, model, run, run_with_states, solve},
+    solve::{Solved, Workers, example, mean, model, run, run_with_states, solve},
 };
 use deck::model::{Gauge, Model};
 use mechanics::{material::Strength, state::field};
@@ -37,7 +37,7 @@ fn momenta(mass: &[f64], x: &[[f64; 3]], v: &[[f64; 3]]) -> ([f64; 6], [f64; 2])
     (sums, scales)
 }
 
-pub(super) fn eight_bodies_that_hit_each_other_keep_both_momenta(sheet: &mut Sheet) {
+pub(super) fn eight_bodies_that_hit_each_other_keep_both_momenta(figures: &mut Figures) {
     let mut deck = String::from(
         "title = \"debris\"\nunits = \"SI\"\n[control]\nend_cycle = 2000\nend_time = 1\n\
          [contact]\ngap_length = 0.0002\nself_interaction = \"all\"\n",
@@ -74,18 +74,18 @@ pub(super) fn eight_bodies_that_hit_each_other_keep_both_momenta(sheet: &mut She
     let (before, scales) = momenta(&state.mass, &solved.model.mesh.positions, &solved.model.velocity);
     let (after, _) = momenta(&state.mass, &state.x, &state.v);
     let change = |from: usize| (from..from + 3).map(|a| (after[a] - before[a]).powi(2)).sum::<f64>().sqrt();
-    let ledger = &solved.outcome.ledger;
+    let run_totals = &solved.outcome.run_totals;
     let fastest = state.v.iter().flatten().fold(0.0_f64, |top, v| top.max(v.abs()));
     println!(
         "{} cycles, {:e} s, fastest {fastest}, kinetic {} of {}",
-        state.cycle, state.time, ledger.last.kinetic, ledger.greatest_kinetic
+        state.cycle, state.time, run_totals.last.kinetic, run_totals.greatest_kinetic
     );
-    sheet.add("debris: momentum", change(0) / scales[0]);
-    sheet.add("debris: angular momentum", change(3) / scales[1]);
-    sheet.add("debris: energy error", ledger.last.error);
-    sheet.add("debris: penetration (gaps)", ledger.worst_penetration);
-    sheet.add("debris: nodes in foreign bodies", intruders(&solved.model.mesh, &state.x).len() as f64);
-    assert!(ledger.worst_penetration > 0.0, "nothing met");
+    figures.add("debris: momentum", change(0) / scales[0]);
+    figures.add("debris: angular momentum", change(3) / scales[1]);
+    figures.add("debris: energy error", run_totals.last.error);
+    figures.add("debris: penetration (gaps)", run_totals.worst_penetration);
+    figures.add("debris: nodes in foreign bodies", intruders(&solved.model.mesh, &state.x).len() as f64);
+    assert!(run_totals.worst_penetration > 0.0, "nothing met");
 }
 
 /// A debris box: bodies of one to three elements an edge, of any size, orientation, velocity and spin, all on their way to
@@ -143,9 +143,9 @@ fn debris(n_bodies: usize, cycles: u64, pace: f64) -> Model {
 
 /// Both momenta, energy and penetrations of a debris box. Momenta are those of the nodes at `v(n-1/2)` and `x(n)`: as
 /// `x(n+1) - x(n)` is along `v(n+1/2)`, their sum changes by the moments of forces alone.
-fn box_of(name: &str, (n_bodies, cycles, pace): (usize, u64, f64), sheet: &mut Sheet) {
+fn box_of(name: &str, (n_bodies, cycles, pace): (usize, u64, f64), figures: &mut Figures) {
     let solved = run_with_states(debris(n_bodies, cycles, pace));
-    let (state, ledger) = (&solved.state, &solved.outcome.ledger);
+    let (state, run_totals) = (&solved.state, &solved.outcome.run_totals);
     let (before, scales) = momenta(&state.mass, &solved.model.mesh.positions, &solved.model.velocity);
     let (after, _) = momenta(&state.mass, &state.x, &state.v);
     let change = |from: usize| (from..from + 3).map(|a| (after[a] - before[a]).powi(2)).sum::<f64>().sqrt();
@@ -154,29 +154,29 @@ fn box_of(name: &str, (n_bodies, cycles, pace): (usize, u64, f64), sheet: &mut S
         state.cycle,
         state.time,
         solved.states.len(),
-        ledger.contacts.len(),
-        ledger.last.kinetic,
-        ledger.greatest_kinetic,
+        run_totals.contacts.len(),
+        run_totals.last.kinetic,
+        run_totals.greatest_kinetic,
         worst_energy(&solved)
     );
     assert_eq!(state.cycle, cycles);
     let mesh = &solved.model.mesh;
-    sheet.add(&format!("{name} @ momentum"), change(0) / scales[0]);
-    sheet.add(&format!("{name} @ angular momentum"), change(3) / scales[1]);
-    sheet.add(&format!("{name} @ greatest energy error"), worst_energy(&solved));
-    sheet.add(&format!("{name} @ penetration (gaps)"), ledger.worst_penetration);
+    figures.add(&format!("{name} @ momentum"), change(0) / scales[0]);
+    figures.add(&format!("{name} @ angular momentum"), change(3) / scales[1]);
+    figures.add(&format!("{name} @ greatest energy error"), worst_energy(&solved));
+    figures.add(&format!("{name} @ penetration (gaps)"), run_totals.worst_penetration);
     let inside: usize = solved.states.iter().map(|state| intruders(mesh, &state.x).len()).sum();
-    sheet.add(&format!("{name} @ nodes in foreign bodies, all states"), inside as f64);
+    figures.add(&format!("{name} @ nodes in foreign bodies, all states"), inside as f64);
     let through: usize = solved.states.iter().map(|state| crossed(mesh, &state.x).len()).sum();
-    sheet.add(&format!("{name} @ faces gone through, all states"), through as f64);
+    figures.add(&format!("{name} @ faces gone through, all states"), through as f64);
 }
 
-pub(super) fn a_debris_box_of_ten_bodies_keeps_both_momenta_and_its_energy(sheet: &mut Sheet) {
-    box_of("debris box of 10", (10, 2000, 1.5), sheet);
+pub(super) fn a_debris_box_of_ten_bodies_keeps_both_momenta_and_its_energy(figures: &mut Figures) {
+    box_of("debris box of 10", (10, 2000, 1.5), figures);
 }
 
-pub(super) fn a_debris_box_of_fifty_bodies_keeps_both_momenta_and_its_energy(sheet: &mut Sheet) {
-    box_of("debris box of 50", (50, 10_000, 1.5), sheet);
+pub(super) fn a_debris_box_of_fifty_bodies_keeps_both_momenta_and_its_energy(figures: &mut Figures) {
+    box_of("debris box of 50", (50, 10_000, 1.5), figures);
     let mut off = debris(50, 10_000, 1.5);
     off.setup.contact.as_mut().expect("the deck has contact").edges = false;
     let off = run_with_states(off);
@@ -225,34 +225,34 @@ fn worst_energy(solved: &Solved) -> f64 {
     solved.rows.iter().map(|row| row.error.abs()).fold(0.0, f64::max)
 }
 
-pub(super) fn struck_plates_conserve_keep_apart_and_move_together(sheet: &mut Sheet) {
+pub(super) fn struck_plates_conserve_keep_apart_and_move_together(figures: &mut Figures) {
     let slip = plates("plates-free-slip", 50.0, false);
     let joined = plates("plates-joined", 50.0, false);
-    let ledger = &slip.outcome.ledger;
-    sheet.add("plates, free slip: momentum error", ledger.momentum_error());
-    sheet.add("plates, free slip: energy error to 50 us", worst_energy(&slip));
-    sheet.add("plates, free slip: penetration (gaps)", ledger.worst_penetration);
-    sheet.add(
+    let run_totals = &slip.outcome.run_totals;
+    figures.add("plates, free slip: momentum error", run_totals.momentum_error());
+    figures.add("plates, free slip: energy error to 50 us", worst_energy(&slip));
+    figures.add("plates, free slip: penetration (gaps)", run_totals.worst_penetration);
+    figures.add(
         "plates, free slip: nodes in the other plate",
         intruders(&slip.model.mesh, &slip.state.x).len() as f64,
     );
-    sheet.add("plates, joined: momentum error", joined.outcome.ledger.momentum_error());
-    sheet.add("plates, joined: energy error to 50 us", worst_energy(&joined));
+    figures.add("plates, joined: momentum error", joined.outcome.run_totals.momentum_error());
+    figures.add("plates, joined: energy error to 50 us", worst_energy(&joined));
     // The plates start one gap apart, so that the spring of the gap pushes from the first cycle and nothing has to be
     // shifted in time. The two faces swing against each other; their mean is the interface.
     let both = 0.5 * (between(&interface(&slip, 0), 10.0, 24.0) + between(&interface(&slip, 2), 10.0, 24.0));
-    sheet.add(
+    figures.add(
         "plates: velocity at the axis, free slip over joined",
         both / between(&interface(&joined, 0), 10.0, 24.0),
     );
 }
 
-pub(super) fn strengthless_plates_reach_the_impedance_match_on_the_axis(sheet: &mut Sheet) {
+pub(super) fn strengthless_plates_reach_the_impedance_match_on_the_axis(figures: &mut Figures) {
     let slip = plates("plates-free-slip", 24.0, true);
     let both = 0.5 * (between(&interface(&slip, 0), 10.0, 24.0) + between(&interface(&slip, 2), 10.0, 24.0));
     let joined = plates("plates-joined", 24.0, true);
-    sheet.add("strengthless plates, free slip: velocity at the axis (m/s)", both);
-    sheet.add(
+    figures.add("strengthless plates, free slip: velocity at the axis (m/s)", both);
+    figures.add(
         "strengthless plates, joined: velocity at the axis (m/s)",
         between(&interface(&joined, 0), 10.0, 24.0),
     );
@@ -349,29 +349,29 @@ fn throw(throw: &Throw, fraction: f64, speed: f64) -> Result<Solved, String> {
         cube("lower", [0.0; 3], throw.lower),
         cube("upper", velocity, throw.upper),
     );
-    solve(model(&deck), Crew::default())
+    solve(model(&deck), Workers::default())
 }
 
-pub(super) fn no_node_of_a_body_thrown_at_another_ends_inside_it(sheet: &mut Sheet) {
+pub(super) fn no_node_of_a_body_thrown_at_another_ends_inside_it(figures: &mut Figures) {
     let (mut inside, mut deepest) = (0, 0.0_f64);
     for fraction in [0.1, 0.3, 0.5] {
         for case in throws() {
             for speed in [100.0, 500.0, 1000.0, 2000.0, 3000.0, 5000.0] {
                 let named = format!("{} at {speed} m/s, gap {fraction}", case.name);
                 let solved = throw(&case, fraction, speed).unwrap_or_else(|e| panic!("{named}: {e}"));
-                let ledger = &solved.outcome.ledger;
+                let run_totals = &solved.outcome.run_totals;
                 let found = intruders(&solved.model.mesh, &solved.state.x);
-                assert!(ledger.worst_penetration > 0.0, "{named}: they did not meet");
+                assert!(run_totals.worst_penetration > 0.0, "{named}: they did not meet");
                 inside += found.len();
-                deepest = deepest.max(ledger.worst_penetration);
+                deepest = deepest.max(run_totals.worst_penetration);
             }
         }
     }
-    sheet.add("thrown bodies: nodes inside another", inside as f64);
-    sheet.add("thrown bodies: greatest penetration (gaps)", deepest);
+    figures.add("thrown bodies: nodes inside another", inside as f64);
+    figures.add("thrown bodies: greatest penetration (gaps)", deepest);
 }
 
-pub(super) fn bodies_that_close_in_from_both_sides_are_sorted_in_time(sheet: &mut Sheet) {
+pub(super) fn bodies_that_close_in_from_both_sides_are_sorted_in_time(figures: &mut Figures) {
     // Each travels a sixth of the gap in a cycle, the two together an eighth of the slack: a sort every few cycles.
     let deck = r#"
         title = "closing in"
@@ -395,12 +395,12 @@ pub(super) fn bodies_that_close_in_from_both_sides_are_sorted_in_time(sheet: &mu
     "#;
     let solved = run(model(deck));
     println!("{} sorts in {} cycles", solved.outcome.sorts, solved.state.cycle);
-    sheet.add("closing in: greatest penetration (gaps)", solved.outcome.ledger.worst_penetration);
+    figures.add("closing in: greatest penetration (gaps)", solved.outcome.run_totals.worst_penetration);
     let inside = intruders(&solved.model.mesh, &solved.state.x).len();
-    sheet.add("closing in: nodes inside another", inside as f64);
+    figures.add("closing in: nodes inside another", inside as f64);
 }
 
-pub(super) fn meshes_of_three_and_five_faces_press_on_each_other_evenly(sheet: &mut Sheet) {
+pub(super) fn meshes_of_three_and_five_faces_press_on_each_other_evenly(figures: &mut Figures) {
     // Columns held at their sides, so that only the contact can make the stress uneven; 1 m/s.
     let deck = r#"
         title = "mismatch"
@@ -439,14 +439,14 @@ pub(super) fn meshes_of_three_and_five_faces_press_on_each_other_evenly(sheet: &
         assert_eq!(pressure.len(), [9, 25][part]);
         let all = mean(pressure.iter().copied());
         let off = pressure.iter().map(|p| (p / all - 1.0).abs()).fold(0.0, f64::max);
-        sheet.add(&format!("mismatch @ {name} side, greatest deviation of a single element"), off);
-        sheet.add(&format!("mismatch @ {name} side, pressure (GPa)"), all);
+        figures.add(&format!("mismatch @ {name} side, greatest deviation of a single element"), off);
+        figures.add(&format!("mismatch @ {name} side, pressure (GPa)"), all);
         let variation = mean(pressure.iter().map(|p| (p / all - 1.0).powi(2))).sqrt();
-        sheet.add(&format!("mismatch @ {name} side, variation of pressure"), variation);
+        figures.add(&format!("mismatch @ {name} side, variation of pressure"), variation);
     }
     let vertical = |v: &[[f64; 3]]| v.iter().zip(&solved.state.mass).map(|(v, m)| m * v[2]).sum::<f64>();
     let (before, after) = (vertical(&solved.model.velocity), vertical(&solved.state.v));
-    sheet.add("mismatch @ momentum", after / before - 1.0);
+    figures.add("mismatch @ momentum", after / before - 1.0);
 }
 
 /// A cube of one element falls at 100 m/s on one that is turned by 45 degrees against it: no node of either is above the
@@ -476,32 +476,32 @@ fn stacked(gap_fraction: f64, edges: bool) -> Solved {
 }
 
 pub(super) fn a_cube_stacked_at_45_degrees_is_stopped_by_the_zones_of_edges_if_the_gap_reaches_them(
-    sheet: &mut Sheet,
+    figures: &mut Figures,
 ) {
     let solved = stacked(0.3, false);
-    sheet.add("stacked cubes: velocity of the lower one (m/s)", solved.part_velocity(0)[2]);
-    sheet.add(
+    figures.add("stacked cubes: velocity of the lower one (m/s)", solved.part_velocity(0)[2]);
+    figures.add(
         "stacked cubes: nodes inside the other",
         intruders(&solved.model.mesh, &solved.state.x).len() as f64,
     );
-    sheet.add("stacked cubes: penetration (gaps)", solved.outcome.ledger.worst_penetration);
+    figures.add("stacked cubes: penetration (gaps)", solved.outcome.run_totals.worst_penetration);
     // Edges that cross without a node in any zone are not seen where they are not asked for.
     let unseen = stacked(0.1, false);
-    assert_eq!(unseen.outcome.ledger.worst_penetration.to_bits(), 0.0_f64.to_bits());
+    assert_eq!(unseen.outcome.run_totals.worst_penetration.to_bits(), 0.0_f64.to_bits());
     assert_eq!(unseen.part_velocity(0), [0.0; 3]);
     assert!(!crossed(&unseen.model.mesh, &unseen.state.x).is_empty(), "they have gone through each other");
 }
 
-pub(super) fn a_cube_stacked_at_45_degrees_is_stopped_by_its_edges(sheet: &mut Sheet) {
+pub(super) fn a_cube_stacked_at_45_degrees_is_stopped_by_its_edges(figures: &mut Figures) {
     let solved = stacked(0.1, true);
-    let ledger = &solved.outcome.ledger;
+    let run_totals = &solved.outcome.run_totals;
     let (lower, upper) = (solved.part_velocity(0)[2], solved.part_velocity(1)[2]);
-    sheet.add("stacked cubes with edges: velocity of the lower one (m/s)", lower);
-    sheet.add("stacked cubes with edges: momentum", (lower + upper) / -100.0 - 1.0);
-    sheet.add("stacked cubes with edges: greatest energy error", worst_energy(&solved));
-    sheet.add("stacked cubes with edges: penetration (gaps)", ledger.worst_penetration);
+    figures.add("stacked cubes with edges: velocity of the lower one (m/s)", lower);
+    figures.add("stacked cubes with edges: momentum", (lower + upper) / -100.0 - 1.0);
+    figures.add("stacked cubes with edges: greatest energy error", worst_energy(&solved));
+    figures.add("stacked cubes with edges: penetration (gaps)", run_totals.worst_penetration);
     let through = crossed(&solved.model.mesh, &solved.state.x).len();
-    sheet.add("stacked cubes with edges: faces gone through", through as f64);
+    figures.add("stacked cubes with edges: faces gone through", through as f64);
 }
 
 /// Two cubes of three elements an edge, ridge against ridge at right angles, at `speed` (m/s) with a gap of this fraction
@@ -520,17 +520,17 @@ fn ridges(fraction: f64, speed: f64, edges: bool) -> Result<Solved, String> {
         4.0 / speed,
         -speed,
     );
-    solve(model(&deck), Crew::default())
+    solve(model(&deck), Workers::default())
 }
 
-pub(super) fn ridges_that_meet_at_right_angles_do_not_pass_through_each_other(sheet: &mut Sheet) {
+pub(super) fn ridges_that_meet_at_right_angles_do_not_pass_through_each_other(figures: &mut Figures) {
     let (mut through, mut inside, mut deepest, mut energy) = (0, 0, 0.0_f64, 0.0_f64);
     for fraction in [0.1, 0.3, 0.5] {
         for speed in [100.0, 1000.0, 3000.0] {
             let named = format!("ridges at {speed} m/s, gap {fraction}");
             let solved = ridges(fraction, speed, true).unwrap_or_else(|e| panic!("{named}: {e}"));
-            let ledger = &solved.outcome.ledger;
-            assert!(ledger.worst_penetration > 0.0, "{named}: they did not meet");
+            let run_totals = &solved.outcome.run_totals;
+            assert!(run_totals.worst_penetration > 0.0, "{named}: they did not meet");
             // Faces of one body are not compared: at 3 km/s the struck ridges fold, and bodies do not meet themselves.
             let first = solved.model.mesh.element_offsets()[1] as u32;
             let pairs = crossed(&solved.model.mesh, &solved.state.x);
@@ -539,18 +539,18 @@ pub(super) fn ridges_that_meet_at_right_angles_do_not_pass_through_each_other(sh
             inside += intruders(&solved.model.mesh, &solved.state.x).len();
             println!(
                 "{named}: depth {}, energy {:e}, {foreign} of {} crossings foreign",
-                ledger.worst_penetration,
+                run_totals.worst_penetration,
                 worst_energy(&solved),
                 pairs.len()
             );
-            deepest = deepest.max(ledger.worst_penetration);
+            deepest = deepest.max(run_totals.worst_penetration);
             energy = energy.max(worst_energy(&solved));
         }
     }
-    sheet.add("ridges: faces gone through", through as f64);
-    sheet.add("ridges: nodes inside another", inside as f64);
-    sheet.add("ridges: greatest penetration (gaps)", deepest);
-    sheet.add("ridges: greatest energy error", energy);
+    figures.add("ridges: faces gone through", through as f64);
+    figures.add("ridges: nodes inside another", inside as f64);
+    figures.add("ridges: greatest penetration (gaps)", deepest);
+    figures.add("ridges: greatest energy error", energy);
     let unseen = ridges(0.1, 100.0, false).unwrap_or_else(|e| panic!("{e}"));
     assert!(!crossed(&unseen.model.mesh, &unseen.state.x).is_empty(), "without edges they pass");
 }

@@ -1,7 +1,7 @@
 //! Elements and nodes, through the whole system: what single elements do is tested beside the mechanics.
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{model, run},
 };
 
@@ -20,7 +20,7 @@ rotate = { axis = [1, 2, 3], degrees = 40 }
 "#;
 
 pub(super) fn mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_for_ten_thousand_cycles(
-    sheet: &mut Sheet,
+    figures: &mut Figures,
 ) {
     let mut model = model(LUMP);
     for (v, [x, y, z]) in model.velocity.iter_mut().zip(&model.mesh.positions) {
@@ -42,7 +42,7 @@ pub(super) fn mass_is_density_times_volume_and_a_free_body_keeps_its_momentum_fo
         .map(|(v, m)| m * v.iter().map(|c| c * c).sum::<f64>().sqrt())
         .sum();
     let change = (0..3).map(|a| (after[a] - before[a]).powi(2)).sum::<f64>().sqrt();
-    sheet.add("free body: mass over density and volume", mass / (7896.0 * 0.013 * 0.007 * 0.011));
-    sheet.add("free body: momentum after 10,000 cycles", change / scale);
-    sheet.add("free body: energy error after 10,000 cycles", solved.outcome.ledger.last.error);
+    figures.add("free body: mass over density and volume", mass / (7896.0 * 0.013 * 0.007 * 0.011));
+    figures.add("free body: momentum after 10,000 cycles", change / scale);
+    figures.add("free body: energy error after 10,000 cycles", solved.outcome.run_totals.last.error);
 }

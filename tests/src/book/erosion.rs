@@ -1,14 +1,14 @@
-//! Erosion: a rod goes through a plate, and what left is in the ledger.
+//! Erosion: a rod goes through a plate, and what left is in the totals.
 
 use mechanics::{contact::Surface, erosion::ALIVE};
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{Solved, example, keyword, model, run},
 };
 
 /// A block of 4 by 4 by 4 elements without one of them: the faces on its surface.
-pub(super) fn an_element_that_leaves_a_block_uncovers_its_neighbours(sheet: &mut Sheet) {
+pub(super) fn an_element_that_leaves_a_block_uncovers_its_neighbours(figures: &mut Figures) {
     let block = model(
         r#"
             title = "block"
@@ -25,7 +25,7 @@ pub(super) fn an_element_that_leaves_a_block_uncovers_its_neighbours(sheet: &mut
     for (place, gone) in
         [("nowhere", u32::MAX), ("a corner", 0), ("an edge", 1), ("a face", 5), ("inside", 21)]
     {
-        sheet.add(&format!("block without an element @ {place}, faces"), n_faces(gone) as f64);
+        figures.add(&format!("block without an element @ {place}, faces"), n_faces(gone) as f64);
     }
 }
 
@@ -35,7 +35,7 @@ fn never_falls(solved: &Solved) -> bool {
     grows(&|i| solved.rows[i].eroded_mass) && grows(&|i| solved.rows[i].eroded_elements as f64)
 }
 
-/// Mass of the elements of the whole mesh that have eroded, over that which the ledger has.
+/// Mass of the elements of the whole mesh that have eroded, over that which the totals has.
 fn mass_of_the_eroded(solved: &Solved) -> f64 {
     let offsets = solved.model.mesh.element_offsets();
     let mut mass = 0.0;
@@ -45,20 +45,20 @@ fn mass_of_the_eroded(solved: &Solved) -> f64 {
             mass += density * solved.state.initial_volume[e];
         }
     }
-    solved.outcome.ledger.eroded_mass / mass
+    solved.outcome.run_totals.eroded_mass / mass
 }
 
 /// Tungsten of 6 mm x 24 mm through 5 mm of steel at 1200 m/s, elements out at a geometric strain of 1.5: nodes that
 /// lost all their elements fly on.
-pub(super) fn a_rod_goes_through_a_plate_and_the_ledger_closes(sheet: &mut Sheet) {
+pub(super) fn a_rod_goes_through_a_plate_and_energies_add_up(figures: &mut Figures) {
     let mut model = example("rod-through-plate");
     model.output.history_cycles = 10;
     let solved = run(model);
-    let ledger = &solved.outcome.ledger;
+    let run_totals = &solved.outcome.run_totals;
     assert!(never_falls(&solved), "what has eroded came back");
-    sheet.add("rod through plate: energy error", ledger.last.error);
-    sheet.add("rod through plate: momentum error", ledger.momentum_error());
-    sheet.add("rod through plate: mass of the eroded over the ledger's", mass_of_the_eroded(&solved));
+    figures.add("rod through plate: energy error", run_totals.last.error);
+    figures.add("rod through plate: momentum error", run_totals.momentum_error());
+    figures.add("rod through plate: mass of the eroded over the ledger's", mass_of_the_eroded(&solved));
     let mass: f64 = solved.state.mass.iter().sum();
     let first: f64 = (0..solved.model.mesh.n_elements())
         .map(|e| {
@@ -67,20 +67,20 @@ pub(super) fn a_rod_goes_through_a_plate_and_the_ledger_closes(sheet: &mut Sheet
             solved.model.setup.materials[material].density * solved.state.initial_volume[e]
         })
         .sum();
-    sheet.add("rod through plate: mass of all nodes over that of all elements", mass / first);
+    figures.add("rod through plate: mass of all nodes over that of all elements", mass / first);
     let speed = -solved.part_velocity(0)[2];
     assert!(speed < 1200.0, "{speed}");
-    sheet.add("rod through plate: deepest contact over the gap", ledger.worst_penetration);
+    figures.add("rod through plate: deepest contact over the gap", run_totals.worst_penetration);
     let front = solved.model.mesh.parts[0].nodes.iter().map(|&n| solved.state.x[n as usize][2]);
     assert!(front.fold(f64::INFINITY, f64::min) < -5.0, "the rod is not through");
 }
 
 /// The keyword example: a punch slantwise through a held plate; nodes without elements leave the run.
-pub(super) fn a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked(sheet: &mut Sheet) {
+pub(super) fn a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked(figures: &mut Figures) {
     let solved = run(keyword("punch-through-plate"));
-    let ledger = &solved.outcome.ledger;
+    let run_totals = &solved.outcome.run_totals;
     assert!(never_falls(&solved), "what has eroded came back");
-    assert!(ledger.eroded_momentum[2] < 0.0, "nothing was dropped: {:?}", ledger.eroded_momentum);
-    sheet.add("punch through plate: energy error", ledger.last.error);
-    sheet.add("punch through plate: mass of the eroded over the ledger's", mass_of_the_eroded(&solved));
+    assert!(run_totals.eroded_momentum[2] < 0.0, "nothing was dropped: {:?}", run_totals.eroded_momentum);
+    figures.add("punch through plate: energy error", run_totals.last.error);
+    figures.add("punch through plate: mass of the eroded over the ledger's", mass_of_the_eroded(&solved));
 }

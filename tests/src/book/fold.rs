@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     checker::{nearest, pierced},
     solve::{Solved, model, run_with_states},
 };
@@ -47,19 +47,19 @@ fn thrown(meets_itself: bool) -> Solved {
     run_with_states(model)
 }
 
-pub(super) fn arms_of_a_strip_that_are_thrown_together_stay_apart(sheet: &mut Sheet) {
+pub(super) fn arms_of_a_strip_that_are_thrown_together_stay_apart(figures: &mut Figures) {
     let distances = |solved: &Solved| -> Vec<f64> {
         solved.states.iter().map(|state| nearest(&solved.model.mesh, &state.x, 4.0 * GAP) / GAP).collect()
     };
     let (with, without) = (thrown(true), thrown(false));
     let smallest = |all: &[f64]| all.iter().copied().fold(4.0, f64::min);
-    sheet.add("folded strip: smallest distance of its arms (gaps)", smallest(&distances(&with)));
-    sheet.add("folded strip: deepest contact (gaps)", with.outcome.ledger.worst_penetration);
-    sheet.add("folded strip: energy error", with.outcome.ledger.last.error);
+    figures.add("folded strip: smallest distance of its arms (gaps)", smallest(&distances(&with)));
+    figures.add("folded strip: deepest contact (gaps)", with.outcome.run_totals.worst_penetration);
+    figures.add("folded strip: energy error", with.outcome.run_totals.last.error);
     let crossings = |solved: &Solved| {
         solved.states.iter().map(|state| pierced(&solved.model.mesh, &state.x).len()).max().unwrap_or(0)
             as f64
     };
-    sheet.add("folded strip: edges through faces", crossings(&with));
-    sheet.add("folded strip without contact: edges through faces", crossings(&without));
+    figures.add("folded strip: edges through faces", crossings(&with));
+    figures.add("folded strip without contact: edges through faces", crossings(&without));
 }

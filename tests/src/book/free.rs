@@ -1,14 +1,14 @@
 //! Small free bodies: whatever they do, at default settings none of them gains energy, and what is left of their vibration stays.
 //!
 //! Energy is kinetic, of elastic strain and of plastic work: what a body has without the heat of viscosity and of hourglass control. The
-//! ledger books this heat by the velocities of half a step before, which for noise of the mesh is 10 to 40 % too much.
+//! totals books this heat by the velocities of half a step before, which for noise of the mesh is 10 to 40 % too much.
 
 use deck::Model;
 use master::results::history::PartEnergy;
 use mechanics::state::field;
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{Solved, model, run},
 };
 
@@ -84,43 +84,43 @@ fn growth(solved: &Solved) -> f64 {
     solved.rows.iter().map(|row| usable(&row.parts[0]) / first).fold(0.0, f64::max)
 }
 
-fn of_solids(sheet: &mut Sheet, cycles: u64, cells: [u32; 3]) {
+fn of_solids(figures: &mut Figures, cycles: u64, cells: [u32; 3]) {
     let plastic = if cells == [1; 3] { "plastic, one element" } else { "plastic" };
     for (kind, material, speed) in
         [("elastic", ELASTIC, 0.1), (plastic, PLASTIC, 30.0), ("nearly liquid", SOFT, 0.1)]
     {
         let solved = run(shaken(deck(cycles, &solids("block", material, cells)), speed));
-        sheet.add(&format!("free solids @ {kind}, greatest energy over the first"), growth(&solved));
+        figures.add(&format!("free solids @ {kind}, greatest energy over the first"), growth(&solved));
     }
     let solved = run(shaken(deck(cycles, &solids("block", "\"STEEL_4340\"", cells)), 1.0));
-    sheet.add("free solids @ 4340, greatest energy over the first", growth(&solved));
+    figures.add("free solids @ 4340, greatest energy over the first", growth(&solved));
     let strain = solved.state.elements[field::PLASTIC_STRAIN].iter().copied().fold(0.0, f64::max);
-    sheet.add("free solids: plastic strain of 4340 that shakes with 1 m/s", strain);
+    figures.add("free solids: plastic strain of 4340 that shakes with 1 m/s", strain);
 }
 
-fn of_shells(sheet: &mut Sheet, cycles: u64, cells: [u32; 2]) {
+fn of_shells(figures: &mut Figures, cycles: u64, cells: [u32; 2]) {
     for (kind, material, speed) in
         [("elastic", ELASTIC, 0.1), ("elastic with 5 m/s", ELASTIC, 5.0), ("plastic", PLASTIC, 10.0)]
     {
         let solved = run(shaken(deck(cycles, &shells(material, cells)), speed));
         let long = if cycles > 10_000 && kind == "plastic" { ", for long" } else { "" };
-        sheet.add(&format!("free shells @ {kind}{long}, greatest energy over the first"), growth(&solved));
+        figures.add(&format!("free shells @ {kind}{long}, greatest energy over the first"), growth(&solved));
     }
 }
 
 /// A cube that turns about z once in some 1,000 cycles.
-fn of_spin(sheet: &mut Sheet, cycles: u64, n: u32) {
+fn of_spin(figures: &mut Figures, cycles: u64, n: u32) {
     let mut model = deck(cycles, &solids("cube", ELASTIC, [n; 3]));
     let middle = 0.5 * CELL * f64::from(n);
     let rate = 1e5 / f64::from(n);
     for (v, [x, y, _]) in model.velocity.iter_mut().zip(&model.mesh.positions) {
         *v = [-rate * (y - middle), rate * (x - middle), 0.0];
     }
-    sheet.add("spinning cube: greatest energy over the first", growth(&run(model)));
+    figures.add("spinning cube: greatest energy over the first", growth(&run(model)));
 }
 
 /// A free cube beside a bar of smaller cells, which shakes so hard that the step of both breathes by a tenth.
-fn of_another(sheet: &mut Sheet, cycles: u64, n: u32) {
+fn of_another(figures: &mut Figures, cycles: u64, n: u32) {
     let bar = "[[part]]\nname = \"bar\"\nmaterial = { density = 7850, eos = { type = \"linear\", bulk = 175e9 }, \
         strength = { type = \"elastic\", shear = 80.7692307692e9 } }\n\
         box = { origin = [0.1, 0, 0], size = [0.009, 0.0009, 0.0009], cells = [10, 1, 1] }\n";
@@ -129,34 +129,34 @@ fn of_another(sheet: &mut Sheet, cycles: u64, n: u32) {
     for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
         *v = if x[0] < 0.05 { [0; 3].map(|_| 0.1 * draw()) } else { [1e4 * (x[0] - 0.1045), 0.0, 0.0] };
     }
-    sheet.add("free cube beside a shaking bar: greatest energy over the first", growth(&run(model)));
+    figures.add("free cube beside a shaking bar: greatest energy over the first", growth(&run(model)));
 }
 
 /// A few thousand cycles of those that gained energy soonest: a factor of 1e3 within 2,000 to 3,500 cycles.
-pub(super) fn small_free_bodies_do_not_gain_energy(sheet: &mut Sheet) {
+pub(super) fn small_free_bodies_do_not_gain_energy(figures: &mut Figures) {
     for cells in [[1, 1, 1], [1, 1, 3], [2, 2, 2]] {
-        of_solids(sheet, 5000, cells);
+        of_solids(figures, 5000, cells);
     }
     for cells in [[1, 1], [2, 2]] {
-        of_shells(sheet, 5000, cells);
+        of_shells(figures, 5000, cells);
     }
-    of_spin(sheet, 8000, 1);
-    of_spin(sheet, 8000, 2);
-    of_another(sheet, 5000, 1);
-    of_another(sheet, 5000, 2);
+    of_spin(figures, 8000, 1);
+    of_spin(figures, 8000, 2);
+    of_another(figures, 5000, 1);
+    of_another(figures, 5000, 2);
 }
 
 /// A hundred thousand cycles of bodies from one element to 160.
-pub(super) fn free_bodies_keep_their_energy_for_a_hundred_thousand_cycles(sheet: &mut Sheet) {
+pub(super) fn free_bodies_keep_their_energy_for_a_hundred_thousand_cycles(figures: &mut Figures) {
     const CYCLES: u64 = 100_000;
     for cells in
         [[1, 1, 1], [1, 1, 2], [1, 1, 3], [1, 1, 10], [2, 2, 2], [2, 2, 10], [3, 3, 3], [4, 4, 4], [4, 4, 10]]
     {
-        of_solids(sheet, CYCLES, cells);
+        of_solids(figures, CYCLES, cells);
     }
     for cells in [[1, 1], [1, 2], [2, 2], [3, 3], [4, 4]] {
-        of_shells(sheet, CYCLES, cells);
+        of_shells(figures, CYCLES, cells);
     }
-    (1..=4).for_each(|n| of_spin(sheet, CYCLES, n));
-    (1..=2).for_each(|n| of_another(sheet, CYCLES, n));
+    (1..=4).for_each(|n| of_spin(figures, CYCLES, n));
+    (1..=2).for_each(|n| of_another(figures, CYCLES, n));
 }

@@ -3,7 +3,7 @@
 use mechanics::state::{GlobalState, field};
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{Solved, crossing, mean, model, run, run_with_states},
 };
 
@@ -57,7 +57,7 @@ fn sod(x: f64) -> f64 {
     }
 }
 
-pub(super) fn sods_tube_has_its_plateaus_and_its_shock_in_place(sheet: &mut Sheet) {
+pub(super) fn sods_tube_has_its_plateaus_and_its_shock_in_place(figures: &mut Figures) {
     let side = 0.01;
     let deck = format!(
         "title = \"Sod\"\nunits = \"SI\"\n[control]\nend_time = 0.2\nlinear_viscosity = 0.06\n{}{}[[join]]\nparts = \"all\"\n\
@@ -73,10 +73,10 @@ pub(super) fn sods_tube_has_its_plateaus_and_its_shock_in_place(sheet: &mut Shee
     let plateau = |from: f64, to: f64, read: &dyn Fn(usize, f64) -> f64| {
         mean(cells.iter().filter(|(x, ..)| (from..to).contains(&x[0])).map(|(_, rho, e)| read(*e, *rho)))
     };
-    sheet.add("Sod: mean error of density over mean density", off);
-    sheet.add("Sod: density left of the contact", plateau(0.55, 0.66, &|_, rho| rho));
-    sheet.add("Sod: density right of the contact", plateau(0.73, 0.81, &|_, rho| rho));
-    sheet.add(
+    figures.add("Sod: mean error of density over mean density", off);
+    figures.add("Sod: density left of the contact", plateau(0.55, 0.66, &|_, rho| rho));
+    figures.add("Sod: density right of the contact", plateau(0.73, 0.81, &|_, rho| rho));
+    figures.add(
         "Sod: pressure between rarefaction and shock",
         plateau(0.53, 0.81, &|e, _| solved.state.elements[field::PRESSURE][e]),
     );
@@ -85,20 +85,20 @@ pub(super) fn sods_tube_has_its_plateaus_and_its_shock_in_place(sheet: &mut Shee
         .iter()
         .filter(|n| (0.70..0.81).contains(&solved.state.x[**n as usize][0]))
         .map(|n| solved.state.v[*n as usize][0]);
-    sheet.add("Sod: velocity between rarefaction and shock", mean(speed));
+    figures.add("Sod: velocity between rarefaction and shock", mean(speed));
     let front = crossing(
         cells.iter().filter(|c| c.0[0] > 0.75).map(|(x, rho, _)| (x[0], *rho)),
         0.5 * (0.265_574 + 0.125),
     );
-    sheet.add("Sod: place of the shock", front.expect("the shock is in the tube"));
+    figures.add("Sod: place of the shock", front.expect("the shock is in the tube"));
     let membrane = solved.model.mesh.parts[1].nodes.iter().map(|n| solved.state.x[*n as usize][0]);
-    sheet.add("Sod: place of the contact", membrane.fold(f64::MAX, f64::min));
+    figures.add("Sod: place of the contact", membrane.fold(f64::MAX, f64::min));
     // Energy by mass is E over density at first; at the contact the start leaves an overshoot that stays.
     let energy = |e: usize, first: f64| solved.state.elements[field::ENERGY][e] / first;
     let beside =
         mean(cells.iter().filter(|(x, ..)| (0.73..0.81).contains(&x[0])).map(|(_, _, e)| energy(*e, 0.125)));
     let at_contact = cells.iter().find(|(_, _, e)| *e == 50).map_or(0.0, |(_, _, e)| energy(*e, 0.125));
-    sheet.add("Sod: heating at the contact", at_contact / beside - 1.0);
+    figures.add("Sod: heating at the contact", at_contact / beside - 1.0);
 }
 
 /// Gas that runs together: along x, towards the axis z, or towards a point; all at unit speed. Viscosity heats gas that
@@ -134,7 +134,7 @@ fn cells_of(directions: usize) -> u32 {
     if directions == 1 { 200 } else { 60 }
 }
 
-pub(super) fn gas_that_runs_together_is_compressed_as_noh_says(sheet: &mut Sheet) {
+pub(super) fn gas_that_runs_together_is_compressed_as_noh_says(figures: &mut Figures) {
     for (directions, name) in [(1, "plane"), (2, "cylinder"), (3, "sphere")] {
         let solved = noh(directions, cells_of(directions));
         let cells = profile(&solved, &solved.state, &[1.0]);
@@ -149,7 +149,7 @@ pub(super) fn gas_that_runs_together_is_compressed_as_noh_says(sheet: &mut Sheet
         let ahead = (1.0 + 0.6 / 0.2_f64).powi(directions as i32 - 1);
         let half = 0.5 * (4.0_f64.powi(directions as i32) + ahead);
         let front = crossing(axis.into_iter(), half).expect("the shock has left the origin");
-        sheet.add(&format!("Noh @ {name}, radius of the shock"), front);
+        figures.add(&format!("Noh @ {name}, radius of the shock"), front);
         let shocked: Vec<(f64, usize)> = cells
             .into_iter()
             .filter(|(x, ..)| {
@@ -159,15 +159,15 @@ pub(super) fn gas_that_runs_together_is_compressed_as_noh_says(sheet: &mut Sheet
             })
             .map(|(_, rho, e)| (rho, e))
             .collect();
-        sheet.add(
+        figures.add(
             &format!("Noh @ {name}, density behind the shock"),
             mean(shocked.iter().map(|(rho, _)| *rho)),
         );
-        sheet.add(
+        figures.add(
             &format!("Noh @ {name}, pressure behind the shock"),
             mean(shocked.iter().map(|(_, e)| solved.state.elements[field::PRESSURE][*e])),
         );
-        sheet.add("Noh: energy error", solved.outcome.ledger.last.error);
+        figures.add("Noh: energy error", solved.outcome.run_totals.last.error);
     }
 }
 
@@ -225,23 +225,23 @@ fn front(solved: &Solved, state: &GlobalState, h: f64) -> f64 {
 
 /// An octant of 36 cells an edge with an eighth of the energy that puts the shock at 1 at the time 1. Steps are short: at twice
 /// their length the first element gains 2 % of all energy.
-pub(super) fn a_point_blast_has_sedovs_radius_at_two_times(sheet: &mut Sheet) {
+pub(super) fn a_point_blast_has_sedovs_radius_at_two_times(figures: &mut Figures) {
     for (gamma, name, alpha) in [(1.4, "1.4", 0.851_072), (5.0 / 3.0, "5/3", 0.493_590)] {
         let solved = blast(36, gamma, alpha / 8.0, 1.0, 0.3);
         for (time, of) in [(0.5, "half the time"), (1.0, "the end")] {
             let radius = front(&solved, solved.state_at(time), 1.125 / 36.0);
-            sheet.add(&format!("point blast @ gamma {name}, radius at {of}"), radius);
+            figures.add(&format!("point blast @ gamma {name}, radius at {of}"), radius);
         }
-        sheet.add("point blast: energy error", solved.outcome.ledger.last.error);
+        figures.add("point blast: energy error", solved.outcome.run_totals.last.error);
     }
 }
 
-pub(super) fn the_blast_of_lulesh_reaches_sedovs_radius(sheet: &mut Sheet) {
+pub(super) fn the_blast_of_lulesh_reaches_sedovs_radius(figures: &mut Figures) {
     let n = 30;
     let h = 1.125 / f64::from(n);
     // LULESH gives its first element so much whatever its size, for 45 cells an edge.
     let solved = blast(n, 5.0 / 3.0, 3.948_746e7 * (1.125_f64 / 45.0).powi(3), 0.01, 0.6666);
-    sheet.add("blast: radius of the shock", front(&solved, &solved.state, h));
+    figures.add("blast: radius of the shock", front(&solved, &solved.state, h));
     // The mesh and the problem look the same along x, y and z.
     let mesh = &solved.model.mesh;
     let key = |x: [f64; 3]| x.map(|c| (c / h).round() as i64);
@@ -254,7 +254,7 @@ pub(super) fn the_blast_of_lulesh_reaches_sedovs_radius(sheet: &mut Sheet) {
         let (x, y) = (solved.state.x[i], solved.state.x[turned]);
         skew = skew.max((x[1] - y[0]).abs()).max((x[2] - y[1]).abs()).max((x[0] - y[2]).abs());
     }
-    sheet.add("blast: difference of the three directions", skew);
-    sheet.add("blast: energy of the element at the origin", solved.state.elements[field::ENERGY][0]);
-    sheet.add("blast: energy error", solved.outcome.ledger.last.error);
+    figures.add("blast: difference of the three directions", skew);
+    figures.add("blast: energy of the element at the origin", solved.state.elements[field::ENERGY][0]);
+    figures.add("blast: energy error", solved.outcome.run_totals.last.error);
 }

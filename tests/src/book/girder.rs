@@ -6,8 +6,8 @@ use mechanics::state::GlobalState;
 use protocol::options::JobOptions;
 
 use crate::{
-    case::Sheet,
-    solve::{Crew, Solved, mean, model, solve},
+    case::Figures,
+    solve::{Solved, Workers, mean, model, solve},
 };
 
 /// Sides, shells around and along, side (m), thickness (m), length (m), speed (m/s).
@@ -43,7 +43,7 @@ fn thrown() -> Solved {
     model.output.period = Some(50e-6);
     let asked = JobOptions { snapshot_at: Some(CYCLES - 10), ..JobOptions::default() };
     let options = SessionOptions { asked, ..SessionOptions::default() };
-    solve(model, Crew { options, ..Crew::default() }).unwrap_or_else(|e| panic!("{e}"))
+    solve(model, Workers { options, ..Workers::default() }).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// How far a node is from where a turn by so many sides of the octagon, about its axis, puts the node that was there at
@@ -62,7 +62,9 @@ fn skew(solved: &Solved, state: &GlobalState, sides: usize) -> f64 {
     .fold(0.0, f64::max)
 }
 
-pub(super) fn a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_throughout(sheet: &mut Sheet) {
+pub(super) fn a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_throughout(
+    figures: &mut Figures,
+) {
     let solved = thrown();
     let mesh = &solved.model.mesh;
     let mass: f64 = solved.state.mass.iter().sum();
@@ -71,7 +73,7 @@ pub(super) fn a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_thr
     let lost = momentum(&solved.model.velocity) - momentum(&snapshot.state.v);
     let [_, wall] = snapshot.walls[0];
     assert!(lost < -SPEED * mass, "it comes back: {lost}");
-    sheet.add("girder alone: momentum of the wall over what it lost", WALL * wall[2] / lost);
+    figures.add("girder alone: momentum of the wall over what it lost", WALL * wall[2] / lost);
 
     // The fronts leave the wall at 5172 and 409 m/s; the first is back from the rear at 310 us.
     let section = mass / (DENSITY * LENGTH);
@@ -81,11 +83,11 @@ pub(super) fn a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_thr
     });
     let force: Vec<(f64, f64)> = force.collect();
     let plateau = mean(force.iter().filter(|(t, _)| (20e-6..100e-6).contains(t)).map(|(_, f)| *f));
-    sheet.add("girder alone: stress that it meets the wall with", plateau / section);
+    figures.add("girder alone: stress that it meets the wall with", plateau / section);
 
     let early = solved.state_at(100e-6);
-    sheet.add("girder alone: difference of its quarters at 100 us", skew(&solved, early, 2) / SIDE);
-    sheet.add("girder alone: difference of its eighths at 100 us", skew(&solved, early, 1) / SIDE);
+    figures.add("girder alone: difference of its quarters at 100 us", skew(&solved, early, 2) / SIDE);
+    figures.add("girder alone: difference of its eighths at 100 us", skew(&solved, early, 1) / SIDE);
 
     let rear = mesh.parts[0].nodes[AROUND * ALONG] as usize;
     let shortest = solved.states.iter().map(|state| {
@@ -95,6 +97,6 @@ pub(super) fn a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_thr
     });
     let shortened = LENGTH - shortest.fold(f64::MAX, f64::min);
     let last = solved.rows.last().expect("rows");
-    sheet.add("girder alone: greatest shortening", shortened);
-    sheet.add("girder alone: energy error", last.error);
+    figures.add("girder alone: greatest shortening", shortened);
+    figures.add("girder alone: energy error", last.error);
 }

@@ -10,7 +10,7 @@ use mechanics::{
 use nalgebra::{Matrix3, Vector3};
 
 use super::bodies::*;
-use crate::case::Sheet;
+use crate::case::Figures;
 
 /// Volume of [`SKEWED`].
 const SKEWED_VOLUME: f64 = 1.014;
@@ -32,18 +32,18 @@ fn greatest(numbers: impl IntoIterator<Item = f64>) -> f64 {
     numbers.into_iter().fold(0.0, |top, x| top.max(x.abs()))
 }
 
-pub(super) fn volumes_and_their_gradients_are_exact(sheet: &mut Sheet) {
-    sheet.add("hexahedron: volume of a skewed one", volume(&SKEWED));
+pub(super) fn volumes_and_their_gradients_are_exact(figures: &mut Figures) {
+    figures.add("hexahedron: volume of a skewed one", volume(&SKEWED));
     let (sin, cos) = 30f64.to_radians().sin_cos();
     let twisted = UNIT_CUBE.map(|[x, y, z]| {
         let (x, y) = (x - 0.5, y - 0.5);
         if z == 0.0 { [x, y, z] } else { [cos * x - sin * y, sin * x + cos * y, z] }
     });
-    sheet.add("hexahedron: volume of a cube twisted by 30 degrees", volume(&twisted));
+    figures.add("hexahedron: volume of a cube twisted by 30 degrees", volume(&twisted));
 
     let gradient = volume_gradient(&SKEWED);
     let components = || (0..8).flat_map(|corner| (0..3).map(move |axis| (corner, axis)));
-    sheet.add(
+    figures.add(
         "volume gradient: difference from the integrals",
         greatest(components().map(|(c, a)| gradient[c][a] - SKEWED_GRADIENT[c][a])),
     );
@@ -55,15 +55,15 @@ pub(super) fn volumes_and_their_gradients_are_exact(sheet: &mut Sheet) {
         });
         (high - low) / 2e-6
     };
-    sheet.add(
+    figures.add(
         "volume gradient: difference from the difference quotient",
         greatest(components().map(|(c, a)| gradient[c][a] - quotient(c, a))),
     );
-    sheet.add(
+    figures.add(
         "volume gradient: sum over the corners",
         greatest((0..3).map(|a| gradient.iter().map(|row| row[a]).sum::<f64>())),
     );
-    sheet.add(
+    figures.add(
         "volume gradient: sum of x B",
         components().map(|(c, a)| gradient[c][a] * SKEWED[c][a]).sum::<f64>(),
     );
@@ -72,7 +72,7 @@ pub(super) fn volumes_and_their_gradients_are_exact(sheet: &mut Sheet) {
     let of = |i: usize, j: usize| {
         (0..8).map(|c| velocity[c][i] * gradient[c][j]).sum::<f64>() / SKEWED_VOLUME - l[(i, j)]
     };
-    sheet.add(
+    figures.add(
         "volume gradient: error of the gradient of linear velocities",
         greatest((0..9).map(|n| of(n / 3, n % 3))),
     );
@@ -107,7 +107,7 @@ fn patch() -> (Vec<[f64; 3]>, Vec<[u32; 8]>) {
 
 /// Displacements of 1e-5 (2x + y + z)/2 and so on, a hundredth of the published ones: strains are finite here, and the small
 /// ones of the closed form are met to their first order. Stresses are said a hundredfold.
-pub(super) fn the_patch_has_one_stress_and_no_force_inside(sheet: &mut Sheet) {
+pub(super) fn the_patch_has_one_stress_and_no_force_inside(figures: &mut Figures) {
     let (young, poisson) = (1e6, 0.25);
     let (bulk, shear) = (young / 3.0 / (1.0 - 2.0 * poisson), young / 2.0 / (1.0 + poisson));
     let material = elastic(1.0, bulk, shear);
@@ -122,17 +122,17 @@ pub(super) fn the_patch_has_one_stress_and_no_force_inside(sheet: &mut Sheet) {
     for element in 0..7 {
         let found = stress(&block, element);
         for axis in 0..3 {
-            sheet.add("patch test: normal stress", 1e2 * found[axis][axis]);
-            sheet.add("patch test: shear stress", 1e2 * found[axis][(axis + 1) % 3]);
+            figures.add("patch test: normal stress", 1e2 * found[axis][axis]);
+            figures.add("patch test: shear stress", 1e2 * found[axis][(axis + 1) % 3]);
         }
     }
     let inside = (8..16).flat_map(|node| force(&block, node));
-    sheet.add("patch test: force inside over the largest", greatest(inside) / largest_force(&block));
+    figures.add("patch test: force inside over the largest", greatest(inside) / largest_force(&block));
     let internal: f64 = (0..7).map(|e| block.field(e, field::ENERGY)).sum();
-    sheet.add("patch test: hourglass work over internal energy", vote.hourglass / internal);
+    figures.add("patch test: hourglass work over internal energy", vote.hourglass / internal);
 }
 
-pub(super) fn moving_and_turning_leave_the_stress_what_it_is(sheet: &mut Sheet) {
+pub(super) fn moving_and_turning_leave_the_stress_what_it_is(figures: &mut Figures) {
     let mut changed = 0;
     for material in all_laws() {
         // Positions and the path are multiples of 2^-10, so the moved element has the same edges exactly.
@@ -146,7 +146,7 @@ pub(super) fn moving_and_turning_leave_the_stress_what_it_is(sheet: &mut Sheet) 
         let same = |(a, b): &(&Vec<f64>, &Vec<f64>)| a[0].to_bits() == b[0].to_bits();
         changed += before.fields.iter().zip(&after.fields).filter(|pair| !same(pair)).count();
     }
-    sheet.add("translation: fields of the state that changed, all laws", changed as f64);
+    figures.add("translation: fields of the state that changed, all laws", changed as f64);
 
     let material = elastic(1.0, 1.0, 1.0);
     let mut body = one(&material, &SKEWED);
@@ -163,15 +163,15 @@ pub(super) fn moving_and_turning_leave_the_stress_what_it_is(sheet: &mut Sheet) 
         [(cos * x - sin * y - x) / dt, (sin * x + cos * y - y) / dt, 0.0]
     });
     let found = stress(&block, 0);
-    sheet.add("turn by 30 degrees in one step @ stress xx", found[0][0] + mean);
-    sheet.add("turn by 30 degrees in one step @ stress yy", found[1][1] + mean);
-    sheet.add("turn by 30 degrees in one step @ stress zz", found[2][2] + mean);
-    sheet.add("turn by 30 degrees in one step @ stress xy", found[0][1]);
-    sheet.add("turn by 30 degrees in one step @ energy", block.field(0, field::ENERGY));
-    sheet.add("turn by 30 degrees in one step @ hourglass work", vote.hourglass);
+    figures.add("turn by 30 degrees in one step @ stress xx", found[0][0] + mean);
+    figures.add("turn by 30 degrees in one step @ stress yy", found[1][1] + mean);
+    figures.add("turn by 30 degrees in one step @ stress zz", found[2][2] + mean);
+    figures.add("turn by 30 degrees in one step @ stress xy", found[0][1]);
+    figures.add("turn by 30 degrees in one step @ energy", block.field(0, field::ENERGY));
+    figures.add("turn by 30 degrees in one step @ hourglass work", vote.hourglass);
 }
 
-pub(super) fn simple_shear_follows_the_jaumann_rate(sheet: &mut Sheet) {
+pub(super) fn simple_shear_follows_the_jaumann_rate(figures: &mut Figures) {
     let material = elastic(1.0, 1.0, 1.0);
     let mut block = Block::new(&one(&material, &UNIT_CUBE));
     let step = bare_step(1e-3, 10.0, 10.0);
@@ -180,9 +180,9 @@ pub(super) fn simple_shear_follows_the_jaumann_rate(sheet: &mut Sheet) {
         if cycle == 100 || cycle == 1000 {
             let of = format!("simple shear @ {}", f64::from(cycle) * 1e-3);
             let s = stress(&block, 0);
-            sheet.add(&format!("{of}, stress xy over G"), s[0][1]);
-            sheet.add(&format!("{of}, stress xx over G"), s[0][0]);
-            sheet.add(&format!("{of}, stress yy over G"), s[1][1]);
+            figures.add(&format!("{of}, stress xy over G"), s[0][1]);
+            figures.add(&format!("{of}, stress xx over G"), s[0][0]);
+            figures.add(&format!("{of}, stress yy over G"), s[1][1]);
         }
     }
 }

@@ -9,16 +9,15 @@ use mechanics::{
 
 use super::bodies::*;
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{Solved, mean, model, run_with_states},
 };
 
-/// A material of the library.
 fn of_library(name: &str) -> Material {
     deck::library::find(name).unwrap_or_else(|| panic!("the library has no \"{name}\"")).clone()
 }
 
-pub(super) fn uniaxial_strain_yields_hardens_by_volume_and_unloads(sheet: &mut Sheet) {
+pub(super) fn uniaxial_strain_yields_hardens_by_volume_and_unloads(figures: &mut Figures) {
     let (young, poisson): (f64, f64) = (210e9, 0.3);
     let (bulk, shear) = (young / 3.0 / (1.0 - 2.0 * poisson), young / 2.0 / (1.0 + poisson));
     let strength = Strength::VonMises { shear, yield_stress: 400e6, hardening: 0.0, rate: None };
@@ -38,21 +37,21 @@ pub(super) fn uniaxial_strain_yields_hardens_by_volume_and_unloads(sheet: &mut S
         path.push(go_to(1e-4 * f64::from(cycle)));
         if [10, 20, 50, 100, 200].contains(&cycle) {
             let strain = 1e-4 * f64::from(cycle);
-            sheet.add(&format!("uniaxial strain @ {strain}, stress"), path[path.len() - 1].0);
+            figures.add(&format!("uniaxial strain @ {strain}, stress"), path[path.len() - 1].0);
         }
     }
     let at = |cycle: usize| path[cycle - 1].0;
     let (elastic, plastic) = (at(10) / 1e-3, (at(200) - at(100)) / 1e-2);
-    sheet.add("uniaxial strain: slope up to yield", elastic);
-    sheet.add("uniaxial strain: slope after yield", plastic);
+    figures.add("uniaxial strain: slope up to yield", elastic);
+    figures.add("uniaxial strain: slope after yield", plastic);
     let strain_at_yield = (at(200) - 0.02 * plastic) / (elastic - plastic);
-    sheet.add("uniaxial strain: elastic limit, strain", strain_at_yield);
-    sheet.add("uniaxial strain: elastic limit, stress", strain_at_yield * elastic);
-    sheet.add("uniaxial strain: stress over the pressure after yield", path[199].0 - path[199].1);
+    figures.add("uniaxial strain: elastic limit, strain", strain_at_yield);
+    figures.add("uniaxial strain: elastic limit, stress", strain_at_yield * elastic);
+    figures.add("uniaxial strain: stress over the pressure after yield", path[199].0 - path[199].1);
     for cycle in (0..200).rev() {
         let (stress, _) = go_to(1e-4 * f64::from(cycle));
         if cycle == 0 {
-            sheet.add("uniaxial strain: stress back at no strain", stress);
+            figures.add("uniaxial strain: stress back at no strain", stress);
         }
     }
 }
@@ -97,18 +96,18 @@ fn chapman_jouguet(material: &Material) -> [f64; 3] {
     [v, p, energy + 0.5 * p * (1.0 - v)]
 }
 
-pub(super) fn products_have_their_chapman_jouguet_state_and_follow_its_isentrope(sheet: &mut Sheet) {
+pub(super) fn products_have_their_chapman_jouguet_state_and_follow_its_isentrope(figures: &mut Figures) {
     for name in EXPLOSIVES {
         let material = of_library(name);
         let Eos::Jwl { a, b, r1, r2, omega, .. } = material.eos else {
             panic!("{name} is not of JWL");
         };
         let [v_cj, p_cj, e_cj] = chapman_jouguet(&material);
-        sheet.add(&format!("Chapman-Jouguet @ {name}, volume"), v_cj);
-        sheet.add(&format!("Chapman-Jouguet @ {name}, pressure"), p_cj);
+        figures.add(&format!("Chapman-Jouguet @ {name}, volume"), v_cj);
+        figures.add(&format!("Chapman-Jouguet @ {name}, pressure"), p_cj);
         let speed = (p_cj / (material.density * (1.0 - v_cj))).sqrt();
-        sheet.add(&format!("Chapman-Jouguet @ {name}, detonation speed"), speed);
-        sheet.add(&format!("Chapman-Jouguet @ {name}, energy"), e_cj);
+        figures.add(&format!("Chapman-Jouguet @ {name}, detonation speed"), speed);
+        figures.add(&format!("Chapman-Jouguet @ {name}, energy"), e_cj);
         // The isentrope through that state, in closed form.
         let cold = |v: f64| a * (-r1 * v).exp() + b * (-r2 * v).exp();
         let c = (p_cj - cold(v_cj)) * v_cj.powf(1.0 + omega);
@@ -118,8 +117,8 @@ pub(super) fn products_have_their_chapman_jouguet_state_and_follow_its_isentrope
             worst = worst.max((p / (cold(v) + c * v.powf(-1.0 - omega)) - 1.0).abs());
             last = p;
         });
-        sheet.add("isentropes: greatest deviation from the closed form", worst);
-        sheet.add(&format!("isentrope @ {name}, pressure at twentyfold volume"), last);
+        figures.add("isentropes: greatest deviation from the closed form", worst);
+        figures.add(&format!("isentrope @ {name}, pressure at twentyfold volume"), last);
     }
 }
 
@@ -144,7 +143,7 @@ fn late_peak(solved: &Solved) -> f64 {
     mean(late.map(|state| state.elements[field::PRESSURE].iter().copied().fold(0.0, f64::max)))
 }
 
-pub(super) fn a_detonation_runs_at_its_speed_with_its_pressure_behind(sheet: &mut Sheet) {
+pub(super) fn a_detonation_runs_at_its_speed_with_its_pressure_behind(figures: &mut Figures) {
     let end = 180e-3 / TNT_SPEED;
     let wall = "[[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n";
     let solved = run_with_states(model(&charge(200, end, wall)));
@@ -156,15 +155,15 @@ pub(super) fn a_detonation_runs_at_its_speed_with_its_pressure_behind(sheet: &mu
         (lit.map(|(_, x)| x[0]).fold(0.0, f64::max), state.time)
     };
     let ((x0, t0), (x1, t1)) = (front(0.25 * end), front(0.95 * end));
-    sheet.add("detonation from a wall: speed (m/s)", (x1 - x0) / (t1 - t0));
-    sheet.add(
+    figures.add("detonation from a wall: speed (m/s)", (x1 - x0) / (t1 - t0));
+    figures.add(
         "detonation from a wall: peak pressure over that of Chapman and Jouguet",
         late_peak(&solved) / p_cj,
     );
     // Less viscosity.
     let gentle = charge(200, end, wall).replace("[control]\n", "[control]\nlinear_viscosity = 0.06\n");
     let solved = run_with_states(model(&gentle));
-    sheet.add(
+    figures.add(
         "detonation from a wall, linear viscosity 0.06: peak pressure over that of Chapman and Jouguet",
         late_peak(&solved) / p_cj,
     );
@@ -175,11 +174,11 @@ pub(super) fn a_detonation_runs_at_its_speed_with_its_pressure_behind(sheet: &mu
     let solved = run_with_states(model(&charge(200, end, piston)));
     let behind = |[x, _, _]: [f64; 3]| (0.06..0.16).contains(&x);
     let there = |f: usize| solved.element_mean(&solved.state, 0, behind, |s, e| s.elements[f][e]);
-    sheet.add(
+    figures.add(
         "detonation with a piston: pressure over that of Chapman and Jouguet",
         there(field::PRESSURE) / p_cj,
     );
-    sheet.add("detonation with a piston: volume", there(field::RELATIVE_VOLUME));
+    figures.add("detonation with a piston: volume", there(field::RELATIVE_VOLUME));
 }
 
 /// What the stresses of an element are at first: deviator by components, and its volume.
@@ -251,7 +250,7 @@ fn fracture_strain(material: &Material, triaxiality: f64, room: f64) -> f64 {
     (block.field(0, field::PLASTIC_STRAIN) - 0.2) / block.field(0, field::DAMAGE)
 }
 
-pub(super) fn johnson_cook_has_its_point_values_in_an_element(sheet: &mut Sheet) {
+pub(super) fn johnson_cook_has_its_point_values_in_an_element(figures: &mut Figures) {
     // Densities as Johnson and Cook give them; the library's aluminium has that of its shock line.
     for (name, library, density) in [
         ("4340", "STEEL_4340", 7830.0),
@@ -265,7 +264,7 @@ pub(super) fn johnson_cook_has_its_point_values_in_an_element(sheet: &mut Sheet)
         };
         for (rate, temperature) in [(1.0, 294.0), (1e3, 294.0), (1e3, 500.0)] {
             let at = format!("Johnson-Cook @ {name}, strain 0.2, {rate} /s, {temperature} K, flow stress");
-            sheet.add(&at, flow_stress(&material, 0.2, rate, temperature));
+            figures.add(&at, flow_stress(&material, 0.2, rate, temperature));
         }
         // Drawn out at 1000 /s without a turn until the plastic strain is one.
         let mut block = Block::new(&one(&material, &UNIT_CUBE));
@@ -280,11 +279,11 @@ pub(super) fn johnson_cook_has_its_point_values_in_an_element(sheet: &mut Sheet)
             }
             before = now;
         };
-        sheet.add(&format!("Johnson-Cook @ {name}, temperature at strain 1 and 1000 /s"), hot);
+        figures.add(&format!("Johnson-Cook @ {name}, temperature at strain 1 and 1000 /s"), hot);
         material.failure = deck::library::fracture(library).expect("its constants of fracture");
         assert!(matches!(material.failure, Failure::JohnsonCook { .. }), "{:?}", material.failure);
         for (triaxiality, of) in [(1.0 / 3.0, "1/3"), (0.0, "0")] {
-            sheet.add(
+            figures.add(
                 &format!("Johnson-Cook @ {name}, strain at fracture at triaxiality {of}"),
                 fracture_strain(&material, triaxiality, t_room),
             );

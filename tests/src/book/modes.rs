@@ -11,7 +11,7 @@ use nalgebra::{Rotation3, SMatrix, Vector3};
 
 use super::bodies::*;
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{model, run},
 };
 
@@ -62,26 +62,26 @@ fn zeros(values: &[f64]) -> f64 {
     values.iter().filter(|v| v.abs() < 1e-4 * greatest).count() as f64
 }
 
-pub(super) fn a_free_cube_has_six_strain_modes_and_control_resists_the_twelve_others(sheet: &mut Sheet) {
+pub(super) fn a_free_cube_has_six_strain_modes_and_control_resists_the_twelve_others(figures: &mut Figures) {
     let (density, bulk, shear, h) = (2.0, 3.0, 0.7, 0.5);
     let material = elastic(density, bulk, shear);
     let corners = UNIT_CUBE.map(|x| x.map(|c| h * (c - 0.5)));
     let stiffness = response(&material, &corners, 0.0, false);
     let values = eigenvalues(stiffness);
-    sheet.add("free cube: modes without a frequency, no hourglass control", zeros(&values));
+    figures.add("free cube: modes without a frequency, no hourglass control", zeros(&values));
     // Frequencies squared are eigenvalues over the mass of a node, density h^3 / 8.
     for value in &values[18..23] {
-        sheet.add("free cube: deviatoric modes, density h^2 omega^2 over G", 8.0 * value / (h * shear));
+        figures.add("free cube: deviatoric modes, density h^2 omega^2 over G", 8.0 * value / (h * shear));
     }
-    sheet.add("free cube: volumetric mode, density h^2 omega^2 over K", 8.0 * values[23] / (h * bulk));
+    figures.add("free cube: volumetric mode, density h^2 omega^2 over K", 8.0 * values[23] / (h * bulk));
     let damping = response(&material, &corners, 0.1, true);
     let resisted = eigenvalues(damping);
-    sheet.add("free cube: modes that hourglass control resists", 24.0 - zeros(&resisted));
+    figures.add("free cube: modes that hourglass control resists", 24.0 - zeros(&resisted));
     let scale = |m: &Matrix24| m / m.norm();
     let both = eigenvalues(scale(&stiffness) + scale(&damping));
-    sheet.add("free cube: modes without resistance, with hourglass control", zeros(&both));
+    figures.add("free cube: modes without resistance, with hourglass control", zeros(&both));
     // What control does to strains: the two matrices have no motion in common.
-    sheet.add(
+    figures.add(
         "free cube: share of strains that hourglass control resists",
         (scale(&stiffness) * scale(&damping)).norm(),
     );
@@ -95,7 +95,7 @@ const PATTERNS: [[f64; 8]; 4] = [
     [-1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0],
 ];
 
-pub(super) fn each_hourglass_pattern_is_resisted_without_resultant_and_decays(sheet: &mut Sheet) {
+pub(super) fn each_hourglass_pattern_is_resisted_without_resultant_and_decays(figures: &mut Figures) {
     let material = elastic(1.0, 1.0, 0.4);
     let (mut free, mut sum, mut moment) = (0.0_f64, 0.0_f64, 0.0_f64);
     for corners in [UNIT_CUBE, SKEWED] {
@@ -126,9 +126,9 @@ pub(super) fn each_hourglass_pattern_is_resisted_without_resultant_and_decays(sh
             assert!(power < 0.0, "{power}");
         }
     }
-    sheet.add("hourglass patterns: force without control over that of a strain", free);
-    sheet.add("hourglass patterns: resultant of the control over its largest force", sum);
-    sheet.add("hourglass patterns: moment of the control over its largest force", moment);
+    figures.add("hourglass patterns: force without control over that of a strain", free);
+    figures.add("hourglass patterns: resultant of the control over its largest force", sum);
+    figures.add("hourglass patterns: moment of the control over its largest force", moment);
 
     for pattern in PATTERNS {
         let mut body = one(&material, &UNIT_CUBE);
@@ -153,8 +153,8 @@ pub(super) fn each_hourglass_pattern_is_resisted_without_resultant_and_decays(sh
             assert!(now < before, "{before} to {now}");
             before = now;
         }
-        sheet.add("hourglass patterns: energy left after 100 steps", before / first);
-        sheet.add("hourglass patterns: energy booked over energy lost", booked / (first - before));
+        figures.add("hourglass patterns: energy left after 100 steps", before / first);
+        figures.add("hourglass patterns: energy booked over energy lost", booked / (first - before));
     }
 }
 
@@ -167,19 +167,19 @@ fn millimetre() -> [[f64; 3]; 8] {
     UNIT_CUBE.map(|x| x.map(|c| 1e-3 * c))
 }
 
-pub(super) fn time_steps_are_those_of_the_thinnest_way_through(sheet: &mut Sheet) {
+pub(super) fn time_steps_are_those_of_the_thinnest_way_through(figures: &mut Figures) {
     let material = elastic(STEEL.0, STEEL.1, STEEL.2);
     let mut block = Block::new(&one(&material, &millimetre()));
     let mut step = bare_step(0.0, 1e6, 1.0);
     let limit = compute(&mut block, &material, &step, Width::best()).courant;
-    sheet.add("steel cube of 1 mm: limit of the time step (s)", limit);
+    figures.add("steel cube of 1 mm: limit of the time step (s)", limit);
     // A slow compression switches the linear viscosity on.
     step.linear_viscosity = 0.06;
     for node in [1, 2, 5, 6] {
         block.v[0][node] = -1e-12;
     }
     let limit = compute(&mut block, &material, &step, Width::best()).courant;
-    sheet.add("steel cube of 1 mm: limit with linear viscosity of 0.06 (s)", limit);
+    figures.add("steel cube of 1 mm: limit with linear viscosity of 0.06 (s)", limit);
 
     let material = elastic(1.0, 1.0 - 4.0 / 3.0 * 0.3, 0.3);
     for [x, y, z] in [[1.0, 1.0, 0.01], [0.01, 1.0, 1.0], [1.0, 0.01, 0.01], [1.0, 0.5, 0.2]] {
@@ -188,7 +188,7 @@ pub(super) fn time_steps_are_those_of_the_thinnest_way_through(sheet: &mut Sheet
         let corners = UNIT_CUBE.map(|[i, j, k]| (turn * Vector3::new(x * i, y * j, z * k)).into());
         let mut block = Block::new(&one(&material, &corners));
         let limit = compute(&mut block, &material, &bare_step(0.0, 1.0, 1.0), Width::best()).courant;
-        sheet.add("flat element: limit times wave speed over thickness", limit / x.min(y).min(z));
+        figures.add("flat element: limit times wave speed over thickness", limit / x.min(y).min(z));
     }
 
     let steel = elastic(STEEL.0, STEEL.1, STEEL.2);
@@ -197,7 +197,7 @@ pub(super) fn time_steps_are_those_of_the_thinnest_way_through(sheet: &mut Sheet
     let quantum = Quantum::for_reference(1e3, 49);
     let step =
         ShellStep { dt: 1e-9, force_quantum: quantum, moment_quantum: quantum, energy_quantum: quantum };
-    sheet
+    figures
         .add("steel shell of 1 mm: limit of the time step (s)", shells.compute(&step, Width::best()).courant);
 
     for safety in [0.6666, 0.9] {
@@ -209,11 +209,11 @@ pub(super) fn time_steps_are_those_of_the_thinnest_way_through(sheet: &mut Sheet
             STEEL.2
         )));
         let last = solved.rows.last().expect("rows");
-        sheet.add(&format!("steel cube of 1 mm @ step of a run at safety {safety} (s)"), last.dt);
+        figures.add(&format!("steel cube of 1 mm @ step of a run at safety {safety} (s)"), last.dt);
     }
 }
 
-pub(super) fn an_isolated_cube_is_stable_to_its_own_limit_only(sheet: &mut Sheet) {
+pub(super) fn an_isolated_cube_is_stable_to_its_own_limit_only(figures: &mut Figures) {
     let material = elastic(STEEL.0, STEEL.1, STEEL.2);
     let cube = millimetre();
     for ratio in [0.73, 0.735, 0.76] {
@@ -231,6 +231,6 @@ pub(super) fn an_isolated_cube_is_stable_to_its_own_limit_only(sheet: &mut Sheet
             largest = block.v.iter().flatten().fold(largest, |l, v| l.max(v.abs()));
         }
         let of = format!("isolated cube @ {ratio} of its crossing time");
-        sheet.add(&format!("{of}, greatest velocity over the first"), largest / 0.5e-6);
+        figures.add(&format!("{of}, greatest velocity over the first"), largest / 0.5e-6);
     }
 }

@@ -1,7 +1,7 @@
 //! Rigid bodies: a free top, a ball on a block, a mass on the end of a bar.
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{Solved, cross, model, run},
 };
 use deck::model::Model;
@@ -10,7 +10,7 @@ fn norm(a: [f64; 3]) -> f64 {
     a.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
-pub(super) fn a_free_top_precesses_after_euler(sheet: &mut Sheet) {
+pub(super) fn a_free_top_precesses_after_euler(figures: &mut Figures) {
     // Twice as long as wide, spun about an axis 17 degrees off its own.
     let model = model(
         "title = \"top\"\nunits = \"SI\"\n[control]\nend_time = 0.04\n\
@@ -36,24 +36,24 @@ pub(super) fn a_free_top_precesses_after_euler(sheet: &mut Sheet) {
     let found: [f64; 3] = std::array::from_fn(|a| (head[a] - foot[a]) / 0.2);
     let off = norm(std::array::from_fn(|a| found[a] - expected[a]));
     println!("{} cycles, {:.2} turns", solved.state.cycle, angle / std::f64::consts::TAU);
-    sheet.add("top: its axis after three turns of it", off);
+    figures.add("top: its axis after three turns of it", off);
     let length = |a: u32, b: u32| {
         let between = |x: &[[f64; 3]]| norm(std::array::from_fn(|i| x[a as usize][i] - x[b as usize][i]));
         between(&solved.state.x) / between(&mesh.positions) - 1.0
     };
     let n = mesh.n_nodes() as u32;
     let strain = (1..n).map(|b| length(0, b).abs()).fold(0.0, f64::max);
-    sheet.add("top: strain", strain);
-    let end = solved.outcome.ledger.bodies[0];
+    figures.add("top: strain", strain);
+    let end = solved.outcome.run_totals.bodies[0];
     let change = norm(std::array::from_fn(|a| end.momentum[a] - momentum[a])) / norm(momentum);
-    sheet.add("top: angular momentum", change);
-    sheet.add("top: momentum", solved.outcome.ledger.momentum_error());
+    figures.add("top: angular momentum", change);
+    figures.add("top: momentum", solved.outcome.run_totals.momentum_error());
     let kinetic = |row: &master::results::history::HistoryRow| row.kinetic;
     let (low, high) = solved.rows[1..]
         .iter()
         .map(kinetic)
         .fold((f64::INFINITY, 0.0_f64), |(low, high), k| (low.min(k), high.max(k)));
-    sheet.add("top: energy", high / low - 1.0);
+    figures.add("top: energy", high / low - 1.0);
 }
 
 /// Momentum and angular momentum of all, and the sums of their magnitudes over nodes and bodies.
@@ -84,7 +84,7 @@ fn momenta(
     ([linear, angular], scales)
 }
 
-pub(super) fn a_rigid_ball_that_strikes_a_block_keeps_both_momenta(sheet: &mut Sheet) {
+pub(super) fn a_rigid_ball_that_strikes_a_block_keeps_both_momenta(figures: &mut Figures) {
     let solved = run(model(
         "title = \"ball on block\"\nunits = \"SI\"\n[control]\nend_time = 6e-4\n\
          [[part]]\nname = \"ball\"\nmaterial = \"STEEL_4340\"\nvelocity = [2, 0, -10]\n\
@@ -97,18 +97,18 @@ pub(super) fn a_rigid_ball_that_strikes_a_block_keeps_both_momenta(sheet: &mut S
     let Solved { model, state, outcome, .. } = &solved;
     let start: Vec<_> = model.setup.bodies.iter().map(|body| body.start).collect();
     let (before, _) = momenta(model, &state.mass, &model.mesh.positions, &model.velocity, &start);
-    let (after, scales) = momenta(model, &state.mass, &state.x, &state.v, &outcome.ledger.bodies);
+    let (after, scales) = momenta(model, &state.mass, &state.x, &state.v, &outcome.run_totals.bodies);
     let change = |k: usize| norm(std::array::from_fn(|a| after[k][a] - before[k][a])) / scales[k];
-    let ball = outcome.ledger.bodies[0];
+    let ball = outcome.run_totals.bodies[0];
     println!("{} cycles, ball leaves at {:?}, spin {:?}", state.cycle, ball.velocity, ball.spin);
-    assert!(ball.velocity[2] > 0.0 && outcome.ledger.worst_penetration > 0.0, "it bounces");
-    sheet.add("rigid ball: momentum", change(0));
-    sheet.add("rigid ball: angular momentum", change(1));
-    sheet.add("rigid ball: energy error", outcome.ledger.last.error);
-    sheet.add("rigid ball: penetration (gaps)", outcome.ledger.worst_penetration);
+    assert!(ball.velocity[2] > 0.0 && outcome.run_totals.worst_penetration > 0.0, "it bounces");
+    figures.add("rigid ball: momentum", change(0));
+    figures.add("rigid ball: angular momentum", change(1));
+    figures.add("rigid ball: energy error", outcome.run_totals.last.error);
+    figures.add("rigid ball: penetration (gaps)", outcome.run_totals.worst_penetration);
 }
 
-pub(super) fn a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant(sheet: &mut Sheet) {
+pub(super) fn a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant(figures: &mut Figures) {
     // Without Poisson's ratio waves have one axis.
     let solved = run(model(
         "title = \"mass on bar\"\nunits = \"SI\"\n[control]\nend_time = 3e-5\n\
@@ -131,7 +131,7 @@ pub(super) fn a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant(she
     };
     for (name, time) in [("early", 1e-5), ("late", 3e-5)] {
         let (v, t) = at(time);
-        sheet.add(&format!("mass on bar @ velocity over that of the formula, {name}"), v / formula(t));
+        figures.add(&format!("mass on bar @ velocity over that of the formula, {name}"), v / formula(t));
     }
-    sheet.add("mass on bar: energy error", solved.outcome.ledger.last.error);
+    figures.add("mass on bar: energy error", solved.outcome.run_totals.last.error);
 }

@@ -7,7 +7,7 @@ use deck::Model;
 use mechanics::{load::Drive, setup::Constraint};
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     checker::{nearest, pierced},
     solve::{Solved, example, model, run, run_with_states},
 };
@@ -79,7 +79,7 @@ fn gone(solved: &Solved, node: u32, axis: usize) -> f64 {
 }
 
 /// MacNeal and Harder's twisted beam: 12 by 1.1 by 0.32, turned by 90 degrees over its length.
-pub(super) fn the_twisted_beam_bends_as_published(sheet: &mut Sheet) {
+pub(super) fn the_twisted_beam_bends_as_published(figures: &mut Figures) {
     for (axis, name) in [(2, "in plane"), (1, "out of plane")] {
         let mut conditions = held("i-min", "xyz", "xyz");
         for (j, share) in [(0, 0.25), (1, 0.5), (2, 0.25)] {
@@ -98,12 +98,12 @@ pub(super) fn the_twisted_beam_bends_as_published(sheet: &mut Sheet) {
                 [12.0 * s, 1.1 * (t - 0.5) * cos, 1.1 * (t - 0.5) * sin]
             },
         ));
-        sheet.add(&format!("twisted beam @ load {name}, deflection"), gone(&solved, 26, axis));
+        figures.add(&format!("twisted beam @ load {name}, deflection"), gone(&solved, 26, axis));
     }
 }
 
 /// A quarter of the roof of Scordelis and Lo: radius 25, length 50, 40 degrees to each side, under 90 per area.
-pub(super) fn the_roof_sags_as_published(sheet: &mut Sheet) {
+pub(super) fn the_roof_sags_as_published(figures: &mut Figures) {
     // I along the axis from the diaphragm to the middle, J from the crown to the free edge.
     let conditions = held("i-min", "xz", "")
         + &held("i-max", "y", "xz")
@@ -120,11 +120,11 @@ pub(super) fn the_roof_sags_as_published(sheet: &mut Sheet) {
             [25.0 * angle.sin(), 25.0 * s, 25.0 * angle.cos()]
         },
     ));
-    sheet.add("obstacle course: roof, free edge", -gone(&solved, 17 * 17, 2));
+    figures.add("obstacle course: roof, free edge", -gone(&solved, 17 * 17, 2));
 }
 
 /// An eighth of a cylinder with diaphragms at its ends, pinched by unit forces: radius 300, length 600, thickness 3.
-pub(super) fn the_cylinder_is_pinched_as_published(sheet: &mut Sheet) {
+pub(super) fn the_cylinder_is_pinched_as_published(figures: &mut Figures) {
     let conditions = held("i-min", "xz", "")
         + &held("i-max", "y", "xz")
         + &held("j-min", "x", "yz")
@@ -135,12 +135,12 @@ pub(super) fn the_cylinder_is_pinched_as_published(sheet: &mut Sheet) {
             let angle = FRAC_PI_2 * t;
             [300.0 * angle.sin(), 300.0 * s, 300.0 * angle.cos()]
         }));
-    sheet.add("obstacle course: pinched cylinder", -gone(&solved, 17, 2));
+    figures.add("obstacle course: pinched cylinder", -gone(&solved, 17, 2));
 }
 
 /// A quarter of a hemisphere with a hole of 18 degrees, pulled and pushed by pairs of forces of 2: radius 10, thickness
 /// 0.04.
-pub(super) fn the_hemisphere_opens_as_published(sheet: &mut Sheet) {
+pub(super) fn the_hemisphere_opens_as_published(figures: &mut Figures) {
     // I along the equator from x to y, J up to the hole.
     let conditions = held("i-min", "y", "xz")
         + &held("i-max", "x", "yz")
@@ -156,11 +156,11 @@ pub(super) fn the_hemisphere_opens_as_published(sheet: &mut Sheet) {
     hold(&mut model, held, 2);
     let solved = run(model);
     let mean = 0.5 * (gone(&solved, 1, 0) - gone(&solved, 17, 1));
-    sheet.add("obstacle course: hemisphere with a hole", mean);
+    figures.add("obstacle course: hemisphere with a hole", mean);
 }
 
 /// A cantilever of 0.2 by 0.01 m, thick as wide, under 100 N at its tip.
-pub(super) fn a_cantilever_of_shells_bends_as_a_beam(sheet: &mut Sheet) {
+pub(super) fn a_cantilever_of_shells_bends_as_a_beam(figures: &mut Figures) {
     let mut conditions = held("i-min", "xyz", "xyz");
     for (j, share) in [(0, 0.25), (1, 0.5), (2, 0.25)] {
         conditions += &pushed(&[41 * (j + 1)], [0.0, 0.0, 100.0 * share]);
@@ -173,11 +173,11 @@ pub(super) fn a_cantilever_of_shells_bends_as_a_beam(sheet: &mut Sheet) {
         &conditions,
         |s, t| [0.2 * s, 0.01 * t, 0.0],
     ));
-    sheet.add("cantilever of shells: deflection of its tip", gone(&solved, 82, 2));
+    figures.add("cantilever of shells: deflection of its tip", gone(&solved, 82, 2));
 }
 
 /// A quarter of a hinged square plate of 0.2 m and 2 mm under 1000 Pa, as acceleration.
-pub(super) fn a_square_plate_sags_under_pressure(sheet: &mut Sheet) {
+pub(super) fn a_square_plate_sags_under_pressure(figures: &mut Figures) {
     let conditions = held("i-min", "z", "x")
         + &held("j-min", "z", "y")
         + &held("i-max", "x", "yz")
@@ -191,11 +191,11 @@ pub(super) fn a_square_plate_sags_under_pressure(sheet: &mut Sheet) {
         &conditions,
         |s, t| [0.1 * s, 0.1 * t, 0.0],
     ));
-    sheet.add("square plate: deflection under 1000 Pa", -gone(&solved, 17 * 17, 2));
+    figures.add("square plate: deflection under 1000 Pa", -gone(&solved, 17 * 17, 2));
 }
 
 /// A strip of 0.2 by 0.01 m, 2 mm thick, clamped at one end.
-pub(super) fn a_strip_of_shells_rings_as_a_beam(sheet: &mut Sheet) {
+pub(super) fn a_strip_of_shells_rings_as_a_beam(figures: &mut Figures) {
     let deck = format!(
         "title = \"strip\"\nunits = \"SI\"\n[control]\nend_time = 0.062\n[output]\nhistory_cycles = 5\n\
          [[part]]\nname = \"strip\"\nmaterial = {}\nshell = {{ thickness = 2e-3, points = 2 }}\n\
@@ -213,7 +213,7 @@ pub(super) fn a_strip_of_shells_rings_as_a_beam(sheet: &mut Sheet) {
         model.velocity[n][2] = 1e-3 * s * s * (6.0 - 4.0 * s + s * s) / 3.0;
         model.spin[n] = [0.0, -1e-3 * slope, 0.0];
     }
-    sheet.add("strip of shells: frequency (Hz)", frequency(&run(model), 2));
+    figures.add("strip of shells: frequency (Hz)", frequency(&run(model), 2));
 }
 
 /// Holds a node along an axis too.
@@ -225,7 +225,7 @@ fn hold(model: &mut Model, node: usize, axis: usize) {
 }
 
 /// Square plates of 0.2 m and 2 mm: hinged all round, and clamped all round.
-pub(super) fn a_square_plate_rings_at_its_frequencies(sheet: &mut Sheet) {
+pub(super) fn a_square_plate_rings_at_its_frequencies(figures: &mut Figures) {
     for (name, rotations) in [("hinged", ""), ("clamped", "xyz")] {
         let edges: String = ["i-min", "i-max", "j-min", "j-max"]
             .iter()
@@ -256,7 +256,7 @@ pub(super) fn a_square_plate_rings_at_its_frequencies(sheet: &mut Sheet) {
             model.spin[n] = [1e-3 * shape(x) * slope(y), -1e-3 * slope(x) * shape(y), 0.0];
         }
         let solved = run(model);
-        sheet.add(&format!("square plate @ {name}, frequency (Hz)"), frequency(&solved, 2));
+        figures.add(&format!("square plate @ {name}, frequency (Hz)"), frequency(&solved, 2));
     }
 }
 
@@ -275,7 +275,7 @@ fn frequency(solved: &Solved, axis: usize) -> f64 {
 }
 
 /// Balmer and Witmer's panel as in the room of structures, of shells with five points. Half of it.
-pub(super) fn the_impulsive_panel_of_shells_is_dented_about_as_deep(sheet: &mut Sheet) {
+pub(super) fn the_impulsive_panel_of_shells_is_dented_about_as_deep(figures: &mut Figures) {
     let (radius, thickness, length) = (2.9375 * INCH, 0.125 * INCH, 12.56 * INCH);
     let material = plastic(2.5e-4 * DENSITY, 10.5e6 * PSI, 0.33, 44_000.0 * PSI);
     let deck = format!(
@@ -309,9 +309,9 @@ pub(super) fn the_impulsive_panel_of_shells_is_dented_about_as_deep(sheet: &mut 
     for (gauge, name) in [(0, "half way"), (1, "at three quarters")] {
         let start = solved.model.mesh.positions[solved.model.output.gauges[gauge].node as usize][1];
         let greatest = solved.rows.iter().map(|row| start - row.gauges[gauge].x[1]).fold(0.0, f64::max);
-        sheet.add(&format!("impulsive panel of shells @ {name}, deflection (in)"), greatest / INCH);
+        figures.add(&format!("impulsive panel of shells @ {name}, deflection (in)"), greatest / INCH);
     }
-    sheet.add("impulsive panel of shells: energy error", solved.outcome.ledger.last.error);
+    figures.add("impulsive panel of shells: energy error", solved.outcome.run_totals.last.error);
 }
 
 /// A tube of shells that a wall shortens at a speed.
@@ -414,24 +414,24 @@ fn closest(solved: &Solved, gap: f64) -> f64 {
     all.fold(4.0 * gap, f64::min) / gap
 }
 
-pub(super) fn a_square_tube_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
+pub(super) fn a_square_tube_folds_at_its_mean_crush_force(figures: &mut Figures) {
     let (solved, stroke) = SQUARE.crush();
     let last = solved.rows.last().expect("rows");
-    sheet.add("square tube: mean crush force (N)", (last.internal + last.hourglass) / stroke);
-    sheet.add("square tube: energy error", last.error);
-    sheet.add("square tube: hourglass energy over internal", last.hourglass / last.internal);
+    figures.add("square tube: mean crush force (N)", (last.internal + last.hourglass) / stroke);
+    figures.add("square tube: energy error", last.error);
+    figures.add("square tube: hourglass energy over internal", last.hourglass / last.internal);
     let crossings = pierced(&solved.model.mesh, &solved.state.x);
-    sheet.add("square tube: edges through faces", crossings.len() as f64);
-    sheet.add("square tube: smallest distance of sheets that share no node (gaps)", closest(&solved, 1e-3));
-    sheet.add("square tube: deepest contact (gaps)", solved.outcome.ledger.worst_penetration);
+    figures.add("square tube: edges through faces", crossings.len() as f64);
+    figures.add("square tube: smallest distance of sheets that share no node (gaps)", closest(&solved, 1e-3));
+    figures.add("square tube: deepest contact (gaps)", solved.outcome.run_totals.worst_penetration);
     // What the same tube does that does not feel itself.
     let (solved, stroke) = Tube { meets_itself: false, ..SQUARE }.crush();
     let through = solved.rows.last().expect("rows");
     let crossings = pierced(&solved.model.mesh, &solved.state.x);
-    sheet.add("square tube without contact: edges through faces", crossings.len() as f64);
+    figures.add("square tube without contact: edges through faces", crossings.len() as f64);
     let of = "square tube without contact: smallest distance of sheets that share no node (gaps)";
-    sheet.add(of, closest(&solved, 1e-3));
-    sheet.add(
+    figures.add(of, closest(&solved, 1e-3));
+    figures.add(
         "square tube without contact: crush force over that with it",
         (through.internal + through.hourglass) / stroke / ((last.internal + last.hourglass) / stroke),
     );
@@ -441,36 +441,37 @@ pub(super) fn a_square_tube_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
 const SHORT: Tube = Tube { widths: [4.0, 2.0], along: 48, ..SQUARE };
 
 /// Figures of a tube of the table.
-fn crushed(sheet: &mut Sheet, name: &str, tube: &Tube) {
+fn crushed(figures: &mut Figures, name: &str, tube: &Tube) {
     let (solved, stroke) = tube.crush();
     let last = solved.rows.last().expect("rows");
-    sheet.add(&format!("tube @ {name}, mean crush force (N)"), (last.internal + last.hourglass) / stroke);
+    figures.add(&format!("tube @ {name}, mean crush force (N)"), (last.internal + last.hourglass) / stroke);
     let crossings = pierced(&solved.model.mesh, &solved.state.x);
-    sheet.add("tubes: edges through faces", crossings.len() as f64);
+    figures.add("tubes: edges through faces", crossings.len() as f64);
     let of = "tubes: smallest distance of sheets that share no node (gaps)";
-    sheet.add(of, closest(&solved, 0.5 * tube.thickness));
+    figures.add(of, closest(&solved, 0.5 * tube.thickness));
 }
 
-pub(super) fn a_tube_that_feels_the_rate_folds_at_a_greater_force(sheet: &mut Sheet) {
-    crushed(sheet, "50 by 2 mm of 250 MPa at 20 m/s", &Tube { rate: true, ..SHORT });
+pub(super) fn a_tube_that_feels_the_rate_folds_at_a_greater_force(figures: &mut Figures) {
+    crushed(figures, "50 by 2 mm of 250 MPa at 20 m/s", &Tube { rate: true, ..SHORT });
 }
 
 /// The tube that feels the rate and a wall of 100 kg, for as long as that would take over its whole length: at no state of
 /// the output does a sheet pass through another.
-pub(super) fn a_tube_that_is_crushed_to_a_block_passes_nowhere_through_itself(sheet: &mut Sheet) {
+pub(super) fn a_tube_that_is_crushed_to_a_block_passes_nowhere_through_itself(figures: &mut Figures) {
     let tube = Tube { rate: true, widths: [4.0, 4.0], mass: Some(100.0), ..SHORT };
     let solved = run_with_states(tube.model());
     let mesh = &solved.model.mesh;
     let worst = solved.states.iter().map(|state| pierced(mesh, &state.x).len()).max();
-    sheet.add("tube crushed to a block: edges through faces", worst.expect("states are written") as f64);
+    figures.add("tube crushed to a block: edges through faces", worst.expect("states are written") as f64);
     let height = solved.state.x.iter().map(|x| x[2]).fold(0.0, f64::max);
-    sheet.add("tube crushed to a block: height left over length", height / (tube.widths[0] * tube.width));
-    sheet.add("tube crushed to a block: energy error", solved.rows.last().expect("rows").error);
-    sheet.add("tube crushed to a block: deepest contact (gaps)", solved.outcome.ledger.worst_penetration);
+    figures.add("tube crushed to a block: height left over length", height / (tube.widths[0] * tube.width));
+    figures.add("tube crushed to a block: energy error", solved.rows.last().expect("rows").error);
+    figures
+        .add("tube crushed to a block: deepest contact (gaps)", solved.outcome.run_totals.worst_penetration);
 }
 
-pub(super) fn a_hexagonal_tube_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
-    crushed(sheet, "hexagon, 50 by 2 mm of 250 MPa, no rate", &Tube { sides: 6, ..SHORT });
+pub(super) fn a_hexagonal_tube_folds_at_its_mean_crush_force(figures: &mut Figures) {
+    crushed(figures, "hexagon, 50 by 2 mm of 250 MPa, no rate", &Tube { sides: 6, ..SHORT });
 }
 
 /// A tube of Abramowicz and Jones: half the length of its folds is theirs.
@@ -479,25 +480,25 @@ fn tested(width: f64, thickness: f64) -> Tube {
     Tube { rate: true, width, thickness, fold, yield_stress: 310e6, speed: 10.0, ..SHORT }
 }
 
-pub(super) fn a_thin_tube_that_was_tested_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
-    crushed(sheet, "37.07 by 1.152 mm of 310 MPa at 10 m/s", &tested(0.03707, 1.152e-3));
+pub(super) fn a_thin_tube_that_was_tested_folds_at_its_mean_crush_force(figures: &mut Figures) {
+    crushed(figures, "37.07 by 1.152 mm of 310 MPa at 10 m/s", &tested(0.03707, 1.152e-3));
 }
 
-pub(super) fn a_wide_tube_that_was_tested_folds_at_its_mean_crush_force(sheet: &mut Sheet) {
-    crushed(sheet, "49.31 by 1.63 mm of 310 MPa at 10 m/s", &tested(0.04931, 1.63e-3));
+pub(super) fn a_wide_tube_that_was_tested_folds_at_its_mean_crush_force(figures: &mut Figures) {
+    crushed(figures, "49.31 by 1.63 mm of 310 MPa at 10 m/s", &tested(0.04931, 1.63e-3));
 }
 
 /// The girder of the examples: it folds on itself, and at no state of the output does a sheet pass through another.
-pub(super) fn the_girder_folds_without_passing_through_itself(sheet: &mut Sheet) {
+pub(super) fn the_girder_folds_without_passing_through_itself(figures: &mut Figures) {
     let solved = run_with_states(example("girder-crush"));
     let worst = solved.states.iter().map(|state| pierced(&solved.model.mesh, &state.x).len()).max();
-    sheet.add("girder: edges through faces", worst.expect("states are written") as f64);
-    sheet.add("girder: smallest distance of sheets that share no node (gaps)", closest(&solved, 1e-3));
+    figures.add("girder: edges through faces", worst.expect("states are written") as f64);
+    figures.add("girder: smallest distance of sheets that share no node (gaps)", closest(&solved, 1e-3));
     let last = solved.rows.last().expect("rows");
     let rear = solved.model.output.gauges[0].node as usize;
     let shortened = solved.model.mesh.positions[rear][2] - last.gauges[0].x[2];
-    sheet.add("girder: mean crush force (N)", (last.internal + last.hourglass) / shortened);
-    sheet.add("girder: energy error", last.error);
-    sheet.add("girder: hourglass energy over internal", last.hourglass / last.internal);
-    sheet.add("girder: deepest contact over the gap", solved.outcome.ledger.worst_penetration);
+    figures.add("girder: mean crush force (N)", (last.internal + last.hourglass) / shortened);
+    figures.add("girder: energy error", last.error);
+    figures.add("girder: hourglass energy over internal", last.hourglass / last.internal);
+    figures.add("girder: deepest contact over the gap", solved.outcome.run_totals.worst_penetration);
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{Solved, crossing, model, run},
 };
 use deck::Model;
@@ -24,7 +24,7 @@ const WALL: &str = "[[wall]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n";
 const HELD: &str = "[[boundary]]\ntype = \"fixed\"\nparts = [\"bar\"]\nface = \"k-min\"\naxes = \"z\"\n";
 
 /// The copper bar with `[core, ring, length]` cells of a quarter.
-fn copper_bar(sheet: &mut Sheet, cells: [u32; 3], foot: &str) {
+fn copper_bar(figures: &mut Figures, cells: [u32; 3], foot: &str) {
     let family = if foot == WALL { "taylor copper, free foot" } else { "taylor copper, held foot" };
     let deck = format!(
         "title = \"Taylor bar, copper\"\nunits = \"mm-ms-kg\"\n\
@@ -36,29 +36,29 @@ fn copper_bar(sheet: &mut Sheet, cells: [u32; 3], foot: &str) {
     let solved = run(model(&deck));
     let n = solved.model.mesh.n_elements();
     let [length, radius, strain] = shape(&solved);
-    let ledger = &solved.outcome.ledger;
+    let run_totals = &solved.outcome.run_totals;
     let of = format!("{family} @ {n} elements");
-    sheet.add(&format!("{of}, length (mm)"), length);
-    sheet.add(&format!("{of}, radius of the foot (mm)"), radius);
-    sheet.add(&format!("{of}, greatest plastic strain"), strain);
-    sheet.add("taylor copper: energy error", ledger.last.error);
-    sheet.add(
+    figures.add(&format!("{of}, length (mm)"), length);
+    figures.add(&format!("{of}, radius of the foot (mm)"), radius);
+    figures.add(&format!("{of}, greatest plastic strain"), strain);
+    figures.add("taylor copper: energy error", run_totals.last.error);
+    figures.add(
         "taylor copper: hourglass energy over kinetic at first",
-        ledger.hourglass / ledger.greatest_kinetic,
+        run_totals.hourglass / run_totals.greatest_kinetic,
     );
 }
 
-pub(super) fn the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find(sheet: &mut Sheet) {
-    copper_bar(sheet, [3, 3, 36], WALL);
-    copper_bar(sheet, [3, 3, 36], HELD);
+pub(super) fn the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find(figures: &mut Figures) {
+    copper_bar(figures, [3, 3, 36], WALL);
+    copper_bar(figures, [3, 3, 36], HELD);
 }
 
-pub(super) fn finer_copper_bars_come_nearer_to_what_others_converge_to(sheet: &mut Sheet) {
-    copper_bar(sheet, [6, 6, 72], HELD);
-    copper_bar(sheet, [8, 8, 96], HELD);
+pub(super) fn finer_copper_bars_come_nearer_to_what_others_converge_to(figures: &mut Figures) {
+    copper_bar(figures, [6, 6, 72], HELD);
+    copper_bar(figures, [8, 8, 96], HELD);
 }
 
-pub(super) fn the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds(sheet: &mut Sheet) {
+pub(super) fn the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds(figures: &mut Figures) {
     let deck = format!(
         "title = \"Taylor bar, OFHC copper\"\nunits = \"mm-ms-kg\"\n\
          [control]\nend_time = 0.09\nlinear_viscosity = 0.06\nquadratic_viscosity = 1.2247\nhourglass = 0.03\n\
@@ -69,13 +69,13 @@ pub(super) fn the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds(sheet: 
     let solved = run(model(&deck));
     let [length, radius, strain] = shape(&solved);
     let hottest = solved.state.elements[field::TEMPERATURE].iter().copied().fold(0.0, f64::max);
-    sheet.add("taylor OFHC: length (mm)", length);
-    sheet.add("taylor OFHC: radius of the foot (mm)", radius);
-    sheet.add("taylor OFHC: greatest plastic strain", strain);
-    sheet.add("taylor OFHC: highest temperature (K)", hottest);
+    figures.add("taylor OFHC: length (mm)", length);
+    figures.add("taylor OFHC: radius of the foot (mm)", radius);
+    figures.add("taylor OFHC: greatest plastic strain", strain);
+    figures.add("taylor OFHC: highest temperature (K)", hottest);
 }
 
-pub(super) fn a_soft_sphere_bounces_off_a_wall_as_hertz_says(sheet: &mut Sheet) {
+pub(super) fn a_soft_sphere_bounces_off_a_wall_as_hertz_says(figures: &mut Figures) {
     // E = 1 GPa, nu = 0.3, 1 m/s, a quarter of the sphere; the wall stands at its pole.
     let deck = "title = \"sphere of Hertz\"\nunits = \"SI\"\n\
         [control]\nend_time = 260e-6\nlinear_viscosity = 0.06\n\
@@ -98,10 +98,10 @@ pub(super) fn a_soft_sphere_bounces_off_a_wall_as_hertz_says(sheet: &mut Sheet) 
         crossing(momentum.iter().copied(), first + part * (last - first)).expect("the sphere turns round")
     };
     let middle = at(0.75) - at(0.25);
-    sheet.add("sphere of Hertz: greatest force (N)", force);
-    sheet.add("sphere of Hertz: time of the middle half of the impulse (s)", middle);
-    sheet.add("sphere of Hertz: restitution", -last / first);
-    sheet.add("sphere of Hertz: mass (kg)", 4.0 * mass);
+    figures.add("sphere of Hertz: greatest force (N)", force);
+    figures.add("sphere of Hertz: time of the middle half of the impulse (s)", middle);
+    figures.add("sphere of Hertz: restitution", -last / first);
+    figures.add("sphere of Hertz: mass (kg)", 4.0 * mass);
     assert!((4.0 / 3.0 * PI * 1e-6 * 1000.0 / (4.0 * mass) - 1.0).abs() < 0.01);
 }
 
@@ -124,19 +124,19 @@ fn refine_pole(x: &mut [f64; 3], finer: f64) {
 }
 
 /// The figures of an impact of spheres from the momentum by time that it changes.
-fn bounce(sheet: &mut Sheet, of: &str, momentum: &[(f64, f64)]) {
+fn bounce(figures: &mut Figures, of: &str, momentum: &[(f64, f64)]) {
     // As for the soft sphere: force over some cycles, and the time of the middle half of the impulse.
     let force = momentum.windows(41).map(|w| (w[40].1 - w[0].1) / (w[40].0 - w[0].0)).fold(0.0, f64::max);
     let (first, last) = (momentum[0].1, momentum[momentum.len() - 1].1);
     let at = |part: f64| {
         crossing(momentum.iter().copied(), first + part * (last - first)).expect("the sphere turns round")
     };
-    sheet.add(&format!("{of}, greatest force (N)"), force);
-    sheet.add(&format!("{of}, time of the middle half of the impulse (s)"), at(0.75) - at(0.25));
-    sheet.add(&format!("{of}, restitution"), -last / first);
+    figures.add(&format!("{of}, greatest force (N)"), force);
+    figures.add(&format!("{of}, time of the middle half of the impulse (s)"), at(0.75) - at(0.25));
+    figures.add(&format!("{of}, restitution"), -last / first);
 }
 
-pub(super) fn steel_spheres_bounce_off_a_wall_as_hertz_says(sheet: &mut Sheet) {
+pub(super) fn steel_spheres_bounce_off_a_wall_as_hertz_says(figures: &mut Figures) {
     for (speed, cells, finer, end) in
         [(0.1, [14, 8], 8.0, 100e-6), (1.0, [18, 10], 4.0, 64e-6), (10.0, [18, 10], 2.0, 42e-6)]
     {
@@ -151,12 +151,12 @@ pub(super) fn steel_spheres_bounce_off_a_wall_as_hertz_says(sheet: &mut Sheet) {
         let solved = run(model);
         let momentum: Vec<(f64, f64)> =
             solved.rows.iter().map(|row| (row.time, 4.0 * row.momentum[0])).collect();
-        bounce(sheet, &format!("steel sphere on a wall @ {speed:?} m/s"), &momentum);
+        bounce(figures, &format!("steel sphere on a wall @ {speed:?} m/s"), &momentum);
     }
 }
 
 /// Two of them, each at half of 1 m/s; half a gap of contact lies on either side of the middle.
-pub(super) fn two_steel_spheres_bounce_off_each_other_as_hertz_says(sheet: &mut Sheet) {
+pub(super) fn two_steel_spheres_bounce_off_each_other_as_hertz_says(figures: &mut Figures) {
     let (cells, finer) = ([14, 8], 5.0);
     let gap = 1e-5;
     let sphere = |name: &str, speed: f64, at: f64| {
@@ -198,8 +198,11 @@ pub(super) fn two_steel_spheres_bounce_off_each_other_as_hertz_says(sheet: &mut 
             (row.time, now)
         })
         .collect();
-    bounce(sheet, "two steel spheres @ closing at 1.0 m/s", &momentum);
-    sheet.add("two steel spheres: greatest depth of contact (gaps)", solved.outcome.ledger.worst_penetration);
+    bounce(figures, "two steel spheres @ closing at 1.0 m/s", &momentum);
+    figures.add(
+        "two steel spheres: greatest depth of contact (gaps)",
+        solved.outcome.run_totals.worst_penetration,
+    );
 }
 
 /// Puts the corners of a part that was reflected in an order that has a positive volume.
@@ -226,7 +229,7 @@ fn thrown_at_wall(friction: f64) -> Solved {
 }
 
 pub(super) fn a_rigid_wall_gives_its_impulse_along_its_normal_and_coulombs_share_beside_it(
-    sheet: &mut Sheet,
+    figures: &mut Figures,
 ) {
     for friction in [0.0, 0.05] {
         let solved = thrown_at_wall(friction);
@@ -236,10 +239,10 @@ pub(super) fn a_rigid_wall_gives_its_impulse_along_its_normal_and_coulombs_share
         });
         let at = format!("friction {friction:?}");
         assert!(v[2] > 0.0, "it has turned round: {v:?}");
-        sheet.add(
+        figures.add(
             &format!("oblique on a wall @ {at}, tangential over normal impulse"),
             (10.0 - v[0]) / (v[2] + 10.0),
         );
-        sheet.add("oblique on a wall: velocity across (m/s)", v[1]);
+        figures.add("oblique on a wall: velocity across (m/s)", v[1]);
     }
 }

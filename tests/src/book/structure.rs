@@ -3,7 +3,7 @@
 use mechanics::{load::Drive, setup::Constraint};
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{Solved, model, run},
 };
 
@@ -33,7 +33,7 @@ fn deflections(solved: &Solved, gauge: usize, axis: usize) -> (f64, Vec<(f64, f6
 
 /// Balmer and Witmer's panel: 120 degrees of a cylinder, straight edges clamped, ends hinged, explosively thrown
 /// inward over 60 degrees and 10.205 in from one end. Half of it, with 4 elements through the thickness.
-pub(super) fn the_impulsive_panel_is_dented_as_deep_as_measured(sheet: &mut Sheet) {
+pub(super) fn the_impulsive_panel_is_dented_as_deep_as_measured(figures: &mut Figures) {
     let (radius, thickness, length) = (2.9375 * INCH, 0.125 * INCH, 12.56 * INCH);
     let material = perfectly_plastic(2.5e-4 * DENSITY, 10.5e6 * PSI, 0.33, 44_000.0 * PSI);
     let deck = format!(
@@ -74,13 +74,13 @@ pub(super) fn the_impulsive_panel_is_dented_as_deep_as_measured(sheet: &mut Shee
     let solved = run(model);
     for (gauge, name) in [(0, "half way"), (1, "at three quarters")] {
         let (greatest, _) = deflections(&solved, gauge, 1);
-        sheet.add(&format!("impulsive panel @ {name}, deflection (in)"), greatest / INCH);
+        figures.add(&format!("impulsive panel @ {name}, deflection (in)"), greatest / INCH);
     }
-    sheet.add("impulsive panel: energy error", solved.outcome.ledger.last.error);
+    figures.add("impulsive panel: energy error", solved.outcome.run_totals.last.error);
 }
 
 /// A clamped beam of 10 x 1.2 x 0.125 in, its middle 2 in thrown at 5,000 in/s; a quarter of it.
-pub(super) fn the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds(sheet: &mut Sheet) {
+pub(super) fn the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds(figures: &mut Figures) {
     let material = perfectly_plastic(2.61e-4 * DENSITY, 10.4e6 * PSI, 0.3, 41_400.0 * PSI);
     let deck = format!(
         "title = \"impulsive beam\"\nunits = \"SI\"\n[control]\nend_time = 2e-3\nlinear_viscosity = 0.06\nhourglass = 0.03\n\
@@ -104,8 +104,8 @@ pub(super) fn the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds(shee
     let (greatest, path) = deflections(&solved, 0, 2);
     let peak_at = path.iter().find(|(_, d)| *d == greatest).map_or(0.0, |(t, _)| *t);
     let after: Vec<f64> = path.iter().filter(|(t, _)| *t > 1.5 * peak_at).map(|(_, d)| *d).collect();
-    sheet.add("impulsive beam: greatest deflection (in)", greatest / INCH);
-    sheet.add(
+    figures.add("impulsive beam: greatest deflection (in)", greatest / INCH);
+    figures.add(
         "impulsive beam: mean deflection afterwards (in)",
         after.iter().sum::<f64>() / after.len() as f64 / INCH,
     );
@@ -113,7 +113,7 @@ pub(super) fn the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds(shee
 
 /// A beam clamped at both ends, thrown at 30 m/s all over: half of its length and of its width. Theory takes it as rigid and
 /// perfectly plastic, so it is ten times as stiff here as aluminium, whose elastic bending would take half of the energy.
-pub(super) fn a_beam_thrown_all_over_is_bent_about_as_a_rigid_plastic_one(sheet: &mut Sheet) {
+pub(super) fn a_beam_thrown_all_over_is_bent_about_as_a_rigid_plastic_one(figures: &mut Figures) {
     let (height, length) = (3.175e-3, 0.127);
     let deck = format!(
         "title = \"clamped beam\"\nunits = \"SI\"\n[control]\nend_time = 0.8e-3\nlinear_viscosity = 0.06\nhourglass = 0.03\n\
@@ -132,23 +132,27 @@ pub(super) fn a_beam_thrown_all_over_is_bent_about_as_a_rigid_plastic_one(sheet:
         }
     }
     let (greatest, _) = deflections(&run(model), 0, 2);
-    sheet.add("beam thrown all over: greatest deflection over its height", greatest / height);
+    figures.add("beam thrown all over: greatest deflection over its height", greatest / height);
 }
 
 /// A cantilever of 0.2 m with a section of 10 mm square, two and four elements high, without hourglass control.
-pub(super) fn a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness(sheet: &mut Sheet) {
+pub(super) fn a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness(
+    figures: &mut Figures,
+) {
     for layers in [2, 4] {
-        sheet.add(&format!("cantilever @ {layers} layers, frequency (Hz)"), first_frequency(layers));
+        figures.add(&format!("cantilever @ {layers} layers, frequency (Hz)"), first_frequency(layers));
     }
 }
 
 /// The same beams in their second and third mode, both at once.
-pub(super) fn higher_tones_of_a_cantilever_are_those_of_timoshenko_with_that_stiffness(sheet: &mut Sheet) {
+pub(super) fn higher_tones_of_a_cantilever_are_those_of_timoshenko_with_that_stiffness(
+    figures: &mut Figures,
+) {
     for layers in [2, 4] {
         let solved = cantilever(layers, &[1, 2]);
         for (mode, name) in [(1, "second"), (2, "third")] {
             let frequency = peak(&solved, slender_frequency(mode));
-            sheet.add(&format!("cantilever @ {layers} layers, {name} mode (Hz)"), frequency);
+            figures.add(&format!("cantilever @ {layers} layers, {name} mode (Hz)"), frequency);
         }
     }
 }

@@ -3,7 +3,7 @@
 //! Bars are columns of cubes without Poisson's ratio, free at their sides; shocks run in columns held at their sides.
 
 use crate::{
-    case::Sheet,
+    case::Figures,
     solve::{Solved, crossing, example, mean, model, run, run_with_states},
 };
 
@@ -66,7 +66,9 @@ fn forces(solved: &Solved) -> Vec<(f64, f64)> {
         .collect()
 }
 
-pub(super) fn a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages(sheet: &mut Sheet) {
+pub(super) fn a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_passages(
+    figures: &mut Figures,
+) {
     // Viscosity smears the front over a length that shrinks as the root of the cell size only: at 100 cells the
     // bar rebounds with 9.64 m/s, at 400 with 9.82 m/s, and the rest of the energy is left as vibration.
     let bar = Bar { name: "bar", from: 0.0, length: 0.1, cells: 1600, velocity: -10.0, material: BAR };
@@ -79,12 +81,12 @@ pub(super) fn a_bar_on_a_rigid_wall_feels_density_wave_speed_velocity_for_two_pa
     let (end, _) = force.iter().rfind(|(_, f)| *f > 0.01 * plateau).expect("the wall pushes");
     let section = (0.1_f64 / 1600.0).powi(2);
     let mass = 8000.0 * 0.1 * section;
-    sheet.add("bar on wall: face stress", plateau / section);
-    sheet.add("bar on wall: contact time", *end);
-    sheet.add("bar on wall: rebound velocity", solved.outcome.ledger.last.momentum[0] / mass);
+    figures.add("bar on wall: face stress", plateau / section);
+    figures.add("bar on wall: contact time", *end);
+    figures.add("bar on wall: rebound velocity", solved.outcome.run_totals.last.momentum[0] / mass);
 }
 
-pub(super) fn of_two_equal_bars_the_first_stops_and_the_second_flies_on(sheet: &mut Sheet) {
+pub(super) fn of_two_equal_bars_the_first_stops_and_the_second_flies_on(figures: &mut Figures) {
     let mut model = example("two-bars");
     model.output.period = Some(20e-6);
     let solved = run_with_states(model);
@@ -95,25 +97,25 @@ pub(super) fn of_two_equal_bars_the_first_stops_and_the_second_flies_on(sheet: &
     let level = 0.25 * mean(spring().filter(|(t, _)| (10e-6..30e-6).contains(t)).map(|(_, e)| e));
     let begin = crossing(spring(), level).expect("they meet");
     let end = crossing(spring().filter(|(t, _)| *t > 20e-6), level).expect("they part");
-    sheet.add("equal bars: stress in the striker", sides[0]);
-    sheet.add("equal bars: stress in the struck", sides[1]);
-    sheet.add("equal bars: contact time", end - begin);
-    sheet.add("equal bars: striker afterwards", solved.part_velocity(0)[0]);
-    sheet.add("equal bars: struck afterwards", solved.part_velocity(1)[0]);
+    figures.add("equal bars: stress in the striker", sides[0]);
+    figures.add("equal bars: stress in the struck", sides[1]);
+    figures.add("equal bars: contact time", end - begin);
+    figures.add("equal bars: striker afterwards", solved.part_velocity(0)[0]);
+    figures.add("equal bars: struck afterwards", solved.part_velocity(1)[0]);
 }
 
-pub(super) fn a_short_bar_stops_on_a_long_one_that_flies_on_slower(sheet: &mut Sheet) {
+pub(super) fn a_short_bar_stops_on_a_long_one_that_flies_on_slower(figures: &mut Figures) {
     // The spring of the gap is as soft as a cell or two: with cells of 1 mm the restitution is 0.4105.
     let short = Bar { name: "short", from: -0.1, length: 0.1, cells: 200, velocity: 10.0, material: BAR };
     let long = Bar { name: "long", from: 1e-4, length: 0.25, cells: 500, velocity: 0.0, material: BAR };
     let solved = run(model(&bars(90e-6, "", &[short, long], "[contact]\ngap_length = 1e-4\n")));
     let (short, long) = (solved.part_velocity(0)[0], solved.part_velocity(1)[0]);
-    sheet.add("unequal bars: short afterwards", short);
-    sheet.add("unequal bars: long afterwards", long);
-    sheet.add("unequal bars: restitution", (long - short) / 10.0);
+    figures.add("unequal bars: short afterwards", short);
+    figures.add("unequal bars: long afterwards", long);
+    figures.add("unequal bars: restitution", (long - short) / 10.0);
 }
 
-pub(super) fn a_free_end_doubles_the_velocity_and_turns_the_stress(sheet: &mut Sheet) {
+pub(super) fn a_free_end_doubles_the_velocity_and_turns_the_stress(figures: &mut Figures) {
     let head = Bar { name: "head", from: 0.0, length: 0.02, cells: 20, velocity: 10.0, material: BAR };
     let rest = Bar { name: "rest", from: 0.02, length: 0.08, cells: 80, velocity: 0.0, material: BAR };
     let more = "[[join]]\nparts = \"all\"\n[[gauge]]\nname = \"middle\"\npoint = [0.06, 0, 0]\n\
@@ -124,8 +126,8 @@ pub(super) fn a_free_end_doubles_the_velocity_and_turns_the_stress(sheet: &mut S
     let middle = |[x, _, _]: [f64; 3]| (0.055..0.065).contains(&x);
     let there = solved.element_mean(solved.state_at(12e-6), 1, middle, stress);
     let back = solved.element_mean(solved.state_at(28e-6), 1, middle, stress);
-    sheet.add("free end: velocity over that of the pulse", v(1, 18e-6, 22e-6) / v(0, 10e-6, 14e-6));
-    sheet.add("free end: stress over that of the pulse", back / there);
+    figures.add("free end: velocity over that of the pulse", v(1, 18e-6, 22e-6) / v(0, 10e-6, 14e-6));
+    figures.add("free end: stress over that of the pulse", back / there);
 }
 
 const STEEL: &str = "{ density = 7850, eos = { type = \"linear\", bulk = 70e9 }, \
@@ -133,7 +135,7 @@ const STEEL: &str = "{ density = 7850, eos = { type = \"linear\", bulk = 70e9 },
 const ALUMINIUM: &str = "{ density = 2700, eos = { type = \"linear\", bulk = 23.333333333333333e9 }, \
                          strength = { type = \"elastic\", shear = 35e9 } }";
 
-pub(super) fn a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances(sheet: &mut Sheet) {
+pub(super) fn a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances(figures: &mut Figures) {
     for (name, first, second) in
         [("steel to aluminium", STEEL, ALUMINIUM), ("aluminium to steel", ALUMINIUM, STEEL)]
     {
@@ -148,12 +150,12 @@ pub(super) fn a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances(s
         let pulse = solved.element_mean(solved.state_at(12e-6), 1, within(0.045, 0.08), stress);
         let through = solved.element_mean(&solved.state, 2, within(0.145, 0.175), stress);
         let back = solved.element_mean(&solved.state, 1, within(0.03, 0.055), stress);
-        sheet.add(&format!("impedance @ {name}, transmitted"), through / pulse);
-        sheet.add(&format!("impedance @ {name}, reflected"), back / pulse);
+        figures.add(&format!("impedance @ {name}, transmitted"), through / pulse);
+        figures.add(&format!("impedance @ {name}, reflected"), back / pulse);
     }
 }
 
-pub(super) fn a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front(sheet: &mut Sheet) {
+pub(super) fn a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front(figures: &mut Figures) {
     // Hardening H of plastic strain so that stress rises with E H / (E + H) = 2 GPa of strain.
     let bilinear = "{ density = 8000, eos = { type = \"linear\", bulk = 66.66666666666667e9 }, strength = \
                     { type = \"von-mises\", shear = 100e9, yield_stress = 300e6, hardening = 2.0202020202020203e9 } }";
@@ -179,13 +181,13 @@ pub(super) fn a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front(she
             .filter(|(_, x)| (0.015..0.035).contains(&x[0]))
             .map(|(n, _)| state.v[n][0]),
     );
-    sheet.add("bilinear bar: velocity step at yield", between + 20.0);
-    sheet.add(
+    figures.add("bilinear bar: velocity step at yield", between + 20.0);
+    figures.add(
         "bilinear bar: stress behind the plastic front",
         -solved.element_mean(&solved.state, 0, behind, stress),
     );
-    sheet.add("bilinear bar: plastic strain", strain);
-    sheet.add("bilinear bar: plastic front", speed);
+    figures.add("bilinear bar: plastic strain", strain);
+    figures.add("bilinear bar: plastic front", speed);
 }
 
 /// Angular frequency of a gauge's velocity along x that is one mode: for a harmonic series of equal steps
@@ -213,16 +215,16 @@ fn ringing(cells: u32, safety: f64, more: &str, mode: impl Fn(f64) -> f64) -> So
     run(model)
 }
 
-pub(super) fn bars_of_forty_cells_ring_at_their_frequencies(sheet: &mut Sheet) {
+pub(super) fn bars_of_forty_cells_ring_at_their_frequencies(figures: &mut Figures) {
     use std::f64::consts::PI;
     let free = ringing(40, 0.6666, "", |x| (PI * x).cos());
     let fixed = "[[boundary]]\ntype = \"fixed\"\nface = \"i-min\"\naxes = \"x\"\n";
     let clamped = ringing(40, 0.6666, fixed, |x| (0.5 * PI * x).sin());
-    sheet.add("ringing bar: free at both ends", frequency(&free) / (2.0 * PI));
-    sheet.add("ringing bar: fixed at one end", frequency(&clamped) / (2.0 * PI));
+    figures.add("ringing bar: free at both ends", frequency(&free) / (2.0 * PI));
+    figures.add("ringing bar: fixed at one end", frequency(&clamped) / (2.0 * PI));
 }
 
-pub(super) fn short_waves_are_slow_by_what_central_differences_say(sheet: &mut Sheet) {
+pub(super) fn short_waves_are_slow_by_what_central_differences_say(figures: &mut Figures) {
     use std::f64::consts::PI;
     for (per_wave, courant) in [(10, 0.5), (10, 0.9), (20, 0.5)] {
         // 40 cells hold whole half waves, so that the mode is one of the mesh.
@@ -230,7 +232,8 @@ pub(super) fn short_waves_are_slow_by_what_central_differences_say(sheet: &mut S
         let solved = ringing(40, courant, "", |x| (2.0 * PI * waves * x).cos());
         let wave_number = 2.0 * PI * waves / 0.1;
         let speed = frequency(&solved) / wave_number;
-        sheet.add(&format!("dispersion @ {per_wave} cells a wave, Courant number {courant}"), speed / 5000.0);
+        figures
+            .add(&format!("dispersion @ {per_wave} cells a wave, Courant number {courant}"), speed / 5000.0);
     }
 }
 
@@ -333,7 +336,7 @@ impl Collision {
     }
 }
 
-pub(super) fn symmetric_impacts_reach_the_hugoniot(sheet: &mut Sheet) {
+pub(super) fn symmetric_impacts_reach_the_hugoniot(figures: &mut Figures) {
     for (name, material) in [
         ("copper", COPPER),
         ("aluminium 2024", AL_2024),
@@ -343,16 +346,16 @@ pub(super) fn symmetric_impacts_reach_the_hugoniot(sheet: &mut Sheet) {
         for velocity in [500.0, 1000.0] {
             let hit = collide(material, material, velocity);
             let at = format!("{name}, {velocity} m/s");
-            sheet.add(&format!("symmetric impact @ {at}, pressure"), hit.pressure(1));
-            sheet.add(&format!("symmetric impact @ {at}, velocity"), hit.velocity());
-            sheet.add(&format!("symmetric impact @ {at}, shock"), hit.shock(1, velocity));
-            sheet.add(&format!("symmetric impact @ {at}, density"), hit.density(1));
-            sheet.add("shock overshoot", hit.overshoot(1));
+            figures.add(&format!("symmetric impact @ {at}, pressure"), hit.pressure(1));
+            figures.add(&format!("symmetric impact @ {at}, velocity"), hit.velocity());
+            figures.add(&format!("symmetric impact @ {at}, shock"), hit.shock(1, velocity));
+            figures.add(&format!("symmetric impact @ {at}, density"), hit.density(1));
+            figures.add("shock overshoot", hit.overshoot(1));
         }
     }
 }
 
-pub(super) fn impacts_of_two_materials_match_their_impedances(sheet: &mut Sheet) {
+pub(super) fn impacts_of_two_materials_match_their_impedances(figures: &mut Figures) {
     for (name, flyer, target) in [
         ("steel 1006 on aluminium 2024", STEEL_1006, AL_2024),
         ("copper on aluminium 2024", COPPER, AL_2024),
@@ -362,19 +365,19 @@ pub(super) fn impacts_of_two_materials_match_their_impedances(sheet: &mut Sheet)
         for velocity in [500.0, 1000.0] {
             let hit = collide(flyer, target, velocity);
             let at = format!("{name}, {velocity} m/s");
-            sheet.add(&format!("impedance match @ {at}, velocity"), hit.velocity());
-            sheet.add(&format!("impedance match @ {at}, pressure in the target"), hit.pressure(1));
-            sheet.add(&format!("impedance match @ {at}, pressure in the flyer"), hit.pressure(0));
-            sheet.add(&format!("impedance match @ {at}, shock in the target"), hit.shock(1, velocity));
-            sheet.add(&format!("impedance match @ {at}, shock in the flyer"), hit.shock(0, velocity));
-            sheet.add(&format!("impedance match @ {at}, density of the target"), hit.density(1));
-            sheet.add("shock overshoot", hit.overshoot(1).max(hit.overshoot(0)));
+            figures.add(&format!("impedance match @ {at}, velocity"), hit.velocity());
+            figures.add(&format!("impedance match @ {at}, pressure in the target"), hit.pressure(1));
+            figures.add(&format!("impedance match @ {at}, pressure in the flyer"), hit.pressure(0));
+            figures.add(&format!("impedance match @ {at}, shock in the target"), hit.shock(1, velocity));
+            figures.add(&format!("impedance match @ {at}, shock in the flyer"), hit.shock(0, velocity));
+            figures.add(&format!("impedance match @ {at}, density of the target"), hit.density(1));
+            figures.add("shock overshoot", hit.overshoot(1).max(hit.overshoot(0)));
         }
     }
 }
 
 pub(super) fn an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longitudinal_speed(
-    sheet: &mut Sheet,
+    figures: &mut Figures,
 ) {
     for (name, material, shear, yield_stress, velocity, cells) in [
         ("copper", COPPER, 46.4e9, 90e6, 100.0, 800),
@@ -417,8 +420,8 @@ pub(super) fn an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longit
             crossing(solved.gauge(g).map(|(t, row)| (t, row.v[0])), at_half)
                 .expect("the precursor passes the gauge")
         });
-        sheet.add(&format!("precursor @ {name}, amplitude"), limit);
-        sheet.add(&format!("precursor @ {name}, speed"), 0.05 / (far - near));
+        figures.add(&format!("precursor @ {name}, amplitude"), limit);
+        figures.add(&format!("precursor @ {name}, speed"), 0.05 / (far - near));
         // Behind the plastic front the fluid's pressure at that volume carries two thirds of the yield stress more.
         let behind_front = |[x, _, _]: [f64; 3]| (0.2 * behind..0.8 * behind).contains(&x);
         let volume = |s: &GlobalState, e: usize| s.elements[field::RELATIVE_VOLUME][e];
@@ -426,6 +429,6 @@ pub(super) fn an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longit
         let fluid =
             material[0] * material[1] * material[1] * squeezed / (1.0 - material[2] * squeezed).powi(2);
         let excess = -solved.element_mean(&solved.state, 1, behind_front, stress) - fluid;
-        sheet.add("stress behind a plastic front", (fluid + excess) / (fluid + 2.0 / 3.0 * yield_stress));
+        figures.add("stress behind a plastic front", (fluid + excess) / (fluid + 2.0 / 3.0 * yield_stress));
     }
 }

@@ -11,7 +11,7 @@ use super::{
     clouds::{cloud, compare},
     world::*,
 };
-use crate::case::Sheet;
+use crate::case::Figures;
 
 /// Half the harmonic mean of `K A^2/V = 1` on both sides: stiffness between a node and a face of the worlds.
 const K: f64 = 0.5;
@@ -73,7 +73,7 @@ const REGIONS: [Region; 12] = {
     ]
 };
 
-pub(super) fn points_about_a_face_have_their_region_distance_and_weights(sheet: &mut Sheet) {
+pub(super) fn points_about_a_face_have_their_region_distance_and_weights(figures: &mut Figures) {
     let (mut wrong, mut off) = (0, [0.0_f64; 3]);
     let frame = Frame::new(&SQUARE);
     for (p, feature, distance, normal, weights) in REGIONS {
@@ -85,10 +85,10 @@ pub(super) fn points_about_a_face_have_their_region_distance_and_weights(sheet: 
         let w = frame.weights(&nearest, p);
         off[2] = (0..4).map(|i| (w[i] - weights[i]).abs()).fold(off[2], f64::max);
     }
-    sheet.add("unit square: points of the table in a wrong region", wrong as f64);
-    sheet.add("unit square: greatest error of the distance", off[0]);
-    sheet.add("unit square: greatest error of the direction", off[1]);
-    sheet.add("unit square: greatest error of the weights", off[2]);
+    figures.add("unit square: points of the table in a wrong region", wrong as f64);
+    figures.add("unit square: greatest error of the distance", off[0]);
+    figures.add("unit square: greatest error of the direction", off[1]);
+    figures.add("unit square: greatest error of the weights", off[2]);
 
     // The table's row at z = -0.05 as the face of a solid reads it: depth 0.15 of gap 0.1, pushed outward.
     let (mut world, probe) = with_probe(block([1, 1, 1], 1.0), 0.1, &|_| true);
@@ -100,8 +100,8 @@ pub(super) fn points_about_a_face_have_their_region_distance_and_weights(sheet: 
     ] {
         world.place(probe, [0.5, 0.5, height]);
         let depth = world.forces(1.0).worst_depth;
-        sheet.add(&format!("face of a solid @ {name}, depth over the gap"), depth);
-        sheet.add(
+        figures.add(&format!("face of a solid @ {name}, depth over the gap"), depth);
+        figures.add(
             &format!("face of a solid @ {name}, push along z over stiffness"),
             world.force_on(probe)[2] / K,
         );
@@ -109,7 +109,7 @@ pub(super) fn points_about_a_face_have_their_region_distance_and_weights(sheet: 
 
     let warped = Frame::new(&WARPED);
     for p in [[0.5, 0.5, 0.12], [0.9, 0.9, 0.1], [0.3, 0.2, 0.0], [1.05, 1.05, 0.25]] {
-        sheet.add(&format!("warped face @ {p:?}, distance"), warped.nearest(p).distance2.sqrt());
+        figures.add(&format!("warped face @ {p:?}, distance"), warped.nearest(p).distance2.sqrt());
     }
 }
 
@@ -119,7 +119,7 @@ fn rotated(p: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|a| (r[a][0] * p[0] + r[a][1] * p[1] + r[a][2] * p[2]) / 7.0 + 3.0)
 }
 
-pub(super) fn a_node_swept_over_joints_feels_one_steady_force(sheet: &mut Sheet) {
+pub(super) fn a_node_swept_over_joints_feels_one_steady_force(figures: &mut Figures) {
     let up = [0.0, 0.0, 1.0];
     let (mut along_off, mut across_most) = (0.0_f64, 0.0_f64);
     for turned in [false, true] {
@@ -151,8 +151,8 @@ pub(super) fn a_node_swept_over_joints_feels_one_steady_force(sheet: &mut Sheet)
             }
         }
     }
-    sheet.add("sweep over a flat patch: change of the normal force", along_off);
-    sheet.add("sweep over a flat patch: force along the patch over the normal force", across_most);
+    figures.add("sweep over a flat patch: change of the normal force", along_off);
+    figures.add("sweep over a flat patch: force along the patch over the normal force", across_most);
 
     // Rings about a convex edge and a corner of a skewed block, within the gap.
     let mut mesh = block([2, 2, 2], 1.0);
@@ -173,10 +173,10 @@ pub(super) fn a_node_swept_over_joints_feels_one_steady_force(sheet: &mut Sheet)
             }
         }
     }
-    sheet.add("sweep around edges and corners: greatest jump of the force", jump);
+    figures.add("sweep around edges and corners: greatest jump of the force", jump);
 }
 
-pub(super) fn every_pair_keeps_force_and_moment(sheet: &mut Sheet) {
+pub(super) fn every_pair_keeps_force_and_moment(figures: &mut Figures) {
     let mut random = Random(31);
     let (mut sum, mut turn, mut hits) = (0.0_f64, 0.0_f64, 0);
     for _ in 0..20 {
@@ -192,11 +192,11 @@ pub(super) fn every_pair_keeps_force_and_moment(sheet: &mut Sheet) {
         }
     }
     assert!(hits > 2000, "{hits} hits");
-    sheet.add("pairs of a node and a bent face: sum of the forces", sum);
-    sheet.add("pairs of a node and a bent face: sum of the moments", turn);
+    figures.add("pairs of a node and a bent face: sum of the forces", sum);
+    figures.add("pairs of a node and a bent face: sum of the moments", turn);
 }
 
-pub(super) fn a_bounce_keeps_its_energy_as_central_differences_allow(sheet: &mut Sheet) {
+pub(super) fn a_bounce_keeps_its_energy_as_central_differences_allow(figures: &mut Figures) {
     let (mut world, probe) = with_probe(block([1, 1, 1], 1.0), 0.1, &|_| true);
     let omega = K.sqrt();
     let speed = 0.5 * 0.1 * omega;
@@ -220,8 +220,8 @@ pub(super) fn a_bounce_keeps_its_energy_as_central_differences_allow(sheet: &mut
             assert!(v > 0.0 && z > 1.1, "{v} {z}");
             worst = worst.max((v * v / (speed * speed) - 1.0).abs());
         }
-        sheet.add(&format!("bounce @ omega dt {omega_dt}, change of the kinetic energy"), worst);
-        sheet.add(
+        figures.add(&format!("bounce @ omega dt {omega_dt}, change of the kinetic energy"), worst);
+        figures.add(
             &format!("bounce @ omega dt {omega_dt}, depth times omega over v"),
             depth * 0.1 * omega / speed,
         );
@@ -331,29 +331,29 @@ fn shoot(gap: f64, jitter: f64, seed: u64, shots: usize) -> Shots {
     Shots { touched, through, deepest, energy: (square / touched as f64).sqrt() }
 }
 
-pub(super) fn no_node_shot_at_a_faceted_body_gets_in(sheet: &mut Sheet) {
+pub(super) fn no_node_shot_at_a_faceted_body_gets_in(figures: &mut Figures) {
     for (gap, jitter, seed) in [(0.1, 0.0, 1), (0.1, 0.15, 2), (0.3, 0.15, 3), (0.5, 0.05, 4), (0.2, 0.25, 5)]
     {
         let shots = shoot(gap, jitter, seed, 1000);
         assert!(shots.touched > 300, "{} of 1000 shots met the body", shots.touched);
-        sheet.add("shots at a faceted body: nodes that ended inside", shots.through as f64);
-        sheet.add("shots at a faceted body: greatest depth (gaps)", shots.deepest);
+        figures.add("shots at a faceted body: nodes that ended inside", shots.through as f64);
+        figures.add("shots at a faceted body: greatest depth (gaps)", shots.deepest);
         // Bent faces add jumps of stiffness and direction at joints; with every hit of a concave joint pushing in full it
         // would be 0.08 to 0.17.
         let faces = if jitter == 0.0 { "flat" } else { "bent" };
         let of = format!("shots at a faceted body @ {faces} faces, root mean square of the change of energy");
-        sheet.add(&of, shots.energy);
+        figures.add(&of, shots.energy);
     }
 }
 
-pub(super) fn the_sort_of_a_cloud_finds_what_brute_force_finds(sheet: &mut Sheet) {
+pub(super) fn the_sort_of_a_cloud_finds_what_brute_force_finds(figures: &mut Figures) {
     let mesh = cloud(12, 1000, 1);
     let mut found = 0;
     // Cubes are as wide as twice the reach: each slack is another size of them.
     for (gap, slack) in [(0.02, 0.0), (0.1, 0.5), (0.3, 3.0)] {
         let (pairs, different) = compare(&mesh, &settings(1000, gap, slack));
         found += pairs;
-        sheet.add("sort of a thousand boxes: pairs beside those of brute force", different as f64);
+        figures.add("sort of a thousand boxes: pairs beside those of brute force", different as f64);
     }
     assert!(found > 1000, "{found} pairs");
     let settings = settings(1000, 0.0625, 0.125);
@@ -367,7 +367,7 @@ pub(super) fn the_sort_of_a_cloud_finds_what_brute_force_finds(sheet: &mut Sheet
     let still = units([0.0; 3]);
     let moved = units([8192.0, -8192.0, 16384.0]);
     let differ = still.iter().zip(&moved).filter(|(a, b)| a != b).count() + still.len().abs_diff(moved.len());
-    sheet.add("sort of a thousand boxes: units that a translation by 1000 lengths changes", differ as f64);
+    figures.add("sort of a thousand boxes: units that a translation by 1000 lengths changes", differ as f64);
 
     // Parts and nodes in the opposite order.
     let named = |reverse: bool| {
@@ -391,5 +391,5 @@ pub(super) fn the_sort_of_a_cloud_finds_what_brute_force_finds(sheet: &mut Sheet
         units.collect::<BTreeSet<_>>()
     };
     let differ = named(false).symmetric_difference(&named(true)).count();
-    sheet.add("sort of a thousand boxes: units that the opposite order of parts changes", differ as f64);
+    figures.add("sort of a thousand boxes: units that the opposite order of parts changes", differ as f64);
 }

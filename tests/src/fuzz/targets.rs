@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use master::{
-    event::{Action, Event, Hand},
+    event::{Action, Event, WorkerSpec},
     job::Job,
-    options::{Keep, SessionOptions},
+    options::{CheckpointEvery, SessionOptions},
     snapshot,
 };
 use protocol::{
@@ -26,12 +26,11 @@ use worker::{
 use super::damage;
 use crate::{
     seeds::Draws,
-    solve::{Crew, model, solve, without_states},
+    solve::{Workers, model, solve, without_states},
 };
 
 /// Something that reads what comes from outside.
 pub trait Target {
-    /// Its name.
     fn name(&self) -> &'static str;
     /// Takes a damaged input; whether it was taken for a good one. A panic is a finding.
     fn attack(&mut self, draws: &mut Draws) -> bool;
@@ -59,7 +58,6 @@ pub fn all() -> Vec<Box<dyn Target>> {
     ]
 }
 
-/// One of some.
 fn one<'a, T>(of: &'a [T], draws: &mut Draws) -> &'a T {
     &of[draws.below(of.len() as u64) as usize]
 }
@@ -180,12 +178,12 @@ const DECK: &str = r#"
 const WORKERS: usize = 2;
 
 fn job(model: &Arc<deck::Model>) -> (Job, Vec<Action>) {
-    let hand = |i: usize| Hand { name: format!("host-{i}"), speed: 1.0, threads: 1 };
-    let hands: Vec<Hand> = (0..WORKERS).map(hand).collect();
-    let keep = Keep::Cycles(3);
+    let spec = |i: usize| WorkerSpec { name: format!("host-{i}"), speed: 1.0, threads: 1 };
+    let specs: Vec<WorkerSpec> = (0..WORKERS).map(spec).collect();
+    let keep = CheckpointEvery::Cycles(3);
     let options = without_states(JobOptions { route: Some(Route::Master), ..JobOptions::default() });
     let options = SessionOptions { replay: true, keep, ..options };
-    Job::new(Arc::clone(model), &hands, options, None).unwrap_or_else(|e| panic!("the corpus: {e}"))
+    Job::new(Arc::clone(model), &specs, options, None).unwrap_or_else(|e| panic!("the corpus: {e}"))
 }
 
 impl Said {
@@ -452,7 +450,7 @@ impl Snapshots {
 
     fn new() -> Self {
         let options = without_states(JobOptions { snapshot_at: Some(4), ..JobOptions::default() });
-        let solved = solve(model(DECK), Crew { options, ..Crew::of(1) });
+        let solved = solve(model(DECK), Workers { options, ..Workers::of(1) });
         let solved = solved.unwrap_or_else(|e| panic!("the corpus: {e}"));
         let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("the corpus: {e}"));
         let path = folder.path().join("snapshot");
@@ -496,8 +494,8 @@ impl Target for Snapshots {
             return false;
         }
         let Ok(stored) = snapshot::read(&path) else { return false };
-        let hands = [Hand { name: "host".into(), speed: 1.0, threads: 1 }];
-        Job::new(Arc::clone(&self.model), &hands, without_states(JobOptions::default()), Some(stored)).is_ok()
+        let specs = [WorkerSpec { name: "host".into(), speed: 1.0, threads: 1 }];
+        Job::new(Arc::clone(&self.model), &specs, without_states(JobOptions::default()), Some(stored)).is_ok()
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use deck::Model;
-use master::options::{Keep, SessionOptions};
+use master::options::{CheckpointEvery, SessionOptions};
 use protocol::options::{JobOptions, Route};
 
 use super::{Draws, Played, play, seen};
@@ -14,37 +14,30 @@ use crate::{bits::Fingerprint, solve::model};
 pub enum Fault {
     /// A process is gone with all that it knew; another may start on its host.
     Crash {
-        /// Which.
         host: u64,
         /// Whether it is started again.
         returns: bool,
     },
     /// Nothing passes between master and worker for a while; if long, the master gives the worker up and it calls anew.
     Cut {
-        /// Which.
         host: u64,
         /// Longer than the master waits.
         long: bool,
     },
     /// The link between two workers ends with what is on it.
     PairCut {
-        /// One.
         host: u64,
         /// The other, or the same: then nothing happens.
         other: u64,
     },
     /// A host becomes so many times as slow.
     Slow {
-        /// Which.
         host: u64,
         /// How many times.
         factor: u64,
     },
     /// From now on a host's elements are wrong by one unit in the last place.
-    Spoil {
-        /// Which.
-        host: u64,
-    },
+    Spoil { host: u64 },
     /// A worker comes.
     Join,
     /// The master is gone, and starts anew from the disk.
@@ -148,21 +141,20 @@ impl Stage {
             Ok(played) => played,
             Err(why) => panic!("the undisturbed run: {why}"),
         };
-        assert!(solved.outcome.ledger.worst_penetration > 0.0, "no contact");
+        assert!(solved.outcome.run_totals.worst_penetration > 0.0, "no contact");
         assert!(solved.states.len() > 3 && solved.rows.len() > 15, "{} states", solved.states.len());
         Self { model, answer: seen(&solved), length: count }
     }
 
-    /// The plot of a seed.
     pub fn plot(&self, seed: u64) -> (Plot, SessionOptions) {
         let mut draws = Draws::new(seed);
         let workers = 1 + draws.below(4) as usize;
         let route = [Route::Master, Route::Direct][draws.below(2) as usize];
         let keep = match draws.below(4) {
-            0 => Keep::Never,
-            1 => Keep::Cycles(1),
-            2 => Keep::Cycles(10),
-            _ => Keep::Seconds(0.002),
+            0 => CheckpointEvery::Never,
+            1 => CheckpointEvery::Cycles(1),
+            2 => CheckpointEvery::Cycles(10),
+            _ => CheckpointEvery::Seconds(0.002),
         };
         let snapshot_at = (draws.below(2) == 0).then(|| 1 + draws.below(50));
         let length = self.length;

@@ -1,6 +1,6 @@
 //! Element block: elements of one kind and one material with their own copies of their nodes.
 //!
-//! A [`Piece`] is the image of a sub-domain in element and node order, as it travels and is stored; a [`Block`] is
+//! A [`Piece`] is the state of a sub-domain in element and node order, as it travels and is stored; a [`Block`] is
 //! the same laid out for the kernels: nodes, and a [`Group`] of elements of one kind, which the block asks without knowing
 //! what they are. A block knows nothing of other blocks: nodes that several hold are kept equal by whoever integrates them.
 
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     element::{
         ElementVote, Step,
-        group::{self, Call, Group, Image, Scanned},
+        group::{self, Call, Group, Scanned, WorkerState},
         place::Nodal,
     },
     erosion::PieceErosion,
@@ -22,7 +22,7 @@ use crate::{
     state::{N_FIELDS, ShellState},
 };
 
-/// State image of a sub-domain. Node arrays are by local node (structured: I fastest), element arrays by local
+/// State of a sub-domain. Node arrays are by local node (structured: I fastest), element arrays by local
 /// element (structured: I fastest).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Piece {
@@ -127,11 +127,11 @@ impl Block {
         }
     }
 
-    /// The state image: what [`Block::new`] was given, to the bit, with the state of now. Which elements have eroded is not in
+    /// The state: what [`Block::new`] was given, to the bit, with the state of now. Which elements have eroded is not in
     /// it: whoever watches them adds that.
     pub fn piece(&self) -> Piece {
         let n = self.nodes.len();
-        let Image { initial_volume, fields, own } = self.group.image(&self.x);
+        let WorkerState { initial_volume, fields, own } = self.group.image(&self.x);
         Piece {
             part: self.part,
             material: self.material,
@@ -153,7 +153,7 @@ impl Block {
     pub fn into_piece(mut self) -> Piece {
         let n = self.nodes.len();
         drop(take(&mut self.f));
-        let Image { initial_volume, fields, own } = self.group.into_image(&self.x);
+        let WorkerState { initial_volume, fields, own } = self.group.into_image(&self.x);
         self.mass.truncate(n);
         Piece {
             part: self.part,

@@ -1,17 +1,17 @@
 //! One cycle of a worker.
 //!
 //! A [`Domain`] is all that a worker holds: blocks with their own copies of their nodes, the contact nodes and
-//! faces of its work units, and *guests* (contact nodes that no block here has). Which nodes have several
+//! faces of its work units, and *ghosts* (contact nodes that no block here has). Which nodes have several
 //! copies, here or on other workers, is said by a [`Plan`]; their total forces are exact sums, so the
 //! lines of [`step`] give the same bits however blocks, workers and threads are cut.
 
 mod assembly;
 mod bodies;
-mod guests;
+mod ghosts;
+mod held_block;
 mod image;
 mod plan;
 mod report;
-mod room;
 mod sharing;
 #[cfg(test)]
 mod tests;
@@ -19,10 +19,10 @@ mod tests;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    copy_index::CopyIndex,
     element::{ElementVote, Step},
     erosion::Eroding,
     exact::Quantum,
-    home::Home,
     lanes::Width,
     load::face,
     nodes::{Advance, Nodes},
@@ -34,9 +34,9 @@ use crate::{
 
 pub use assembly::Subdomain;
 use bodies::Held;
-use guests::{ContactRoom, Guests};
-pub use plan::{Guest, Neighbour, Plan};
-use room::{Room, each};
+use ghosts::{Ghosts, HeldContact};
+use held_block::{HeldBlock, each};
+pub use plan::{Ghost, Neighbour, Plan};
 use sharing::{Exchange, Groups};
 
 /// The time of a cycle, its steps, and the quantum of its forces.
@@ -88,9 +88,7 @@ pub trait Meter: Sync {
 pub enum Sets {
     /// Those that touch nodes of the exchange.
     Border,
-    /// The others.
     Interior,
-    /// All.
     All,
 }
 
@@ -101,7 +99,7 @@ pub struct Load {
     pub border: u64,
     /// Elements that are computed while they travel.
     pub interior: u64,
-    /// Nodes that are integrated, copies and guests included.
+    /// Nodes that are integrated, copies and ghosts included.
     pub nodes: u64,
     /// Node-face pairs that are looked at each cycle.
     pub pairs: u64,
@@ -116,9 +114,9 @@ pub struct Domain {
     n_parts: usize,
     quanta: Quanta,
     width: Width,
-    rooms: Vec<Room>,
-    guests: Guests,
-    contact: Option<ContactRoom>,
+    held_blocks: Vec<HeldBlock>,
+    ghosts: Ghosts,
+    contact: Option<HeldContact>,
     /// Whether nodes turn anywhere in the run.
     moments: bool,
     exchange: Exchange,
@@ -126,10 +124,10 @@ pub struct Domain {
     bodies: Vec<Held>,
     /// Pushes on bodies travel: there are other workers.
     sends_pushes: bool,
-    home: Home,
+    copy_index: CopyIndex,
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
-    /// Element gauges: gauge, room, local element.
+    /// Element gauges: gauge, block, local element.
     element_gauges: Vec<(u32, u32, u32)>,
     /// Pairs of parts whose contact force is wanted.
     watched_pairs: Vec<[u32; 2]>,
@@ -144,7 +142,7 @@ pub struct Domain {
     surface_ends: bool,
     /// Where the walls are and how they move in this step.
     poses: Vec<Pose>,
-    /// Takes what guests give walls, which their owners book.
+    /// Takes what ghosts give walls, which their owners book.
     unbooked: Vec<WallVote>,
 }
 
@@ -158,17 +156,23 @@ impl Domain {
     /// Contact forces of the work units at `x_n` and loads on faces; `dt` is `dt_{n-1}`.
     pub fn contact(&mut self, dt: f64, meter: &dyn Meter) {
         let mark = meter.start();
-        if let Some(room) = &mut self.contact {
-            room.pack(&self.rooms, &self.guests);
-            for f in &mut room.f {
+        if let Some(packed) = &mut self.contact {
+            packed.pack(&self.held_blocks, &self.ghosts);
+            for f in &mut packed.f {
                 f.fill(0.0);
             }
-            let vote =
-                room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
+            let vote = packed.contact.forces(
+                &packed.x,
+                &packed.v,
+                dt,
+                self.quanta.force,
+                self.quanta.energy,
+                &mut packed.f,
+            );
             self.vote.add_contact(&vote);
-            self.vote.contact_energies.merge(room.contact.energies());
+            self.vote.contact_energies.merge(packed.contact.energies());
             if !self.watched_pairs.is_empty() {
-                self.vote.add_contacts(&room.contact.pair_votes());
+                self.vote.add_contacts(&packed.contact.pair_votes());
             }
         }
         meter.stop(mark, true);
@@ -182,9 +186,10 @@ impl Domain {
         }
         let Setup { loads, control, .. } = &self.setup;
         let (time, quantum) = (self.time, self.quanta.force);
-        each(&mut self.rooms, |room| {
+        each(&mut self.held_blocks, |held_block| {
             let mark = meter.start();
-            room.face_vote = face::apply(&mut room.faces, &mut room.block, loads, control, time, quantum);
+            held_block.face_vote =
+                face::apply(&mut held_block.faces, &mut held_block.block, loads, control, time, quantum);
             meter.stop(mark, false);
         });
     }
@@ -202,30 +207,30 @@ impl Domain {
             arm: self.quanta.arm,
         };
         let (materials, width, cycle) = (&self.setup.materials, self.width, self.cycle);
-        let work = |room: &mut Room| {
-            if room.is_rigid {
+        let work = |held_block: &mut HeldBlock| {
+            if held_block.is_rigid {
                 return;
             }
             let mark = meter.start();
-            let material = &materials[room.block.material as usize];
-            if let Some(eroding) = room.eroding.as_mut().filter(|_| dt > 0.0) {
+            let material = &materials[held_block.block.material as usize];
+            if let Some(eroding) = held_block.eroding.as_mut().filter(|_| dt > 0.0) {
                 if sets != Sets::Interior {
-                    eroding.watch(&mut room.block, &room.border, &step, cycle, width);
+                    eroding.watch(&mut held_block.block, &held_block.border, &step, cycle, width);
                 }
                 if sets != Sets::Border {
-                    eroding.watch(&mut room.block, &room.interior, &step, cycle, width);
+                    eroding.watch(&mut held_block.block, &held_block.interior, &step, cycle, width);
                 }
             }
             if sets != Sets::Interior {
-                room.vote = ElementVote::default();
-                room.block.compute(material, &room.border, &step, width, &mut room.vote);
+                held_block.vote = ElementVote::default();
+                held_block.block.compute(material, &held_block.border, &step, width, &mut held_block.vote);
             }
             if sets != Sets::Border {
-                room.block.compute(material, &room.interior, &step, width, &mut room.vote);
+                held_block.block.compute(material, &held_block.interior, &step, width, &mut held_block.vote);
             }
             meter.stop(mark, false);
         };
-        each(&mut self.rooms, work);
+        each(&mut self.held_blocks, work);
     }
 
     /// Partial forces of the nodes of the exchange, three numbers each, with moments six, and behind them pushes on rigid bodies.
@@ -234,7 +239,7 @@ impl Domain {
         self.push_bodies();
         let mut out = Vec::with_capacity(self.stride() * self.exchange.len() + self.n_pushes());
         let of_contact = self.contact.as_ref().map(|contact| &contact.f);
-        self.exchange.pack(&self.rooms, of_contact, self.moments, &mut out);
+        self.exchange.pack(&self.held_blocks, of_contact, self.moments, &mut out);
         self.pack_pushes(&mut out);
         meter.stop(mark, false);
         out
@@ -268,9 +273,9 @@ impl Domain {
         }
         let mark = meter.start();
         let (totals, pushes) = totals.split_at(totals.len() - n_pushes);
-        self.exchange.put(totals, self.moments, &mut self.rooms, &mut self.guests);
+        self.exchange.put(totals, self.moments, &mut self.held_blocks, &mut self.ghosts);
         let of_contact = self.contact.as_ref().map(|contact| &contact.f);
-        self.groups.add_up(&mut self.rooms, of_contact, self.moments);
+        self.groups.add_up(&mut self.held_blocks, of_contact, self.moments);
         meter.stop(mark, false);
         self.move_bodies(pushes, dt_previous, dt);
         let setup = &self.setup;
@@ -286,48 +291,49 @@ impl Domain {
             quanta: self.quanta,
         };
         let width = self.width;
-        each(&mut self.rooms, |room| {
+        each(&mut self.held_blocks, |held_block| {
             let mark = meter.start();
-            let block = &mut room.block;
+            let block = &mut held_block.block;
             let mut nodes = Nodes {
                 x: &mut block.x,
                 v: &mut block.v,
                 f: &mut block.f,
                 mass: &block.mass,
                 constraint: &block.constraint,
-                sets: &room.sets,
-                reference: &room.reference,
-                walls: &mut room.walls,
+                sets: &held_block.sets,
+                reference: &held_block.reference,
+                walls: &mut held_block.walls,
             };
-            room.booked = advance.run(&mut nodes, width);
+            held_block.booked = advance.run(&mut nodes, width);
             if let Some(turning) = &mut block.turning {
-                let (kinetic, external) = spin::advance(&advance, turning, &block.constraint, &room.sets);
-                room.booked.kinetic += kinetic;
-                room.booked.external.merge(external);
+                let (kinetic, external) =
+                    spin::advance(&advance, turning, &block.constraint, &held_block.sets);
+                held_block.booked.kinetic += kinetic;
+                held_block.booked.external.merge(external);
             }
-            if !room.faces.is_empty() {
+            if !held_block.faces.is_empty() {
                 let half_steps = 0.5 * (dt_previous + dt);
-                let work = face::work(&room.faces, block, half_steps, advance.quanta.energy);
-                room.booked.external.merge(work);
+                let work = face::work(&held_block.faces, block, half_steps, advance.quanta.energy);
+                held_block.booked.external.merge(work);
             }
-            if room.eroding.as_mut().is_some_and(Eroding::take_change) {
+            if held_block.eroding.as_mut().is_some_and(Eroding::take_change) {
                 // Loads leave with the faces of eroded elements.
-                room.leave_out_dead();
-                if !room.faces.is_empty() {
-                    let material = &setup.materials[room.block.material as usize];
-                    room.faces = face::faces_of(&room.block, &setup.loads, material);
+                held_block.leave_out_dead();
+                if !held_block.faces.is_empty() {
+                    let material = &setup.materials[held_block.block.material as usize];
+                    held_block.faces = face::faces_of(&held_block.block, &setup.loads, material);
                 }
             }
             meter.stop(mark, false);
         });
-        let guests = &mut self.guests;
+        let ghosts = &mut self.ghosts;
         let mut nodes = Nodes {
-            x: &mut guests.x,
-            v: &mut guests.v,
-            f: &mut guests.f,
-            mass: &guests.mass,
-            constraint: &guests.constraint,
-            sets: &guests.sets,
+            x: &mut ghosts.x,
+            v: &mut ghosts.v,
+            f: &mut ghosts.f,
+            mass: &ghosts.mass,
+            constraint: &ghosts.constraint,
+            sets: &ghosts.sets,
             reference: &Default::default(),
             walls: &mut self.unbooked,
         };

@@ -49,7 +49,6 @@ pub struct ElementVote {
     pub courant_element: u32,
     /// Least `0.1 / |tr D|` (time): the step in which some volume changes by a tenth.
     pub volume_limit: f64,
-    /// Internal energy.
     pub internal: f64,
     /// Energy that hourglass control took in this step, at the velocity `v_{n-1/2}`. In a mesh, where the forces of
     /// neighbours mostly balance, that is close; for a single free element it is too much by the part

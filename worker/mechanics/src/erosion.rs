@@ -67,7 +67,6 @@ impl Erosion {
         self.parts.iter().flatten().any(|criteria| criteria.incremental_strain.is_some())
     }
 
-    /// The criteria of a part.
     pub fn of_part(&self, part: usize) -> Option<&Criteria> {
         self.parts.get(part).and_then(Option::as_ref)
     }
@@ -111,7 +110,6 @@ pub struct Criteria {
 }
 
 impl Criteria {
-    /// Whether there is any.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
@@ -129,7 +127,7 @@ pub struct PieceErosion {
     pub eroded: Vec<u64>,
     /// Incremental geometric strain by local element; empty if no part of the run erodes by it.
     pub strain: Vec<f64>,
-    /// Position at time zero by local node (length); empty in images, which it does not change.
+    /// Position at time zero by local node (length); empty in states, which it does not change.
     pub initial: Vec<[f64; 3]>,
 }
 
@@ -154,7 +152,7 @@ pub(crate) struct Eroding {
     /// Inverse of the Jacobian at time zero, by rows, in units of the modes; empty without an instantaneous strain.
     inverse: [Vec<f64>; 9],
     /// Of this cycle.
-    casualties: Casualties,
+    eroded_now: Casualties,
     /// Whether any element has eroded since [`Eroding::take_change`].
     changed: bool,
 }
@@ -177,7 +175,7 @@ impl Eroding {
             eroded: vec![ALIVE; n_slots],
             strain: vec![0.0; if criteria.incremental_strain.is_some() { n_slots } else { 0 }],
             inverse: std::array::from_fn(|_| vec![0.0; if criteria.measures_shape() { n_slots } else { 0 }]),
-            casualties: Casualties::default(),
+            eroded_now: Casualties::default(),
             changed: false,
         };
         let Some(state) = state else { return eroding };
@@ -241,15 +239,15 @@ impl Eroding {
         for slot in found.into_iter().map(|slot| slot as usize) {
             let (element, internal) = block.take_out(slot);
             self.eroded[slot] = cycle;
-            self.casualties.elements.push(element);
-            self.casualties.internal += step.energy_quantum.round(internal);
+            self.eroded_now.elements.push(element);
+            self.eroded_now.internal += step.energy_quantum.round(internal);
             self.changed = true;
         }
     }
 
     /// What eroded since the last call.
     pub(crate) fn take_casualties(&mut self) -> Casualties {
-        std::mem::take(&mut self.casualties)
+        std::mem::take(&mut self.eroded_now)
     }
 
     /// Whether anything has eroded since the last call.
@@ -257,7 +255,7 @@ impl Eroding {
         std::mem::take(&mut self.changed)
     }
 
-    /// The state, by local element, for an image.
+    /// The state, by local element, for a state.
     pub(crate) fn state(&self, block: &Block) -> PieceErosion {
         let n = block.elements.len();
         let strain = if self.strain.is_empty() { 0 } else { n };

@@ -37,7 +37,6 @@ impl Quantum {
         Self { q: self.q * power_of_two }
     }
 
-    /// The quantum itself.
     pub fn value(self) -> f64 {
         self.q
     }

@@ -31,7 +31,6 @@ pub(crate) struct Loading<L> {
     pub temperature: L,
 }
 
-/// A failure law.
 pub(crate) trait FailureLaw: Copy {
     /// Whether there is damage at all.
     #[inline(always)]

@@ -36,7 +36,6 @@ pub trait Lane:
     /// One truth value per lane.
     type Mask: Copy;
 
-    /// The same value in every lane.
     fn splat(x: f64) -> Self;
     /// `from[at..at + N]`.
     ///
@@ -92,9 +91,7 @@ pub trait Lane:
     fn equal(self, other: Self) -> Self::Mask;
     /// Lane `i` set where bit `i` is; higher bits are no matter.
     fn mask(bits: u32) -> Self::Mask;
-    /// Both masks.
     fn both(one: Self::Mask, other: Self::Mask) -> Self::Mask;
-    /// One mask or the other.
     fn either(one: Self::Mask, other: Self::Mask) -> Self::Mask;
     /// `yes` where the mask is set, else `no`. What is not chosen has no influence, NaN included.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;

@@ -29,14 +29,12 @@ pub enum Bound {
     NotNegative,
 }
 
-/// One constant of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Constant {
     /// The key that a deck writes.
     pub key: &'static str,
     /// Its unit.
     pub unit: Unit,
-    /// Its bounds.
     pub bound: Bound,
 }
 

@@ -23,6 +23,7 @@
 pub mod block;
 pub mod burn;
 pub mod contact;
+mod copy_index;
 pub mod cycle;
 pub mod digest;
 pub mod element;
@@ -30,7 +31,6 @@ mod eos;
 pub mod erosion;
 pub mod exact;
 mod failure;
-mod home;
 pub mod initial;
 pub mod lanes;
 pub mod law;

@@ -16,7 +16,6 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// The value at a time.
     pub fn at(&self, time: f64) -> f64 {
         let after = self.points.partition_point(|p| p[0] <= time);
         match (after.checked_sub(1).map(|i| self.points[i]), self.points.get(after)) {
@@ -66,7 +65,6 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A constant.
     pub const fn constant(factor: f64) -> Self {
         Self { factor, curve: None }
     }

@@ -78,7 +78,6 @@ pub enum Eos {
         r1: f64,
         /// R2.
         r2: f64,
-        /// omega.
         omega: f64,
         /// Energy of detonation (energy per initial volume).
         energy: f64,

@@ -76,7 +76,6 @@ impl Section {
 }
 
 impl Part {
-    /// Number of elements.
     pub fn n_elements(&self) -> usize {
         match &self.topology {
             Topology::Structured { cells } => cells.iter().map(|&c| c as usize).product(),

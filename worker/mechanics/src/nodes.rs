@@ -43,7 +43,7 @@ impl NodeSet {
     }
 }
 
-/// The nodes of a block or the guests of a worker, by local node index. Arrays of numbers are padded to whole sets;
+/// The nodes of a block or the ghosts of a worker, by local node index. Arrays of numbers are padded to whole sets;
 /// masses of the padding are positive.
 pub struct Nodes<'a> {
     /// Position `x_n`, becomes `x_{n+1}`.

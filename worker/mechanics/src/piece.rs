@@ -1,6 +1,6 @@
 //! Pieces: what part of a mesh a sub-domain holds, cut out of the global state and put back into it.
 //!
-//! A piece is the state image of a sub-domain: it travels, is stored, and is enough to restart that
+//! A piece is the state of a sub-domain: it travels, is stored, and is enough to restart that
 //! sub-domain anywhere.
 
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,6 @@ pub enum Region {
 }
 
 impl Region {
-    /// Number of elements.
     pub fn n_elements(&self) -> usize {
         match self {
             Self::Cells { low, high } => (0..3).map(|a| (high[a] - low[a]) as usize).product(),

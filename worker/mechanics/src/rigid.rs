@@ -18,7 +18,6 @@ use crate::{
 
 pub mod shape;
 
-/// A rigid body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Body {
     /// Its parts, by index, ascending.
@@ -97,9 +96,7 @@ pub fn entries(n: usize) -> std::ops::Range<u32> {
 /// body's quantum of lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Push {
-    /// Force.
     pub force: [i128; 3],
-    /// Torque.
     pub torque: [i128; 3],
 }
 

@@ -23,7 +23,6 @@ pub struct Setup {
     pub contact: Option<contact::Settings>,
     /// Node constraints, indexed by [`crate::state::GlobalState::constraint`]; entry 0 is "free".
     pub constraints: Vec<Constraint>,
-    /// Rigid walls.
     pub walls: Vec<RigidWall>,
     /// Rigid bodies.
     pub bodies: Vec<Body>,

@@ -113,7 +113,6 @@ pub struct ShellState {
 }
 
 impl GlobalState {
-    /// Whether an element has eroded.
     pub fn is_eroded(&self, element: usize) -> bool {
         self.eroded.get(element).is_some_and(|&cycle| cycle != crate::erosion::ALIVE)
     }
@@ -131,7 +130,7 @@ impl GlobalState {
             mass: self.mass.clone(),
             constraint: self.constraint.clone(),
             initial_volume: self.initial_volume.clone(),
-            // Kept in length alone: the images of parts that do not erode have nothing of this.
+            // Kept in length alone: the states of parts that do not erode have nothing of this.
             eroded: vec![crate::erosion::ALIVE; self.eroded.len()],
             strain: vec![0.0; self.strain.len()],
             shells: ShellState {
@@ -148,7 +147,7 @@ impl GlobalState {
         self.x.len() < self.mass.len()
     }
 
-    /// A state to put images of all elements and nodes back into; zeros until then.
+    /// A state to put states of all elements and nodes back into; zeros until then.
     pub fn to_fill(&self) -> Self {
         let (n_nodes, n_elements) = (self.mass.len(), self.initial_volume.len());
         Self {

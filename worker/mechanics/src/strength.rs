@@ -39,7 +39,6 @@ pub(crate) struct Deviator<L> {
 }
 
 impl<L: Lane> Deviator<L> {
-    /// Zero.
     #[inline(always)]
     pub fn zero() -> Self {
         let zero = L::splat(0.0);
@@ -122,7 +121,6 @@ pub(crate) struct Strain<L> {
     pub increment: L,
 }
 
-/// A strength law.
 pub(crate) trait StrengthLaw: Copy {
     /// Whether there is a deviatoric stress at all.
     #[inline(always)]

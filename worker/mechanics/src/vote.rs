@@ -80,7 +80,6 @@ pub struct Gone {
     pub internal: f64,
     /// Kinetic energy of freed nodes that were dropped.
     pub kinetic: f64,
-    /// Their momentum.
     pub momentum: [f64; 3],
 }
 

@@ -46,7 +46,6 @@ pub enum Shape {
     },
     /// All inside a sphere.
     Sphere {
-        /// Centre.
         centre: [f64; 3],
         /// Radius (length).
         radius: f64,
@@ -88,7 +87,6 @@ pub enum Motion {
     Driven([Drive; 3]),
     /// It has a mass, and starts at this velocity.
     Free {
-        /// Mass.
         mass: f64,
         /// Velocity at the start (length per time).
         velocity: [f64; 3],
@@ -134,7 +132,6 @@ pub fn poses(
 /// What the nodes gave a wall in one cycle: exact sums.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WallVote {
-    /// Impulse on the wall.
     pub impulse: [f64; 3],
     /// Mass of the nodes that touched a wall of finite mass.
     pub touched: f64,

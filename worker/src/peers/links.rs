@@ -18,7 +18,7 @@ use protocol::{
 use tokio::sync::mpsc;
 use tracing::{debug, info, warn};
 
-use super::{Circle, Key, News, Peers, Shared, What, gate, pairs::Heard, pairs::Pairs};
+use super::{Circle, Key, News, Peers, Shared, What, connect, pairs::Heard, pairs::Pairs};
 use crate::{runner::Input, session::Session};
 
 /// What comes of news.
@@ -99,7 +99,7 @@ impl Links {
                 && circle.take(other)
             {
                 self.pairs.dial(other);
-                shared.runtime.spawn(gate::dial(Arc::clone(shared), Arc::clone(circle), other));
+                shared.runtime.spawn(connect::dial(Arc::clone(shared), Arc::clone(circle), other));
             }
         }
     }
@@ -120,7 +120,7 @@ impl Links {
                     epoch: circle.key.epoch,
                     incarnation: circle
                         .who
-                        .members
+                        .peer_workers
                         .get(circle.who.me as usize)
                         .map_or(0, |member| member.incarnation),
                     cycle: packed.cycle,
@@ -140,7 +140,7 @@ impl Links {
     fn lose(&mut self, other: u32, error: &Error) -> Vec<ToPeer> {
         let Some((messages, link)) = self.pairs.lose(other) else { return Vec::new() };
         let circle = self.circle.as_ref();
-        let member = circle.and_then(|circle| circle.who.members.get(other as usize));
+        let member = circle.and_then(|circle| circle.who.peer_workers.get(other as usize));
         let name = member.map_or("unknown", |member| &member.name);
         let address = member.and_then(|member| member.address).map(|address| format!(" at {address}"));
         let address = address.unwrap_or_default();

@@ -46,7 +46,6 @@ impl<L> Default for Pair<L> {
 /// What to do with a frame that came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// It is new.
     Fresh,
     /// It came before, the same to the bit.
     Double,

@@ -6,7 +6,7 @@ use protocol::{
     dial::{self, Call},
     frame::Frame,
     handshake::{Hello, Membership, Role},
-    message::Member,
+    message::PeerWorker,
 };
 use tokio::{net::TcpSocket, time::timeout};
 
@@ -44,13 +44,13 @@ async fn any_port() -> TcpListener {
 }
 
 fn introduction(me: u32, addresses: &[SocketAddr]) -> Introduction {
-    let member = |(index, address): (usize, &SocketAddr)| Member {
+    let member = |(index, address): (usize, &SocketAddr)| PeerWorker {
         name: format!("pc-{index}"),
         address: Some(*address),
         incarnation: 10 + index as u32,
     };
-    let members = addresses.iter().enumerate().map(member).collect();
-    Introduction { me, secret: "of the epoch".into(), members }
+    let peer_workers = addresses.iter().enumerate().map(member).collect();
+    Introduction { me, secret: "of the epoch".into(), peer_workers }
 }
 
 impl Side {
@@ -247,8 +247,8 @@ async fn another_worker_than_the_one_dialled_is_noticed() {
     }
     let member = |address: &str| Some(address.parse().expect("an address"));
     let mut who = introduction(2, &addresses);
-    who.members[0].address = member("127.0.0.1:9");
-    who.members[2].address = member("192.0.2.1:9");
+    who.peer_workers[0].address = member("127.0.0.1:9");
+    who.peer_workers[2].address = member("192.0.2.1:9");
     high.links.introduce(Key { epoch: 2, ..KEY }, who);
     high.links.want([0]);
     match high.next().await.what {

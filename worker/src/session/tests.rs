@@ -1,7 +1,7 @@
 //! A session without a master, sockets or clocks.
 
 use super::*;
-use mechanics::{cycle::Guest, setup::Control, setup::Setup, vote::Quanta};
+use mechanics::{cycle::Ghost, setup::Control, setup::Setup, vote::Quanta};
 
 fn assign(cycle: u64) -> Box<Assign> {
     let quantum = Quantum::for_reference(1.0, 42);
@@ -41,7 +41,7 @@ fn assign(cycle: u64) -> Box<Assign> {
         route: Route::Master,
         plan: Plan { exchange: vec![4], ..Plan::default() },
         plan_hash: 7,
-        guest_state: Vec::new(),
+        ghost_state: Vec::new(),
         bodies: Vec::new(),
     })
 }
@@ -137,12 +137,12 @@ fn after_the_last_image_a_sample_is_computed_of_the_cycle_that_will_not_be() {
     done(&mut session, Outcome::Computed);
     hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
     let actions = done(&mut session, vote());
-    assert!(matches!(actions[..], [Action::Compute(Task::Image { last: false })]));
-    let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
+    assert!(matches!(actions[..], [Action::Compute(Task::WorkerState { last: false })]));
+    let actions = done(&mut session, Outcome::WorkerState { pieces: Vec::new(), work: Work::default() });
     assert!(matches!(
         actions[..],
         [
-            Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. }),
+            Action::Send(ToMaster::WorkerState { cycle: 1, last: Some(_), .. }),
             Action::Compute(Task::Border { gather: false, .. })
         ]
     ));
@@ -155,7 +155,7 @@ fn after_the_last_image_a_sample_is_computed_of_the_cycle_that_will_not_be() {
 }
 
 #[test]
-fn a_plan_is_installed_when_it_and_the_guests_are_there() {
+fn a_plan_is_installed_when_it_and_the_ghosts_are_there() {
     let mut session = in_first_cycle(Orders { gather: true, ..orders(0) });
     done(&mut session, Outcome::Computed);
     hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
@@ -172,7 +172,7 @@ fn a_plan_is_installed_when_it_and_the_guests_are_there() {
         assert_eq!(actions.is_empty(), cycle == 2, "cycle 3 waits for the plan: {actions:?}");
     }
     let plan =
-        Box::new(Plan { guests: vec![Guest { node: 9, mass: 1.0, constraint: 0 }], ..Plan::default() });
+        Box::new(Plan { ghosts: vec![Ghost { node: 9, mass: 1.0, constraint: 0 }], ..Plan::default() });
     assert_eq!((session.plan_at(2), session.plan_at(3)), (Some(7), None), "that of cycle 3 is still to come");
     let actions = hear(&mut session, ToWorker::Plan { gathered_at: 1, acts_at: 3, plan, hash: 8 });
     assert_eq!((session.plan_at(3), session.plan_at(4)), (Some(8), Some(8)));
@@ -182,7 +182,7 @@ fn a_plan_is_installed_when_it_and_the_guests_are_there() {
         actions[..],
         [Action::Send(ToMaster::Transfer { cycle: 3, .. }), Action::Compute(Task::Elements { .. })]
     ));
-    assert!(done(&mut session, Outcome::Computed).is_empty(), "waits for the guests");
+    assert!(done(&mut session, Outcome::Computed).is_empty(), "waits for the ghosts");
     let actions = hear(&mut session, ToWorker::Transfer { cycle: 3, state: vec![0.0; 6] });
     assert!(matches!(actions[..], [Action::Compute(Task::Install { .. })]));
     assert_eq!(session.plan_hash(), 8);
@@ -252,7 +252,7 @@ fn stop_sends_the_image_with_the_last_vote() {
     done(&mut session, Outcome::Computed);
     hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
     let actions = done(&mut session, vote());
-    assert!(matches!(actions[..], [Action::Compute(Task::Image { last: true })]));
-    let actions = done(&mut session, Outcome::Image { pieces: Vec::new(), work: Work::default() });
-    assert!(matches!(actions[..], [Action::Send(ToMaster::Image { cycle: 1, last: Some(_), .. })]));
+    assert!(matches!(actions[..], [Action::Compute(Task::WorkerState { last: true })]));
+    let actions = done(&mut session, Outcome::WorkerState { pieces: Vec::new(), work: Work::default() });
+    assert!(matches!(actions[..], [Action::Send(ToMaster::WorkerState { cycle: 1, last: Some(_), .. })]));
 }

@@ -8,7 +8,6 @@ use crate::{
     typed::{Gauge, Kind, Spot, condition::made},
 };
 
-/// Most gauges.
 const MAX_GAUGES: usize = 100;
 
 /// Adds what is to be written to the deck.

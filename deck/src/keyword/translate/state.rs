@@ -86,7 +86,6 @@ impl<'p> Translation<'p> {
         x + 0.0
     }
 
-    /// The same of a vector.
     pub(super) fn vector(&self, at: Place, what: &str, v: [f64; 3]) -> [f64; 3] {
         v.map(|x| self.number(at, what, x))
     }

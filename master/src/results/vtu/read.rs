@@ -17,7 +17,6 @@ const MOST: usize = 1 << 32;
 /// Where an array is, and of what.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heading {
-    /// Its name.
     pub name: String,
     /// `PointData`, `CellData`, `Points`, `Cells`, `Polys`.
     pub section: String,
@@ -37,9 +36,7 @@ pub struct Piece {
     compressed: bool,
     /// Time (time).
     pub time: f64,
-    /// Cycle.
     pub cycle: u64,
-    /// Number of points.
     pub n_points: usize,
     /// Number of cells; of polygons in a surface.
     pub n_cells: usize,
@@ -225,7 +222,6 @@ pub fn index(folder: &Path) -> Result<Vec<(f64, PathBuf)>, Error> {
     Ok(states)
 }
 
-/// The value of an attribute of a tag.
 fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     let start = tag.find(&format!(" {name}=\""))? + name.len() + 3;
     tag[start..].split('"').next()

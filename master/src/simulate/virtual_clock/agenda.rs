@@ -58,7 +58,6 @@ pub struct Due {
     pub time: f64,
     /// By when it was foreseen.
     pub order: u64,
-    /// What.
     pub what: What,
 }
 

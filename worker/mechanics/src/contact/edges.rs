@@ -39,12 +39,10 @@ pub struct Edge {
     pub sharp: bool,
 }
 
-/// One edge of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BatchEdge {
     /// Batch node indices.
     pub nodes: [u32; 2],
-    /// Part of the edge.
     pub part: u32,
     /// Mean of the stiffness of its nodes (force per length).
     pub stiffness: f64,

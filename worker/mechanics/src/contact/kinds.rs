@@ -65,7 +65,6 @@ impl Kinds {
         Self { faces: NodeFace::new(batch, settings, x, width), edges: Edges::new(batch, settings) }
     }
 
-    /// Each of them.
     pub(super) fn each(&self) -> [&dyn Pairs; 2] {
         [&self.faces, &self.edges]
     }

@@ -14,7 +14,6 @@ pub(super) struct NearPairs {
 }
 
 impl NearPairs {
-    /// The node of each pair.
     pub(super) fn node(&self) -> &[u32] {
         &self.node
     }

@@ -75,12 +75,10 @@ impl Slots {
         }
     }
 
-    /// Number of sets.
     pub(super) fn n_sets(&self) -> usize {
         self.node.len() / SET
     }
 
-    /// The slots of some sets.
     pub(super) fn of_sets(&self, sets: &Range<usize>) -> Range<usize> {
         self.starts[sets.start] as usize..self.starts[sets.end] as usize
     }

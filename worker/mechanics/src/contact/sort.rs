@@ -293,7 +293,6 @@ fn sort_nodes(x: &[[f64; 3]], grid: &Grid, sides: &Sides) -> (Table, Vec<u32>) {
 /// How many nodes of which part each unit holds.
 struct PartCensus {
     starts: Vec<u32>,
-    /// Part and count.
     counts: Vec<(u32, u32)>,
 }
 

@@ -78,12 +78,10 @@ pub struct Batch {
     pub listed: Listed,
 }
 
-/// One node of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BatchNode {
     /// Global node index.
     pub global: u32,
-    /// Part of the node.
     pub part: u32,
     /// Nodal mass.
     pub mass: f64,
@@ -93,7 +91,6 @@ pub struct BatchNode {
     pub share: f64,
 }
 
-/// One face of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BatchFace {
     /// Batch node indices, outward by the right-hand rule.

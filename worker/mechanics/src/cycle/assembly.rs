@@ -7,15 +7,15 @@ use serde::{Deserialize, Serialize};
 use super::{
     Domain,
     bodies::Held,
-    guests::Guests,
-    room::Room,
+    ghosts::Ghosts,
+    held_block::HeldBlock,
     sharing::{Exchange, Groups},
 };
 use crate::{
     block::{Block, Piece},
+    copy_index::CopyIndex,
     element::ElementVote,
     erosion::Eroding,
-    home::Home,
     lanes::{SET, Width},
     load::face::{self, FaceVote},
     nodes::{Booked, NodeSet},
@@ -50,12 +50,12 @@ impl Domain {
         gauges: &[u32],
         width: Width,
     ) -> Self {
-        let mut rooms: Vec<Room> = Vec::new();
+        let mut held_blocks: Vec<HeldBlock> = Vec::new();
         let pieces = subdomains.iter().flat_map(|subdomain| &subdomain.pieces);
-        let home = Home::new(pieces.map(|piece| piece.nodes.as_slice()));
+        let copy_index = CopyIndex::new(pieces.map(|piece| piece.nodes.as_slice()));
         let mut gather = Vec::new();
         for Subdomain { pieces, unowned, surface, .. } in subdomains {
-            let first = rooms.len();
+            let first = held_blocks.len();
             for mut piece in pieces {
                 let erosion = piece.erosion.take();
                 let mut block = Block::of(piece, &setup.materials);
@@ -73,7 +73,7 @@ impl Domain {
                 let faces = face::faces_of(&block, &setup.loads, material);
                 let part = block.part;
                 let is_rigid = setup.bodies.iter().any(|body| body.parts.binary_search(&part).is_ok());
-                rooms.push(Room {
+                held_blocks.push(HeldBlock {
                     is_rigid,
                     sets: NodeSet::all(&block.constraint),
                     block,
@@ -89,40 +89,42 @@ impl Domain {
                     eroding,
                 });
             }
-            let own = first as u32..rooms.len() as u32;
+            let own = first as u32..held_blocks.len() as u32;
             let first_copy =
-                |node: u32| home.get(node).iter().copied().find(|(block, _)| own.contains(block));
-            for room in own.clone() {
-                for local in 0..rooms[room as usize].block.nodes.len() as u32 {
-                    let node = rooms[room as usize].block.nodes[local as usize];
+                |node: u32| copy_index.get(node).iter().copied().find(|(block, _)| own.contains(block));
+            for held_block in own.clone() {
+                for local in 0..held_blocks[held_block as usize].block.nodes.len() as u32 {
+                    let node = held_blocks[held_block as usize].block.nodes[local as usize];
                     let owned = unowned.binary_search(&node).is_err();
-                    if owned && first_copy(node) == Some((room, local)) {
-                        rooms[room as usize].sets[local as usize / SET].booked |= 1 << (local as usize % SET);
+                    if owned && first_copy(node) == Some((held_block, local)) {
+                        held_blocks[held_block as usize].sets[local as usize / SET].booked |=
+                            1 << (local as usize % SET);
                     }
                 }
             }
             for &node in &surface {
-                if let Some((room, local)) = first_copy(node) {
+                if let Some((held_block, local)) = first_copy(node) {
                     if unowned.binary_search(&node).is_err() {
-                        gather.push((room, local));
+                        gather.push((held_block, local));
                     }
-                    rooms[room as usize].sets[local as usize / SET].surface |= 1 << (local as usize % SET);
+                    held_blocks[held_block as usize].sets[local as usize / SET].surface |=
+                        1 << (local as usize % SET);
                 }
             }
         }
-        for room in &mut rooms {
-            room.reference = room.surface_positions();
+        for held_block in &mut held_blocks {
+            held_block.reference = held_block.surface_positions();
         }
         let gauges = gauges
             .iter()
             .enumerate()
             .filter_map(|(g, node)| {
-                let &(room, local) =
-                    home.get(*node).iter().find(|&&(r, l)| rooms[r as usize].is_booked(l))?;
-                Some((g as u32, room, local))
+                let &(held_block, local) =
+                    copy_index.get(*node).iter().find(|&&(r, l)| held_blocks[r as usize].is_booked(l))?;
+                Some((g as u32, held_block, local))
             })
             .collect();
-        let bodies = Held::all(&setup, &home, &mut rooms);
+        let bodies = Held::all(&setup, &copy_index, &mut held_blocks);
         Self {
             vote: Vote::empty(n_parts),
             cycle,
@@ -135,15 +137,15 @@ impl Domain {
             n_parts,
             quanta,
             width,
-            rooms,
-            guests: Guests::default(),
+            held_blocks,
+            ghosts: Ghosts::default(),
             contact: None,
             moments: false,
             exchange: Exchange::default(),
             groups: Groups::default(),
             bodies,
             sends_pushes: false,
-            home,
+            copy_index,
             gather,
             gauges,
             element_gauges: Vec::new(),
@@ -155,13 +157,15 @@ impl Domain {
     pub fn watch(&mut self, watched: &Watched) {
         self.watched_pairs.clone_from(&watched.contacts);
         let place = |element: &u32| {
-            let found = |room: &Room| room.block.elements.iter().position(|e| e == element);
-            let mut rooms = (0..).zip(&self.rooms);
-            rooms.find_map(|(index, room)| found(room).map(|local| (index, local as u32)))
+            let found = |held_block: &HeldBlock| held_block.block.elements.iter().position(|e| e == element);
+            let mut held_blocks = (0..).zip(&self.held_blocks);
+            held_blocks.find_map(|(index, held_block)| found(held_block).map(|local| (index, local as u32)))
         };
         let places = (0..).zip(&watched.elements);
         self.element_gauges = places
-            .filter_map(|(gauge, element)| place(element).map(|(room, local)| (gauge, room, local)))
+            .filter_map(|(gauge, element)| {
+                place(element).map(|(held_block, local)| (gauge, held_block, local))
+            })
             .collect();
     }
 }

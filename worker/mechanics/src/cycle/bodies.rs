@@ -7,10 +7,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::{Domain, Guests, NONE, Room};
+use super::{Domain, Ghosts, HeldBlock, NONE};
 use crate::{
+    copy_index::CopyIndex,
     exact::Quantum,
-    home::Home,
     lanes::SET,
     nodes,
     rigid::{self, Body, Booked, ENTRIES, PUSH, Push, State},
@@ -23,8 +23,8 @@ pub(super) struct Held {
     state: State,
     /// Room, local node and place of every copy in a block.
     copies: Vec<[u32; 3]>,
-    /// Guest and place.
-    guests: Vec<[u32; 2]>,
+    /// Ghost and place.
+    ghosts: Vec<[u32; 2]>,
     /// Contact node and place.
     contact: Vec<[u32; 2]>,
     /// Whether this domain books it.
@@ -35,22 +35,26 @@ pub(super) struct Held {
 
 impl Held {
     /// Finds the copies of all bodies; from now on their nodes book nothing.
-    pub(super) fn all(setup: &Setup, home: &Home, rooms: &mut [Room]) -> Vec<Self> {
+    pub(super) fn all(setup: &Setup, copy_index: &CopyIndex, held_blocks: &mut [HeldBlock]) -> Vec<Self> {
         let held = setup.bodies.iter().map(|body| {
             let mut copies = Vec::new();
             for (place, &node) in (0..).zip(&body.nodes) {
-                copies.extend(home.get(node).iter().map(|&(room, local)| [room, local, place]));
+                copies.extend(
+                    copy_index.get(node).iter().map(|&(held_block, local)| [held_block, local, place]),
+                );
             }
-            let booked =
-                |&[room, local, place]: &[u32; 3]| place == 0 && rooms[room as usize].is_booked(local);
+            let booked = |&[held_block, local, place]: &[u32; 3]| {
+                place == 0 && held_blocks[held_block as usize].is_booked(local)
+            };
             let is_booked = copies.iter().any(booked);
-            for &[room, local, _] in &copies {
-                rooms[room as usize].sets[local as usize / SET].booked &= !(1 << (local as usize % SET));
+            for &[held_block, local, _] in &copies {
+                held_blocks[held_block as usize].sets[local as usize / SET].booked &=
+                    !(1 << (local as usize % SET));
             }
             Self {
                 state: body.start,
                 copies,
-                guests: Vec::new(),
+                ghosts: Vec::new(),
                 contact: Vec::new(),
                 is_booked,
                 push: Push::default(),
@@ -80,11 +84,11 @@ impl Domain {
         Ok(())
     }
 
-    /// Finds the nodes of bodies among guests and contact nodes (global indices, ascending), and adds all of them to
+    /// Finds the nodes of bodies among ghosts and contact nodes (global indices, ascending), and adds all of them to
     /// `exchanged`: elements that push them are computed before partial forces travel.
     pub(super) fn find_bodies(
         &mut self,
-        guest_of: &HashMap<u32, u32>,
+        ghost_of: &HashMap<u32, u32>,
         contact_nodes: &[u32],
         exchanged: &mut HashSet<u32>,
     ) {
@@ -93,7 +97,7 @@ impl Domain {
             let among = |find: &dyn Fn(&u32) -> Option<u32>| {
                 (0..).zip(&body.nodes).filter_map(|(place, node)| Some([find(node)?, place])).collect()
             };
-            held.guests = among(&|node| guest_of.get(node).copied());
+            held.ghosts = among(&|node| ghost_of.get(node).copied());
             held.contact = among(&|node| contact_nodes.binary_search(node).ok().map(|i| i as u32));
         }
     }
@@ -104,8 +108,8 @@ impl Domain {
         for (held, body) in self.bodies.iter_mut().zip(&self.setup.bodies) {
             held.push = Push::default();
             let state = &held.state;
-            for &[room, local, place] in &held.copies {
-                let block = &self.rooms[room as usize].block;
+            for &[held_block, local, place] in &held.copies {
+                let block = &self.held_blocks[held_block as usize].block;
                 push(&mut held.push, at(&block.f, local), body, state, place, force);
                 if let Some(turning) = &block.turning {
                     held.push.add_moment(at(&turning.m, local), force, body.length);
@@ -119,7 +123,7 @@ impl Domain {
         }
     }
 
-    /// What pushes the bodies here, to travel: three numbers in each entry, which may have room for more.
+    /// What pushes the bodies here, to travel: three numbers in each entry, which may have block for more.
     pub(super) fn pack_pushes(&self, out: &mut Vec<f64>) {
         if !self.sends_pushes {
             return;
@@ -148,7 +152,7 @@ impl Domain {
         let advance = rigid::Advance { dt_previous, dt, time, loads, quanta };
         let of_nodes =
             nodes::Advance { dt_previous, dt, time, constraints: &[], walls: &[], poses: &[], loads, quanta };
-        let Guests { x, v, f, mass, .. } = &mut self.guests;
+        let Ghosts { x, v, f, mass, .. } = &mut self.ghosts;
         for (b, (held, body)) in self.bodies.iter_mut().zip(&self.setup.bodies).enumerate() {
             if self.sends_pushes {
                 let first = ENTRIES as usize * b * stride;
@@ -157,8 +161,8 @@ impl Domain {
                 }));
             }
             held.booked = advance.run(body, &held.push, &mut held.state);
-            for &[room, local, place] in &held.copies {
-                let block = &mut self.rooms[room as usize].block;
+            for &[held_block, local, place] in &held.copies {
+                let block = &mut self.held_blocks[held_block as usize].block;
                 let target = held.state.at(body.places[place as usize]);
                 let (x, v) = (at(&block.x, local), at(&block.v, local));
                 let force = of_nodes.leading(x, v, block.mass[local as usize], target);
@@ -169,10 +173,10 @@ impl Domain {
                     (0..3).for_each(|a| turning.m[a][local as usize] = moment[a]);
                 }
             }
-            for &[guest, place] in &held.guests {
+            for &[ghost, place] in &held.ghosts {
                 let target = held.state.at(body.places[place as usize]);
-                let force = of_nodes.leading(at(x, guest), at(v, guest), mass[guest as usize], target);
-                (0..3).for_each(|a| f[a][guest as usize] = force[a]);
+                let force = of_nodes.leading(at(x, ghost), at(v, ghost), mass[ghost as usize], target);
+                (0..3).for_each(|a| f[a][ghost as usize] = force[a]);
             }
         }
     }

@@ -1,22 +1,22 @@
-//! What of a domain's state leaves it: images, samples, positions for a sort, states for guests elsewhere.
+//! What of a domain's state leaves it: states, samples, positions for a sort, states for ghosts elsewhere.
 
-use super::{Domain, room::Room};
+use super::{Domain, held_block::HeldBlock};
 use crate::block::Piece;
 
 impl Domain {
-    /// Position and velocity of `nodes` (global), six numbers each, for workers that will have them as guests.
+    /// Position and velocity of `nodes` (global), six numbers each, for workers that will have them as ghosts.
     ///
     /// # Errors
     /// If a node is not held here.
     pub fn transfer(&self, nodes: &[u32]) -> Result<Vec<f64>, String> {
         let mut out = Vec::with_capacity(6 * nodes.len());
         for node in nodes {
-            let (room, local) = *self
-                .home
+            let (held_block, local) = *self
+                .copy_index
                 .get(*node)
                 .first()
                 .ok_or_else(|| format!("node {node} to transfer is not held"))?;
-            let (block, i) = (&self.rooms[room as usize].block, local as usize);
+            let (block, i) = (&self.held_blocks[held_block as usize].block, local as usize);
             out.extend((0..3).map(|a| block.x[a][i]));
             out.extend((0..3).map(|a| block.v[a][i]));
         }
@@ -25,12 +25,12 @@ impl Domain {
 
     /// Positions of the owned surface nodes in the order the master expects; a sort will use them.
     pub fn gather(&mut self) -> Vec<f64> {
-        for room in &mut self.rooms {
-            room.gathered.push_back(room.surface_positions());
+        for held_block in &mut self.held_blocks {
+            held_block.gathered.push_back(held_block.surface_positions());
         }
         let mut out = Vec::with_capacity(3 * self.gather.len());
-        for &(room, local) in &self.gather {
-            let block = &self.rooms[room as usize].block;
+        for &(held_block, local) in &self.gather {
+            let block = &self.held_blocks[held_block as usize].block;
             out.extend((0..3).map(|a| block.x[a][local as usize]));
         }
         out
@@ -38,12 +38,14 @@ impl Domain {
 
     /// The state of all blocks, to be put back into a global state.
     pub fn pieces(&self) -> Vec<Piece> {
-        self.rooms.iter().map(|room| Piece { erosion: room.erosion(), ..room.block.piece() }).collect()
+        self.held_blocks
+            .iter()
+            .map(|held_block| Piece { erosion: held_block.erosion(), ..held_block.block.piece() })
+            .collect()
     }
 
-    /// Number of blocks.
     pub fn n_blocks(&self) -> usize {
-        self.rooms.len()
+        self.held_blocks.len()
     }
 
     /// What the elements of a block made of `x_n`, between all its elements and integration: forces of its elements and
@@ -53,21 +55,23 @@ impl Domain {
     /// # Errors
     /// If there is no such block.
     pub fn sample(&self, block: usize) -> Result<[u8; 16], String> {
-        let n = self.rooms.len();
-        let room = self.rooms.get(block).ok_or_else(|| format!("block {block} of {n} to sample"))?;
-        Ok(crate::proof::of_block(&room.block, &room.vote))
+        let n = self.held_blocks.len();
+        let held_block =
+            self.held_blocks.get(block).ok_or_else(|| format!("block {block} of {n} to sample"))?;
+        Ok(crate::proof::of_block(&held_block.block, &held_block.vote))
     }
 
     /// Makes the pressure (of shells a stress) of the first element of every block wrong by one unit in the last place: what a faulty
     /// processor might do. For tests of who finds it.
     #[doc(hidden)]
     pub fn plant_fault(&mut self) {
-        self.rooms.iter_mut().for_each(|room| room.block.plant_fault());
+        self.held_blocks.iter_mut().for_each(|held_block| held_block.block.plant_fault());
     }
 
     /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
     pub fn into_pieces(self) -> Vec<Piece> {
-        let image = |room: Room| Piece { erosion: room.erosion(), ..room.block.into_piece() };
-        self.rooms.into_iter().map(image).collect()
+        let image =
+            |held_block: HeldBlock| Piece { erosion: held_block.erosion(), ..held_block.block.into_piece() };
+        self.held_blocks.into_iter().map(image).collect()
     }
 }

@@ -1,4 +1,4 @@
-//! The plan that a domain acts by, from one boundary to the next: shared nodes, guests and work units put in their places,
+//! The plan that a domain acts by, from one boundary to the next: shared nodes, ghosts and work units put in their places,
 //! and freed nodes taken out.
 
 use std::{
@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Domain, NONE, bodies,
-    guests::{ContactRoom, Guests, pack, positions},
-    room::Room,
+    ghosts::{Ghosts, HeldContact, pack, positions},
+    held_block::HeldBlock,
 };
 use crate::{
     contact::{Batch, Contact, PairEnergies},
@@ -27,7 +27,7 @@ pub struct Plan {
     /// Work units.
     pub batch: Option<Batch>,
     /// Contact nodes that no sub-domain here has.
-    pub guests: Vec<Guest>,
+    pub ghosts: Vec<Ghost>,
     /// Global nodes whose state this worker sends to others when the plan starts to act.
     pub send: Vec<u32>,
     /// Whether moments travel behind the forces of each node: six numbers instead of three.
@@ -56,9 +56,9 @@ pub struct Neighbour {
     pub shared: Vec<u32>,
 }
 
-/// What integrating a guest needs beside its position and velocity.
+/// What integrating a ghost needs beside its position and velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Guest {
+pub struct Ghost {
     /// Global node index.
     pub node: u32,
     /// Nodal mass.
@@ -68,40 +68,40 @@ pub struct Guest {
 }
 
 impl Domain {
-    /// Starts to act by `plan`. `guest_state` is x, y, z, vx, vy, vz of each guest, in the plan's order.
+    /// Starts to act by `plan`. `ghost_state` is x, y, z, vx, vy, vz of each ghost, in the plan's order.
     ///
     /// # Errors
-    /// If the plan names a node that is neither held nor a guest, or the state has the wrong length.
-    pub fn install(&mut self, plan: &Plan, guest_state: &[f64]) -> Result<(), String> {
-        if guest_state.len() != 6 * plan.guests.len() {
+    /// If the plan names a node that is neither held nor a ghost, or the state has the wrong length.
+    pub fn install(&mut self, plan: &Plan, ghost_state: &[f64]) -> Result<(), String> {
+        if ghost_state.len() != 6 * plan.ghosts.len() {
             return Err(format!(
-                "{} numbers of guest state for {} guests, expected 6 each",
-                guest_state.len(),
-                plan.guests.len()
+                "{} numbers of ghost state for {} ghosts, expected 6 each",
+                ghost_state.len(),
+                plan.ghosts.len()
             ));
         }
-        let constraint: Vec<u16> = plan.guests.iter().map(|g| g.constraint).collect();
+        let constraint: Vec<u16> = plan.ghosts.iter().map(|g| g.constraint).collect();
         let sets = NodeSet::all(&constraint);
         let padded = |values: &mut dyn Iterator<Item = f64>, padding: f64| {
             let mut array: Vec<f64> = values.collect();
             array.resize(sets.len() * SET, padding);
             array
         };
-        let number = |i: usize| padded(&mut guest_state.chunks_exact(6).map(|s| s[i]), 0.0);
-        self.guests = Guests {
-            node: plan.guests.iter().map(|g| g.node).collect(),
+        let number = |i: usize| padded(&mut ghost_state.chunks_exact(6).map(|s| s[i]), 0.0);
+        self.ghosts = Ghosts {
+            node: plan.ghosts.iter().map(|g| g.node).collect(),
             x: std::array::from_fn(number),
             v: std::array::from_fn(|a| number(3 + a)),
             f: std::array::from_fn(|_| padded(&mut std::iter::empty(), 0.0)),
-            mass: padded(&mut plan.guests.iter().map(|g| g.mass), 1.0),
+            mass: padded(&mut plan.ghosts.iter().map(|g| g.mass), 1.0),
             constraint,
             sets,
         };
-        if let Some(guest) = plan.guests.iter().find(|guest| !self.home.get(guest.node).is_empty()) {
-            return Err(format!("guest {} is held here, must be a node of other workers alone", guest.node));
+        if let Some(ghost) = plan.ghosts.iter().find(|ghost| !self.copy_index.get(ghost.node).is_empty()) {
+            return Err(format!("ghost {} is held here, must be a node of other workers alone", ghost.node));
         }
-        let guest_of: HashMap<u32, u32> =
-            self.guests.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
+        let ghost_of: HashMap<u32, u32> =
+            self.ghosts.node.iter().enumerate().map(|(i, &n)| (n, i as u32)).collect();
         let contact_nodes = plan.batch.as_ref().map_or(&[][..], |batch| &batch.nodes);
         if !contact_nodes.is_sorted_by(|a, b| a.global < b.global) {
             return Err("contact nodes are not in ascending order".to_owned());
@@ -110,11 +110,11 @@ impl Domain {
         if let (Some(batch), Some(settings)) = (&plan.batch, &self.setup.contact) {
             let mut sources = Vec::with_capacity(batch.nodes.len());
             for node in &batch.nodes {
-                let source = match (self.home.get(node.global), guest_of.get(&node.global)) {
+                let source = match (self.copy_index.get(node.global), ghost_of.get(&node.global)) {
                     ([first, ..], _) => *first,
-                    ([], Some(&guest)) => (NONE, guest),
+                    ([], Some(&ghost)) => (NONE, ghost),
                     ([], None) => {
-                        return Err(format!("contact node {} is neither held nor a guest", node.global));
+                        return Err(format!("contact node {} is neither held nor a ghost", node.global));
                     }
                 };
                 sources.push(source);
@@ -122,10 +122,10 @@ impl Domain {
             let n = sources.len();
             let zeros = || std::array::from_fn(|_| vec![0.0; n]);
             let mut x = zeros();
-            pack(&sources, |room| positions(&self.rooms, &self.guests, room), &mut x);
+            pack(&sources, |held_block| positions(&self.held_blocks, &self.ghosts, held_block), &mut x);
             let mut contact = Contact::new(batch, settings, &x, self.width);
             contact.watch_pairs(&self.watched_pairs);
-            self.contact = Some(ContactRoom { contact, sources, x, v: zeros(), f: zeros() });
+            self.contact = Some(HeldContact { contact, sources, x, v: zeros(), f: zeros() });
         }
         // Every node with more than one copy, here or elsewhere, and every contact node.
         self.moments = plan.moments;
@@ -137,42 +137,43 @@ impl Domain {
         for &node in &plan.exchange[..plan.exchange.len() - n_entries] {
             exchanged.insert(node);
             let contact = contact_nodes.binary_search_by_key(&node, |n| n.global);
-            let (copies, guest) = (self.home.get(node), guest_of.get(&node).copied().unwrap_or(NONE));
-            if copies.is_empty() && guest == NONE {
-                return Err(format!("node {node} of the exchange is neither held nor a guest"));
+            let (copies, ghost) = (self.copy_index.get(node), ghost_of.get(&node).copied().unwrap_or(NONE));
+            if copies.is_empty() && ghost == NONE {
+                return Err(format!("node {node} of the exchange is neither held nor a ghost"));
             }
-            self.exchange.push(copies, contact.map_or(NONE, |i| i as u32), guest);
+            self.exchange.push(copies, contact.map_or(NONE, |i| i as u32), ghost);
         }
         if !self.bodies.is_empty() {
             let nodes: Vec<u32> = contact_nodes.iter().map(|node| node.global).collect();
-            self.find_bodies(&guest_of, &nodes, &mut exchanged);
+            self.find_bodies(&ghost_of, &nodes, &mut exchanged);
         }
         // Both lists ascend, so one walk over them finds the contact node of each.
-        let (mut next, n_several) = (0, self.home.several().len());
+        let (mut next, n_several) = (0, self.copy_index.several().len());
         for (i, node) in (0_u32..).zip(contact_nodes.iter().map(|n| n.global)) {
-            while next < n_several && self.home.several()[next] < node {
-                self.share_locally(self.home.several()[next], NONE, &exchanged);
+            while next < n_several && self.copy_index.several()[next] < node {
+                self.share_locally(self.copy_index.several()[next], NONE, &exchanged);
                 next += 1;
             }
-            next += usize::from(next < n_several && self.home.several()[next] == node);
+            next += usize::from(next < n_several && self.copy_index.several()[next] == node);
             self.share_locally(node, i, &exchanged);
         }
         for i in next..n_several {
-            self.share_locally(self.home.several()[i], NONE, &exchanged);
+            self.share_locally(self.copy_index.several()[i], NONE, &exchanged);
         }
-        for room in &mut self.rooms {
-            (room.border, room.interior) = if exchanged.is_empty() {
-                let all = 0..room.block.n_sets();
+        for held_block in &mut self.held_blocks {
+            (held_block.border, held_block.interior) = if exchanged.is_empty() {
+                let all = 0..held_block.block.n_sets();
                 (Vec::new(), vec![all])
             } else {
-                let touched: Vec<bool> = room.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
-                split(&room.block.sets_touching(&touched))
+                let touched: Vec<bool> =
+                    held_block.block.nodes.iter().map(|n| exchanged.contains(n)).collect();
+                split(&held_block.block.sets_touching(&touched))
             };
-            if room.eroding.is_some() {
-                room.leave_out_dead();
+            if held_block.eroding.is_some() {
+                held_block.leave_out_dead();
             }
-            if let Some(gathered) = room.gathered.pop_front() {
-                room.reference = gathered;
+            if let Some(gathered) = held_block.gathered.pop_front() {
+                held_block.reference = gathered;
             }
         }
         self.drop_nodes(&plan.dropped);
@@ -183,10 +184,10 @@ impl Domain {
     /// earlier cycles too, which stand still already: what left with them was booked then, and nothing is booked here.
     fn drop_nodes(&mut self, nodes: &[u32]) {
         for &node in nodes {
-            for &(room, local) in self.home.get(node) {
-                let room = &mut self.rooms[room as usize];
-                let booked = room.drop_node(local);
-                let (v, mass) = (&mut room.block.v, room.block.mass[local as usize]);
+            for &(held_block, local) in self.copy_index.get(node) {
+                let held_block = &mut self.held_blocks[held_block as usize];
+                let booked = held_block.drop_node(local);
+                let (v, mass) = (&mut held_block.block.v, held_block.block.mass[local as usize]);
                 let velocity: [f64; 3] = std::array::from_fn(|a| std::mem::take(&mut v[a][local as usize]));
                 if booked {
                     let [x, y, z] = velocity;
@@ -204,30 +205,30 @@ impl Domain {
     /// the vote will say what the springs hold after it ([`crate::vote::Vote::released`]).
     pub fn end_surface(&mut self) {
         self.surface_ends = true;
-        for room in &mut self.rooms {
-            room.gathered.clear();
+        for held_block in &mut self.held_blocks {
+            held_block.gathered.clear();
         }
     }
 
     /// Energies that the springs on the surface in force have at the positions as of now; `dt` is the step that led to them.
     pub(super) fn spring_energies(&mut self, dt: f64) -> PairEnergies {
-        let Some(room) = &mut self.contact else { return PairEnergies::default() };
-        room.pack(&self.rooms, &self.guests);
+        let Some(packed) = &mut self.contact else { return PairEnergies::default() };
+        packed.pack(&self.held_blocks, &self.ghosts);
         // Forces are added to what is cleared before the next ones.
-        room.contact.forces(&room.x, &room.v, dt, self.quanta.force, self.quanta.energy, &mut room.f);
-        room.contact.energies().of_springs()
+        packed.contact.forces(&packed.x, &packed.v, dt, self.quanta.force, self.quanta.energy, &mut packed.f);
+        packed.contact.energies().of_springs()
     }
 
     /// Adds a node to the groups, if it is held here and not exchanged.
     fn share_locally(&mut self, node: u32, contact: u32, exchanged: &HashSet<u32>) {
-        let copies = self.home.get(node);
+        let copies = self.copy_index.get(node);
         if !copies.is_empty() && !exchanged.contains(&node) {
             self.groups.push(copies, contact);
         }
     }
 }
 
-impl Room {
+impl HeldBlock {
     /// Sets without a living element are not computed any more.
     pub(super) fn leave_out_dead(&mut self) {
         let alive = self.block.alive();

@@ -1,4 +1,4 @@
-//! Total forces of nodes that several arrays hold: blocks, contact, guests, other workers.
+//! Total forces of nodes that several arrays hold: blocks, contact, ghosts, other workers.
 //!
 //! What holds a node is one of its *holders*. A node of the [`Exchange`] has holders on other workers too, so what its holders
 //! here come to is packed and travels; the total comes back. The other nodes with several holders stand in [`Groups`] by who
@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::{Guests, NONE, Room};
+use super::{Ghosts, HeldBlock, NONE};
 
 /// Forces of the contact nodes, by axis.
 type OfContact<'a> = Option<&'a [Vec<f64>; 3]>;
@@ -20,11 +20,11 @@ pub(super) struct Exchange {
     copies: Vec<(u32, u32)>,
 }
 
-/// One node of the exchange: a range of the copies, its contact node and its guest.
+/// One node of the exchange: a range of the copies, its contact node and its ghost.
 struct Shared {
     copies: Range<u32>,
     contact: u32,
-    guest: u32,
+    ghost: u32,
 }
 
 impl Exchange {
@@ -37,35 +37,47 @@ impl Exchange {
         self.nodes.len()
     }
 
-    /// Adds a node; a contact node or a guest that it has not is [`NONE`].
-    pub(super) fn push(&mut self, copies: &[(u32, u32)], contact: u32, guest: u32) {
+    /// Adds a node; a contact node or a ghost that it has not is [`NONE`].
+    pub(super) fn push(&mut self, copies: &[(u32, u32)], contact: u32, ghost: u32) {
         let first = self.copies.len() as u32;
         self.copies.extend_from_slice(copies);
-        self.nodes.push(Shared { copies: first..self.copies.len() as u32, contact, guest });
+        self.nodes.push(Shared { copies: first..self.copies.len() as u32, contact, ghost });
     }
 
     /// Packs what the holders here come to: three numbers for each node, with `moments` six.
-    pub(super) fn pack(&self, rooms: &[Room], of_contact: OfContact<'_>, moments: bool, out: &mut Vec<f64>) {
+    pub(super) fn pack(
+        &self,
+        held_blocks: &[HeldBlock],
+        of_contact: OfContact<'_>,
+        moments: bool,
+        out: &mut Vec<f64>,
+    ) {
         for node in &self.nodes {
             let copies = &self.copies[node.copies.start as usize..node.copies.end as usize];
-            out.extend(force(rooms, copies, of_contact, node.contact));
+            out.extend(force(held_blocks, copies, of_contact, node.contact));
             if moments {
-                out.extend(moment(rooms, copies));
+                out.extend(moment(held_blocks, copies));
             }
         }
     }
 
     /// Gives every holder here the totals, packed likewise.
-    pub(super) fn put(&self, totals: &[f64], moments: bool, rooms: &mut [Room], guests: &mut Guests) {
+    pub(super) fn put(
+        &self,
+        totals: &[f64],
+        moments: bool,
+        held_blocks: &mut [HeldBlock],
+        ghosts: &mut Ghosts,
+    ) {
         let stride = if moments { 6 } else { 3 };
         for (node, total) in self.nodes.iter().zip(totals.chunks_exact(stride)) {
             let copies = &self.copies[node.copies.start as usize..node.copies.end as usize];
             let moment = if moments { [total[3], total[4], total[5]] } else { [0.0; 3] };
             let total = [total[0], total[1], total[2]];
-            put(rooms, copies, total, moment);
-            if node.guest != NONE {
-                for (f, total) in guests.f.iter_mut().zip(total) {
-                    f[node.guest as usize] = total;
+            put(held_blocks, copies, total, moment);
+            if node.ghost != NONE {
+                for (f, total) in ghosts.f.iter_mut().zip(total) {
+                    f[node.ghost as usize] = total;
                 }
             }
         }
@@ -111,20 +123,22 @@ impl Groups {
     }
 
     /// Gives every holder the total of its node.
-    pub(super) fn add_up(&mut self, rooms: &mut [Room], of_contact: OfContact<'_>, moments: bool) {
+    pub(super) fn add_up(&mut self, held_blocks: &mut [HeldBlock], of_contact: OfContact<'_>, moments: bool) {
         let Self { groups, copies } = self;
         for Group { blocks, with_contact, nodes } in &*groups {
             match (&blocks[..], with_contact) {
-                (&[one, other], false) if one != other && !moments => between(rooms, [one, other], nodes),
-                (&[block], true) if !moments => touched(&mut rooms[block as usize], of_contact, nodes),
+                (&[one, other], false) if one != other && !moments => {
+                    between(held_blocks, [one, other], nodes)
+                }
+                (&[block], true) if !moments => touched(&mut held_blocks[block as usize], of_contact, nodes),
                 _ => {
                     for node in nodes.chunks_exact(blocks.len() + usize::from(*with_contact)) {
                         copies.clear();
                         copies.extend(blocks.iter().copied().zip(node.iter().copied()));
                         let contact = if *with_contact { node[blocks.len()] } else { NONE };
-                        let total = force(rooms, copies, of_contact, contact);
-                        let turn = if moments { moment(rooms, copies) } else { [0.0; 3] };
-                        put(rooms, copies, total, turn);
+                        let total = force(held_blocks, copies, of_contact, contact);
+                        let turn = if moments { moment(held_blocks, copies) } else { [0.0; 3] };
+                        put(held_blocks, copies, total, turn);
                     }
                 }
             }
@@ -133,8 +147,8 @@ impl Groups {
 }
 
 /// Nodes that two blocks have and nothing else.
-fn between(rooms: &mut [Room], blocks: [u32; 2], nodes: &[u32]) {
-    let Ok([one, other]) = rooms.get_disjoint_mut(blocks.map(|block| block as usize)) else {
+fn between(held_blocks: &mut [HeldBlock], blocks: [u32; 2], nodes: &[u32]) {
+    let Ok([one, other]) = held_blocks.get_disjoint_mut(blocks.map(|block| block as usize)) else {
         unreachable!("two blocks of the domain");
     };
     for (f, g) in one.block.f.iter_mut().zip(&mut other.block.f) {
@@ -146,9 +160,8 @@ fn between(rooms: &mut [Room], blocks: [u32; 2], nodes: &[u32]) {
     }
 }
 
-/// Nodes that one block has and contact.
-fn touched(room: &mut Room, of_contact: OfContact<'_>, nodes: &[u32]) {
-    for (f, of_contact) in room.block.f.iter_mut().zip(of_contact.into_iter().flatten()) {
+fn touched(held_block: &mut HeldBlock, of_contact: OfContact<'_>, nodes: &[u32]) {
+    for (f, of_contact) in held_block.block.f.iter_mut().zip(of_contact.into_iter().flatten()) {
         for node in nodes.chunks_exact(2) {
             f[node[0] as usize] += of_contact[node[1] as usize];
         }
@@ -156,10 +169,15 @@ fn touched(room: &mut Room, of_contact: OfContact<'_>, nodes: &[u32]) {
 }
 
 /// What the holders of a node come to: its force.
-fn force(rooms: &[Room], copies: &[(u32, u32)], of_contact: OfContact<'_>, contact: u32) -> [f64; 3] {
+fn force(
+    held_blocks: &[HeldBlock],
+    copies: &[(u32, u32)],
+    of_contact: OfContact<'_>,
+    contact: u32,
+) -> [f64; 3] {
     let mut total = [0.0; 3];
-    for &(room, local) in copies {
-        for (sum, f) in total.iter_mut().zip(&rooms[room as usize].block.f) {
+    for &(held_block, local) in copies {
+        for (sum, f) in total.iter_mut().zip(&held_blocks[held_block as usize].block.f) {
             *sum += f[local as usize];
         }
     }
@@ -174,10 +192,10 @@ fn force(rooms: &[Room], copies: &[(u32, u32)], of_contact: OfContact<'_>, conta
 }
 
 /// Likewise its moment, which only blocks whose nodes turn have.
-fn moment(rooms: &[Room], copies: &[(u32, u32)]) -> [f64; 3] {
+fn moment(held_blocks: &[HeldBlock], copies: &[(u32, u32)]) -> [f64; 3] {
     let mut total = [0.0; 3];
-    for &(room, local) in copies {
-        if let Some(turning) = &rooms[room as usize].block.turning {
+    for &(held_block, local) in copies {
+        if let Some(turning) = &held_blocks[held_block as usize].block.turning {
             for (sum, m) in total.iter_mut().zip(&turning.m) {
                 *sum += m[local as usize];
             }
@@ -186,9 +204,9 @@ fn moment(rooms: &[Room], copies: &[(u32, u32)]) -> [f64; 3] {
     total
 }
 
-fn put(rooms: &mut [Room], copies: &[(u32, u32)], force: [f64; 3], moment: [f64; 3]) {
-    for &(room, local) in copies {
-        let block = &mut rooms[room as usize].block;
+fn put(held_blocks: &mut [HeldBlock], copies: &[(u32, u32)], force: [f64; 3], moment: [f64; 3]) {
+    for &(held_block, local) in copies {
+        let block = &mut held_blocks[held_block as usize].block;
         for (f, total) in block.f.iter_mut().zip(force) {
             f[local as usize] = total;
         }

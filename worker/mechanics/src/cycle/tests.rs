@@ -129,9 +129,9 @@ fn run(friction: f64, width: Width) -> (Vec<u64>, u64) {
     for cycle in 0..20 {
         domain.begin(domain.quanta.force, DT * f64::from(cycle));
         domain.contact(dt_previous, &Silent);
-        let room = domain.contact.as_ref().expect("the plan has a batch");
-        assert_eq!(room.contact.width(), width, "contact on other lanes than those of the elements");
-        bits.extend(room.f.iter().flatten().map(|f| f.to_bits()));
+        let held_block = domain.contact.as_ref().expect("the plan has a batch");
+        assert_eq!(held_block.contact.width(), width, "contact on other lanes than those of the elements");
+        bits.extend(held_block.f.iter().flatten().map(|f| f.to_bits()));
         domain.elements(Sets::All, dt_previous, &Silent);
         let vote = domain.integrate(&[], dt_previous, DT, &[], &Silent).expect("no node is exchanged");
         hits = hits.max(vote.hits);
@@ -205,7 +205,7 @@ fn element_gauges_on_shells_read_what_the_state_has_of_them() {
             let stored = piece.fields.each_ref().map(|field| field[element]);
             assert_eq!(found.map(f64::to_bits), stored.map(f64::to_bits), "{found:?} for {stored:?}");
             for (index, value) in found.into_iter().enumerate() {
-                assert_eq!(domain.rooms[0].block.field(element, index).to_bits(), value.to_bits());
+                assert_eq!(domain.held_blocks[0].block.field(element, index).to_bits(), value.to_bits());
             }
             if cycle == 29 {
                 assert!(found[field::SXX] > 1e-4 && found[field::PLASTIC_STRAIN] > 1e-3, "{found:?}");

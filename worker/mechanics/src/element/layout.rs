@@ -15,7 +15,6 @@ pub(crate) enum Layout {
     },
     /// Local nodes of the corners by set.
     Explicit {
-        /// Of each set.
         sets: Vec<Corners>,
         /// Those of sets that are not runs, by corner and slot.
         lists: Vec<[[u32; SET]; 8]>,
@@ -27,7 +26,6 @@ pub(crate) enum Layout {
 pub(crate) enum Corners {
     /// Each corner of the next slot is the next local node: those of the first slot.
     Run(Along, [u32; 8]),
-    /// Which of the lists.
     List(u32),
 }
 

@@ -2,7 +2,6 @@
 
 use crate::lanes::Lane;
 
-/// A vector.
 #[derive(Clone, Copy)]
 pub(crate) struct Vector<L> {
     pub x: L,

@@ -56,7 +56,6 @@ impl<L: Lane> Spread<L> {
         self.zx = g.z.mul_add(g.x, self.zx);
     }
 
-    /// Trace.
     #[inline(always)]
     pub fn trace(&self) -> L {
         self.xx + self.yy + self.zz

@@ -26,7 +26,6 @@ pub(crate) struct Jwl {
     pub amplitude: [f64; 2],
     /// R1 and R2.
     pub decay: [f64; 2],
-    /// omega.
     pub omega: f64,
     /// Speed of detonation (velocity).
     pub detonation: f64,

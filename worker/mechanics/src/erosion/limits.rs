@@ -83,7 +83,6 @@ pub(super) struct Shape {
     effective: f64,
     /// Of `(h1 - h3) / 2`.
     shear: f64,
-    /// Of `h1`.
     longest: f64,
     /// Of `-h3`.
     shortest: f64,

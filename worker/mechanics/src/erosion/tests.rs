@@ -127,9 +127,9 @@ fn watched(criteria: &Criteria, structured: bool, width: Width) -> (Casualties, 
     let mut eroding = Eroding::new(criteria, Some(&state), &mut block, &materials[0], 0.6666);
     let all = 0..block.n_sets();
     eroding.watch(&mut block, std::slice::from_ref(&all), &step(), 17, width);
-    let mut casualties = eroding.take_casualties();
-    casualties.elements.sort_unstable();
-    (casualties, eroding.state(&block))
+    let mut eroded_now = eroding.take_casualties();
+    eroded_now.elements.sort_unstable();
+    (eroded_now, eroding.state(&block))
 }
 
 #[test]

@@ -18,11 +18,8 @@ pub(crate) struct JohnsonCook {
     pub a: f64,
     /// B (stress).
     pub b: f64,
-    /// n.
     pub n: f64,
-    /// C.
     pub c: f64,
-    /// m.
     pub m: f64,
     /// Room temperature (K).
     pub t_room: f64,

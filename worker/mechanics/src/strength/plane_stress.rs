@@ -34,7 +34,6 @@ pub(crate) struct Layer<L> {
     pub temperature: L,
 }
 
-/// A law in plane stress.
 #[derive(Clone, Copy)]
 pub(crate) struct PlaneLaw {
     /// Young's modulus (stress).

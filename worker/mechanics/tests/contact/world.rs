@@ -187,7 +187,6 @@ pub fn with_probe(mut mesh: Mesh, gap: f64, alive: &dyn Fn(u32) -> bool) -> (Wor
     (world, index)
 }
 
-/// One block.
 pub fn block(cells: [u32; 3], h: f64) -> Mesh {
     let mut mesh = Mesh::default();
     add_block(&mut mesh, cells, [0.0; 3], h);

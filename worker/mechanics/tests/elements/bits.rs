@@ -1,4 +1,4 @@
-//! Equality to the bit: lane widths, topologies, cuts, the order of sets, images.
+//! Equality to the bit: lane widths, topologies, cuts, the order of sets, states.
 
 use mechanics::{
     block::{Block, Piece},
@@ -256,8 +256,8 @@ fn border_sets_first_and_then_the_rest_make_the_whole() {
     let marked: Vec<bool> = (0..piece.nodes.len()).map(|node| node % 8 == 7).collect();
     let border = block.sets_touching(&marked);
     for set in 0..block.n_sets() {
-        let members = (0..piece.elements.len()).filter(|&e| block.set_of_element(e) == set);
-        let mut nodes = members.flat_map(|e| block.corners(e));
+        let peer_workers = (0..piece.elements.len()).filter(|&e| block.set_of_element(e) == set);
+        let mut nodes = peer_workers.flat_map(|e| block.corners(e));
         assert_eq!(border[set as usize], nodes.any(|node| marked[node as usize]), "set {set}");
     }
     let mut joined = ElementVote::default();

@@ -329,7 +329,6 @@ pub fn stress(block: &Block, element: usize) -> [[f64; 3]; 3] {
     [[xx - p, xy, zx], [xy, yy - p, yz], [zx, yz, -(xx + yy) - p]]
 }
 
-/// Force on a node.
 pub fn force(block: &Block, node: usize) -> [f64; 3] {
     std::array::from_fn(|axis| block.f[axis][node])
 }

@@ -31,7 +31,6 @@ pub(in crate::contact) struct Pushes<'a> {
     pub(in crate::contact) depth: &'a [f64],
     /// Unit vector of the force on the node.
     pub(in crate::contact) direction: &'a [Vec<f64>; 3],
-    /// Share of the push.
     pub(in crate::contact) share: &'a [f64],
     /// How many springs act on the node along one direction.
     pub(in crate::contact) stacking: &'a [f64],

@@ -6,7 +6,7 @@ use super::{Rule, kernel};
 use crate::{
     element::{
         ElementVote,
-        group::{Call, Group, Image},
+        group::{Call, Group, WorkerState},
         place::Nodal,
     },
     exact::Quantum,
@@ -48,7 +48,6 @@ pub enum SectionError {
     Law {
         /// Name of the material.
         material: String,
-        /// What it is.
         law: &'static str,
     },
 }
@@ -273,17 +272,17 @@ impl Group for Core {
         self.summary(element, x)
     }
 
-    fn image(&self, x: &[Vec<f64>; 3]) -> Image {
+    fn image(&self, x: &[Vec<f64>; 3]) -> WorkerState {
         let all: Vec<_> = (0..self.n_elements).map(|e| self.summary(e, x)).collect();
         let own = self.state.iter().chain(&self.layers);
-        Image {
+        WorkerState {
             initial_volume: self.initial_volume.clone(),
             fields: std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect()),
             own: own.map(|field| field[..self.n_elements].to_vec()).collect(),
         }
     }
 
-    fn into_image(self: Box<Self>, x: &[Vec<f64>; 3]) -> Image {
+    fn into_image(self: Box<Self>, x: &[Vec<f64>; 3]) -> WorkerState {
         self.image(x)
     }
 
@@ -372,7 +371,6 @@ impl Shells {
         })
     }
 
-    /// Number of elements.
     pub fn n_elements(&self) -> usize {
         self.core.n_elements
     }

@@ -1,4 +1,4 @@
-//! Images of all sub-domains at the start of a cycle become a whole state.
+//! States of all sub-domains at the start of a cycle become a whole state.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +9,14 @@ use super::{
     frames::merge,
 };
 
-/// An image on its way.
+/// A state on its way.
 struct Collecting {
     pieces: Vec<Piece>,
     arrived: Vec<bool>,
     vote: Option<Vote>,
 }
 
-/// All images of a cycle.
+/// All states of a cycle.
 pub(super) struct Collected {
     pub(super) state: GlobalState,
     /// The last vote, where all have stopped.
@@ -25,21 +25,21 @@ pub(super) struct Collected {
     pub(super) due: bool,
 }
 
-/// The images of one epoch.
+/// The states of one epoch.
 #[derive(Default)]
-pub(super) struct Images {
+pub(super) struct WorkerStates {
     collecting: BTreeMap<u64, Collecting>,
-    /// Time of each image that was ordered and is not complete, and whether it is for the user.
+    /// Time of each state that was ordered and is not complete, and whether it is for the user.
     ordered: BTreeMap<u64, (f64, bool)>,
 }
 
-impl Images {
-    /// Images are sent at the start of a cycle, which begins at this time; `due` says that they are for the user.
+impl WorkerStates {
+    /// States are sent at the start of a cycle, which begins at this time; `due` says that they are for the user.
     pub(super) fn order(&mut self, cycle: u64, time: f64, due: bool) {
         self.ordered.insert(cycle, (time, due));
     }
 
-    /// Adds the image of one of `n` workers; gives the whole state once all are here. What images do not hold is taken from
+    /// Adds the state of one of `n` workers; gives the whole state once all are here. What states do not hold is taken from
     /// `before`, the state that work was dealt out from.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl Images {
             vote: None,
         });
         if std::mem::replace(&mut collecting.arrived[worker], true) {
-            return Err(Error::Worker(worker, Breach::Twice(Sent::Image, cycle)));
+            return Err(Error::Worker(worker, Breach::Twice(Sent::WorkerState, cycle)));
         }
         collecting.pieces.extend(pieces);
         merge(&mut collecting.vote, last);
@@ -70,7 +70,7 @@ impl Images {
             piece::put_back(piece, &mut state).map_err(Error::Problem)?;
         }
         let ordered = self.ordered.remove(&cycle);
-        let (time, due) = ordered.ok_or(Error::Worker(worker, Breach::Unasked(Sent::Image, cycle)))?;
+        let (time, due) = ordered.ok_or(Error::Worker(worker, Breach::Unasked(Sent::WorkerState, cycle)))?;
         (state.cycle, state.time) = (cycle, time);
         Ok(Some(Collected { state, vote: collected.vote, due }))
     }
@@ -83,19 +83,19 @@ mod tests {
     #[test]
     fn images_become_a_state_when_the_last_is_here_and_none_that_nobody_asked_for() {
         let (job, _) = job(2);
-        let mut images = Images::default();
-        images.order(8, 0.25, true);
-        let add = |images: &mut Images, worker, cycle| {
-            images.add((worker, 2), cycle, (Vec::new(), None), job.start_state())
+        let mut worker_states = WorkerStates::default();
+        worker_states.order(8, 0.25, true);
+        let add = |worker_states: &mut WorkerStates, worker, cycle| {
+            worker_states.add((worker, 2), cycle, (Vec::new(), None), job.start_state())
         };
-        assert!(add(&mut images, 1, 8).expect("ordered").is_none());
-        let twice = add(&mut images, 1, 8).err();
-        assert_eq!(twice, Some(Error::Worker(1, Breach::Twice(Sent::Image, 8))));
-        let whole = add(&mut images, 0, 8).expect("ordered").expect("both are here");
+        assert!(add(&mut worker_states, 1, 8).expect("ordered").is_none());
+        let twice = add(&mut worker_states, 1, 8).err();
+        assert_eq!(twice, Some(Error::Worker(1, Breach::Twice(Sent::WorkerState, 8))));
+        let whole = add(&mut worker_states, 0, 8).expect("ordered").expect("both are here");
         assert_eq!((whole.state.cycle, whole.state.time, whole.due), (8, 0.25, true));
         assert!(whole.vote.is_none());
-        assert!(add(&mut images, 0, 9).expect("the first").is_none());
-        let unasked = add(&mut images, 1, 9).err();
-        assert_eq!(unasked, Some(Error::Worker(1, Breach::Unasked(Sent::Image, 9))));
+        assert!(add(&mut worker_states, 0, 9).expect("the first").is_none());
+        let unasked = add(&mut worker_states, 1, 9).err();
+        assert_eq!(unasked, Some(Error::Worker(1, Breach::Unasked(Sent::WorkerState, 9))));
     }
 }

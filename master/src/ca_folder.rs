@@ -1,4 +1,4 @@
-//! The lab: the CA's folder as a running master uses it. Tokens, and certificates that are revoked.
+//! The CA's folder as a running master uses it: tokens, and certificates that are revoked.
 //!
 //! `tokens/ID` is a token that was issued, `tokens/ID.used` one that was exchanged: the one is renamed to the other, so
 //! that a token is good once, whoever else issues or takes tokens at the same time and whatever dies in between. ID is a
@@ -38,13 +38,12 @@ struct Grant {
     expires: u64,
 }
 
-/// The folder of a CA.
 #[derive(Clone, Debug)]
-pub struct Lab {
+pub struct CaFolder {
     folder: PathBuf,
 }
 
-impl Lab {
+impl CaFolder {
     /// Takes the folder of a CA that stands there, key and all.
     ///
     /// # Errors
@@ -182,13 +181,13 @@ impl Lab {
     /// If it cannot be read at first.
     pub fn follow(&self) -> Result<Revoked, Error> {
         let (news, revoked) = watch::channel(Arc::new(self.revoked()?));
-        let lab = self.clone();
+        let ca_folder = self.clone();
         tokio::spawn(async move {
             let mut told = false;
             loop {
                 tokio::time::sleep(LOOK).await;
-                let lab = lab.clone();
-                let read = tokio::task::spawn_blocking(move || lab.revoked()).await;
+                let ca_folder = ca_folder.clone();
+                let read = tokio::task::spawn_blocking(move || ca_folder.revoked()).await;
                 match read {
                     Ok(Ok(list)) => {
                         told = false;
@@ -221,24 +220,24 @@ fn now() -> u64 {
 mod tests {
     use super::*;
 
-    fn lab() -> (tempfile::TempDir, Lab) {
+    fn ca_folder() -> (tempfile::TempDir, CaFolder) {
         let folder = tempfile::tempdir().expect("room for a folder");
         certs::make_ca(folder.path(), false).expect("a new CA");
-        let lab = Lab::open(folder.path()).expect("a CA");
-        (folder, lab)
+        let ca_folder = CaFolder::open(folder.path()).expect("a CA");
+        (folder, ca_folder)
     }
 
-    fn redeem(lab: &Lab, token: &str) -> Result<(String, String), Error> {
+    fn redeem(ca_folder: &CaFolder, token: &str) -> Result<(String, String), Error> {
         let (_, request) = certs::make_request().expect("a key");
-        lab.redeem(token, "pc-1", Some([127, 0, 0, 1].into()), &request)
+        ca_folder.redeem(token, "pc-1", Some([127, 0, 0, 1].into()), &request)
     }
 
     #[test]
     fn a_token_is_exchanged_once_by_whichever_of_many_comes_first() {
-        let (folder, lab) = lab();
-        let token = lab.issue(Role::Worker, 1).expect("a token").to_string();
+        let (folder, ca_folder) = ca_folder();
+        let token = ca_folder.issue(Role::Worker, 1).expect("a token").to_string();
         let all: Vec<_> = std::thread::scope(|scope| {
-            let tries: Vec<_> = (0..8).map(|_| scope.spawn(|| redeem(&lab, &token))).collect();
+            let tries: Vec<_> = (0..8).map(|_| scope.spawn(|| redeem(&ca_folder, &token))).collect();
             tries.into_iter().map(|one| one.join().expect("no panic")).collect()
         });
         let good: Vec<_> = all.iter().filter_map(|result| result.as_ref().ok()).collect();
@@ -252,46 +251,48 @@ mod tests {
             assert!(error.to_string().starts_with("the token was used before; ask for"), "{error}");
         }
         // A master that starts anew knows as much.
-        let again = redeem(&Lab::open(folder.path()).expect("a CA"), &token).expect_err("used");
+        let again = redeem(&CaFolder::open(folder.path()).expect("a CA"), &token).expect_err("used");
         assert!(again.to_string().contains("used before"), "{again}");
     }
 
     #[test]
     fn tokens_of_others_and_those_out_of_date_are_refused_and_not_used_up() {
-        let (folder, lab) = lab();
-        let (_kept, other) = self::lab();
-        let error =
-            redeem(&lab, &other.issue(Role::Worker, 1).expect("a token").to_string()).expect_err("theirs");
+        let (folder, ca_folder) = ca_folder();
+        let (_kept, other) = self::ca_folder();
+        let error = redeem(&ca_folder, &other.issue(Role::Worker, 1).expect("a token").to_string())
+            .expect_err("theirs");
         assert!(error.to_string().contains("did not issue"), "{error}");
-        let token = lab.issue(Role::Client, 1).expect("a token");
+        let token = ca_folder.issue(Role::Client, 1).expect("a token");
         let path = folder.path().join("tokens").join(token.id());
         let record = fs::read_to_string(&path).expect("a record");
         assert!(!record.contains(&protocol::token::hex(&token.secret)), "{record}");
         fs::write(&path, r#"{"role":"Client","expires":7}"#).expect("room");
-        let error = redeem(&lab, &token.to_string()).expect_err("of 1970");
+        let error = redeem(&ca_folder, &token.to_string()).expect_err("of 1970");
         assert!(error.to_string().contains("out of date"), "{error}");
         fs::write(&path, "{").expect("room");
-        let error = redeem(&lab, &token.to_string()).expect_err("damaged");
+        let error = redeem(&ca_folder, &token.to_string()).expect_err("damaged");
         assert!(error.to_string().contains("damaged"), "{error}");
         fs::write(&path, record).expect("room");
-        assert!(redeem(&lab, &token.to_string()).is_ok());
+        assert!(redeem(&ca_folder, &token.to_string()).is_ok());
     }
 
     #[tokio::test]
     async fn a_host_is_revoked_by_its_name_and_those_who_follow_the_list_hear_of_it() {
-        let (folder, lab) = lab();
+        let (folder, ca_folder) = ca_folder();
         certs::make_host(folder.path(), "pc-2", &[], Role::Worker, false).expect("a host");
-        redeem(&lab, &lab.issue(Role::Worker, 1).expect("a token").to_string()).expect("pc-1");
-        let mut news = lab.follow().expect("no list yet");
+        redeem(&ca_folder, &ca_folder.issue(Role::Worker, 1).expect("a token").to_string()).expect("pc-1");
+        let mut news = ca_folder.follow().expect("no list yet");
         assert!(news.borrow().is_empty());
-        assert_eq!(lab.revoke("pc-1").expect("there is one"), 1);
+        assert_eq!(ca_folder.revoke("pc-1").expect("there is one"), 1);
         tokio::time::timeout(Duration::from_secs(20), news.changed())
             .await
             .expect("in time")
             .expect("it follows");
         assert_eq!(news.borrow().len(), 1);
-        assert_eq!(lab.revoke("pc-2").expect("there is one"), 1);
-        assert_eq!(lab.revoked().expect("a list").len(), 2);
-        assert!(lab.revoke("pc-3").expect_err("nobody").to_string().contains("no certificate was issued"));
+        assert_eq!(ca_folder.revoke("pc-2").expect("there is one"), 1);
+        assert_eq!(ca_folder.revoked().expect("a list").len(), 2);
+        assert!(
+            ca_folder.revoke("pc-3").expect_err("nobody").to_string().contains("no certificate was issued")
+        );
     }
 }

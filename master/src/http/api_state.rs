@@ -9,7 +9,7 @@ use crate::notice::Notice;
 
 /// What every request needs of the daemon.
 #[derive(Clone)]
-pub struct Office {
+pub struct ApiState {
     /// To the scheduler.
     pub notices: mpsc::Sender<Notice>,
     /// What runs show.

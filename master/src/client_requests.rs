@@ -1,4 +1,4 @@
-//! DESK: answers the requests of one client after another.
+//! Answers the requests of one client after another.
 //!
 //! What concerns hosts and queue is asked of the scheduler; decks are read and files opened here, on blocking threads.
 
@@ -34,25 +34,25 @@ pub async fn serve(
     receiver: &mut Receiver,
     incarnation: u32,
 ) -> Error {
-    let mut desk = Desk {
+    let mut client_requests = ClientRequests {
         notices,
         outbox: Outbox::new(sender.clone(), 0),
         inbox: Inbox::new(incarnation, (DECK_LIMIT + AROUND_A_DECK) as u64),
     };
     loop {
-        if let Err(error) = desk.next(receiver).await {
+        if let Err(error) = client_requests.next(receiver).await {
             return error;
         }
     }
 }
 
-struct Desk<'a> {
+struct ClientRequests<'a> {
     notices: &'a mpsc::Sender<Notice>,
     outbox: Outbox,
     inbox: Inbox,
 }
 
-impl Desk<'_> {
+impl ClientRequests<'_> {
     async fn next(&mut self, receiver: &mut Receiver) -> Result<()> {
         self.inbox.accept(receiver.receive().await?)?;
         while let Some(letter) = self.inbox.take() {

@@ -1,4 +1,4 @@
-//! Holdings: which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
+//! Which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,7 @@ use mechanics::{cycle::Neighbour, rigid};
 use crate::decompose::Subdomain;
 
 /// Which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
-pub struct Holdings {
+pub struct NodeOwners {
     /// Sub-domain that owns each node: the lowest that has it.
     pub owner_subdomain: Vec<u32>,
     /// Worker of that sub-domain.
@@ -33,7 +33,7 @@ pub struct Standing {
     pub neighbours: Vec<Neighbour>,
 }
 
-impl Holdings {
+impl NodeOwners {
     /// From the nodes of each sub-domain (global indices); `work` is what each worker's cost.
     pub fn new(n_nodes: usize, work: Vec<f64>, subdomains: &[Subdomain], nodes: &[Vec<u32>]) -> Self {
         let mut owner_subdomain = vec![u32::MAX; n_nodes];
@@ -56,9 +56,10 @@ impl Holdings {
         }
         let mut shared: Vec<u32> = others.keys().copied().collect();
         shared.sort_unstable();
-        let mut holdings = Self { owner_subdomain, owner_worker, standing: Vec::new(), work, others, shared };
-        holdings.standing = holdings.stand();
-        holdings
+        let mut node_owners =
+            Self { owner_subdomain, owner_worker, standing: Vec::new(), work, others, shared };
+        node_owners.standing = node_owners.stand();
+        node_owners
     }
 
     /// The same with the pushes on `n` rigid bodies in the exchange of every worker, where there are several.
@@ -105,7 +106,6 @@ impl Holdings {
         standing
     }
 
-    /// Number of workers.
     pub fn n_workers(&self) -> usize {
         self.work.len()
     }

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// A block and what the domain keeps beside it.
-pub(super) struct Room {
+pub(super) struct HeldBlock {
     pub block: Block,
     /// Its elements are those of a rigid body: they are not computed.
     pub is_rigid: bool,
@@ -36,7 +36,7 @@ pub(super) struct Room {
     pub eroding: Option<Eroding>,
 }
 
-impl Room {
+impl HeldBlock {
     /// Positions as of now of the sets with nodes on the surface.
     pub fn surface_positions(&self) -> [Vec<f64>; 3] {
         let touched = || (0..).zip(&self.sets).filter(|(_, set)| set.surface != 0);
@@ -74,18 +74,18 @@ impl Room {
     }
 }
 
-/// Runs `work` on each room, in parallel on the current pool when there are several.
-pub(super) fn each(rooms: &mut [Room], work: impl Fn(&mut Room) + Send + Sync) {
-    one_by_one(rooms, &work);
+/// Runs `work` on each block, in parallel on the current pool when there are several.
+pub(super) fn each(held_blocks: &mut [HeldBlock], work: impl Fn(&mut HeldBlock) + Send + Sync) {
+    one_by_one(held_blocks, &work);
 }
 
-/// So many rooms are taken one by one at most: each is handed to the next thread by the one before.
+/// So many blocks are taken one by one at most: each is handed to the next thread by the one before.
 const ONE_BY_ONE: usize = 32;
 
-/// Whichever thread is free takes the next room: rooms of a small part and of a large one are not alike, and halves of the
+/// Whichever thread is free takes the next block: blocks of a small part and of a large one are not alike, and halves of the
 /// list would leave a thread with all the large ones. Longer lists are halved first.
-fn one_by_one(rooms: &mut [Room], work: &(impl Fn(&mut Room) + Send + Sync)) {
-    match rooms {
+fn one_by_one(held_blocks: &mut [HeldBlock], work: &(impl Fn(&mut HeldBlock) + Send + Sync)) {
+    match held_blocks {
         [] => {}
         [one] => work(one),
         [first, rest @ ..] if rest.len() < ONE_BY_ONE => {

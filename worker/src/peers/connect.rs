@@ -79,7 +79,7 @@ async fn admit(
             return Err(Error::Message(reason));
         }
     };
-    let incarnation = circle.who.members[index as usize].incarnation;
+    let incarnation = circle.who.peer_workers[index as usize].incarnation;
     let welcome = Welcome { incarnation, host: circle.who.me, heartbeat_ms: HEARTBEAT_MS };
     link::admit(server, &sender, &mut receiver, welcome)?;
     // The place in the queue was taken before: the job does not start before the caller knows of its link, so this
@@ -109,7 +109,7 @@ async fn judge(shared: &Shared, hello: &Hello) -> std::result::Result<Judged, St
     if !hello.holds(&circle.who.secret) {
         return Err("token missing or wrong".to_owned());
     }
-    let (me, n) = (circle.who.me, circle.who.members.len());
+    let (me, n) = (circle.who.me, circle.who.peer_workers.len());
     if index <= me || index as usize >= n {
         return Err(format!("worker {index} calls worker {me} of {n}; the higher of two dials"));
     }
@@ -139,8 +139,9 @@ pub(super) async fn dial(shared: Arc<Shared>, circle: Arc<Circle>, other: u32) {
 async fn reach(shared: &Shared, circle: &Circle, other: u32) -> Result<dial::Call> {
     let who = &circle.who;
     let no_address = || Error::Message("it takes no peers".into());
-    let address = who.members.get(other as usize).and_then(|member| member.address).ok_or_else(no_address)?;
-    let me = who.members.get(who.me as usize);
+    let address =
+        who.peer_workers.get(other as usize).and_then(|member| member.address).ok_or_else(no_address)?;
+    let me = who.peer_workers.get(who.me as usize);
     if address.ip().is_loopback() && me.and_then(|me| me.address).is_some_and(|a| !a.ip().is_loopback()) {
         return Err(Error::Message(
             "the master knows it by a loopback address; start it with the master's outward address".into(),

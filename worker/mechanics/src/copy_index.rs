@@ -3,7 +3,7 @@
 
 /// The copies of nodes in the blocks of one worker. Built once; a plan only reads it.
 #[derive(Debug)]
-pub(crate) struct Home {
+pub(crate) struct CopyIndex {
     /// Where the copies of each global node begin in `copies`, and the end of the last.
     starts: Vec<u32>,
     /// Block and local node.
@@ -11,7 +11,7 @@ pub(crate) struct Home {
     several: Vec<u32>,
 }
 
-impl Home {
+impl CopyIndex {
     /// Takes the global nodes of each block, by local node. Copies of a node are in the order of the blocks.
     pub(crate) fn new<'a>(blocks: impl Iterator<Item = &'a [u32]> + Clone) -> Self {
         let n_nodes = blocks.clone().flatten().max().map_or(0, |&last| last as usize + 1);
@@ -56,14 +56,14 @@ mod tests {
     #[test]
     fn copies_are_found_in_the_order_of_blocks_and_nodes_elsewhere_have_none() {
         let blocks: [&[u32]; 3] = [&[7, 2, 5], &[], &[2, 9, 7]];
-        let home = Home::new(blocks.into_iter());
-        assert_eq!(home.get(2), [(0, 1), (2, 0)]);
-        assert_eq!(home.get(7), [(0, 0), (2, 2)]);
-        assert_eq!(home.get(9), [(2, 1)]);
-        assert_eq!(home.several(), [2, 7]);
+        let copy_index = CopyIndex::new(blocks.into_iter());
+        assert_eq!(copy_index.get(2), [(0, 1), (2, 0)]);
+        assert_eq!(copy_index.get(7), [(0, 0), (2, 2)]);
+        assert_eq!(copy_index.get(9), [(2, 1)]);
+        assert_eq!(copy_index.several(), [2, 7]);
         for absent in [0, 3, 8, 10, 11, u32::MAX] {
-            assert_eq!(home.get(absent), []);
+            assert_eq!(copy_index.get(absent), []);
         }
-        assert_eq!(Home::new([].into_iter()).get(0), []);
+        assert_eq!(CopyIndex::new([].into_iter()).get(0), []);
     }
 }

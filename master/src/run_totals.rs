@@ -1,4 +1,4 @@
-//! The ledger of a run: energies and momentum from votes, the worst ratios, rows of history.
+//! The totals of a run: energies and momentum from votes, the worst ratios, rows of history.
 
 use deck::model::Model;
 use mechanics::{
@@ -26,7 +26,7 @@ pub struct PairSums {
 
 /// Sums over all cycles so far; stored in a snapshot as it stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Ledger {
+pub struct RunTotals {
     /// Hourglass work so far.
     pub hourglass: f64,
     /// Work of artificial viscosity so far (part of internal energy).
@@ -46,13 +46,11 @@ pub struct Ledger {
     pub eroded_momentum: [f64; 3],
     /// Elements that have eroded.
     pub eroded_elements: u64,
-    /// Their mass.
     pub eroded_mass: f64,
     /// Total energy less external work after the first cycle; none before it.
     pub initial_total: Option<f64>,
     /// The first cycle in which anything had energy or work was done; none while all is at rest.
     pub first_stirred: Option<u64>,
-    /// Greatest kinetic energy so far.
     pub greatest_kinetic: f64,
     /// Greatest size of the external work so far.
     pub greatest_external: f64,
@@ -76,11 +74,10 @@ pub struct Ledger {
     pub released: Option<PairEnergies>,
     /// Rigid bodies as the last vote had them.
     pub bodies: Vec<rigid::State>,
-    /// The last row.
     pub last: HistoryRow,
 }
 
-impl Ledger {
+impl RunTotals {
     /// Before the first cycle of a run.
     pub fn new(model: &Model, mass: &[f64]) -> Self {
         let momentum_of = |nodes: &mut dyn Iterator<Item = usize>| {
