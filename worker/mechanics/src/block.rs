@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     element::{
         ElementVote, Step,
-        group::{self, Call, Group, Scanned, WorkerState},
+        group::{self, Call, Group, Scanned, ElementArrays},
         place::Nodal,
     },
     erosion::PieceErosion,
@@ -131,7 +131,7 @@ impl Block {
     /// it: whoever watches them adds that.
     pub fn piece(&self) -> Piece {
         let n = self.nodes.len();
-        let WorkerState { initial_volume, fields, own } = self.group.image(&self.x);
+        let ElementArrays { initial_volume, fields, own } = self.group.image(&self.x);
         Piece {
             part: self.part,
             material: self.material,
@@ -153,7 +153,7 @@ impl Block {
     pub fn into_piece(mut self) -> Piece {
         let n = self.nodes.len();
         drop(take(&mut self.f));
-        let WorkerState { initial_volume, fields, own } = self.group.into_image(&self.x);
+        let ElementArrays { initial_volume, fields, own } = self.group.into_image(&self.x);
         self.mass.truncate(n);
         Piece {
             part: self.part,

@@ -29,7 +29,7 @@ pub(crate) struct Call<'a> {
 }
 
 /// Element arrays of a [`Piece`], by local element.
-pub(crate) struct WorkerState {
+pub(crate) struct ElementArrays {
     /// Volume at time zero.
     pub initial_volume: Vec<f64>,
     /// One array per entry of [`crate::state::FIELDS`]: the state, or what stands for it in results.
@@ -79,10 +79,10 @@ pub(crate) trait Group: Send + Sync {
     fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS];
 
     /// The arrays of the image, with the nodes at `x`.
-    fn image(&self, x: &[Vec<f64>; 3]) -> WorkerState;
+    fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays;
 
     /// [`Group::image`] of a group that is not needed any more: a kind with large arrays lets them go one by one.
-    fn into_image(self: Box<Self>, x: &[Vec<f64>; 3]) -> WorkerState;
+    fn into_image(self: Box<Self>, x: &[Vec<f64>; 3]) -> ElementArrays;
 
     /// Every number that a cycle changes, in a fixed order.
     fn visit(&self, visit: &mut dyn FnMut(f64));

@@ -10,7 +10,7 @@ use crate::{
     block::Piece,
     element::{
         ElementVote,
-        group::{Call, Group, PHANTOM, Scanned, WorkerState},
+        group::{Call, Group, PHANTOM, Scanned, ElementArrays},
         layout::{Corners, Layout, explicit, in_runs, structured},
         place::Nodal,
     },
@@ -150,15 +150,15 @@ impl Group for Solids {
         self.fields.each_ref().map(|values| values[slot])
     }
 
-    fn image(&self, _x: &[Vec<f64>; 3]) -> WorkerState {
-        WorkerState {
+    fn image(&self, _x: &[Vec<f64>; 3]) -> ElementArrays {
+        ElementArrays {
             initial_volume: self.by_element(&self.initial_volume),
             fields: self.fields.each_ref().map(|values| self.by_element(values)),
             own: Vec::new(),
         }
     }
 
-    fn into_image(mut self: Box<Self>, _x: &[Vec<f64>; 3]) -> WorkerState {
+    fn into_image(mut self: Box<Self>, _x: &[Vec<f64>; 3]) -> ElementArrays {
         drop(take(&mut self.slot_elements));
         let initial_volume = take(&mut self.initial_volume);
         let initial_volume = self.by_element(&initial_volume);
@@ -166,7 +166,7 @@ impl Group for Solids {
             let values = take(&mut self.fields[field]);
             self.by_element(&values)
         });
-        WorkerState { initial_volume, fields, own: Vec::new() }
+        ElementArrays { initial_volume, fields, own: Vec::new() }
     }
 
     fn visit(&self, visit: &mut dyn FnMut(f64)) {

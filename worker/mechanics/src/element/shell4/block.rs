@@ -6,7 +6,7 @@ use super::{Rule, kernel};
 use crate::{
     element::{
         ElementVote,
-        group::{Call, Group, WorkerState},
+        group::{Call, Group, ElementArrays},
         place::Nodal,
     },
     exact::Quantum,
@@ -272,17 +272,17 @@ impl Group for Core {
         self.summary(element, x)
     }
 
-    fn image(&self, x: &[Vec<f64>; 3]) -> WorkerState {
+    fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays {
         let all: Vec<_> = (0..self.n_elements).map(|e| self.summary(e, x)).collect();
         let own = self.state.iter().chain(&self.layers);
-        WorkerState {
+        ElementArrays {
             initial_volume: self.initial_volume.clone(),
             fields: std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect()),
             own: own.map(|field| field[..self.n_elements].to_vec()).collect(),
         }
     }
 
-    fn into_image(self: Box<Self>, x: &[Vec<f64>; 3]) -> WorkerState {
+    fn into_image(self: Box<Self>, x: &[Vec<f64>; 3]) -> ElementArrays {
         self.image(x)
     }
 
