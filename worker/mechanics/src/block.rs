@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     element::{
         ElementVote, Step,
-        group::{self, Call, Group, Scanned, ElementArrays},
+        group::{self, Call, ElementArrays, Group, Scanned},
         place::Nodal,
     },
     erosion::PieceErosion,

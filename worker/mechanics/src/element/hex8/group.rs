@@ -10,7 +10,7 @@ use crate::{
     block::Piece,
     element::{
         ElementVote,
-        group::{Call, Group, PHANTOM, Scanned, ElementArrays},
+        group::{Call, ElementArrays, Group, PHANTOM, Scanned},
         layout::{Corners, Layout, explicit, in_runs, structured},
         place::Nodal,
     },

@@ -6,7 +6,7 @@ use super::{Rule, kernel};
 use crate::{
     element::{
         ElementVote,
-        group::{Call, Group, ElementArrays},
+        group::{Call, ElementArrays, Group},
         place::Nodal,
     },
     exact::Quantum,
