@@ -11,6 +11,8 @@
 //! 10 1 2 3 4 5 6 7 8
 //! shells 1 "lid"
 //! 11 5 6 7 8
+//! trusses 1 "rope"
+//! 12 5 6
 //! set 2 "left end"
 //! 1 4
 //! segments 1 "top"
@@ -65,15 +67,32 @@ pub struct Body {
     pub name: String,
     /// Number and corners of each hexahedron.
     pub solids: Vec<(u32, [u32; 8])>,
-    /// Number and corners of each shell; a body has either solids or shells.
+    /// Number and corners of each shell.
     pub shells: Vec<(u32, [u32; 4])>,
+    /// Number and ends of each truss. A body has elements of one kind.
+    pub trusses: Vec<(u32, [u32; 2])>,
 }
 
 impl Body {
     /// The nodes of its elements, as often as they are corners.
     pub fn corners(&self) -> impl Iterator<Item = u32> + '_ {
-        let of_shells = self.shells.iter().flat_map(|(_, nodes)| *nodes);
-        self.solids.iter().flat_map(|(_, nodes)| *nodes).chain(of_shells)
+        self.elements().flat_map(|(_, nodes)| nodes.iter().copied())
+    }
+
+    /// Number and nodes of each element.
+    pub fn elements(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        let solids = self.solids.iter().map(|(id, nodes)| (*id, &nodes[..]));
+        let shells = self.shells.iter().map(|(id, nodes)| (*id, &nodes[..]));
+        solids.chain(shells).chain(self.trusses.iter().map(|(id, nodes)| (*id, &nodes[..])))
+    }
+
+    /// The word of its elements in a mesh file.
+    pub fn kind(&self) -> &'static str {
+        match (self.shells.is_empty(), self.trusses.is_empty()) {
+            (true, true) => "solids",
+            (false, _) => "shells",
+            (true, false) => "trusses",
+        }
     }
 }
 
@@ -98,17 +117,10 @@ impl MeshFile {
             text.push('\n');
         };
         for body in &self.bodies {
-            if body.shells.is_empty() {
-                let _ = writeln!(text, "solids {} \"{}\"", body.solids.len(), body.name);
-            } else {
-                let _ = writeln!(text, "shells {} \"{}\"", body.shells.len(), body.name);
-            }
-            for (id, corners) in &body.solids {
-                let [a, b, c, d, e, f, g, h] = *corners;
-                row(&mut text, &[*id, a, b, c, d, e, f, g, h]);
-            }
-            for (id, [a, b, c, d]) in &body.shells {
-                row(&mut text, &[*id, *a, *b, *c, *d]);
+            let _ = writeln!(text, "{} {} \"{}\"", body.kind(), body.elements().count(), body.name);
+            for (id, nodes) in body.elements() {
+                let numbers: Vec<u32> = std::iter::once(id).chain(nodes.iter().copied()).collect();
+                row(&mut text, &numbers);
             }
         }
         for (name, nodes) in &self.sets {
@@ -134,6 +146,7 @@ enum Section {
     Nodes,
     Solids(usize),
     Shells(usize),
+    Trusses(usize),
     Set(String),
     Segments(String),
     Velocities,
@@ -148,8 +161,8 @@ pub fn parse(text: &str, file_name: &str) -> Result<MeshFile, Vec<Fault>> {
     let faults = Faults::new(file_name, text);
     let mut mesh = MeshFile::default();
     let mut nodes: BTreeSet<u32> = BTreeSet::new();
-    // Solids and shells are numbered apart.
-    let mut elements: [BTreeSet<u32>; 2] = Default::default();
+    // Each kind is numbered apart.
+    let mut elements: [BTreeSet<u32>; 3] = Default::default();
     let mut section: Option<(Section, u64)> = None;
     let mut started = false;
     let mut at = 0;
@@ -210,7 +223,7 @@ type Wrong = (String, &'static str);
 /// `kind COUNT "name"`.
 fn heading(line: &str, mesh: &mut MeshFile) -> Result<(Section, u64), Wrong> {
     let wrong = || {
-        let kinds = "nodes N, solids N \"name\", shells N \"name\", set N \"name\", segments N \"name\", velocities N or spins N";
+        let kinds = "nodes N, solids N \"name\", shells N \"name\", trusses N \"name\", set N \"name\", segments N \"name\", velocities N or spins N";
         (kinds.to_string(), "correct the heading, or the number of lines of the one before")
     };
     let (kind, rest) = line.split_once(' ').ok_or_else(wrong)?;
@@ -235,13 +248,17 @@ fn heading(line: &str, mesh: &mut MeshFile) -> Result<(Section, u64), Wrong> {
     }
     let taken = || ("a name that is not taken".to_string(), "choose another name");
     let section = match kind {
-        "solids" | "shells" => {
+        "solids" | "shells" | "trusses" => {
             if mesh.body(name).is_some() {
                 return Err(taken());
             }
             mesh.bodies.push(Body { name: name.to_string(), ..Body::default() });
             let body = mesh.bodies.len() - 1;
-            if kind == "solids" { Section::Solids(body) } else { Section::Shells(body) }
+            match kind {
+                "solids" => Section::Solids(body),
+                "shells" => Section::Shells(body),
+                _ => Section::Trusses(body),
+            }
         }
         "set" => {
             if mesh.sets.insert(name.to_string(), Vec::new()).is_some() {
@@ -269,7 +286,7 @@ fn row(
     line: &str,
     mesh: &mut MeshFile,
     nodes: &mut BTreeSet<u32>,
-    elements: &mut [BTreeSet<u32>; 2],
+    elements: &mut [BTreeSet<u32>; 3],
 ) -> Result<(), Wrong> {
     match section {
         Section::Nodes => {
@@ -300,6 +317,14 @@ fn row(
             }
             known(nodes, &corners)?;
             mesh.bodies[*body].shells.push((id, corners));
+        }
+        Section::Trusses(body) => {
+            let [id, ends @ ..] = numbers::<3>(line)?;
+            if !elements[2].insert(id) {
+                return Err((format!("an element number other than {id}"), "renumber one"));
+            }
+            known(nodes, &ends)?;
+            mesh.bodies[*body].trusses.push((id, ends));
         }
         Section::Set(name) => {
             let ids: Option<Vec<u32>> = line.split_whitespace().map(id).collect();

@@ -452,7 +452,10 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
         ),
         ("*CONTROL_CONTACT\n,,,,,,,3\n", "a.k:23:8: read 3; expected ENMASS 0, 1 or 2"),
         ("*MAT_VISCOELASTIC\n2,1.0\n", "a.k:22:1: read *MAT_VISCOELASTIC; expected a material of the table"),
-        ("*ELEMENT_BEAM\n1,1,1,2,3\n", "a.k:22:1: read *ELEMENT_BEAM; expected a keyword of the table"),
+        (
+            "*ELEMENT_DISCRETE\n1,1,1,2,3\n",
+            "a.k:22:1: read *ELEMENT_DISCRETE; expected a keyword of the table",
+        ),
         (
             "*CONTROL_IMPLICIT_GENERAL\n1\n",
             "a.k:22:1: read *CONTROL_IMPLICIT_GENERAL; expected explicit dynamics",
@@ -594,4 +597,17 @@ fn mutated_keyword_decks_never_panic_and_faults_always_have_a_place() {
         }
     }
     assert!(read > 100 && refused > 100, "the changes test nothing: {read} read, {refused} refused");
+}
+
+#[test]
+fn beams_of_elform_3_are_trusses_with_the_area_of_their_section() {
+    let more = "*PART\nrope\n2,2,1\n*SECTION_BEAM\n2,3\n4.5\n*ELEMENT_BEAM\n       7       2       1       3       5\n";
+    let model = good(more);
+    let rope = &model.mesh.parts[1];
+    assert_eq!((rope.name.as_str(), rope.element_ids.as_slice(), rope.nodes.len()), ("rope", &[7][..], 2));
+    assert_eq!(rope.topology, Topology::Trusses { bars: vec![[0, 1]], area: 4.5 });
+    let faults = read(&cube(&more.replace("2,3\n4.5", "2,1\n4.5"))).expect_err("a beam that bends");
+    assert!(lines(&faults).contains("ELFORM 3"), "{}", lines(&faults));
+    let faults = read(&cube(&more.replace("2,2,1", "2,1,1"))).expect_err("a section of solids");
+    assert!(lines(&faults).contains("*SECTION_BEAM"), "{}", lines(&faults));
 }

@@ -11,6 +11,7 @@ mod fuzz;
 mod late;
 mod seeds;
 mod sums;
+mod trusses;
 
 /// A row that nobody computes would look like one that holds.
 #[test]

@@ -3,7 +3,7 @@
 use super::{
     cards::Block,
     fields::{Context, EIGHTS},
-    problem::{Node, Problem, Shell, Solid},
+    problem::{Beam, Node, Problem, Shell, Solid},
 };
 
 /// `*NODE`.
@@ -102,5 +102,13 @@ pub(super) fn read_shells(problem: &mut Problem, block: &Block<'_>, context: &Co
             thickness = Some(mean).filter(|mean| *mean > 0.0);
         }
         problem.shells.push(Shell { id: f.id(0), part: f.id(1), nodes, thickness, at: card.at });
+    }
+}
+
+/// `*ELEMENT_BEAM`, whose third node and releases mean nothing to a truss.
+pub(super) fn read_beams(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
+    for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
+        let f = context.fields(card, block.width, &EIGHTS);
+        problem.beams.push(Beam { id: f.id(0), part: f.id(1), nodes: [f.id(2), f.id(3)], at: card.at });
     }
 }

@@ -39,6 +39,14 @@ pub(super) struct Shell {
     pub(super) at: Place,
 }
 
+/// A truss, of `*ELEMENT_BEAM`.
+pub(super) struct Beam {
+    pub(super) id: u32,
+    pub(super) part: u32,
+    pub(super) nodes: [u32; 2],
+    pub(super) at: Place,
+}
+
 /// `*PART`.
 pub(super) struct PartCard {
     pub(super) at: Place,
@@ -54,6 +62,8 @@ pub(super) struct PartCard {
 pub(super) enum Section {
     Solid,
     Shell(ShellSection),
+    /// Of a truss: its area.
+    Truss(f64),
 }
 
 /// `*SECTION_SHELL`.
@@ -99,6 +109,7 @@ pub(super) struct Problem {
     pub(super) node_index: HashMap<u32, u32>,
     pub(super) solids: Vec<Solid>,
     pub(super) shells: Vec<Shell>,
+    pub(super) beams: Vec<Beam>,
     pub(super) parts: BTreeMap<u32, PartCard>,
     pub(super) sections: BTreeMap<u32, (Place, Section)>,
     pub(super) materials: BTreeMap<u32, MaterialCard>,
@@ -135,7 +146,8 @@ impl Problem {
     pub(super) fn nodes_of_part(&self, part: u32) -> Vec<u32> {
         let solids = self.solids.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
         let shells = self.shells.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
-        let mut nodes: Vec<u32> = solids.chain(shells).collect();
+        let beams = self.beams.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
+        let mut nodes: Vec<u32> = solids.chain(shells).chain(beams).collect();
         nodes.sort_unstable();
         nodes.dedup();
         nodes

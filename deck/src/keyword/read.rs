@@ -16,8 +16,8 @@ use crate::log::Log;
 
 /// Keywords of several sections, each with a heading of its own where the keyword ends in `_TITLE`; and the cards of a
 /// section.
-const HEADED: [(&str, usize); 4] =
-    [("SECTION_SOLID", 1), ("SECTION_SHELL", 2), ("HOURGLASS", 1), ("DEFINE_BOX", 1)];
+const HEADED: [(&str, usize); 5] =
+    [("SECTION_SOLID", 1), ("SECTION_SHELL", 2), ("SECTION_BEAM", 2), ("HOURGLASS", 1), ("DEFINE_BOX", 1)];
 
 /// Reads all blocks.
 pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
@@ -78,11 +78,13 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "NODE" => mesh::read_nodes(problem, block, context),
         "ELEMENT_SOLID" => mesh::read_solids(problem, block, context),
         "ELEMENT_SHELL" => mesh::read_shells(problem, block, context, false),
+        "ELEMENT_BEAM" => mesh::read_beams(problem, block, context),
         "ELEMENT_SHELL_THICKNESS" => mesh::read_shells(problem, block, context, true),
         "PART" => property::read_parts(problem, block, context, false),
         "PART_CONTACT" => property::read_parts(problem, block, context, true),
         "SECTION_SOLID" => property::read_solid_sections(problem, block, context),
         "SECTION_SHELL" => property::read_shell_sections(problem, block, context),
+        "SECTION_BEAM" => property::read_beam_sections(problem, block, context),
         "HOURGLASS" => property::read_hourglass(problem, block, context),
         "DEFINE_CURVE" => define::read_curve(problem, block, context),
         "DEFINE_BOX" => define::read_box(problem, block, context),

@@ -207,7 +207,7 @@ fn number(drafts: &[PartDraft], log: &Log<'_>) -> Mesh {
     // Numbers of different parts may not meet; inside a part this was looked at when it was read.
     let mut node_owner: Owners<'_> = BTreeMap::new();
     // Solids and shells are numbered apart.
-    let mut element_owner: [Owners<'_>; 2] = Default::default();
+    let mut element_owner: [Owners<'_>; 3] = Default::default();
     // The node of each number of each file: its parts share them.
     let mut of_file: BTreeMap<(&str, u32), u32> = BTreeMap::new();
     for draft in drafts {
@@ -285,13 +285,16 @@ type Owners<'a> = BTreeMap<u32, (Place, Option<&'a str>)>;
 fn owned<'a>(
     own: &'a Numbers,
     draft: &PartDraft,
-    elements: &mut [Owners<'a>; 2],
+    elements: &mut [Owners<'a>; 3],
     nodes: &mut Owners<'a>,
     log: &Log<'_>,
 ) {
-    let of_shells =
-        draft.block.as_ref().is_some_and(|block| matches!(block.topology, Topology::Shells { .. }));
-    let elements = &mut elements[usize::from(of_shells)];
+    let kind = match draft.block.as_ref().map(|block| &block.topology) {
+        None | Some(Topology::Structured { .. } | Topology::Explicit { .. }) => 0,
+        Some(Topology::Shells { .. }) => 1,
+        Some(Topology::Trusses { .. }) => 2,
+    };
+    let elements = &mut elements[kind];
     for (ids, places, owner, what) in [
         (&own.nodes, &own.node_places, nodes, "node"),
         (&own.elements, &own.element_places, elements, "element"),

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use mechanics::{
     erosion::{Criteria, GEOMETRIC_STRAIN},
     material::{Failure, Material, Strength},
-    mesh::{Section, Topology},
 };
 
 use super::material::Materials;
@@ -18,7 +17,7 @@ use crate::{
     place::{Place, Placed},
     typed::{
         mesh::{Meshes, Numbers, PartMesh, Places, Source},
-        part::{Criterion, Erosion, Part},
+        part::{Criterion, Erosion, Kind, Part},
     },
 };
 
@@ -63,10 +62,10 @@ pub(super) fn make(
         let material = materials.resolve(part);
         let of_material = material.map(|m| &materials.list[m as usize]);
         let erosion = part.erosion.as_ref().map(|given| {
-            if part.shell.is_some() {
+            if part.kind != Kind::Solids {
                 log.fault_of(
                     given.origin,
-                    "solids: shells do not erode",
+                    format!("solids: {} do not erode", part.kind.elements()),
                     log.say(
                         "remove erosion, or make the part of solids",
                         "leave the limit blank, or make the part of solids",
@@ -214,11 +213,16 @@ fn body_of(
     };
     let mesh = mesh.as_ref()?;
     let name = body.map_or(part.name.as_str(), |body| &body.value);
-    let holds =
-        |body: &&Body| if part.shell.is_some() { !body.shells.is_empty() } else { !body.solids.is_empty() };
-    if part.shell.is_none() && mesh.file.body(name).is_some_and(|body| !body.shells.is_empty()) {
-        let read = format!("the shells of body \"{name}\" in part \"{}\"", part.name);
-        log.fault(at.at, read, "their thickness", "add shell = { thickness = ... } to the part");
+    let holds = |body: &&Body| body.kind() == part.kind.elements() && body.elements().next().is_some();
+    if part.kind == Kind::Solids
+        && let Some(body) = mesh.file.body(name).filter(|body| body.kind() != part.kind.elements())
+    {
+        let (expected, advice) = match body.kind() {
+            "shells" => ("their thickness", "add shell = { thickness = ... } to the part"),
+            _ => ("their cross-section", "add truss = { area = ... } to the part"),
+        };
+        let read = format!("the {} of body \"{name}\" in part \"{}\"", body.kind(), part.name);
+        log.fault(at.at, read, expected, advice);
         return None;
     }
     let index = mesh.file.bodies.iter().position(|body| body.name == name);
@@ -226,7 +230,7 @@ fn body_of(
     else {
         let names: Vec<&str> =
             mesh.file.bodies.iter().filter(holds).map(|b| b.name.as_str()).take(20).collect();
-        let what = if part.shell.is_some() { "shells" } else { "solids" };
+        let what = part.kind.elements();
         log.fault_of(
             body.unwrap_or(file).origin,
             format!("a body with {what} of that file ({})", names.join(", ")),
@@ -236,13 +240,8 @@ fn body_of(
     };
     let distinct =
         |corners: &[u32]| (0..corners.len()).filter(|&i| !corners[..i].contains(&corners[i])).count();
-    let (kinds, expected): (&[usize], _) = match part.shell {
-        None => (&[4, 5, 6, 8], "eight, or six, five or four of a wedge, a pyramid or a tetrahedron"),
-        Some(_) => (&[3, 4], "four, or three of a triangle"),
-    };
-    let all = found.solids.iter().map(|(id, corners)| (id, &corners[..]));
-    let mut all = all.chain(found.shells.iter().map(|(id, corners)| (id, &corners[..])));
-    if let Some((id, corners)) = all.find(|(_, corners)| !kinds.contains(&distinct(corners))) {
+    let (counts, expected) = part.kind.distinct();
+    if let Some((id, corners)) = found.elements().find(|(_, corners)| !counts.contains(&distinct(corners))) {
         let read = format!("element {id} with {} different corners", distinct(corners));
         log.fault(at.at, read, expected, "correct the element");
         return None;
@@ -251,7 +250,7 @@ fn body_of(
     for id in found.corners() {
         local.entry(id).or_insert(0);
     }
-    let n_elements = found.solids.len() + found.shells.len();
+    let n_elements = found.elements().count();
     budget.take(Some((local.len() as u64, n_elements as u64)), at, log)?;
     let mut positions = Vec::with_capacity(local.len());
     let mut nodes = Vec::with_capacity(local.len());
@@ -263,9 +262,10 @@ fn body_of(
             nodes.push(*id);
         }
     }
-    let topology = topology(found, part.shell, &local);
-    let ids = found.solids.iter().map(|(id, _)| id).chain(found.shells.iter().map(|(id, _)| id));
-    let elements: Vec<u32> = ids.copied().collect();
+    let n_corners = part.kind.n_corners();
+    let corners: Vec<u32> = found.corners().map(|id| local[&id]).collect();
+    let topology = part.kind.topology(corners.chunks(n_corners));
+    let elements: Vec<u32> = found.elements().map(|(id, _)| id).collect();
     let places = mesh.elements.get(index).map_or(Places::All(at.at), |places| Places::Each(places.clone()));
     let numbers = Numbers {
         nodes,
@@ -275,19 +275,6 @@ fn body_of(
         mesh: Some(file.value.clone()),
     };
     Some((Block { positions, topology, faces: Vec::new() }, numbers))
-}
-
-/// The elements of a body by the local index of each of its nodes.
-fn topology(body: &Body, shell: Option<Section>, local: &BTreeMap<u32, u32>) -> Topology {
-    match shell {
-        None => Topology::Explicit {
-            hexahedra: body.solids.iter().map(|(_, corners)| corners.map(|id| local[&id])).collect(),
-        },
-        Some(section) => Topology::Shells {
-            quads: body.shells.iter().map(|(_, corners)| corners.map(|id| local[&id])).collect(),
-            section,
-        },
-    }
 }
 
 /// Turns a block, then moves it.

@@ -2,6 +2,7 @@
 
 use mechanics::{
     contact::Settings,
+    element::truss2,
     material::{Failure, Material},
     mesh::Topology,
 };
@@ -41,26 +42,36 @@ pub(super) fn check(
     }
 }
 
-/// Reports shells of a material that layers do not know.
+/// Reports shells and trusses of a section or a material that cannot be computed.
 fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], log: &Log<'_>) {
     for (part, draft) in assembly.mesh.parts.iter().zip(parts) {
         let material = draft.material.and_then(|index| materials.get(index as usize));
-        if let (Some(section), Some(material)) = (part.section(), material) {
-            if let Err(error) = section.check(material) {
+        let Some(material) = material else { continue };
+        let (kind, checked) = match &part.topology {
+            Topology::Structured { .. } | Topology::Explicit { .. } => continue,
+            Topology::Shells { section, .. } => {
+                ("shells", section.check(material).map_err(|e| e.to_string()))
+            }
+            Topology::Trusses { area, .. } => {
+                ("trusses", truss2::check(*area, material).map_err(|e| e.to_string()))
+            }
+        };
+        match checked {
+            Err(error) => log.fault(
+                draft.at,
+                format!("part \"{}\": {error}", part.name),
+                "a material whose law has a plane-stress form",
+                "choose another material, or model the part with solids",
+            ),
+            Ok(()) if material.failure != Failure::None => {
                 log.fault(
                     draft.at,
-                    format!("part \"{}\": {error}", part.name),
-                    "a material whose law has a plane-stress form",
-                    "choose another material, or model the part with solids",
-                );
-            } else if material.failure != Failure::None {
-                log.fault(
-                    draft.at,
-                    format!("part \"{}\" of shells, whose material \"{}\" fails", part.name, material.name),
+                    format!("part \"{}\" of {kind}, whose material \"{}\" fails", part.name, material.name),
                     "a material without failure",
                     "remove the failure of the material, or model the part with solids",
                 );
             }
+            Ok(()) => {}
         }
     }
 }

@@ -6,7 +6,6 @@ use super::assembly::Assembly;
 use crate::geometry::{FACES, norm, sub};
 
 /// The side of a shell that stands for it, an index into [`FACES`].
-const UPPER: usize = 1;
 
 /// An outer face of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +32,7 @@ pub(super) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
             let corners = part.corners(e);
             for (f, face) in FACES.iter().enumerate() {
                 // A shell is one face, its upper side.
-                if part.section().is_some() && f != UPPER {
+                if !part.sides().contains(&f) {
                     continue;
                 }
                 if let Topology::Structured { cells } = &part.topology

@@ -2,10 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::{
-    element::shell4::Rule,
-    mesh::{Section, Topology},
-};
+use mechanics::{element::shell4::Rule, mesh::Section};
 
 use super::{entry::text, shape};
 use crate::{
@@ -17,7 +14,7 @@ use crate::{
     table::{Range, Table, Value},
     typed::{
         mesh::{Explicit, Numbers, PartMesh, Places, Source},
-        part::{Choice, Criterion, Erosion, Own, Part, Rotation},
+        part::{Choice, Criterion, Erosion, Kind, Own, Part, Rotation},
     },
 };
 
@@ -52,25 +49,23 @@ pub(super) fn read_parts(deck: &Table<'_>) -> Vec<Part> {
             .and_then(|v| read_choice(v, &name));
         let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
         let erosion = table.get("erosion").and_then(|v| read_erosion(v, &name));
-        let shell = table.get("shell");
-        let section = shell.and_then(|value| read_section(value, &name));
-        let mesh = read_mesh(&table, &name, shell, section);
+        let (shell, truss) = (table.get("shell"), table.get("truss"));
+        let kind = match (shell, truss) {
+            (None, None) => Some(Kind::Solids),
+            (Some(value), None) => read_section(value, &name).map(Kind::Shells),
+            (None, Some(value)) => read_truss(value, &name),
+            (Some(_), Some(value)) => {
+                let advice = "remove one; a part has elements of one kind";
+                value.fault("either shell or truss", advice);
+                None
+            }
+        };
+        let mesh = read_mesh(&table, &name, shell.or(truss), kind);
+        let kind = kind.unwrap_or(Kind::Solids);
         let rotate = table.get("rotate").and_then(|v| read_rotation(v, &table));
         let translate = table.get("translate").and_then(|v| v.vector().map(|by| v.placed(by)));
         table.finish();
-        Part {
-            at,
-            name,
-            named,
-            material,
-            fracture,
-            velocity,
-            shell: section,
-            erosion,
-            mesh,
-            rotate,
-            translate,
-        }
+        Part { at, name, named, material, fracture, velocity, kind, erosion, mesh, rotate, translate }
     };
     tables.into_iter().enumerate().map(part).collect()
 }
@@ -112,12 +107,20 @@ fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
     Some(Section { thickness: thickness?, rule })
 }
 
+/// `truss = { area }`.
+fn read_truss(value: Value<'_>, name: &str) -> Option<Kind> {
+    let table = value.table(format!("truss of \"{name}\""))?;
+    let area = table.number("area", Range::Positive);
+    table.finish();
+    area.map(|area| Kind::Trusses { area })
+}
+
 /// The mesh of a part: exactly one of the blocks, or `mesh`.
 fn read_mesh(
     table: &Table<'_>,
     name: &str,
-    shell: Option<Value<'_>>,
-    section: Option<Section>,
+    given: Option<Value<'_>>,
+    kind_of: Option<Kind>,
 ) -> Option<PartMesh> {
     const KINDS: [&str; 7] = ["box", "cylinder", "sphere", "tube", "plate", "prism", "mesh"];
     let present: Vec<(&'static str, Value<'_>)> =
@@ -135,22 +138,29 @@ fn read_mesh(
     };
     let inner = value.table(format!("{kind} of \"{name}\""))?;
     let of_shells = ["plate", "prism"].contains(&kind);
-    match shell {
+    match given {
         None if of_shells => {
             let read = format!("a {kind} without a shell in {}", table.title);
             table.faults.add(table.at, read, "its thickness", "add shell = { thickness = ... }");
         }
         Some(shell) if !of_shells && kind != "mesh" => {
-            shell.fault("no shell: solids fill this block", "remove it, or take plate, prism or mesh");
+            shell.fault("a block of solids alone", "remove this line, or take plate, prism or mesh");
+        }
+        Some(truss) if of_shells && matches!(kind_of, Some(Kind::Trusses { .. })) => {
+            truss.fault("a mesh of trusses", "take mesh = { nodes, elements } or mesh = { file, body }");
         }
         _ => {}
     }
     let (at, title) = (inner.place(), inner.title.clone());
     let source = if kind != "mesh" {
+        let section = match kind_of {
+            Some(Kind::Shells(section)) => Some(section),
+            _ => None,
+        };
         let shape = shape::read(kind, &inner, section);
         inner.finish();
         shape.map(Source::Shape)
-    } else if shell.is_some() && section.is_none() {
+    } else if kind_of.is_none() {
         None
     } else if inner.has("file") {
         let mesh = inner.require("file", "the name of a mesh file").and_then(text);
@@ -161,13 +171,13 @@ fn read_mesh(
         inner.finish();
         mesh.zip(body).map(|(mesh, body)| Source::Body { mesh, body })
     } else {
-        read_explicit(inner, section).map(|own| Source::Explicit(Box::new(own)))
+        read_explicit(inner, kind_of?).map(|own| Source::Explicit(Box::new(own)))
     };
     source.map(|source| PartMesh { at, title, source })
 }
 
-/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`, of shells `[id, n1 ... n4]`.
-fn read_explicit(table: Table<'_>, section: Option<Section>) -> Option<Explicit> {
+/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`, of shells `[id, n1 ... n4]`, of trusses `[id, n1, n2]`.
+fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
     let max = u64::from(MAX_ID);
     let nodes = table.require("nodes", "a list of [id, x, y, z]").and_then(|v| v.items());
     let elements = table.require("elements", "a list of [id, n1, ..., n8]").and_then(|v| v.items());
@@ -193,14 +203,14 @@ fn read_explicit(table: Table<'_>, section: Option<Section>) -> Option<Explicit>
         node_places.push(Place::text(node.at));
         positions.push([x, y, z]);
     }
-    let mut hexahedra = Vec::new();
+    let mut all_corners: Vec<u32> = Vec::new();
     let mut seen: BTreeMap<u32, Place> = BTreeMap::new();
     let mut used = vec![false; positions.len()];
     for element in &elements {
-        let numbers = if section.is_some() {
-            element.integers::<5>("[id, n1, n2, n3, n4]", 1, max).map(|n| n.to_vec())
-        } else {
-            element.integers::<9>("[id, n1, ..., n8]", 1, max).map(|n| n.to_vec())
+        let numbers = match kind {
+            Kind::Solids => element.integers::<9>("[id, n1, ..., n8]", 1, max).map(|n| n.to_vec()),
+            Kind::Shells(_) => element.integers::<5>("[id, n1, n2, n3, n4]", 1, max).map(|n| n.to_vec()),
+            Kind::Trusses { .. } => element.integers::<3>("[id, n1, n2]", 1, max).map(|n| n.to_vec()),
         };
         let Some(numbers) = numbers else { continue };
         let id = numbers[0] as u32;
@@ -208,7 +218,7 @@ fn read_explicit(table: Table<'_>, section: Option<Section>) -> Option<Explicit>
             let line = table.faults.line_seen_from(first, table.place());
             element.fault(&format!("an element number other than {id}, which {line} has"), "renumber one");
         }
-        let mut corners = [0; 8];
+        let mut corners = vec![0; kind.n_corners()];
         let mut complete = true;
         for (corner, number) in corners.iter_mut().zip(&numbers[1..]) {
             match index.get(&(*number as u32)) {
@@ -227,18 +237,21 @@ fn read_explicit(table: Table<'_>, section: Option<Section>) -> Option<Explicit>
                 }
             }
         }
-        let mut sorted = corners[..numbers.len() - 1].to_vec();
+        let mut sorted = corners.clone();
         sorted.sort_unstable();
         if complete && sorted.windows(2).any(|w| w[0] == w[1]) {
             complete = false;
-            let (expected, advice) = match section {
-                None => ("eight different nodes", "list each corner once; wedges are not read"),
-                Some(_) => ("four different nodes", "list each corner once; triangles come in mesh files"),
+            let (expected, advice) = match kind {
+                Kind::Solids => ("eight different nodes", "list each corner once; wedges are not read"),
+                Kind::Shells(_) => {
+                    ("four different nodes", "list each corner once; triangles come in mesh files")
+                }
+                Kind::Trusses { .. } => ("two different nodes", "list both ends"),
             };
             element.fault(expected, advice);
         }
         if complete {
-            hexahedra.push(corners);
+            all_corners.extend(corners);
             element_ids.push(id);
             element_places.push(Place::text(element.at));
         }
@@ -264,13 +277,7 @@ fn read_explicit(table: Table<'_>, section: Option<Section>) -> Option<Explicit>
     }
     let clean = table.faults.count() == before;
     table.finish();
-    let topology = match section {
-        None => Topology::Explicit { hexahedra },
-        Some(section) => {
-            let quads = hexahedra.iter().map(|&[a, b, c, d, ..]: &[u32; 8]| [a, b, c, d]).collect();
-            Topology::Shells { quads, section }
-        }
-    };
+    let topology = kind.topology(all_corners.chunks(kind.n_corners()));
     let numbers = Numbers {
         nodes: node_ids,
         elements: element_ids,

@@ -1,6 +1,10 @@
 //! Materials of a deck, and its parts.
 
-use mechanics::{erosion::Criteria, material::Material, mesh::Section};
+use mechanics::{
+    erosion::Criteria,
+    material::Material,
+    mesh::{Section, Topology},
+};
 
 use super::mesh::PartMesh;
 use crate::{
@@ -26,6 +30,60 @@ pub(crate) enum Choice {
     Inline(Box<Material>),
 }
 
+/// The kind of the elements of a part, with what the part says of all of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Kind {
+    Solids,
+    Shells(Section),
+    Trusses {
+        /// Area of the cross-section.
+        area: f64,
+    },
+}
+
+impl Kind {
+    /// What a message calls such elements.
+    pub(crate) fn elements(self) -> &'static str {
+        match self {
+            Self::Solids => "solids",
+            Self::Shells(_) => "shells",
+            Self::Trusses { .. } => "trusses",
+        }
+    }
+
+    /// Nodes that an element names.
+    pub(crate) fn n_corners(self) -> usize {
+        match self {
+            Self::Solids => 8,
+            Self::Shells(_) => 4,
+            Self::Trusses { .. } => 2,
+        }
+    }
+
+    /// Numbers of different nodes that an element of a mesh may have, and how a message says that.
+    pub(crate) fn distinct(self) -> (&'static [usize], &'static str) {
+        match self {
+            Self::Solids => {
+                (&[4, 5, 6, 8], "eight, or six, five or four of a wedge, a pyramid or a tetrahedron")
+            }
+            Self::Shells(_) => (&[3, 4], "four, or three of a triangle"),
+            Self::Trusses { .. } => (&[2], "two"),
+        }
+    }
+
+    /// Elements of this kind by the local indices of their nodes, [`Kind::n_corners`] each.
+    pub(crate) fn topology<'a>(self, elements: impl Iterator<Item = &'a [u32]>) -> Topology {
+        fn fixed<'a, const N: usize>(elements: impl Iterator<Item = &'a [u32]>) -> Vec<[u32; N]> {
+            elements.map(|nodes| std::array::from_fn(|i| nodes[i])).collect()
+        }
+        match self {
+            Self::Solids => Topology::Explicit { hexahedra: fixed(elements) },
+            Self::Shells(section) => Topology::Shells { quads: fixed(elements), section },
+            Self::Trusses { area } => Topology::Trusses { bars: fixed(elements), area },
+        }
+    }
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) at: Place,
@@ -37,8 +95,7 @@ pub(crate) struct Part {
     pub(crate) fracture: Option<Origin>,
     /// Initial velocity.
     pub(crate) velocity: [f64; 3],
-    /// Layers of shells; none where the part is of solids.
-    pub(crate) shell: Option<Section>,
+    pub(crate) kind: Kind,
     pub(crate) erosion: Option<Erosion>,
     /// None where it could not be read.
     pub(crate) mesh: Option<PartMesh>,

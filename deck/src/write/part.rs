@@ -12,7 +12,7 @@ use crate::{
     typed::{
         Deck,
         mesh::{Explicit, PartMesh, Source},
-        part::{Choice, Erosion, Part},
+        part::{Choice, Erosion, Kind, Part},
     },
 };
 
@@ -147,7 +147,10 @@ fn write_part(text: &mut Text, part: &Part) {
     if part.velocity != [0.0; 3] {
         text.key("velocity", vector(part.velocity));
     }
-    if let Some(Section { thickness, rule }) = part.shell {
+    if let Kind::Trusses { area } = part.kind {
+        text.key("truss", table(&[("area", format!("{area:?}"))]));
+    }
+    if let Kind::Shells(Section { thickness, rule }) = part.kind {
         let (rule, points) = match rule {
             Rule::Gauss(points) => ("gauss", points),
             Rule::Lobatto(points) => ("lobatto", points),
@@ -214,6 +217,7 @@ fn explicit(own: &Explicit) -> String {
         Topology::Shells { quads, .. } => {
             list(quads.iter().zip(numbers).map(|(corners, id)| element(id, corners)))
         }
+        Topology::Trusses { bars, .. } => list(bars.iter().zip(numbers).map(|(ends, id)| element(id, ends))),
         // No reader makes a grid of explicit elements.
         Topology::Structured { .. } => list(std::iter::empty()),
     };

@@ -48,8 +48,10 @@ impl Outer {
             (0..part.n_elements()).filter(move |e| !state.is_eroded(first + e)).map(move |e| {
                 let corners = part.corners(e);
                 let [a, b, c, d, ..] = corners;
-                let shell = part.section().is_some();
-                (first + e, if shell { Cell::Face([a, b, c, d]) } else { Cell::Solid(corners) })
+                (
+                    first + e,
+                    if part.n_corners() == 8 { Cell::Solid(corners) } else { Cell::Face([a, b, c, d]) },
+                )
             })
         });
         let seen = outside(mesh.n_nodes(), cells);

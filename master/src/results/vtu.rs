@@ -22,6 +22,7 @@ use appended::Appended;
 const VTK_HEXAHEDRON: u8 = 12;
 
 /// Cell type of the four-node quadrilateral: shells.
+const VTK_LINE: u8 = 3;
 const VTK_QUAD: u8 = 9;
 
 /// Fields whose numbers identify rather than measure: written whatever the deck selects.
@@ -164,8 +165,8 @@ impl Elements<'_> {
         self.model.mesh.parts[part].corners(local).map(i64::from)
     }
 
-    fn is_shell(&self, element: usize) -> bool {
-        self.model.mesh.parts[self.locate(element).0].section().is_some()
+    fn n_corners(&self, element: usize) -> usize {
+        self.model.mesh.parts[self.locate(element).0].n_corners()
     }
 
     fn element_id(&self, element: usize) -> u32 {
@@ -194,7 +195,7 @@ fn plane_von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
     (xx * xx + yy * yy - xx * yy + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
 }
 
-/// Writes one state as a `.vtu` file, whole or not at all. With shells, which are quadrilaterals in it, there are two
+/// Writes one state as a `.vtu` file, whole or not at all. Shells are quadrilaterals and trusses lines in it. With shells there are two
 /// more element fields: `thickness` (zero for solids) and `von_mises_max`, the greatest of their layers; other stresses of
 /// shells are means through the thickness in the frame of the element.
 ///
@@ -250,23 +251,23 @@ fn stream(
     let cell: Vec<Array> =
         if n_cells < n_elements { cell.into_iter().map(|array| array.only(&kept)).collect() } else { cell };
     let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
-    // A shell has four corners, so with shells the lists are made first.
-    let with_shells = model.mesh.parts.iter().any(|part| part.section().is_some());
+    // Where not every element has eight corners the lists are made first.
+    let mixed = model.mesh.parts.iter().any(|part| part.n_corners() != 8);
     let (mut corners, mut ends) = (Vec::new(), Vec::new());
-    if with_shells {
+    if mixed {
         for &e in &kept {
-            corners.extend_from_slice(&elements.corners(e)[..if elements.is_shell(e) { 4 } else { 8 }]);
+            corners.extend_from_slice(&elements.corners(e)[..elements.n_corners(e)]);
             ends.push(corners.len() as i64);
         }
     }
-    let connectivity = if with_shells {
+    let connectivity = if mixed {
         Array::i64("connectivity", corners.len(), |i| [corners[i]])
     } else {
         Array::i64("connectivity", n_cells, |cell| elements.corners(kept[cell]))
     };
     let cells = [
         connectivity,
-        Array::i64("offsets", n_cells, |cell| [if with_shells { ends[cell] } else { 8 * (cell as i64 + 1) }]),
+        Array::i64("offsets", n_cells, |cell| [if mixed { ends[cell] } else { 8 * (cell as i64 + 1) }]),
         Array {
             name: "types",
             kind: "UInt8",
@@ -275,8 +276,11 @@ fn stream(
             tuples: n_cells,
             grouped: true,
             put: Box::new(|cell, out| {
-                let quad = with_shells && elements.is_shell(kept[cell]);
-                out.push(if quad { VTK_QUAD } else { VTK_HEXAHEDRON });
+                out.push(match if mixed { elements.n_corners(kept[cell]) } else { 8 } {
+                    2 => VTK_LINE,
+                    4 => VTK_QUAD,
+                    _ => VTK_HEXAHEDRON,
+                });
             }),
         },
     ];
@@ -395,7 +399,7 @@ fn data_arrays<'a>(
             let largest = |layer: &[Vec<f64>]| plane_von_mises([0, 1, 2, 3, 4].map(|i| layer[i][e]));
             [layers
                 .map(largest)
-                .fold(if elements.is_shell(e) { 0.0 } else { von_mises(deviator(e)) }, f64::max)]
+                .fold(if elements.n_corners(e) == 4 { 0.0 } else { von_mises(deviator(e)) }, f64::max)]
         }));
     }
     if let Some(worker) = worker {

@@ -211,7 +211,7 @@ fn owners(mesh: &Mesh, layout: &[Subdomain]) -> Vec<u32> {
                 }
             }
             (_, Region::List(elements)) => elements.iter().for_each(|&e| take(e as usize)),
-            (Topology::Explicit { .. } | Topology::Shells { .. }, Region::Cells { .. }) => {}
+            (_, Region::Cells { .. }) => {}
         }
     }
     owner

@@ -8,7 +8,7 @@ use crate::{
     erosion::ALIVE,
     exact::Quantum,
     load::{Drive, SurfaceKind},
-    mesh::{Mesh, Part},
+    mesh::{Mesh, Part, Topology},
     rigid::{Body, cross, dot},
     setup::{Constraint, MAX_WALLS, Setup},
     state::{GlobalState, N_FIELDS, ShellState, field},
@@ -190,14 +190,15 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         let strength = modulus.max(material.density * top_speed2).max(pressure);
         for e in 0..part.n_elements() {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
-            force = force.max(match part.section() {
-                None => largest_face(&x) * strength,
+            force = force.max(match &part.topology {
+                Topology::Structured { .. } | Topology::Explicit { .. } => largest_face(&x) * strength,
                 // A shell pulls with its section; only loads act on its face.
-                Some(section) => {
+                Topology::Shells { section, .. } => {
                     let area = largest_face(&x);
                     arm = arm.max(area.sqrt());
                     (area.sqrt() * section.thickness * strength).max(area * pressure)
                 }
+                Topology::Trusses { area, .. } => area * strength,
             });
             stored += (1e-3 * material.bulk()).max(material.initial_energy()) * state.initial_volume[index];
             index += 1;

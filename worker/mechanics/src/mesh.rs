@@ -57,6 +57,12 @@ pub enum Topology {
         /// What stands through the thickness.
         section: Section,
     },
+    /// Two-node trusses of one cross-section: two indices into [`Part::nodes`] each.
+    Trusses {
+        bars: Vec<[u32; 2]>,
+        /// Initial area of the cross-section.
+        area: f64,
+    },
 }
 
 /// Thickness of shells and the points through it.
@@ -81,11 +87,13 @@ impl Part {
             Topology::Structured { cells } => cells.iter().map(|&c| c as usize).product(),
             Topology::Explicit { hexahedra } => hexahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
+            Topology::Trusses { bars, .. } => bars.len(),
         }
     }
 
     /// Corners of element `e` of this part as global node indices. A shell is a hexahedron without height: its four
-    /// corners twice, so that its first two faces are its lower and its upper side and the others vanish.
+    /// corners twice, so that its first two faces are its lower and its upper side and the others vanish. A truss has no face: each of its
+    /// two nodes stands for the four corners of an end.
     pub fn corners(&self, e: usize) -> [u32; 8] {
         match &self.topology {
             Topology::Structured { cells } => {
@@ -108,6 +116,7 @@ impl Part {
             }
             Topology::Explicit { hexahedra } => hexahedra[e].map(|local| self.nodes[local as usize]),
             Topology::Shells { quads, .. } => twice(quads[e]).map(|local| self.nodes[local as usize]),
+            Topology::Trusses { bars, .. } => spread(bars[e]).map(|local| self.nodes[local as usize]),
         }
     }
 
@@ -119,12 +128,31 @@ impl Part {
         }
     }
 
+    /// Number of nodes of an element, the first of its [`Part::corners`].
+    pub fn n_corners(&self) -> usize {
+        match &self.topology {
+            Topology::Structured { .. } | Topology::Explicit { .. } => 8,
+            Topology::Shells { .. } => 4,
+            Topology::Trusses { .. } => 2,
+        }
+    }
+
+    /// The sides of an element that contact and loads may act on, indices into [`FACES`]. The upper side of a shell stands for both.
+    pub fn sides(&self) -> &'static [usize] {
+        match &self.topology {
+            Topology::Structured { .. } | Topology::Explicit { .. } => &[0, 1, 2, 3, 4, 5],
+            Topology::Shells { .. } => &[UPPER],
+            Topology::Trusses { .. } => &[],
+        }
+    }
+
     /// Volume of an element of this part whose [`Part::corners`] stand at `x`; of a shell, area times initial
     /// thickness.
     pub fn volume(&self, x: &[[f64; 3]; 8]) -> f64 {
-        match self.section() {
-            None => hex8::volume(x),
-            Some(section) => quad_area(&[x[0], x[1], x[2], x[3]]) * section.thickness,
+        match &self.topology {
+            Topology::Structured { .. } | Topology::Explicit { .. } => hex8::volume(x),
+            Topology::Shells { section, .. } => quad_area(&[x[0], x[1], x[2], x[3]]) * section.thickness,
+            Topology::Trusses { area, .. } => distance(x[0], x[1]) * area,
         }
     }
 }
@@ -166,9 +194,21 @@ pub const CORNERS: [[f64; 3]; 8] = [
 pub const FACES: [[usize; 4]; 6] =
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
 
+/// The side of a shell that stands for it, an index into [`FACES`].
+pub const UPPER: usize = 1;
+
 /// The corners of a shell as those of a hexahedron without height.
 pub fn twice([a, b, c, d]: [u32; 4]) -> [u32; 8] {
     [a, b, c, d, a, b, c, d]
+}
+
+/// The nodes of a truss as the corners of a hexahedron: an end each.
+pub fn spread([a, b]: [u32; 2]) -> [u32; 8] {
+    [a, b, b, a, a, b, b, a]
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|axis| (b[axis] - a[axis]) * (b[axis] - a[axis])).sum::<f64>().sqrt()
 }
 
 /// Area of a quadrilateral: half the cross product of its diagonals.

@@ -94,38 +94,17 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             (Topology::Structured { cells: std::array::from_fn(|a| high[a] - low[a]) }, nodes, elements)
         }
         (Topology::Explicit { hexahedra }, Region::List(list)) => {
-            // Local nodes are numbered by first use, which keeps an element's corners close together.
-            let mut local_of = std::collections::BTreeMap::new();
-            let mut nodes = Vec::new();
-            let corners: Vec<_> = list
-                .iter()
-                .map(|&e| {
-                    hexahedra[e as usize].map(|n| {
-                        *local_of.entry(n).or_insert_with(|| {
-                            nodes.push(n);
-                            (nodes.len() - 1) as u32
-                        })
-                    })
-                })
-                .collect();
+            let (corners, nodes) = by_first_use(hexahedra, list);
             let (corners, nodes) = as_rows_are(corners, nodes);
             (Topology::Explicit { hexahedra: corners }, nodes, list.clone())
         }
         (Topology::Shells { quads, section }, Region::List(list)) => {
-            let mut local_of = std::collections::BTreeMap::new();
-            let mut nodes = Vec::new();
-            let corners = list
-                .iter()
-                .map(|&e| {
-                    quads[e as usize].map(|n| {
-                        *local_of.entry(n).or_insert_with(|| {
-                            nodes.push(n);
-                            (nodes.len() - 1) as u32
-                        })
-                    })
-                })
-                .collect();
-            (Topology::Shells { quads: corners, section: *section }, nodes, list.clone())
+            let (quads, nodes) = by_first_use(quads, list);
+            (Topology::Shells { quads, section: *section }, nodes, list.clone())
+        }
+        (Topology::Trusses { bars, area }, Region::List(list)) => {
+            let (bars, nodes) = by_first_use(bars, list);
+            (Topology::Trusses { bars, area: *area }, nodes, list.clone())
         }
         (topology, region) => {
             panic!("region {region:?} does not fit part `{}` ({topology:?})", mesh_part.name)
@@ -169,6 +148,20 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         elements,
         shells,
     }
+}
+
+/// Corners of the listed elements by local node, and the nodes, numbered by first use, which keeps an element's corners close together.
+fn by_first_use<const N: usize>(all: &[[u32; N]], list: &[u32]) -> (Vec<[u32; N]>, Vec<u32>) {
+    let mut local_of = std::collections::BTreeMap::new();
+    let mut nodes = Vec::new();
+    let mut local = |n: u32| {
+        *local_of.entry(n).or_insert_with(|| {
+            nodes.push(n);
+            (nodes.len() - 1) as u32
+        })
+    };
+    let corners = list.iter().map(|&e| all[e as usize].map(&mut local)).collect();
+    (corners, nodes)
 }
 
 /// Corners and nodes numbered in the order of the mesh, if more elements then are in runs: first use breaks rows at their ends and

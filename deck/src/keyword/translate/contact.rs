@@ -138,7 +138,8 @@ fn parts_of(card: &ContactCard, side: Side, t: &Translation<'_>) -> Vec<u32> {
         let held = |id: &u32| nodes.binary_search(id).is_ok();
         let solids = problem.solids.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
         let shells = problem.shells.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
-        let mut parts: Vec<u32> = solids.chain(shells).collect();
+        let beams = problem.beams.iter().filter(|e| e.nodes.iter().any(held)).map(|e| e.part);
+        let mut parts: Vec<u32> = solids.chain(shells).chain(beams).collect();
         parts.sort_unstable();
         parts.dedup();
         log.warn(card.at, format!("a contact of a set of {what}: the parts that hold them meet as a whole"));

@@ -6,7 +6,7 @@ use super::state::Translation;
 use crate::{
     fault::short,
     geometry::{cross, norm, sub, volume},
-    keyword::problem::{Section, Shell},
+    keyword::problem::{Beam, Section, Shell},
     mesh_file::Body,
     place::Place,
 };
@@ -14,14 +14,14 @@ use crate::{
 /// The elements of a part, and their places.
 struct Found {
     body: Body,
-    solids: Vec<Place>,
-    shells: Vec<Place>,
+    /// Of its elements, in their order.
+    places: Vec<Place>,
 }
 
 impl Found {
     fn of(part: u32) -> Self {
         let body = Body { name: format!("part {part}"), ..Body::default() };
-        Self { body, solids: Vec::new(), shells: Vec::new() }
+        Self { body, places: Vec::new() }
     }
 }
 
@@ -80,7 +80,7 @@ pub(super) fn read(t: &mut Translation<'_>) {
         t.used.extend(solid.nodes);
         let found = bodies.entry(solid.part).or_insert_with(|| Found::of(solid.part));
         found.body.solids.push((id, nodes));
-        found.solids.push(at);
+        found.places.push(at);
     }
     if let Some((at, count)) = collapsed {
         log.warn(
@@ -88,16 +88,17 @@ pub(super) fn read(t: &mut Translation<'_>) {
             format!("{count} wedges, pyramids or tetrahedra: computed as hexahedra whose corners coincide"),
         );
     }
-    let shells = read_shells(t, &mut bodies);
+    let mut named = read_shells(t, &mut bodies);
+    named.extend(read_beams(t, &mut bodies));
     for (id, part) in &problem.parts {
         let Some(found) = bodies.remove(id) else {
-            if !shells.contains(id) {
+            if !named.contains(id) {
                 log.warn(part.at, format!("part {id} has no elements and is left out"));
             }
             continue;
         };
         check_section(t, *id, &found.body);
-        t.places.push(found.solids.into_iter().chain(found.shells).collect());
+        t.places.push(found.places);
         t.mesh.bodies.push(found.body);
         t.names.insert(*id, String::new());
     }
@@ -105,7 +106,7 @@ pub(super) fn read(t: &mut Translation<'_>) {
         t.mesh.nodes.push((node.id, node.x));
     }
     if t.mesh.bodies.is_empty() && log.count() == 0 {
-        let expected = "*ELEMENT_SOLID or *ELEMENT_SHELL";
+        let expected = "*ELEMENT_SOLID, *ELEMENT_SHELL or *ELEMENT_BEAM";
         log.fault(Place::card(0, 1), "a deck without elements", expected, "add a mesh");
     }
 }
@@ -115,12 +116,23 @@ fn check_section(t: &mut Translation<'_>, id: u32, body: &Body) {
     let (problem, log) = (t.problem, t.log);
     let part = &problem.parts[&id];
     match problem.sections.get(&part.section.value) {
-        Some((_, Section::Solid)) if body.shells.is_empty() => return,
-        Some((_, Section::Shell(_))) if body.solids.is_empty() => return,
         Some((at, section)) => {
-            let (expected, other) = match section {
-                Section::Solid => ("a *SECTION_SHELL", "shells"),
-                Section::Shell(_) => ("a *SECTION_SOLID", "solids"),
+            let goes_with = match section {
+                Section::Solid => "solids",
+                Section::Shell(_) => "shells",
+                Section::Truss(_) => "trusses",
+            };
+            let lists = [!body.solids.is_empty(), !body.shells.is_empty(), !body.trusses.is_empty()];
+            let several = lists.into_iter().filter(|is| *is).count() > 1;
+            if body.kind() == goes_with && !several {
+                return;
+            }
+            let (other, expected) = match goes_with {
+                "solids" if body.shells.is_empty() => ("beams", "a *SECTION_BEAM"),
+                "solids" => ("shells", "a *SECTION_SHELL"),
+                _ if !body.solids.is_empty() => ("solids", "a *SECTION_SOLID"),
+                "shells" => ("beams", "a *SECTION_BEAM"),
+                _ => ("shells", "a *SECTION_SHELL"),
             };
             let read = format!("part {id} with {other} and the section at {}", log.line(*at, part.at));
             log.fault(part.at, read, expected, "correct SECID; a part has elements of one kind");
@@ -198,10 +210,49 @@ fn read_shells(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BT
         t.turns.extend(nodes);
         let found = bodies.entry(part).or_insert_with(|| Found::of(part));
         found.body.shells.push((id, nodes));
-        found.shells.push(at);
+        found.places.push(at);
     }
     if let Some((at, count)) = triangles {
         log.warn(at, format!("{count} triangles: computed as quadrilaterals with two corners in one node"));
+    }
+    parts
+}
+
+/// Trusses by part, and the parts that have any.
+fn read_beams(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTreeSet<u32> {
+    let (problem, log) = (t.problem, t.log);
+    let mut parts = BTreeSet::new();
+    let mut seen: HashMap<u32, Place> = HashMap::with_capacity(problem.beams.len());
+    let mut missing = BTreeSet::new();
+    for beam in &problem.beams {
+        let Beam { id, part, nodes, at } = *beam;
+        parts.insert(part);
+        if let Some(first) = seen.insert(id, at) {
+            let expected = format!("a number other than {id}, which {} has", log.line(first, at));
+            log.fault(at, format!("beam {id}"), expected, "renumber one");
+            continue;
+        }
+        if let Some(node) = nodes.iter().find(|node| problem.position(**node).is_none()) {
+            log.fault(at, format!("beam {id} with node {node}"), "nodes of the deck", "add the node");
+            continue;
+        }
+        if !problem.parts.contains_key(&part) {
+            if missing.insert(part) {
+                log.fault(at, format!("beam {id} of part {part}"), "a part of the deck", "add the *PART");
+            }
+            continue;
+        }
+        let [a, b] = nodes.map(|node| problem.position(node).unwrap_or_default());
+        let length = norm(sub(b, a));
+        if !(length > 0.0 && length.is_finite()) {
+            let read = format!("beam {id} of length {}", short(length));
+            log.fault(at, read, "a length above 0", "give two nodes at different places");
+            continue;
+        }
+        t.used.extend(nodes);
+        let found = bodies.entry(part).or_insert_with(|| Found::of(part));
+        found.body.trusses.push((id, nodes));
+        found.places.push(at);
     }
     parts
 }

@@ -13,7 +13,7 @@ use crate::{
     typed::{
         condition::made,
         mesh::{PartMesh, Source},
-        part::{Choice, Erosion, Part},
+        part::{Choice, Erosion, Kind, Part},
     },
 };
 
@@ -61,14 +61,17 @@ pub(super) fn write(t: &mut Translation<'_>) {
         let common = if nodes.iter().all(|node| of(node) == common) { common } else { [0.0; 3] };
         apart.extend(nodes.iter().filter(|node| of(node) != common));
         let at = part.at;
-        let shell = match (t.thicknesses.get(&id), problem.sections.get(&part.section.value)) {
+        let kind = match (t.thicknesses.get(&id), problem.sections.get(&part.section.value)) {
             (Some(thickness), Some((_, Section::Shell(shell)))) => {
                 let rule =
                     if shell.lobatto { Rule::Lobatto(shell.points) } else { Rule::Gauss(shell.points) };
                 let thickness = t.number(at, "a thickness of", *thickness);
-                Some(mesh::Section { thickness, rule })
+                Kind::Shells(mesh::Section { thickness, rule })
             }
-            _ => None,
+            (None, Some((_, Section::Truss(area)))) => {
+                Kind::Trusses { area: t.number(at, "an area of", *area) }
+            }
+            _ => Kind::Solids,
         };
         let source = Source::Body {
             mesh: made(t.mesh_name.to_string(), at),
@@ -84,7 +87,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
             material: known.then(|| Choice::Named(name_of())),
             fracture: None,
             velocity: t.vector(at, "a velocity of", common),
-            shell,
+            kind,
             erosion: erosion_of(t, part.material.value),
             mesh: (!t.without_section.contains(&id)).then_some(mesh),
             rotate: None,

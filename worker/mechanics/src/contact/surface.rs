@@ -17,9 +17,6 @@ pub use crate::mesh::FACES as SIDES;
 /// behind it.
 const STOPPING_DEPTH: f64 = 0.75;
 
-/// The side of a shell that stands for it, an index into [`SIDES`].
-const UPPER: usize = 1;
-
 /// The outer faces of a mesh and their nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
@@ -361,11 +358,9 @@ fn for_each_side(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, visit: &mut dyn FnMut
         for e in 0..part.n_elements() {
             if alive(element) {
                 let corners = part.corners(e);
-                // A shell is one face, whose zone acts on both its sides: the upper.
-                let of_shell = part.section().is_some();
-                for (side, local) in SIDES.iter().enumerate().filter(|(side, _)| !of_shell || *side == UPPER)
-                {
-                    let mut key = local.map(|c| corners[c]);
+                // A shell is one face, whose zone acts on both its sides.
+                for &side in part.sides() {
+                    let mut key = SIDES[side].map(|c| corners[c]);
                     key.sort_unstable();
                     for i in 1..4 {
                         if key[i] == key[i - 1] {

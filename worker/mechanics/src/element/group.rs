@@ -6,7 +6,9 @@
 
 use std::ops::Range;
 
-use super::{ElementVote, Step, hex8::group::Solids, layout::Layout, place::Nodal, shell4::Core};
+use super::{
+    ElementVote, Step, hex8::group::Solids, layout::Layout, place::Nodal, shell4::Core, truss2::Trusses,
+};
 use crate::{
     block::Piece,
     lanes::Width,
@@ -115,6 +117,11 @@ pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, 
             let core = Core::new(quads, n_nodes, &piece.elements, volume, &fields, section, material);
             let core = core.expect("the deck has checked section and material");
             (Box::new(core), Some(Turning::new(&spin, inertia)))
+        }
+        Topology::Trusses { bars, .. } => {
+            let material = materials.get(piece.material as usize).expect("trusses need their material");
+            let bars = bars.clone();
+            (Box::new(Trusses::of(piece, bars, material)), None)
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::{
     initial::largest_face,
     load::{Curve, Drive},
     material::Material,
-    mesh::{CORNERS, Mesh, Part, quad_area},
+    mesh::{CORNERS, Mesh, Part, Topology, quad_area},
     setup::Constraint,
 };
 
@@ -161,10 +161,12 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
     least
 }
 
-/// Volume over the largest face; of a shell, area over the longest side.
+/// Volume over the largest face; of a shell, area over the longest side; of a truss, its length.
 fn least_height(part: &Part, x: &[[f64; 3]; 8]) -> f64 {
-    if part.section().is_none() {
-        return hex8::volume(x) / largest_face(x);
+    match &part.topology {
+        Topology::Structured { .. } | Topology::Explicit { .. } => return hex8::volume(x) / largest_face(x),
+        Topology::Trusses { area, .. } => return part.volume(x) / area,
+        Topology::Shells { .. } => {}
     }
     let corners = [x[0], x[1], x[2], x[3]];
     let side = |i: usize| {
@@ -229,12 +231,17 @@ impl Moments {
     }
 
     fn add_element(&mut self, part: &Part, x: &[[f64; 3]; 8], density: f64) {
-        match part.section() {
-            None => self.add_hexahedron(x, density),
-            Some(section) => {
-                let mass = density * part.volume(x);
+        let mass = density * part.volume(x);
+        match &part.topology {
+            Topology::Structured { .. } | Topology::Explicit { .. } => self.add_hexahedron(x, density),
+            Topology::Shells { section, .. } => {
                 self.add_shell(&[x[0], x[1], x[2], x[3]], mass, section.thickness);
             }
+            // Gauss's two points give the second moments of a line.
+            Topology::Trusses { .. } => [-1.0, 1.0].iter().for_each(|side| {
+                let r = 0.5 * (1.0 + side / 3.0_f64.sqrt());
+                self.add(0.5 * mass, std::array::from_fn(|a| x[0][a] + r * (x[1][a] - x[0][a])));
+            }),
         }
     }
 

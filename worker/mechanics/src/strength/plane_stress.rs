@@ -10,7 +10,7 @@ use super::{AnyStrength, StrengthLaw};
 use crate::{lanes::Lane, material::Material};
 
 /// Most Newton steps of the return.
-const STEPS: usize = 10;
+pub(crate) const STEPS: usize = 10;
 /// A lane stops after a step of this part of its multiplier: the next would be smaller than its rounding.
 const SMALL: f64 = 1e-9;
 

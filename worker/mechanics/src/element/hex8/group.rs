@@ -50,7 +50,7 @@ impl Solids {
         let (layout, slots, reach) = match &piece.topology {
             Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
             Topology::Explicit { hexahedra } => explicit(hexahedra, in_runs(hexahedra), n_nodes),
-            Topology::Shells { .. } => panic!("shells as hexahedra"),
+            Topology::Shells { .. } | Topology::Trusses { .. } => panic!("no hexahedra"),
         };
         assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
         let n_slots = match &layout {

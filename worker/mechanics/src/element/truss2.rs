@@ -1,0 +1,273 @@
+//! The two-node truss: a straight bar that pulls and pushes along itself and does not bend.
+//!
+//! Its stress is uniaxial, so the bar thins as it stretches elastically and keeps its volume as it flows:
+//! `V / V0 = 1 + (1 - 2 nu) sigma / E`, and its section is `V / L`. The strain of a step is `2 (L - L') / (L + L')`, the logarithmic
+//! strain to third order. The elements are few and their arithmetic is short, so they are computed one at a time.
+
+use std::{fmt, ops::Range};
+
+use super::{
+    ElementVote, Fault, Step,
+    group::{Call, ElementArrays, Group},
+    place::Nodal,
+};
+use crate::{
+    block::Piece,
+    lanes::{SET, scalar::Scalar},
+    material::Material,
+    mesh::spread,
+    spin::Turning,
+    state::{N_FIELDS, field},
+    strength::{
+        AnyStrength, StrengthLaw,
+        plane_stress::{PlaneLaw, STEPS},
+    },
+};
+
+/// Why trusses cannot be built.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TrussError {
+    /// The area is not a positive finite number.
+    Area {
+        /// What was given (area).
+        area: f64,
+    },
+    /// Uniaxial stress does not know the law.
+    Law {
+        /// Name of the material.
+        material: String,
+        law: &'static str,
+    },
+}
+
+impl fmt::Display for TrussError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TrussError::Area { area } => {
+                write!(f, "truss of area {area}, expected a positive area; give one")
+            }
+            TrussError::Law { material, law } => {
+                write!(f, "trusses of {material:?}: {law} carries no tension; take a material with strength")
+            }
+        }
+    }
+}
+
+impl std::error::Error for TrussError {}
+
+/// Whether trusses of this area and material can be computed.
+///
+/// # Errors
+/// [`TrussError`].
+pub fn check(area: f64, material: &Material) -> Result<(), TrussError> {
+    if !(area.is_finite() && area > 0.0) {
+        return Err(TrussError::Area { area });
+    }
+    PlaneLaw::of(material).map_err(|law| TrussError::Law { material: material.name.clone(), law }).map(|_| ())
+}
+
+/// The trusses of a block; arrays are by local element.
+pub(crate) struct Trusses {
+    n_nodes: usize,
+    bars: Vec<[u32; 2]>,
+    fields: [Vec<f64>; N_FIELDS],
+    initial_volume: Vec<f64>,
+    alive: Vec<u8>,
+    elements: Vec<u32>,
+    density: f64,
+    law: PlaneLaw,
+}
+
+impl Trusses {
+    /// The elements of a piece, whose arrays they take.
+    ///
+    /// # Panics
+    /// If the material has no strength.
+    pub fn of(piece: &mut Piece, bars: Vec<[u32; 2]>, material: &Material) -> Self {
+        let n_elements = bars.len();
+        Self {
+            n_nodes: piece.nodes.len(),
+            fields: std::mem::take(&mut piece.fields),
+            initial_volume: std::mem::take(&mut piece.initial_volume),
+            alive: (0..n_elements.div_ceil(SET))
+                .map(|set| (0..SET).map(|i| u8::from(set * SET + i < n_elements) << i).sum())
+                .collect(),
+            elements: piece.elements.clone(),
+            density: material.density,
+            law: PlaneLaw::of(material).expect("the deck has checked the material"),
+            bars,
+        }
+    }
+
+    /// Force, state and vote of one element.
+    fn one(&mut self, e: usize, nodes: &mut Nodal<'_>, step: &Step, vote: &mut ElementVote) {
+        let [a, b] = self.bars[e].map(|n| n as usize);
+        let along: [f64; 3] = std::array::from_fn(|axis| nodes.x[axis][b] - nodes.x[axis][a]);
+        let before: [f64; 3] = std::array::from_fn(|axis| {
+            let apart = nodes.v[axis][b] - nodes.v[axis][a];
+            (-step.dt).mul_add(apart, along[axis])
+        });
+        let (length, length_before) = (norm(along), norm(before));
+        let volume = self.initial_volume[e];
+        let at = |fields: &[Vec<f64>; N_FIELDS], k: usize| fields[k][e];
+        let mut bar = Bar {
+            stress: -3.0 * at(&self.fields, field::PRESSURE),
+            plastic_strain: at(&self.fields, field::PLASTIC_STRAIN),
+            temperature: at(&self.fields, field::TEMPERATURE),
+        };
+        let mut energy = at(&self.fields, field::ENERGY);
+        let thinner = (1.0 - 2.0 * self.law.poisson) / self.law.young;
+        let volume_of = |stress: f64| thinner.mul_add(stress, 1.0);
+        let pull_before = bar.stress * volume_of(bar.stress) / length_before;
+        if step.dt > 0.0 {
+            let strain = 2.0 * (length - length_before) / (length + length_before);
+            update(&self.law, &mut bar, strain, step.dt);
+        }
+        let relative_volume = volume_of(bar.stress);
+        // Forces are by initial volume until they are given to the nodes.
+        let pull = bar.stress * relative_volume / length;
+        if step.dt > 0.0 {
+            energy = (0.5 * (pull_before + pull)).mul_add(length - length_before, energy);
+        }
+        let force = pull * volume;
+        if !(force.is_finite() && length > 0.0 && relative_volume > 0.0 && energy.is_finite()) {
+            vote.offer_fault(Fault { element: self.elements[e], volume: relative_volume * volume });
+            return;
+        }
+        for axis in 0..3 {
+            let component = force * along[axis] / length;
+            vote.force_bound = vote.force_bound.max(component.abs());
+            let component = step.force_quantum.round(component);
+            nodes.f[axis][a] += component;
+            nodes.f[axis][b] -= component;
+        }
+        // Two masses of half the bar on a spring of stiffness E V / L^2.
+        let courant = length * (self.density / (self.law.young * relative_volume)).sqrt();
+        vote.offer_courant(courant, self.elements[e]);
+        vote.internal += step.energy_quantum.round(energy * volume);
+        if step.dt > 0.0 {
+            let p = -bar.stress / 3.0;
+            for (k, value) in [
+                (field::PRESSURE, p),
+                (field::SXX, -2.0 * p),
+                (field::SYY, p),
+                (field::ENERGY, energy),
+                (field::PLASTIC_STRAIN, bar.plastic_strain),
+                (field::TEMPERATURE, bar.temperature),
+                (field::RELATIVE_VOLUME, relative_volume),
+            ] {
+                self.fields[k][e] = value;
+            }
+        }
+    }
+}
+
+fn norm(x: [f64; 3]) -> f64 {
+    x[0].mul_add(x[0], x[1].mul_add(x[1], x[2] * x[2])).sqrt()
+}
+
+/// What a bar remembers.
+struct Bar {
+    /// Stress along the bar, positive in tension.
+    stress: f64,
+    plastic_strain: f64,
+    temperature: f64,
+}
+
+/// Adds an elastic increment and returns the stress to the yield stress.
+fn update(law: &PlaneLaw, bar: &mut Bar, strain: f64, dt: f64) {
+    let trial = law.young.mul_add(strain, bar.stress);
+    bar.stress = trial;
+    let strength: &AnyStrength = &law.strength;
+    if !strength.plastic() {
+        return;
+    }
+    let factor = strength.factor(Scalar((strain / dt).abs()), Scalar(bar.temperature));
+    let start = bar.plastic_strain;
+    let size = trial.abs();
+    if size <= strength.flow(Scalar(start), factor).0.0 {
+        return;
+    }
+    let mut slip = 0.0_f64;
+    for _ in 0..STEPS {
+        let (flow, hardening) = strength.flow(Scalar(start + slip), factor);
+        let excess = (-law.young).mul_add(slip, size) - flow.0;
+        let next = (slip + excess / (law.young + hardening.0)).max(0.0);
+        let small = (next - slip).abs() <= 1e-12 * next;
+        slip = next;
+        if small {
+            break;
+        }
+    }
+    let stress = (-law.young).mul_add(slip, size);
+    bar.stress = stress.copysign(trial);
+    bar.plastic_strain = start + slip;
+    if strength.thermal() {
+        bar.temperature += strength.heating() * stress * slip;
+    }
+}
+
+impl Group for Trusses {
+    fn reach(&self) -> usize {
+        self.n_nodes
+    }
+
+    fn alive(&self) -> &[u8] {
+        &self.alive
+    }
+
+    fn slot(&self, element: usize) -> usize {
+        element
+    }
+
+    fn corners(&self, element: usize) -> [u32; 8] {
+        spread(self.bars[element])
+    }
+
+    fn compute(
+        &mut self,
+        mut nodes: Nodal<'_>,
+        _turning: Option<&mut Turning>,
+        call: &Call<'_>,
+        vote: &mut ElementVote,
+    ) {
+        for &Range { start, end } in call.sets {
+            for e in start as usize * SET..(end as usize * SET).min(self.bars.len()) {
+                if self.alive[e / SET] >> (e % SET) & 1 == 1 {
+                    self.one(e, &mut nodes, call.step, vote);
+                }
+            }
+        }
+    }
+
+    fn element(&self, element: usize, _x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
+        self.fields.each_ref().map(|values| values[element])
+    }
+
+    fn image(&self, _x: &[Vec<f64>; 3]) -> ElementArrays {
+        ElementArrays {
+            initial_volume: self.initial_volume.clone(),
+            fields: self.fields.clone(),
+            own: Vec::new(),
+        }
+    }
+
+    fn into_image(self: Box<Self>, _x: &[Vec<f64>; 3]) -> ElementArrays {
+        ElementArrays { initial_volume: self.initial_volume, fields: self.fields, own: Vec::new() }
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(f64)) {
+        for values in &self.fields {
+            values.iter().for_each(|&value| visit(value));
+        }
+    }
+
+    fn take_out(&mut self, slot: usize) -> (u32, f64) {
+        self.alive[slot / SET] &= !(1 << (slot % SET));
+        (self.elements[slot], self.fields[field::ENERGY][slot] * self.initial_volume[slot])
+    }
+
+    fn first_stress(&mut self) -> Option<&mut f64> {
+        self.fields[field::PRESSURE].first_mut()
+    }
+}
