@@ -84,7 +84,6 @@ without_chance() {
         -e 's/[0-9.]+ ns of thread time/NS of thread time/' \
         -e 's/[0-9.]+ % of it in contact/SHARE of it in contact/' \
         -e 's/[0-9,]+ bytes per cycle, [0-9,]+ of them/BYTES per cycle, BYTES of them/' \
-        -e 's/sorts; [0-9]+ work units of .*/sorts; UNITS of the last sort that was done, in force or not/' \
         -e '/^    job 1 running( .*)?$/d'
 }
 

@@ -451,7 +451,7 @@ impl Job {
     /// No frame of `cycle` or before will come any more.
     fn retire(&mut self, cycle: u64) {
         self.epoch.schedule.complete(cycle);
-        self.tally.sorts += self.epoch.sorts.retire_before(cycle + 1);
+        self.epoch.sorts.retire_before(cycle + 1);
     }
 
     /// Every worker's frame of `cycle` is here: totals and orders go out, the vote of the cycle before is booked.
@@ -469,6 +469,10 @@ impl Job {
             }
         };
         let now = self.epoch.schedule.ordered(cycle)?;
+        if let Some(census) = self.epoch.sorts.census_beginning_at(cycle) {
+            self.tally.sorts += 1;
+            self.tally.census = census;
+        }
         if fresh {
             if let Some(settings) = &self.problem.model.setup.contact {
                 self.epoch.sorts.follow_spread(cycle.saturating_sub(1), &vote, settings);
@@ -529,13 +533,13 @@ impl Job {
             return Ok(());
         }
         for sorts::Done { gathered, acts_at, sorted } in self.epoch.sorts.done(sorted)? {
-            self.tally.census = sorted.census;
+            let census = sorted.census;
             let exchange = Arc::new(sorted.exchange);
             self.epoch.send_all(actions, |worker| {
                 let plan = Box::new(exchange.plans[worker].clone());
                 ToWorker::Plan { gathered_at: gathered, acts_at, plan, hash: exchange.hash }
             });
-            self.epoch.sorts.act(gathered, acts_at, exchange);
+            self.epoch.sorts.act(gathered, acts_at, exchange, census);
             // A late sort: the cycles before its own are complete, and workers wait for the plan. It is in force from here,
             // as it would be had it come in time, so that the cycles of further sorts do not depend on how long this one took.
             let completed = self.epoch.schedule.completed();

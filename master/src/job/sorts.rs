@@ -8,7 +8,7 @@ use std::{collections::VecDeque, sync::Arc};
 
 use deck::model::Model;
 use mechanics::{
-    contact::{Settings, Surface, reach},
+    contact::{Census, Settings, Surface, reach},
     state::GlobalState,
     vote::Vote,
 };
@@ -30,6 +30,8 @@ struct Acting {
     /// The cycle whose positions it was sorted from.
     gathered: u64,
     exchange: Arc<Exchange>,
+    /// Of the work units of its sort; none for the plan that an epoch begins with.
+    census: Option<Census>,
 }
 
 /// A sort that was ordered.
@@ -88,7 +90,7 @@ impl Sorts {
     /// Begins with the first exchange, from the positions at the start of `cycle`.
     pub(super) fn begin(&mut self, cycle: u64, basis: Option<Arc<SortBasis>>, exchange: Arc<Exchange>) {
         self.basis = basis;
-        self.acting = VecDeque::from([Acting { at: cycle, gathered: cycle, exchange }]);
+        self.acting = VecDeque::from([Acting { at: cycle, gathered: cycle, exchange, census: None }]);
     }
 
     /// What sorts work on; none without contact.
@@ -126,6 +128,12 @@ impl Sorts {
     /// The exchange that begins to act at a cycle.
     pub(super) fn beginning_at(&self, cycle: u64) -> Option<Arc<Exchange>> {
         self.acting.iter().find(|acting| acting.at == cycle).map(|acting| Arc::clone(&acting.exchange))
+    }
+
+    /// The census of the sort whose plan begins to act at a cycle. It is known once the frames of that cycle are here, however long the
+    /// sort took.
+    pub(super) fn census_beginning_at(&self, cycle: u64) -> Option<Census> {
+        self.acting.iter().find(|acting| acting.at == cycle)?.census
     }
 
     /// Whether a plan begins to act at a cycle, as far as is known.
@@ -201,20 +209,17 @@ impl Sorts {
     }
 
     /// The plan of a sort has gone out.
-    pub(super) fn act(&mut self, gathered: u64, acts_at: u64, exchange: Arc<Exchange>) {
-        self.acting.push_back(Acting { at: acts_at, gathered, exchange });
+    pub(super) fn act(&mut self, gathered: u64, acts_at: u64, exchange: Arc<Exchange>, census: Census) {
+        self.acting.push_back(Acting { at: acts_at, gathered, exchange, census: Some(census) });
     }
 
-    /// No frame before cycle `completed` will come any more. Gives how many plans have come into force by that.
-    pub(super) fn retire_before(&mut self, completed: u64) -> u64 {
-        let mut n = 0;
+    /// No frame before cycle `completed` will come any more.
+    pub(super) fn retire_before(&mut self, completed: u64) {
         while let Some(acts_at) = self.acting.get(1).map(|acting| acting.at).filter(|at| *at <= completed) {
             self.acting.pop_front();
             let gathered = self.acting.front().map_or(acts_at, |acting| acting.gathered);
             self.references = [(acts_at, gathered), self.references[0]];
-            n += 1;
         }
-        n
     }
 
     /// Whether positions travel at the start of `cycle`, so that a sort acts `lag` cycles later. `vote` is the newest, of two
@@ -304,13 +309,26 @@ mod tests {
             [(5, 8), (6, 9)]
         );
         for done in turns {
-            sorts.act(done.gathered, done.acts_at, Arc::new(done.sorted.exchange));
+            sorts.act(done.gathered, done.acts_at, Arc::new(done.sorted.exchange), done.sorted.census);
         }
         assert!(sorts.change_plan_at(8) && sorts.change_plan_at(9) && !sorts.change_plan_at(10));
-        assert_eq!(sorts.retire_before(8), 1);
-        assert_eq!(sorts.retire_before(9), 1);
-        assert_eq!(sorts.retire_before(9), 0);
+        sorts.retire_before(8);
+        assert!(sorts.exchange_at(7).is_err() && sorts.exchange_at(8).is_ok());
+        sorts.retire_before(9);
         assert!(sorts.exchange_at(8).is_err() && sorts.exchange_at(9).is_ok());
+    }
+
+    #[test]
+    fn a_census_belongs_to_the_cycle_in_which_its_plan_begins_to_act() {
+        let (mut sorts, job) = sorts();
+        sorts.gather_at(5, false, 3);
+        let sort = sorted(&sorts, &job, 5);
+        let census = sort.census;
+        for done in sorts.done(sort).expect("asked for") {
+            sorts.act(done.gathered, done.acts_at, Arc::new(done.sorted.exchange), done.sorted.census);
+        }
+        let found = [0, 7, 8, 9].map(|cycle| sorts.census_beginning_at(cycle));
+        assert_eq!(found, [None, None, Some(census), None]);
     }
 
     #[test]

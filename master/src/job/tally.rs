@@ -10,7 +10,7 @@ use crate::incident::{Loss, Rebalance};
 pub(super) struct Tally {
     /// Sorts that took effect.
     pub(super) sorts: u64,
-    /// Of the last sort.
+    /// Of the sort in force in the last cycle that is complete.
     pub(super) census: Census,
     /// By index: compute time.
     work: Vec<Work>,

@@ -53,7 +53,7 @@ pub struct Summary {
     pub contact_share: f64,
     /// Sorts that took effect.
     pub sorts: u64,
-    /// Contact work units of the last sort.
+    /// Contact work units of the sort in force in the last cycle.
     pub work_units: WorkUnits,
     /// Largest over mean of cost over speed by worker; 1 is perfect.
     pub imbalance: f64,
