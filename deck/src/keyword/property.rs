@@ -133,7 +133,7 @@ pub(super) fn read_beam_sections(problem: &mut Problem, block: &Block<'_>, conte
         }
         for (i, what) in [(1, "RAMPT"), (2, "STRESS")] {
             if g.real(i, 0.0) != 0.0 {
-                g.fault(i, "0: trusses start without stress", &format!("leave {what} blank"));
+                g.fault(i, "0: trusses start without stress", format!("leave {what} blank"));
             }
         }
         problem.sections.insert(f.id(0), (card.at, Section::Truss(area)));

@@ -5,8 +5,6 @@ use mechanics::mesh::Topology;
 use super::assembly::Assembly;
 use crate::geometry::{FACES, norm, sub};
 
-/// The side of a shell that stands for it, an index into [`FACES`].
-
 /// An outer face of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Face {
