@@ -66,6 +66,7 @@ fn a_rope_with_one_end_held_rings_as_a_bar() {
 }
 
 #[test]
+#[expect(clippy::disallowed_methods, reason = "a logarithm to compare with reaches no digest")]
 fn a_truss_that_is_drawn_follows_its_hardening() {
     let (yields, hardens) = (3e8, 2e9);
     let strength =
@@ -80,7 +81,7 @@ fn a_truss_that_is_drawn_follows_its_hardening() {
     let x = &solved.state.x;
     let length = (x[1][0].powi(2) + x[1][2].powi(2)).sqrt();
     let strain = length.ln();
-    assert!((strain - 1.1_f64.ln()).abs() < 1e-3, "{strain}");
+    assert!((length - 1.1).abs() < 1e-3, "{strain}");
     let slip = solved.state.elements[field::PLASTIC_STRAIN][0];
     let stress = -3.0 * solved.state.elements[field::PRESSURE][0];
     assert!((stress / (yields + hardens * slip) - 1.0).abs() < 1e-9, "{stress:e} at {slip}");
@@ -124,7 +125,7 @@ fn two_masses_on_a_rope_turn_about_each_other_without_loss() {
     }
     let error = energy_error(&solved);
     assert!(error.abs() < 2e-3, "{error:e}");
-    let far = x.iter().map(|x| x[0].hypot(x[1])).fold(0.0, f64::max);
+    let far = x.iter().map(|x| (x[0] * x[0] + x[1] * x[1]).sqrt()).fold(0.0, f64::max);
     assert!((far - 0.5).abs() < 0.005, "an end is {far} m away");
 }
 

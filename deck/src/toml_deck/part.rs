@@ -60,7 +60,8 @@ pub(super) fn read_parts(deck: &Table<'_>) -> Vec<Part> {
                 None
             }
         };
-        let mesh = read_mesh(&table, &name, shell.or(truss), kind);
+        let given = shell.map(|value| (Word::Shell, value)).or(truss.map(|value| (Word::Truss, value)));
+        let mesh = read_mesh(&table, &name, given, kind);
         let kind = kind.unwrap_or(Kind::Solids);
         let rotate = table.get("rotate").and_then(|v| read_rotation(v, &table));
         let translate = table.get("translate").and_then(|v| v.vector().map(|by| v.placed(by)));
@@ -107,6 +108,13 @@ fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
     Some(Section { thickness: thickness?, rule })
 }
 
+/// The key that says the kind of elements.
+#[derive(Clone, Copy)]
+enum Word {
+    Shell,
+    Truss,
+}
+
 /// `truss = { area }`.
 fn read_truss(value: Value<'_>, name: &str) -> Option<Kind> {
     let table = value.table(format!("truss of \"{name}\""))?;
@@ -119,7 +127,7 @@ fn read_truss(value: Value<'_>, name: &str) -> Option<Kind> {
 fn read_mesh(
     table: &Table<'_>,
     name: &str,
-    given: Option<Value<'_>>,
+    given: Option<(Word, Value<'_>)>,
     kind_of: Option<Kind>,
 ) -> Option<PartMesh> {
     const KINDS: [&str; 7] = ["box", "cylinder", "sphere", "tube", "plate", "prism", "mesh"];
@@ -143,11 +151,11 @@ fn read_mesh(
             let read = format!("a {kind} without a shell in {}", table.title);
             table.faults.add(table.at, read, "its thickness", "add shell = { thickness = ... }");
         }
-        Some(shell) if !of_shells && kind != "mesh" => {
-            shell.fault("a block of solids alone", "remove this line, or take plate, prism or mesh");
+        Some((Word::Shell, shell)) if !of_shells && kind != "mesh" => {
+            shell.fault("no shell: solids fill this block", "remove it, or take plate, prism or mesh");
         }
-        Some(truss) if of_shells && matches!(kind_of, Some(Kind::Trusses { .. })) => {
-            truss.fault("a mesh of trusses", "take mesh = { nodes, elements } or mesh = { file, body }");
+        Some((Word::Truss, truss)) if kind != "mesh" => {
+            truss.fault("no truss: another kind of element fills this block", "remove it, or take mesh");
         }
         _ => {}
     }
