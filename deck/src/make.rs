@@ -21,6 +21,7 @@ mod region;
 mod rigid;
 mod spans;
 mod surface;
+mod tie;
 mod wall;
 mod zones;
 
@@ -46,10 +47,9 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let rigid = rigid::drafts(&deck.rigid, &names, &curves, log);
     let mut conditions = boundary::make(deck, &names, curves, &parts, &assembly, log);
     let bodies = rigid::make(&rigid, &materials, &mut assembly, &mut conditions, log);
-    let contact = deck
-        .contact
-        .as_ref()
-        .and_then(|contact| contact::make(contact, &names, &assembly, &materials, &conditions, &rigid, log));
+    let contact = deck.contact.as_ref().and_then(|contact| {
+        contact::make(contact, &names, &mut assembly, &materials, &conditions, &rigid, log)
+    });
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = deck.control.as_ref().map(|given| {
         let control = control::make(given, log);

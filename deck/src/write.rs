@@ -91,6 +91,12 @@ fn write_contact(text: &mut Text, contact: &Contact) {
         text.some("interacts", Some(pair.interacts).filter(|on| !on));
         text.some("friction", pair.friction);
     }
+    for tie in &contact.ties {
+        text.heading("[[contact.tie]]");
+        text.key("nodes", list(tie.nodes.iter().map(|part| quoted(&part.value))));
+        text.key("faces", list(tie.faces.iter().map(|part| quoted(&part.value))));
+        text.key("tolerance", format!("{:?}", tie.tolerance));
+    }
 }
 
 fn write_output(text: &mut Text, output: &Output) {

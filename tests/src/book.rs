@@ -62,6 +62,7 @@ macro_rules! each_case_of_the_book {
             wave: a_short_bar_stops_on_a_long_one_that_flies_on_slower quick;
             wave: a_free_end_doubles_the_velocity_and_turns_the_stress quick;
             wave: a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances quick;
+            wave: a_pulse_at_a_tied_joint_is_split_as_at_a_joined_one quick;
             wave: a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front quick;
             wave: bars_of_forty_cells_ring_at_their_frequencies quick;
             wave: short_waves_are_slow_by_what_central_differences_say quick;

@@ -49,6 +49,8 @@ pub(super) struct ContactCard {
     pub(super) friction: f64,
     /// Whether it follows the surface that erosion leaves.
     pub(super) erodes: bool,
+    /// Whether nodes of the first are tied to faces of the second.
+    pub(super) tied: bool,
 }
 
 impl ContactCard {
@@ -66,13 +68,15 @@ impl ContactCard {
             | "AUTOMATIC_NODES_TO_SURFACE"
             | "AUTOMATIC_ONE_WAY_SURFACE_TO_SURFACE"
             | "ERODING_SURFACE_TO_SURFACE"
-            | "ERODING_NODES_TO_SURFACE" => false,
+            | "ERODING_NODES_TO_SURFACE"
+            | "TIED_NODES_TO_SURFACE"
+            | "TIED_SURFACE_TO_SURFACE" => false,
             _ => {
                 log.fault(
                     block.at,
                     format!("*{}", log.quote(&whole)),
                     "a contact of the table in deck/README.md",
-                    "use an AUTOMATIC or ERODING one",
+                    "use an AUTOMATIC, ERODING or TIED one",
                 );
                 return None;
             }
@@ -108,7 +112,8 @@ impl ContactCard {
         }
         let second = if single { None } else { Some(side(1)?) };
         let friction = if decays { moving } else { fixed };
-        Some(Self { at: f.at, first: side(0)?, second, friction, erodes })
+        let tied = word.starts_with("TIED");
+        Some(Self { at: f.at, first: side(0)?, second, friction, erodes, tied })
     }
 
     /// Reads `*CONTACT_FORCE_TRANSDUCER_`; none where its surfaces are of a kind that is not known.
@@ -125,6 +130,13 @@ impl ContactCard {
             return None;
         }
         let second = if f.id(1) == 0 { None } else { Some(Side::read(&f, 1, false)?) };
-        Some(Self { at: f.at, first: Side::read(&f, 0, true)?, second, friction: 0.0, erodes: false })
+        Some(Self {
+            at: f.at,
+            first: Side::read(&f, 0, true)?,
+            second,
+            friction: 0.0,
+            erodes: false,
+            tied: false,
+        })
     }
 }

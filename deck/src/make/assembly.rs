@@ -61,6 +61,20 @@ pub(super) struct Assembly {
     pub(super) segments: BTreeMap<String, Vec<[u32; 4]>>,
 }
 
+impl Assembly {
+    /// Measures the volumes of all elements, where nodes have been moved.
+    pub(super) fn measure_volumes(&mut self) {
+        let Self { mesh, volumes, .. } = self;
+        volumes.clear();
+        for part in &mesh.parts {
+            for e in 0..part.n_elements() {
+                let corners = part.corners(e).map(|node| mesh.positions[node as usize]);
+                volumes.push(part.volume(&corners));
+            }
+        }
+    }
+}
+
 /// The joins of a deck, by the index of their parts.
 pub(super) fn joins(joins: &[contact::Join], names: &Names<'_>, log: &Log<'_>) -> Vec<Join> {
     let mut list = Vec::new();
@@ -119,13 +133,8 @@ pub(super) fn assemble(
         merge(&mut mesh, joins, &mut assembly, log);
     }
     assembly.faces = drafts.iter().zip(&mesh.parts).map(|(draft, part)| global_faces(draft, part)).collect();
-    for part in &mesh.parts {
-        for e in 0..part.n_elements() {
-            let corners = part.corners(e).map(|node| mesh.positions[node as usize]);
-            assembly.volumes.push(part.volume(&corners));
-        }
-    }
     assembly.mesh = mesh;
+    assembly.measure_volumes();
     velocities(&mut assembly, materials);
     let used = drafts.iter().filter_map(|d| d.numbers.as_ref()?.mesh.as_ref());
     for mesh in used.collect::<BTreeSet<_>>().into_iter().filter_map(|name| meshes.get(name)?.as_ref()) {

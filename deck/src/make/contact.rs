@@ -1,4 +1,4 @@
-//! Contact: gap, slack, which parts meet, friction.
+//! Contact: gap, slack, which parts meet, friction; which are tied stands in `tie`.
 
 use std::collections::BTreeMap;
 
@@ -16,6 +16,7 @@ use super::{
     names::Names,
     rigid::{self, RigidDraft},
     surface::{Face, outer_faces, smallest_face_dimension},
+    tie,
     zones::clearance,
 };
 use crate::{
@@ -57,7 +58,7 @@ const STIFFNESS: f64 = 0.5;
 pub(super) fn make(
     contact: &Contact,
     names: &Names<'_>,
-    assembly: &Assembly,
+    assembly: &mut Assembly,
     materials: &[Material],
     conditions: &Conditions,
     rigid: &[RigidDraft<'_>],
@@ -91,8 +92,21 @@ pub(super) fn make(
             interacts[a as usize * n + b as usize] = false;
         }
     }
+    // Parts that are tied hold each other already.
+    let is_rigid = |part: usize| rigid::parts_of(rigid).any(|parts| parts.contains(&(part as u32)));
+    let tied = tie::tied(&contact.ties, names, &is_rigid, log);
+    for [a, b] in tied.iter().map(|tied| tied.parts) {
+        (interacts[a * n + b], interacts[b * n + a]) = (false, false);
+    }
+    let ties = tie::make(&contact.ties, &tied, assembly, materials, log);
+    let assembly = &*assembly;
     let faces = outer_faces(assembly);
-    let smallest = smallest_face_dimension(assembly, &faces, &interacts);
+    let mut touching = interacts.clone();
+    if !interacts.contains(&true) {
+        // The gap bounds only what nodes travel in a cycle.
+        tied.iter().for_each(|tied| touching[tied.parts[0] * n + tied.parts[1]] = true);
+    }
+    let smallest = smallest_face_dimension(assembly, &faces, &touching);
     let gap = match contact.gap {
         Gap::Fit => {
             let fit = |face: f64| {
@@ -117,7 +131,7 @@ pub(super) fn make(
     let friction_velocity = contact
         .friction_velocity
         .unwrap_or_else(|| default_friction_velocity(assembly, materials, conditions));
-    if n > 0 && !interacts.contains(&true) {
+    if n > 0 && !interacts.contains(&true) && contact.ties.is_empty() {
         log.fault(
             contact.at,
             format!("{} in which no part meets another", log.say("[contact]", "*CONTACT")),
@@ -137,6 +151,7 @@ pub(super) fn make(
         friction_velocity,
         ignores_initial: contact.ignores_initial,
         edges: contact.edges,
+        ties,
     };
     Some(ContactDraft { settings, faces })
 }

@@ -3,11 +3,11 @@
 use super::entry::{parts, text};
 use crate::{
     limits::MAX_ENTRIES,
-    place::Place,
-    table::{Range, Table},
+    place::{Place, Placed},
+    table::{Range, Table, Value},
     typed::{
         condition::Parts,
-        contact::{Contact, Gap, Join, Pair, Slack},
+        contact::{Contact, Gap, Join, Pair, Slack, Tie},
     },
 };
 
@@ -32,6 +32,7 @@ pub(super) fn read(deck: &Table<'_>) -> Option<Contact> {
     let default_interacts = flag("default_interacts").unwrap_or(true);
     let self_interaction = table.get("self_interaction").map(parts);
     let pairs = read_pairs(&table);
+    let ties = read_ties(&table);
     let gap = read_gap(&table);
     let slack = match (table.get("slack_gaps"), table.get("slack_length")) {
         (Some(_), Some(second)) => {
@@ -55,6 +56,7 @@ pub(super) fn read(deck: &Table<'_>) -> Option<Contact> {
         default_interacts,
         self_interaction,
         pairs,
+        ties,
         gap,
         slack,
         stiffness,
@@ -78,6 +80,39 @@ fn read_pairs(table: &Table<'_>) -> Vec<Pair> {
         pairs.push(Pair { origin: value.origin(), parts: [a, b], interacts, friction });
     }
     pairs
+}
+
+/// Default distance of a tied node from its face over the smallest edge of both parts: that of nodes which a join merges.
+const TOLERANCE: f64 = 1e-3;
+
+/// `[[contact.tie]]`: nodes of one part tied to faces of another.
+fn read_ties(table: &Table<'_>) -> Vec<Tie> {
+    let mut ties = Vec::new();
+    for tie in table.tables("tie", MAX_ENTRIES) {
+        let at = tie.place();
+        let [nodes, faces] = ["nodes", "faces"].map(|key| {
+            let value = tie.require(key, "the name of a [[part]], or a list of them");
+            value.and_then(one_or_several)
+        });
+        let range = Range::Within(0.0, 0.1, "a number above 0 and at most 0.1");
+        let tolerance = tie.number_or("tolerance", TOLERANCE, range);
+        tie.finish();
+        if let (Some(nodes), Some(faces)) = (nodes, faces) {
+            ties.push(Tie { at, nodes, faces, tolerance });
+        }
+    }
+    ties
+}
+
+/// A name, or a list of names.
+fn one_or_several(value: Value<'_>) -> Option<Vec<Placed<String>>> {
+    if value.is_text() {
+        return text(value).map(|name| vec![name]);
+    }
+    match parts(value) {
+        Parts::Named(names) => Some(names),
+        Parts::All | Parts::Broken => None,
+    }
 }
 
 fn read_gap(table: &Table<'_>) -> Gap {

@@ -13,6 +13,7 @@ pub(crate) struct Contact {
     /// Parts that meet themselves.
     pub(crate) self_interaction: Option<Parts>,
     pub(crate) pairs: Vec<Pair>,
+    pub(crate) ties: Vec<Tie>,
     pub(crate) gap: Gap,
     pub(crate) slack: Slack,
     pub(crate) stiffness: Option<f64>,
@@ -29,6 +30,16 @@ pub(crate) struct Pair {
     pub(crate) parts: [Placed<String>; 2],
     pub(crate) interacts: bool,
     pub(crate) friction: Option<f64>,
+}
+
+/// Outer nodes of some parts tied to the outer faces of others.
+#[derive(Clone, Debug)]
+pub(crate) struct Tie {
+    pub(crate) at: Place,
+    pub(crate) nodes: Vec<Placed<String>>,
+    pub(crate) faces: Vec<Placed<String>>,
+    /// Greatest distance of a tied node from its face, over the smallest edge of both parts.
+    pub(crate) tolerance: f64,
 }
 
 /// How thick contact is.

@@ -16,6 +16,8 @@
 //! too, they are a kind of pairs of their own ([`edges`]). What a kind does for the sort, the batch and the cycle is said in `pair`;
 //! `kinds` lists them.
 //!
+//! Nodes that are tied to faces are another (`ties`).
+//!
 //! Search, geometry (zone and joint) and force know nothing of each other; only `node_face` knows all three.
 
 use serde::{Deserialize, Serialize};
@@ -37,6 +39,7 @@ mod slots;
 pub mod sort;
 pub mod surface;
 mod tally;
+mod ties;
 mod watch;
 pub mod work_unit;
 pub mod zone;
@@ -52,6 +55,7 @@ pub use pair_energy::{PairEnergies, PairEnergy};
 pub use reach::Extent;
 pub use search::{Exclusions, cull};
 pub use surface::{Face, Surface};
+pub use ties::{BatchTies, OnFace, Tie, on_faces, tie};
 pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
 
 /// Distance, in gaps, within which a pair votes on the time step although only those within one gap push.
@@ -80,6 +84,8 @@ pub struct Settings {
     pub ignores_initial: bool,
     /// Whether edges meet edges ([`edges`]).
     pub edges: bool,
+    /// Nodes tied to faces, by node.
+    pub ties: Vec<Tie>,
 }
 
 impl Settings {

@@ -10,7 +10,7 @@ use crate::{
     typed::{
         FreedNodes,
         condition::made,
-        contact::{Contact, Gap, Pair, Slack},
+        contact::{Contact, Gap, Pair, Slack, Tie},
     },
 };
 
@@ -18,7 +18,12 @@ use crate::{
 pub(super) fn write(t: &mut Translation<'_>) {
     let problem = t.problem;
     let mut pairs: BTreeMap<(u32, u32), (Place, f64)> = BTreeMap::new();
+    let mut ties = Vec::new();
     for contact in &problem.contacts {
+        if contact.tied {
+            ties.extend(tie_of(contact, t));
+            continue;
+        }
         for (a, b) in pairs_of(contact, t) {
             let known = t.names.contains_key(&a) && t.names.contains_key(&b);
             if known && !t.bodies.same(a, b) {
@@ -26,7 +31,9 @@ pub(super) fn write(t: &mut Translation<'_>) {
             }
         }
     }
-    let Some(at) = problem.contacts.first().map(|contact| contact.at).filter(|_| !pairs.is_empty()) else {
+    let Some(at) =
+        problem.contacts.first().map(|contact| contact.at).filter(|_| !(pairs.is_empty() && ties.is_empty()))
+    else {
         return;
     };
     write_freed_nodes(t);
@@ -37,6 +44,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
         interacts: true,
         friction: (friction != 0.0).then_some(friction),
     };
+    let met = !pairs.is_empty();
     let pairs = pairs.into_iter().map(pair).collect();
     t.deck.has_contact = true;
     t.deck.contact = Some(Contact {
@@ -45,13 +53,31 @@ pub(super) fn write(t: &mut Translation<'_>) {
         default_interacts: false,
         self_interaction: None,
         pairs,
-        gap: Gap::Fit,
+        ties,
+        gap: if met { Gap::Fit } else { Gap::Default },
         slack: Slack::Default,
         stiffness: None,
         friction_velocity: None,
         edges: false,
         ignores_initial: false,
     });
+}
+
+/// Distance of a tied node from its face over the smallest edge of both parts: LS-DYNA takes nodes within 5 % of a face's diagonal.
+const TIED_WITHIN: f64 = 0.05;
+
+/// The tie of a card whose parts have elements; parts on both sides are left to the second.
+fn tie_of(contact: &ContactCard, t: &Translation<'_>) -> Option<Tie> {
+    let faces = parts_of(contact, contact.second?, t);
+    let nodes: Vec<u32> =
+        parts_of(contact, contact.first, t).into_iter().filter(|part| !faces.contains(part)).collect();
+    let named = |parts: Vec<u32>| -> Vec<Placed<String>> {
+        let names = parts.iter().filter_map(|part| t.names.get(part));
+        names.map(|name| made(name.clone(), contact.at)).collect()
+    };
+    let (nodes, faces) = (named(nodes), named(faces));
+    let empty = nodes.is_empty() || faces.is_empty();
+    (!empty).then_some(Tie { at: contact.at, nodes, faces, tolerance: TIED_WITHIN })
 }
 
 /// Of a deck with contact: LS-DYNA drops freed nodes unless ENMASS keeps them.

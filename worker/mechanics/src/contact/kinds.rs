@@ -3,13 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BatchEdges, Settings, edges,
+    BatchEdges, BatchTies, Settings, edges,
     edges::cycle::Edges,
     node_face::NodeFace,
     pair::{Books, Cycle, Pairs},
     search::Exclusions,
     sort as by_cubes,
     surface::Surface,
+    ties::{self, Ties},
     work_unit::{Batch, WorkUnit},
 };
 use crate::lanes::Width;
@@ -30,6 +31,7 @@ pub fn sort(
 ) -> Vec<WorkUnit> {
     let mut units = by_cubes::units(surface, x, settings, exclusions);
     units.extend(edges::sort::units(surface, x, settings, exclusions));
+    units.extend(ties::units(surface, settings));
     units
 }
 
@@ -38,17 +40,22 @@ pub fn sort(
 pub struct Listed {
     /// Pairs of edges, where the deck asks for them.
     pub edges: BatchEdges,
+    /// Nodes tied to faces.
+    pub ties: BatchTies,
 }
 
 impl Listed {
     /// Of some units; `node_index` gives the batch node of a surface node.
     pub(super) fn gather(surface: &Surface, units: &[&WorkUnit], node_index: &[u32]) -> Self {
-        Self { edges: BatchEdges::gather(surface, units, node_index) }
+        Self {
+            edges: BatchEdges::gather(surface, units, node_index),
+            ties: BatchTies::gather(surface, units, node_index),
+        }
     }
 
     /// Whether every index is in range, of `n_nodes` and `n_parts`.
     pub(super) fn is_sound(&self, n_nodes: usize, n_parts: usize) -> bool {
-        self.edges.is_sound(n_nodes, n_parts)
+        self.edges.is_sound(n_nodes, n_parts) && self.ties.is_sound(n_nodes)
     }
 }
 
@@ -57,16 +64,21 @@ impl Listed {
 pub(super) struct Kinds {
     pub(super) faces: NodeFace,
     edges: Edges,
+    ties: Ties,
 }
 
 impl Kinds {
     /// Takes the pairs of a batch; see [`super::Contact::new`].
     pub(super) fn new(batch: &Batch, settings: &Settings, x: &[Vec<f64>; 3], width: Width) -> Self {
-        Self { faces: NodeFace::new(batch, settings, x, width), edges: Edges::new(batch, settings) }
+        Self {
+            faces: NodeFace::new(batch, settings, x, width),
+            edges: Edges::new(batch, settings),
+            ties: Ties::new(batch, settings),
+        }
     }
 
-    pub(super) fn each(&self) -> [&dyn Pairs; 2] {
-        [&self.faces, &self.edges]
+    pub(super) fn each(&self) -> [&dyn Pairs; 3] {
+        [&self.faces, &self.edges, &self.ties]
     }
 
     /// The forces of all. Gives the greatest squared frequency.
@@ -74,6 +86,7 @@ impl Kinds {
     pub(super) fn forces(&mut self, cycle: &mut Cycle<'_>, books: &mut Books<'_>) -> f64 {
         let faces = self.faces.forces(cycle, books);
         let edges = self.edges.forces(cycle, books);
-        if edges > faces { edges } else { faces }
+        let ties = self.ties.forces(cycle, books);
+        faces.max(edges).max(ties)
     }
 }

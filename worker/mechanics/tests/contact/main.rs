@@ -1,4 +1,4 @@
-//! Contact: zone, joints, forces, edges, surface and sort. The verification book has more of it, in these worlds.
+//! Contact: zone, joints, forces, edges, ties, surface and sort. The verification book has more of it, in these worlds.
 
 #![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
 
@@ -8,5 +8,6 @@ mod force;
 mod patch;
 mod sort;
 mod surface;
+mod ties;
 mod world;
 mod zone;

@@ -1,0 +1,265 @@
+//! Nodes tied to faces: two meshes that do not match act as one body.
+//!
+//! A tie holds a node where it lay on a face at the start, in any direction, by a spring from the node to the point of the face with
+//! the same shape functions. It is a penalty and not a constraint, because a spring is one more pair of contact: it needs no
+//! order among nodes and faces, takes no mass from anyone, acts between any two workers by the exchange that there is, and may be
+//! let go when its face erodes. The force lies on the line of both points and goes to the corners by the shape functions, the node gets
+//! exactly minus what the corners get: momentum is conserved to the bit, angular momentum to rounding.
+//!
+//! Ties are static data of the deck: which they are, their stiffness, and what bounds their frequency. By the row sums of
+//! `M^-1 K`, of springs whose shares `w` at a node of mass m add up to `sum k w`, no frequency is above `2 sum k w / m`.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Settings, force,
+    pair::{Books, Cycle, Kind, Pairs},
+    surface::Surface,
+    work_unit::{Batch, WorkUnit},
+    zone::Frame,
+};
+
+/// `omega dt` of ties at most. Elements take 2/3 of 2, the springs of contact 0.4: their squares, 1.8, 1 and 0.2, add up to less than
+/// the 4 at which the leapfrog loses its hold. Energy is right at any, since the springs are linear and never let go.
+const OMEGA_DT: f64 = 1.0;
+
+/// Ties of a work unit.
+const OF_UNIT: usize = 16;
+
+/// A node that is tied to a face.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tie {
+    /// Global node; tied once at most.
+    pub node: u32,
+    /// The face, see [`Face::key`](super::Face::key).
+    pub face: u64,
+    /// Part of the node and part of the face.
+    pub parts: [u32; 2],
+    /// Shape functions of the face's corners where the node lies.
+    pub weights: [f64; 4],
+    /// Stiffness of the spring (force per length).
+    pub stiffness: f64,
+    /// By the node and the four corners: stiffness of all ties there by its share in them (force per length).
+    pub load: [f64; 5],
+}
+
+/// A node on a face: surface indices, shape functions, the point and the distance from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OnFace {
+    /// Surface node.
+    pub node: u32,
+    /// Surface face.
+    pub face: u32,
+    /// Shape functions of its corners.
+    pub weights: [f64; 4],
+    /// The closest point of the face (length).
+    pub at: [f64; 3],
+    /// Distance of the node from it (length).
+    pub distance: f64,
+}
+
+/// The nodes of a part that lie within `distance` of faces of another, each with the nearest of these, by node. `settings` have
+/// this distance as their gap, and let the two parts interact and no others. `x` by surface node.
+pub fn on_faces(
+    surface: &Surface,
+    x: &[[f64; 3]],
+    settings: &Settings,
+    [nodes, faces]: [u32; 2],
+) -> Vec<OnFace> {
+    let mut nearest: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+    for (node, face, distance) in super::initial_pairs(surface, x, settings) {
+        let of = (surface.node_part[node as usize], surface.faces[face as usize].part);
+        if of == (nodes, faces) {
+            let best = nearest.entry(node).or_insert((distance, face));
+            if distance < best.0 {
+                *best = (distance, face);
+            }
+        }
+    }
+    let place = |(node, (distance, face)): (u32, (f64, u32))| {
+        let corners = surface.faces[face as usize].nodes.map(|n| x[n as usize]);
+        let (frame, p) = (Frame::new(&corners), x[node as usize]);
+        let weights = frame.weights(&frame.nearest(p), p);
+        let at = std::array::from_fn(|a| (0..4).fold(0.0, |sum, i| weights[i].mul_add(corners[i][a], sum)));
+        OnFace { node, face, weights, at, distance }
+    };
+    nearest.into_iter().map(place).collect()
+}
+
+/// The ties of nodes on faces, by node. Stiffness is the harmonic mean of both sides' `K A^2 / V`, of which the node takes its share.
+pub fn tie(surface: &Surface, found: &[OnFace]) -> Vec<Tie> {
+    let mut ties: Vec<Tie> = found
+        .iter()
+        .map(|on| {
+            let (n, face) = (on.node as usize, &surface.faces[on.face as usize]);
+            Tie {
+                node: surface.nodes[n],
+                face: face.key(),
+                parts: [surface.node_part[n], face.part],
+                weights: on.weights,
+                stiffness: force::stiffness(surface.node_share[n], surface.node_stiffness[n], face.stiffness),
+                load: [0.0; 5],
+            }
+        })
+        .collect();
+    let ends = |on: &OnFace| {
+        let [a, b, c, d] = surface.faces[on.face as usize].nodes;
+        [on.node, a, b, c, d]
+    };
+    let mut load = vec![0.0; surface.nodes.len()];
+    for (on, tie) in found.iter().zip(&ties) {
+        for (node, share) in ends(on).into_iter().zip(tie.shares()) {
+            load[node as usize] += tie.stiffness * share;
+        }
+    }
+    for (on, tie) in found.iter().zip(&mut ties) {
+        tie.load = ends(on).map(|node| load[node as usize]);
+    }
+    ties.sort_unstable_by_key(|tie| tie.node);
+    ties
+}
+
+impl Tie {
+    /// Of the node and the corners, without sign.
+    fn shares(&self) -> [f64; 5] {
+        let [a, b, c, d] = self.weights;
+        [1.0, a, b, c, d]
+    }
+}
+
+/// Units of the ties of which node and face are on the surface.
+pub(super) fn units(surface: &Surface, settings: &Settings) -> Vec<WorkUnit> {
+    let of_tie = |tie: &Tie| {
+        let node = surface.node_index(tie.node).filter(|&n| surface.active[n as usize])?;
+        Some([node, surface.face_index(tie.face)?])
+    };
+    let pairs: Vec<[u32; 2]> = settings.ties.iter().filter_map(of_tie).collect();
+    let of_pairs = |(i, pairs): (i32, &[[u32; 2]])| {
+        let faces = pairs.iter().flat_map(|&[_, face]| surface.faces[face as usize].nodes);
+        let mut nodes: Vec<u32> = pairs.iter().map(|&[node, _]| node).chain(faces).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let interactions = pairs.len() as u64;
+        WorkUnit {
+            kind: Kind::Tied,
+            cube: [i, 0, 0],
+            nodes,
+            pairs: pairs.to_vec(),
+            interactions,
+            ..WorkUnit::default()
+        }
+    };
+    (0..).zip(pairs.chunks(OF_UNIT)).map(of_pairs).collect()
+}
+
+/// The ties of a batch: batch nodes of each, the tied node first.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BatchTies {
+    /// One for each tie.
+    pub nodes: Vec<[u32; 5]>,
+}
+
+impl BatchTies {
+    /// Those of units. `node_index` gives the batch node of a surface node.
+    pub(super) fn gather(surface: &Surface, units: &[&WorkUnit], node_index: &[u32]) -> Self {
+        let pairs = units.iter().filter(|unit| unit.kind == Kind::Tied).flat_map(|unit| &unit.pairs);
+        let nodes = pairs.map(|&[node, face]| {
+            let [a, b, c, d] = surface.faces[face as usize].nodes;
+            [node, a, b, c, d].map(|n| node_index[n as usize])
+        });
+        Self { nodes: nodes.collect() }
+    }
+
+    /// Whether every index is in range.
+    pub(super) fn is_sound(&self, n_nodes: usize) -> bool {
+        self.nodes.iter().flatten().all(|&node| (node as usize) < n_nodes)
+    }
+}
+
+/// A tie with its batch nodes.
+#[derive(Clone, Copy, Debug)]
+struct Spring {
+    nodes: [usize; 5],
+    weights: [f64; 4],
+    stiffness: f64,
+    parts: [u32; 2],
+}
+
+/// The ties of one batch.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ties {
+    springs: Vec<Spring>,
+    /// Of all, made comparable with that of other springs of contact.
+    frequency2: f64,
+}
+
+impl Ties {
+    /// Those of a batch, which must be sound, with the deck's constants.
+    pub(super) fn new(batch: &Batch, settings: &Settings) -> Self {
+        let mut ties = Self::default();
+        for &nodes in &batch.listed.ties.nodes {
+            let global = batch.nodes[nodes[0] as usize].global;
+            let Ok(at) = settings.ties.binary_search_by_key(&global, |tie| tie.node) else { continue };
+            let Tie { weights, stiffness, parts, load, .. } = settings.ties[at];
+            let nodes = nodes.map(|n| n as usize);
+            ties.springs.push(Spring { nodes, weights, stiffness, parts });
+            for (node, load) in nodes.into_iter().zip(load) {
+                let frequency2 = 2.0 * load / batch.nodes[node].mass;
+                let comparable = (force::OMEGA_DT / OMEGA_DT).powi(2) * frequency2;
+                ties.frequency2 = ties.frequency2.max(comparable);
+            }
+        }
+        ties
+    }
+}
+
+impl Pairs for Ties {
+    fn n_listed(&self) -> usize {
+        self.springs.len()
+    }
+
+    fn n_looked_at(&self) -> usize {
+        self.springs.len()
+    }
+
+    fn reads_velocities(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn forces(&mut self, cycle: &mut Cycle<'_>, Books { vote, by_pair }: &mut Books<'_>) -> f64 {
+        for Spring { nodes: [node, corners @ ..], weights, stiffness, parts } in &self.springs {
+            let (mut square, mut on_node) = (0.0, [0.0; 3]);
+            for a in 0..3 {
+                let x = &cycle.x[a];
+                let mut apart = x[*node];
+                for i in 0..4 {
+                    apart = (-weights[i]).mul_add(x[corners[i]], apart);
+                }
+                square = apart.mul_add(apart, square);
+                let force = stiffness * apart;
+                let f = &mut cycle.f[a];
+                let mut sum = 0.0;
+                for i in 0..4 {
+                    let term = cycle.force_quantum.round(weights[i] * force);
+                    f[corners[i]] += term;
+                    sum += term;
+                }
+                f[*node] -= sum;
+                on_node[a] = -sum;
+                // No corner gets more than all together, but for the rounding of four.
+                let bound = force.abs() + 4.0 * cycle.force_quantum.value();
+                vote.force_bound = if bound > vote.force_bound { bound } else { vote.force_bound };
+            }
+            let energy = cycle.energy_quantum.round(0.5 * stiffness * square);
+            vote.energy += energy;
+            by_pair.energies.add(parts[0], parts[1], energy, 0.0);
+            if let Some(tally) = &mut by_pair.forces {
+                tally.add((parts[0], parts[1]), on_node);
+            }
+        }
+        self.frequency2
+    }
+}
