@@ -4,7 +4,7 @@ use mechanics::{mesh::Mesh, setup::Setup};
 use serde::{Deserialize, Serialize};
 
 /// Names that [`Output::fields`] may hold: fields of nodes and elements in the results.
-pub const FIELD_NAMES: [&str; 22] = [
+pub const FIELD_NAMES: [&str; 23] = [
     "velocity",
     "displacement",
     "node_id",
@@ -27,6 +27,7 @@ pub const FIELD_NAMES: [&str; 22] = [
     "stress_zx",
     "mass",
     "time_to_light",
+    "viscosity",
 ];
 
 /// A checked problem in one consistent set of units.

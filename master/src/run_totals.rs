@@ -4,7 +4,9 @@ use deck::model::Model;
 use mechanics::{
     contact::PairEnergies,
     element::hex8,
+    mesh::Part,
     rigid,
+    state::{GlobalState, field},
     vote::{PartVote, Vote},
 };
 use serde::{Deserialize, Serialize};
@@ -78,6 +80,41 @@ pub struct RunTotals {
 }
 
 impl RunTotals {
+    /// Of a run that begins with `start`: its last row is that of the start.
+    pub fn at_start(model: &Model, start: &GlobalState) -> Self {
+        let mut totals = Self::new(model, &start.mass);
+        let square = |v: [f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+        let internal = |(part, first): (&Part, usize)| {
+            let of = |e: usize| start.elements[field::ENERGY][e] * start.initial_volume[e];
+            PartEnergy { internal: (first..first + part.n_elements()).map(of).sum(), ..PartEnergy::default() }
+        };
+        let mesh = &model.mesh;
+        let parts: Vec<PartEnergy> = mesh.parts.iter().zip(mesh.element_offsets()).map(internal).collect();
+        let mut is_of_body = vec![false; mesh.n_nodes()];
+        let bodies = &model.setup.bodies;
+        bodies.iter().flat_map(|body| &body.nodes).for_each(|&node| is_of_body[node as usize] = true);
+        let of_node = |n: usize| {
+            let turning = start.shells.spin.get(n).map_or(0.0, |w| start.shells.inertia[n] * square(*w));
+            0.5 * start.mass[n].mul_add(square(start.v[n]), turning)
+        };
+        let of_bodies = bodies.iter().map(|body| {
+            let [spin, momentum] = [body.start.spin, body.start.momentum];
+            0.5 * body.mass.mul_add(square(body.start.velocity), (0..3).map(|a| spin[a] * momentum[a]).sum())
+        });
+        let kinetic = (0..mesh.n_nodes()).filter(|&n| !is_of_body[n]).map(of_node).chain(of_bodies).sum();
+        let internal = parts.iter().map(|part| part.internal).sum();
+        let momentum = totals.initial_momentum;
+        totals.last = HistoryRow {
+            kinetic,
+            internal,
+            total: kinetic + internal,
+            momentum,
+            parts,
+            ..HistoryRow::default()
+        };
+        totals
+    }
+
     /// Before the first cycle of a run.
     pub fn new(model: &Model, mass: &[f64]) -> Self {
         let momentum_of = |nodes: &mut dyn Iterator<Item = usize>| {

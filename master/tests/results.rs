@@ -374,7 +374,8 @@ fn deck_selects_fields_and_an_empty_list_selects_all_but_components() {
     let default: Vec<_> = results::FIELD_NAMES
         .into_iter()
         .filter(|name| {
-            !name.starts_with("stress") && !["relative_volume", "mass", "time_to_light"].contains(name)
+            !name.starts_with("stress")
+                && !["relative_volume", "mass", "time_to_light", "viscosity"].contains(name)
         })
         .collect();
     assert_eq!(names_in(&[]), default);

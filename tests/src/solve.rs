@@ -91,9 +91,9 @@ pub struct Solved {
 }
 
 impl Solved {
-    /// Times (of the velocity: half a step into the cycle) and readings of a gauge.
+    /// Times and readings of a gauge.
     pub fn gauge(&self, index: usize) -> impl Iterator<Item = (f64, GaugeRow)> + '_ {
-        self.rows.iter().map(move |row| (0.5f64.mul_add(row.dt, row.time), row.gauges[index]))
+        self.rows.iter().map(move |row| (row.time, row.gauges[index]))
     }
 
     /// Mean of `read` over the rows of a gauge between two times.

@@ -51,7 +51,7 @@ impl Checkpoint {
             quanta: [problem.quanta.force; 2],
             vote: None,
             walls: mechanics::wall::first_poses(&model.setup.walls),
-            run_totals: RunTotals::new(model, &start.mass),
+            run_totals: RunTotals::at_start(model, &start),
             n_rows: 0,
             spread_rate: 0.0,
         };

@@ -18,8 +18,8 @@ use crate::{
 /// Deepest contact (gaps) before the run is stopped. Where elements erode, a face that they leave bare may have a node at any
 /// depth, and one that comes through is pushed on from the other side: there it is only reported.
 const DEEPEST: f64 = 0.9;
-/// Cycles before energies are judged, from the first in which anything stirs. The heat of viscosity and of hourglass control is booked by
-/// the velocities of half a step before: too much where a body is struck, and in the first cycles that is much of what there is.
+/// Cycles before energies are judged, from the first in which anything stirs. The energy of viscous hourglass control is booked by the
+/// velocities of half a step before: too much where a body is struck, and in the first cycles that is much of what there is.
 const SETTLED: u64 = 20;
 /// Share of the first time step below which a run is stopped where the deck gives no floor.
 const FLOOR: f64 = 1e-4;

@@ -51,7 +51,7 @@ pub fn words(field: &str, units: &Units) -> String {
     let unit = match base {
         "velocity" => format!("{length}/{time}"),
         "displacement" | "gap" | "thickness" => (*length).to_owned(),
-        "pressure" | "von_mises" | "von_mises_max" | "contact_pressure" => (*stress).to_owned(),
+        "pressure" | "viscosity" | "von_mises" | "von_mises_max" | "contact_pressure" => (*stress).to_owned(),
         name if name.starts_with("stress_") => (*stress).to_owned(),
         "temperature" => "K".to_owned(),
         "density" => format!("{mass}/{length}3"),

@@ -29,7 +29,7 @@ const VTK_QUAD: u8 = 9;
 const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
 
 /// Fields that follow from others or never change: written only if the deck names them.
-const ON_REQUEST: [&str; 9] = [
+const ON_REQUEST: [&str; 10] = [
     "stress",
     "relative_volume",
     "stress_xx",
@@ -39,6 +39,7 @@ const ON_REQUEST: [&str; 9] = [
     "stress_zx",
     "mass",
     "time_to_light",
+    "viscosity",
 ];
 
 /// Arrays that are written wherever they exist: the worker, and what shells have.
@@ -202,7 +203,7 @@ fn plane_von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
 /// Points are current positions. Node fields: `velocity`, `displacement` from the initial mesh, `node_id`,
 /// `mass`. Element fields: `part` and `material` (indices), `element_id`, `pressure`, `von_mises`, `plastic_strain`,
 /// `temperature` (K), `damage`, `density`, `energy` (per mass), `stress` (Cauchy, positive in tension: XX YY ZZ XY YZ XZ),
-/// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric), `time_to_light`.
+/// `relative_volume`, `stress_xx` to `stress_zx` (deviatoric), `time_to_light`, `viscosity`.
 /// `worker` gives, by global element index, the worker that computes the element, and becomes the element
 /// field of that name. Eroded elements are left out. Units are the deck's.
 ///
@@ -389,6 +390,7 @@ fn data_arrays<'a>(
             ("stress_yz", field::SYZ),
             ("stress_zx", field::SZX),
             ("time_to_light", field::TIME_TO_LIGHT),
+            ("viscosity", field::VISCOSITY),
         ]
         .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
     );

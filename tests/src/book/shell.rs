@@ -264,7 +264,7 @@ pub(super) fn a_square_plate_rings_at_its_frequencies(figures: &mut Figures) {
 fn frequency(solved: &Solved, axis: usize) -> f64 {
     let start = solved.model.mesh.positions[solved.model.output.gauges[0].node as usize][axis];
     let path: Vec<(f64, f64)> =
-        solved.rows.iter().map(|row| (row.time + row.dt, row.gauges[0].x[axis] - start)).collect();
+        solved.rows.iter().map(|row| (row.time, row.gauges[0].x[axis] - start)).collect();
     let zeros: Vec<f64> = path
         .windows(2)
         .filter(|w| w[0].1 * w[1].1 < 0.0)

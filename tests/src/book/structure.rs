@@ -27,7 +27,7 @@ fn perfectly_plastic(density: f64, young: f64, poisson: f64, yield_stress: f64) 
 fn deflections(solved: &Solved, gauge: usize, axis: usize) -> (f64, Vec<(f64, f64)>) {
     let start = solved.model.mesh.positions[solved.model.output.gauges[gauge].node as usize][axis];
     let path: Vec<(f64, f64)> =
-        solved.rows.iter().map(|row| (row.time + row.dt, start - row.gauges[gauge].x[axis])).collect();
+        solved.rows.iter().map(|row| (row.time, start - row.gauges[gauge].x[axis])).collect();
     (path.iter().map(|(_, d)| *d).fold(0.0, f64::max), path)
 }
 
@@ -199,7 +199,7 @@ fn first_frequency(layers: u32) -> f64 {
     // Displacement of the tip passes through 0 twice a period.
     let start = solved.model.mesh.positions[solved.model.output.gauges[0].node as usize][2];
     let path: Vec<(f64, f64)> =
-        solved.rows.iter().map(|row| (row.time + row.dt, row.gauges[0].x[2] - start)).collect();
+        solved.rows.iter().map(|row| (row.time, row.gauges[0].x[2] - start)).collect();
     let zeros: Vec<f64> = path
         .windows(2)
         .filter(|w| w[0].1 * w[1].1 < 0.0)

@@ -25,7 +25,7 @@ use crate::{
     exact::Quantum,
     lanes::Width,
     load::face,
-    nodes::{Advance, Nodes},
+    nodes::{Advance, Nodes, share_before},
     setup::Setup,
     spin,
     vote::{Gone, Quanta, Vote},
@@ -127,6 +127,8 @@ pub struct Domain {
     copy_index: CopyIndex,
     gather: Vec<(u32, u32)>,
     gauges: Vec<(u32, u32, u32)>,
+    /// Positions and velocities of their nodes before integration; empty outside of it.
+    gauges_before: Vec<[f64; 6]>,
     /// Element gauges: gauge, block, local element.
     element_gauges: Vec<(u32, u32, u32)>,
     /// Pairs of parts whose contact force is wanted.
@@ -278,6 +280,7 @@ impl Domain {
         self.groups.add_up(&mut self.held_blocks, of_contact, self.moments);
         meter.stop(mark, false);
         self.move_bodies(pushes, dt_previous, dt);
+        self.gauges_before = self.read_gauges();
         let setup = &self.setup;
         wall::poses(&setup.walls, &setup.loads.curves, self.time, dt, free_walls, &mut self.poses);
         let advance = Advance {
@@ -316,6 +319,9 @@ impl Domain {
                 let work = face::work(&held_block.faces, block, half_steps, advance.quanta.energy);
                 held_block.booked.external.merge(work);
             }
+            if dt_previous == 0.0 {
+                held_block.booked.external.put_off();
+            }
             if held_block.eroding.as_mut().is_some_and(Eroding::take_change) {
                 // Loads leave with the faces of eroded elements.
                 held_block.leave_out_dead();
@@ -344,6 +350,6 @@ impl Domain {
             meter.stop(mark, true);
         }
         self.cycle += 1;
-        Ok(self.finish_vote())
+        Ok(self.finish_vote(share_before(dt_previous, dt)))
     }
 }

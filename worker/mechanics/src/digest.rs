@@ -4,7 +4,7 @@ use crate::state::{FIELDS, GlobalState};
 
 /// Fields that only some laws use. Where they are zero everywhere they leave no trace in the digest, so that a run
 /// without such a law has the digest that it had before the law was there.
-const LAW_FIELDS: [&str; 2] = ["damage", "time_to_light"];
+const LAW_FIELDS: [&str; 3] = ["damage", "time_to_light", "viscosity"];
 
 /// BLAKE3 over cycle, time, positions, velocities (by global node index) and element fields (field by field, by global
 /// element index; `LAW_FIELDS` after their names, if anything is in them), each number as its eight little-endian

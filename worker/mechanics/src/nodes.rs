@@ -88,11 +88,11 @@ pub struct Advance<'a> {
 /// surface nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Booked {
-    /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`.
+    /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`: the kinetic energy at `t_n`. In the first cycle of a run `1/2 m v_0^2`.
     pub kinetic: f64,
     /// Work done on the nodes by prescribed velocities, walls, forces, gravity and relaxation.
     pub external: Work,
-    /// `sum m v_{n+1/2}`.
+    /// `sum m v_n`, with `v_n` between the velocities before and after in proportion to the steps.
     pub momentum: [f64; 3],
     /// Displacements of surface nodes from the reference.
     pub extent: Extent,
@@ -138,6 +138,16 @@ impl Advance<'_> {
             gravity.acceleration.map(|g| g * scale)
         });
         Some(Body { gain, loss: relaxation.map_or(0.0, |r| 1.0 - r.factor) })
+    }
+
+    /// Whether no step has led to `x_n`: velocities before are those of `t_n`.
+    fn is_first(&self) -> bool {
+        self.dt_previous == 0.0
+    }
+
+    /// Share of the time from `t_{n-1/2}` to `t_{n+1/2}` that lies before `t_n`.
+    fn share_before(&self) -> f64 {
+        share_before(self.dt_previous, self.dt)
     }
 
     /// The force on a node that brings it to `target` in this step, whatever gravity and relaxation do.
@@ -263,10 +273,13 @@ impl Advance<'_> {
                 after + L::select(booked, rounded(later, energy), zero),
             ];
         }
-        let kinetic = L::splat(0.5) * mass * old.dot(&new);
+        let after = if self.is_first() { &old } else { &new };
+        let kinetic = L::splat(0.5) * mass * old.dot(after);
         tally.kinetic = tally.kinetic + L::select(booked, rounded(kinetic, energy), zero);
         let momentum = L::splat(self.quanta.momentum.magic());
-        let carried = new.scaled(mass);
+        let share = L::splat(self.share_before());
+        let passed = Vector { x: new.x - old.x, y: new.y - old.y, z: new.z - old.z };
+        let carried = passed.mul_add(share, &old).scaled(mass);
         tally.momentum.x = tally.momentum.x + L::select(booked, rounded(carried.x, momentum), zero);
         tally.momentum.y = tally.momentum.y + L::select(booked, rounded(carried.y, momentum), zero);
         tally.momentum.z = tally.momentum.z + L::select(booked, rounded(carried.z, momentum), zero);
@@ -287,6 +300,11 @@ impl Advance<'_> {
             tally.speed_ahead = tally.speed_ahead.max(L::select(moved, squared.sqrt() + gain, zero));
         }
     }
+}
+
+/// Share of the time from `t_{n-1/2}` to `t_{n+1/2}` that lies before `t_n`: `v_n = v_{n-1/2} + share (v_{n+1/2} - v_{n-1/2})`.
+pub(crate) fn share_before(dt_previous: f64, dt: f64) -> f64 {
+    if dt_previous == 0.0 { 0.0 } else { dt_previous / (dt_previous + dt) }
 }
 
 /// The bits of the first N lanes.

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     exact::Quantum,
     load::{Drive, Loads},
+    nodes::share_before,
     vote::{Quanta, Work},
 };
 
@@ -168,7 +169,7 @@ pub struct Booked {
     pub kinetic: f64,
     /// Work of gravity, relaxation, nodal forces and whatever prescribes its motion.
     pub external: Work,
-    /// `m v_{n+1/2}`.
+    /// `m v_n`.
     pub momentum: [f64; 3],
 }
 
@@ -221,8 +222,14 @@ impl Advance<'_> {
         state.attitude = turn(&old.attitude, spin, self.dt);
         (0..3).for_each(|a| state.centre[a] += velocity[a] * self.dt);
         let Quanta { energy, momentum: of_momentum, .. } = self.quanta;
-        let translation = 0.5 * body.mass * dot(old.velocity, velocity);
-        let rotation = 0.25 * (dot(old.spin, momentum) + dot(spin, old.momentum));
+        let [translation, rotation] = if self.dt_previous == 0.0 {
+            [dot(old.velocity, old.velocity), dot(old.spin, old.momentum)]
+        } else {
+            [dot(old.velocity, velocity), 0.5 * (dot(old.spin, momentum) + dot(spin, old.momentum))]
+        };
+        let kinetic = 0.5 * body.mass.mul_add(translation, rotation);
+        let share = share_before(self.dt_previous, self.dt);
+        let carried = |a: usize| body.mass * (velocity[a] - old.velocity[a]).mul_add(share, old.velocity[a]);
         let work = |with_velocity: [f64; 3], with_spin: [f64; 3]| {
             let along = |a: usize| body.mass * (velocity[a] - pushed[a]) * with_velocity[a];
             let about = |a: usize| (momentum[a] - twisted[a]) * with_spin[a];
@@ -230,9 +237,9 @@ impl Advance<'_> {
         };
         let external = Work { before: work(old.velocity, old.spin), after: work(velocity, spin) };
         Booked {
-            kinetic: energy.round(translation + rotation),
+            kinetic: energy.round(kinetic),
             external,
-            momentum: velocity.map(|v| of_momentum.round(body.mass * v)),
+            momentum: [0, 1, 2].map(|a| of_momentum.round(carried(a))),
         }
     }
 }

@@ -69,7 +69,7 @@ pub(crate) fn advance(
             }
             turning.w[axis][i] = new;
             turning.m[axis][i] = 0.0;
-            product = old.mul_add(new, product);
+            product = old.mul_add(if advance.dt_previous == 0.0 { old } else { new }, product);
         }
         if sets[i / SET].booked >> (i % SET) & 1 == 1 {
             kinetic += energy.round(0.5 * inertia * product);

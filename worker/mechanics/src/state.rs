@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 /// Element state fields in their order inside [`GlobalState::elements`] and inside a block.
 ///
 /// Deviatoric stress (zz is minus the sum of xx and yy), pressure, internal energy per initial volume,
-/// effective plastic strain, temperature, current volume over initial volume, damage, and the time until the
-/// detonation arrives.
-pub const FIELDS: [&str; 12] = [
+/// effective plastic strain, temperature, current volume over initial volume, damage, the time until the detonation
+/// arrives, and artificial viscosity.
+pub const FIELDS: [&str; 13] = [
     "stress_xx",
     "stress_yy",
     "stress_xy",
@@ -20,6 +20,7 @@ pub const FIELDS: [&str; 12] = [
     "relative_volume",
     "damage",
     "time_to_light",
+    "viscosity",
 ];
 
 /// Number of element state fields.
@@ -52,6 +53,8 @@ pub mod field {
     /// Time until the detonation arrives (time), negative after that; runs down with the steps. Zero where nothing
     /// burns.
     pub const TIME_TO_LIGHT: usize = 11;
+    /// Artificial viscosity of the forces at `x_n` (stress): the element does half of its work against it before `t_n`, and half after.
+    pub const VISCOSITY: usize = 12;
 }
 
 /// An array of these values of which pages that hold nothing but zeros take no memory until they are written.

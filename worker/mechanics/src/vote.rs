@@ -46,7 +46,7 @@ pub struct Vote {
     pub contact_energies: PairEnergies,
     /// Work of prescribed velocities, walls and loads in this cycle.
     pub external: Work,
-    /// Momentum of all nodes, `m v_{n+1/2}`.
+    /// Momentum of all nodes at `t_n`, `m v_n`.
     pub momentum: [f64; 3],
     /// Energies by part.
     pub parts: Vec<PartVote>,
@@ -56,7 +56,7 @@ pub struct Vote {
     pub bodies: Vec<rigid::State>,
     /// Displacement extents of surface nodes since the sorted positions, by part.
     pub extents: Vec<Extent>,
-    /// Position and velocity of gauge nodes: gauge index, then x, y, z, vx, vy, vz.
+    /// Position and velocity of gauge nodes at `t_n`: gauge index, then x, y, z, vx, vy, vz.
     pub gauges: Vec<(u32, [f64; 6])>,
     /// State of the elements that are watched: gauge index, and one number per entry of [`crate::state::FIELDS`].
     pub element_gauges: Vec<(u32, [f64; N_FIELDS])>,
@@ -142,6 +142,11 @@ impl Work {
         self.after += other.after;
     }
 
+    /// Puts off what the impulses at the start of a run do: no time has passed before them.
+    pub fn put_off(&mut self) {
+        *self = Self { before: 0.0, after: self.whole() };
+    }
+
     /// Both halves.
     pub fn whole(self) -> f64 {
         self.before + self.after
@@ -151,7 +156,8 @@ impl Work {
 /// Energies of one part in one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartVote {
-    /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`: the kinetic energy that central differences conserve.
+    /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`: the kinetic energy at `t_n` that central differences conserve; at the start of a run
+    /// `1/2 m v_0^2`.
     pub kinetic: f64,
     /// Internal energy of the elements.
     pub internal: f64,

@@ -148,6 +148,7 @@ impl Domain {
             copy_index,
             gather,
             gauges,
+            gauges_before: Vec::new(),
             element_gauges: Vec::new(),
             watched_pairs: Vec::new(),
         }

@@ -161,6 +161,9 @@ impl Domain {
                 }));
             }
             held.booked = advance.run(body, &held.push, &mut held.state);
+            if dt_previous == 0.0 {
+                held.booked.external.put_off();
+            }
             for &[held_block, local, place] in &held.copies {
                 let block = &mut self.held_blocks[held_block as usize].block;
                 let target = held.state.at(body.places[place as usize]);

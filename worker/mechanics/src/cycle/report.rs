@@ -40,11 +40,21 @@ impl Domain {
             self.vote.contact_speed_squared = self.vote.contact_speed_squared.max(top);
             self.vote.contact_speed_ahead = self.vote.contact_speed_ahead.max(top.sqrt());
         }
-        self.finish_vote()
+        self.gauges_before = self.read_gauges();
+        self.finish_vote(0.0)
     }
 
-    /// The vote of the cycle, which leaves an empty one for the next.
-    pub(super) fn finish_vote(&mut self) -> Vote {
+    /// Positions and velocities of the gauge nodes as they are.
+    pub(super) fn read_gauges(&self) -> Vec<[f64; 6]> {
+        let read = |&(_, held_block, local): &(u32, u32, u32)| {
+            let (block, i) = (&self.held_blocks[held_block as usize].block, local as usize);
+            [block.x[0][i], block.x[1][i], block.x[2][i], block.v[0][i], block.v[1][i], block.v[2][i]]
+        };
+        self.gauges.iter().map(read).collect()
+    }
+
+    /// The vote of the cycle, which leaves an empty one for the next. `share_before` is that of [`crate::nodes::share_before`].
+    pub(super) fn finish_vote(&mut self, share_before: f64) -> Vote {
         let mut vote = std::mem::replace(&mut self.vote, Vote::empty(self.n_parts));
         for held_block in &mut self.held_blocks {
             let part = held_block.block.part as usize;
@@ -70,11 +80,13 @@ impl Domain {
         }
         self.vote_on_bodies(&mut vote);
         vote.gone.merge(&std::mem::take(&mut self.gone));
-        for &(gauge, held_block, local) in &self.gauges {
-            let (block, i) = (&self.held_blocks[held_block as usize].block, local as usize);
-            let values =
-                [block.x[0][i], block.x[1][i], block.x[2][i], block.v[0][i], block.v[1][i], block.v[2][i]];
-            vote.gauges.push((gauge, values));
+        let after = self.read_gauges();
+        let before = std::mem::take(&mut self.gauges_before);
+        for ((&(gauge, ..), mut read), after) in self.gauges.iter().zip(before).zip(after) {
+            for (v, after) in read[3..].iter_mut().zip(&after[3..]) {
+                *v = (after - *v).mul_add(share_before, *v);
+            }
+            vote.gauges.push((gauge, read));
         }
         for &(gauge, held_block, local) in &self.element_gauges {
             vote.element_gauges

@@ -325,15 +325,17 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let linear = L::splat(step.linear_viscosity);
     let damping = (quadratic * length).mul_add(closing, linear * sound) * length;
     let viscosity = density * damping * closing;
+    // The forces at both ends of a step do work in it, so its heat is that of their mean.
+    let heating = half * (view.state::<L>(slot, field::VISCOSITY) + viscosity);
 
     // 6. Energy and pressure together.
-    let mut energy = line.energy_after(energy_before, pressure_before, viscosity, volume_change);
+    let mut energy = line.energy_after(energy_before, pressure_before, heating, volume_change);
     let mut pressure = line.pressure(energy);
     let mut damage_after = damage;
     if laws.failure.fails() {
         let least = L::select(failed, zero, L::splat(laws.failure.least_pressure()));
         let cut = pressure.less(least);
-        let resistance = half.mul_add(pressure_before + least, viscosity);
+        let resistance = half.mul_add(pressure_before + least, heating);
         energy = L::select(cut, resistance.neg_mul_add(volume_change, energy_before), energy);
         pressure = L::select(cut, least, pressure);
         let plastic_strain = [plastic_before, history.plastic_strain];
@@ -375,13 +377,14 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let energy_magic = L::splat(step.energy_quantum.magic());
     let internal = energy * initial_volume;
     let taken = L::splat(step.dt / 8.0) * resist * hourglass.square();
-    let squeezed = -(viscosity * volume_change * initial_volume);
+    let squeezed = -(heating * volume_change * initial_volume);
     tally.internal = tally.internal + L::select(active, rounded(internal, energy_magic), zero);
     tally.hourglass = tally.hourglass + L::select(active, rounded(taken, energy_magic), zero);
     tally.viscosity = tally.viscosity + L::select(active, rounded(squeezed, energy_magic), zero);
     tally.largest_rate = tally.largest_rate.max(L::select(active, volume_rate.abs(), zero));
 
-    // 9. State.
+    // 9. State. Forces act from the first cycle on, so their viscosity is kept from there.
+    view.set_state(slot, field::VISCOSITY, viscosity, active);
     if step.dt != 0.0 {
         if laws.strength.deviatoric() {
             view.set_state(slot, field::SXX, stress.xx, active);
