@@ -169,7 +169,13 @@ fn loads_curves_and_walls_are_as_the_deck_says() {
     let of = |node: usize| model.setup.constraints[usize::from(model.constraint[node])];
     assert_eq!(
         of(0),
-        Constraint { velocity: [Some(ramp(2.0)), None, None], walls: 0, forces: 1, clamped: 0 }
+        Constraint {
+            velocity: [Some(ramp(2.0)), None, None],
+            walls: 0,
+            forces: 1,
+            clamped: 0,
+            supports: [2, 0, 0]
+        }
     );
     assert_eq!(of(124), Constraint { forces: 1, ..Constraint::default() });
     assert_eq!((model.velocity[0], model.velocity[124]), ([6.0, 0.0, 0.0], [0.0; 3]));

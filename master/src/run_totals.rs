@@ -7,11 +7,16 @@ use mechanics::{
     mesh::Part,
     rigid,
     state::{GlobalState, field},
-    vote::{PartVote, Vote},
+    vote::{PartVote, Vote, Work},
+    wall::WallVote,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::results::history::{GaugeRow, HistoryRow, PartEnergy};
+use crate::results::history::{GaugeRow, HistoryRow, HolderRow, PartEnergy};
+
+mod bodies;
+
+pub use bodies::{BodyError, PartScale};
 
 /// Energies of contact between two parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -24,6 +29,8 @@ pub struct PairSums {
     pub friction: f64,
     /// What springs lost so far where the surface changed by erosion.
     pub eroded: f64,
+    /// In springs after the first cycle of the run.
+    pub first: f64,
 }
 
 /// Sums over all cycles so far; stored in a snapshot as it stands.
@@ -35,6 +42,12 @@ pub struct RunTotals {
     pub viscosity: f64,
     /// Energy lost to friction so far.
     pub friction: f64,
+    /// What was lost at walls up to the time of the last cycle booked.
+    pub wall_loss: f64,
+    /// What the impulses of that cycle lose after its time; the next cycle books it.
+    pub wall_loss_ahead: f64,
+    /// Walls and supports up to the time of the last cycle booked, and their work and loss after it.
+    pub holders: Vec<(HolderRow, [f64; 2])>,
     /// Work done from outside up to the time of the last cycle booked: by supports, walls and loads.
     pub external: f64,
     /// Work that the impulses of that cycle do after its time; the next cycle books it.
@@ -58,6 +71,10 @@ pub struct RunTotals {
     pub greatest_external: f64,
     /// Sums of each part after the first cycle, and up to now; empty before it.
     pub parts: [Vec<PartEnergy>; 2],
+    /// What each part is judged by.
+    pub scales: Vec<PartScale>,
+    /// By part: the lowest part that it is one body with from the start, as nodes are shared or it is rigid.
+    pub joined: Vec<usize>,
     /// The first time step that was booked (time); none before it.
     pub first_step: Option<f64>,
     /// Momentum before the first cycle.
@@ -144,6 +161,9 @@ impl RunTotals {
             hourglass: 0.0,
             viscosity: 0.0,
             friction: 0.0,
+            wall_loss: 0.0,
+            wall_loss_ahead: 0.0,
+            holders: vec![Default::default(); model.setup.n_holders()],
             external: 0.0,
             external_ahead: 0.0,
             external_ahead_of_parts: Vec::new(),
@@ -156,6 +176,8 @@ impl RunTotals {
             greatest_kinetic: 0.0,
             greatest_external: 0.0,
             parts: Default::default(),
+            scales: vec![PartScale::default(); model.mesh.parts.len()],
+            joined: bodies::joined(model),
             first_step: None,
             initial_momentum,
             part_momentum,
@@ -175,8 +197,11 @@ impl RunTotals {
         self.hourglass += sum(&|p| p.hourglass);
         self.viscosity += sum(&|p| p.viscosity);
         self.friction += vote.friction;
-        self.external +=
-            std::mem::replace(&mut self.external_ahead, vote.external.after) + vote.external.before;
+        let lost = self.book_holders(&vote.walls, 0.5 * (self.last.dt + dt));
+        self.wall_loss += std::mem::replace(&mut self.wall_loss_ahead, lost.after) + lost.before;
+        // Votes count what is lost at walls as their work.
+        self.external += std::mem::replace(&mut self.external_ahead, vote.external.after + lost.after)
+            + (vote.external.before + lost.before);
         let kinetic = sum(&|p| p.kinetic);
         let internal = sum(&|p| p.internal);
         self.eroded += vote.gone.internal + vote.gone.kinetic;
@@ -187,12 +212,13 @@ impl RunTotals {
         if let Some(released) = std::mem::replace(&mut self.released, vote.released.clone()) {
             self.book_released(&released);
         }
-        let total = kinetic + internal + self.hourglass + vote.contact + self.friction + self.eroded;
+        let total =
+            kinetic + internal + self.hourglass + vote.contact + self.friction + self.eroded + self.wall_loss;
         let initial = *self.initial_total.get_or_insert(total - self.external);
         self.greatest_kinetic = self.greatest_kinetic.max(kinetic);
         self.greatest_external = self.greatest_external.max(self.external.abs());
         self.first_step.get_or_insert(dt);
-        self.book_parts(&vote.parts);
+        self.book_parts(&vote.parts, cycle);
         self.bodies.clone_from(&vote.bodies);
         // Slow loading is not judged by the little kinetic energy that it has.
         let scale = initial.abs().max(self.greatest_kinetic).max(self.greatest_external);
@@ -217,6 +243,7 @@ impl RunTotals {
             eroded: self.eroded,
             eroded_elements: self.eroded_elements,
             eroded_mass: self.eroded_mass,
+            wall_loss: self.wall_loss,
             external: self.external,
             total,
             error,
@@ -229,7 +256,22 @@ impl RunTotals {
                 .collect(),
             element_gauges: vote.element_gauges.iter().map(|(_, state)| *state).collect(),
             contacts: vote.contacts.clone(),
+            holders: self.holders.iter().map(|(row, _)| *row).collect(),
         };
+    }
+
+    /// Books what walls and supports gave the bodies by impulses over `half_steps`; gives what was lost at walls.
+    fn book_holders(&mut self, votes: &[WallVote], half_steps: f64) -> Work {
+        let mut lost = Work::default();
+        for (index, (row, ahead)) in self.holders.iter_mut().enumerate() {
+            let vote = votes.get(index).copied().unwrap_or_default();
+            let [work, loss] = std::mem::replace(ahead, [vote.work.after, vote.loss.after]);
+            row.work += work + vote.work.before;
+            row.loss += loss + vote.loss.before;
+            row.force = vote.impulse.map(|j| if half_steps > 0.0 { -j / half_steps } else { 0.0 });
+            lost.merge(vote.loss);
+        }
+        lost
     }
 
     fn pair(&mut self, parts: [u32; 2]) -> &mut PairSums {
@@ -280,7 +322,7 @@ impl RunTotals {
         self.last.eroded_mass = self.eroded_mass;
     }
 
-    fn book_parts(&mut self, votes: &[PartVote]) {
+    fn book_parts(&mut self, votes: &[PartVote], cycle: u64) {
         let [first, now] = &mut self.parts;
         now.resize(votes.len(), PartEnergy::default());
         self.external_ahead_of_parts.resize(votes.len(), 0.0);
@@ -288,10 +330,15 @@ impl RunTotals {
             (part.kinetic, part.internal) = (vote.kinetic, vote.internal);
             part.hourglass += vote.hourglass;
             part.viscosity += vote.viscosity;
+            part.eroded += vote.gone;
             part.external += std::mem::replace(ahead, vote.external.after) + vote.external.before;
         }
         if first.is_empty() {
             first.clone_from(now);
+            self.contacts.iter_mut().for_each(|pair| pair.first = pair.contact);
+        }
+        for (scale, part) in self.scales.iter_mut().zip(now) {
+            scale.book(part, cycle);
         }
     }
 

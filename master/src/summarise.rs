@@ -12,9 +12,9 @@ use crate::{
     job::Job,
     results::{
         history::PartEnergy,
-        summary::{Energies, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
+        summary::{Energies, NamedBody, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
     },
-    run_totals::PairSums,
+    run_totals::{PairSums, RunTotals},
 };
 
 /// Counts of the surface, taken before the run.
@@ -104,8 +104,10 @@ pub fn summarise(
             viscosity: run_totals.viscosity,
             contact: run_totals.last.contact + run_totals.friction,
             friction: run_totals.friction,
+            wall_loss: run_totals.wall_loss,
             external: run_totals.external,
             error: run_totals.last.error,
+            worst_body: worst_body(model, run_totals),
             parts: named_parts(model, &run_totals.last.parts, outcome.state.as_ref()),
             contacts: run_totals.contacts.iter().map(|pair| named_pair(model, pair)).collect(),
         },
@@ -117,6 +119,17 @@ pub fn summarise(
         losses: outcome.losses.clone(),
         digest: outcome.digest.clone(),
     }
+}
+
+/// The body whose own energy error is greatest; the first of equals. None where all is one body.
+fn worst_body(model: &Model, run_totals: &RunTotals) -> Option<NamedBody> {
+    let bodies = run_totals.bodies();
+    if bodies.len() < 2 {
+        return None;
+    }
+    let worst = bodies.into_iter().reduce(|a, b| if b.error.abs() > a.error.abs() { b } else { a })?;
+    let parts = worst.parts.iter().map(|&p| model.mesh.parts[p].name.clone()).collect();
+    Some(NamedBody { parts, gain: worst.gain, error: worst.error })
 }
 
 /// Energies of the parts beside their names, and what each has lost to erosion.

@@ -205,6 +205,8 @@ fn summary(model: &Model) -> Summary {
             friction: 3e-9,
             external: -0.0,
             error: -3.2e-5,
+            wall_loss: 0.0,
+            worst_body: None,
             contacts: vec![NamedPair {
                 parts: ["target".into(), "rod".into()],
                 contact: 5e-324,
@@ -235,6 +237,7 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
         hourglass: -0.0,
         contact: 1e-7,
         friction: 1e16,
+        wall_loss: 0.25,
         eroded: 0.0,
         eroded_elements: 0,
         eroded_mass: 0.0,
@@ -248,7 +251,8 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
                 internal: x + 0.2,
                 hourglass: -x,
                 viscosity: 0.3,
-                external: x + 0.4
+                external: x + 0.4,
+                eroded: 0.0
             };
             model.mesh.parts.len()
         ],
@@ -259,6 +263,7 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
             .then_some((1, PairVote { force: [x, -0.5, 1e-300], hits: 10 + cycle }))
             .into_iter()
             .collect(),
+        holders: Vec::new(),
     }
 }
 
@@ -535,7 +540,7 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
     );
     assert_eq!(
         keys(&json["energies"]),
-        "contact contacts error external friction hourglass internal kinetic parts viscosity"
+        "contact contacts error external friction hourglass internal kinetic parts viscosity wall_loss worst_body"
     );
     assert_eq!(
         keys(&json["work_units"]),

@@ -46,7 +46,7 @@ fn bad_peers_are_one_line_each_and_the_job_goes_on() {
     cluster.json(&submit);
     cluster.wait_until_running(1);
 
-    let hello = Hello { version: 9, ..Hello::new(Role::Worker, "old", 1.0, 1, "scalar", 1) };
+    let hello = Hello { version: 10, ..Hello::new(Role::Worker, "old", 1.0, 1, "scalar", 1) };
     let old = frame(Header::new(Kind::Hello), codec::encode(&hello).expect("plain"));
     let peer = Hello::new(Role::Peer, "peer", 1.0, 1, "scalar", 1);
     let peer = frame(Header::new(Kind::Hello), codec::encode(&peer).expect("plain"));
@@ -55,7 +55,7 @@ fn bad_peers_are_one_line_each_and_the_job_goes_on() {
     let mut damaged = old.clone();
     damaged[HEADER_LEN + 3] ^= 1;
     for (bytes, words) in [
-        (old.clone(), "protocol version 9, this side speaks 8"),
+        (old.clone(), "protocol version 10, this side speaks 9"),
         (vec![0x55; 400], "frame starts with [55, 55, 55, 55]"),
         (oversize.to_vec(), "hello: length 4294967295, limit 4096"),
         (old[..20].to_vec(), "frame header: ended after 20 bytes, needs 52"),

@@ -8,6 +8,7 @@ mod book;
 mod documents;
 mod erosion;
 mod fuzz;
+mod holders;
 mod late;
 mod seeds;
 mod sums;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mechanics::{
     load::{Drive, Loads, SurfaceKind, SurfaceLoad},
-    setup::{Constraint, MAX_WALLS},
+    setup::{Constraint, MAX_SUPPORTS, MAX_WALLS},
     wall::RigidWall,
 };
 
@@ -38,6 +38,8 @@ pub(super) struct Conditions {
 /// What a boundary prescribes, and where it stands.
 struct Prescribing {
     at: Place,
+    /// Its number among the boundaries of the deck, from 1; 0 past the last whose force is booked.
+    number: u8,
     velocity: Prescribed,
 }
 
@@ -67,7 +69,7 @@ pub(super) fn make(
     let mut clamps: BTreeMap<u32, u8> = BTreeMap::new();
     // By pair of boundaries and axis: the first node both prescribe differently, and how many.
     let mut conflicts: BTreeMap<(usize, usize, usize), (u32, usize)> = BTreeMap::new();
-    for boundary in &deck.boundaries {
+    for (number, boundary) in (1..).zip(&deck.boundaries) {
         if let BoundaryKind::Transmit(faces) = &boundary.kind {
             let selected = names.several(&boundary.parts).unwrap_or_default();
             let asking = Asking { at: boundary.at, title: &boundary.title, selected: &selected };
@@ -86,7 +88,8 @@ pub(super) fn make(
             continue;
         };
         let this = boundaries.len();
-        boundaries.push(Prescribing { at: boundary.at, velocity });
+        let number = u8::try_from(number).ok().filter(|number: &u8| *number <= MAX_SUPPORTS).unwrap_or(0);
+        boundaries.push(Prescribing { at: boundary.at, number, velocity });
         for node in nodes {
             if clamped != 0 && turns[node as usize] {
                 *clamps.entry(node).or_default() |= clamped;
@@ -166,7 +169,7 @@ fn number(
     log: &Log<'_>,
 ) -> (Vec<Constraint>, Vec<u16>) {
     let mut list = vec![Constraint::default()];
-    let mut known: BTreeMap<([DriveBits; 3], u32, u32, u8), u16> = BTreeMap::new();
+    let mut known: BTreeMap<([DriveBits; 3], [u8; 3], u32, u32, u8), u16> = BTreeMap::new();
     let mut of_node = vec![0u16; n_nodes];
     let forces = &loads.forces;
     let nodes: BTreeSet<u32> =
@@ -177,7 +180,9 @@ fn number(
         let walls = touched.get(&node).copied().unwrap_or_default();
         let clamped = clamps.get(&node).copied().unwrap_or_default();
         let velocity = [0, 1, 2].map(|axis| held[axis].and_then(|b| boundaries[b].velocity[axis]));
-        let key = (velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve))), forces, walls, clamped);
+        let supports = held.map(|held| held.map_or(0, |b| boundaries[b].number));
+        let bits = velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve)));
+        let key = (bits, supports, forces, walls, clamped);
         let next = list.len();
         let index = match known.get(&key) {
             Some(index) => *index,
@@ -191,7 +196,7 @@ fn number(
                     );
                     return (list, of_node);
                 };
-                list.push(Constraint { velocity, walls, forces, clamped });
+                list.push(Constraint { velocity, walls, forces, clamped, supports });
                 known.insert(key, index);
                 index
             }

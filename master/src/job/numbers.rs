@@ -15,7 +15,8 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<Stri
         let numbers =
             energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external.whole()]);
         let released = vote.released.iter().flat_map(|released| released.pairs()).map(|pair| pair.contact);
-        let numbers = numbers.chain(released);
+        let held = vote.walls.iter().flat_map(|wall| [wall.work.whole(), wall.loss.whole()]);
+        let numbers = numbers.chain(released).chain(held);
         let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);
         let mut numbers = numbers
             .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| *state)))

@@ -100,7 +100,9 @@ impl Account {
                 self.run_totals.worst_gap_travel
             ))
         } else {
-            stale(problem, vote, cycle).or_else(|| self.run_away(problem, cycle))
+            stale(problem, vote, cycle)
+                .or_else(|| self.run_away(problem, cycle))
+                .or_else(|| self.body_runs_away(problem, cycle))
         };
         if self.failure.is_some() && !written {
             self.row(actions);
@@ -130,6 +132,30 @@ impl Account {
             last.external,
             self.run_totals.initial_total.unwrap_or_default(),
             part.unwrap_or_default()
+        ))
+    }
+
+    /// Whether a body, of parts that nothing else has touched, gained more energy than the deck allows: in the totals of a large run it
+    /// would not show.
+    fn body_runs_away(&self, problem: &Problem, cycle: u64) -> Option<String> {
+        let limit = problem.model.setup.control.energy_error;
+        let parts = &problem.model.mesh.parts;
+        let rounding = 0.5 * problem.quanta.energy.value() * (cycle + 1) as f64;
+        let bodies = self.run_totals.bodies();
+        if bodies.len() < 2 {
+            return None;
+        }
+        let ran_away = bodies.into_iter().find(|body| {
+            let n_elements: usize = body.parts.iter().map(|&p| parts[p].n_elements()).sum();
+            let settled = body.first_stirred.is_some_and(|first| cycle >= first + SETTLED);
+            settled && body.error > limit && body.gain > rounding * n_elements as f64
+        })?;
+        let names: Vec<&str> = ran_away.parts.iter().map(|&p| parts[p].name.as_str()).collect();
+        Some(format!(
+            "part `{}` gained {:e} by itself up to cycle {cycle}: energy error {:e}, at most {limit:e}; lower control.safety_factor, refine the mesh, or raise control.energy_error",
+            names.join("`, `"),
+            ran_away.gain,
+            ran_away.error
         ))
     }
 
@@ -228,4 +254,44 @@ pub(super) fn element_fault(
         "element {}: volume {volume:e} at cycle {cycle}, at first {was:e}; refine the mesh, soften the load or add an erosion strain",
         element_name(problem, element)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::tests::job, *};
+    use crate::run_totals::PairSums;
+
+    #[test]
+    fn a_small_body_that_gains_energy_ends_the_run_by_name() {
+        let (job, _) = job(2);
+        let problem = &job.problem;
+        let run_totals = RunTotals::new(&problem.model, &job.start_state().mass);
+        let mut account = Account { run_totals, walls: Vec::new(), rows: Vec::new(), failure: None };
+        let mut book = |cycle: u64, small: f64| {
+            let mut vote = Vote::empty(2);
+            (vote.parts[0].kinetic, vote.parts[1].kinetic) = (1e15, small);
+            account.run_totals.book(&vote, cycle, cycle as f64, 1.0, None);
+        };
+        (0..30).for_each(|cycle| book(cycle, 1e6));
+        book(30, 1e7);
+        assert_eq!(account.run_away(problem, 30), None, "the sum hides it");
+        let bodies = account.run_totals.bodies();
+        assert_eq!(
+            bodies.iter().map(|body| (&body.parts[..], body.gain)).collect::<Vec<_>>(),
+            [(&[0][..], 0.0), (&[1][..], 9e6)]
+        );
+        let told = account.body_runs_away(problem, 30).expect("nine tenths of its energy");
+        let name = &problem.model.mesh.parts[1].name;
+        assert!(
+            told.starts_with(&format!(
+                "part `{name}` gained 9e6 by itself up to cycle 30: energy error 9e-1"
+            )),
+            "{told}"
+        );
+        // Once they have touched, what one gains may be the other's.
+        let touched = PairSums { parts: [0, 1], ..PairSums::default() };
+        account.run_totals.contacts.push(touched);
+        assert_eq!(account.run_totals.bodies().len(), 1);
+        assert_eq!(account.body_runs_away(problem, 30), None);
+    }
 }

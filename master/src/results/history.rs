@@ -4,6 +4,7 @@
 //! runs can be compared as files.
 
 use std::{
+    collections::BTreeSet,
     fmt::Write as _,
     fs::{self, File, OpenOptions},
     io::{Seek, SeekFrom, Write},
@@ -42,9 +43,11 @@ pub struct HistoryRow {
     /// Elements that have eroded.
     pub eroded_elements: u64,
     pub eroded_mass: f64,
-    /// Work done on the bodies from outside, by prescribed velocities and walls.
+    /// Energy lost at rigid walls: by nodes that strike them, and by friction.
+    pub wall_loss: f64,
+    /// Work done on the bodies from outside, by prescribed velocities, walls and loads.
     pub external: f64,
-    /// Sum of kinetic, internal, hourglass, contact, friction and eroded energy.
+    /// Sum of kinetic, internal, hourglass, contact, friction and eroded energy, and of what was lost at walls.
     pub total: f64,
     /// Energy error, relative, as in the summary.
     pub error: f64,
@@ -58,12 +61,25 @@ pub struct HistoryRow {
     pub element_gauges: Vec<[f64; N_FIELDS]>,
     /// The pairs of parts that are watched and in contact: index of the pair in the deck, force and hits.
     pub contacts: Vec<(u32, PairVote)>,
+    /// Walls and supports, see [`mechanics::setup::Setup::n_holders`].
+    pub holders: Vec<HolderRow>,
+}
+
+/// What a wall or a support does to the bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct HolderRow {
+    /// Force on the bodies.
+    pub force: [f64; 3],
+    /// Work on the bodies so far.
+    pub work: f64,
+    /// Energy lost at it so far, if it is a wall.
+    pub loss: f64,
 }
 
 impl HistoryRow {
     /// Columns of the energies whose sum is `total`.
-    pub const SHARES: [&'static str; 6] =
-        ["kinetic", "internal", "hourglass", "contact", "friction", "eroded"];
+    pub const SHARES: [&'static str; 7] =
+        ["kinetic", "internal", "hourglass", "contact", "friction", "eroded", "wall_loss"];
 }
 
 /// Energies of one part.
@@ -76,8 +92,10 @@ pub struct PartEnergy {
     pub hourglass: f64,
     /// Work of artificial viscosity so far (part of internal energy).
     pub viscosity: f64,
-    /// Work done on it from outside so far.
+    /// Work done on it from outside so far, less what it lost at walls.
     pub external: f64,
+    /// Energy that left it with eroded elements and dropped nodes so far.
+    pub eroded: f64,
 }
 
 impl PartEnergy {
@@ -89,9 +107,9 @@ impl PartEnergy {
         [self.kinetic, self.internal, self.hourglass, self.viscosity, self.external]
     }
 
-    /// What the part has by itself: kinetic, internal and hourglass energy less the work done on it.
+    /// What the part has by itself: kinetic, internal, hourglass and eroded energy less the work done on it.
     pub fn own(&self) -> f64 {
-        self.kinetic + self.internal + self.hourglass - self.external
+        self.kinetic + self.internal + self.hourglass + self.eroded - self.external
     }
 }
 
@@ -120,6 +138,9 @@ pub struct History {
     densities: Vec<f64>,
     /// Pairs of parts that are watched.
     n_contacts: u32,
+    /// The walls and supports that rows speak of.
+    holders: Vec<Holder>,
+    has_walls: bool,
     /// Whether anything can erode: then rows say what has.
     erodes: bool,
     row: String,
@@ -159,6 +180,8 @@ impl History {
             gauges: model.output.gauges.iter().map(|g| model.mesh.positions[g.node as usize]).collect(),
             densities: model.output.element_gauges.iter().map(|g| density(model, g.element)).collect(),
             n_contacts: model.output.contact_forces.len() as u32,
+            holders: holders(model),
+            has_walls: !model.setup.walls.is_empty(),
             erodes: model.setup.erosion.is_on(),
             row: String::new(),
         };
@@ -207,6 +230,7 @@ impl History {
             .chain([row.external, row.total, row.error])
             .chain(row.momentum)
             .chain([row.eroded, row.eroded_mass].into_iter().filter(|_| self.erodes))
+            .chain([row.wall_loss].into_iter().filter(|_| self.has_walls))
             .chain(row.parts.iter().flat_map(PartEnergy::numbers))
             .chain(row.gauges.iter().zip(&self.gauges).flat_map(|(gauge, start)| {
                 let moved: [f64; 3] = std::array::from_fn(|axis| gauge.x[axis] - start[axis]);
@@ -227,6 +251,14 @@ impl History {
                 contacts.next_if(|(index, _)| *index == pair).map(|(_, vote)| *vote).unwrap_or_default();
             let [x, y, z] = vote.force;
             let _ = write!(self.row, ",{x:?},{y:?},{z:?},{}", vote.hits);
+        }
+        for Holder { index, is_wall, .. } in &self.holders {
+            let HolderRow { force: [x, y, z], work, loss } =
+                row.holders.get(*index).copied().unwrap_or_default();
+            let _ = write!(self.row, ",{x:?},{y:?},{z:?},{work:?}");
+            if *is_wall {
+                let _ = write!(self.row, ",{loss:?}");
+            }
         }
         if self.erodes {
             let _ = write!(self.row, ",{}", row.eroded_elements);
@@ -290,6 +322,29 @@ fn reading(state: &[f64; N_FIELDS], density: f64) -> [f64; READINGS.len()] {
     ]
 }
 
+/// A wall or a support with columns of its own.
+#[derive(Debug)]
+struct Holder {
+    /// As it is numbered in the deck: `wall 1`, `boundary 2`.
+    name: String,
+    /// Place among the holders of a vote.
+    index: usize,
+    is_wall: bool,
+}
+
+/// All walls, and the supports that prescribe a velocity.
+fn holders(model: &Model) -> Vec<Holder> {
+    let n_walls = model.setup.walls.len();
+    let walls = (0..n_walls).map(|w| Holder { name: format!("wall {}", w + 1), index: w, is_wall: true });
+    let numbers: BTreeSet<u8> = model.setup.constraints.iter().flat_map(|held| held.supports).collect();
+    let supports = numbers.into_iter().filter(|number| *number > 0).map(|number| Holder {
+        name: format!("boundary {number}"),
+        index: n_walls + usize::from(number) - 1,
+        is_wall: false,
+    });
+    walls.chain(supports).collect()
+}
+
 /// Density of the undeformed material of an element.
 fn density(model: &Model, element: u32) -> f64 {
     let part = model.mesh.element_offsets().partition_point(|&first| first <= element as usize) - 1;
@@ -307,6 +362,9 @@ fn header(model: &Model) -> String {
     if model.setup.erosion.is_on() {
         columns.push(format!("eroded [{energy}]"));
         columns.push(format!("eroded mass [{mass}]"));
+    }
+    if !model.setup.walls.is_empty() {
+        columns.push(format!("wall_loss [{energy}]"));
     }
     for part in &model.mesh.parts {
         columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
@@ -329,6 +387,13 @@ fn header(model: &Model) -> String {
         let [a, b] = pair.map(|part| &model.mesh.parts[part as usize].name);
         columns.extend(["fx", "fy", "fz"].iter().map(|axis| format!("{a} from {b}:{axis} [{force}]")));
         columns.push(format!("{a} from {b}:contacts"));
+    }
+    for Holder { name, is_wall, .. } in holders(model) {
+        columns.extend(["fx", "fy", "fz"].iter().map(|axis| format!("{name}:{axis} [{force}]")));
+        columns.push(format!("{name}:work [{energy}]"));
+        if is_wall {
+            columns.push(format!("{name}:loss [{energy}]"));
+        }
     }
     if model.setup.erosion.is_on() {
         columns.push("eroded elements".to_owned());

@@ -67,9 +67,9 @@ fn page(history: &Table, summary: &Summary, units: &str) -> String {
         ("vy", "Velocity of gauges, y", format!("{length}/{time}")),
         ("vz", "Velocity of gauges, z", format!("{length}/{time}")),
         ("pressure", "Pressure at gauges", stress.to_owned()),
-        ("fx", "Contact force, x", force.to_owned()),
-        ("fy", "Contact force, y", force.to_owned()),
-        ("fz", "Contact force, z", force.to_owned()),
+        ("fx", "Force of contact, walls and supports, x", force.to_owned()),
+        ("fy", "Force of contact, walls and supports, y", force.to_owned()),
+        ("fz", "Force of contact, walls and supports, z", force.to_owned()),
     ] {
         let of_owner = |column: &String| {
             let (owner, found) = quantity(column)?;

@@ -152,6 +152,16 @@ pub struct NamedPart {
     pub eroded_elements: u64,
 }
 
+/// A body: parts that share nodes or have touched, and nothing else has touched them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NamedBody {
+    pub parts: Vec<String>,
+    /// Energy that appeared or vanished in it.
+    pub gain: f64,
+    /// That over the greatest of what it had first, of its kinetic energies, and of the work done on it.
+    pub error: f64,
+}
+
 /// Energies of the contact of two parts in the deck's unit of energy.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NamedPair {
@@ -179,10 +189,16 @@ pub struct Energies {
     pub contact: f64,
     /// Part of `contact` that friction took.
     pub friction: f64,
+    /// Energy lost at rigid walls: by nodes that strike them, and by friction.
+    #[serde(default)]
+    pub wall_loss: f64,
     /// Work done on the bodies from outside.
     pub external: f64,
     /// Energy error: what appeared or vanished, relative.
     pub error: f64,
+    /// The body whose own energy error is greatest, where there are several.
+    #[serde(default)]
+    pub worst_body: Option<NamedBody>,
     /// By part, in deck order.
     pub parts: Vec<NamedPart>,
     /// By pair of parts that touched, in deck order.
@@ -300,6 +316,14 @@ impl Summary {
         ] {
             writeln!(out, "             {name:<10} {:>14}", significant(value))?;
         }
+        if self.energies.wall_loss != 0.0 {
+            let lost = significant(self.energies.wall_loss);
+            writeln!(
+                out,
+                "             {:<10} {lost:>14}   lost by nodes that struck walls, and to friction there",
+                "walls"
+            )?;
+        }
         if self.eroded_elements > 0 {
             let eroded = self.energies.parts.iter().filter(|part| part.eroded_elements > 0);
             let parts: Vec<String> = eroded
@@ -326,6 +350,13 @@ impl Summary {
             "error",
             percent(error)
         )?;
+        if let Some(NamedBody { parts, error, .. }) = &self.energies.worst_body {
+            let mut names = parts[..parts.len().min(NAMED_PARTS)].join(", ");
+            if parts.len() > NAMED_PARTS {
+                names.push_str(", ...");
+            }
+            writeln!(out, "             {:<10} {:>14}   worst body: {names}", "of a body", percent(*error))?;
+        }
         writeln!(
             out,
             "  momentum   {:<10} {:>14}   supports and walls included",

@@ -60,7 +60,7 @@ pub struct Nodes<'a> {
     pub sets: &'a [NodeSet],
     /// Positions that displacements of surface nodes are counted from: eight for each set with such a node.
     pub reference: &'a [Vec<f64>; 3],
-    /// What booked nodes gave each wall in this step, by wall: terms are added to it.
+    /// What booked nodes gave each wall and support in this step, see [`crate::setup::Setup::n_holders`]: terms are added to it.
     pub walls: &'a mut [WallVote],
 }
 

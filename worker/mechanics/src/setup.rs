@@ -47,6 +47,19 @@ pub struct Constraint {
     pub forces: u32,
     /// Axes about which a node of shells does not turn: bit 0 is x.
     pub clamped: u8,
+    /// By axis the number of the support that prescribes the velocity, from 1; 0 is none whose force is wanted.
+    pub supports: [u8; 3],
+}
+
+/// Highest number of a support whose force is booked.
+pub const MAX_SUPPORTS: u8 = 64;
+
+impl Setup {
+    /// How many walls and supports book what nodes give them: supports stand behind the walls, by their number.
+    pub fn n_holders(&self) -> usize {
+        let supports = self.constraints.iter().flat_map(|held| held.supports).max().unwrap_or(0);
+        self.walls.len() + usize::from(supports)
+    }
 }
 
 /// Most walls in a run: one bit each in [`Constraint::walls`].

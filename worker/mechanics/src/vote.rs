@@ -50,7 +50,7 @@ pub struct Vote {
     pub momentum: [f64; 3],
     /// Energies by part.
     pub parts: Vec<PartVote>,
-    /// What nodes gave each wall; empty if none was touched.
+    /// What nodes gave each wall and support, see [`crate::setup::Setup::n_holders`]; empty if none was touched.
     pub walls: Vec<WallVote>,
     /// States of the rigid bodies after the cycle; the same from every worker.
     pub bodies: Vec<rigid::State>,
@@ -165,6 +165,8 @@ pub struct PartVote {
     pub hourglass: f64,
     /// Work of artificial viscosity in this cycle (part of `internal`).
     pub viscosity: f64,
+    /// Energy that left with eroded elements and dropped nodes in this cycle.
+    pub gone: f64,
     /// Work of prescribed velocities, walls and loads in this cycle.
     pub external: Work,
 }
@@ -228,6 +230,7 @@ impl Vote {
             mine.internal += theirs.internal;
             mine.hourglass += theirs.hourglass;
             mine.viscosity += theirs.viscosity;
+            mine.gone += theirs.gone;
             mine.external.merge(theirs.external);
         }
         for (mine, theirs) in self.extents.iter_mut().zip(&other.extents) {

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     exact::Quantum,
     load::{Curve, Drive},
+    vote::Work,
 };
 
 /// A wall that no node of the named parts enters.
@@ -129,12 +130,16 @@ pub fn poses(
     }));
 }
 
-/// What the nodes gave a wall in one cycle: exact sums.
+/// What the nodes gave a wall or a support in one cycle, and its work: exact sums.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WallVote {
     pub impulse: [f64; 3],
     /// Mass of the nodes that touched a wall of finite mass.
     pub touched: f64,
+    /// Work on the nodes: of a wall by its own velocity, of a support by that which it prescribes.
+    pub work: Work,
+    /// What nodes lost at a wall beside that: a node that strikes it stops at once, and friction.
+    pub loss: Work,
 }
 
 impl WallVote {
@@ -144,6 +149,8 @@ impl WallVote {
             self.impulse[a] += other.impulse[a];
         }
         self.touched += other.touched;
+        self.work.merge(other.work);
+        self.loss.merge(other.loss);
     }
 }
 
@@ -292,8 +299,8 @@ mod tests {
         let sphere = Shape::Sphere { centre: [0.0; 3], radius: 1.0 };
         let walls = [wall(sphere, Motion::Fixed, 0.0), wall(sphere, motion, 0.0)];
         let mut free = first_poses(&walls);
-        let vote = WallVote { impulse: [2.0, 0.0, -8.0], touched: 1.0 };
-        let other = WallVote { impulse: [9.0; 3], touched: 0.0 };
+        let vote = WallVote { impulse: [2.0, 0.0, -8.0], touched: 1.0, ..WallVote::default() };
+        let other = WallVote { impulse: [9.0; 3], ..WallVote::default() };
         advance(&walls, &[other, vote], 0.25, &mut free).expect("light nodes");
         assert_eq!(free, [[[0.25, 0.0, 0.0], [1.5, 0.0, -2.0]]]);
         let heavy = WallVote { touched: 2.5, ..vote };

@@ -85,7 +85,7 @@ impl Domain {
                     booked: Booked::default(),
                     faces,
                     face_vote: NO_FACES,
-                    walls: vec![WallVote::default(); setup.walls.len()],
+                    walls: vec![WallVote::default(); setup.n_holders()],
                     eroding,
                 });
             }
@@ -132,7 +132,7 @@ impl Domain {
             gone: Gone::default(),
             surface_ends: false,
             poses: Vec::with_capacity(setup.walls.len()),
-            unbooked: vec![WallVote::default(); setup.walls.len()],
+            unbooked: vec![WallVote::default(); setup.n_holders()],
             setup,
             n_parts,
             quanta,

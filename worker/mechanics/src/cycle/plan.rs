@@ -192,7 +192,9 @@ impl Domain {
                 if booked {
                     let [x, y, z] = velocity;
                     let square = x.mul_add(x, y.mul_add(y, z * z));
-                    self.gone.kinetic += self.quanta.energy.round(0.5 * mass * square);
+                    let kinetic = self.quanta.energy.round(0.5 * mass * square);
+                    self.gone.kinetic += kinetic;
+                    self.vote.parts[held_block.block.part as usize].gone += kinetic;
                     for (sum, v) in self.gone.momentum.iter_mut().zip(velocity) {
                         *sum += self.quanta.momentum.round(mass * v);
                     }

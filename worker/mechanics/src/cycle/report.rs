@@ -76,6 +76,7 @@ impl Domain {
                 let eroded_now = eroding.take_casualties();
                 vote.add_eroded(&eroded_now.elements);
                 vote.gone.internal += eroded_now.internal;
+                vote.parts[part].gone += eroded_now.internal;
             }
         }
         self.vote_on_bodies(&mut vote);

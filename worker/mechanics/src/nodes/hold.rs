@@ -4,7 +4,7 @@ use super::{Advance, NodeSet, Nodes};
 use crate::{
     lanes::SET,
     vote::Work,
-    wall::{Motion, touched_quantum},
+    wall::{Motion, Pose, WallVote, touched_quantum},
 };
 
 impl Advance<'_> {
@@ -36,9 +36,15 @@ impl Advance<'_> {
                 }
                 forces &= forces - 1;
             }
-            for (component, prescribed) in new.iter_mut().zip(held.velocity) {
-                if let Some(velocity) = prescribed {
-                    *component = velocity.at(curves, 0.5f64.mul_add(self.dt, self.time));
+            for axis in 0..3 {
+                let Some(velocity) = held.velocity[axis] else { continue };
+                let before = new[axis];
+                new[axis] = velocity.at(curves, 0.5f64.mul_add(self.dt, self.time));
+                if let Some(support) = held.supports[axis].checked_sub(1).filter(|_| booked) {
+                    let vote = &mut nodes.walls[self.walls.len() + usize::from(support)];
+                    let impulse = mass * (new[axis] - before);
+                    vote.impulse[axis] -= self.quanta.momentum.round(impulse);
+                    vote.work.merge(self.halves(0.5 * impulse * old[axis], 0.5 * impulse * new[axis]));
                 }
             }
             let mut walls = held.walls;
@@ -47,10 +53,7 @@ impl Advance<'_> {
                 let x = [nodes.x[0][i], nodes.x[1][i], nodes.x[2][i]];
                 let before = new;
                 if self.walls[w].stop(&self.poses[w], x, &mut new, self.dt) && booked {
-                    let quantum = self.quanta.momentum;
-                    for a in 0..3 {
-                        nodes.walls[w].impulse[a] += quantum.round(mass * (before[a] - new[a]));
-                    }
+                    self.struck(&mut nodes.walls[w], &self.poses[w], mass, [old, before, new]);
                     if let Motion::Free { mass: own, .. } = self.walls[w].motion {
                         nodes.walls[w].touched += touched_quantum(own).round(mass);
                     }
@@ -69,5 +72,29 @@ impl Advance<'_> {
             }
         }
         external
+    }
+
+    /// Books what a wall and a node that it stops give each other. The velocities are those before the step, without the wall, and with it.
+    ///
+    /// Of the work of the impulse, `J . v`, the wall does `J . w` with its own velocity; the rest is lost.
+    fn struck(&self, vote: &mut WallVote, [_, speed]: &Pose, mass: f64, [old, free, new]: [[f64; 3]; 3]) {
+        let impulse: [f64; 3] = std::array::from_fn(|a| mass * (new[a] - free[a]));
+        for a in 0..3 {
+            vote.impulse[a] -= self.quanta.momentum.round(impulse[a]);
+        }
+        let half = |v: [f64; 3]| (0..3).map(|a| 0.5 * impulse[a] * v[a]).sum::<f64>();
+        let done = half(*speed);
+        vote.work.merge(self.halves(done, done));
+        vote.loss.merge(self.halves(done - half(old), done - half(new)));
+    }
+
+    /// Work before `t_n` and after it, rounded; all of it is after the start of a run.
+    fn halves(&self, before: f64, after: f64) -> Work {
+        let [before, after] = [before, after].map(|half| self.quanta.energy.round(half));
+        let mut work = Work { before, after };
+        if self.is_first() {
+            work.put_off();
+        }
+        work
     }
 }
