@@ -35,11 +35,10 @@ pub(crate) trait EquationOfState: Copy {
     /// Least bulk stiffness used for the sound speed (stress), where tension has softened the law.
     fn least_stiffness<L: Lane>(&self, burnt: L) -> L;
 
-    /// Time until lighting (negative after it) as the compression may have shortened it, and the fraction burnt, in an
-    /// element of this initial volume.
+    /// How far an element of this initial volume has burnt, from the time until lighting (negative after it).
     #[inline(always)]
-    fn burn<L: Lane>(&self, time_to_light: L, _v: L, _initial_volume: L) -> (L, L) {
-        (time_to_light, L::splat(1.0))
+    fn burn<L: Lane>(&self, time_to_light: L, _v: L, _initial_volume: L) -> Burn<L> {
+        Burn { time_to_light, burnt: L::splat(1.0), pace_square: L::splat(0.0) }
     }
 }
 
@@ -109,12 +108,23 @@ impl EquationOfState for AnyEos {
     }
 
     #[inline(always)]
-    fn burn<L: Lane>(&self, time_to_light: L, v: L, initial_volume: L) -> (L, L) {
+    fn burn<L: Lane>(&self, time_to_light: L, v: L, initial_volume: L) -> Burn<L> {
         match self {
             Self::Jwl(law) => law.burn(time_to_light, v, initial_volume),
-            _ => (time_to_light, L::splat(1.0)),
+            _ => Burn { time_to_light, burnt: L::splat(1.0), pace_square: L::splat(0.0) },
         }
     }
+}
+
+/// How far an element has burnt.
+#[derive(Clone, Copy)]
+pub(crate) struct Burn<L> {
+    /// Time until lighting, which a compression to the end of the burn has brought to the end of it.
+    pub time_to_light: L,
+    /// From 0 to 1.
+    pub burnt: L,
+    /// Square of the speed at which the burn crosses elements, for the limit of the step; 0 where none is near.
+    pub pace_square: L,
 }
 
 /// Slope of the isentrope by differences, for the tests of the laws: `-v dp/dv` with `dE = -p dv`.

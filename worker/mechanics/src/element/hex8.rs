@@ -305,10 +305,11 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let middle = at_mid.volume() * inverse_initial;
     let energy_before = (deviatoric_power * dt).mul_add(middle, energy_before);
     let mut burnt = one;
-    let mut time_to_light = zero;
+    let (mut time_to_light, mut pace_square) = (zero, zero);
     if laws.eos.burns() {
         let left = view.state::<L>(slot, field::TIME_TO_LIGHT) - dt;
-        (time_to_light, burnt) = laws.eos.burn(left, relative_volume, initial_volume);
+        let now = laws.eos.burn(left, relative_volume, initial_volume);
+        (time_to_light, burnt, pace_square) = (now.time_to_light, now.burnt, now.pace_square);
     }
     let line = laws.eos.line(relative_volume, burnt);
     let energy = pressure_before.neg_mul_add(volume_change, energy_before);
@@ -360,6 +361,8 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     // 8. Votes and energies.
     let double_inverse_square = L::splat(2.0 / 512.0) * inverse_volume * inverse_volume;
     let shear_square = L::splat(laws.strength.shear() / laws.density) * relative_volume;
+    // The burn crosses elements faster than sound, and the step follows it.
+    let sound_square = sound_square.max(pace_square);
     let swing = Swing { damping, sound_square, shear_square, trace: spread.trace() * double_inverse_square };
     let bound = swing.frequency(spread.eigenvalue_bound() * double_inverse_square);
     let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);

@@ -147,28 +147,28 @@ fn charge(cells: u32) -> Column {
     Column::new(&piece, &tnt, 8e4)
 }
 
-/// A miss: the peak should come to p_CJ as the run grows in cells, and it falls, to 0.919 after 360 cells.
 #[test]
-fn a_detonation_from_a_wall_runs_at_its_speed_with_a_peak_that_is_seven_per_cent_low() {
+fn a_detonation_from_a_wall_runs_at_its_speed_to_its_peak() {
     let mut column = charge(200);
     let mut lit = 0;
     let mut peak = 0.0_f64;
     while column.time < 180.0 * H / D {
         column.cycle(0.0, None);
-        // An element bears pressure from the step in which the front passes its centre.
-        while lit < 200 && column.pressure(lit) > 0.0 {
+        // An element bears a tenth of the pressure about when the front passes its centre.
+        while lit < 200 && column.pressure(lit) > 0.1 * P_CJ {
             let due = (lit as f64 + 0.5) * H / D;
-            assert!(due < column.time && column.time < due + 1e-7, "{lit}: {due} {}", column.time);
+            assert!((column.time - due).abs() < H / D, "{lit}: {due} {}", column.time);
             lit += 1;
         }
-        assert!((lit..200).all(|e| column.pressure(e) == 0.0), "ahead of the front at {}", column.time);
+        let ahead = (lit + 4).min(200)..200;
+        assert!(ahead.into_iter().all(|e| column.pressure(e) < 1e-3 * P_CJ), "at {}", column.time);
         if column.time > 150.0 * H / D {
             peak = (0..200).map(|e| column.pressure(e)).fold(peak, f64::max);
         }
     }
     println!("TNT from a wall: {lit} of 200 lit, peak {:.4} p_CJ", peak / P_CJ);
     assert!((179..=181).contains(&lit), "{lit} lit");
-    assert!((peak / P_CJ - 1.0).abs() < 0.07, "{peak}");
+    assert!((peak / P_CJ - 1.0).abs() < 0.03, "{peak}");
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn behind_a_detonation_that_is_pushed_stands_the_chapman_jouguet_state() {
     while column.time < 180.0 * H / D {
         column.cycle(U_CJ, None);
     }
-    let front = (0..200).find(|&e| column.pressure(e) == 0.0).expect("the front is inside");
+    let front = (0..200).find(|&e| column.pressure(e) < 0.1 * P_CJ).expect("the front is inside");
     let mean = |value: &dyn Fn(usize) -> f64| (60..160).map(value).sum::<f64>() / 100.0;
     let pressure = mean(&|e| column.pressure(e));
     let volume = mean(&|e| column.block.field(e, field::RELATIVE_VOLUME));
