@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use mechanics::{
     law::{Bound, Constant, Declaration},
-    material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength},
+    material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
 };
 use toml::de::DeTable;
 
@@ -315,6 +315,10 @@ fn read_failure(value: Value<'_>, table: Table<'_>, strength: Option<&Strength>)
     failure
 }
 
+/// What a Johnson-Cook material takes its temperature from.
+pub(crate) const HEATS: [(&str, Heat); 2] =
+    [("plastic-work", Heat::PlasticWork), ("internal-energy", Heat::InternalEnergy)];
+
 fn read_johnson_cook(table: &Table<'_>) -> Option<Strength> {
     let shear = table.number("shear", Range::Positive);
     let a = table.number("a", Range::Positive);
@@ -326,6 +330,10 @@ fn read_johnson_cook(table: &Table<'_>) -> Option<Strength> {
     let t_room = table.number("t_room", Range::Positive);
     let specific_heat = table.number("specific_heat", Range::Positive);
     let rate0 = table.number("rate0", Range::Positive);
+    let heat = match table.get("temperature") {
+        Some(value) => HEATS[value.one_of(&HEATS.map(|(word, _)| word))?].1,
+        None => Heat::PlasticWork,
+    };
     let (t_melt, t_room) = (t_melt?, t_room?);
     if t_melt <= t_room {
         table.faults.add(
@@ -347,6 +355,7 @@ fn read_johnson_cook(table: &Table<'_>) -> Option<Strength> {
         t_room,
         specific_heat: specific_heat?,
         rate0: rate0?,
+        heat,
     })
 }
 

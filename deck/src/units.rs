@@ -128,20 +128,31 @@ impl Units {
                     let rate = rate.map(|rate| self.cowper_symonds(rate));
                     Strength::Tabulated { shear: stress(shear), hardening, rate }
                 }
-                Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => {
-                    Strength::JohnsonCook {
-                        shear: stress(shear),
-                        a: stress(a),
-                        b: stress(b),
-                        n,
-                        c,
-                        m,
-                        t_melt,
-                        t_room,
-                        specific_heat: scale(specific_heat, self.specific_energy()),
-                        rate0: scale(rate0, -self.time),
-                    }
-                }
+                Strength::JohnsonCook {
+                    shear,
+                    a,
+                    b,
+                    n,
+                    c,
+                    m,
+                    t_melt,
+                    t_room,
+                    specific_heat,
+                    rate0,
+                    heat,
+                } => Strength::JohnsonCook {
+                    shear: stress(shear),
+                    a: stress(a),
+                    b: stress(b),
+                    n,
+                    c,
+                    m,
+                    t_melt,
+                    t_room,
+                    specific_heat: scale(specific_heat, self.specific_energy()),
+                    rate0: scale(rate0, -self.time),
+                    heat,
+                },
                 declared => declared.converted(&|unit, x| scale(x, self.power(unit))),
             },
             failure: self.failure_from_si(material.failure),

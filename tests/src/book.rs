@@ -76,6 +76,7 @@ macro_rules! each_case_of_the_book {
             law: products_have_their_chapman_jouguet_state_and_follow_its_isentrope quick;
             law: a_detonation_runs_at_its_speed_with_its_pressure_behind quick;
             law: detonations_at_default_settings_reach_the_state_of_chapman_and_jouguet quick;
+            law: a_shock_heats_by_the_energy_above_the_cold_curve quick;
             law: johnson_cook_has_its_point_values_in_an_element quick;
             solid: the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find quick;
             solid: finer_copper_bars_come_nearer_to_what_others_converge_to long;

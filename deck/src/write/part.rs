@@ -2,13 +2,14 @@
 
 use mechanics::{
     element::shell4::Rule,
-    material::{CowperSymonds, Eos, Failure, Material, Strength},
+    material::{CowperSymonds, Eos, Failure, Heat, Material, Strength},
     mesh::{Section, Topology},
 };
 
 use super::value::{Text, list, numbers, quoted, table, vector};
 use crate::{
     blocks::{Sector, Shape},
+    library::HEATS,
     typed::{
         Deck,
         mesh::{Explicit, PartMesh, Source},
@@ -96,9 +97,8 @@ fn strength(strength: &Strength) -> String {
             keys.push(("points", list(points.map(|point| numbers(&point)))));
             law("tabulated", with_rate(keys, rate))
         }
-        Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => law(
-            "johnson-cook",
-            plain(&[
+        Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0, heat } => {
+            let mut keys = plain(&[
                 ("shear", *shear),
                 ("a", *a),
                 ("b", *b),
@@ -109,8 +109,11 @@ fn strength(strength: &Strength) -> String {
                 ("t_room", *t_room),
                 ("specific_heat", *specific_heat),
                 ("rate0", *rate0),
-            ]),
-        ),
+            ]);
+            let words = HEATS.iter().find(|(_, one)| one == heat && *heat != Heat::PlasticWork);
+            keys.extend(words.map(|(word, _)| ("temperature", quoted(word))));
+            law("johnson-cook", keys)
+        }
         other => {
             let (name, constants) =
                 other.declared().expect("a law that is not written by hand declares its constants");

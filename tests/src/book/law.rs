@@ -200,7 +200,9 @@ fn front(material: &str, [speed, pressure, pushed]: [f64; 3], cells: u32, with_p
     let end = f64::from(cells) * 1e-3 / speed;
     let deck = charge(cells + 20, end, &(face + &gauges)).replace("\"TNT\"", &format!("\"{material}\""));
     let solved = run(model(&deck));
-    let history = |gauge: usize| solved.rows.iter().map(move |row| (row.time, row.element_gauges[gauge][field::PRESSURE]));
+    let history = |gauge: usize| {
+        solved.rows.iter().map(move |row| (row.time, row.element_gauges[gauge][field::PRESSURE]))
+    };
     let passed = |gauge: usize| crossing(history(gauge), 0.25 * pressure).expect("the front passed");
     let last = places.len() - 1;
     let way = f64::from(places[last] - places[0]) * 1e-3;
@@ -222,6 +224,45 @@ pub(super) fn detonations_at_default_settings_reach_the_state_of_chapman_and_jou
                 figures.add(&format!("detonation @ {of}, speed over the quoted one"), speed);
                 figures.add(&format!("detonation @ {of}, energy error"), error);
             }
+        }
+    }
+}
+
+/// Temperature behind a shock of this pressure, with `temperature = "internal-energy"`: a bar whose sides are held is thrown at a wall.
+fn temperature_behind(density: f64, [c0, s, gamma, specific_heat]: [f64; 4], pressure: f64) -> f64 {
+    // Of p = rho (c0 + s u) u.
+    let half = 0.5 * c0 / s;
+    let u = (half * half + pressure / (density * s)).sqrt() - half;
+    let end = 0.08 / (c0 + s * u);
+    let solved = run(model(&format!(
+        "title = \"shock\"\nunits = \"SI\"\n[control]\nend_time = {end:e}\n\
+         [[part]]\nname = \"bar\"\nvelocity = [{:e}, 0, 0]\n\
+         box = {{ origin = [0, 0, 0], size = [0.1, 1e-3, 1e-3], cells = [100, 1, 1] }}\n\
+         [part.material]\ndensity = {density:?}\n\
+         eos = {{ type = \"shock\", c0 = {c0:?}, s = {s:?}, gamma = {gamma:?} }}\n\
+         [part.material.strength]\ntype = \"johnson-cook\"\nshear = 1e9\na = 1e6\nb = 0\nn = 1\nc = 0\nm = 1\n\
+         t_melt = 1e4\nt_room = 300\nspecific_heat = {specific_heat:?}\nrate0 = 1\ntemperature = \"internal-energy\"\n\
+         [[boundary]]\ntype = \"fixed\"\naxes = \"yz\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n",
+        -u
+    )));
+    solved.element_mean(
+        &solved.state,
+        0,
+        |[x, ..]| (0.03..0.06).contains(&x),
+        |state, e| state.elements[field::TEMPERATURE][e],
+    )
+}
+
+pub(super) fn a_shock_heats_by_the_energy_above_the_cold_curve(figures: &mut Figures) {
+    for (name, density, constants) in [
+        ("copper", 8930.0, [3940.0, 1.489, 1.99, 383.0]),
+        ("aluminium 2024", 2785.0, [5328.0, 1.338, 2.0, 885.0]),
+    ] {
+        for pressure in [30, 100] {
+            figures.add(
+                &format!("Hugoniot temperature @ {name}, {pressure} GPa (K)"),
+                temperature_behind(density, constants, f64::from(pressure) * 1e9),
+            );
         }
     }
 }

@@ -20,7 +20,7 @@ use mechanics::{
     exact::Quantum,
     initial,
     lanes::Width,
-    material::{Eos, Failure, Hardening, MAX_HARDENING, Material, Strength},
+    material::{Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
     mesh::{Mesh, Part, Section, Topology},
     piece::{Region, cut},
     setup::{Constraint, Control, Setup},
@@ -244,7 +244,7 @@ fn plates(
             name: name.into(),
             density,
             eos: Eos::Shock { c0, s, gamma },
-            strength: Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 },
+            strength: Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0, heat: Heat::PlasticWork },
             failure: Failure::None,
         }
     });
@@ -438,7 +438,7 @@ const SHEAR: f64 = 81.8e9;
 fn johnson_cook(m: f64) -> Strength {
     let (a, b, n, c) = (350e6, 275e6, 0.36, 0.022);
     let (t_melt, t_room, specific_heat, rate0) = (1811.0, 300.0, 452.0, 1.0);
-    Strength::JohnsonCook { shear: SHEAR, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 }
+    Strength::JohnsonCook { shear: SHEAR, a, b, n, c, m, t_melt, t_room, specific_heat, rate0, heat: Heat::PlasticWork }
 }
 
 /// A steel by these laws.

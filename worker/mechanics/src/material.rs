@@ -9,7 +9,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::strength::{AnyStrength, StrengthLaw};
-pub use crate::strength::{CowperSymonds, Hardening, MAX_HARDENING, Strength};
+pub use crate::strength::{CowperSymonds, Hardening, Heat, MAX_HARDENING, Strength};
 
 /// One material: constants in the deck's consistent units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

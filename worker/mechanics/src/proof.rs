@@ -13,7 +13,7 @@ use crate::{
     exact::Quantum,
     lanes::{Width, functions, scalar::Scalar},
     load::Loads,
-    material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength},
+    material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
     mesh::{Part, Topology},
     setup::{Constraint, Control, Setup},
     state::{N_FIELDS, ShellState, field},
@@ -135,6 +135,7 @@ fn materials() -> Vec<Material> {
         t_room,
         specific_heat,
         rate0: 1.0,
+        heat: Heat::PlasticWork,
     };
     let mut hardening = Hardening { n_points: 3, strain: [0.0; MAX_HARDENING], stress: [0.0; MAX_HARDENING] };
     hardening.strain[..3].copy_from_slice(&[0.0, 0.05, 0.3]);

@@ -162,6 +162,12 @@ pub(crate) trait StrengthLaw: Copy {
         0.0
     }
 
+    /// Kelvin per internal energy per initial volume above the cold curve, where the temperature follows that; else 0.
+    #[inline(always)]
+    fn heating_by_energy(&self) -> f64 {
+        0.0
+    }
+
     /// Returns the trial deviator to the yield surface. Only lanes in `active` need be right; what the others
     /// hold is arbitrary.
     fn update<L: Lane>(
@@ -229,7 +235,7 @@ pub enum Strength {
         rate: Option<CowperSymonds>,
     },
     /// `Y = (A + B e^n)(1 + C ln max(rate/rate0, 1))(1 - T*^m)`, `T* = (T - t_room)/(t_melt - t_room)` clamped
-    /// to 0..1; T rises by plastic work over `density * specific_heat` (Johnson and Cook 1983).
+    /// to 0..1 (Johnson and Cook 1983).
     JohnsonCook {
         /// Shear modulus G (stress).
         shear: f64,
@@ -251,9 +257,21 @@ pub enum Strength {
         specific_heat: f64,
         /// Reference strain rate (1/time).
         rate0: f64,
+        /// What T follows; shells take plastic work always.
+        heat: Heat,
     },
     /// Von Mises yield with saturating hardening.
     Voce(Voce),
+}
+
+/// What the temperature of a Johnson-Cook material follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Heat {
+    /// Plastic work over `density * specific_heat`.
+    PlasticWork,
+    /// `(E - E_cold(v)) / (density * specific_heat)`: the internal energy, that of shocks too, less that of the material at the same volume
+    /// without heat. The cold curve is the isentrope at 0 K, `dE_cold = -p(v, E_cold) dv`.
+    InternalEnergy,
 }
 
 impl Strength {
@@ -317,7 +335,12 @@ impl AnyStrength {
             Strength::Tabulated { shear, hardening, rate } => {
                 Self::Tabulated(Tabulated::new(shear, &hardening, RateFactor::of(rate)))
             }
-            Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0 } => {
+            Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0, heat } => {
+                let heating = 1.0 / (material.density * specific_heat);
+                let [by_work, by_energy] = match heat {
+                    Heat::PlasticWork => [heating, 0.0],
+                    Heat::InternalEnergy => [0.0, heating],
+                };
                 Self::JohnsonCook(JohnsonCook {
                     shear,
                     a,
@@ -327,7 +350,9 @@ impl AnyStrength {
                     m,
                     t_room,
                     inverse_range: 1.0 / (t_melt - t_room),
-                    heating: 1.0 / (material.density * specific_heat),
+                    heating,
+                    by_work,
+                    by_energy,
                     inverse_rate0: 1.0 / rate0,
                 })
             }
@@ -370,6 +395,11 @@ impl StrengthLaw for AnyStrength {
     #[inline(always)]
     fn heating(&self) -> f64 {
         of_any!(self, law => law.heating())
+    }
+
+    #[inline(always)]
+    fn heating_by_energy(&self) -> f64 {
+        of_any!(self, law => law.heating_by_energy())
     }
 
     #[inline(always)]

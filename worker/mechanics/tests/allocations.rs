@@ -10,7 +10,7 @@ use mechanics::{
     initial,
     lanes::Width,
     load::Drive,
-    material::{Eos, Failure, Material, Strength},
+    material::{Eos, Failure, Heat, Material, Strength},
     mesh::{Mesh, Part, Topology},
     piece::{Region, cut},
     setup::{Constraint, Control, Setup},
@@ -84,6 +84,7 @@ fn domain() -> Domain {
         t_room: 300.0,
         specific_heat: 4.5e-6,
         rate0: 1e-6,
+        heat: Heat::PlasticWork,
     };
     let eos = Eos::Shock { c0: 0.457, s: 1.49, gamma: 2.17 };
     let setup = Setup {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use mechanics::material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength};
+use mechanics::material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength};
 
 use super::state::Translation;
 use crate::{
@@ -201,6 +201,7 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
                 t_room: *t_room,
                 specific_heat: *specific_heat,
                 rate0: *rate0,
+                heat: Heat::PlasticWork,
             }
         }
     })

@@ -345,6 +345,23 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         damage_after = laws.failure.damage(damage, &loading);
     }
 
+    let mut temperature = history.temperature;
+    let by_energy = laws.strength.heating_by_energy();
+    if E::IS_CHOSEN && by_energy != 0.0 {
+        // The temperature before says how far the energy was above the cold curve, which is followed to the new volume.
+        let heat = view.state::<L>(slot, field::TEMPERATURE) * L::splat(1.0 / by_energy);
+        let cold_before = view.state::<L>(slot, field::ENERGY) - heat;
+        let line_before = laws.eos.line(volume_before, burnt);
+        let pressure_before = line_before.pressure(cold_before);
+        let chord = line.energy_after(cold_before, pressure_before, zero, volume_change);
+        // A shock crosses an element in a few steps: the curve bends between the ends of the chord, by the slopes there.
+        let slope_before = line_before.stiffness(volume_before, pressure_before, cold_before) / volume_before;
+        let slope = line.stiffness(relative_volume, line.pressure(chord), chord) / relative_volume;
+        let bend = volume_change * volume_change * (slope - slope_before);
+        let cold = L::splat(1.0 / 12.0).neg_mul_add(bend, chord);
+        temperature = (energy - cold) * L::splat(by_energy);
+    }
+
     // 7. Which elements count.
     let check = energy + pressure + viscosity + hourglass.square() + stress.sum();
     let upright = L::both(zero.less(at_mid.volume_times_64), zero.less(at_end.volume_times_64));
@@ -400,7 +417,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
             view.set_state(slot, field::PLASTIC_STRAIN, history.plastic_strain, active);
         }
         if laws.strength.thermal() {
-            view.set_state(slot, field::TEMPERATURE, history.temperature, active);
+            view.set_state(slot, field::TEMPERATURE, temperature, active);
         }
         if laws.failure.fails() {
             view.set_state(slot, field::DAMAGE, damage_after, active);

@@ -1,7 +1,8 @@
 //! Johnson and Cook (1983): `Y = (A + B e^n)(1 + C ln max(rate/rate0, 1))(1 - T*^m)`.
 //!
 //! The rate is the total effective deviatoric strain rate, floored at rate0; T* is
-//! `(T - t_room) / (t_melt - t_room)` clamped to 0..1; all plastic work becomes heat.
+//! `(T - t_room) / (t_melt - t_room)` clamped to 0..1. All plastic work becomes heat, or the element says what heat it has
+//! (`StrengthLaw::heating_by_energy`).
 
 use super::{Deviator, History, Strain, StrengthLaw};
 use crate::lanes::{
@@ -27,6 +28,10 @@ pub(crate) struct JohnsonCook {
     pub inverse_range: f64,
     /// `1 / (density * specific_heat)`: kelvin per energy per initial volume.
     pub heating: f64,
+    /// The same for plastic work in solids; 0 where their temperature follows internal energy.
+    pub by_work: f64,
+    /// The same for internal energy above the cold curve; 0 where the temperature follows plastic work.
+    pub by_energy: f64,
     /// `1 / rate0` (time).
     pub inverse_rate0: f64,
 }
@@ -103,6 +108,11 @@ impl StrengthLaw for JohnsonCook {
     }
 
     #[inline(always)]
+    fn heating_by_energy(&self) -> f64 {
+        self.by_energy
+    }
+
+    #[inline(always)]
     fn update<L: Lane>(
         &self,
         trial: Deviator<L>,
@@ -136,7 +146,7 @@ impl StrengthLaw for JohnsonCook {
         let slip = L::select(yields, slip, zero);
         let flow = three_g.neg_mul_add(slip, sigma).max(zero);
         history.plastic_strain = history.plastic_strain + slip;
-        history.temperature = (L::splat(self.heating) * flow).mul_add(slip, history.temperature);
+        history.temperature = (L::splat(self.by_work) * flow).mul_add(slip, history.temperature);
         trial.scaled(L::select(yields, flow / sigma, one))
     }
 }
@@ -209,6 +219,8 @@ mod tests {
             t_room: 294.0,
             inverse_range: 1.0 / (t_melt - 294.0),
             heating: 1.0 / (reference.density * specific_heat),
+            by_work: 1.0 / (reference.density * specific_heat),
+            by_energy: 0.0,
             inverse_rate0: 1.0,
         }
     }

@@ -132,7 +132,7 @@ mod tests {
     use super::*;
     use crate::{
         lanes::scalar::Scalar,
-        material::{Eos, Failure, Hardening, Strength},
+        material::{Eos, Failure, Hardening, Heat, Strength},
         strength::CowperSymonds,
     };
 
@@ -180,6 +180,7 @@ mod tests {
             t_room: 294.0,
             specific_heat: 383.0,
             rate0: 1.0,
+        heat: Heat::PlasticWork,
         });
         let mut layer = layer([0.0, 0.0, 120e6, 0.0, 0.0]);
         layer.temperature = Scalar(294.0);

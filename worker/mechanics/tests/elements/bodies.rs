@@ -5,7 +5,7 @@ use mechanics::{
     element::{ElementVote, Step, hex8},
     exact::Quantum,
     lanes::Width,
-    material::{CowperSymonds, Eos, Failure, Hardening, MAX_HARDENING, Material, Strength},
+    material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
     mesh::{Part, Topology},
     state::{N_FIELDS, field},
 };
@@ -54,6 +54,7 @@ pub fn johnson_cook() -> Strength {
         t_room: 300.0,
         specific_heat: 452.0,
         rate0: 1.0,
+        heat: Heat::PlasticWork,
     }
 }
 

@@ -9,7 +9,7 @@ use mechanics::{
     },
     exact::Quantum,
     lanes::Width,
-    material::{Eos, Failure, Material, Strength},
+    material::{Eos, Failure, Heat, Material, Strength},
 };
 
 fn material(young: f64, poisson: f64, density: f64) -> Material {
@@ -217,6 +217,7 @@ fn laws() -> [Strength; 3] {
         t_room: 294.0,
         specific_heat: 477.0,
         rate0: 1.0,
+        heat: Heat::PlasticWork,
     };
     let von_mises = Strength::VonMises { shear, yield_stress: 3e8, hardening: 1e9, rate: None };
     [Strength::Elastic { shear }, von_mises, johnson_cook]

@@ -30,7 +30,9 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, vote: &mut ElementVote
     let laws = (AnyEos::of(material), AnyStrength::of(material), AnyFailure::of(material));
     match laws {
         // A copy of its own: with AVX2 the kernel of all laws takes 8 % longer for them.
-        (AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength), AnyFailure::Unfailing(Unfailing)) => {
+        (AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength), AnyFailure::Unfailing(Unfailing))
+            if strength.by_energy == 0.0 =>
+        {
             let laws = Laws { density, eos, strength, failure: Unfailing };
             width.run(Pass { view, laws, step, sets, vote });
         }
