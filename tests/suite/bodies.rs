@@ -2,6 +2,7 @@
 
 use deck::Model;
 use master::snapshot::file;
+use mechanics::element::shell4;
 use protocol::options::JobOptions;
 use tests::{
     bits::Fingerprint,
@@ -159,4 +160,25 @@ fn a_free_body_takes_the_moments_of_the_shells_on_it() {
     assert!((total[1] / (-0.1 * impulse) - 1.0).abs() < 1e-3, "{total:?}, impulse {impulse}");
     // The strip turns its root by the moments in it: in the sense in which the force turns the tip.
     assert!(moved.spin[1] < 0.0, "{moved:?}");
+}
+
+#[test]
+fn a_sheet_that_is_pulled_gets_thinner_unless_the_deck_says_that_it_does_not() {
+    let thickness = |key: &str| {
+        let deck = model(&format!(
+            "title = \"strip\"\nunits = \"SI\"\n[control]\nend_time = 1e-4\n[[part]]\nname = \"strip\"\n\
+             material = \"STEEL_1006\"\nshell = {{ thickness = 1e-3{key} }}\n\
+             plate = {{ origin = [0, 0, 0], side_i = [0.02, 0, 0], side_j = [0, 0.01, 0], cells = [8, 4] }}\n\
+             [[boundary]]\ntype = \"velocity\"\nface = \"i-max\"\nvelocity = {{ x = 20 }}\n\
+             [[boundary]]\ntype = \"velocity\"\nface = \"i-min\"\nvelocity = {{ x = 0 }}\n"
+        ));
+        let solved = run(&deck, Workers::default());
+        let of = &solved.state.shells.fields[shell4::THICKNESS];
+        of.iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    let (follows, stays) = (thickness(""), thickness(", thinning = false"));
+    println!("least thickness {follows:e} m, {stays:e} m without thinning");
+    assert_eq!(stays, 1e-3);
+    // A tenth longer, plastic: the thickness takes half of that.
+    assert!((0.90e-3..0.98e-3).contains(&follows), "{follows}");
 }

@@ -96,16 +96,17 @@ fn read_erosion(value: Value<'_>, part: &str) -> Option<Erosion> {
     Some(Erosion { origin: value.origin(), limits, failure })
 }
 
-/// `shell = { thickness, points, rule }`.
+/// `shell = { thickness, points, rule, thinning }`.
 fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
     let table = value.table(format!("shell of \"{name}\""))?;
     let thickness = table.number("thickness", Range::Positive);
     let rule = table.get("rule").map_or(Some(0), |v| v.one_of(&["gauss", "lobatto"]));
     let (least, default) = if rule == Some(1) { (3, 5) } else { (1, 3) };
     let points = table.integer_or("points", default, least, 5) as u32;
+    let thins = table.get("thinning").map_or(Some(true), |v| v.boolean());
     table.finish();
     let rule = if rule? == 1 { Rule::Lobatto(points) } else { Rule::Gauss(points) };
-    Some(Section { thickness: thickness?, rule })
+    Some(Section { thickness: thickness?, rule, thins: thins? })
 }
 
 /// The key that says the kind of elements.

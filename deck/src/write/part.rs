@@ -153,13 +153,17 @@ fn write_part(text: &mut Text, part: &Part) {
     if let Kind::Trusses { area } = part.kind {
         text.key("truss", table(&[("area", format!("{area:?}"))]));
     }
-    if let Kind::Shells(Section { thickness, rule }) = part.kind {
+    if let Kind::Shells(Section { thickness, rule, thins }) = part.kind {
         let (rule, points) = match rule {
             Rule::Gauss(points) => ("gauss", points),
             Rule::Lobatto(points) => ("lobatto", points),
         };
-        let keys =
-            [("thickness", format!("{thickness:?}")), ("points", points.to_string()), ("rule", quoted(rule))];
+        let mut keys = vec![
+            ("thickness", format!("{thickness:?}")),
+            ("points", points.to_string()),
+            ("rule", quoted(rule)),
+        ];
+        keys.extend((!thins).then(|| ("thinning", "false".to_owned())));
         text.key("shell", table(&keys));
     }
     if let Some(erosion) = &part.erosion {

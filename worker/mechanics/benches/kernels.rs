@@ -218,7 +218,7 @@ fn plates(
     };
     let sheet = || {
         let quads = (0..side * side).map(|e| e / side * row + e % side);
-        let section = Section { thickness: 0.2 * size, rule: Rule::Gauss(5) };
+        let section = Section { thickness: 0.2 * size, rule: Rule::Gauss(5), thins: true };
         Part {
             name: "sheet".into(),
             material: 1,
@@ -244,7 +244,19 @@ fn plates(
             name: name.into(),
             density,
             eos: Eos::Shock { c0, s, gamma },
-            strength: Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0, heat: Heat::PlasticWork },
+            strength: Strength::JohnsonCook {
+                shear,
+                a,
+                b,
+                n,
+                c,
+                m,
+                t_melt,
+                t_room,
+                specific_heat,
+                rate0,
+                heat: Heat::PlasticWork,
+            },
             failure: Failure::None,
         }
     });
@@ -438,7 +450,19 @@ const SHEAR: f64 = 81.8e9;
 fn johnson_cook(m: f64) -> Strength {
     let (a, b, n, c) = (350e6, 275e6, 0.36, 0.022);
     let (t_melt, t_room, specific_heat, rate0) = (1811.0, 300.0, 452.0, 1.0);
-    Strength::JohnsonCook { shear: SHEAR, a, b, n, c, m, t_melt, t_room, specific_heat, rate0, heat: Heat::PlasticWork }
+    Strength::JohnsonCook {
+        shear: SHEAR,
+        a,
+        b,
+        n,
+        c,
+        m,
+        t_melt,
+        t_room,
+        specific_heat,
+        rate0,
+        heat: Heat::PlasticWork,
+    }
 }
 
 /// A steel by these laws.

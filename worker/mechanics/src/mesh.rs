@@ -72,6 +72,8 @@ pub struct Section {
     pub thickness: f64,
     /// Points of integration.
     pub rule: Rule,
+    /// Whether the thickness follows the strains in the plane; else it stays.
+    pub thins: bool,
 }
 
 impl Section {

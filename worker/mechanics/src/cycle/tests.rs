@@ -172,7 +172,7 @@ fn folding_plate() -> Domain {
     let nodes: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     mesh.node_ids.clone_from(&nodes);
     let element_ids: Vec<u32> = (0..quads.len() as u32).collect();
-    let section = Section { thickness: 0.2, rule: Rule::Gauss(3) };
+    let section = Section { thickness: 0.2, rule: Rule::Gauss(3), thins: true };
     let topology = Topology::Shells { quads, section };
     mesh.parts.push(Part { name: "plate".into(), material: 0, topology, nodes, element_ids });
     let mut setup = Setup { contact: None, ..setup(0.0) };

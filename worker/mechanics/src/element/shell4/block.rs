@@ -88,12 +88,14 @@ pub(crate) struct Core {
     alive: Vec<u8>,
     elements: Vec<u32>,
     points: Vec<(f64, f64)>,
+    /// Share of the strain across the thickness that this follows: 1, or 0 where it stays.
+    thinning: f64,
     law: PlaneLaw,
 }
 
 /// Whether shells can be built of this: the points through the thickness and the law of the layers.
 fn section_of(section: &Section, material: &Material) -> Result<(Vec<(f64, f64)>, PlaneLaw), SectionError> {
-    let Section { thickness, rule } = *section;
+    let Section { thickness, rule, .. } = *section;
     if !(thickness.is_finite() && thickness > 0.0) {
         return Err(SectionError::Thickness { thickness });
     }
@@ -156,6 +158,7 @@ impl Core {
                 .collect(),
             elements: (0..n_slots).map(|slot| elements.get(slot).copied().unwrap_or(u32::MAX)).collect(),
             points,
+            thinning: f64::from(section.thins),
             law,
         })
     }
@@ -208,6 +211,7 @@ impl Core {
         let constants = kernel::Constants {
             law: self.law,
             points: &self.points,
+            thinning: self.thinning,
             dt: step.dt,
             force_magic: step.force_quantum.magic(),
             moment_magic: step.moment_quantum.magic(),
@@ -333,7 +337,7 @@ impl Shells {
         rule: Rule,
         material: &Material,
     ) -> Result<Shells, SectionError> {
-        let section = Section { thickness, rule };
+        let section = Section { thickness, rule, thins: true };
         section.check(material)?;
         let (n_nodes, n_elements) = (x.len(), corners.len());
         let n_padded = n_nodes.next_multiple_of(SET);

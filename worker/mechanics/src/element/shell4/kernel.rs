@@ -46,6 +46,8 @@ pub(super) struct View<'a> {
 pub(super) struct Constants<'a> {
     pub law: PlaneLaw,
     pub points: &'a [(f64, f64)],
+    /// Share of the strain across the thickness that the thickness follows.
+    pub thinning: f64,
     pub dt: f64,
     pub force_magic: f64,
     pub moment_magic: f64,
@@ -301,7 +303,7 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
     let spent = dt * hourglass_power;
     state[INTERNAL] = (dt * h * g.area).mul_add(power, state[INTERNAL]);
     state[HOURGLASS] = state[HOURGLASS] + spent;
-    state[THICKNESS] = h * (one + thinning);
+    state[THICKNESS] = h * (one + L::splat(c.thinning) * thinning);
     let h = state[THICKNESS];
 
     // 4. Forces and moments on the geometry of now, conjugate to the rates above.
