@@ -38,7 +38,8 @@ use names::{Curves, Names};
 /// Checks a deck and makes its model; none where it has no control. The model is not to be used after a fault.
 pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model> {
     let mut materials = Materials::of(deck, log);
-    let parts = part::make(&deck.parts, &mut materials, meshes, log);
+    let hourglass = deck.control.as_ref().and_then(|control| control.hourglass).unwrap_or_default();
+    let parts = part::make((&deck.parts, hourglass), &mut materials, meshes, log);
     let materials = materials.list;
     let names = Names::of(&deck.parts, log);
     let joins = assembly::joins(&deck.joins, &names, log);

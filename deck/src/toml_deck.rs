@@ -6,6 +6,7 @@
 mod condition;
 mod contact;
 mod entry;
+mod hourglass;
 mod output;
 mod part;
 mod shape;
@@ -106,7 +107,7 @@ fn read_control(deck: &Table<'_>) -> Option<Control> {
         time_step_floor: number("time_step_floor", Range::NotNegative),
         linear_viscosity: number("linear_viscosity", coefficient),
         quadratic_viscosity: number("quadratic_viscosity", coefficient),
-        hourglass: number("hourglass", coefficient),
+        hourglass: table.get("hourglass").and_then(|v| hourglass::read(v, "[control]")),
         sort_lag: cycles("sort_lag", 1, 1000).map(|n| n as u32),
         plan_interval: cycles("plan_interval", 2, 100_000).map(|n| n as u32),
     };

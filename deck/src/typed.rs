@@ -11,7 +11,7 @@ pub(crate) mod contact;
 pub(crate) mod mesh;
 pub(crate) mod part;
 
-use mechanics::burn::Detonation;
+use mechanics::{burn::Detonation, element::hourglass::Hourglass};
 
 use crate::{
     place::{Place, Placed},
@@ -85,7 +85,8 @@ pub(crate) struct Control {
     pub(crate) time_step_floor: Option<f64>,
     pub(crate) linear_viscosity: Option<f64>,
     pub(crate) quadratic_viscosity: Option<f64>,
-    pub(crate) hourglass: Option<f64>,
+    /// That of parts without one of their own.
+    pub(crate) hourglass: Option<Hourglass>,
     pub(crate) sort_lag: Option<u32>,
     pub(crate) plan_interval: Option<u32>,
 }

@@ -56,7 +56,9 @@ fn write_control(text: &mut Text, control: &Control) {
     text.some("time_step_floor", control.time_step_floor);
     text.some("quadratic_viscosity", control.quadratic_viscosity);
     text.some("linear_viscosity", control.linear_viscosity);
-    text.some("hourglass", control.hourglass);
+    if let Some(hourglass) = &control.hourglass {
+        text.key("hourglass", part::hourglass(hourglass));
+    }
     text.some("sort_lag", control.sort_lag);
     text.some("plan_interval", control.plan_interval);
 }

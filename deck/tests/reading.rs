@@ -3,6 +3,7 @@
 use deck::Model;
 use mechanics::{
     burn::Detonation,
+    element::hourglass::Hourglass,
     load::{Drive, Gravity, NodalForce, Relaxation, SurfaceKind},
     material::{CowperSymonds, Eos, Failure, Strength},
     mesh::{FACES, Topology},
@@ -37,14 +38,47 @@ fn defaults_are_those_of_the_reference() {
     let control = read(&cube("a", [0.0; 3], "")).setup.control;
     assert_eq!(control.end_cycle, u64::MAX);
     assert_eq!((control.sort_lag, control.plan_interval), (8, 50));
-    let numbers = [
-        control.safety_factor,
-        control.growth,
-        control.linear_viscosity,
-        control.quadratic_viscosity,
-        control.hourglass,
-    ];
-    assert_eq!(numbers.map(f64::to_bits), [0.6666f64, 1.05, 0.2, 1.0, 0.1].map(f64::to_bits));
+    let numbers =
+        [control.safety_factor, control.growth, control.linear_viscosity, control.quadratic_viscosity];
+    assert_eq!(numbers.map(f64::to_bits), [0.6666f64, 1.05, 0.2, 1.0].map(f64::to_bits));
+}
+
+#[test]
+fn hourglass_control_is_that_of_the_part_or_of_the_deck_and_viscous_on_fluids() {
+    let water = cube("water", [3.0, 0.0, 0.0], "").replace("LEAD", "WATER");
+    let parts = cube("own", [0.0; 3], "hourglass = { kind = \"assumed-strain\", coefficient = 0.5 }")
+        + &cube("of the deck", [1.5, 0.0, 0.0], "")
+        + &water;
+    let controls = |of_deck: &str| {
+        let text = format!("{HEAD}{of_deck}\n{parts}");
+        let model = deck::read(&text, "t.toml").unwrap_or_else(|faults| panic!("{}", faults[0]));
+        let words = |h: &Hourglass| format!("{} {}", h.kind.name(), h.coefficient);
+        model.mesh.parts.iter().map(|part| words(&part.hourglass)).collect::<Vec<_>>().join(", ")
+    };
+    assert_eq!(
+        controls("hourglass = { kind = \"stiffness\" }"),
+        "assumed-strain 0.5, stiffness 0.05, viscous 0.1"
+    );
+    assert_eq!(controls("hourglass = 0.03"), "assumed-strain 0.5, viscous 0.03, viscous 0.03");
+    let fault = |tables: &str| {
+        let faults = deck::read(&format!("{HEAD}{tables}"), "t.toml").expect_err("a fault");
+        faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    };
+    let water = water.replace("cells", "cells ").replace("box", "hourglass = { kind = \"stiffness\" }\nbox");
+    assert!(fault(&water).contains("expected viscous control, or a material with shear stiffness"));
+    for (words, expected) in [
+        ("{ coefficient = 0.1 }", "expected viscous, stiffness or assumed-strain; add kind = ..."),
+        ("{ kind = \"asumed-strain\" }", "write \"assumed-strain\""),
+        ("{ kind = \"stiffness\", coefficient = 1.5 }", "expected a number above 0 and at most 1"),
+        ("{ kind = \"viscous\", coeficient = 1.5 }", "write \"coefficient\""),
+        ("-0.1", "expected a number of 0 or more"),
+    ] {
+        let faults = fault(&cube("a", [0.0; 3], &format!("hourglass = {words}")));
+        assert!(faults.contains(expected), "{words}: {faults}");
+    }
+    let plate = "[[part]]\nname = \"p\"\nmaterial = \"LEAD\"\nshell = { thickness = 0.1 }\nhourglass = 0.1\n\
+                 plate = { origin = [0, 0, 0], side_i = [1, 0, 0], side_j = [0, 1, 0], cells = [2, 2] }\n";
+    assert!(fault(plate).contains("expected solids: hourglass control of shells is not chosen"));
 }
 
 #[test]

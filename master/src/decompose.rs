@@ -447,6 +447,7 @@ mod tests {
             topology: Topology::Structured { cells },
             nodes: Vec::new(),
             element_ids: Vec::new(),
+            hourglass: Default::default(),
         };
         Mesh { positions: Vec::new(), node_ids: Vec::new(), parts: vec![part] }
     }

@@ -56,6 +56,7 @@ fn block(mesh: &mut Mesh, name: &str, material: u32, cells: [u32; 3], low: [f64;
         topology: Topology::Structured { cells },
         nodes: (first..end).collect(),
         element_ids: (0..ni * nj * nk).map(|e| 1000 + n_before + e).collect(),
+        hourglass: Default::default(),
     });
 }
 
@@ -79,6 +80,7 @@ fn plates(cells: u32) -> Model {
         topology: Topology::Explicit { hexahedra: Vec::new() },
         nodes: Vec::new(),
         element_ids: Vec::new(),
+        hourglass: Default::default(),
     });
     block(&mut mesh, "target, lower", 1, [cells, cells, cells], [0.0, 0.0, 0.0], [30.0, 30.0, 20.0]);
     block(&mut mesh, "chip", 1, [1, 1, 1], [32.0, 0.0, 0.0], [33.0, 1.0, 1.0]);
@@ -104,7 +106,6 @@ fn plates(cells: u32) -> Model {
                 time_step_floor: 0.0,
                 linear_viscosity: 0.2,
                 quadratic_viscosity: 1.0,
-                hourglass: 0.1,
                 sort_lag: 4,
                 plan_interval: 100,
             },
@@ -159,6 +160,7 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         eroded: Vec::new(),
         strain: Vec::new(),
         shells: mechanics::state::ShellState::default(),
+        own: Vec::new(),
     }
 }
 

@@ -19,8 +19,8 @@ use std::fmt;
 /// 7: in votes what springs hold on a surface that ends.
 /// 8: a submitted job has no route where the master is to choose it; votes have the external work of a cycle before and after
 /// its time.
-/// 9: trusses and numbers of supports in assignments; nodes tied to faces in assignments and plans; in votes the work of each wall
-/// and support, and what nodes lost at walls.
+/// 9: trusses, numbers of supports and hourglass control of pieces in assignments; nodes tied to faces in assignments and plans; in
+/// votes the work of each wall and support, and what nodes lost at walls.
 pub const VERSION: u16 = 9;
 
 /// Most characters of a host's name.

@@ -89,6 +89,8 @@ macro_rules! each_case_of_the_book {
             structure: the_impulsive_beam_bends_as_a_code_of_the_same_elements_finds quick;
             structure: a_beam_thrown_all_over_is_bent_about_as_a_rigid_plastic_one quick;
             structure: a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness quick;
+            structure: a_cantilever_of_assumed_strains_rings_as_a_beam_with_one_layer quick;
+            structure: a_ball_of_assumed_strains_keeps_its_motion_for_ten_bounces long;
             structure: higher_tones_of_a_cantilever_are_those_of_timoshenko_with_that_stiffness long;
             shell: the_twisted_beam_bends_as_published quick;
             shell: the_roof_sags_as_published quick;

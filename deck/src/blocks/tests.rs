@@ -14,6 +14,7 @@ fn hexahedra(block: &Block) -> Vec<[[f64; 3]; 8]> {
         topology: block.topology.clone(),
         nodes: (0..block.positions.len() as u32).collect(),
         element_ids: Vec::new(),
+        hourglass: Default::default(),
     };
     (0..part.n_elements()).map(|e| part.corners(e).map(|n| block.positions[n as usize])).collect()
 }

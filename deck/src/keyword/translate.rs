@@ -4,6 +4,7 @@ mod condition;
 mod contact;
 mod control;
 mod element;
+mod hourglass;
 mod material;
 mod motion;
 mod output;

@@ -238,6 +238,7 @@ fn number(drafts: &[PartDraft], log: &Log<'_>) -> Mesh {
             topology,
             nodes: (first..mesh.positions.len() as u32).collect(),
             element_ids: Vec::new(),
+            hourglass: draft.hourglass,
         };
         match &draft.numbers {
             Some(own) => {
@@ -284,6 +285,7 @@ fn number_shared<'a>(
         topology,
         nodes,
         element_ids: own.elements.clone(),
+        hourglass: draft.hourglass,
     });
 }
 

@@ -32,7 +32,6 @@ pub(super) fn make(given: &typed::Control, log: &Log<'_>) -> Control {
         time_step_floor: given.time_step_floor.unwrap_or(0.0),
         linear_viscosity: given.linear_viscosity.unwrap_or(0.2),
         quadratic_viscosity: given.quadratic_viscosity.unwrap_or(1.0),
-        hourglass: given.hourglass.unwrap_or(0.1),
         sort_lag,
         plan_interval,
     }

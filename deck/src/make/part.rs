@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
+    element::hourglass::Hourglass,
     erosion::{Criteria, GEOMETRIC_STRAIN},
     material::{Failure, Material, Strength},
 };
@@ -28,6 +29,8 @@ pub(super) struct PartDraft {
     /// Index into the materials in use; none after a fault.
     pub(super) material: Option<u32>,
     pub(super) velocity: [f64; 3],
+    /// Hourglass control of solids.
+    pub(super) hourglass: Hourglass,
     /// When its elements erode; none if they do not.
     pub(super) erosion: Option<Criteria>,
     /// None after a fault.
@@ -36,9 +39,10 @@ pub(super) struct PartDraft {
     pub(super) numbers: Option<Numbers>,
 }
 
-/// Makes every part. A part with a fault keeps its place in the list, so that others may refer to it.
+/// Makes every part, with the hourglass control of those that have none of their own. A part with a fault keeps its place in the
+/// list, so that others may refer to it.
 pub(super) fn make(
-    parts: &[Part],
+    (parts, hourglass): (&[Part], Hourglass),
     materials: &mut Materials<'_>,
     meshes: &Meshes,
     log: &Log<'_>,
@@ -74,6 +78,7 @@ pub(super) fn make(
             }
             criteria(given, of_material, log)
         });
+        let hourglass = hourglass_of(part, of_material, hourglass, log);
         let (mut block, numbers) = mesh_of(part, meshes, &mut budget, log);
         match &mut block {
             Some(block) if numbers.as_ref().is_none_or(|own| own.mesh.is_none()) => transform(part, block),
@@ -86,9 +91,28 @@ pub(super) fn make(
             None => {}
         }
         let (name, at, velocity) = (part.name.clone(), part.at, part.velocity);
-        drafts.push(PartDraft { name, at, material, velocity, erosion, block, numbers });
+        drafts.push(PartDraft { name, at, material, velocity, hourglass, erosion, block, numbers });
     }
     drafts
+}
+
+/// The hourglass control of a part: its own or that of the deck, and viscous where the material cannot have elastic forces.
+fn hourglass_of(part: &Part, material: Option<&Material>, of_deck: Hourglass, log: &Log<'_>) -> Hourglass {
+    let Some(Placed { value: own, origin }) = part.hourglass else {
+        return material.map_or(of_deck, |material| of_deck.on(material));
+    };
+    if part.kind != Kind::Solids {
+        let expected = format!("solids: hourglass control of {} is not chosen", part.kind.elements());
+        log.fault_of(origin, expected, "remove it");
+    }
+    if material.is_some_and(|material| own.on(material) != own) {
+        log.fault_of(
+            origin,
+            "viscous control, or a material with shear stiffness",
+            "remove it: elements without shear stiffness get viscous control",
+        );
+    }
+    own
 }
 
 /// The criteria of a part, whose material is `material` if that could be read.

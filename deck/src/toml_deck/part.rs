@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mechanics::{element::shell4::Rule, mesh::Section};
 
-use super::{entry::text, shape};
+use super::{entry::text, hourglass, shape};
 use crate::{
     blocks::Block,
     geometry::norm,
@@ -61,12 +61,28 @@ pub(super) fn read_parts(deck: &Table<'_>) -> Vec<Part> {
             }
         };
         let given = shell.map(|value| (Word::Shell, value)).or(truss.map(|value| (Word::Truss, value)));
+        let hourglass = table
+            .get("hourglass")
+            .and_then(|v| hourglass::read(v, &format!("\"{name}\"")).map(|control| v.placed(control)));
         let mesh = read_mesh(&table, &name, given, kind);
         let kind = kind.unwrap_or(Kind::Solids);
         let rotate = table.get("rotate").and_then(|v| read_rotation(v, &table));
         let translate = table.get("translate").and_then(|v| v.vector().map(|by| v.placed(by)));
         table.finish();
-        Part { at, name, named, material, fracture, velocity, kind, erosion, mesh, rotate, translate }
+        Part {
+            at,
+            name,
+            named,
+            material,
+            fracture,
+            velocity,
+            kind,
+            hourglass,
+            erosion,
+            mesh,
+            rotate,
+            translate,
+        }
     };
     tables.into_iter().enumerate().map(part).collect()
 }

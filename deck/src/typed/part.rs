@@ -1,6 +1,7 @@
 //! Materials of a deck, and its parts.
 
 use mechanics::{
+    element::hourglass::Hourglass,
     erosion::Criteria,
     material::Material,
     mesh::{Section, Topology},
@@ -96,6 +97,8 @@ pub(crate) struct Part {
     /// Initial velocity.
     pub(crate) velocity: [f64; 3],
     pub(crate) kind: Kind,
+    /// Hourglass control of solids; none where that of the deck serves.
+    pub(crate) hourglass: Option<Placed<Hourglass>>,
     pub(crate) erosion: Option<Erosion>,
     /// None where it could not be read.
     pub(crate) mesh: Option<PartMesh>,

@@ -1,7 +1,7 @@
 //! Materials and parts with their meshes.
 
 use mechanics::{
-    element::shell4::Rule,
+    element::{hourglass::Hourglass, shell4::Rule},
     material::{CowperSymonds, Eos, Failure, Heat, Material, Strength},
     mesh::{Section, Topology},
 };
@@ -138,6 +138,10 @@ fn failure(failure: Failure) -> Option<String> {
     }
 }
 
+pub(super) fn hourglass(control: &Hourglass) -> String {
+    table(&[("kind", quoted(control.kind.name())), ("coefficient", format!("{:?}", control.coefficient))])
+}
+
 fn write_part(text: &mut Text, part: &Part) {
     text.heading("[[part]]");
     text.key("name", quoted(&part.name));
@@ -165,6 +169,9 @@ fn write_part(text: &mut Text, part: &Part) {
         ];
         keys.extend((!thins).then(|| ("thinning", "false".to_owned())));
         text.key("shell", table(&keys));
+    }
+    if let Some(control) = &part.hourglass {
+        text.key("hourglass", hourglass(&control.value));
     }
     if let Some(erosion) = &part.erosion {
         write_erosion(text, erosion);

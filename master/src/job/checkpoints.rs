@@ -113,11 +113,11 @@ impl Checkpoint {
 
 /// How long the arrays of a state are: what its mesh and its laws ask for.
 fn shape(state: &GlobalState) -> (Vec<usize>, Vec<usize>) {
-    let GlobalState { x, v, mass, constraint, initial_volume, elements, eroded, strain, shells, .. } = state;
+    let GlobalState { x, v, mass, constraint, initial_volume, elements, eroded, strain, shells, own, .. } =
+        state;
     let fixed =
         [x.len(), v.len(), mass.len(), constraint.len(), initial_volume.len(), eroded.len(), strain.len()];
-    let of_shells =
-        [shells.spin.len(), shells.inertia.len()].into_iter().chain(shells.fields.iter().map(Vec::len));
+    let of_shells = [shells.spin.len(), shells.inertia.len()].into_iter().chain(own.iter().map(Vec::len));
     (fixed.into_iter().chain(elements.iter().map(Vec::len)).collect(), of_shells.collect())
 }
 

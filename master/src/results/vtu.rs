@@ -394,14 +394,17 @@ fn data_arrays<'a>(
         ]
         .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
     );
-    if !state.shells.fields.is_empty() {
-        cell.push(Array::f64("thickness", n_elements, move |e| [state.shells.fields[shell4::THICKNESS][e]]));
+    if !state.shells.inertia.is_empty() {
+        let thickness =
+            move |e| if elements.n_corners(e) == 4 { state.own[shell4::THICKNESS][e] } else { 0.0 };
+        cell.push(Array::f64("thickness", n_elements, move |e| [thickness(e)]));
         cell.push(Array::f64("von_mises_max", n_elements, move |e| {
-            let layers = state.shells.fields[shell4::ELEMENT..].chunks(shell4::LAYER);
+            if elements.n_corners(e) != 4 {
+                return [von_mises(deviator(e))];
+            }
+            let layers = state.own[shell4::ELEMENT..].chunks_exact(shell4::LAYER);
             let largest = |layer: &[Vec<f64>]| plane_von_mises([0, 1, 2, 3, 4].map(|i| layer[i][e]));
-            [layers
-                .map(largest)
-                .fold(if elements.n_corners(e) == 4 { 0.0 } else { von_mises(deviator(e)) }, f64::max)]
+            [layers.map(largest).fold(0.0, f64::max)]
         }));
     }
     if let Some(worker) = worker {

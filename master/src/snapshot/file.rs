@@ -14,7 +14,7 @@ use tracing::trace;
 use super::Snapshot;
 
 /// First bytes of a snapshot file: the form of the file and of what is in it.
-const MAGIC: &[u8; 8] = b"BLDSNAPB";
+const MAGIC: &[u8; 8] = b"BLDSNAPC";
 /// Bytes that one checksum covers.
 pub const CHUNK: usize = 1 << 20;
 /// Magic, length, cycle.

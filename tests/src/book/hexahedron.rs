@@ -2,7 +2,10 @@
 
 use mechanics::{
     block::Block,
-    element::hex8::{volume, volume_gradient},
+    element::{
+        hex8::{volume, volume_gradient},
+        hourglass::Hourglass,
+    },
     lanes::Width,
     mesh::Topology,
     state::field,
@@ -112,10 +115,10 @@ pub(super) fn the_patch_has_one_stress_and_no_force_inside(figures: &mut Figures
     let (bulk, shear) = (young / 3.0 / (1.0 - 2.0 * poisson), young / 2.0 / (1.0 + poisson));
     let material = elastic(1.0, bulk, shear);
     let (x, hexahedra) = patch();
-    let mut block = Block::new(&piece(&material, x, Topology::Explicit { hexahedra }));
+    let body = piece(&material, x, Topology::Explicit { hexahedra });
+    let mut block = Block::new(&controlled(body, Hourglass::viscous(0.1)));
     let dt = 1e-3;
-    let mut step = bare_step(dt, 10.0, 1e-3);
-    step.hourglass = 0.1;
+    let step = bare_step(dt, 10.0, 1e-3);
     let h = Matrix3::from_fn(|i, j| if i == j { 1e-5 } else { 0.5e-5 });
     let vote = carry(&mut block, &material, &step, |x| (h / dt * Vector3::from(x)).into());
     assert!(vote.fault.is_none(), "{:?}", vote.fault);
@@ -154,11 +157,10 @@ pub(super) fn moving_and_turning_leave_the_stress_what_it_is(figures: &mut Figur
     body.fields[field::SXX][0] = 100.0 - mean;
     body.fields[field::SYY][0] = -mean;
     body.fields[field::SXY][0] = 50.0;
-    let mut block = Block::new(&body);
+    let mut block = Block::new(&controlled(body, Hourglass::viscous(0.1)));
     let (sin, cos) = 30f64.to_radians().sin_cos();
     let dt = 0.01;
-    let mut step = bare_step(dt, 1e3, 1e3);
-    step.hourglass = 0.1;
+    let step = bare_step(dt, 1e3, 1e3);
     let vote = carry(&mut block, &material, &step, |[x, y, _]| {
         [(cos * x - sin * y - x) / dt, (sin * x + cos * y - y) / dt, 0.0]
     });

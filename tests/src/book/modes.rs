@@ -2,6 +2,7 @@
 
 use mechanics::{
     block::{Block, Piece},
+    element::hourglass::Hourglass,
     element::shell4::{Rule, ShellStep, Shells},
     exact::Quantum,
     lanes::Width,
@@ -26,7 +27,7 @@ fn response(material: &Material, corners: &[[f64; 3]; 8], hourglass: f64, by_vel
         let mut body: Piece = rest.clone();
         body.v[freedom / 3][freedom % 3] = amplitude;
         let mut block = Block::new(&body);
-        let mut step = bare_step(1.0, 1e-6, 1.0);
+        let step = bare_step(1.0, 1e-6, 1.0);
         if !by_velocity {
             advance(&mut block, step.dt);
         }
@@ -35,7 +36,7 @@ fn response(material: &Material, corners: &[[f64; 3]; 8], hourglass: f64, by_vel
         if !by_velocity {
             return std::array::from_fn(|i| without.f[i % 3][i / 3]);
         }
-        step.hourglass = hourglass;
+        let mut block = Block::new(&controlled(block.piece(), Hourglass::viscous(hourglass)));
         compute(&mut block, material, &step, Width::best());
         std::array::from_fn(|i| block.f[i % 3][i / 3] - without.f[i % 3][i / 3])
     };
@@ -105,7 +106,7 @@ pub(super) fn each_hourglass_pattern_is_resisted_without_resultant_and_decays(fi
                 v[axis] = 1e-3 * sign;
             }
             let mut block = Block::new(&body);
-            let mut step = bare_step(1e-3, 1e-3, 1.0);
+            let step = bare_step(1e-3, 1e-3, 1.0);
             advance(&mut block, step.dt);
             let body = block.piece();
             compute(&mut block, &material, &step, Width::best());
@@ -113,8 +114,7 @@ pub(super) fn each_hourglass_pattern_is_resisted_without_resultant_and_decays(fi
             if corners == UNIT_CUBE {
                 free = free.max(largest_force(&block) / 1e-6);
             }
-            step.hourglass = 0.1;
-            block = Block::new(&body);
+            block = Block::new(&controlled(body.clone(), Hourglass::viscous(0.1)));
             compute(&mut block, &material, &step, Width::best());
             let largest = largest_force(&block);
             assert!(largest > 1e-5, "{largest}");
@@ -135,10 +135,9 @@ pub(super) fn each_hourglass_pattern_is_resisted_without_resultant_and_decays(fi
         for (v, sign) in body.v.iter_mut().zip(pattern) {
             v[1] = 1e-6 * sign;
         }
-        let mut block = Block::new(&body);
+        let mut block = Block::new(&controlled(body, Hourglass::viscous(0.1)));
         let dt = 0.02;
-        let mut step = bare_step(dt, 1e-6, 1e-12);
-        step.hourglass = 0.1;
+        let step = bare_step(dt, 1e-6, 1e-12);
         let kinetic = |block: &Block| {
             let squares = block.v.iter().map(|v| v.iter().take(8).map(|v| v * v).sum::<f64>());
             0.5 * 0.125 * squares.sum::<f64>()

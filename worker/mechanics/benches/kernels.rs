@@ -51,6 +51,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         topology: Topology::Structured { cells: CELLS },
         nodes: (0..positions.len() as u32).collect(),
         element_ids: (0..n_elements as u32).collect(),
+        hourglass: Default::default(),
     };
     let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part] };
     let hexahedra: Vec<[u32; 8]> = (0..n_elements).map(|e| mesh.parts[0].corners(e)).collect();
@@ -85,6 +86,8 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         fields,
         erosion: None,
         shells: mechanics::state::ShellState::default(),
+        own: Vec::new(),
+        hourglass: Default::default(),
     }
 }
 
@@ -102,7 +105,6 @@ fn step() -> Step {
         dt: DT,
         linear_viscosity: 0.2,
         quadratic_viscosity: 1.0,
-        hourglass: 0.1,
         force_quantum: Quantum::for_reference(2e8, 42),
         energy_quantum: Quantum::for_reference(1e9, 40),
         arm: 1.0,
@@ -204,6 +206,7 @@ fn plates(
             topology: Topology::Structured { cells },
             nodes: (0..plane * (layers + 1)).collect(),
             element_ids: (0..n_elements).collect(),
+            hourglass: Default::default(),
         };
         if kind != Kind::Structured {
             let mut order: Vec<u32> = (0..n_elements).collect();
@@ -228,6 +231,7 @@ fn plates(
             },
             nodes: (0..plane).collect(),
             element_ids: (0..side * side).collect(),
+            hourglass: Default::default(),
         }
     };
     let parts = match kind {
@@ -271,7 +275,6 @@ fn plates(
             time_step_floor: 0.0,
             linear_viscosity: 0.2,
             quadratic_viscosity: 1.0,
-            hourglass: 0.1,
             sort_lag: 3,
             plan_interval: 100,
         },

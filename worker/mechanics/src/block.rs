@@ -12,6 +12,7 @@ use crate::{
     element::{
         ElementVote, Step,
         group::{self, Call, ElementArrays, Group, Scanned},
+        hourglass::Hourglass,
         place::Nodal,
     },
     erosion::PieceErosion,
@@ -50,8 +51,15 @@ pub struct Piece {
     pub fields: [Vec<f64>; N_FIELDS],
     /// In runs where anything erodes.
     pub erosion: Option<PieceErosion>,
-    /// What shells have beside that; empty of solids.
+    /// What nodes of shells have beside that; empty of solids.
     pub shells: ShellState,
+    /// What elements of this kind have beside [`Piece::fields`], one array per number: of shells six hourglass forces, thickness,
+    /// internal energy, energy of hourglass control, then for each point through the thickness, from below, stress xx, yy,
+    /// xy, yz, zx in the frame of the element, plastic strain, temperature; of solids with elastic hourglass control its
+    /// forces, x, y, z of each mode; of other solids nothing.
+    pub own: Vec<Vec<f64>>,
+    /// Hourglass control of solids.
+    pub hourglass: Hourglass,
 }
 
 /// Elements of one kind and one material, laid out for the kernels. The first `nodes.len()` entries of the node
@@ -77,6 +85,8 @@ pub struct Block {
     pub constraint: Vec<u16>,
     /// Rotations of the nodes, where the elements turn them.
     pub turning: Option<Turning>,
+    /// Hourglass control of solids.
+    pub(crate) hourglass: Hourglass,
     topology: Topology,
     group: Box<dyn Group>,
 }
@@ -120,6 +130,7 @@ impl Block {
             mass: piece.mass.iter().copied().chain(std::iter::repeat_n(1.0, n_padded - n_nodes)).collect(),
             constraint: piece.constraint,
             turning,
+            hourglass: piece.hourglass,
             topology: piece.topology,
             nodes: piece.nodes,
             elements: piece.elements,
@@ -144,7 +155,9 @@ impl Block {
             constraint: self.constraint.clone(),
             initial_volume,
             fields,
-            shells: of_shells(n, self.turning.as_ref(), own),
+            shells: of_shells(n, self.turning.as_ref()),
+            own,
+            hourglass: self.hourglass,
             erosion: None,
         }
     }
@@ -168,7 +181,9 @@ impl Block {
             mass: self.mass,
             constraint: self.constraint,
             erosion: None,
-            shells: of_shells(n, self.turning.as_ref(), own),
+            shells: of_shells(n, self.turning.as_ref()),
+            own,
+            hourglass: self.hourglass,
         }
     }
 
@@ -298,8 +313,8 @@ fn by_node(n: usize, arrays: &[Vec<f64>; 3]) -> Vec<[f64; 3]> {
     (0..n).map(|node| std::array::from_fn(|axis| arrays[axis][node])).collect()
 }
 
-/// Rotations of the first `n` nodes and the elements' own state, as a piece carries them.
-fn of_shells(n: usize, turning: Option<&Turning>, fields: Vec<Vec<f64>>) -> ShellState {
-    let Some(turning) = turning else { return ShellState { fields, ..ShellState::default() } };
-    ShellState { spin: by_node(n, &turning.w), inertia: turning.inertia[..n].to_vec(), fields }
+/// Rotations of the first `n` nodes, as a piece carries them.
+fn of_shells(n: usize, turning: Option<&Turning>) -> ShellState {
+    let Some(turning) = turning else { return ShellState::default() };
+    ShellState { spin: by_node(n, &turning.w), inertia: turning.inertia[..n].to_vec() }
 }

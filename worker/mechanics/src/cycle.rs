@@ -203,7 +203,6 @@ impl Domain {
             dt,
             linear_viscosity: control.linear_viscosity,
             quadratic_viscosity: control.quadratic_viscosity,
-            hourglass: control.hourglass,
             force_quantum: self.quanta.force,
             energy_quantum: self.quanta.energy,
             arm: self.quanta.arm,

@@ -44,11 +44,11 @@ pub fn digest(state: &GlobalState) -> String {
             hasher.update(&strain.to_le_bytes());
         }
     }
-    // A run without shells has nothing here, and the digest that it had before there were shells.
+    // A run without shells and elastic hourglass control has nothing here, and the digest that it had before there were such.
     for spin in state.shells.spin.iter().flatten() {
         hasher.update(&spin.to_le_bytes());
     }
-    for value in state.shells.fields.iter().flatten() {
+    for value in state.own.iter().flatten() {
         hasher.update(&value.to_le_bytes());
     }
     hasher.finalize().to_hex()[..32].to_owned()

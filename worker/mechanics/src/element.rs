@@ -11,7 +11,7 @@ use crate::exact::Quantum;
 
 pub(crate) mod group;
 pub mod hex8;
-pub(crate) mod hourglass;
+pub mod hourglass;
 pub(crate) mod layout;
 pub(crate) mod modes;
 pub(crate) mod place;
@@ -31,8 +31,6 @@ pub struct Step {
     pub linear_viscosity: f64,
     /// Quadratic artificial viscosity coefficient `C_Q`; enters squared.
     pub quadratic_viscosity: f64,
-    /// Viscous hourglass coefficient Q.
-    pub hourglass: f64,
     /// Corner forces are rounded to it (force).
     pub force_quantum: Quantum,
     /// Energies are rounded to it (energy).
@@ -51,7 +49,7 @@ pub struct ElementVote {
     /// Least `0.1 / |tr D|` (time): the step in which some volume changes by a tenth.
     pub volume_limit: f64,
     pub internal: f64,
-    /// Energy that hourglass control took in this step, at the velocity `v_{n-1/2}`. In a mesh, where the forces of
+    /// Energy that hourglass control took in this step, less what it gave back, at the velocity `v_{n-1/2}`. In a mesh, where the forces of
     /// neighbours mostly balance, that is close; for a single free element it is too much by the part
     /// `4 c dt / mass` (c the resistance of its modes), since its own force slows it within the step.
     pub hourglass: f64,

@@ -41,6 +41,7 @@ pub fn state(
         eroded: vec![ALIVE; if setup.erosion.is_on() { n_elements } else { 0 }],
         strain: vec![0.0; if setup.erosion.counts_strain() { n_elements } else { 0 }],
         shells: ShellState::default(),
+        own: vec![vec![0.0; n_elements]; mesh.parts.iter().map(Part::n_own).max().unwrap_or(0)],
     };
     let mut mass_of = Vec::with_capacity(n_elements);
     for (p, part) in (0..).zip(&mesh.parts) {
@@ -102,12 +103,12 @@ pub fn spin(state: &mut GlobalState, constraints: &[Constraint], given: &[[f64; 
 /// The state of shells at time zero. A node has the rotational inertia of a quarter of each of its elements, about any axis:
 /// `mass max(h^2 / 12, A / 8)`, so that bending and transverse shear never ask for a smaller step than the membrane.
 fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
-    let Some(n_fields) = mesh.parts.iter().filter_map(Part::section).map(|s| s.n_fields()).max() else {
+    if mesh.parts.iter().all(|part| part.section().is_none()) {
         return;
-    };
+    }
     let n_elements = mesh.n_elements();
     let mut inertia_of = vec![0.0; n_elements];
-    let mut fields = vec![vec![0.0; n_elements]; n_fields];
+    let fields = &mut state.own;
     for (part, first) in mesh.parts.iter().zip(mesh.element_offsets()) {
         let Some(section) = part.section() else { continue };
         let material = &setup.materials[part.material as usize];
@@ -137,7 +138,7 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
             }
         }
     }
-    state.shells = ShellState { spin: vec![[0.0; 3]; mesh.n_nodes()], inertia, fields };
+    state.shells = ShellState { spin: vec![[0.0; 3]; mesh.n_nodes()], inertia };
 }
 
 /// The quanta of a run's sums, from the deck's data alone.

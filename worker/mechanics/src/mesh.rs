@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::element::{
     hex8,
+    hourglass::{Hourglass, N_FORCES},
     shell4::{self, Rule},
 };
 
@@ -35,6 +36,8 @@ pub struct Part {
     pub nodes: Vec<u32>,
     /// The user's number of each element, in element order.
     pub element_ids: Vec<u32>,
+    /// Hourglass control of solids.
+    pub hourglass: Hourglass,
 }
 
 /// How the elements of a part are connected.
@@ -77,7 +80,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// Number of arrays that the state of such shells has ([`crate::state::ShellState::fields`]).
+    /// Number of arrays that such shells have of their own ([`crate::block::Piece::own`]).
     pub fn n_fields(&self) -> usize {
         shell4::ELEMENT + shell4::LAYER * self.rule.points().map_or(0, |points| points.len())
     }
@@ -145,6 +148,17 @@ impl Part {
             Topology::Structured { .. } | Topology::Explicit { .. } => &[0, 1, 2, 3, 4, 5],
             Topology::Shells { .. } => &[UPPER],
             Topology::Trusses { .. } => &[],
+        }
+    }
+
+    /// Number of arrays that its elements have of their own ([`crate::block::Piece::own`]).
+    pub fn n_own(&self) -> usize {
+        match &self.topology {
+            Topology::Structured { .. } | Topology::Explicit { .. } if self.hourglass.is_elastic() => {
+                N_FORCES
+            }
+            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::Trusses { .. } => 0,
+            Topology::Shells { section, .. } => section.n_fields(),
         }
     }
 

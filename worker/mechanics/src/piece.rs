@@ -114,15 +114,13 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
     let elements: Vec<u32> = local_elements.iter().map(|&e| e + offset as u32).collect();
     let shells = match mesh_part.section() {
         None => ShellState::default(),
-        Some(section) => ShellState {
+        Some(_) => ShellState {
             spin: nodes.iter().map(|&n| state.shells.spin[n as usize]).collect(),
             inertia: nodes.iter().map(|&n| state.shells.inertia[n as usize]).collect(),
-            fields: state.shells.fields[..section.n_fields()]
-                .iter()
-                .map(|field| elements.iter().map(|&e| field[e as usize]).collect())
-                .collect(),
         },
     };
+    let own = state.own[..mesh_part.n_own()].iter();
+    let own = own.map(|field| sparse(elements.iter().map(|&e| field[e as usize]))).collect();
     Piece {
         part: part as u32,
         material: mesh_part.material,
@@ -147,6 +145,8 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         nodes,
         elements,
         shells,
+        own,
+        hourglass: mesh_part.hourglass,
     }
 }
 
@@ -196,8 +196,8 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
         })
         && (piece.shells.spin.is_empty()
             || (piece.shells.spin.len() == piece.nodes.len() && state.shells.spin.len() == n_nodes))
-        && piece.shells.fields.iter().all(|field| field.len() == piece.elements.len())
-        && piece.shells.fields.len() <= state.shells.fields.len();
+        && piece.own.iter().all(|field| field.len() == piece.elements.len())
+        && piece.own.len() <= state.own.len();
     if !lengths_fit {
         return Err(format!(
             "image of part {}: array lengths do not fit its {} nodes and {} elements",
@@ -233,12 +233,8 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
     for (&n, &spin) in piece.nodes.iter().zip(&piece.shells.spin) {
         state.shells.spin[n as usize] = spin;
     }
-    for (field, values) in state.shells.fields.iter_mut().zip(&piece.shells.fields) {
-        for (&e, &value) in piece.elements.iter().zip(values) {
-            field[e as usize] = value;
-        }
-    }
-    for (values, to) in piece.fields.iter_mut().zip(&mut state.elements) {
+    let own = piece.own.iter_mut().zip(&mut state.own);
+    for (values, to) in piece.fields.iter_mut().zip(&mut state.elements).chain(own) {
         for (&e, value) in piece.elements.iter().zip(std::mem::take(values)) {
             write_changed(&mut to[e as usize], value);
         }

@@ -190,6 +190,7 @@ fn stirred(material: &Material, seed: u64) -> Piece {
         topology: topology.clone(),
         nodes: nodes.clone(),
         element_ids: Vec::new(),
+        hourglass: Default::default(),
     };
     let n = part.n_elements();
     let mut mass = vec![0.0; x.len()];
@@ -240,6 +241,8 @@ fn stirred(material: &Material, seed: u64) -> Piece {
         fields,
         erosion: None,
         shells: ShellState::default(),
+        own: Vec::new(),
+        hourglass: Default::default(),
     }
 }
 
@@ -254,7 +257,6 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
         growth: 1.05,
         linear_viscosity: 0.2,
         quadratic_viscosity: 1.0,
-        hourglass: 0.1,
         sort_lag: 2,
         plan_interval: 50,
         energy_error: 0.5,
@@ -367,7 +369,6 @@ mod tests {
             dt: 2e-7,
             linear_viscosity: 0.2,
             quadratic_viscosity: 1.0,
-            hourglass: 0.1,
             force_quantum: Quantum::for_reference(3e7, 42),
             energy_quantum: Quantum::for_reference(1e6, 42),
             arm: 1.0,

@@ -17,7 +17,7 @@ use crate::{
 pub struct Setup {
     /// Materials, indexed by [`crate::mesh::Part::material`].
     pub materials: Vec<Material>,
-    /// Time step, viscosity, hourglass, ends.
+    /// Time step, viscosity, ends.
     pub control: Control,
     /// Contact, or none.
     pub contact: Option<contact::Settings>,
@@ -84,8 +84,6 @@ pub struct Control {
     pub linear_viscosity: f64,
     /// Quadratic artificial viscosity coefficient; default 1.0 (enters squared).
     pub quadratic_viscosity: f64,
-    /// Viscous hourglass coefficient; default 0.1.
-    pub hourglass: f64,
     /// Cycles from the trigger of a sort to the cycle it acts at.
     pub sort_lag: u32,
     /// Longest distance between plan boundaries (cycles).

@@ -98,21 +98,19 @@ pub struct GlobalState {
     pub eroded: Vec<u64>,
     /// Incremental geometric strain by element; empty where none erodes by it.
     pub strain: Vec<f64>,
-    /// What shells have beside that; empty arrays in a run without shells.
+    /// What nodes of shells have beside that; empty arrays in a run without shells.
     pub shells: ShellState,
+    /// What elements have beside [`GlobalState::elements`], see [`crate::block::Piece::own`]: as many arrays as the kind that has most.
+    pub own: Vec<Vec<f64>>,
 }
 
-/// What shells have beside the state of solids.
+/// What nodes of shells have beside the state of other nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShellState {
     /// Rotation rate `w_{n-1/2}` by node (1/time); zero at nodes without shells.
     pub spin: Vec<[f64; 3]>,
     /// Rotational inertia about any axis by node (mass times length squared); zero at nodes without shells.
     pub inertia: Vec<f64>,
-    /// By element: six hourglass forces, thickness, internal energy, energy of hourglass control; then for each point
-    /// through the thickness, from below, stress xx, yy, xy, yz, zx in the frame of the element, plastic strain,
-    /// temperature.
-    pub fields: Vec<Vec<f64>>,
 }
 
 impl GlobalState {
@@ -136,11 +134,8 @@ impl GlobalState {
             // Kept in length alone: the states of parts that do not erode have nothing of this.
             eroded: vec![crate::erosion::ALIVE; self.eroded.len()],
             strain: vec![0.0; self.strain.len()],
-            shells: ShellState {
-                spin: Vec::new(),
-                inertia: self.shells.inertia.clone(),
-                fields: vec![Vec::new(); self.shells.fields.len()],
-            },
+            shells: ShellState { spin: Vec::new(), inertia: self.shells.inertia.clone() },
+            own: vec![Vec::new(); self.own.len()],
             ..Self::default()
         }
     }
@@ -162,8 +157,8 @@ impl GlobalState {
             shells: ShellState {
                 spin: vec![[0.0; 3]; self.shells.inertia.len()],
                 inertia: self.shells.inertia.clone(),
-                fields: vec![vec![0.0; n_elements]; self.shells.fields.len()],
             },
+            own: vec![vec![0.0; n_elements]; self.own.len()],
             ..self.statics()
         }
     }

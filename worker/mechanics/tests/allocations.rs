@@ -71,6 +71,7 @@ fn domain() -> Domain {
         topology: Topology::Structured { cells },
         nodes: (0..n_nodes).collect(),
         element_ids: (0..cells.iter().product()).collect(),
+        hourglass: Default::default(),
     };
     let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part] };
     let strength = Strength::JohnsonCook {
@@ -104,7 +105,6 @@ fn domain() -> Domain {
             time_step_floor: 0.0,
             linear_viscosity: 0.2,
             quadratic_viscosity: 1.0,
-            hourglass: 0.1,
             sort_lag: 3,
             plan_interval: 100,
         },

@@ -18,7 +18,6 @@ fn assign(cycle: u64) -> Box<Assign> {
                 time_step_floor: 0.0,
                 linear_viscosity: 0.2,
                 quadratic_viscosity: 1.0,
-                hourglass: 0.1,
                 sort_lag: 2,
                 plan_interval: 50,
             },

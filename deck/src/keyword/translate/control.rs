@@ -38,24 +38,7 @@ pub(super) fn write(t: &mut Translation<'_>, units: Option<&str>) {
         // Theirs enters as it is, ours squared.
         quadratic_viscosity: Some(quadratic.sqrt()),
         linear_viscosity: Some(linear),
-        hourglass: hourglass(t),
+        hourglass: super::hourglass::of_deck(t),
         ..Control::new(at)
     });
-}
-
-/// One coefficient for all parts.
-fn hourglass(t: &Translation<'_>) -> Option<f64> {
-    let (problem, log) = (t.problem, t.log);
-    let of_parts = t.names.keys().filter_map(|id| problem.hourglasses.get(&problem.parts[id].hourglass));
-    let mut given: Vec<(Place, i64, f64)> = of_parts.map(|h| (h.at, h.kind, h.coefficient)).collect();
-    given.extend(problem.control.hourglass);
-    let (at, kind, coefficient) = given.first().copied()?;
-    if kind > 3 {
-        log.warn(at, format!("IHQ {kind}: hourglass control is viscous, with the coefficient 0.1"));
-        return None;
-    }
-    if given.iter().any(|(_, k, c)| (*k, *c) != (kind, coefficient)) {
-        log.warn(at, "one hourglass coefficient serves all parts: that of this line");
-    }
-    (coefficient > 0.0).then_some(coefficient)
 }

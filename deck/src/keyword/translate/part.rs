@@ -88,6 +88,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
             fracture: None,
             velocity: t.vector(at, "a velocity of", common),
             kind,
+            hourglass: super::hourglass::of_part(t, id),
             erosion: erosion_of(t, part.material.value),
             mesh: (!t.without_section.contains(&id)).then_some(mesh),
             rotate: None,

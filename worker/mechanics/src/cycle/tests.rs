@@ -50,6 +50,7 @@ fn two_blocks() -> Mesh {
             topology: Topology::Structured { cells: CELLS },
             nodes,
             element_ids: (0..CELLS.iter().product()).collect(),
+            hourglass: Default::default(),
         });
     }
     mesh
@@ -74,7 +75,6 @@ fn setup(friction: f64) -> Setup {
             time_step_floor: 0.0,
             linear_viscosity: 0.2,
             quadratic_viscosity: 1.0,
-            hourglass: 0.1,
             sort_lag: 2,
             plan_interval: 100,
         },
@@ -174,7 +174,14 @@ fn folding_plate() -> Domain {
     let element_ids: Vec<u32> = (0..quads.len() as u32).collect();
     let section = Section { thickness: 0.2, rule: Rule::Gauss(3), thins: true };
     let topology = Topology::Shells { quads, section };
-    mesh.parts.push(Part { name: "plate".into(), material: 0, topology, nodes, element_ids });
+    mesh.parts.push(Part {
+        name: "plate".into(),
+        material: 0,
+        topology,
+        nodes,
+        element_ids,
+        hourglass: Default::default(),
+    });
     let mut setup = Setup { contact: None, ..setup(0.0) };
     setup.materials[0].strength =
         Strength::VonMises { shear: 0.5, yield_stress: 1e-3, hardening: 1e-2, rate: None };

@@ -111,7 +111,8 @@ pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, 
     match &piece.topology {
         Topology::Structured { .. } | Topology::Explicit { .. } => (Box::new(Solids::of(piece)), None),
         Topology::Shells { quads, section } => {
-            let ShellState { spin, inertia, fields } = std::mem::take(&mut piece.shells);
+            let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);
+            let fields = std::mem::take(&mut piece.own);
             let material = materials.get(piece.material as usize).expect("shells need their material");
             let volume = &piece.initial_volume;
             let core = Core::new(quads, n_nodes, &piece.elements, volume, &fields, section, material);

@@ -10,11 +10,13 @@ mod pass;
 
 use super::{
     ElementVote, Fault, Step,
-    hourglass::{Hourglass, amplitude},
+    hourglass::{
+        Amplitudes, Frame, LEAST_STRAIN, N_FORCES, PLASTIC, Resistance, amplitude, growth, stress_square,
+    },
     layout::{Corners, Layout},
     modes::{Gradient, Modes, corner_values, modes_of},
     place::{Bases, Nodal, PACKED, Packed, Place, Rows},
-    rotation::rotated,
+    rotation::{rotated, rotation},
     vector::{Tensor, Vector},
     viscosity::{Spread, Swing},
 };
@@ -60,6 +62,8 @@ pub(crate) struct View<'a> {
 /// Arrays by slot or set.
 pub(crate) struct BySlot<'a> {
     pub fields: [&'a mut [f64]; N_FIELDS],
+    /// Forces of elastic hourglass control; empty without it.
+    pub hourglass: [&'a mut [f64]; N_FORCES],
     /// Volume at time zero by slot; 1 in phantoms.
     pub initial_volume: &'a [f64],
     /// Bits of the slots of a set whose elements take part; phantoms do not.
@@ -85,6 +89,29 @@ impl BySlot<'_> {
         // SAFETY: the kernel keeps slots inside the state arrays.
         unsafe { L::select(active, value, kept).store(self.fields[field], slot) };
     }
+
+    /// Forces of elastic hourglass control of the slots from `slot` on; they have such control.
+    #[inline(always)]
+    fn hourglass<L: Lane>(&self, slot: usize) -> Amplitudes<L> {
+        let mut forces = [L::splat(0.0); N_FORCES];
+        for (force, array) in forces.iter_mut().zip(&self.hourglass) {
+            // SAFETY: the kernel keeps slots inside the state arrays, which these are with elastic control.
+            *force = unsafe { L::load(array, slot) };
+        }
+        Amplitudes::from_array(forces)
+    }
+
+    /// Writes them for the active lanes; the others keep theirs.
+    #[inline(always)]
+    fn set_hourglass<L: Lane>(&mut self, slot: usize, forces: Amplitudes<L>, active: L::Mask) {
+        for (value, array) in forces.to_array().into_iter().zip(&mut self.hourglass) {
+            // SAFETY: as in `hourglass`.
+            unsafe {
+                let kept = L::load(array, slot);
+                L::select(active, value, kept).store(array, slot);
+            }
+        }
+    }
 }
 
 /// A material made ready for kernels.
@@ -94,6 +121,7 @@ pub(crate) struct Laws<E, S, F> {
     pub eos: E,
     pub strength: S,
     pub failure: F,
+    pub hourglass: Resistance,
 }
 
 /// Running sums and extremes by lane. Sums are exact and extremes order-free, so lanes join in any way.
@@ -146,7 +174,7 @@ impl<L: Lane> Tally<L> {
 /// Sets are below the number of sets of the block, and every corner of every slot, phantoms included, is
 /// inside the node arrays with [`SET`] lanes behind it in a structured layout.
 #[inline(always)]
-unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool>(
     view: &mut View<'_>,
     laws: &Laws<E, S, F>,
     step: &Step,
@@ -162,7 +190,7 @@ unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
             Layout::Structured { row, plane, base } => {
                 let place = Rows { row: *row, plane: *plane, base };
                 for set in sets.iter().cloned().flatten() {
-                    of_set::<L, _, E, S, F>(place, nodes, slots, laws, step, set, &mut tally, vote);
+                    of_set::<L, _, E, S, F, ELASTIC>(place, nodes, slots, laws, step, set, &mut tally, vote);
                 }
             }
             Layout::Explicit { sets: places, lists } => {
@@ -180,7 +208,16 @@ unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
                             (PACKED, packed.nodal(), Some(list))
                         }
                     };
-                    of_set::<L, _, E, S, F>(place, &mut arrays, slots, laws, step, set, &mut tally, vote);
+                    of_set::<L, _, E, S, F, ELASTIC>(
+                        place,
+                        &mut arrays,
+                        slots,
+                        laws,
+                        step,
+                        set,
+                        &mut tally,
+                        vote,
+                    );
                     if let Some(list) = list {
                         packed.scatter(nodes, list);
                     }
@@ -197,7 +234,14 @@ unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
 /// As [`compute`].
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "one level of the kernel")]
-unsafe fn of_set<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+unsafe fn of_set<
+    L: Lane,
+    P: Place,
+    E: EquationOfState,
+    S: StrengthLaw,
+    F: FailureLaw,
+    const ELASTIC: bool,
+>(
     place: P,
     nodes: &mut Nodal<'_>,
     view: &mut BySlot<'_>,
@@ -211,7 +255,7 @@ unsafe fn of_set<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failu
     while lane < SET {
         let slot = set as usize * SET + lane;
         // SAFETY: handed on from the caller.
-        unsafe { slots::<L, P, E, S, F>(place, nodes, view, laws, step, slot, tally, vote) };
+        unsafe { slots::<L, P, E, S, F, ELASTIC>(place, nodes, view, laws, step, slot, tally, vote) };
         lane += L::N;
     }
 }
@@ -222,7 +266,7 @@ unsafe fn of_set<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failu
 /// As [`compute`].
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "one level of the kernel")]
-unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool>(
     place: P,
     nodes: &mut Nodal<'_>,
     view: &mut BySlot<'_>,
@@ -261,7 +305,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let mid = Modes::before(&x, &v, L::splat(0.5 * step.dt));
     let at_mid = Gradient::of(&mid);
     let gradient = at_mid.against(&v).scaled(one / at_mid.volume_times_64);
-    let hourglass = Hourglass {
+    let hourglass = Amplitudes {
         d: amplitude(&v.d, &gradient, &mid.d),
         e: amplitude(&v.e, &gradient, &mid.e),
         f: amplitude(&v.f, &gradient, &mid.f),
@@ -275,12 +319,12 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let (stressed, end);
     if E::IS_CHOSEN {
         end = End::of(&x, initial_volume);
-        stressed = Stressed::of(&gradient, view, slot, laws, step.dt, alive);
+        stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive);
     } else {
-        stressed = Stressed::of(&gradient, view, slot, laws, step.dt, alive);
+        stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive);
         end = End::of(&x, initial_volume);
     }
-    let Stressed { stress, power: deviatoric_power, history, plastic_before, strain, damage, failed } =
+    let Stressed { stress, power: deviatoric_power, history, plastic_before, strain, damage, failed, left } =
         stressed;
     let End {
         gradient: at_end,
@@ -362,8 +406,41 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         temperature = (energy - cold) * L::splat(by_energy);
     }
 
-    // 7. Which elements count.
-    let check = energy + pressure + viscosity + hourglass.square() + stress.sum();
+    // 7. Hourglass forces: turned, grown, and yielding as the stress does.
+    let mut resist = L::splat(2.0 * laws.hourglass.viscous) * density * sound * area;
+    let mut elastic = hourglass;
+    let mut elastic_power = zero;
+    if ELASTIC {
+        let spin = spin_of(&gradient, L::splat(0.5 * step.dt));
+        let turned = view.hourglass::<L>(slot).turned(&rotation(&spin));
+        let frame = Frame {
+            axes: [&mid.a, &mid.b, &mid.c],
+            volume: at_mid.volume(),
+            stiffness: stiffness * area * area * inverse_volume,
+        };
+        let trial = growth(&laws.hourglass, &hourglass, &frame, step.dt);
+        elastic = trial.mul_add(one, &turned).scaled(left);
+        let bent = stress_square(&elastic, &frame);
+        if L::any(L::splat(laws.hourglass.sound).less(bent)) {
+            let factor = laws.strength.factor(strain.rate, history.temperature);
+            let (yield_stress, _) =
+                laws.strength.flow(history.plastic_strain.max(L::splat(LEAST_STRAIN)), factor);
+            let most = L::splat(PLASTIC) * yield_stress;
+            let share = L::select((most * most).less(bent), most / bent.sqrt(), one);
+            elastic = elastic.scaled(share);
+        }
+        elastic_power = elastic.mul_add(one, &turned).dot(&hourglass);
+        if laws.failure.fails() {
+            resist = L::splat(2.0 * laws.hourglass.failed) * density * sound * area;
+            resist = L::select(failed, resist, zero);
+        }
+    }
+
+    // 8. Which elements count.
+    let mut check = energy + pressure + viscosity + hourglass.square() + stress.sum();
+    if ELASTIC {
+        check = check + elastic.square();
+    }
     let upright = L::both(zero.less(at_mid.volume_times_64), zero.less(at_end.volume_times_64));
     let finite = check.abs().less_equal(L::splat(f64::MAX));
     let active = L::both(alive, L::both(upright, finite));
@@ -375,7 +452,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         }
     }
 
-    // 8. Votes and energies.
+    // 9. Votes and energies.
     let double_inverse_square = L::splat(2.0 / 512.0) * inverse_volume * inverse_volume;
     let shear_square = L::splat(laws.strength.shear() / laws.density) * relative_volume;
     // The burn crosses elements faster than sound, and the step follows it.
@@ -393,17 +470,19 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
             }
         }
     }
-    let resist = L::splat(2.0 * step.hourglass) * density * sound * area;
     let energy_magic = L::splat(step.energy_quantum.magic());
     let internal = energy * initial_volume;
-    let taken = L::splat(step.dt / 8.0) * resist * hourglass.square();
+    let mut taken = L::splat(step.dt / 8.0) * resist * hourglass.square();
+    if ELASTIC {
+        taken = L::splat(0.5 * step.dt).mul_add(elastic_power, taken);
+    }
     let squeezed = -(heating * volume_change * initial_volume);
     tally.internal = tally.internal + L::select(active, rounded(internal, energy_magic), zero);
     tally.hourglass = tally.hourglass + L::select(active, rounded(taken, energy_magic), zero);
     tally.viscosity = tally.viscosity + L::select(active, rounded(squeezed, energy_magic), zero);
     tally.largest_rate = tally.largest_rate.max(L::select(active, volume_rate.abs(), zero));
 
-    // 9. State. Forces act from the first cycle on, so their viscosity is kept from there.
+    // 10. State. Forces act from the first cycle on, so their viscosity is kept from there.
     view.set_state(slot, field::VISCOSITY, viscosity, active);
     if step.dt != 0.0 {
         if laws.strength.deviatoric() {
@@ -425,23 +504,31 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         if laws.eos.burns() {
             view.set_state(slot, field::TIME_TO_LIGHT, time_to_light, active);
         }
+        if ELASTIC {
+            view.set_hourglass(slot, elastic, active);
+        }
         view.set_state(slot, field::PRESSURE, pressure, active);
         view.set_state(slot, field::ENERGY, energy, active);
         view.set_state(slot, field::RELATIVE_VOLUME, relative_volume, active);
     }
 
-    // 10. Corner forces: minus the stress, with the correction of hourglass control, on the volume gradient.
+    // 11. Corner forces: minus the stress, with the correction of hourglass control, on the volume gradient.
     //     The factor 1/64 takes back what the gradient is too large by.
     let squeeze = (pressure + viscosity) * L::splat(1.0 / 64.0);
     let stress = stress.scaled(L::splat(1.0 / 64.0));
-    let resist = resist * L::splat(1.0 / 8.0);
-    let bent = hourglass.against(&x.d, &x.e, &x.f, &x.g).scaled(resist * inverse_by_64);
+    let mut resist = resist * L::splat(1.0 / 8.0);
+    let mut resisted = hourglass;
+    if ELASTIC {
+        resisted = hourglass.mul_add(resist, &elastic);
+        resist = one;
+    }
+    let bent = resisted.against(&x.d, &x.e, &x.f, &x.g).scaled(resist * inverse_by_64);
     let rows = [
         Vector { x: bent.x.x - (stress.xx - squeeze), y: bent.x.y - stress.xy, z: bent.x.z - stress.zx },
         Vector { x: bent.y.x - stress.xy, y: bent.y.y - (stress.yy - squeeze), z: bent.y.z - stress.yz },
         Vector { x: bent.z.x - stress.zx, y: bent.z.y - stress.yz, z: bent.z.z - (stress.zz - squeeze) },
     ];
-    let Hourglass { d, e, f, g } = hourglass;
+    let Amplitudes { d, e, f, g } = resisted;
     let amplitudes = [[d.x, e.x, f.x, g.x], [d.y, e.y, f.y, g.y], [d.z, e.z, f.z, g.z]];
     let magic = L::splat(step.force_quantum.magic());
     let mut axis = 0;
@@ -466,12 +553,14 @@ struct Stressed<L: Lane> {
     damage: L,
     /// Where that is 1.
     failed: L::Mask,
+    /// What yield and failure leave of the trial stress, between 0 and 1; reckoned for elastic hourglass control only.
+    left: L,
 }
 
 impl<L: Lane> Stressed<L> {
     /// Rotation, elastic increment, yield.
     #[inline(always)]
-    fn of<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+    fn of<E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool>(
         gradient: &Tensor<L>,
         view: &BySlot<'_>,
         slot: usize,
@@ -487,6 +576,7 @@ impl<L: Lane> Stressed<L> {
         let mut plastic_before = zero;
         let mut stress = Deviator::zero();
         let mut power = zero;
+        let mut left = one;
         if laws.strength.deviatoric() {
             let third = (gradient.x.x + gradient.y.y + gradient.z.z) * L::splat(1.0 / 3.0);
             let rate = Deviator {
@@ -497,12 +587,7 @@ impl<L: Lane> Stressed<L> {
                 yz: half * (gradient.y.z + gradient.z.y),
                 zx: half * (gradient.z.x + gradient.x.z),
             };
-            let half_dt = L::splat(0.5 * dt);
-            let spin = Vector {
-                x: half_dt * (gradient.z.y - gradient.y.z),
-                y: half_dt * (gradient.x.z - gradient.z.x),
-                z: half_dt * (gradient.y.x - gradient.x.y),
-            };
+            let spin = spin_of(gradient, L::splat(0.5 * dt));
             let (xx, yy): (L, L) = (view.state(slot, field::SXX), view.state(slot, field::SYY));
             let before = Deviator {
                 xx,
@@ -533,8 +618,27 @@ impl<L: Lane> Stressed<L> {
             // The stress before, turned, is `turned` less its half of the increment.
             let sum = turned.plus(&stress);
             power = half * half_increment.neg_mul_add(rate_square, sum.contract(&rate));
+            if ELASTIC {
+                left = L::select(failed, zero, one);
+                let yields = plastic_before.less(history.plastic_strain);
+                if L::any(yields) {
+                    let share =
+                        stress.contract(&trial) / trial.contract(&trial).max(L::splat(f64::MIN_POSITIVE));
+                    left = L::select(yields, share.max(zero).min(left), left);
+                }
+            }
         }
-        Self { stress, power, history, plastic_before, strain, damage, failed }
+        Self { stress, power, history, plastic_before, strain, damage, failed, left }
+    }
+}
+
+/// The axial vector of the spin of a step, from the velocity gradient and half of the step.
+#[inline(always)]
+fn spin_of<L: Lane>(gradient: &Tensor<L>, half_dt: L) -> Vector<L> {
+    Vector {
+        x: half_dt * (gradient.z.y - gradient.y.z),
+        y: half_dt * (gradient.x.z - gradient.z.x),
+        z: half_dt * (gradient.y.x - gradient.x.y),
     }
 }
 

@@ -3,13 +3,13 @@
 //! `R = (I - w/2)^-1 (I + w/2)` with `w = W dt` the spin of the step. On the mid-step geometry a rigid rotation by
 //! theta gives `|w| = 2 tan(theta/2)`, for which R is the rotation by theta exactly.
 
-use super::vector::Vector;
+use super::vector::{Tensor, Vector};
 use crate::{lanes::Lane, strength::Deviator};
 
-/// `R s R^T` for the axial vector `w` of the spin of the step (`W r = w x r`). Closed form
-/// `R = I + k (W + W^2 / 2)`, `k = 1 / (1 + |w|^2 / 4)`; a zero spin leaves the stress as it is.
+/// R for the axial vector `w` of the spin of the step (`W r = w x r`). Closed form
+/// `R = I + k (W + W^2 / 2)`, `k = 1 / (1 + |w|^2 / 4)`.
 #[inline(always)]
-pub(crate) fn rotated<L: Lane>(s: &Deviator<L>, w: &Vector<L>) -> Deviator<L> {
+pub(crate) fn rotation<L: Lane>(w: &Vector<L>) -> Tensor<L> {
     let (one, half, quarter) = (L::splat(1.0), L::splat(0.5), L::splat(0.25));
     let k = one / w.dot(w).mul_add(quarter, one);
     let h = k * half;
@@ -17,9 +17,17 @@ pub(crate) fn rotated<L: Lane>(s: &Deviator<L>, w: &Vector<L>) -> Deviator<L> {
     let (kx, ky, kz) = (k * w.x, k * w.y, k * w.z);
     let (xx, yy, zz) = (hx * w.x, hy * w.y, hz * w.z);
     let (xy, yz, zx) = (hx * w.y, hy * w.z, hz * w.x);
-    let row_x = Vector { x: one - (yy + zz), y: xy - kz, z: zx + ky };
-    let row_y = Vector { x: xy + kz, y: one - (zz + xx), z: yz - kx };
-    let row_z = Vector { x: zx - ky, y: yz + kx, z: one - (xx + yy) };
+    Tensor {
+        x: Vector { x: one - (yy + zz), y: xy - kz, z: zx + ky },
+        y: Vector { x: xy + kz, y: one - (zz + xx), z: yz - kx },
+        z: Vector { x: zx - ky, y: yz + kx, z: one - (xx + yy) },
+    }
+}
+
+/// `R s R^T` for R of the axial vector `w`; a zero spin leaves the stress as it is.
+#[inline(always)]
+pub(crate) fn rotated<L: Lane>(s: &Deviator<L>, w: &Vector<L>) -> Deviator<L> {
+    let Tensor { x: row_x, y: row_y, z: row_z } = rotation(w);
     // Columns of the symmetric s are its rows.
     let s_x = Vector { x: s.xx, y: s.xy, z: s.zx };
     let s_y = Vector { x: s.xy, y: s.yy, z: s.yz };

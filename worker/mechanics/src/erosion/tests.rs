@@ -49,6 +49,7 @@ fn bent(structured: bool) -> (Piece, PieceErosion) {
         topology: topology.clone(),
         nodes: (0..initial.len() as u32).collect(),
         element_ids: Vec::new(),
+        hourglass: Default::default(),
     };
     let hexahedra = (0..n).map(|e| part.corners(e)).collect();
     let topology = if structured { topology } else { Topology::Explicit { hexahedra } };
@@ -78,6 +79,8 @@ fn bent(structured: bool) -> (Piece, PieceErosion) {
         fields,
         erosion: None,
         shells: ShellState::default(),
+        own: Vec::new(),
+        hourglass: Default::default(),
     };
     // One has gone before.
     let mut eroded = vec![ALIVE; n];
@@ -112,7 +115,6 @@ fn step() -> Step {
         dt: 1e-6,
         linear_viscosity: 0.0,
         quadratic_viscosity: 0.0,
-        hourglass: 0.0,
         force_quantum: Quantum::for_reference(1e7, 42),
         energy_quantum: Quantum::for_reference(1e4, 42),
         arm: 1.0,

@@ -164,12 +164,13 @@ mod tests {
             fields: std::array::from_fn(|k| vec![if k == field::RELATIVE_VOLUME { 1.0 } else { 0.0 }]),
             erosion: None,
             shells: ShellState::default(),
+            own: Vec::new(),
+            hourglass: Default::default(),
         });
         let step = Step {
             dt: 1e-4,
             linear_viscosity: 0.0,
             quadratic_viscosity: 0.0,
-            hourglass: 0.0,
             force_quantum: Quantum::for_reference(1e12, 42),
             energy_quantum: Quantum::for_reference(1e12, 40),
             arm: 1.0,

@@ -2,7 +2,10 @@
 
 use mechanics::{
     block::{Block, Piece},
-    element::{ElementVote, Fault},
+    element::{
+        ElementVote, Fault,
+        hourglass::{Hourglass, Kind},
+    },
     lanes::Width,
     material::{Failure, Material},
     mesh::{Part, Topology},
@@ -26,7 +29,8 @@ fn bits(block: &Block, vote: &ElementVote) -> Vec<u64> {
         vote.viscosity,
         vote.force_bound,
     ];
-    let all = forces.chain(nodes).chain(piece.fields.iter().flatten().copied()).chain(votes);
+    let fields = piece.fields.iter().chain(&piece.own).flatten().copied();
+    let all = forces.chain(nodes).chain(fields).chain(votes);
     all.map(f64::to_bits).collect()
 }
 
@@ -54,6 +58,7 @@ fn written_out(piece: &Piece) -> Piece {
         topology: piece.topology.clone(),
         nodes: (0..piece.nodes.len() as u32).collect(),
         element_ids: Vec::new(),
+        hourglass: Default::default(),
     };
     let hexahedra = (0..part.n_elements()).map(|element| part.corners(element)).collect();
     Piece { topology: Topology::Explicit { hexahedra }, ..piece.clone() }
@@ -64,20 +69,41 @@ fn with_gases() -> Vec<Material> {
     all_laws().into_iter().chain(gases()).collect()
 }
 
+/// Every kind of hourglass control.
+fn controls() -> [Hourglass; 3] {
+    Kind::ALL.map(|kind| Hourglass { kind, coefficient: kind.usual() })
+}
+
+/// Every law under every kind that it can have, with a seed for each law.
+fn by_control(first: u64) -> impl Iterator<Item = (u64, (Material, Hourglass))> {
+    let laws = (first..).zip(with_gases());
+    laws.flat_map(|(seed, material)| {
+        controls().map(|control| (seed, (material.clone(), control.on(&material))))
+    })
+}
+
+/// A stirred body whose hourglass forces, if it keeps such, are stirred too.
+fn with_forces(piece: Piece, hourglass: Hourglass, seed: u64) -> Piece {
+    let mut piece = controlled(piece, hourglass);
+    let mut draws = Draws(seed.wrapping_mul(77) | 1);
+    piece.own.iter_mut().flatten().for_each(|force| *force = 1e4 * draws.next());
+    piece
+}
+
 const SHAPES: [[u32; 3]; 6] = [[7, 5, 3], [1, 1, 3], [8, 2, 2], [3, 1, 1], [2, 9, 1], [19, 2, 2]];
 
 #[test]
-fn every_width_and_both_topologies_give_the_same_bits_for_every_law() {
-    for (seed, material) in (1..).zip(with_gases()) {
+fn every_width_and_both_topologies_give_the_same_bits_for_every_law_and_hourglass_control() {
+    for (seed, (material, control)) in by_control(1) {
         for shape in SHAPES {
-            let piece = stirred(&material, shape, seed);
+            let piece = with_forces(stirred(&material, shape, seed), control, seed);
             let reference = three_cycles(&piece, &material, Width::Scalar);
             for width in Width::ALL {
                 if let Err(error) = width.require() {
                     println!("not compared: {error}");
                     continue;
                 }
-                let name = format!("{width}, {shape:?}, {material:?}");
+                let name = format!("{width}, {shape:?}, {control:?}, {material:?}");
                 assert!(three_cycles(&piece, &material, width) == reference, "{name}");
                 let explicit = written_out(&piece);
                 assert!(three_cycles(&explicit, &material, width) == reference, "explicit, {name}");
@@ -190,6 +216,7 @@ fn half(piece: &Piece, cut: u32, low: bool) -> Piece {
         constraint: nodes.iter().map(|&n| piece.constraint[n]).collect(),
         initial_volume: by_element(&piece.initial_volume),
         fields: std::array::from_fn(|field| by_element(&piece.fields[field])),
+        own: piece.own.iter().map(|values| by_element(values)).collect(),
         erosion: None,
         shells: piece.shells.clone(),
         ..*piece
@@ -198,8 +225,8 @@ fn half(piece: &Piece, cut: u32, low: bool) -> Piece {
 
 #[test]
 fn two_halves_add_to_the_whole() {
-    for (seed, material) in (11..).zip(with_gases()) {
-        let piece = stirred(&material, [9, 4, 3], seed);
+    for (seed, (material, control)) in by_control(11) {
+        let piece = with_forces(stirred(&material, [9, 4, 3], seed), control, seed);
         let step = full_step(2e-7);
         let mut whole = Block::new(&piece);
         let vote = compute(&mut whole, &material, &step, Width::best());
@@ -220,6 +247,11 @@ fn two_halves_add_to_the_whole() {
                     assert_eq!(value.to_bits(), image.fields[field][element as usize].to_bits());
                 }
             }
+            for (values, whole) in part.own.iter().zip(&image.own) {
+                for (value, &element) in values.iter().zip(&part.elements) {
+                    assert_eq!(value.to_bits(), whole[element as usize].to_bits());
+                }
+            }
         }
         assert_eq!(joined, vote);
         for (node, sum) in forces.iter().enumerate() {
@@ -231,7 +263,8 @@ fn two_halves_add_to_the_whole() {
 #[test]
 fn the_order_and_grouping_of_sets_do_not_show() {
     let material = &all_laws()[7];
-    let piece = stirred(material, [7, 5, 3], 77);
+    let assumed = Hourglass { kind: Kind::AssumedStrain, coefficient: 1.0 };
+    let piece = with_forces(stirred(material, [7, 5, 3], 77), assumed, 77);
     let step = full_step(2e-7);
     let mut forward = Block::new(&piece);
     let vote = compute(&mut forward, material, &step, Width::best());
@@ -356,6 +389,7 @@ fn the_vote_is_the_least_of_the_elements_alone() {
         let mut joined = ElementVote::default();
         for (element, corners) in hexahedra.iter().enumerate().rev() {
             let mut alone = one(&material, &corners.map(|node| piece.x[node as usize]));
+            alone.hourglass = piece.hourglass;
             alone.v = corners.map(|node| piece.v[node as usize]).to_vec();
             alone.elements = vec![piece.elements[element]];
             alone.initial_volume = vec![piece.initial_volume[element]];

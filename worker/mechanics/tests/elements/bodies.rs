@@ -2,7 +2,10 @@
 
 use mechanics::{
     block::{Block, Piece},
-    element::{ElementVote, Step, hex8},
+    element::{
+        ElementVote, Step, hex8,
+        hourglass::{Hourglass, N_FORCES},
+    },
     exact::Quantum,
     lanes::Width,
     material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
@@ -131,7 +134,7 @@ impl Draws {
     }
 }
 
-/// A piece at rest, unstressed, with the mass of each element spread in eighths.
+/// A piece at rest, unstressed, without hourglass control, with the mass of each element spread in eighths.
 pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece {
     let nodes: Vec<u32> = (0..x.len() as u32).collect();
     let part = Part {
@@ -140,6 +143,7 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
         topology: topology.clone(),
         nodes: nodes.clone(),
         element_ids: Vec::new(),
+        hourglass: Default::default(),
     };
     let n_elements = part.n_elements();
     let mut mass = vec![0.0; x.len()];
@@ -171,7 +175,15 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
         fields,
         erosion: None,
         shells: mechanics::state::ShellState::default(),
+        own: Vec::new(),
+        hourglass: Hourglass::NONE,
     }
+}
+
+/// A piece with this hourglass control, whose forces are zero.
+pub fn controlled(piece: Piece, hourglass: Hourglass) -> Piece {
+    let n_own = if hourglass.is_elastic() { N_FORCES } else { 0 };
+    Piece { own: vec![vec![0.0; piece.elements.len()]; n_own], hourglass, ..piece }
 }
 
 /// One element.
@@ -199,6 +211,7 @@ pub fn grid(material: &Material, cells: [u32; 3], h: f64, distortion: f64, seed:
 pub fn stirred(material: &Material, cells: [u32; 3], seed: u64) -> Piece {
     let h = 0.01;
     let mut piece = grid(material, cells, h, 0.12, seed);
+    piece.hourglass = Hourglass::viscous(0.1);
     let mut draws = Draws(seed.wrapping_mul(31) | 1);
     for v in &mut piece.v {
         *v = std::array::from_fn(|_| 40.0 * draws.next());
@@ -233,13 +246,12 @@ pub fn stirred(material: &Material, cells: [u32; 3], seed: u64) -> Piece {
     piece
 }
 
-/// A step without viscosity and hourglass control, with quanta far below `force` and `energy`.
+/// A step without viscosity, with quanta far below `force` and `energy`.
 pub fn bare_step(dt: f64, force: f64, energy: f64) -> Step {
     Step {
         dt,
         linear_viscosity: 0.0,
         quadratic_viscosity: 0.0,
-        hourglass: 0.0,
         force_quantum: Quantum::for_reference(force, 49),
         energy_quantum: Quantum::for_reference(energy, 49),
         arm: 1.0,
@@ -252,7 +264,6 @@ pub fn full_step(dt: f64) -> Step {
         dt,
         linear_viscosity: 0.2,
         quadratic_viscosity: 1.0,
-        hourglass: 0.1,
         force_quantum: Quantum::for_reference(3e7, 42),
         energy_quantum: Quantum::for_reference(1e6, 42),
         arm: 1.0,

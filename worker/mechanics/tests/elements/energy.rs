@@ -2,6 +2,7 @@
 
 use mechanics::{
     block::Block,
+    element::hourglass::{Hourglass, Kind},
     lanes::Width,
     material::{Eos, Strength},
     state::field,
@@ -11,8 +12,10 @@ use crate::bodies::*;
 
 #[test]
 fn energy_and_momentum_of_a_free_body_are_conserved() {
-    for material in all_laws() {
-        let mut piece = grid(&material, [6, 5, 4], 0.01, 0.1, 4);
+    let controls = Kind::ALL.map(|kind| Hourglass { kind, coefficient: kind.usual() });
+    let all = all_laws().into_iter().flat_map(|material| controls.map(|control| (material.clone(), control)));
+    for (material, control) in all {
+        let mut piece = controlled(grid(&material, [6, 5, 4], 0.01, 0.1, 4), control);
         let mut draws = Draws(5);
         for (v, x) in piece.v.iter_mut().zip(&piece.x) {
             *v = [200.0 - 8000.0 * x[0], 6000.0 * x[2] - 100.0, 20.0 * draws.next()];
@@ -45,7 +48,7 @@ fn energy_and_momentum_of_a_free_body_are_conserved() {
             }
             worst = worst.max((total / first - 1.0).abs());
         }
-        assert!(worst < 0.02, "{worst} with {material:?}");
+        assert!(worst < 0.02, "{worst} with {control:?}, {material:?}");
         for (now, before) in momentum(&block).into_iter().zip(before) {
             assert!((now - before).abs() < 1e-13 * scale, "{now} {before}, scale {scale}");
         }

@@ -4,8 +4,8 @@
 #![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
 
 mod bits;
-#[expect(dead_code, reason = "the verification book uses more of them")]
 mod bodies;
 mod energy;
+mod hourglass;
 mod laws;
 mod waves;

@@ -11,6 +11,7 @@ use crate::{
     element::{
         ElementVote,
         group::{Call, ElementArrays, Group, PHANTOM, Scanned},
+        hourglass::{Hourglass, N_FORCES},
         layout::{Corners, Layout, explicit, in_runs, structured},
         place::Nodal,
     },
@@ -30,6 +31,9 @@ pub(crate) struct Solids {
     /// Slot of each local element.
     slots: Vec<u32>,
     fields: [Vec<f64>; N_FIELDS],
+    control: Hourglass,
+    /// Forces of elastic hourglass control; empty without it.
+    hourglass: [Vec<f64>; N_FORCES],
     initial_volume: Vec<f64>,
     /// Bits of the slots of each set that hold elements.
     alive: Vec<u8>,
@@ -44,7 +48,7 @@ impl Solids {
     /// Those of a piece, whose element arrays go one by one.
     ///
     /// # Panics
-    /// If the arrays do not fit the topology or that is none of hexahedra.
+    /// If the arrays do not fit the topology or the hourglass control, or the topology is none of hexahedra.
     pub fn of(piece: &mut Piece) -> Self {
         let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
         let (layout, slots, reach) = match &piece.topology {
@@ -68,7 +72,13 @@ impl Solids {
         for (&slot, &element) in slots.iter().zip(&piece.elements) {
             slot_elements[slot as usize] = element;
         }
+        let own = take(&mut piece.own);
+        let n_own = if piece.hourglass.is_elastic() { N_FORCES } else { 0 };
+        assert!(own.len() == n_own, "{} arrays of hourglass forces, {n_own} expected", own.len());
+        let mut own = own.into_iter().map(|values| by_slot(values, 0.0));
         Self {
+            control: piece.hourglass,
+            hourglass: std::array::from_fn(|_| own.next().unwrap_or_default()),
             fields: piece.fields.each_mut().map(|values| by_slot(take(values), 0.0)),
             initial_volume: by_slot(take(&mut piece.initial_volume), 1.0),
             alive: slot_elements
@@ -88,6 +98,12 @@ impl Solids {
 
     fn by_element(&self, array: &[f64]) -> Vec<f64> {
         sparse(self.slots.iter().map(|&slot| array[slot as usize]))
+    }
+
+    /// Forces of elastic hourglass control by element; none without it.
+    fn own(&self) -> Vec<Vec<f64>> {
+        let kept = self.hourglass.iter().filter(|array| !array.is_empty());
+        kept.map(|array| self.by_element(array)).collect()
     }
 }
 
@@ -135,6 +151,7 @@ impl Group for Solids {
             nodes,
             slots: BySlot {
                 fields: self.fields.each_mut().map(Vec::as_mut_slice),
+                hourglass: self.hourglass.each_mut().map(Vec::as_mut_slice),
                 initial_volume: &self.initial_volume,
                 alive: &self.alive,
                 elements: &self.slot_elements,
@@ -142,7 +159,7 @@ impl Group for Solids {
             },
         };
         // SAFETY: corners and slots are inside their arrays since these were built.
-        unsafe { pass::run(view, call, vote) };
+        unsafe { pass::run(view, call, self.control, vote) };
     }
 
     fn element(&self, element: usize, _x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
@@ -154,7 +171,7 @@ impl Group for Solids {
         ElementArrays {
             initial_volume: self.by_element(&self.initial_volume),
             fields: self.fields.each_ref().map(|values| self.by_element(values)),
-            own: Vec::new(),
+            own: self.own(),
         }
     }
 
@@ -166,11 +183,11 @@ impl Group for Solids {
             let values = take(&mut self.fields[field]);
             self.by_element(&values)
         });
-        ElementArrays { initial_volume, fields, own: Vec::new() }
+        ElementArrays { initial_volume, fields, own: self.own() }
     }
 
     fn visit(&self, visit: &mut dyn FnMut(f64)) {
-        for values in &self.fields {
+        for values in self.fields.iter().chain(self.hourglass.iter().filter(|array| !array.is_empty())) {
             self.slots.iter().for_each(|&slot| visit(values[slot as usize]));
         }
     }

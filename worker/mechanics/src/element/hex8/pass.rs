@@ -4,10 +4,14 @@ use std::ops::Range;
 
 use super::{Laws, View, compute};
 use crate::{
-    element::{ElementVote, Step, group::Call},
+    element::{
+        ElementVote, Step,
+        group::Call,
+        hourglass::{Hourglass, Resistance},
+    },
     eos::{AnyEos, EquationOfState},
     failure::{AnyFailure, FailureLaw, Unfailing},
-    lanes::{Lane, dispatch::Task},
+    lanes::{Lane, SET, Width, dispatch::Task},
     strength::{AnyStrength, StrengthLaw},
 };
 
@@ -19,26 +23,32 @@ use crate::{
 /// # Safety
 /// Arrays by slot and set hold the sets of the layout; every corner of every slot, phantoms included, is below the reach, with
 /// [`SET`](crate::lanes::SET) lanes behind it in a structured layout.
-pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, vote: &mut ElementVote) {
+pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vote: &mut ElementVote) {
     let Call { material, sets, step, width } = *call;
     let (n_sets, reach) = (view.slots.alive.len(), view.reach);
     assert!(sets.iter().all(|r| r.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
     let arrays = view.nodes.x.iter().chain(&view.nodes.v).map(|a| a.len());
     let shortest = arrays.chain(view.nodes.f.iter().map(|a| a.len())).min().unwrap_or(0);
     assert!(shortest >= reach, "node arrays shrunk to {shortest}, below {reach}");
-    let density = material.density;
+    let elastic = control.is_elastic();
+    let n_forces = if elastic { n_sets * SET } else { 0 };
+    assert!(
+        view.slots.hourglass.iter().all(|array| array.len() == n_forces),
+        "hourglass forces that are not of {n_forces} slots"
+    );
+    let (density, hourglass) = (material.density, Resistance::of(control, material));
     let laws = (AnyEos::of(material), AnyStrength::of(material), AnyFailure::of(material));
     match laws {
         // A copy of its own: with AVX2 the kernel of all laws takes 8 % longer for them.
         (AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength), AnyFailure::Unfailing(Unfailing))
             if strength.by_energy == 0.0 =>
         {
-            let laws = Laws { density, eos, strength, failure: Unfailing };
-            width.run(Pass { view, laws, step, sets, vote });
+            let laws = Laws { density, eos, strength, failure: Unfailing, hourglass };
+            Pass { view, laws, step, sets, vote }.on(width, elastic);
         }
         (eos, strength, failure) => {
-            let laws = Laws { density, eos, strength, failure };
-            width.run(Pass { view, laws, step, sets, vote });
+            let laws = Laws { density, eos, strength, failure, hourglass };
+            Pass { view, laws, step, sets, vote }.on(width, elastic);
         }
     }
 }
@@ -52,7 +62,23 @@ struct Pass<'a, E, S, F> {
     vote: &'a mut ElementVote,
 }
 
-impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw> Task for Pass<'_, E, S, F> {
+impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw> Pass<'_, E, S, F> {
+    /// Runs on a width, with elastic hourglass control or without.
+    fn on(self, width: Width, elastic: bool) {
+        if elastic {
+            width.run(Controlled::<_, true>(self));
+        } else {
+            width.run(Controlled::<_, false>(self));
+        }
+    }
+}
+
+/// A pass whose hourglass control is elastic or not.
+struct Controlled<P, const ELASTIC: bool>(P);
+
+impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool> Task
+    for Controlled<Pass<'_, E, S, F>, ELASTIC>
+{
     type Output = ();
 
     const PAIRED: bool = true;
@@ -61,10 +87,10 @@ impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw> Task for Pass<'_, E, S, 
     fn run<L: Lane>(self) {
         // Copies of its own: what is behind a reference that a task carries could be what the kernel writes, for all the compiler
         // knows, and would be loaded again after each store.
-        let Self { mut view, laws, step, sets, vote } = self;
+        let Pass { mut view, laws, step, sets, vote } = self.0;
         let (step, mut own) = (*step, *vote);
         // SAFETY: `run` above, which alone makes a pass, has checked it or has the promise of its caller.
-        unsafe { compute::<L, E, S, F>(&mut view, &laws, &step, sets, &mut own) }
+        unsafe { compute::<L, E, S, F, ELASTIC>(&mut view, &laws, &step, sets, &mut own) }
         *vote = own;
     }
 }

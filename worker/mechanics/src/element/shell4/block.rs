@@ -117,7 +117,7 @@ impl Section {
 
 impl Core {
     /// Lays out the state of `quads.len()` elements in slots, eight to a set. `elements` are their global indices,
-    /// `volume` their area times thickness at the start, `fields` their state, see [`crate::state::ShellState::fields`].
+    /// `volume` their area times thickness at the start, `fields` their state, see [`crate::block::Piece::own`].
     ///
     /// # Errors
     /// [`SectionError`].
