@@ -183,6 +183,9 @@ pub fn conclude(
     json: bool,
 ) -> Result<ExitCode, String> {
     let summary = summarise(model, census, outcome, traffic, threads, wall_s);
+    for warning in &summary.warnings {
+        warn!("{warning}");
+    }
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;

@@ -220,8 +220,7 @@ impl RunTotals {
         self.first_step.get_or_insert(dt);
         self.book_parts(&vote.parts, cycle);
         self.bodies.clone_from(&vote.bodies);
-        // Slow loading is not judged by the little kinetic energy that it has.
-        let scale = initial.abs().max(self.greatest_kinetic).max(self.greatest_external);
+        let scale = self.scale();
         if scale > 0.0 {
             self.first_stirred.get_or_insert(cycle);
         }
@@ -272,6 +271,13 @@ impl RunTotals {
             lost.merge(vote.loss);
         }
         lost
+    }
+
+    /// What energies are large or small beside: the greatest of the energy at first, the kinetic energy and the external work. Slow
+    /// loading is not judged by the little kinetic energy that it has.
+    pub fn scale(&self) -> f64 {
+        let initial = self.initial_total.unwrap_or_default().abs();
+        initial.max(self.greatest_kinetic).max(self.greatest_external)
     }
 
     fn pair(&mut self, parts: [u32; 2]) -> &mut PairSums {

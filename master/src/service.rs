@@ -170,6 +170,9 @@ fn run(order: &Order) -> Result<(Change, Ended), String> {
     }
     let threads = specs.iter().map(|spec| spec.threads).sum();
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
+    for warning in &summary.warnings {
+        warn!(job = order.number, "{warning}");
+    }
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;

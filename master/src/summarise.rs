@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use deck::model::Model;
-use mechanics::{contact::Surface, state::GlobalState};
+use mechanics::{contact::Surface, element::hourglass::Kind, state::GlobalState};
 use protocol::phase::{Phase, Report};
 
 use crate::{
@@ -61,6 +61,7 @@ pub fn summarise(
     let per = |value: f64, by: f64| if by > 0.0 { value / by } else { 0.0 };
     let run_cycles = outcome.cycles_run as f64;
     let units = &outcome.census;
+    let parts = named_parts(model, &run_totals.last.parts, outcome.state.as_ref());
     Summary {
         title: model.title.clone(),
         elements,
@@ -108,7 +109,7 @@ pub fn summarise(
             external: run_totals.external,
             error: run_totals.last.error,
             worst_body: worst_body(model, run_totals),
-            parts: named_parts(model, &run_totals.last.parts, outcome.state.as_ref()),
+            parts: parts.clone(),
             contacts: run_totals.contacts.iter().map(|pair| named_pair(model, pair)).collect(),
         },
         momentum_error: run_totals.momentum_error(),
@@ -117,6 +118,7 @@ pub fn summarise(
         worst_penetration: run_totals.worst_penetration,
         rebalances: outcome.rebalances.clone(),
         losses: outcome.losses.clone(),
+        warnings: hourglass_warnings(&model.mesh.parts, &parts, run_totals.eroded, run_totals.scale()),
         digest: outcome.digest.clone(),
     }
 }
@@ -149,6 +151,38 @@ fn named_parts(model: &Model, parts: &[PartEnergy], state: Option<&GlobalState>)
         external: e.external,
     };
     model.mesh.parts.iter().zip(parts).enumerate().map(of).collect()
+}
+
+/// Share of the internal energy of a part above which its hourglass energy is told.
+const HOURGLASS_SHARE: f64 = 0.1;
+/// Share of the energy of the whole run below which the hourglass energy of a part is nothing to tell.
+const NEGLIGIBLE: f64 = 0.01;
+
+/// The parts whose hourglass energy is large beside their internal energy, as warnings. With the internal energy of a part that erodes
+/// goes what has `eroded` in the whole run, since some of it was its own; `scale` is the energy of the run.
+fn hourglass_warnings(
+    of_mesh: &[mechanics::mesh::Part],
+    parts: &[NamedPart],
+    eroded: f64,
+    scale: f64,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (in_mesh, part) in of_mesh.iter().zip(parts) {
+        let gone = if part.eroded_elements > 0 { eroded.max(0.0) } else { 0.0 };
+        let (hourglass, internal) = (part.hourglass, part.internal.max(0.0) + gone);
+        if hourglass <= HOURGLASS_SHARE * internal || hourglass <= NEGLIGIBLE * scale {
+            continue;
+        }
+        let name = &part.name;
+        let of = if internal > 0.0 { format!(" of {internal:.3e}") } else { String::new() };
+        let assumed = in_mesh.section().is_some() || in_mesh.hourglass.kind == Kind::AssumedStrain;
+        let or = if assumed { "" } else { ", or give it hourglass = { kind = \"assumed-strain\" }" };
+        warnings.push(format!(
+            "part \"{name}\": hourglass energy {hourglass:.3e}, above a tenth of its internal energy{of}; refine its mesh where it \
+             bends or is struck{or}"
+        ));
+    }
+    warnings
 }
 
 /// Energies of a pair beside the names of its parts.
@@ -187,4 +221,49 @@ fn worker_times(names: &[String], reports: &[Report]) -> Vec<WorkerTimes> {
         peer_bytes: report.peer_bytes,
     };
     names.iter().zip(reports).map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mechanics::{
+        element::hourglass::Hourglass,
+        mesh::{Part, Topology},
+    };
+
+    fn part(name: &str, internal: f64, hourglass: f64, eroded_elements: u64) -> NamedPart {
+        NamedPart { name: name.to_owned(), internal, hourglass, eroded_elements, ..NamedPart::default() }
+    }
+
+    #[test]
+    fn a_part_whose_hourglass_energy_is_a_tenth_of_the_internal_one_is_told_where_that_matters() {
+        let parts = [
+            part("sound", 10.0, 0.9, 0),
+            part("swallowed", 10.0, 1.1, 0),
+            part("hardly strained", 1e-3, 0.5, 0),
+            part("cold and bent", -1e-9, 2.0, 0),
+            part("worn", 1.0, 1.5, 3),
+        ];
+        let in_mesh = |kind: Kind| Part {
+            name: String::new(),
+            material: 0,
+            topology: Topology::Structured { cells: [1; 3] },
+            nodes: Vec::new(),
+            element_ids: Vec::new(),
+            hourglass: Hourglass { kind, coefficient: 0.1 },
+        };
+        let mut of_mesh = [Kind::Viscous; 5].map(in_mesh);
+        of_mesh[3].hourglass.kind = Kind::AssumedStrain;
+        assert_eq!(
+            hourglass_warnings(&of_mesh, &parts, 20.0, 100.0),
+            [
+                "part \"swallowed\": hourglass energy 1.100e0, above a tenth of its internal energy of 1.000e1; refine its mesh \
+                 where it bends or is struck, or give it hourglass = { kind = \"assumed-strain\" }",
+                "part \"cold and bent\": hourglass energy 2.000e0, above a tenth of its internal energy; refine its mesh where it \
+                 bends or is struck",
+            ]
+        );
+        // Without erosion elsewhere its own internal energy is what counts.
+        assert_eq!(hourglass_warnings(&of_mesh[4..], &parts[4..], 0.0, 100.0).len(), 1);
+    }
 }

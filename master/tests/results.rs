@@ -538,7 +538,7 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
         keys(&json),
         "bytes_per_cycle contact_share cycles digest elements end_time energies eroded_elements eroded_energy eroded_mass grind_ns imbalance lanes \
          linked_pairs losses master_bytes_per_cycle momentum_error nodes rebalances relayed_pairs route sorts surface_elements surface_faces surface_nodes threads title wall_s \
-         work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
+         warnings work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
     );
     assert_eq!(
         keys(&json["energies"]),

@@ -83,6 +83,9 @@ pub struct Summary {
     pub rebalances: Vec<Rebalance>,
     /// Workers that were lost, and how far the run went back for them.
     pub losses: Vec<Loss>,
+    /// What makes the results doubtful, and what to do about it.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// Hash of the final state (hexadecimal).
     pub digest: String,
 }
@@ -363,6 +366,9 @@ impl Summary {
             "change",
             percent(self.momentum_error)
         )?;
+        for warning in &self.warnings {
+            writeln!(out, "  warning    {}", warning.replace(char::is_control, " "))?;
+        }
         writeln!(out, "  digest     {}", self.digest)
     }
 }
@@ -422,6 +428,14 @@ mod tests {
         ] {
             assert_eq!(significant(number), text);
         }
+    }
+
+    #[test]
+    fn warnings_have_lines_of_their_own() {
+        let warnings = vec!["part \"ball\": one\u{1b}".to_owned(), "two".to_owned()];
+        let table = Summary { warnings, ..Summary::default() }.table("SI");
+        assert!(table.contains("\n  warning    part \"ball\": one \n  warning    two\n  digest"), "{table}");
+        assert!(!Summary::default().table("SI").contains("warning"));
     }
 
     #[test]
