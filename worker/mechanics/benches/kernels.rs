@@ -6,7 +6,8 @@
 //! width, on a strained plate of 27,000 elements. On request the same cycles on one thread and on two in turn.
 //!
 //! `cargo bench -p mechanics --bench kernels`; after `--` a word chooses: `cycles`, `kernels`, `threads`, `quiet`, or a number of
-//! elements. `quiet` compares builds on a machine that others use: of each chunk of sets the least over many cycles. `4000000` is on request only, for its memory.
+//! elements. `quiet` compares builds on a machine that others use: of each chunk of sets the least over many cycles; names of lane
+//! widths after it choose columns. `4000000` is on request only, for its memory.
 
 #![expect(clippy::disallowed_methods, reason = "bodies of measurements, whose digests nobody compares")]
 
@@ -141,11 +142,11 @@ fn grind(material: &Material, explicit: bool, width: Width) -> [f64; 2] {
     [times[times.len() / 2], times[0]].map(|time| time * 1e9 / f64::from(CELLS.iter().product::<u32>()))
 }
 
-/// Nanoseconds per element of the kernel alone, wall clock, each chunk of 32 sets by its least of 80 cycles, the first twenty, in
+/// Nanoseconds per element of the kernel alone, wall clock, each chunk of 8 sets by its least of 80 cycles, the first twenty, in
 /// which not all elements yield, left out: what neighbours take shows in most cycles, but hardly in all of them for one chunk.
 fn quiet(material: &Material, explicit: bool, width: Width) -> f64 {
     let mut block = Block::new(&plate(material, explicit));
-    let chunks: Vec<_> = (0..block.n_sets()).step_by(32).map(|s| s..(s + 32).min(block.n_sets())).collect();
+    let chunks: Vec<_> = (0..block.n_sets()).step_by(8).map(|s| s..(s + 8).min(block.n_sets())).collect();
     let mut least = vec![f64::INFINITY; chunks.len()];
     for cycle in 0..100 {
         drift(&mut block);
@@ -427,7 +428,7 @@ fn main() {
         return;
     }
     if words.iter().any(|word| word == "quiet") {
-        quiet_table();
+        quiet_table(&words);
         return;
     }
     // Blocks spread over the current pool: one of a single thread keeps all work on the clock.
@@ -503,11 +504,13 @@ fn steels() -> Vec<Material> {
     ]
 }
 
-/// The table of the quietest chunks.
-fn quiet_table() {
+/// The table of the quietest chunks; words that name lane widths choose columns.
+fn quiet_table(words: &[String]) {
     println!("kernel alone, ns per element, quietest: structured, and written out");
     println!("{:<34}{:>20}{:>20}{:>20}", "laws", "scalar", "avx2", "avx512");
-    let widths = Width::ALL.map(|width| width.require().ok());
+    let named = |width: Width| words.contains(&width.to_string());
+    let all = !Width::ALL.into_iter().any(named);
+    let widths = Width::ALL.map(|width| width.require().ok().filter(|&width| all || named(width)));
     for material in steels() {
         let of = |width| {
             let [rows, lists] = [false, true].map(|explicit| quiet(&material, explicit, width));

@@ -1,4 +1,5 @@
-//! From a block and its material to a kernel: one for all laws, and a copy for the pair that most runs are made of.
+//! From a block and its material to a kernel: one for all laws, and copies for the commonest laws where a width
+//! pays for them.
 
 use std::ops::Range;
 
@@ -38,17 +39,45 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vo
     );
     let (density, hourglass) = (material.density, Resistance::of(control, material));
     let laws = (AnyEos::of(material), AnyStrength::of(material), AnyFailure::of(material));
-    match laws {
-        // A copy of its own: with AVX2 the kernel of all laws takes 8 % longer for them.
-        (AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength), AnyFailure::Unfailing(Unfailing))
-            if strength.by_energy == 0.0 =>
-        {
-            let laws = Laws { density, eos, strength, failure: Unfailing, hourglass };
-            Pass { view, laws, step, sets, vote }.on(width, elastic);
-        }
-        (eos, strength, failure) => {
+    // Copies of their own for the commonest of each kind: see benches/TRIED.md.
+    macro_rules! alone {
+        ($run:ident, $eos:expr, $strength:expr) => {{
+            let laws = Laws { density, eos: $eos, strength: $strength, failure: Unfailing, hourglass };
+            return width.$run(Controlled::<_, false>(Pass { view, laws, step, sets, vote }));
+        }};
+    }
+    match (width, laws) {
+        (width, (eos, strength, failure)) if elastic => {
             let laws = Laws { density, eos, strength, failure, hourglass };
-            Pass { view, laws, step, sets, vote }.on(width, elastic);
+            width.run(Controlled::<_, true>(Pass { view, laws, step, sets, vote }));
+        }
+        (width, (AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength), AnyFailure::Unfailing(_)))
+            if width.is_fused() && strength.by_energy == 0.0 =>
+        {
+            alone!(run_fused, eos, strength)
+        }
+        (Width::Avx2, (AnyEos::Linear(eos), AnyStrength::Hydro(strength), AnyFailure::Unfailing(_))) => {
+            alone!(run_avx2, eos, strength)
+        }
+        (
+            Width::Avx2 | Width::Avx512,
+            (AnyEos::Jwl(eos), AnyStrength::Hydro(strength), AnyFailure::Unfailing(_)),
+        ) => alone!(run_wide, eos, strength),
+        (
+            Width::Avx2 | Width::Avx512,
+            (AnyEos::Linear(eos), AnyStrength::Elastic(strength), AnyFailure::Unfailing(_)),
+        ) => alone!(run_wide, eos, strength),
+        (
+            Width::Avx2 | Width::Avx512,
+            (AnyEos::Shock(eos), AnyStrength::VonMises(strength), AnyFailure::Unfailing(_)),
+        ) => alone!(run_wide, eos, strength),
+        (
+            Width::Avx2 | Width::Avx512,
+            (AnyEos::Polynomial(eos), AnyStrength::Tabulated(strength), AnyFailure::Unfailing(_)),
+        ) => alone!(run_wide, eos, strength),
+        (width, (eos, strength, failure)) => {
+            let laws = Laws { density, eos, strength, failure, hourglass };
+            width.run(Controlled::<_, false>(Pass { view, laws, step, sets, vote }));
         }
     }
 }
@@ -60,17 +89,6 @@ struct Pass<'a, E, S, F> {
     step: &'a Step,
     sets: &'a [Range<u32>],
     vote: &'a mut ElementVote,
-}
-
-impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw> Pass<'_, E, S, F> {
-    /// Runs on a width, with elastic hourglass control or without.
-    fn on(self, width: Width, elastic: bool) {
-        if elastic {
-            width.run(Controlled::<_, true>(self));
-        } else {
-            width.run(Controlled::<_, false>(self));
-        }
-    }
 }
 
 /// A pass whose hourglass control is elastic or not.

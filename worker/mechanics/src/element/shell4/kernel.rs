@@ -43,6 +43,7 @@ pub(super) struct View<'a> {
 }
 
 /// What does not change from element to element.
+#[derive(Clone, Copy)]
 pub(super) struct Constants<'a> {
     pub law: PlaneLaw,
     pub points: &'a [(f64, f64)],
@@ -81,9 +82,13 @@ impl Task for Pass<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane>(mut self) {
+    fn run<L: Lane>(self) {
+        // Copies of its own, as the pass of hexahedra has them.
+        let Self { mut view, constants, sets, vote } = self;
+        let (constants, mut own) = (*constants, *vote);
         // SAFETY: whoever made the pass has promised it.
-        unsafe { compute::<L>(&mut self.view, self.constants, self.sets, self.vote) }
+        unsafe { compute::<L>(&mut view, &constants, sets, &mut own) }
+        *vote = own;
     }
 }
 
