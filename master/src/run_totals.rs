@@ -253,7 +253,7 @@ impl RunTotals {
                 .iter()
                 .map(|(_, g)| GaugeRow { x: [g[0], g[1], g[2]], v: [g[3], g[4], g[5]] })
                 .collect(),
-            element_gauges: vote.element_gauges.iter().map(|(_, state)| *state).collect(),
+            element_gauges: vote.element_gauges.iter().map(|(_, state)| state.clone()).collect(),
             contacts: vote.contacts.clone(),
             holders: self.holders.iter().map(|(row, _)| *row).collect(),
         };

@@ -161,6 +161,7 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         strain: Vec::new(),
         shells: mechanics::state::ShellState::default(),
         own: Vec::new(),
+        history: Vec::new(),
     }
 }
 
@@ -259,7 +260,10 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
             model.mesh.parts.len()
         ],
         gauges: vec![GaugeRow { x: [1.0, 2.0, x], v: [0.1, 0.2, 0.3] }; model.output.gauges.len()],
-        element_gauges: vec![std::array::from_fn(|f| 0.25 + x + f as f64); model.output.element_gauges.len()],
+        element_gauges: vec![
+            (0..mechanics::state::N_FIELDS).map(|f| 0.25 + x + f as f64).collect();
+            model.output.element_gauges.len()
+        ],
         // Of two pairs the second is in contact, from cycle 2 on.
         contacts: (cycle >= 2)
             .then_some((1, PairVote { force: [x, -0.5, 1e-300], hits: 10 + cycle }))

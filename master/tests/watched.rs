@@ -132,7 +132,7 @@ fn element_gauge_reads_the_state_of_the_element_that_the_deck_means() {
     deck.setup.control.end_cycle = 59;
     let short = run(deck);
     for (gauge, &element) in gauges.iter().enumerate() {
-        let read = long.rows[58].element_gauges[gauge];
+        let read = &long.rows[58].element_gauges[gauge];
         for (f, value) in read.iter().enumerate() {
             assert_eq!(
                 value.to_bits(),

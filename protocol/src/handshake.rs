@@ -20,7 +20,8 @@ use std::fmt;
 /// 8: a submitted job has no route where the master is to choose it; votes have the external work of a cycle before and after
 /// its time.
 /// 9: trusses, numbers of supports and hourglass control of pieces in assignments; nodes tied to faces in assignments and plans; in
-/// votes the work of each wall and support, and what nodes lost at walls.
+/// votes the work of each wall and support, and what nodes lost at walls,
+/// and readings of element gauges with history variables behind them.
 pub const VERSION: u16 = 9;
 
 /// Most characters of a host's name.

@@ -251,8 +251,8 @@ impl ToMaster {
 }
 
 /// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
-/// 2: with damage and the time until an explosive is lit behind them. 3: with what has eroded. 4: with artificial viscosity and
-/// hourglass control.
+/// 2: with damage and the time until an explosive is lit behind them. 3: with what has eroded. 4: with artificial viscosity,
+/// hourglass control and history variables of laws.
 pub const WORKER_STATE_VERSION: u32 = 4;
 
 /// Time that a worker has computed for (ns): of its threads in a state, of its host in the frame of a cycle.

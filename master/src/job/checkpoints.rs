@@ -113,12 +113,27 @@ impl Checkpoint {
 
 /// How long the arrays of a state are: what its mesh and its laws ask for.
 fn shape(state: &GlobalState) -> (Vec<usize>, Vec<usize>) {
-    let GlobalState { x, v, mass, constraint, initial_volume, elements, eroded, strain, shells, own, .. } =
-        state;
+    let GlobalState {
+        x,
+        v,
+        mass,
+        constraint,
+        initial_volume,
+        elements,
+        eroded,
+        strain,
+        shells,
+        own,
+        history,
+        ..
+    } = state;
     let fixed =
         [x.len(), v.len(), mass.len(), constraint.len(), initial_volume.len(), eroded.len(), strain.len()];
     let of_shells = [shells.spin.len(), shells.inertia.len()].into_iter().chain(own.iter().map(Vec::len));
-    (fixed.into_iter().chain(elements.iter().map(Vec::len)).collect(), of_shells.collect())
+    let of_history = history.iter().flat_map(|part| {
+        [part.part as usize, part.first as usize].into_iter().chain(part.columns.iter().map(Vec::len))
+    });
+    (fixed.into_iter().chain(elements.iter().map(Vec::len)).collect(), of_shells.chain(of_history).collect())
 }
 
 /// A checkpoint of which parts have come.

@@ -19,7 +19,7 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<Stri
         let numbers = numbers.chain(released).chain(held);
         let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);
         let mut numbers = numbers
-            .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| *state)))
+            .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| state.iter().copied())))
             .chain([vote.force_bound, vote.contact_speed_squared]);
         let bad = numbers.find(|v| !v.is_finite());
         if let Some(value) = bad.or(Some(vote.courant).filter(|courant| courant.is_nan())) {

@@ -13,6 +13,8 @@ use std::{
 
 use deck::model::Model;
 use mechanics::{
+    law::Unit,
+    material::Material,
     state::{N_FIELDS, field},
     vote::PairVote,
 };
@@ -57,8 +59,8 @@ pub struct HistoryRow {
     pub parts: Vec<PartEnergy>,
     /// One entry per gauge, in deck order.
     pub gauges: Vec<GaugeRow>,
-    /// State of the element of each element gauge, one number per entry of [`mechanics::state::FIELDS`].
-    pub element_gauges: Vec<[f64; N_FIELDS]>,
+    /// State of the element of each element gauge, see [`mechanics::block::Block::reading`].
+    pub element_gauges: Vec<Vec<f64>>,
     /// The pairs of parts that are watched and in contact: index of the pair in the deck, force and hits.
     pub contacts: Vec<(u32, PairVote)>,
     /// Walls and supports, see [`mechanics::setup::Setup::n_holders`].
@@ -178,7 +180,12 @@ impl History {
             length,
             n_parts: model.mesh.parts.len(),
             gauges: model.output.gauges.iter().map(|g| model.mesh.positions[g.node as usize]).collect(),
-            densities: model.output.element_gauges.iter().map(|g| density(model, g.element)).collect(),
+            densities: model
+                .output
+                .element_gauges
+                .iter()
+                .map(|g| material(model, g.element).density)
+                .collect(),
             n_contacts: model.output.contact_forces.len() as u32,
             holders: holders(model),
             has_walls: !model.setup.walls.is_empty(),
@@ -300,11 +307,11 @@ const READINGS: [&str; 13] = [
     "damage",
 ];
 
-/// The numbers of [`READINGS`] from the state of an element of this initial density.
-fn reading(state: &[f64; N_FIELDS], density: f64) -> [f64; READINGS.len()] {
+/// The numbers of [`READINGS`] from the state of an element of this initial density, and behind them its history variables.
+fn reading(state: &[f64], density: f64) -> impl Iterator<Item = f64> {
     let deviator = [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX].map(|index| state[index]);
     let ([xx, yy, xy, yz, zx], p) = (deviator, state[field::PRESSURE]);
-    [
+    let known: [f64; READINGS.len()] = [
         p,
         von_mises(deviator),
         xx - p,
@@ -319,7 +326,8 @@ fn reading(state: &[f64; N_FIELDS], density: f64) -> [f64; READINGS.len()] {
         // Energy is held per initial volume.
         state[field::ENERGY] / density,
         state[field::DAMAGE],
-    ]
+    ];
+    known.into_iter().chain(state[N_FIELDS..].iter().copied())
 }
 
 /// A wall or a support with columns of its own.
@@ -345,10 +353,10 @@ fn holders(model: &Model) -> Vec<Holder> {
     walls.chain(supports).collect()
 }
 
-/// Density of the undeformed material of an element.
-fn density(model: &Model, element: u32) -> f64 {
+/// The material of an element.
+fn material(model: &Model, element: u32) -> &Material {
     let part = model.mesh.element_offsets().partition_point(|&first| first <= element as usize) - 1;
-    model.setup.materials[model.mesh.parts[part].material as usize].density
+    &model.setup.materials[model.mesh.parts[part].material as usize]
 }
 
 /// The header row, with its line end.
@@ -382,6 +390,14 @@ fn header(model: &Model) -> String {
             "" => format!("{}:{what}", gauge.name),
             unit => format!("{}:{what} [{unit}]", gauge.name),
         }));
+        columns.extend(material(model, gauge.element).history().iter().map(|variable| {
+            let name = format!("{}:{}", gauge.name, variable.name);
+            match variable.unit {
+                Unit::NONE => name,
+                Unit::STRESS => format!("{name} [{stress}]"),
+                unit => format!("{name} [{}]", product(unit, [length, mass, time])),
+            }
+        }));
     }
     for pair in &model.output.contact_forces {
         let [a, b] = pair.map(|part| &model.mesh.parts[part as usize].name);
@@ -401,6 +417,12 @@ fn header(model: &Model) -> String {
     let mut header = columns.iter().map(|column| cell(column)).collect::<Vec<_>>().join(",");
     header.push('\n');
     header
+}
+
+/// A unit by the names of length, mass and time.
+fn product(unit: Unit, names: [&str; 3]) -> String {
+    let powers = names.into_iter().zip([unit.length, unit.mass, unit.time]).filter(|(_, power)| *power != 0);
+    powers.map(|(name, power)| format!("{name}^{power}")).collect::<Vec<_>>().join("*")
 }
 
 /// A header cell: quoted where a name holds a comma or a quote (RFC 4180); control characters become spaces, so

@@ -4,7 +4,7 @@
 //! the state as it is written, raw or compressed (`appended`). The corner order of [`mechanics`] is that of VTK's
 //! cell type 12. Format: the VTK file format documentation, section "XML file formats". [`read`] reads the files back.
 
-use std::{io, io::Write, path::Path};
+use std::{collections::BTreeSet, io, io::Write, path::Path};
 
 mod appended;
 pub mod read;
@@ -12,7 +12,7 @@ pub mod read;
 use deck::model::Model;
 use mechanics::{
     element::shell4,
-    state::{GlobalState, field},
+    state::{GlobalState, PartHistory, field},
 };
 
 use super::{Error, FIELD_NAMES, Folder, PVD, state_name, surface::Probe, write_whole};
@@ -242,8 +242,11 @@ fn stream(
     }
 
     let elements = Elements { model, offsets: model.mesh.element_offsets() };
+    let variables = variables(model);
     let [point, cell] = data_arrays(&elements, state, worker).map(|mut arrays: Vec<Array>| {
-        arrays.retain(|array| ALWAYS.contains(&array.name) || fields.contains(array.name));
+        arrays.retain(|array| {
+            ALWAYS.contains(&array.name) || variables.contains(&array.name) || fields.contains(array.name)
+        });
         arrays
     });
     // Eroded elements are left out, their nodes are not.
@@ -340,6 +343,11 @@ pub(super) fn write_piece(
     writeln!(out, "\n  </AppendedData>\n</VTKFile>")
 }
 
+/// Names of the history variables of all materials.
+fn variables(model: &Model) -> BTreeSet<&'static str> {
+    model.setup.materials.iter().flat_map(|material| material.history()).map(|v| v.name).collect()
+}
+
 /// All node fields and all element fields.
 fn data_arrays<'a>(
     elements: &'a Elements,
@@ -405,6 +413,22 @@ fn data_arrays<'a>(
             let layers = state.own[shell4::ELEMENT..].chunks_exact(shell4::LAYER);
             let largest = |layer: &[Vec<f64>]| plane_von_mises([0, 1, 2, 3, 4].map(|i| layer[i][e]));
             [layers.map(largest).fold(0.0, f64::max)]
+        }));
+    }
+    for name in variables(elements.model) {
+        // By part: its column, zero where the material has none of this name.
+        let columns: Vec<Option<&PartHistory>> = (0..mesh.parts.len()).map(|p| state.history_of(p)).collect();
+        let places: Vec<Option<usize>> = mesh
+            .parts
+            .iter()
+            .map(|part| {
+                let material = &elements.model.setup.materials[part.material as usize];
+                material.history().iter().position(|variable| variable.name == name)
+            })
+            .collect();
+        cell.push(Array::f64(name, n_elements, move |e| {
+            let (part, local) = elements.locate(e);
+            [columns[part].zip(places[part]).map_or(0.0, |(history, place)| history.columns[place][local])]
         }));
     }
     if let Some(worker) = worker {

@@ -86,6 +86,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         initial_volume,
         fields,
         erosion: None,
+        history: Vec::new(),
         shells: mechanics::state::ShellState::default(),
         own: Vec::new(),
         hourglass: Default::default(),

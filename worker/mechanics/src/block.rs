@@ -60,6 +60,8 @@ pub struct Piece {
     pub own: Vec<Vec<f64>>,
     /// Hourglass control of solids.
     pub hourglass: Hourglass,
+    /// One array per entry of [`Material::history`].
+    pub history: Vec<Vec<f64>>,
 }
 
 /// Elements of one kind and one material, laid out for the kernels. The first `nodes.len()` entries of the node
@@ -111,7 +113,8 @@ impl Block {
         let by_node = [piece.x.len(), piece.v.len(), piece.mass.len(), piece.constraint.len()];
         assert!(by_node == [n_nodes; 4], "node arrays of {by_node:?} entries for {n_nodes} nodes");
         assert!(piece.initial_volume.len() == n_elements, "volumes for {n_elements} elements");
-        assert!(piece.fields.iter().all(|f| f.len() == n_elements), "fields for {n_elements} elements");
+        let arrays = piece.fields.iter().chain(&piece.history);
+        assert!(arrays.into_iter().all(|f| f.len() == n_elements), "fields for {n_elements} elements");
         let (group, turning) = group::of(&mut piece, materials);
         let n_padded = group.reach().max(n_nodes.next_multiple_of(SET));
         let by_axis = |values: Vec<[f64; 3]>| -> [Vec<f64>; 3] {
@@ -142,7 +145,7 @@ impl Block {
     /// it: whoever watches them adds that.
     pub fn piece(&self) -> Piece {
         let n = self.nodes.len();
-        let ElementArrays { initial_volume, fields, own } = self.group.image(&self.x);
+        let ElementArrays { initial_volume, fields, own, history } = self.group.image(&self.x);
         Piece {
             part: self.part,
             material: self.material,
@@ -159,6 +162,7 @@ impl Block {
             own,
             hourglass: self.hourglass,
             erosion: None,
+            history,
         }
     }
 
@@ -166,7 +170,7 @@ impl Block {
     pub fn into_piece(mut self) -> Piece {
         let n = self.nodes.len();
         drop(take(&mut self.f));
-        let ElementArrays { initial_volume, fields, own } = self.group.into_image(&self.x);
+        let ElementArrays { initial_volume, fields, own, history } = self.group.into_image(&self.x);
         self.mass.truncate(n);
         Piece {
             part: self.part,
@@ -184,6 +188,7 @@ impl Block {
             shells: of_shells(n, self.turning.as_ref()),
             own,
             hourglass: self.hourglass,
+            history,
         }
     }
 
@@ -246,6 +251,12 @@ impl Block {
     /// The state of a local element as [`Block::piece`] has it, one number per entry of [`crate::state::FIELDS`].
     pub fn element(&self, element: usize) -> [f64; N_FIELDS] {
         self.group.element(element, &self.x)
+    }
+
+    /// The state of a local element, and behind it one number per entry of [`Material::history`].
+    pub fn reading(&self, element: usize) -> Vec<f64> {
+        let slot = self.slot(element);
+        self.element(element).into_iter().chain(self.group.history().iter().map(|c| c[slot])).collect()
     }
 
     /// The lane set of a local element.

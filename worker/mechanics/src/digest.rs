@@ -44,11 +44,15 @@ pub fn digest(state: &GlobalState) -> String {
             hasher.update(&strain.to_le_bytes());
         }
     }
-    // A run without shells and elastic hourglass control has nothing here, and the digest that it had before there were such.
+    // A run without shells, elastic hourglass control and history variables has nothing here, and the digest that it had before there
+    // were any.
     for spin in state.shells.spin.iter().flatten() {
         hasher.update(&spin.to_le_bytes());
     }
     for value in state.own.iter().flatten() {
+        hasher.update(&value.to_le_bytes());
+    }
+    for value in state.history.iter().flat_map(|part| &part.columns).flatten() {
         hasher.update(&value.to_le_bytes());
     }
     hasher.finalize().to_hex()[..32].to_owned()

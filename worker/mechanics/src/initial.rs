@@ -11,7 +11,7 @@ use crate::{
     mesh::{Mesh, Part, Topology},
     rigid::{Body, cross, dot},
     setup::{Constraint, MAX_WALLS, Setup},
-    state::{GlobalState, N_FIELDS, ShellState, field},
+    state::{GlobalState, N_FIELDS, PartHistory, ShellState, field},
     vote::Quanta,
     wall::{Motion, RigidWall},
 };
@@ -42,12 +42,19 @@ pub fn state(
         strain: vec![0.0; if setup.erosion.counts_strain() { n_elements } else { 0 }],
         shells: ShellState::default(),
         own: vec![vec![0.0; n_elements]; mesh.parts.iter().map(Part::n_own).max().unwrap_or(0)],
+        history: Vec::new(),
     };
     let mut mass_of = Vec::with_capacity(n_elements);
     for (p, part) in (0..).zip(&mesh.parts) {
         let material = &setup.materials[part.material as usize];
         let body = setup.bodies.iter().find(|body| body.parts.binary_search(&p).is_ok());
         let density = material.density * body.map_or(1.0, |body| body.nodal_scale);
+        let variables = material.history();
+        if !variables.is_empty() {
+            let columns =
+                variables.iter().map(|variable| vec![variable.initial; part.n_elements()]).collect();
+            state.history.push(PartHistory { part: p, first: state.initial_volume.len() as u32, columns });
+        }
         for e in 0..part.n_elements() {
             let corners = part.corners(e).map(|n| mesh.positions[n as usize]);
             let v = part.volume(&corners);

@@ -1,6 +1,7 @@
-//! How a law declares its constants: by key, unit and bounds, once, in the file of the law.
+//! How a law declares its constants and its history variables, once, in the file of the law.
 //!
-//! The deck reads a declared law, checks it and converts it between sets of units without knowing it.
+//! The deck reads a declared law, checks it and converts it between sets of units without knowing it. History variables are declared
+//! by name and unit: their columns in blocks, in states that travel and are stored, in digests and in results follow from that.
 
 /// Powers of length, mass and time; temperatures stay in K in every set of units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +20,20 @@ impl Unit {
     /// Force per area, energy per volume.
     pub const STRESS: Self = Self { length: -1, mass: 1, time: -2 };
 }
+
+/// A history variable: a number that a law keeps for an element from cycle to cycle, beside those that every element has
+/// ([`crate::state::FIELDS`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variable {
+    /// Name of its array in results, different from those in [`crate::state::FIELDS`].
+    pub name: &'static str,
+    pub unit: Unit,
+    /// Its value at the start of a run.
+    pub initial: f64,
+}
+
+/// Most history variables of a law.
+pub const MAX_HISTORY: usize = 8;
 
 /// What values a constant may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,8 +8,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::strength::{AnyStrength, StrengthLaw};
 pub use crate::strength::{CowperSymonds, Hardening, Heat, MAX_HARDENING, Strength};
+use crate::{
+    law::Variable,
+    strength::{AnyStrength, StrengthLaw},
+};
 
 /// One material: constants in the deck's consistent units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -125,6 +128,11 @@ impl Material {
     /// Shear modulus G (stress); zero without strength.
     pub fn shear(&self) -> f64 {
         AnyStrength::of(self).shear()
+    }
+
+    /// The history variables of its laws.
+    pub fn history(&self) -> &'static [Variable] {
+        if self.is_gas() { &[] } else { self.strength.history() }
     }
 
     /// Whether the equation of state is that of a gas, which has no strength.

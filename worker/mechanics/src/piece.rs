@@ -142,6 +142,10 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             },
             initial: nodes.iter().map(|&n| mesh.positions[n as usize]).collect(),
         }),
+        history: state.history_of(part).map_or_else(Vec::new, |history| {
+            let of_column = |column: &Vec<f64>| local_elements.iter().map(|&e| column[e as usize]).collect();
+            history.columns.iter().map(of_column).collect()
+        }),
         nodes,
         elements,
         shells,
@@ -197,7 +201,8 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
         && (piece.shells.spin.is_empty()
             || (piece.shells.spin.len() == piece.nodes.len() && state.shells.spin.len() == n_nodes))
         && piece.own.iter().all(|field| field.len() == piece.elements.len())
-        && piece.own.len() <= state.own.len();
+        && piece.own.len() <= state.own.len()
+        && piece.history.iter().all(|column| column.len() == piece.elements.len());
     if !lengths_fit {
         return Err(format!(
             "image of part {}: array lengths do not fit its {} nodes and {} elements",
@@ -213,6 +218,19 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
         return Err(format!(
             "image of part {}: element index {e}, the problem has {n_elements} elements",
             piece.part
+        ));
+    }
+    let part = piece.part;
+    let place = state.history.iter().position(|history| history.part == part);
+    let held = place.map_or(&[][..], |place| &state.history[place].columns);
+    let n_held = held.first().map_or(0, Vec::len);
+    let first = place.map_or(0, |place| state.history[place].first);
+    let within = |&e: &u32| e.checked_sub(first).is_some_and(|e| (e as usize) < n_held);
+    if piece.history.len() != held.len() || !(held.is_empty() || piece.elements.iter().all(within)) {
+        return Err(format!(
+            "image of part {part}: {} history variables of elements of the part, the problem has {}",
+            piece.history.len(),
+            held.len()
         ));
     }
     for (from, to) in [(&mut piece.x, &mut state.x), (&mut piece.v, &mut state.v)] {
@@ -232,6 +250,13 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
     }
     for (&n, &spin) in piece.nodes.iter().zip(&piece.shells.spin) {
         state.shells.spin[n as usize] = spin;
+    }
+    if let Some(place) = place {
+        for (column, values) in state.history[place].columns.iter_mut().zip(&piece.history) {
+            for (&e, &value) in piece.elements.iter().zip(values) {
+                column[(e - first) as usize] = value;
+            }
+        }
     }
     let own = piece.own.iter_mut().zip(&mut state.own);
     for (values, to) in piece.fields.iter_mut().zip(&mut state.elements).chain(own) {

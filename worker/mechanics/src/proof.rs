@@ -240,6 +240,7 @@ fn stirred(material: &Material, seed: u64) -> Piece {
         initial_volume,
         fields,
         erosion: None,
+        history: Vec::new(),
         shells: ShellState::default(),
         own: Vec::new(),
         hourglass: Default::default(),

@@ -102,6 +102,19 @@ pub struct GlobalState {
     pub shells: ShellState,
     /// What elements have beside [`GlobalState::elements`], see [`crate::block::Piece::own`]: as many arrays as the kind that has most.
     pub own: Vec<Vec<f64>>,
+    /// History variables, for each part whose material has some, in the order of parts.
+    pub history: Vec<PartHistory>,
+}
+
+/// History variables of the elements of a part.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PartHistory {
+    /// Part index.
+    pub part: u32,
+    /// Global index of its first element.
+    pub first: u32,
+    /// One array per entry of [`crate::material::Material::history`], by element of the part.
+    pub columns: Vec<Vec<f64>>,
 }
 
 /// What nodes of shells have beside the state of other nodes.
@@ -113,7 +126,21 @@ pub struct ShellState {
     pub inertia: Vec<f64>,
 }
 
+impl PartHistory {
+    /// The same columns, of zeros.
+    fn zeros(&self) -> Self {
+        let columns = self.columns.iter().map(|column| vec![0.0; column.len()]).collect();
+        Self { part: self.part, first: self.first, columns }
+    }
+}
+
 impl GlobalState {
+    /// The history variables of a part, if its material has any.
+    pub fn history_of(&self, part: usize) -> Option<&PartHistory> {
+        let place = self.history.binary_search_by_key(&part, |history| history.part as usize);
+        place.ok().map(|place| &self.history[place])
+    }
+
     pub fn is_eroded(&self, element: usize) -> bool {
         self.eroded.get(element).is_some_and(|&cycle| cycle != crate::erosion::ALIVE)
     }
@@ -136,6 +163,8 @@ impl GlobalState {
             strain: vec![0.0; self.strain.len()],
             shells: ShellState { spin: Vec::new(), inertia: self.shells.inertia.clone() },
             own: vec![Vec::new(); self.own.len()],
+            // Lengths alone, likewise: pages of zeros take no memory.
+            history: self.history.iter().map(PartHistory::zeros).collect(),
             ..Self::default()
         }
     }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     lanes::Lane,
-    law::{Declaration, Unit},
+    law::{Declaration, MAX_HISTORY, Unit, Variable},
     material::Material,
 };
 
@@ -121,7 +121,55 @@ pub(crate) struct Strain<L> {
     pub increment: L,
 }
 
+/// What a law with history variables sees of an element beside the trial, at the end of the step where nothing else is said.
+#[derive(Clone, Copy)]
+#[expect(dead_code, reason = "laws are shown all of it, whichever they read")]
+pub(crate) struct Around<L> {
+    /// That of the equation of state at the energy of the start; [`Memory::added_pressure`] is not in it, nor is viscosity.
+    pub pressure: L,
+    /// Internal energy at the start of the step, per initial volume.
+    pub energy: L,
+    pub density: L,
+    /// Volume over initial volume.
+    pub relative_volume: L,
+    /// Deviator of the rate of deformation in the middle of the step.
+    pub rate: Deviator<L>,
+    /// Rate of the volume by volume, there.
+    pub volume_rate: L,
+    pub strain: Strain<L>,
+    /// The length that artificial viscosity goes by.
+    pub length: L,
+    /// The time step.
+    pub dt: L,
+}
+
+/// What a law with history variables keeps of an element, and what it asks of the pressure of this step.
+#[derive(Clone, Copy)]
+pub(crate) struct Memory<L> {
+    /// In the order of [`Strength::history`].
+    pub variables: [L; MAX_HISTORY],
+    /// Damage, 0 to 1, with which the step begins; after the update, with which the next one begins.
+    pub damage: L,
+    /// Added to the pressure of the equation of state.
+    pub added_pressure: L,
+    /// The pressure goes no lower (stress).
+    pub least_pressure: L,
+}
+
+impl<L: Lane> Memory<L> {
+    /// Of a law that keeps nothing.
+    #[inline(always)]
+    pub fn none() -> Self {
+        let zero = L::splat(0.0);
+        Self { variables: [zero; MAX_HISTORY], damage: zero, added_pressure: zero, least_pressure: zero }
+    }
+}
+
 pub(crate) trait StrengthLaw: Copy {
+    /// Whether the law has history variables: then the kernel calls [`StrengthLaw::remember`] in place of
+    /// [`StrengthLaw::update`], the damage of the element is the law's, and no failure law stands beside it.
+    const REMEMBERS: bool = false;
+
     /// Whether there is a deviatoric stress at all.
     #[inline(always)]
     fn deviatoric(&self) -> bool {
@@ -166,6 +214,19 @@ pub(crate) trait StrengthLaw: Copy {
     #[inline(always)]
     fn heating_by_energy(&self) -> f64 {
         0.0
+    }
+
+    /// As [`StrengthLaw::update`], of a law with history variables.
+    #[inline(always)]
+    fn remember<L: Lane>(
+        &self,
+        trial: Deviator<L>,
+        around: &Around<L>,
+        history: &mut History<L>,
+        _memory: &mut Memory<L>,
+        active: L::Mask,
+    ) -> Deviator<L> {
+        self.update(trial, around.strain, history, active)
     }
 
     /// Returns the trial deviator to the yield surface. Only lanes in `active` need be right; what the others
@@ -281,6 +342,11 @@ impl Strength {
         constants: Voce::CONSTANTS,
         of: |values| Strength::Voce(Voce::of(values)),
     }];
+
+    /// The history variables of the law.
+    pub fn history(&self) -> &'static [Variable] {
+        &[]
+    }
 
     /// The name and the constants by key of a law that declares them.
     pub fn declared(&self) -> Option<(&'static str, Vec<(&'static str, f64)>)> {

@@ -9,7 +9,6 @@ use crate::{
     contact::{ContactVote, Extent, PairEnergies},
     element::ElementVote,
     rigid,
-    state::N_FIELDS,
     wall::WallVote,
 };
 
@@ -58,8 +57,8 @@ pub struct Vote {
     pub extents: Vec<Extent>,
     /// Position and velocity of gauge nodes at `t_n`: gauge index, then x, y, z, vx, vy, vz.
     pub gauges: Vec<(u32, [f64; 6])>,
-    /// State of the elements that are watched: gauge index, and one number per entry of [`crate::state::FIELDS`].
-    pub element_gauges: Vec<(u32, [f64; N_FIELDS])>,
+    /// State of the elements that are watched: gauge index, and see [`crate::block::Block::reading`].
+    pub element_gauges: Vec<(u32, Vec<f64>)>,
     /// Contact between the pairs of parts that are watched: index of the pair, ascending; pairs without force are left out.
     pub contacts: Vec<(u32, PairVote)>,
     /// The first element that went wrong, if any: global index and its volume.

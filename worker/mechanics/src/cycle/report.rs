@@ -91,7 +91,7 @@ impl Domain {
         }
         for &(gauge, held_block, local) in &self.element_gauges {
             vote.element_gauges
-                .push((gauge, self.held_blocks[held_block as usize].block.element(local as usize)));
+                .push((gauge, self.held_blocks[held_block as usize].block.reading(local as usize)));
         }
         vote
     }

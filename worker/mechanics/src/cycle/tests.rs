@@ -210,9 +210,10 @@ fn element_gauges_on_shells_read_what_the_state_has_of_them() {
         assert_eq!(vote.element_gauges.len(), 2);
         for (gauge, found) in vote.element_gauges {
             let element = [7, 0][gauge as usize];
-            let stored = piece.fields.each_ref().map(|field| field[element]);
-            assert_eq!(found.map(f64::to_bits), stored.map(f64::to_bits), "{found:?} for {stored:?}");
-            for (index, value) in found.into_iter().enumerate() {
+            let stored: Vec<f64> = piece.fields.iter().map(|field| field[element]).collect();
+            let bits = |state: &[f64]| state.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&found), bits(&stored), "{found:?} for {stored:?}");
+            for (index, value) in found.iter().copied().enumerate() {
                 assert_eq!(domain.held_blocks[0].block.field(element, index).to_bits(), value.to_bits());
             }
             if cycle == 29 {

@@ -38,6 +38,8 @@ pub(crate) struct ElementArrays {
     pub fields: [Vec<f64>; N_FIELDS],
     /// State of this kind alone.
     pub own: Vec<Vec<f64>>,
+    /// One array per entry of [`Material::history`].
+    pub history: Vec<Vec<f64>>,
 }
 
 /// The arrays that the pass of erosion reads.
@@ -79,6 +81,11 @@ pub(crate) trait Group: Send + Sync {
 
     /// What an element says of itself, one number per entry of [`crate::state::FIELDS`], with its nodes at `x`.
     fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS];
+
+    /// One array per entry of [`Material::history`], by slot; none of a kind whose layers keep their own.
+    fn history(&self) -> &[Vec<f64>] {
+        &[]
+    }
 
     /// The arrays of the image, with the nodes at `x`.
     fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays;

@@ -7,6 +7,7 @@ use std::ops::Range;
 
 pub(crate) mod group;
 mod pass;
+mod stress;
 
 use super::{
     ElementVote, Fault, Step,
@@ -16,7 +17,7 @@ use super::{
     layout::{Corners, Layout},
     modes::{Gradient, Modes, corner_values, modes_of},
     place::{Bases, Nodal, PACKED, Packed, Place, Rows},
-    rotation::{rotated, rotation},
+    rotation::rotation,
     vector::{Tensor, Vector},
     viscosity::{Spread, Swing},
 };
@@ -26,8 +27,9 @@ use crate::{
     failure::{FailureLaw, Loading},
     lanes::{Lane, SET, scalar::Scalar},
     state::{N_FIELDS, field},
-    strength::{Deviator, History, Strain, StrengthLaw},
+    strength::StrengthLaw,
 };
+use stress::Stressed;
 
 /// Volume of a hexahedron with these corners, as the kernel computes it, to the bit.
 pub fn volume(corners: &[[f64; 3]; 8]) -> f64 {
@@ -64,6 +66,8 @@ pub(crate) struct BySlot<'a> {
     pub fields: [&'a mut [f64]; N_FIELDS],
     /// Forces of elastic hourglass control; empty without it.
     pub hourglass: [&'a mut [f64]; N_FORCES],
+    /// One array per history variable of the material.
+    pub history: &'a mut [Vec<f64>],
     /// Volume at time zero by slot; 1 in phantoms.
     pub initial_volume: &'a [f64],
     /// Bits of the slots of a set whose elements take part; phantoms do not.
@@ -316,15 +320,17 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     // 2. Deviatoric stress, and 3. the geometry at the end of the step. With laws that are known the stress comes first: the
     //    geometry then fills its long chain of roots and quotients. Laws that are chosen here stand between branches, which nothing
     //    fills, and what they leave in registers is less than what the geometry needs.
+    //    A law with history variables sees the volume, too.
     let (stressed, end);
-    if E::IS_CHOSEN {
+    if E::IS_CHOSEN || S::REMEMBERS {
         end = End::of(&x, initial_volume);
-        stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive);
+        let size = [end.relative_volume, end.length];
+        stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive, size);
     } else {
-        stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive);
+        stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive, [one; 2]);
         end = End::of(&x, initial_volume);
     }
-    let Stressed { stress, power: deviatoric_power, history, plastic_before, strain, damage, failed, left } =
+    let Stressed { stress, power: deviatoric_power, history, plastic_before, strain, damage, failed, left, memory } =
         stressed;
     let End {
         gradient: at_end,
@@ -355,7 +361,10 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         let now = laws.eos.burn(left, relative_volume, initial_volume);
         (time_to_light, burnt, pace_square) = (now.time_to_light, now.burnt, now.pace_square);
     }
-    let line = laws.eos.line(relative_volume, burnt);
+    let mut line = laws.eos.line(relative_volume, burnt);
+    if S::REMEMBERS {
+        line.a = line.a + memory.added_pressure;
+    }
     let energy = pressure_before.neg_mul_add(volume_change, energy_before);
     let bulk =
         line.stiffness(relative_volume, line.pressure(energy), energy).max(laws.eos.least_stiffness(burnt));
@@ -377,8 +386,11 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let mut energy = line.energy_after(energy_before, pressure_before, heating, volume_change);
     let mut pressure = line.pressure(energy);
     let mut damage_after = damage;
-    if laws.failure.fails() {
-        let least = L::select(failed, zero, L::splat(laws.failure.least_pressure()));
+    if laws.failure.fails() || S::REMEMBERS {
+        let mut least = L::select(failed, zero, L::splat(laws.failure.least_pressure()));
+        if S::REMEMBERS {
+            least = memory.least_pressure;
+        }
         let cut = pressure.less(least);
         let resistance = half.mul_add(pressure_before + least, heating);
         energy = L::select(cut, resistance.neg_mul_add(volume_change, energy_before), energy);
@@ -386,7 +398,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         let plastic_strain = [plastic_before, history.plastic_strain];
         let temperature = history.temperature;
         let loading = Loading { stress, pressure, strain, plastic_strain, temperature };
-        damage_after = laws.failure.damage(damage, &loading);
+        damage_after = if S::REMEMBERS { memory.damage } else { laws.failure.damage(damage, &loading) };
     }
 
     let mut temperature = history.temperature;
@@ -498,8 +510,11 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         if laws.strength.thermal() {
             view.set_state(slot, field::TEMPERATURE, temperature, active);
         }
-        if laws.failure.fails() {
+        if laws.failure.fails() || S::REMEMBERS {
             view.set_state(slot, field::DAMAGE, damage_after, active);
+        }
+        if S::REMEMBERS {
+            view.remember(slot, &memory, active);
         }
         if laws.eos.burns() {
             view.set_state(slot, field::TIME_TO_LIGHT, time_to_light, active);
@@ -538,97 +553,6 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         // SAFETY: corners are inside the node arrays.
         unsafe { place.scatter(nodes.f[axis], slot, forces) };
         axis += 1;
-    }
-}
-
-/// The deviatoric stress of the end of a step and what came with it.
-struct Stressed<L: Lane> {
-    stress: Deviator<L>,
-    /// Its power per volume, with the mean of the stresses before and after.
-    power: L,
-    history: History<L>,
-    plastic_before: L,
-    strain: Strain<L>,
-    /// Before the step.
-    damage: L,
-    /// Where that is 1.
-    failed: L::Mask,
-    /// What yield and failure leave of the trial stress, between 0 and 1; reckoned for elastic hourglass control only.
-    left: L,
-}
-
-impl<L: Lane> Stressed<L> {
-    /// Rotation, elastic increment, yield.
-    #[inline(always)]
-    fn of<E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool>(
-        gradient: &Tensor<L>,
-        view: &BySlot<'_>,
-        slot: usize,
-        laws: &Laws<E, S, F>,
-        dt: f64,
-        alive: L::Mask,
-    ) -> Self {
-        let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
-        let damage: L = if laws.failure.fails() { view.state(slot, field::DAMAGE) } else { zero };
-        let failed = one.less_equal(damage);
-        let mut history = History { plastic_strain: zero, temperature: zero };
-        let mut strain = Strain { rate: zero, increment: zero };
-        let mut plastic_before = zero;
-        let mut stress = Deviator::zero();
-        let mut power = zero;
-        let mut left = one;
-        if laws.strength.deviatoric() {
-            let third = (gradient.x.x + gradient.y.y + gradient.z.z) * L::splat(1.0 / 3.0);
-            let rate = Deviator {
-                xx: gradient.x.x - third,
-                yy: gradient.y.y - third,
-                zz: gradient.z.z - third,
-                xy: half * (gradient.x.y + gradient.y.x),
-                yz: half * (gradient.y.z + gradient.z.y),
-                zx: half * (gradient.z.x + gradient.x.z),
-            };
-            let spin = spin_of(gradient, L::splat(0.5 * dt));
-            let (xx, yy): (L, L) = (view.state(slot, field::SXX), view.state(slot, field::SYY));
-            let before = Deviator {
-                xx,
-                yy,
-                zz: -(xx + yy),
-                xy: view.state(slot, field::SXY),
-                yz: view.state(slot, field::SYZ),
-                zx: view.state(slot, field::SZX),
-            };
-            // Half of the increment turns with the stress, half does not: second order in the spin.
-            let half_increment = L::splat(laws.strength.shear() * dt);
-            let turned = rotated(&rate.mul_add(half_increment, &before), &spin);
-            let mut trial = rate.mul_add(half_increment, &turned);
-            if laws.failure.fails() {
-                trial = trial.scaled(L::select(failed, zero, one));
-            }
-            if laws.strength.plastic() {
-                history.plastic_strain = view.state(slot, field::PLASTIC_STRAIN);
-                plastic_before = history.plastic_strain;
-            }
-            if laws.strength.thermal() {
-                history.temperature = view.state(slot, field::TEMPERATURE);
-            }
-            let rate_square = rate.contract(&rate);
-            let effective = (L::splat(2.0 / 3.0) * rate_square).sqrt();
-            strain = Strain { rate: effective, increment: effective * L::splat(dt) };
-            stress = laws.strength.update(trial, strain, &mut history, alive);
-            // The stress before, turned, is `turned` less its half of the increment.
-            let sum = turned.plus(&stress);
-            power = half * half_increment.neg_mul_add(rate_square, sum.contract(&rate));
-            if ELASTIC {
-                left = L::select(failed, zero, one);
-                let yields = plastic_before.less(history.plastic_strain);
-                if L::any(yields) {
-                    let share =
-                        stress.contract(&trial) / trial.contract(&trial).max(L::splat(f64::MIN_POSITIVE));
-                    left = L::select(yields, share.max(zero).min(left), left);
-                }
-            }
-        }
-        Self { stress, power, history, plastic_before, strain, damage, failed, left }
     }
 }
 

@@ -78,6 +78,7 @@ fn bent(structured: bool) -> (Piece, PieceErosion) {
         initial_volume: vec![1e-6; n],
         fields,
         erosion: None,
+        history: Vec::new(),
         shells: ShellState::default(),
         own: Vec::new(),
         hourglass: Default::default(),

@@ -163,6 +163,7 @@ mod tests {
             initial_volume: vec![1.0],
             fields: std::array::from_fn(|k| vec![if k == field::RELATIVE_VOLUME { 1.0 } else { 0.0 }]),
             erosion: None,
+            history: Vec::new(),
             shells: ShellState::default(),
             own: Vec::new(),
             hourglass: Default::default(),

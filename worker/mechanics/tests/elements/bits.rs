@@ -29,7 +29,7 @@ fn bits(block: &Block, vote: &ElementVote) -> Vec<u64> {
         vote.viscosity,
         vote.force_bound,
     ];
-    let fields = piece.fields.iter().chain(&piece.own).flatten().copied();
+    let fields = piece.fields.iter().chain(&piece.own).chain(&piece.history).flatten().copied();
     let all = forces.chain(nodes).chain(fields).chain(votes);
     all.map(f64::to_bits).collect()
 }
@@ -170,7 +170,7 @@ fn stirred_bodies_yield_in_part() {
 #[test]
 fn stirred_bodies_are_whole_failed_unlit_burning_and_burnt_in_part() {
     for material in with_gases() {
-        let failing = material.failure != Failure::None;
+        let failing = material.failure != Failure::None || !material.history().is_empty();
         let burning = material.detonation_speed().is_some();
         let piece = stirred(&material, [7, 5, 3], 5);
         let count = |field: usize, low: f64, high: f64| {
@@ -218,6 +218,7 @@ fn half(piece: &Piece, cut: u32, low: bool) -> Piece {
         fields: std::array::from_fn(|field| by_element(&piece.fields[field])),
         own: piece.own.iter().map(|values| by_element(values)).collect(),
         erosion: None,
+        history: piece.history.iter().map(|column| by_element(column)).collect(),
         shells: piece.shells.clone(),
         ..*piece
     }
@@ -394,6 +395,7 @@ fn the_vote_is_the_least_of_the_elements_alone() {
             alone.elements = vec![piece.elements[element]];
             alone.initial_volume = vec![piece.initial_volume[element]];
             alone.fields = std::array::from_fn(|field| vec![piece.fields[field][element]]);
+            alone.history = piece.history.iter().map(|column| vec![column[element]]).collect();
             joined.merge(&compute(&mut Block::new(&alone), &material, &step, Width::Scalar));
         }
         assert_eq!(joined, vote);

@@ -174,6 +174,7 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
         initial_volume,
         fields,
         erosion: None,
+        history: material.history().iter().map(|v| vec![v.initial; n_elements]).collect(),
         shells: mechanics::state::ShellState::default(),
         own: Vec::new(),
         hourglass: Hourglass::NONE,
@@ -225,6 +226,9 @@ pub fn stirred(material: &Material, cells: [u32; 3], seed: u64) -> Piece {
         }
         set(field::ENERGY, material.initial_energy() + 1e7 * (draws.next() + 0.5));
         set(field::RELATIVE_VOLUME, 1.0 + 0.01 * draws.next());
+        if !material.history().is_empty() {
+            set(field::DAMAGE, (3.0 * draws.next()).clamp(0.0, 1.0));
+        }
         if material.failure != Failure::None {
             // Some are whole, some failed.
             set(field::DAMAGE, (3.0 * draws.next()).clamp(0.0, 1.0));
@@ -242,6 +246,9 @@ pub fn stirred(material: &Material, cells: [u32; 3], seed: u64) -> Piece {
                 set(field::TEMPERATURE, 300.0 + 800.0 * strain);
             }
         }
+    }
+    for column in &mut piece.history {
+        column.iter_mut().for_each(|value| *value = 1e8 * draws.next().max(0.0));
     }
     piece
 }

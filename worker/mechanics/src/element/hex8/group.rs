@@ -34,6 +34,8 @@ pub(crate) struct Solids {
     control: Hourglass,
     /// Forces of elastic hourglass control; empty without it.
     hourglass: [Vec<f64>; N_FORCES],
+    /// One array per entry of [`crate::material::Material::history`].
+    history: Vec<Vec<f64>>,
     initial_volume: Vec<f64>,
     /// Bits of the slots of each set that hold elements.
     alive: Vec<u8>,
@@ -80,6 +82,7 @@ impl Solids {
             control: piece.hourglass,
             hourglass: std::array::from_fn(|_| own.next().unwrap_or_default()),
             fields: piece.fields.each_mut().map(|values| by_slot(take(values), 0.0)),
+            history: take(&mut piece.history).into_iter().map(|values| by_slot(values, 0.0)).collect(),
             initial_volume: by_slot(take(&mut piece.initial_volume), 1.0),
             alive: slot_elements
                 .chunks(SET)
@@ -152,6 +155,7 @@ impl Group for Solids {
             slots: BySlot {
                 fields: self.fields.each_mut().map(Vec::as_mut_slice),
                 hourglass: self.hourglass.each_mut().map(Vec::as_mut_slice),
+                history: &mut self.history,
                 initial_volume: &self.initial_volume,
                 alive: &self.alive,
                 elements: &self.slot_elements,
@@ -167,11 +171,16 @@ impl Group for Solids {
         self.fields.each_ref().map(|values| values[slot])
     }
 
+    fn history(&self) -> &[Vec<f64>] {
+        &self.history
+    }
+
     fn image(&self, _x: &[Vec<f64>; 3]) -> ElementArrays {
         ElementArrays {
             initial_volume: self.by_element(&self.initial_volume),
             fields: self.fields.each_ref().map(|values| self.by_element(values)),
             own: self.own(),
+            history: self.history.iter().map(|values| self.by_element(values)).collect(),
         }
     }
 
@@ -183,11 +192,13 @@ impl Group for Solids {
             let values = take(&mut self.fields[field]);
             self.by_element(&values)
         });
-        ElementArrays { initial_volume, fields, own: self.own() }
+        let history = take(&mut self.history).iter().map(|values| self.by_element(values)).collect();
+        ElementArrays { initial_volume, fields, own: self.own(), history }
     }
 
     fn visit(&self, visit: &mut dyn FnMut(f64)) {
-        for values in self.fields.iter().chain(self.hourglass.iter().filter(|array| !array.is_empty())) {
+        let hourglass = self.hourglass.iter().filter(|array| !array.is_empty());
+        for values in self.fields.iter().chain(hourglass).chain(&self.history) {
             self.slots.iter().for_each(|&slot| visit(values[slot as usize]));
         }
     }

@@ -38,6 +38,8 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vo
         "hourglass forces that are not of {n_forces} slots"
     );
     let (density, hourglass) = (material.density, Resistance::of(control, material));
+    let (n_columns, n_variables) = (view.slots.history.len(), material.history().len());
+    assert!(n_columns == n_variables, "{n_columns} columns for {n_variables} history variables");
     let laws = (AnyEos::of(material), AnyStrength::of(material), AnyFailure::of(material));
     // Copies of their own for the commonest of each kind: see benches/TRIED.md.
     macro_rules! alone {

@@ -283,6 +283,7 @@ impl Group for Core {
             initial_volume: self.initial_volume.clone(),
             fields: std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect()),
             own: own.map(|field| field[..self.n_elements].to_vec()).collect(),
+            history: Vec::new(),
         }
     }
 
