@@ -15,7 +15,7 @@ use mechanics::{
     },
     erosion::Criteria,
     load::Drive,
-    material::Strength,
+    material::{Eos, Strength},
     mesh::{Section, Topology},
     wall::Shape,
 };
@@ -275,6 +275,17 @@ fn materials_with_a_failure_strain_a_failure_law_or_a_least_step_erode_by_it() {
     assert_eq!(of("*MAT_024\n1,7.85e-9,2.1e5,0.3,300.,,0.8,1e-8\n").erosion.parts, [Some(both)]);
     assert_eq!(of("*MAT_098\n1,7.85e-9,2.1e5,0.3\n300.,200.,0.3,0.01,0.8\n").erosion.parts, [Some(strain)]);
     assert!(!of("*MAT_024\n1,7.85e-9,2.1e5,0.3,300.,,1e21\n").erosion.is_on());
+    let tile = of(
+        "*MAT_110\n1,2.51e-9,1.97e5,0.927,0.7,0.005,0.85,0.67\n1.,260.,0.2,19000.,8710.,1.\n0.001,0.5,2.33e5,-5.93e5,2.8e6,0.8\n",
+    );
+    assert_eq!(tile.erosion.parts, [Some(strain)]);
+    let Eos::Polynomial { a1, a2, a3, t1, .. } = tile.materials[0].eos else { panic!("{tile:?}") };
+    assert_eq!([a1, a2, a3, t1], [2.33e5, -5.93e5, 2.8e6, 2.33e5]);
+    let Strength::JohnsonHolmquist(law) = tile.materials[0].strength else { panic!("{tile:?}") };
+    assert_eq!(
+        [law.hel_stress, law.hel_pressure, law.tension, law.m, law.n],
+        [15435.0, 8710.0, 260.0, 0.85, 0.67]
+    );
     // Johnson and Cook: D1 to D5, and EROD in the card of D5.
     let cook = |last: &str| {
         let deck = cube("*EOS_GRUNEISEN\n1,3.9e6,1.49,,,2.0\n").replace("\n1,1,1\n", "\n1,1,1,1\n").replace(

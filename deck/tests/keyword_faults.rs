@@ -208,6 +208,22 @@ fn constants_that_no_law_takes_are_told_at_their_field() {
             .replace("*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n", material);
         faults(&text)
     };
+    let tile = |second: &str, fs: &str| {
+        format!(
+            "*MAT_JOHNSON_HOLMQUIST_CERAMICS\n1,2.51e-9,1.97e5,0.927,0.7,0.005,0.85,0.67\n{second}\n0.001,0.5,2.33e5,,,{fs}\n"
+        )
+    };
+    let with = |material: String| faults(&cube("").replace("*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n", &material));
+    let upside_down = with(tile("1.,260.,0.2,8710.,19000.,1.", ""));
+    assert!(upside_down.len() == 1 && upside_down[0].contains("a HEL above PHEL"), "{upside_down:?}");
+    let by_pressure = with(tile("1.,260.,0.2,19000.,8710.,1.", "-1."));
+    assert!(
+        by_pressure.len() == 1 && by_pressure[0].contains("no failure by the pressure"),
+        "{by_pressure:?}"
+    );
+    let gruneisen = "*EOS_GRUNEISEN\n1,3.9e6,1.49,,,2.0\n";
+    let doubled = gas(&tile("1.,260.,0.2,19000.,8710.,1.", ""), gruneisen);
+    assert!(doubled.len() == 1 && doubled[0].contains("K1, K2 and K3"), "{doubled:?}");
     let null = "*MAT_NULL\n1,7.85e-9,-1.0\n";
     let ideal = "*EOS_LINEAR_POLYNOMIAL\n1,0,0,0,0,0.4,0.4\n0.25\n";
     assert_eq!(

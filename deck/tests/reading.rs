@@ -252,7 +252,7 @@ fn library_values_come_in_the_units_of_the_deck() {
 #[test]
 fn laws_come_in_the_units_of_the_deck_and_fracture_only_where_a_part_asks() {
     let model = good("laws");
-    let [tnt, water, air, pipe, pane, tube, whole, breaking] = &model.setup.materials[..] else {
+    let [tnt, water, air, pipe, pane, tube, whole, breaking, tile] = &model.setup.materials[..] else {
         panic!("{:?}", model.setup.materials)
     };
     let near = |x: f64, y: f64| assert!((x / y - 1.0).abs() < 1e-14, "{x} {y}");
@@ -271,6 +271,12 @@ fn laws_come_in_the_units_of_the_deck_and_fracture_only_where_a_part_asks() {
     assert_eq!(pane.failure, Failure::PrincipalStress { tension: 0.1 });
     let voce = vec![("shear", 26.0), ("yield_stress", 0.2), ("q", 0.15), ("b", 20.0)];
     assert_eq!(tube.strength.declared(), Some(("voce", voce)));
+    let Some(("johnson-holmquist", tile)) = tile.strength.declared() else { panic!("{tile:?}") };
+    let tile = |key: &str| tile.iter().find(|(name, _)| *name == key).expect("a constant of that name").1;
+    near(tile("shear"), 197.0);
+    near(tile("hel_stress"), 15.435);
+    near(tile("rate0"), 0.001);
+    assert_eq!(tile("d1"), 0.001);
     assert_eq!(whole.failure, Failure::None);
     assert_eq!(breaking.failure, Failure::JohnsonCook { d: [0.05, 3.44, -2.12, 0.002, 0.61] });
     assert_eq!(model.setup.detonations, [Detonation { point: [5.0, 5.0, 0.0], time: 0.001 }]);

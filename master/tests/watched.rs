@@ -145,6 +145,46 @@ fn element_gauge_reads_the_state_of_the_element_that_the_deck_means() {
     assert!(pressures.fold(0.0, f64::max) > 1e-3, "the gauge under the projectile feels nothing");
 }
 
+#[test]
+fn history_variables_are_arrays_of_states_and_columns_of_element_gauges() {
+    let hard = PARTS.replace("AL_2024_T351", "BORON_CARBIDE").replace("-0.03]", "-0.15]");
+    let deck = |end_cycle: u64| {
+        let mut deck = model(&format!("{hard}\n[output]\nhistory_cycles = 1\n{WATCHED}"));
+        deck.setup.control.end_cycle = end_cycle;
+        deck
+    };
+    let (long, short) = (run(deck(60)), run(deck(59)));
+    let columns = &short.state.history_of(0).expect("a ceramic target").columns;
+    assert_eq!(columns.len(), 2);
+    let element = short.model.output.element_gauges[0].element as usize;
+    let read = &long.rows[58].element_gauges[0];
+    assert_eq!(read.len(), mechanics::state::N_FIELDS + 2);
+    for (place, column) in columns.iter().enumerate() {
+        let value = column[element];
+        assert!(value > 0.0, "nothing broke under the projectile: {value}");
+        assert_eq!(value.to_bits(), read[mechanics::state::N_FIELDS + place].to_bits());
+    }
+
+    let folder = Folder::create(&scratch("history"), false).expect("fresh");
+    results::history::History::create(&folder, &short.model).expect("written");
+    let header = fs::read_to_string(folder.file(results::HISTORY)).expect("written");
+    for column in ["under it:bulking_pressure [Mbar]", "corner:released_energy [Mbar]"] {
+        assert!(header.contains(column), "{header}");
+    }
+    let path = folder.file("broken.vtu");
+    let fields = results::vtu::Fields::select(&["pressure".to_owned()]).expect("known");
+    results::vtu::write_vtu(&path, &short.model, &short.state, &fields, None).expect("written");
+    let piece = Piece::open(&path).expect("whole");
+    let n = piece.n_cells;
+    for (name, column) in ["bulking_pressure", "released_energy"].into_iter().zip(columns) {
+        let array = piece.expect("CellData", name).expect("written");
+        let found = piece.numbers(array, n).expect("whole");
+        // The projectile has none.
+        let wanted = column.iter().copied().chain(std::iter::repeat_n(0.0, n - column.len()));
+        assert!(found.iter().map(|v| v.to_bits()).eq(wanted.map(f64::to_bits)), "{name}");
+    }
+}
+
 /// A fresh place below the folder for tests.
 fn scratch(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("watched").join(name);

@@ -4,7 +4,10 @@
 
 use std::sync::Arc;
 
-use mechanics::{lanes::Width, state::GlobalState};
+use mechanics::{
+    lanes::Width,
+    state::{GlobalState, PartHistory},
+};
 use tests::{
     bits::{Fingerprint, forced_sorts},
     solve::{Workers, example, keyword, model, run, solve, solve_through, without_states},
@@ -114,6 +117,53 @@ pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
     assert!(midway >= 4, "{midway} of 8 went back to a state on the way");
 }
 
+/// Steel that shatters a ceramic tile, whose law declares history variables; behind it copper, whose law has none.
+const TILE: &str = r#"
+    title = "tile"
+    units = "cm-g-us"
+    [control]
+    end_cycle = 150
+    end_time = 1e3
+    plan_interval = 20
+    [[part]]
+    name = "backing"
+    material = "CU_OFHC"
+    box = { origin = [0, 0, -2.11], size = [6, 6, 2], cells = [6, 6, 2] }
+    [[part]]
+    name = "tile"
+    material = "BORON_CARBIDE"
+    box = { origin = [0, 0, 0], size = [6, 6, 3], cells = [6, 6, 3] }
+    [[part]]
+    name = "projectile"
+    material = "STEEL_1006"
+    velocity = [0.01, 0, -0.15]
+    box = { origin = [2, 2, 3.11], size = [2, 2, 3], cells = [2, 2, 3] }
+    [contact]
+    gap_length = 0.1
+    [output]
+    history_cycles = 1
+    [[gauge]]
+    name = "struck"
+    of = "element"
+    part = "tile"
+    point = [3.5, 3.5, 2.5]
+"#;
+
+#[test]
+fn history_variables_have_the_same_bits_on_any_workers_routes_and_lanes_and_over_a_snapshot_and_a_loss() {
+    let model = model(TILE);
+    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
+    let [history] = &alone.state.history[..] else { panic!("{} parts", alone.state.history.len()) };
+    assert_eq!((history.part, history.first as usize), (1, model.mesh.element_offsets()[1]));
+    for column in &history.columns {
+        let changed = column.iter().filter(|value| **value > 0.0).count();
+        assert!((10..=108).contains(&changed), "{changed} of 108");
+    }
+    same_bits(&model);
+    same_bits_on_route_direct(&model, &Fingerprint::of(&alone));
+    losing_a_worker_changes_no_bit(&model);
+}
+
 #[test]
 fn a_snapshot_whose_arrays_are_not_as_long_as_the_problems_is_refused() {
     let mut model = example("plates-joined");
@@ -121,12 +171,13 @@ fn a_snapshot_whose_arrays_are_not_as_long_as_the_problems_is_refused() {
     let options = without_states(JobOptions { snapshot_at: Some(2), ..JobOptions::default() });
     let whole = solve(model.clone(), asked(1, options)).unwrap_or_else(|e| panic!("{e}"));
     let snapshot = whole.snapshot.expect("a snapshot was asked for");
-    let spoils: [fn(&mut GlobalState); 5] = [
+    let spoils: [fn(&mut GlobalState); 6] = [
         |state| state.x.truncate(7),
         |state| state.v.push([0.0; 3]),
         |state| state.mass.clear(),
         |state| state.elements[2].clear(),
         |state| state.initial_volume.truncate(26_999),
+        |state| state.history.push(PartHistory::default()),
     ];
     for (number, spoil) in spoils.into_iter().enumerate() {
         let mut snapshot = snapshot.clone();

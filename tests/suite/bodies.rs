@@ -173,7 +173,7 @@ fn a_sheet_that_is_pulled_gets_thinner_unless_the_deck_says_that_it_does_not() {
              [[boundary]]\ntype = \"velocity\"\nface = \"i-min\"\nvelocity = {{ x = 0 }}\n"
         ));
         let solved = run(&deck, Workers::default());
-        let of = &solved.state.shells.fields[shell4::THICKNESS];
+        let of = &solved.state.own[shell4::THICKNESS];
         of.iter().copied().fold(f64::INFINITY, f64::min)
     };
     let (follows, stays) = (thickness(""), thickness(", thinning = false"));

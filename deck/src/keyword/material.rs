@@ -1,5 +1,7 @@
 //! `*MAT_` and `*EOS_`: constants of a deck.
 
+use mechanics::strength::JohnsonHolmquist;
+
 use super::{
     cards::Block,
     condition::AXES_OF_CODE,
@@ -46,6 +48,11 @@ pub(super) enum Law {
         specific_heat: f64,
         damage: Option<[f64; 5]>,
     },
+    JohnsonHolmquist {
+        constants: JohnsonHolmquist,
+        /// K1, K2, K3.
+        bulk: [f64; 3],
+    },
     /// A fluid, with the pressure below which it does not go (negative), if any.
     Null {
         cut_off: Placed<f64>,
@@ -72,7 +79,7 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 7] = [
+const NUMBERS: [(&str, &str); 8] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
     ("MAT_009", "MAT_NULL"),
@@ -80,11 +87,15 @@ const NUMBERS: [(&str, &str); 7] = [
     ("MAT_020", "MAT_RIGID"),
     ("MAT_024", "MAT_PIECEWISE_LINEAR_PLASTICITY"),
     ("MAT_098", "MAT_SIMPLIFIED_JOHNSON_COOK"),
+    ("MAT_110", "MAT_JOHNSON_HOLMQUIST_CERAMICS"),
 ];
 
 /// Temperatures (K) and specific heat of a material that is not warmed: whatever the units, it stays cold.
 const COLD: [f64; 2] = [300.0, 1e6];
 const COLD_HEAT: f64 = 1e40;
+
+/// SFMAX where the card has none.
+const UNLIMITED: f64 = 1e20;
 
 /// Reads a `*MAT_` keyword; none after a fault without which nothing is known of it.
 pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialCard> {
@@ -200,6 +211,10 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
             }
             (None, law)
         }
+        "MAT_JOHNSON_HOLMQUIST_CERAMICS" => {
+            needs_moduli = false;
+            (None, johnson_holmquist(&f, &mut limits))
+        }
         "MAT_NULL" => {
             needs_moduli = false;
             let cut_off = f[0].real(2, 0.0);
@@ -290,6 +305,47 @@ fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool) -> Option<Law> {
         specific_heat: if warm { heat } else { COLD_HEAT },
         damage: d.iter().any(|d| *d != 0.0).then_some(d),
     })
+}
+
+/// Three cards of `*MAT_JOHNSON_HOLMQUIST_CERAMICS`.
+fn johnson_holmquist(f: &[Fields<'_>; 8], limits: &mut Limits) -> Option<Law> {
+    let [shear, a, n] = [(2, "G"), (3, "A"), (7, "N")].map(|(i, what)| f[0].positive(i, what));
+    let [b, c] = [4, 5].map(|i| not_negative(&f[0], i));
+    // Without a fractured strength its exponent says nothing.
+    let m = if b > 0.0 { f[0].positive(6, "M") } else { Some(1.0) };
+    let [tension, hel, hel_pressure] =
+        [(1, "T"), (3, "HEL"), (4, "PHEL")].map(|(i, what)| f[1].positive(i, what));
+    let fractured_limit = Some(f[1].real(2, 0.0)).filter(|limit| *limit > 0.0).unwrap_or(UNLIMITED);
+    let beta = f[1].within(5, 0.0, Range::Within(-f64::MIN_POSITIVE, 1.0, "a number from 0 to 1"));
+    let (d1, d2) = (not_negative(&f[2], 0), f[2].positive(1, "D2"));
+    let k1 = f[2].positive(2, "K1");
+    let [k2, k3] = [3, 4].map(|i| f[2].real(i, 0.0));
+    match f[2].real(5, 0.0) {
+        fs if fs < 0.0 => f[2].fault(5, "no failure by the pressure", "leave FS blank"),
+        _ => limits.read_failure_strain(&f[2], 5, "FS"),
+    }
+    let (hel, hel_pressure) = (hel?, hel_pressure?);
+    if hel <= hel_pressure {
+        f[1].fault(3, "a HEL above PHEL", "correct one of them");
+        return None;
+    }
+    let constants = JohnsonHolmquist {
+        shear: shear?,
+        a: a?,
+        b,
+        c,
+        m: m?,
+        n: n?,
+        rate0: Some(f[1].real(0, 1.0)).filter(|rate| *rate > 0.0).unwrap_or(1.0),
+        tension: tension?,
+        fractured_limit,
+        hel_stress: 1.5 * (hel - hel_pressure),
+        hel_pressure,
+        beta,
+        d1,
+        d2: d2?,
+    };
+    Some(Law::JohnsonHolmquist { constants, bulk: [k1?, k2, k3] })
 }
 
 /// Reads an `*EOS_` keyword; none after a fault.

@@ -147,6 +147,7 @@ fn criteria(given: &Erosion, material: Option<&Material>, log: &Log<'_>) -> Crit
         }
         if let Some(failure) = given.failure.as_ref().filter(|on| on.value)
             && material.failure == Failure::None
+            && material.history().is_empty()
         {
             log.fault_of(
                 failure.origin,

@@ -19,6 +19,8 @@ impl Unit {
     pub const NONE: Self = Self { length: 0, mass: 0, time: 0 };
     /// Force per area, energy per volume.
     pub const STRESS: Self = Self { length: -1, mass: 1, time: -2 };
+    /// Strain per time.
+    pub const RATE: Self = Self { length: 0, mass: 0, time: -1 };
 }
 
 /// A history variable: a number that a law keeps for an element from cycle to cycle, beside those that every element has
@@ -42,6 +44,8 @@ pub enum Bound {
     Positive,
     /// Zero or above.
     NotNegative,
+    /// From 0 to 1.
+    Fraction,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

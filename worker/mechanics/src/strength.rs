@@ -16,11 +16,13 @@ use crate::{
 pub(crate) mod cowper_symonds;
 pub(crate) mod elastic;
 pub(crate) mod johnson_cook;
+pub(crate) mod johnson_holmquist;
 pub(crate) mod plane_stress;
 pub(crate) mod tabulated;
 pub(crate) mod voce;
 pub(crate) mod von_mises;
 
+pub use johnson_holmquist::JohnsonHolmquist;
 pub use voce::Voce;
 pub(crate) use {
     cowper_symonds::RateFactor, elastic::Elastic, elastic::Hydro, johnson_cook::JohnsonCook,
@@ -265,6 +267,60 @@ pub(crate) enum AnyStrength {
     Voce(Voce),
 }
 
+/// The laws with history variables. They have a kernel of their own, so that the other one does not become slower.
+#[derive(Clone, Copy)]
+pub(crate) enum AnyRemembering {
+    JohnsonHolmquist(johnson_holmquist::Ceramic),
+}
+
+impl AnyRemembering {
+    /// That of a material, made ready; none if its law has no history variables.
+    pub fn of(material: &Material) -> Option<Self> {
+        match material.strength {
+            _ if material.is_gas() => None,
+            Strength::JohnsonHolmquist(law) => {
+                Some(Self::JohnsonHolmquist(johnson_holmquist::Ceramic::new(&law, material.bulk())))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl StrengthLaw for AnyRemembering {
+    const REMEMBERS: bool = true;
+
+    #[inline(always)]
+    fn shear(&self) -> f64 {
+        let Self::JohnsonHolmquist(law) = self;
+        law.shear()
+    }
+
+    #[inline(always)]
+    fn update<L: Lane>(
+        &self,
+        trial: Deviator<L>,
+        strain: Strain<L>,
+        history: &mut History<L>,
+        active: L::Mask,
+    ) -> Deviator<L> {
+        let Self::JohnsonHolmquist(law) = self;
+        law.update(trial, strain, history, active)
+    }
+
+    #[inline(always)]
+    fn remember<L: Lane>(
+        &self,
+        trial: Deviator<L>,
+        around: &Around<L>,
+        history: &mut History<L>,
+        memory: &mut Memory<L>,
+        active: L::Mask,
+    ) -> Deviator<L> {
+        let Self::JohnsonHolmquist(law) = self;
+        law.remember(trial, around, history, memory, active)
+    }
+}
+
 /// Strength law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Strength {
@@ -323,6 +379,8 @@ pub enum Strength {
     },
     /// Von Mises yield with saturating hardening.
     Voce(Voce),
+    /// Ceramics and glass, with damage and bulking.
+    JohnsonHolmquist(JohnsonHolmquist),
 }
 
 /// What the temperature of a Johnson-Cook material follows.
@@ -337,21 +395,32 @@ pub enum Heat {
 
 impl Strength {
     /// The laws that declare their constants.
-    pub const DECLARED: &'static [Declaration<Strength>] = &[Declaration {
-        name: Voce::NAME,
-        constants: Voce::CONSTANTS,
-        of: |values| Strength::Voce(Voce::of(values)),
-    }];
+    pub const DECLARED: &'static [Declaration<Strength>] = &[
+        Declaration {
+            name: Voce::NAME,
+            constants: Voce::CONSTANTS,
+            of: |values| Strength::Voce(Voce::of(values)),
+        },
+        Declaration {
+            name: JohnsonHolmquist::NAME,
+            constants: JohnsonHolmquist::CONSTANTS,
+            of: |values| Strength::JohnsonHolmquist(JohnsonHolmquist::of(values)),
+        },
+    ];
 
     /// The history variables of the law.
     pub fn history(&self) -> &'static [Variable] {
-        &[]
+        match self {
+            Strength::JohnsonHolmquist(_) => JohnsonHolmquist::HISTORY,
+            _ => &[],
+        }
     }
 
     /// The name and the constants by key of a law that declares them.
     pub fn declared(&self) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
         match self {
             Strength::Voce(law) => Some((Voce::NAME, law.constants())),
+            Strength::JohnsonHolmquist(law) => Some((JohnsonHolmquist::NAME, law.constants())),
             _ => None,
         }
     }
@@ -360,6 +429,7 @@ impl Strength {
     pub fn converted(self, convert: &dyn Fn(Unit, f64) -> f64) -> Self {
         match self {
             Strength::Voce(law) => Strength::Voce(law.converted(convert)),
+            Strength::JohnsonHolmquist(law) => Strength::JohnsonHolmquist(law.converted(convert)),
             other => other,
         }
     }
@@ -423,6 +493,8 @@ impl AnyStrength {
                 })
             }
             Strength::Voce(law) => Self::Voce(law),
+            // Its elements have a kernel of their own, see [`AnyRemembering`]; others ask for its stiffness.
+            Strength::JohnsonHolmquist(law) => Self::Elastic(Elastic { shear: law.shear }),
         }
     }
 }

@@ -78,7 +78,7 @@ fn make(t: &Translation<'_>, card: &MaterialCard, part: &PartCard, name: String)
                 );
             }
             // Told with the strength.
-            (Clash::Failure, _) => {}
+            (Clash::Failure | Clash::Damage, _) => {}
         }
     }
     Some(material)
@@ -92,6 +92,16 @@ fn eos_of(
     part: &PartCard,
 ) -> Option<Eos> {
     let log = t.log;
+    if let Law::JohnsonHolmquist { bulk: [a1, a2, a3], .. } = material.law {
+        if eos.is_some() {
+            log.fault_of(
+                part.eos.origin,
+                "no *EOS: K1, K2 and K3 of the material are one",
+                "leave EOSID blank",
+            );
+        }
+        return Some(Eos::Polynomial { a1, a2, a3, b0: 0.0, b1: 0.0, t1: a1, t2: 0.0 });
+    }
     match (eos, material.elastic) {
         (Some(EosCard::Grueneisen { c, s, gamma }), _) => {
             Some(Eos::Shock { c0: *c, s: s + 0.0, gamma: gamma + 0.0 })
@@ -152,6 +162,7 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
     let rate_of =
         |rate: &Option<[f64; 2]>| rate.map(|[reference, exponent]| CowperSymonds { reference, exponent });
     Some(match &material.law {
+        Law::JohnsonHolmquist { constants, .. } => Strength::JohnsonHolmquist(*constants),
         Law::Elastic | Law::Rigid { .. } => Strength::Elastic { shear: shear() },
         Law::Null { .. } => Strength::Hydro,
         Law::Bilinear { yield_stress, tangent, rate } => {

@@ -7,7 +7,10 @@
 //! difference is then convex. Each lane stops where its own step was small, whatever its neighbours do.
 
 use super::{AnyStrength, StrengthLaw};
-use crate::{lanes::Lane, material::Material};
+use crate::{
+    lanes::Lane,
+    material::{Material, Strength},
+};
 
 /// Most Newton steps of the return. From a trial far outside each step halves the distance until the last few: a trial of 1e4 times the yield
 /// stress takes 19.
@@ -50,6 +53,9 @@ impl PlaneLaw {
     pub fn of(material: &Material) -> Result<PlaneLaw, &'static str> {
         if material.is_gas() {
             return Err("a gas");
+        }
+        if let Strength::JohnsonHolmquist(_) = material.strength {
+            return Err("johnson-holmquist");
         }
         let strength = AnyStrength::of(material);
         if !strength.deviatoric() {

@@ -99,6 +99,23 @@ pub fn all_laws() -> Vec<Material> {
         Strength::Voce(mechanics::strength::Voce { shear, yield_stress: 3e8, q: 2e8, b: 12.0 }),
         Failure::None,
     );
+    let ceramic = mechanics::strength::JohnsonHolmquist {
+        shear,
+        a: 0.93,
+        b: 0.31,
+        c: 0.01,
+        m: 0.6,
+        n: 0.6,
+        rate0: 1.0,
+        tension: 0.2e9,
+        fractured_limit: 0.2,
+        hel_stress: 4e8,
+        hel_pressure: 3e8,
+        beta: 0.9,
+        d1: 0.01,
+        d2: 0.8,
+    };
+    add(polynomial, Strength::JohnsonHolmquist(ceramic), Failure::None);
     materials
 }
 

@@ -1,5 +1,5 @@
-//! From a block and its material to a kernel: one for all laws, and copies for the commonest laws where a width
-//! pays for them.
+//! From a block and its material to a kernel: one for all laws, one for those with history variables, and copies for the
+//! commonest laws where a width pays for them.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::{
     eos::{AnyEos, EquationOfState},
     failure::{AnyFailure, FailureLaw, Unfailing},
     lanes::{Lane, SET, Width, dispatch::Task},
-    strength::{AnyStrength, StrengthLaw},
+    strength::{AnyRemembering, AnyStrength, StrengthLaw},
 };
 
 /// Computes the elements of `sets`: forces into `view.nodes`, new state, votes.
@@ -40,6 +40,11 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vo
     let (density, hourglass) = (material.density, Resistance::of(control, material));
     let (n_columns, n_variables) = (view.slots.history.len(), material.history().len());
     assert!(n_columns == n_variables, "{n_columns} columns for {n_variables} history variables");
+    if let Some(strength) = AnyRemembering::of(material) {
+        let laws = Laws { density, eos: AnyEos::of(material), strength, failure: Unfailing, hourglass };
+        Pass { view, laws, step, sets, vote }.on(width, elastic);
+        return;
+    }
     let laws = (AnyEos::of(material), AnyStrength::of(material), AnyFailure::of(material));
     // Copies of their own for the commonest of each kind: see benches/TRIED.md.
     macro_rules! alone {
@@ -51,7 +56,7 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vo
     match (width, laws) {
         (width, (eos, strength, failure)) if elastic => {
             let laws = Laws { density, eos, strength, failure, hourglass };
-            width.run(Controlled::<_, true>(Pass { view, laws, step, sets, vote }));
+            Pass { view, laws, step, sets, vote }.on(width, true);
         }
         (width, (AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength), AnyFailure::Unfailing(_)))
             if width.is_fused() && strength.by_energy == 0.0 =>
@@ -79,7 +84,7 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vo
         ) => alone!(run_wide, eos, strength),
         (width, (eos, strength, failure)) => {
             let laws = Laws { density, eos, strength, failure, hourglass };
-            width.run(Controlled::<_, false>(Pass { view, laws, step, sets, vote }));
+            Pass { view, laws, step, sets, vote }.on(width, false);
         }
     }
 }
@@ -91,6 +96,17 @@ struct Pass<'a, E, S, F> {
     step: &'a Step,
     sets: &'a [Range<u32>],
     vote: &'a mut ElementVote,
+}
+
+impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw> Pass<'_, E, S, F> {
+    /// Runs on a width, with elastic hourglass control or without.
+    fn on(self, width: Width, elastic: bool) {
+        if elastic {
+            width.run(Controlled::<_, true>(self));
+        } else {
+            width.run(Controlled::<_, false>(self));
+        }
+    }
 }
 
 /// A pass whose hourglass control is elastic or not.
