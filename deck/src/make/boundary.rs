@@ -46,6 +46,9 @@ struct Prescribing {
 /// A drive as a key: bits of the factor, and the curve.
 type DriveBits = Option<(u64, Option<u32>)>;
 
+/// What tells constraints apart: velocities and supports by axis, forces, walls, clamped axes.
+type Key = ([DriveBits; 3], [u8; 3], u32, u32, u8);
+
 /// Velocities by axis.
 type Prescribed = [Option<Drive>; 3];
 
@@ -169,7 +172,7 @@ fn number(
     log: &Log<'_>,
 ) -> (Vec<Constraint>, Vec<u16>) {
     let mut list = vec![Constraint::default()];
-    let mut known: BTreeMap<([DriveBits; 3], [u8; 3], u32, u32, u8), u16> = BTreeMap::new();
+    let mut known: BTreeMap<Key, u16> = BTreeMap::new();
     let mut of_node = vec![0u16; n_nodes];
     let forces = &loads.forces;
     let nodes: BTreeSet<u32> =

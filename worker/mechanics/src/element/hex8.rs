@@ -468,7 +468,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let double_inverse_square = L::splat(2.0 / 512.0) * inverse_volume * inverse_volume;
     let shear_square = L::splat(laws.strength.shear() / laws.density) * relative_volume;
     // The burn crosses elements faster than sound, and the step follows it.
-    let sound_square = sound_square.max(pace_square);
+    let sound_square = if laws.eos.burns() { sound_square.max(pace_square) } else { sound_square };
     let swing = Swing { damping, sound_square, shear_square, trace: spread.trace() * double_inverse_square };
     let bound = swing.frequency(spread.eigenvalue_bound() * double_inverse_square);
     let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);
