@@ -9,10 +9,7 @@ use deck::{
     mesh_file,
 };
 use mechanics::{
-    element::{
-        hourglass::{Hourglass, Kind},
-        shell4::Rule,
-    },
+    element::shell4::Rule,
     erosion::Criteria,
     load::Drive,
     material::{Eos, Strength},
@@ -446,47 +443,6 @@ fn a_rigid_material_makes_a_body_of_its_part() {
     assert_eq!(body.spin.map(|v| v.map(|v| v.factor)), [Some(0.0); 3]);
     assert!(rigid("-1,4,7").expect_err("a frame").contains("expected constraints along the axes"));
     assert!(rigid("1,8,7").expect_err("a code").contains("expected a number from 0 to 7"));
-}
-
-/// The small deck with a `*HOURGLASS` of its part, its control and its warnings.
-fn controlled(hourglass: &str, more: &str) -> (Hourglass, Vec<String>) {
-    let text = cube(&format!("{hourglass}{more}")).replace("cube\n1,1,1\n", "cube\n1,1,1,0,5\n");
-    let reading = deck::read_whole(&text, "a.k").unwrap_or_else(|f| panic!("{}", lines(&f)));
-    let again = converted(&text, "a.k").mesh.parts[0].hourglass;
-    let found = reading.model.mesh.parts[0].hourglass;
-    assert_eq!(again, found);
-    (found, reading.warnings.into_iter().map(|warning| warning.words).collect())
-}
-
-#[test]
-fn ihq_is_a_kind_of_hourglass_control_and_qm_its_coefficient() {
-    let of = |kind, coefficient| Hourglass { kind, coefficient };
-    for (card, expected, warning) in [
-        ("5,1,0.05", of(Kind::Viscous, 0.05), None),
-        ("5,3", of(Kind::Viscous, 0.1), None),
-        ("5,4,0.03", of(Kind::Stiffness, 0.03), None),
-        ("5,5", of(Kind::Stiffness, 0.1), None),
-        ("5,6,1.0", of(Kind::AssumedStrain, 1.0), None),
-        ("5,6,2.0", of(Kind::AssumedStrain, 1.0), Some("QM 2: the coefficient of hourglass control is 1")),
-        (
-            "5,9,0.5",
-            of(Kind::AssumedStrain, 0.5),
-            Some("IHQ 9: hourglass control is that of IHQ 6, by assumed strains"),
-        ),
-        ("5,8,0.2", of(Kind::Viscous, 0.2), Some("IHQ 8: hourglass control is viscous, as with IHQ 1")),
-    ] {
-        // What the part names goes before what the deck says.
-        let (found, warnings) = controlled(&format!("*HOURGLASS\n{card}\n"), "*CONTROL_HOURGLASS\n4,0.07\n");
-        assert_eq!(found, expected, "{card}");
-        assert_eq!(
-            warnings.iter().find(|words| words.contains("hourglass control")).map(String::as_str),
-            warning
-        );
-    }
-    assert_eq!(good("*CONTROL_HOURGLASS\n4,0.07\n").mesh.parts[0].hourglass, of(Kind::Stiffness, 0.07));
-    let (found, warnings) = controlled("", "*CONTROL_HOURGLASS\n6,0.5\n");
-    assert_eq!(found, of(Kind::AssumedStrain, 0.5));
-    assert_eq!(warnings, ["HGID 5: no *HOURGLASS has this number, that of the deck serves"]);
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod documents;
 mod erosion;
 mod fuzz;
 mod holders;
+mod hourglass;
 mod late;
 mod seeds;
 mod sums;

@@ -159,7 +159,7 @@ pub(super) fn a_ball_of_assumed_strains_keeps_its_motion_for_ten_bounces(figures
          [output]\nhistory_cycles = 20\n[[part]]\nname = \"ball\"\nvelocity = [0, 0, 10]\n\
          material = {{ density = 7.85e-6, eos = {{ type = \"linear\", bulk = 175 }}, \
          strength = {{ type = \"elastic\", shear = 80.76923077 }} }}\n\
-         sphere = {{ centre = [0, 0, 0], radius = 5, core_fraction = 0.5, cells = [2, 2] }}\n\
+         sphere = {{ centre = [0, 0, 0], radius = 5, core_fraction = 0.5, cells = [3, 3] }}\n\
          [[wall]]\npoint = [0, 0, -7]\nnormal = [0, 0, 1]\n[[wall]]\npoint = [0, 0, 7]\nnormal = [0, 0, -1]\n"
     )));
     let momentum: Vec<f64> = solved.rows.iter().map(|row| row.momentum[2]).collect();
