@@ -25,7 +25,10 @@ mod tie;
 mod wall;
 mod zones;
 
-use mechanics::setup::{Control, Setup};
+use mechanics::{
+    contact::Settings,
+    setup::{Control, Setup},
+};
 
 use crate::{
     log::Log,
@@ -82,7 +85,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         setup: Setup {
             materials,
             control: control?,
-            contact: contact.map(|contact| contact.settings),
+            contact: contact.map(|contact| Settings { erodes: erosion.is_on(), ..contact.settings }),
             constraints: conditions.constraints,
             walls: conditions.walls,
             bodies,

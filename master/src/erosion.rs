@@ -89,9 +89,32 @@ impl Eroded {
         self.cycles.iter().map(|&cycle| cycle == ALIVE).collect()
     }
 
+    /// The surface in force at `cycle`, without what comes out in it.
+    fn standing(&self, model: &Model, cycle: u64) -> Surface {
+        surface(model, &|element| self.is_on_surface(element, cycle))
+    }
+
     /// The surface in force at `cycle`.
     pub fn surface(&self, model: &Model, cycle: u64) -> Arc<Surface> {
-        surface(model, &|element| self.is_on_surface(element, cycle))
+        match cycle.checked_sub(1).filter(|&before| self.changes_from(before)) {
+            Some(before) => self.surface_after(model, cycle, &self.standing(model, before)),
+            None => Arc::new(self.standing(model, cycle)),
+        }
+    }
+
+    /// The surface in force at `cycle`, the first after that of `before`.
+    pub fn surface_after(&self, model: &Model, cycle: u64, before: &Surface) -> Arc<Surface> {
+        let mut surface = self.standing(model, cycle);
+        surface.note_exposed(before, cycle);
+        Arc::new(surface)
+    }
+
+    /// Whether the surface in force at `cycle` ends with it.
+    fn changes_from(&self, cycle: u64) -> bool {
+        let leaves = |&eroded: &u64| {
+            eroded != ALIVE && !leaves_before(eroded, cycle) && leaves_before(eroded, cycle + 1)
+        };
+        self.cycles.iter().any(leaves)
     }
 
     /// Nodes that have no element left at `cycle` (global indices, ascending), where those are dropped.
@@ -126,7 +149,7 @@ pub fn surface_of(model: &Model, state: &GlobalState) -> Option<Arc<Surface>> {
 }
 
 /// The surface of the elements for which `stands` holds, with the nodes of all parts that can erode.
-pub fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Arc<Surface> {
+pub fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Surface {
     let setup = &model.setup;
     let erodes: Vec<bool> = setup.erosion.parts.iter().map(Option::is_some).collect();
     let retain_inertia = setup.erosion.retain_inertia;
@@ -138,5 +161,5 @@ pub fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Arc<Surface> {
             surface.find_edges(&model.mesh);
         }
     }
-    Arc::new(surface)
+    surface
 }

@@ -22,8 +22,10 @@ pub struct Exchange {
     /// Says which exchange this is; frames carry it.
     pub hash: u64,
     route: Route,
-    /// Numbers by node of the exchange: three of the force, and with shells three of the moment.
+    /// Numbers by node of the exchange: three of the force, with shells three of the moment, and what contact keeps of it.
     stride: usize,
+    /// Numbers that contact keeps of each node: they are among those of the exchange, and behind those of ghosts.
+    n_history: usize,
     /// Number of nodes in the exchange; 0 on route direct.
     n_slots: usize,
     /// By worker: the slot of each node of its exchange list; empty on route direct.
@@ -41,9 +43,10 @@ impl Exchange {
         route: Route,
     ) -> Self {
         let moments = !state.shells.inertia.is_empty();
-        let stride = if moments { 6 } else { 3 };
-        let mut plans: Vec<Plan> =
-            (0..node_owners.n_workers()).map(|_| Plan { moments, ..Plan::default() }).collect();
+        let n_history = state.contact.len();
+        let stride = (if moments { 6 } else { 3 }) + n_history;
+        let empty = Plan { moments, n_history: n_history as u32, ..Plan::default() };
+        let mut plans: Vec<Plan> = vec![empty; node_owners.n_workers() as usize];
         // Ghosts: node and worker.
         let mut ghosts: Vec<(u32, u32)> = Vec::new();
         for (worker, batch) in (0..).zip(&batches) {
@@ -101,7 +104,7 @@ impl Exchange {
             plan.batch = batch;
         }
         let hash = hash(&plans);
-        Self { plans, hash, route, stride, n_slots: n_slots as usize, slots, sources }
+        Self { plans, hash, route, stride, n_history, n_slots: n_slots as usize, slots, sources }
     }
 
     /// Numbers in the partial forces that a worker sends to the master: none on route direct.
@@ -114,7 +117,7 @@ impl Exchange {
 
     /// Numbers in the transfer of a worker.
     pub fn n_transfer(&self, worker: usize) -> usize {
-        6 * self.plans[worker].send.len()
+        (6 + self.n_history) * self.plans[worker].send.len()
     }
 
     /// Zero totals; none on route direct.
@@ -149,19 +152,22 @@ impl Exchange {
 
     /// State of a worker's ghosts out of what the owners sent.
     pub fn ghost_state(&self, worker: usize, sent: &[Vec<f64>]) -> Vec<f64> {
-        let mut out = Vec::with_capacity(6 * self.sources[worker].len());
+        let each = 6 + self.n_history;
+        let mut out = Vec::with_capacity(each * self.sources[worker].len());
         for &(owner, at) in &self.sources[worker] {
-            out.extend_from_slice(&sent[owner as usize][6 * at as usize..6 * at as usize + 6]);
+            let first = each * at as usize;
+            out.extend_from_slice(&sent[owner as usize][first..first + each]);
         }
         out
     }
 
     /// State of a worker's ghosts out of the global state.
     pub fn ghost_state_from(&self, worker: usize, state: &GlobalState) -> Vec<f64> {
-        let mut out = Vec::with_capacity(6 * self.plans[worker].ghosts.len());
+        let mut out = Vec::with_capacity((6 + self.n_history) * self.plans[worker].ghosts.len());
         for ghost in &self.plans[worker].ghosts {
             out.extend_from_slice(&state.x[ghost.node as usize]);
             out.extend_from_slice(&state.v[ghost.node as usize]);
+            out.extend(state.contact.iter().map(|number| number[ghost.node as usize]));
         }
         out
     }

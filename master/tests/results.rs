@@ -159,6 +159,7 @@ fn dented(model: &Model, cycle: u64, t: f64) -> GlobalState {
         elements,
         eroded: Vec::new(),
         strain: Vec::new(),
+        contact: Vec::new(),
         shells: mechanics::state::ShellState::default(),
         own: Vec::new(),
         history: Vec::new(),

@@ -399,3 +399,71 @@ fn nodes_that_lost_all_elements_keep_colliding_or_leave_with_what_they_have() {
         assert_eq!(masses(&first.state), masses(&run.state));
     }
 }
+
+/// A quarter of a ball that strikes a plate (m/s), with a gap as a share of the smallest face; both erode, and may break before.
+fn ball_on_plate(speed: f64, gap: f64, fracture: bool) -> Model {
+    model(&format!(
+        r#"
+        title = "ball on plate"
+        units = "mm-ms-kg"
+        [control]
+        end_time = {end}
+        energy_error = 1e9
+        [[part]]
+        name = "ball"
+        material = "AL_2024_T351"
+        fracture = {fracture}
+        velocity = [0, 0, -{speed}]
+        sphere = {{ centre = [0, 0, 2.9], radius = 2.5, sector = "quarter", core_fraction = 0.5, cells = [1, 2] }}
+        rotate = {{ axis = [0, 1, 0], degrees = 90, point = [0, 0, 2.9] }}
+        erosion = {{ geometric_strain = 1.5 }}
+        [[part]]
+        name = "plate"
+        material = "AL_2024_T351"
+        fracture = {fracture}
+        box = {{ origin = [0, 0, -2], size = [6, 6, 2], cells = [9, 9, 3] }}
+        erosion = {{ geometric_strain = 1.5 }}
+        [contact]
+        gap_fraction = {gap}
+        self_interaction = "all"
+        [[boundary]]
+        type = "symmetry"
+        axis = "x"
+        [[boundary]]
+        type = "symmetry"
+        axis = "y"
+        [output]
+        history_cycles = 1
+        "#,
+        end = 14.0 / speed,
+    ))
+}
+
+#[test]
+fn contact_of_parts_that_erode_gives_and_takes_no_energy() {
+    for (speed, gap, fracture) in
+        [(3000.0, 0.25, true), (3000.0, 0.5, false), (7000.0, 0.25, false), (7000.0, 0.5, true)]
+    {
+        let solved = solved(&ball_on_plate(speed, gap, fracture), Workers::default());
+        let initial = solved.rows[0].kinetic;
+        let worst = solved.rows.iter().map(|row| row.error.abs()).fold(0.0, f64::max);
+        let back: f64 = solved.rows.windows(2).map(|rows| (rows[0].eroded - rows[1].eroded).max(0.0)).sum();
+        let case = format!("{speed} m/s, gap {gap}, fracture {fracture}");
+        assert!(solved.rows.last().is_some_and(|row| row.eroded_elements > 20), "{case}");
+        assert!(worst < 0.01, "{case}: energy error {worst}");
+        assert!(back < 1e-3 * initial, "{case}: {back} of {initial} came back from what had eroded");
+    }
+}
+
+#[test]
+fn nodes_that_come_out_inside_a_zone_change_no_bit_on_any_crew() {
+    let mut model = ball_on_plate(7000.0, 0.5, true);
+    model.setup.control.end_cycle = 400;
+    let alone = solved(&model, Workers::default());
+    let offsets = &alone.state.contact[0];
+    assert!(offsets.iter().any(|&offset| offset > 0.0), "no node began inside a zone");
+    same_bits(&model);
+    same_bits_on_route_direct(&model, &Fingerprint::of(&alone));
+    snapshots_after_an_erosion(&model);
+    losing_a_worker_changes_no_bit(&model);
+}

@@ -152,6 +152,8 @@ pub(super) fn make(
         ignores_initial: contact.ignores_initial,
         edges: contact.edges,
         ties,
+        // Known with the parts.
+        erodes: false,
     };
     Some(ContactDraft { settings, faces })
 }

@@ -71,7 +71,7 @@ impl Touching {
             refuse_crossing(model, &surface, &crossing, settings.gap)?;
         }
         let exclusions = Arc::new(exclusions.with_edges(&surface, &crossing));
-        Ok(Some(Self { surface, exclusions }))
+        Ok(Some(Self { surface: Arc::new(surface), exclusions }))
     }
 }
 

@@ -179,7 +179,7 @@ impl Sorts {
         let blocking = self.under_way.iter().find(|sort| sort.gathered == cycle)?.blocking;
         let basis = self.basis.clone()?;
         let Some(eroded) = self.eroded.as_mut().filter(|_| blocking) else { return Some(basis) };
-        let surface: Arc<Surface> = eroded.surface(model, cycle + 1);
+        let surface: Arc<Surface> = eroded.surface_after(model, cycle + 1, basis.sorter.surface());
         let mut dropped = eroded.dropped(model, cycle + 1);
         let before = eroded.dropped(model, cycle);
         dropped.retain(|node| before.binary_search(node).is_err());

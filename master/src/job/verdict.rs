@@ -15,8 +15,7 @@ use crate::{
     run_totals::RunTotals,
 };
 
-/// Deepest contact (gaps) before the run is stopped. Where elements erode, a face that they leave bare may have a node at any
-/// depth, and one that comes through is pushed on from the other side: there it is only reported.
+/// Deepest contact (gaps) before the run is stopped. Of a node that came out inside a zone the depth counts from where it was.
 const DEEPEST: f64 = 0.9;
 /// Cycles before energies are judged, from the first in which anything stirs. The energy of viscous hourglass control is booked by the
 /// velocities of half a step before: too much where a body is struck, and in the first cycles that is much of what there is.
@@ -86,7 +85,7 @@ impl Account {
         }
         self.failure = if let Some((element, volume)) = vote.fault {
             Some(element_fault(problem, volumes, (element, volume), cycle))
-        } else if vote.worst_depth >= DEEPEST && !problem.model.setup.erosion.is_on() {
+        } else if vote.worst_depth >= DEEPEST {
             Some(contact_fault(problem, vote, cycle))
         } else if self.run_totals.worst_courant > 1.0 {
             Some(format!(

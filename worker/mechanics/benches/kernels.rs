@@ -87,6 +87,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         fields,
         erosion: None,
         history: Vec::new(),
+        contact: Vec::new(),
         shells: mechanics::state::ShellState::default(),
         own: Vec::new(),
         hourglass: Default::default(),

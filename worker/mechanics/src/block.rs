@@ -51,6 +51,8 @@ pub struct Piece {
     pub fields: [Vec<f64>; N_FIELDS],
     /// In runs where anything erodes.
     pub erosion: Option<PieceErosion>,
+    /// What contact keeps of each local node, by number; no array where it keeps nothing.
+    pub contact: Vec<Vec<f64>>,
     /// What nodes of shells have beside that; empty of solids.
     pub shells: ShellState,
     /// What elements of this kind have beside [`Piece::fields`], one array per number: of shells six hourglass forces, thickness,
@@ -141,8 +143,8 @@ impl Block {
         }
     }
 
-    /// The state: what [`Block::new`] was given, to the bit, with the state of now. Which elements have eroded is not in
-    /// it: whoever watches them adds that.
+    /// The state: what [`Block::new`] was given, to the bit, with the state of now. Which elements have eroded and what
+    /// contact keeps of nodes is not in it: whoever holds the block adds that.
     pub fn piece(&self) -> Piece {
         let n = self.nodes.len();
         let ElementArrays { initial_volume, fields, own, history } = self.group.image(&self.x);
@@ -163,6 +165,7 @@ impl Block {
             hourglass: self.hourglass,
             erosion: None,
             history,
+            contact: Vec::new(),
         }
     }
 
@@ -185,6 +188,7 @@ impl Block {
             mass: self.mass,
             constraint: self.constraint,
             erosion: None,
+            contact: Vec::new(),
             shells: of_shells(n, self.turning.as_ref()),
             own,
             hourglass: self.hourglass,

@@ -26,6 +26,7 @@ mod boxes;
 pub mod cycle;
 pub mod edges;
 pub mod force;
+mod history;
 pub mod joint;
 mod kinds;
 pub mod map;
@@ -47,6 +48,7 @@ pub mod zone;
 pub use cycle::Contact;
 pub use edges::{BatchEdge, BatchEdges, Edge, initial_edges};
 pub use force::ContactVote;
+pub use history::History;
 pub use kinds::{Listed, sort};
 pub use map::Map;
 pub use node_face::initial_pairs;
@@ -54,7 +56,7 @@ pub use pair::Kind;
 pub use pair_energy::{PairEnergies, PairEnergy};
 pub use reach::Extent;
 pub use search::{Exclusions, cull};
-pub use surface::{Face, Surface};
+pub use surface::{Exposed, Face, Surface};
 pub use ties::{BatchTies, OnFace, Tie, on_faces, tie};
 pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
 
@@ -86,6 +88,8 @@ pub struct Settings {
     pub edges: bool,
     /// Nodes tied to faces, by node.
     pub ties: Vec<Tie>,
+    /// Whether any part erodes, so that faces come out with nodes in their zone.
+    pub erodes: bool,
 }
 
 impl Settings {

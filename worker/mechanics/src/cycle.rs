@@ -19,6 +19,7 @@ mod tests;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    contact::Settings,
     copy_index::CopyIndex,
     element::{ElementVote, Step},
     erosion::Eroding,
@@ -160,6 +161,7 @@ impl Domain {
         let mark = meter.start();
         if let Some(packed) = &mut self.contact {
             packed.pack(&self.held_blocks, &self.ghosts);
+            packed.contact.history.cycle = self.cycle;
             for f in &mut packed.f {
                 f.fill(0.0);
             }
@@ -234,13 +236,14 @@ impl Domain {
         each(&mut self.held_blocks, work);
     }
 
-    /// Partial forces of the nodes of the exchange, three numbers each, with moments six, and behind them pushes on rigid bodies.
+    /// Partial forces of the nodes of the exchange, three numbers each, with moments six, with what contact keeps of nodes more, and behind
+    /// them pushes on rigid bodies.
     pub fn partials(&mut self, meter: &dyn Meter) -> Vec<f64> {
         let mark = meter.start();
         self.push_bodies();
         let mut out = Vec::with_capacity(self.stride() * self.exchange.len() + self.n_pushes());
-        let of_contact = self.contact.as_ref().map(|contact| &contact.f);
-        self.exchange.pack(&self.held_blocks, of_contact, self.moments, &mut out);
+        let numbers = (self.moments, self.n_history());
+        self.exchange.pack(&self.held_blocks, self.contact.as_ref(), numbers, &mut out);
         self.pack_pushes(&mut out);
         meter.stop(mark, false);
         out
@@ -248,7 +251,12 @@ impl Domain {
 
     /// Numbers that travel for each entry of the exchange.
     fn stride(&self) -> usize {
-        if self.moments { 6 } else { 3 }
+        (if self.moments { 6 } else { 3 }) + self.n_history()
+    }
+
+    /// Numbers that contact keeps of each node.
+    fn n_history(&self) -> usize {
+        self.setup.contact.as_ref().map_or(0, Settings::n_history)
     }
 
     /// Puts the total forces in place, integrates all nodes from `x_n` to `x_{n+1}` and gives the vote of the cycle.
@@ -274,9 +282,13 @@ impl Domain {
         }
         let mark = meter.start();
         let (totals, pushes) = totals.split_at(totals.len() - n_pushes);
-        self.exchange.put(totals, self.moments, &mut self.held_blocks, &mut self.ghosts);
+        let numbers = (self.moments, self.n_history());
+        self.exchange.put(totals, numbers, &mut self.held_blocks, &mut self.ghosts);
         let of_contact = self.contact.as_ref().map(|contact| &contact.f);
         self.groups.add_up(&mut self.held_blocks, of_contact, self.moments);
+        if let Some(packed) = &self.contact {
+            packed.keep(&mut self.held_blocks);
+        }
         meter.stop(mark, false);
         self.move_bodies(pushes, dt_previous, dt);
         self.gauges_before = self.read_gauges();

@@ -4,6 +4,7 @@
 use crate::{
     burn::lighting_time,
     contact::Extent,
+    contact::Settings,
     element::shell4,
     erosion::ALIVE,
     exact::Quantum,
@@ -40,6 +41,7 @@ pub fn state(
         elements: std::array::from_fn(|_: usize| vec![0.0; n_elements]),
         eroded: vec![ALIVE; if setup.erosion.is_on() { n_elements } else { 0 }],
         strain: vec![0.0; if setup.erosion.counts_strain() { n_elements } else { 0 }],
+        contact: vec![vec![0.0; mesh.n_nodes()]; setup.contact.as_ref().map_or(0, Settings::n_history)],
         shells: ShellState::default(),
         own: vec![vec![0.0; n_elements]; mesh.parts.iter().map(Part::n_own).max().unwrap_or(0)],
         history: Vec::new(),
@@ -270,7 +272,7 @@ pub fn bind_walls(mesh: &Mesh, setup: &mut Setup, constraint: &mut [u16]) -> Res
 
 /// The greatest speed at which each part closes in on a part that it may meet, itself included (length per time): the
 /// diagonal of the box around both parts' initial velocities. `velocity` by global node.
-pub fn closing_speeds(mesh: &Mesh, contact: &crate::contact::Settings, velocity: &[[f64; 3]]) -> Vec<f64> {
+pub fn closing_speeds(mesh: &Mesh, contact: &Settings, velocity: &[[f64; 3]]) -> Vec<f64> {
     let boxes: Vec<Extent> = mesh
         .parts
         .iter()

@@ -146,6 +146,11 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             let of_column = |column: &Vec<f64>| local_elements.iter().map(|&e| column[e as usize]).collect();
             history.columns.iter().map(of_column).collect()
         }),
+        contact: state
+            .contact
+            .iter()
+            .map(|number| nodes.iter().map(|&n| number[n as usize]).collect())
+            .collect(),
         nodes,
         elements,
         shells,
@@ -202,7 +207,9 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
             || (piece.shells.spin.len() == piece.nodes.len() && state.shells.spin.len() == n_nodes))
         && piece.own.iter().all(|field| field.len() == piece.elements.len())
         && piece.own.len() <= state.own.len()
-        && piece.history.iter().all(|column| column.len() == piece.elements.len());
+        && piece.history.iter().all(|column| column.len() == piece.elements.len())
+        && piece.contact.len() == state.contact.len()
+        && piece.contact.iter().all(|number| number.len() == piece.nodes.len());
     if !lengths_fit {
         return Err(format!(
             "image of part {}: array lengths do not fit its {} nodes and {} elements",
@@ -246,6 +253,11 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
             if let (Some(to), Some(from)) = (state.strain.get_mut(e), erosion.strain.get(i)) {
                 *to = *from;
             }
+        }
+    }
+    for (values, to) in piece.contact.iter().zip(&mut state.contact) {
+        for (&n, &value) in piece.nodes.iter().zip(values) {
+            to[n as usize] = value;
         }
     }
     for (&n, &spin) in piece.nodes.iter().zip(&piece.shells.spin) {

@@ -241,6 +241,7 @@ fn stirred(material: &Material, seed: u64) -> Piece {
         fields,
         erosion: None,
         history: Vec::new(),
+        contact: Vec::new(),
         shells: ShellState::default(),
         own: Vec::new(),
         hourglass: Default::default(),

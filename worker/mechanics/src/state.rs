@@ -98,6 +98,8 @@ pub struct GlobalState {
     pub eroded: Vec<u64>,
     /// Incremental geometric strain by element; empty where none erodes by it.
     pub strain: Vec<f64>,
+    /// What contact keeps of each node, by number ([`crate::contact::History`]); no array where it keeps nothing.
+    pub contact: Vec<Vec<f64>>,
     /// What nodes of shells have beside that; empty arrays in a run without shells.
     pub shells: ShellState,
     /// What elements have beside [`GlobalState::elements`], see [`crate::block::Piece::own`]: as many arrays as the kind that has most.
@@ -161,6 +163,7 @@ impl GlobalState {
             // Kept in length alone: the states of parts that do not erode have nothing of this.
             eroded: vec![crate::erosion::ALIVE; self.eroded.len()],
             strain: vec![0.0; self.strain.len()],
+            contact: vec![Vec::new(); self.contact.len()],
             shells: ShellState { spin: Vec::new(), inertia: self.shells.inertia.clone() },
             own: vec![Vec::new(); self.own.len()],
             // Lengths alone, likewise: pages of zeros take no memory.
@@ -183,6 +186,7 @@ impl GlobalState {
             elements: std::array::from_fn(|_| vec![0.0; n_elements]),
             eroded: vec![crate::erosion::ALIVE; self.eroded.len()],
             strain: vec![0.0; self.strain.len()],
+            contact: vec![vec![0.0; n_nodes]; self.contact.len()],
             shells: ShellState {
                 spin: vec![[0.0; 3]; self.shells.inertia.len()],
                 inertia: self.shells.inertia.clone(),

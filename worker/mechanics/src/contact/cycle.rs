@@ -2,6 +2,7 @@
 
 use super::{
     ContactVote, Settings, force,
+    history::History,
     kinds::Kinds,
     pair::{Books, Cycle},
     pair_energy::{ByPair, PairEnergies},
@@ -15,6 +16,9 @@ use crate::{exact::Quantum, lanes::Width, vote::PairVote};
 pub struct Contact {
     n_parts: usize,
     pub(super) kinds: Kinds,
+    /// What is kept of its nodes. Whoever holds them brings it to the state of now before the forces, and takes what they leave;
+    /// without that no node is in a zone before the first cycle.
+    pub history: History,
     /// Sums of the cycle by pair of parts.
     by_pair: ByPair,
 }
@@ -31,6 +35,7 @@ impl Contact {
         Self {
             n_parts: settings.n_parts(),
             kinds: Kinds::new(batch, settings, x, width),
+            history: History::new(settings.n_history(), batch.nodes.len()),
             by_pair: ByPair::default(),
         }
     }
@@ -78,7 +83,15 @@ impl Contact {
         energy_quantum: Quantum,
         f: &mut [Vec<f64>; 3],
     ) -> ContactVote {
-        let cycle = Cycle { x, v, dt, force_quantum, energy_quantum, f };
+        let mut history = std::mem::take(&mut self.history);
+        history.clear();
+        let cycle = Cycle { x, v, dt, force_quantum, energy_quantum, f, history: &mut history };
+        let vote = self.forces_of(cycle);
+        self.history = history;
+        vote
+    }
+
+    fn forces_of(&mut self, cycle: Cycle) -> ContactVote {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("fma") {
             // SAFETY: the feature has just been detected.

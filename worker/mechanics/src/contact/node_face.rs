@@ -31,6 +31,8 @@ use super::{
         lanes::{Closest, Rest, nearest},
     },
 };
+use exposed::CameOut;
+
 use crate::{
     exact::Quantum,
     lanes::{SET, Width},
@@ -93,6 +95,8 @@ pub(super) struct NodeFace {
     pub(super) width: Width,
     /// The candidates that can be near before nodes have moved much further.
     watch: Watch,
+    /// Where parts erode, what came out last.
+    came_out: CameOut,
     work: Work,
 }
 
@@ -153,6 +157,7 @@ impl NodeFace {
             smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
             width,
             watch: Watch::default(),
+            came_out: CameOut::default(),
             work: Work::default(),
         };
         for (index, face) in index.iter_mut().zip(&batch.faces).filter(|(index, _)| **index == 0) {
@@ -170,6 +175,7 @@ impl NodeFace {
             *f = index[*f as usize];
         }
         contact.candidates = candidates;
+        contact.came_out = CameOut::of(batch, &contact.ids);
         contact.watch =
             Watch::new(settings, &contact.candidates, &contact.faces, &contact.parts, &contact.part);
         let (mut watch, mut work) = (std::mem::take(&mut contact.watch), Work::default());
@@ -234,6 +240,9 @@ impl NodeFace {
             (0..3).for_each(|a| near.direction[a][i] = direction[a]);
         }
         near.depth[n..].fill(0.0);
+        if self.settings.erodes {
+            self.take_offsets(n, work, cycle.history);
+        }
         if self.smooth { self.push(n, work, cycle, books) } else { self.rub(n, work, cycle, books) }
     }
 
@@ -485,5 +494,6 @@ fn against(v: &[Vec<f64>; 3], node: usize, corners: &[u32; 4], weights: &[f64; 4
     relative
 }
 
+mod exposed;
 #[cfg(test)]
 mod tests;

@@ -12,7 +12,7 @@
 //! All kinds stand in [`kinds`](super::kinds), which alone knows them; none knows another. A kind may use the search, the geometry and
 //! the force of its neighbours, which do not know each other either.
 
-use super::{ContactVote, pair_energy::ByPair};
+use super::{ContactVote, history::History, pair_energy::ByPair};
 use crate::exact::Quantum;
 
 /// What the pairs of a work unit are.
@@ -36,6 +36,8 @@ pub(super) struct Cycle<'a> {
     pub(super) force_quantum: Quantum,
     pub(super) energy_quantum: Quantum,
     pub(super) f: &'a mut [Vec<f64>; 3],
+    /// What contact keeps of nodes.
+    pub(super) history: &'a mut History,
 }
 
 /// Where all kinds book a cycle: sums that are exact and extremes, so that their order is free.

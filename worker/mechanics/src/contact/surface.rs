@@ -8,6 +8,8 @@
 //! from the start, so that the nodes whose positions and votes travel stay the same; [`Surface::active`] says which of them
 //! can meet anything: those on faces, and those that have no element left.
 
+use serde::{Deserialize, Serialize};
+
 use super::edges::{Edge, features::features};
 use crate::{material::Material, mesh::Mesh};
 
@@ -40,6 +42,18 @@ pub struct Surface {
     pub joined: Vec<(u32, u32)>,
     /// Edges that can meet others, by their nodes; empty unless they were asked for ([`Surface::find_edges`]).
     pub edges: Vec<Edge>,
+    /// What came out with the last change of the surface; nothing of one that has never changed.
+    pub exposed: Exposed,
+}
+
+/// Nodes and faces that come out from under eroded elements, ascending. Of a surface nodes are surface nodes, of a batch batch
+/// nodes; faces are surface faces.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Exposed {
+    /// The first cycle with them.
+    pub at: u64,
+    pub nodes: Vec<u32>,
+    pub faces: Vec<u32>,
 }
 
 /// One outer face.
@@ -206,7 +220,26 @@ impl Surface {
             .collect();
         joined.sort_unstable();
         joined.dedup();
-        Self { nodes, node_part, node_stiffness, node_share, active, faces, joined, edges: Vec::new() }
+        Self {
+            nodes,
+            node_part,
+            node_stiffness,
+            node_share,
+            active,
+            faces,
+            joined,
+            edges: Vec::new(),
+            exposed: Exposed::default(),
+        }
+    }
+
+    /// Notes what this surface, which is in force from cycle `at` on, has and the one `before` had not. Both have the same nodes.
+    pub fn note_exposed(&mut self, before: &Self, at: u64) {
+        let new = |face: &Face| before.face_index(face.key()).is_none();
+        let faces = (0..).zip(&self.faces).filter(|(_, face)| new(face)).map(|(f, _)| f).collect();
+        let active = self.active.iter().zip(&before.active);
+        let nodes = (0..).zip(active).filter(|(_, (now, then))| **now && !**then).map(|(n, _)| n).collect();
+        self.exposed = Exposed { at, nodes, faces };
     }
 
     /// Collects the edges that stick out, for contact of edges.

@@ -58,6 +58,7 @@ impl Domain {
             let first = held_blocks.len();
             for mut piece in pieces {
                 let erosion = piece.erosion.take();
+                let contact_history = std::mem::take(&mut piece.contact);
                 let mut block = Block::of(piece, &setup.materials);
                 let all = 0..block.n_sets();
                 let material = &setup.materials[block.material as usize];
@@ -87,6 +88,7 @@ impl Domain {
                     face_vote: NO_FACES,
                     walls: vec![WallVote::default(); setup.n_holders()],
                     eroding,
+                    contact_history,
                 });
             }
             let own = first as u32..held_blocks.len() as u32;

@@ -11,6 +11,9 @@ pub(super) struct HeldContact {
     pub x: [Vec<f64>; 3],
     pub v: [Vec<f64>; 3],
     pub f: [Vec<f64>; 3],
+    /// Every copy here of the nodes that do not travel: contact node, block, local node. Those take its history from contact. None where
+    /// contact keeps nothing.
+    pub keepers: Vec<[u32; 3]>,
 }
 
 /// Ghosts by index.
@@ -21,16 +24,41 @@ pub(super) struct Ghosts {
     pub v: [Vec<f64>; 3],
     pub f: [Vec<f64>; 3],
     pub mass: Vec<f64>,
+    /// What contact keeps of each, by number.
+    pub contact_history: Vec<Vec<f64>>,
     pub constraint: Vec<u16>,
     pub sets: Vec<NodeSet>,
 }
 
 impl HeldContact {
-    /// Brings positions, and velocities if contact reads them, to those of now.
+    /// Brings positions, histories, and velocities if contact reads them, to those of now.
     pub fn pack(&mut self, held_blocks: &[HeldBlock], ghosts: &Ghosts) {
         pack(&self.sources, |held_block| positions(held_blocks, ghosts, held_block), &mut self.x);
         if self.contact.reads_velocities() {
             pack(&self.sources, |held_block| velocities(held_blocks, ghosts, held_block), &mut self.v);
+        }
+        if self.contact.history.is_empty() {
+            return;
+        }
+        for (node, &(held_block, local)) in self.sources.iter().enumerate() {
+            let from = if held_block == NONE {
+                &ghosts.contact_history
+            } else {
+                &held_blocks[held_block as usize].contact_history
+            };
+            for (to, from) in self.contact.history.before_mut(node).iter_mut().zip(from) {
+                *to = from[local as usize];
+            }
+        }
+    }
+
+    /// Gives the nodes that do not travel the histories that the forces left.
+    pub fn keep(&self, held_blocks: &mut [HeldBlock]) {
+        for &[node, held_block, local] in &self.keepers {
+            let numbers = &mut held_blocks[held_block as usize].contact_history;
+            for (to, from) in numbers.iter_mut().zip(self.contact.history.after(node as usize)) {
+                to[local as usize] = *from;
+            }
         }
     }
 }

@@ -34,6 +34,8 @@ pub(super) struct HeldBlock {
     pub walls: Vec<WallVote>,
     /// Where the part erodes.
     pub eroding: Option<Eroding>,
+    /// What contact keeps of each node, by number; no array where it keeps nothing.
+    pub contact_history: Vec<Vec<f64>>,
 }
 
 impl HeldBlock {

@@ -4,21 +4,23 @@ use super::{Domain, held_block::HeldBlock};
 use crate::block::Piece;
 
 impl Domain {
-    /// Position and velocity of `nodes` (global), six numbers each, for workers that will have them as ghosts.
+    /// Position, velocity and contact history of `nodes` (global), for workers that will have them as ghosts.
     ///
     /// # Errors
     /// If a node is not held here.
     pub fn transfer(&self, nodes: &[u32]) -> Result<Vec<f64>, String> {
-        let mut out = Vec::with_capacity(6 * nodes.len());
+        let mut out = Vec::with_capacity((6 + self.n_history()) * nodes.len());
         for node in nodes {
             let (held_block, local) = *self
                 .copy_index
                 .get(*node)
                 .first()
                 .ok_or_else(|| format!("node {node} to transfer is not held"))?;
-            let (block, i) = (&self.held_blocks[held_block as usize].block, local as usize);
+            let HeldBlock { block, contact_history, .. } = &self.held_blocks[held_block as usize];
+            let i = local as usize;
             out.extend((0..3).map(|a| block.x[a][i]));
             out.extend((0..3).map(|a| block.v[a][i]));
+            out.extend(contact_history.iter().map(|number| number[i]));
         }
         Ok(out)
     }
@@ -40,7 +42,11 @@ impl Domain {
     pub fn pieces(&self) -> Vec<Piece> {
         self.held_blocks
             .iter()
-            .map(|held_block| Piece { erosion: held_block.erosion(), ..held_block.block.piece() })
+            .map(|held_block| Piece {
+                erosion: held_block.erosion(),
+                contact: held_block.contact_history.clone(),
+                ..held_block.block.piece()
+            })
             .collect()
     }
 
@@ -70,8 +76,11 @@ impl Domain {
 
     /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
     pub fn into_pieces(self) -> Vec<Piece> {
-        let image =
-            |held_block: HeldBlock| Piece { erosion: held_block.erosion(), ..held_block.block.into_piece() };
+        let image = |held_block: HeldBlock| Piece {
+            erosion: held_block.erosion(),
+            contact: held_block.contact_history,
+            ..held_block.block.into_piece()
+        };
         self.held_blocks.into_iter().map(image).collect()
     }
 }

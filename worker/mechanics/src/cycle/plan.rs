@@ -14,7 +14,7 @@ use super::{
     held_block::HeldBlock,
 };
 use crate::{
-    contact::{Batch, Contact, PairEnergies},
+    contact::{Batch, BatchNode, Contact, PairEnergies},
     lanes::SET,
     nodes::NodeSet,
 };
@@ -32,6 +32,8 @@ pub struct Plan {
     pub send: Vec<u32>,
     /// Whether moments travel behind the forces of each node: six numbers instead of three.
     pub moments: bool,
+    /// Numbers that contact keeps of each node, which travel behind those.
+    pub n_history: u32,
     /// On route direct: the workers that hold nodes of `exchange` too.
     pub neighbours: Vec<Neighbour>,
     /// Nodes held here that have no element left and leave the run with this plan; in the first plan of an epoch, all that
@@ -42,7 +44,7 @@ pub struct Plan {
 impl Plan {
     /// Numbers that travel for each node of the exchange.
     pub fn stride(&self) -> usize {
-        if self.moments { 6 } else { 3 }
+        (if self.moments { 6 } else { 3 }) + self.n_history as usize
     }
 }
 
@@ -68,16 +70,24 @@ pub struct Ghost {
 }
 
 impl Domain {
-    /// Starts to act by `plan`. `ghost_state` is x, y, z, vx, vy, vz of each ghost, in the plan's order.
+    /// Starts to act by `plan`. `ghost_state` is x, y, z, vx, vy, vz and the contact history of each ghost, in the plan's order.
     ///
     /// # Errors
     /// If the plan names a node that is neither held nor a ghost, or the state has the wrong length.
     pub fn install(&mut self, plan: &Plan, ghost_state: &[f64]) -> Result<(), String> {
-        if ghost_state.len() != 6 * plan.ghosts.len() {
+        let n_history = self.n_history();
+        let each = 6 + n_history;
+        if ghost_state.len() != each * plan.ghosts.len() {
             return Err(format!(
-                "{} numbers of ghost state for {} ghosts, expected 6 each",
+                "{} numbers of ghost state for {} ghosts, expected {each} each",
                 ghost_state.len(),
                 plan.ghosts.len()
+            ));
+        }
+        if plan.n_history as usize != n_history {
+            return Err(format!(
+                "{} numbers of contact history by node, expected {n_history}",
+                plan.n_history
             ));
         }
         let constraint: Vec<u16> = plan.ghosts.iter().map(|g| g.constraint).collect();
@@ -87,13 +97,14 @@ impl Domain {
             array.resize(sets.len() * SET, padding);
             array
         };
-        let number = |i: usize| padded(&mut ghost_state.chunks_exact(6).map(|s| s[i]), 0.0);
+        let number = |i: usize| padded(&mut ghost_state.chunks_exact(each).map(|s| s[i]), 0.0);
         self.ghosts = Ghosts {
             node: plan.ghosts.iter().map(|g| g.node).collect(),
             x: std::array::from_fn(number),
             v: std::array::from_fn(|a| number(3 + a)),
             f: std::array::from_fn(|_| padded(&mut std::iter::empty(), 0.0)),
             mass: padded(&mut plan.ghosts.iter().map(|g| g.mass), 1.0),
+            contact_history: (0..n_history).map(|k| number(6 + k)).collect(),
             constraint,
             sets,
         };
@@ -125,7 +136,8 @@ impl Domain {
             pack(&sources, |held_block| positions(&self.held_blocks, &self.ghosts, held_block), &mut x);
             let mut contact = Contact::new(batch, settings, &x, self.width);
             contact.watch_pairs(&self.watched_pairs);
-            self.contact = Some(HeldContact { contact, sources, x, v: zeros(), f: zeros() });
+            self.contact =
+                Some(HeldContact { contact, sources, x, v: zeros(), f: zeros(), keepers: Vec::new() });
         }
         // Every node with more than one copy, here or elsewhere, and every contact node.
         self.moments = plan.moments;
@@ -142,6 +154,10 @@ impl Domain {
                 return Err(format!("node {node} of the exchange is neither held nor a ghost"));
             }
             self.exchange.push(copies, contact.map_or(NONE, |i| i as u32), ghost);
+        }
+        // Nodes of rigid bodies have histories too, though their forces are not added up here.
+        if n_history > 0 {
+            self.share_histories(contact_nodes, &exchanged);
         }
         if !self.bodies.is_empty() {
             let nodes: Vec<u32> = contact_nodes.iter().map(|node| node.global).collect();
@@ -180,6 +196,24 @@ impl Domain {
         Ok(())
     }
 
+    /// Says which copies of contact nodes take their histories from contact here. Nodes that can meet nothing have none.
+    fn share_histories(&mut self, contact_nodes: &[BatchNode], exchanged: &HashSet<u32>) {
+        let of_contact = |node: u32| contact_nodes.binary_search_by_key(&node, |n| n.global).is_ok();
+        for held_block in &mut self.held_blocks {
+            for (local, &node) in held_block.block.nodes.iter().enumerate() {
+                let kept = held_block.contact_history.iter().any(|number| number[local] != 0.0);
+                if kept && !exchanged.contains(&node) && !of_contact(node) {
+                    held_block.contact_history.iter_mut().for_each(|number| number[local] = 0.0);
+                }
+            }
+        }
+        let Some(packed) = &mut self.contact else { return };
+        for (i, node) in (0..).zip(contact_nodes).filter(|(_, node)| !exchanged.contains(&node.global)) {
+            let copies = self.copy_index.get(node.global);
+            packed.keepers.extend(copies.iter().map(|&(held_block, local)| [i, held_block, local]));
+        }
+    }
+
     /// Takes freed nodes out of the run: they stand still from now on, and nothing feels them. A first plan names those of
     /// earlier cycles too, which stand still already: what left with them was booked then, and nothing is booked here.
     fn drop_nodes(&mut self, nodes: &[u32]) {
@@ -216,6 +250,7 @@ impl Domain {
     pub(super) fn spring_energies(&mut self, dt: f64) -> PairEnergies {
         let Some(packed) = &mut self.contact else { return PairEnergies::default() };
         packed.pack(&self.held_blocks, &self.ghosts);
+        packed.contact.history.cycle = self.cycle + 1;
         // Forces are added to what is cleared before the next ones.
         packed.contact.forces(&packed.x, &packed.v, dt, self.quanta.force, self.quanta.energy, &mut packed.f);
         packed.contact.energies().of_springs()

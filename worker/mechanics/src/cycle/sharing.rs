@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::{Ghosts, HeldBlock, NONE};
+use super::{Ghosts, HeldBlock, HeldContact, NONE};
 
 /// Forces of the contact nodes, by axis.
 type OfContact<'a> = Option<&'a [Vec<f64>; 3]>;
@@ -44,19 +44,26 @@ impl Exchange {
         self.nodes.push(Shared { copies: first..self.copies.len() as u32, contact, ghost });
     }
 
-    /// Packs what the holders here come to: three numbers for each node, with `moments` six.
+    /// Packs what the holders here come to: three numbers for each node, with `moments` six, and `n_history` that contact leaves.
     pub(super) fn pack(
         &self,
         held_blocks: &[HeldBlock],
-        of_contact: OfContact<'_>,
-        moments: bool,
+        contact: Option<&HeldContact>,
+        (moments, n_history): (bool, usize),
         out: &mut Vec<f64>,
     ) {
+        let of_contact = contact.map(|contact| &contact.f);
         for node in &self.nodes {
             let copies = &self.copies[node.copies.start as usize..node.copies.end as usize];
             out.extend(force(held_blocks, copies, of_contact, node.contact));
             if moments {
                 out.extend(moment(held_blocks, copies));
+            }
+            match contact {
+                Some(contact) if node.contact != NONE && n_history > 0 => {
+                    out.extend_from_slice(contact.contact.history.after(node.contact as usize));
+                }
+                _ => out.extend(std::iter::repeat_n(0.0, n_history)),
             }
         }
     }
@@ -65,14 +72,22 @@ impl Exchange {
     pub(super) fn put(
         &self,
         totals: &[f64],
-        moments: bool,
+        (moments, n_history): (bool, usize),
         held_blocks: &mut [HeldBlock],
         ghosts: &mut Ghosts,
     ) {
-        let stride = if moments { 6 } else { 3 };
-        for (node, total) in self.nodes.iter().zip(totals.chunks_exact(stride)) {
+        let of_forces = if moments { 6 } else { 3 };
+        for (node, total) in self.nodes.iter().zip(totals.chunks_exact(of_forces + n_history)) {
             let copies = &self.copies[node.copies.start as usize..node.copies.end as usize];
             let moment = if moments { [total[3], total[4], total[5]] } else { [0.0; 3] };
+            for (k, &value) in total[of_forces..].iter().enumerate() {
+                for &(held_block, local) in copies {
+                    held_blocks[held_block as usize].contact_history[k][local as usize] = value;
+                }
+                if node.ghost != NONE {
+                    ghosts.contact_history[k][node.ghost as usize] = value;
+                }
+            }
             let total = [total[0], total[1], total[2]];
             put(held_blocks, copies, total, moment);
             if node.ghost != NONE {

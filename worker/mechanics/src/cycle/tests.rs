@@ -88,6 +88,7 @@ fn setup(friction: f64) -> Setup {
             ignores_initial: true,
             edges: true,
             ties: Vec::new(),
+            erodes: false,
         }),
         constraints: vec![Constraint::default()],
         walls: Vec::new(),

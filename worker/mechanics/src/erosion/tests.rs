@@ -79,6 +79,7 @@ fn bent(structured: bool) -> (Piece, PieceErosion) {
         fields,
         erosion: None,
         history: Vec::new(),
+        contact: Vec::new(),
         shells: ShellState::default(),
         own: Vec::new(),
         hourglass: Default::default(),

@@ -164,6 +164,7 @@ mod tests {
             fields: std::array::from_fn(|k| vec![if k == field::RELATIVE_VOLUME { 1.0 } else { 0.0 }]),
             erosion: None,
             history: Vec::new(),
+            contact: Vec::new(),
             shells: ShellState::default(),
             own: Vec::new(),
             hourglass: Default::default(),

@@ -219,6 +219,7 @@ fn half(piece: &Piece, cut: u32, low: bool) -> Piece {
         own: piece.own.iter().map(|values| by_element(values)).collect(),
         erosion: None,
         history: piece.history.iter().map(|column| by_element(column)).collect(),
+        contact: Vec::new(),
         shells: piece.shells.clone(),
         ..*piece
     }

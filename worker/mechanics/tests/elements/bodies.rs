@@ -192,6 +192,7 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
         fields,
         erosion: None,
         history: material.history().iter().map(|v| vec![v.initial; n_elements]).collect(),
+        contact: Vec::new(),
         shells: mechanics::state::ShellState::default(),
         own: Vec::new(),
         hourglass: Hourglass::NONE,

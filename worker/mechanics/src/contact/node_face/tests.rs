@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    contact::{BatchFace, BatchNode, BatchUnit, Contact, ContactVote},
+    contact::{BatchFace, BatchNode, BatchUnit, Contact, ContactVote, History},
     exact::Quantum,
 };
 
@@ -138,8 +138,15 @@ fn lanes_of_every_width_have_the_bits_of_one_pair_at_a_time() {
         let quantum = Quantum::for_reference(1.0, 42);
         let mut run = |width: Option<Width>| {
             let mut f = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
-            let cycle =
-                Cycle { x: &x, v: &v, dt: 0.1, force_quantum: quantum, energy_quantum: quantum, f: &mut f };
+            let cycle = Cycle {
+                x: &x,
+                v: &v,
+                dt: 0.1,
+                force_quantum: quantum,
+                energy_quantum: quantum,
+                f: &mut f,
+                history: &mut History::default(),
+            };
             let vote = match width {
                 Some(width) => {
                     contact.kinds.faces.width = width;
@@ -179,9 +186,10 @@ fn watching_few_pairs_for_several_cycles_loses_no_bit_of_bodies_that_move() {
                 contact.forces(&x, &x, 0.1, quanta.0, quanta.1, &mut f)
             } else {
                 let (force_quantum, energy_quantum) = quanta;
+                let history = &mut History::default();
                 slowly(
                     &contact.kinds.faces,
-                    Cycle { x: &x, v: &x, dt: 0.1, force_quantum, energy_quantum, f: &mut f },
+                    Cycle { x: &x, v: &x, dt: 0.1, force_quantum, energy_quantum, f: &mut f, history },
                 )
             };
             (vote, f.iter().flatten().map(|f| f.to_bits()).collect::<Vec<u64>>())

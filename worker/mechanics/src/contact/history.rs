@@ -1,0 +1,67 @@
+//! What contact keeps of a node from one cycle to the next.
+//!
+//! All pairs of a node are computed by one worker, but another one may compute them after the next sort. So the numbers belong to the
+//! node, not to the pair: like its velocity they are equal on every holder, travel with the total forces, go to new ghosts, and
+//! are part of a checkpoint. A node without a hit keeps zeros.
+
+use super::Settings;
+
+/// Numbers where faces come out from under eroded elements: offset of the depth, depth in the last cycle (see
+/// [`exposed`](super::node_face)).
+const EXPOSED: usize = 2;
+
+impl Settings {
+    /// Numbers that contact keeps by node.
+    pub fn n_history(&self) -> usize {
+        if self.erodes { EXPOSED } else { 0 }
+    }
+}
+
+/// The numbers of the nodes of a batch in one cycle, node by node.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History {
+    /// Numbers by node.
+    n: usize,
+    /// The cycle whose forces are computed.
+    pub cycle: u64,
+    /// At its start.
+    before: Vec<f64>,
+    /// At its end; zeros where this batch has not computed the node.
+    after: Vec<f64>,
+}
+
+impl History {
+    /// Zeros for nodes of which contact keeps `n` numbers.
+    pub fn new(n: usize, n_nodes: usize) -> Self {
+        Self { n, cycle: 0, before: vec![0.0; n * n_nodes], after: vec![0.0; n * n_nodes] }
+    }
+
+    /// Whether contact keeps nothing.
+    pub fn is_empty(&self) -> bool {
+        self.before.is_empty()
+    }
+
+    /// The numbers of a node at the start of the cycle.
+    pub fn before(&self, node: usize) -> &[f64] {
+        &self.before[self.n * node..self.n * (node + 1)]
+    }
+
+    /// The same, to be brought to those of now.
+    pub fn before_mut(&mut self, node: usize) -> &mut [f64] {
+        &mut self.before[self.n * node..self.n * (node + 1)]
+    }
+
+    /// The numbers of a node at the end of the cycle.
+    pub fn after(&self, node: usize) -> &[f64] {
+        &self.after[self.n * node..self.n * (node + 1)]
+    }
+
+    pub(super) fn after_mut(&mut self, node: usize) -> &mut [f64] {
+        &mut self.after[self.n * node..self.n * (node + 1)]
+    }
+
+    /// Nothing has been computed in this cycle.
+    pub(super) fn clear(&mut self) {
+        self.after.fill(0.0);
+    }
+}
