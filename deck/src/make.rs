@@ -27,6 +27,7 @@ mod zones;
 
 use mechanics::{
     contact::Settings,
+    initial,
     setup::{Control, Setup},
 };
 
@@ -74,6 +75,13 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
             }
         }
     }
+    let control = control?;
+    let settings = contact.map(|contact| {
+        let settings = contact.settings;
+        let steps =
+            initial::closing_steps(&assembly.mesh, &materials, &bodies, control.safety_factor, &settings);
+        Settings { erodes: erosion.is_on(), steps, ..settings }
+    });
     Some(Model {
         title: deck.title.clone(),
         units: deck.units.name.to_string(),
@@ -84,8 +92,8 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         join_energy: assembly.join_energy,
         setup: Setup {
             materials,
-            control: control?,
-            contact: contact.map(|contact| Settings { erodes: erosion.is_on(), ..contact.settings }),
+            control,
+            contact: settings,
             constraints: conditions.constraints,
             walls: conditions.walls,
             bodies,

@@ -475,8 +475,8 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
             "a.k:22:1: read *CONTROL_IMPLICIT_GENERAL; expected explicit dynamics",
         ),
         (
-            "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_MORTAR\n\n",
-            "a.k:22:1: read *CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_MORTAR; expected a contact",
+            "*CONTACT_TIEBREAK_SURFACE_TO_SURFACE\n\n",
+            "a.k:22:1: read *CONTACT_TIEBREAK_SURFACE_TO_SURFACE; expected a contact",
         ),
         ("*ELEMENT_SOLID\n2,1,1,2,3,4,8,7,6,5\n", "a.k:23:1: read element 2 with volume"),
         (

@@ -21,6 +21,7 @@ mod load;
 mod modes;
 mod rigid;
 mod shell;
+mod soft;
 mod solid;
 mod structure;
 mod wave;
@@ -126,6 +127,7 @@ macro_rules! each_case_of_the_book {
             erosion: a_rod_goes_through_a_plate_and_energies_add_up long;
             erosion: a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked quick;
             exposed: a_ball_goes_through_a_plate_at_any_speed_and_gap long;
+            soft: a_steel_block_thrown_on_foam_rubber_and_water_stays_outside quick;
             rigid: a_free_top_precesses_after_euler quick;
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
             rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;

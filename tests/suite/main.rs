@@ -37,6 +37,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/contact.rs"),
         include_str!("../src/book/erosion.rs"),
         include_str!("../src/book/exposed.rs"),
+        include_str!("../src/book/soft.rs"),
     ]
     .concat();
     for name in tests::case::names() {

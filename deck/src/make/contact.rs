@@ -152,8 +152,8 @@ pub(super) fn make(
         ignores_initial: contact.ignores_initial,
         edges: contact.edges,
         ties,
-        // Known with the parts.
-        erodes: false,
+        // The rest is known with the parts.
+        ..Settings::default()
     };
     Some(ContactDraft { settings, faces })
 }

@@ -79,6 +79,9 @@ pub struct Settings {
     pub interacts: Vec<bool>,
     /// Factor on the penalty stiffness `K A^2 / V`; 0.5.
     pub stiffness: f64,
+    /// By part, the initial time step of the elements that may meet at its faces (time, [`crate::initial::closing_steps`]): springs are at
+    /// least as stiff as it allows. Empty for springs by moduli alone.
+    pub steps: Vec<f64>,
     /// Velocity over which friction is regularised (length per time): below it the force is proportional to
     /// the sliding velocity, so bodies creep instead of sticking.
     pub friction_velocity: f64,
@@ -102,6 +105,11 @@ impl Settings {
     #[inline(always)]
     pub fn permits(&self, a: u32, b: u32) -> bool {
         self.interacts[a as usize * self.n_parts() + b as usize]
+    }
+
+    /// Stiffness of a side of a part by its mass ([`force::least`]).
+    pub(crate) fn least(&self, part: u32, mass: f64) -> f64 {
+        self.steps.get(part as usize).map_or(0.0, |&step| force::least(mass, step))
     }
 
     /// The pair of parts that may meet, if there is only one.

@@ -9,7 +9,8 @@ use crate::{
     erosion::ALIVE,
     exact::Quantum,
     load::{Drive, SurfaceKind},
-    mesh::{Mesh, Part, Topology},
+    material::Material,
+    mesh::{FACES, Mesh, Part, Topology},
     rigid::{Body, cross, dot},
     setup::{Constraint, MAX_WALLS, Setup},
     state::{GlobalState, N_FIELDS, PartHistory, ShellState, field},
@@ -228,7 +229,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
 
 /// Area of the largest face of a hexahedron.
 pub(crate) fn largest_face(x: &[[f64; 3]; 8]) -> f64 {
-    crate::mesh::FACES
+    FACES
         .iter()
         .map(|f| {
             let [p, q, r, s] = f.map(|c| x[c]);
@@ -268,6 +269,47 @@ pub fn bind_walls(mesh: &Mesh, setup: &mut Setup, constraint: &mut [u16]) -> Res
             u16::try_from(index).map_err(|_| "more than 65,535 kinds of constraint".to_owned())?;
     }
     Ok(())
+}
+
+/// By part, the least time step that its elements and those of the parts that it may meet allow in their initial geometry (time): the
+/// thinnest way through an element over the speed of longitudinal waves, times the safety factor. Elements of rigid bodies allow any.
+pub fn closing_steps(
+    mesh: &Mesh,
+    materials: &[Material],
+    bodies: &[Body],
+    safety_factor: f64,
+    contact: &Settings,
+) -> Vec<f64> {
+    let of_part = |p: usize| {
+        let part = &mesh.parts[p];
+        if bodies.iter().any(|body| body.parts.binary_search(&(p as u32)).is_ok()) {
+            return f64::INFINITY;
+        }
+        let material = &materials[part.material as usize];
+        let speed = ((material.bulk() + 4.0 / 3.0 * material.shear()) / material.density).sqrt();
+        let thinnest = (0..part.n_elements()).map(|e| {
+            let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+            match part.section() {
+                // The height above the longest side, as if it were a parallelogram.
+                Some(section) => part.volume(&x) / (section.thickness * longest(&[x[0], x[1], x[2], x[3]])),
+                None => part.volume(&x) / largest_face(&x),
+            }
+        });
+        safety_factor * thinnest.fold(f64::INFINITY, f64::min) / speed
+    };
+    let alone: Vec<f64> = (0..mesh.parts.len()).map(of_part).collect();
+    (0..alone.len())
+        .map(|p| {
+            let meets = (0..alone.len()).filter(|&q| contact.permits(p as u32, q as u32));
+            meets.map(|q| alone[q]).fold(alone[p], f64::min)
+        })
+        .collect()
+}
+
+/// Length of the longest side.
+fn longest(x: &[[f64; 3]; 4]) -> f64 {
+    let side = |i: usize| (0..3).map(|a| (x[(i + 1) & 3][a] - x[i][a]).powi(2)).sum::<f64>().sqrt();
+    (0..4).map(side).fold(0.0, f64::max)
 }
 
 /// The greatest speed at which each part closes in on a part that it may meet, itself included (length per time): the

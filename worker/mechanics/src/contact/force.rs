@@ -79,12 +79,27 @@ pub struct Reaction {
     pub friction: f64,
 }
 
-/// Penalty stiffness of a pair: factor times the harmonic mean of both sides (force per length). The factor is the
+/// Stiffness of a pair by moduli: factor times the harmonic mean of both sides (force per length). The factor is the
 /// deck's times the node's share.
 #[inline(always)]
 pub fn stiffness(factor: f64, node: f64, face: f64) -> f64 {
     let sum = node + face;
     if sum > 0.0 { factor * (2.0 * node * face / sum) } else { 0.0 }
+}
+
+/// Stiffness of a side by its mass, as [`between`] takes it (force per length).
+///
+/// A spring between masses m and M swings at `omega^2 = k (1/m + 1/M)`, between all its kind at twice that. With `omega dt = 0.4` it is as stiff
+/// as the time step allows, and stops a body of whatever modulus: `k = a b / (a + b)` with `a = 0.16 m / (2 dt^2)`.
+pub(super) fn least(mass: f64, step: f64) -> f64 {
+    if step > 0.0 { OMEGA_DT * OMEGA_DT / (BOTH_SIDES * step * step) * mass } else { 0.0 }
+}
+
+/// Penalty stiffness of a pair: that of moduli, or that of masses ([`least`]) where it is greater (force per length).
+#[inline(always)]
+pub(super) fn between(factor: f64, [node, face]: [f64; 2], [node_least, face_least]: [f64; 2]) -> f64 {
+    let (by_moduli, by_masses) = (stiffness(factor, node, face), stiffness(0.5, node_least, face_least));
+    if by_masses > by_moduli { by_masses } else { by_moduli }
 }
 
 /// Inverse of the mass that a pair moves: `1/m + sum w_i^2/m_i`, from inverse masses.

@@ -152,6 +152,8 @@ impl NodeFace {
                 stiffness: batch.nodes.iter().map(|n| n.stiffness).collect(),
                 inverse_mass: batch.nodes.iter().map(|n| 1.0 / n.mass).collect(),
                 face_stiffness: Vec::new(),
+                least: batch.nodes.iter().map(|n| settings.least(n.part, n.mass)).collect(),
+                face_least: Vec::new(),
             },
             only_pair: settings.only_pair(),
             smooth: settings.friction.iter().all(|&coefficient| coefficient <= 0.0),
@@ -167,6 +169,9 @@ impl NodeFace {
             contact.shells.push(super::surface::Face::is_shell(&face.corners));
             contact.parts.push(face.part);
             contact.statics.face_stiffness.push(face.stiffness);
+            let lightest =
+                face.nodes.map(|n| batch.nodes[n as usize].mass).into_iter().fold(f64::INFINITY, f64::min);
+            contact.statics.face_least.push(settings.least(face.part, lightest));
         }
         if !contact.shells.contains(&true) {
             contact.shells.clear();
@@ -382,9 +387,7 @@ impl NodeFace {
         let depths = work.approach.depth[..n].iter().enumerate();
         for (i, &depth) in depths.filter(|(_, depth)| **depth > 0.0) {
             let (node, face) = (nodes[i] as usize, work.face[i] as usize);
-            let (factor, of_node) = (statics.factor[node], statics.stiffness[node]);
-            let normal =
-                force::stiffness(factor, of_node, statics.face_stiffness[face]) * work.share[i] * depth;
+            let normal = statics.stiffness(node, face) * work.share[i] * depth;
             by_pair.add(self.part[node], self.parts[face], quantum.round(0.5 * normal * depth), 0.0);
         }
     }
@@ -400,8 +403,7 @@ impl NodeFace {
             let face = work.face[i] as usize;
             let nodes = self.faces[face];
             let weights = [0, 1, 2, 3].map(|k| approach.weights[k][i]);
-            let k =
-                force::stiffness(statics.factor[node], statics.stiffness[node], statics.face_stiffness[face]);
+            let k = statics.stiffness(node, face);
             let of_corners = nodes.map(|n| statics.inverse_mass[n as usize]);
             let inverse_mass = force::inverse_mass(statics.inverse_mass[node], of_corners, &weights);
             frequency2 = frequency2.max(force::frequency2(k, work.stacking[i], inverse_mass));

@@ -87,8 +87,7 @@ fn setup(friction: f64) -> Setup {
             friction_velocity: 1e-3,
             ignores_initial: true,
             edges: true,
-            ties: Vec::new(),
-            erodes: false,
+            ..Settings::default()
         }),
         constraints: vec![Constraint::default()],
         walls: Vec::new(),

@@ -2,7 +2,7 @@
 
 use super::{
     super::{
-        Settings, WARNING, force,
+        BatchEdge, Settings, WARNING, force,
         pair::{Books, Cycle, Pairs},
         work_unit::Batch,
         zone::Vector,
@@ -58,9 +58,13 @@ impl Edges {
         let pair = |&sides: &[u32; 2]| {
             let [a, b] = sides.map(|side| &batch.listed.edges.edges[side as usize]);
             let factor = settings.stiffness * a.share.min(b.share);
+            let lightest = |edge: &BatchEdge| {
+                edge.nodes.map(|n| batch.nodes[n as usize].mass).into_iter().fold(f64::INFINITY, f64::min)
+            };
+            let least = [a, b].map(|edge| settings.least(edge.part, lightest(edge)));
             Pair {
                 sides,
-                stiffness: force::stiffness(factor, a.stiffness, b.stiffness),
+                stiffness: force::between(factor, [a.stiffness, b.stiffness], least),
                 friction: settings.friction[a.part as usize * n_parts + b.part as usize],
             }
         };

@@ -20,6 +20,19 @@ pub(in crate::contact) struct Statics {
     pub(in crate::contact) inverse_mass: Vec<f64>,
     /// By face: `K A^2 / V` (force per length).
     pub(in crate::contact) face_stiffness: Vec<f64>,
+    /// By batch node: stiffness by its mass ([`least`](super::least)).
+    pub(in crate::contact) least: Vec<f64>,
+    /// By face: that of the lightest of its corners.
+    pub(in crate::contact) face_least: Vec<f64>,
+}
+
+impl Statics {
+    /// Stiffness of a node at a face.
+    #[inline(always)]
+    pub(in crate::contact) fn stiffness(&self, node: usize, face: usize) -> f64 {
+        let moduli = [self.stiffness[node], self.face_stiffness[face]];
+        super::between(self.factor[node], moduli, [self.least[node], self.face_least[face]])
+    }
 }
 
 /// Features near nodes, by pair of a [`NearPairs`]; those beyond the gap have depth zero.
@@ -70,7 +83,9 @@ pub(in crate::contact) fn push(
     let highest = pushes.face.iter().fold(0, |highest, &i| if i > highest { i } else { highest });
     assert!(pushes.face.len() == n && (n == 0 || (highest as usize) < statics.face_stiffness.len()));
     let n_nodes = statics.factor.len();
-    assert!(statics.stiffness.len() == n_nodes && statics.inverse_mass.len() == n_nodes);
+    let by_node = [&statics.stiffness, &statics.inverse_mass, &statics.least];
+    assert!(by_node.iter().all(|list| list.len() == n_nodes));
+    assert!(statics.face_least.len() == statics.face_stiffness.len());
     let lists = pushes.direction.iter().chain(pushes.weights).map(Vec::len);
     let lengths = lists.chain([pushes.depth.len(), pushes.share.len(), pushes.stacking.len()]);
     lengths.for_each(|length| assert!(length == n, "{length} values of {n} pairs"));
@@ -140,6 +155,11 @@ unsafe fn kernel<L: Lane>(
             let sum = of_node + of_face;
             let mean = L::splat(2.0) * of_node * of_face / sum;
             let k = L::select(zero.less(sum), factor * mean, zero);
+            let of_node = L::gather(&statics.least, pairs.node(), at);
+            let of_face = L::gather(&statics.face_least, pushes.face, at);
+            let sum = of_node + of_face;
+            let mean = L::splat(2.0) * of_node * of_face / sum;
+            let k = L::select(zero.less(sum), L::splat(0.5) * mean, zero).max(k);
             let weights = [
                 L::load(&pushes.weights[0], at),
                 L::load(&pushes.weights[1], at),

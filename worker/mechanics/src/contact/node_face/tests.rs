@@ -67,6 +67,8 @@ fn settings(friction: f64) -> Settings {
         interacts: vec![false, true, true, false],
         stiffness: 0.5,
         friction_velocity: 1e-3,
+        // Some springs are as stiff as masses allow, some as moduli ask for.
+        steps: vec![0.5, 0.3],
         ..Settings::default()
     }
 }
@@ -97,7 +99,7 @@ fn slowly(contact: &NodeFace, cycle: Cycle<'_>) -> ContactVote {
             let near = &near[of as usize];
             let (face, nodes) = (near.face as usize, contact.faces[near.face as usize]);
             let statics = &contact.statics;
-            let k = force::stiffness(statics.factor[n], statics.stiffness[n], statics.face_stiffness[face]);
+            let k = statics.stiffness(n, face);
             let weights = frame(near.face).weights(&near.nearest, p);
             let of_corners = nodes.map(|n| statics.inverse_mass[n as usize]);
             let inverse_mass = force::inverse_mass(statics.inverse_mass[n], of_corners, &weights);
