@@ -77,6 +77,8 @@ fn write_contact(text: &mut Text, contact: &Contact) {
         Slack::Default | Slack::Broken => {}
     }
     text.some("friction", Some(contact.friction).filter(|friction| *friction != 0.0));
+    text.some("friction_kinetic", contact.friction_kinetic);
+    text.some("friction_decay", Some(contact.friction_decay).filter(|decay| *decay != 0.0));
     text.some("default_interacts", Some(contact.default_interacts).filter(|others| !others));
     if let Some(parts) = &contact.self_interaction {
         text.key("self_interaction", names(parts));
@@ -92,6 +94,7 @@ fn write_contact(text: &mut Text, contact: &Contact) {
         text.key("parts", list(pair.parts.iter().map(|part| quoted(&part.value))));
         text.some("interacts", Some(pair.interacts).filter(|on| !on));
         text.some("friction", pair.friction);
+        text.some("friction_kinetic", pair.friction_kinetic);
     }
     for tie in &contact.ties {
         text.heading("[[contact.tie]]");

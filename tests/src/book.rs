@@ -13,6 +13,7 @@ mod erosion;
 mod exposed;
 mod fold;
 mod free;
+mod friction;
 mod gas;
 mod girder;
 mod hexahedron;
@@ -128,6 +129,7 @@ macro_rules! each_case_of_the_book {
             erosion: a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked quick;
             exposed: a_ball_goes_through_a_plate_at_any_speed_and_gap long;
             soft: a_steel_block_thrown_on_foam_rubber_and_water_stays_outside quick;
+            friction: a_block_on_an_incline_rests_or_slides_after_coulomb long;
             rigid: a_free_top_precesses_after_euler quick;
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
             rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;

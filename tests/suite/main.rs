@@ -38,6 +38,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/erosion.rs"),
         include_str!("../src/book/exposed.rs"),
         include_str!("../src/book/soft.rs"),
+        include_str!("../src/book/friction.rs"),
     ]
     .concat();
     for name in tests::case::names() {

@@ -80,12 +80,15 @@ pub(super) fn make(
     let others = contact.default_interacts;
     let mut interacts: Vec<bool> = (0..n * n).map(|i| others && i / n != i % n).collect();
     let mut frictions = vec![contact.friction; n * n];
+    let mut kinetic = vec![contact.friction_kinetic; n * n];
     if let Some(parts) = &contact.self_interaction {
         for p in names.several(parts).unwrap_or_default() {
             interacts[p * n + p] = true;
         }
     }
-    apply_pairs(&contact.pairs, names, &mut interacts, &mut frictions, log);
+    apply_pairs(&contact.pairs, names, &mut interacts, (&mut frictions, &mut kinetic), log);
+    let kinetic =
+        kinetic.iter().zip(&frictions).map(|(kinetic, friction)| kinetic.unwrap_or(*friction)).collect();
     // A rigid body does not meet itself.
     for parts in rigid::parts_of(rigid) {
         for (a, b) in parts.iter().flat_map(|&a| parts.iter().map(move |&b| (a, b))) {
@@ -146,6 +149,9 @@ pub(super) fn make(
         gap: gap?,
         slack: slack?,
         friction: frictions,
+        friction_kinetic: kinetic,
+        friction_decay: contact.friction_decay,
+        sticks: contact.friction_velocity.is_none(),
         interacts,
         stiffness: contact.stiffness.unwrap_or(STIFFNESS),
         friction_velocity,
@@ -171,7 +177,7 @@ fn apply_pairs(
     pairs: &[Pair],
     names: &Names<'_>,
     interacts: &mut [bool],
-    frictions: &mut [f64],
+    (frictions, kinetic): (&mut [f64], &mut [Option<f64>]),
     log: &Log<'_>,
 ) {
     let n = names.len();
@@ -190,6 +196,10 @@ fn apply_pairs(
             interacts[cell] = pair.interacts;
             if let Some(friction) = pair.friction {
                 frictions[cell] = friction;
+                kinetic[cell] = None;
+            }
+            if pair.friction_kinetic.is_some() {
+                kinetic[cell] = pair.friction_kinetic;
             }
         }
     }

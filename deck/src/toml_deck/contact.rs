@@ -28,6 +28,8 @@ pub(super) fn read_joins(deck: &Table<'_>) -> Vec<Join> {
 pub(super) fn read(deck: &Table<'_>) -> Option<Contact> {
     let table = deck.get("contact")?.table("[contact]".to_string())?;
     let friction = table.number_or("friction", 0.0, Range::NotNegative);
+    let friction_kinetic = table.get("friction_kinetic").and_then(|v| v.number(Range::NotNegative));
+    let friction_decay = table.number_or("friction_decay", 0.0, Range::NotNegative);
     let flag = |key| table.get(key).and_then(|v| v.boolean());
     let default_interacts = flag("default_interacts").unwrap_or(true);
     let self_interaction = table.get("self_interaction").map(parts);
@@ -53,6 +55,8 @@ pub(super) fn read(deck: &Table<'_>) -> Option<Contact> {
     Some(Contact {
         at,
         friction,
+        friction_kinetic,
+        friction_decay,
         default_interacts,
         self_interaction,
         pairs,
@@ -74,10 +78,11 @@ fn read_pairs(table: &Table<'_>) -> Vec<Pair> {
         let both = parts.and_then(|v| v.fixed::<2>("two part names").map(|both| (v, both)));
         let interacts = pair.get("interacts").and_then(|v| v.boolean()).unwrap_or(true);
         let friction = pair.get("friction").and_then(|v| v.number(Range::NotNegative));
+        let friction_kinetic = pair.get("friction_kinetic").and_then(|v| v.number(Range::NotNegative));
         pair.finish();
         let Some((value, both)) = both else { continue };
         let [Some(a), Some(b)] = both.map(text) else { continue };
-        pairs.push(Pair { origin: value.origin(), parts: [a, b], interacts, friction });
+        pairs.push(Pair { origin: value.origin(), parts: [a, b], interacts, friction, friction_kinetic });
     }
     pairs
 }

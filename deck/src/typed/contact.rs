@@ -8,6 +8,10 @@ use crate::place::{Origin, Place, Placed};
 pub(crate) struct Contact {
     pub(crate) at: Place,
     pub(crate) friction: f64,
+    /// Coefficient of fast sliding; none where it is that at rest.
+    pub(crate) friction_kinetic: Option<f64>,
+    /// How fast the coefficient falls with the sliding velocity (time per length).
+    pub(crate) friction_decay: f64,
     /// Whether different parts meet that no pair names.
     pub(crate) default_interacts: bool,
     /// Parts that meet themselves.
@@ -17,6 +21,7 @@ pub(crate) struct Contact {
     pub(crate) gap: Gap,
     pub(crate) slack: Slack,
     pub(crate) stiffness: Option<f64>,
+    /// Given, nothing sticks.
     pub(crate) friction_velocity: Option<f64>,
     pub(crate) edges: bool,
     /// Whether parts that overlap at the start may.
@@ -30,6 +35,7 @@ pub(crate) struct Pair {
     pub(crate) parts: [Placed<String>; 2],
     pub(crate) interacts: bool,
     pub(crate) friction: Option<f64>,
+    pub(crate) friction_kinetic: Option<f64>,
 }
 
 /// Outer nodes of some parts tied to the outer faces of others.

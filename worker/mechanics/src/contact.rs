@@ -82,8 +82,14 @@ pub struct Settings {
     /// By part, the initial time step of the elements that may meet at its faces (time, [`crate::initial::closing_steps`]): springs are at
     /// least as stiff as it allows. Empty for springs by moduli alone.
     pub steps: Vec<f64>,
-    /// Velocity over which friction is regularised (length per time): below it the force is proportional to
-    /// the sliding velocity, so bodies creep instead of sticking.
+    /// Coefficient of fast sliding by pair of parts, like `friction`; empty where it is that at rest.
+    pub friction_kinetic: Vec<f64>,
+    /// How fast the coefficient falls from rest to that of fast sliding, with the sliding velocity (time per length).
+    pub friction_decay: f64,
+    /// Whether nodes stick to faces, by springs with a slip limit; edges do not.
+    pub sticks: bool,
+    /// Velocity over which friction is regularised where nothing sticks (length per time): below it the force is
+    /// proportional to the sliding velocity, so bodies creep.
     pub friction_velocity: f64,
     /// Nodes that start inside the zone of another part never meet the faces there; without it such a start is refused.
     pub ignores_initial: bool,

@@ -43,6 +43,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
         parts: [a, b].map(|id| made(t.names[&id].clone(), at)),
         interacts: true,
         friction: (friction != 0.0).then_some(friction),
+        friction_kinetic: None,
     };
     let met = !pairs.is_empty();
     let pairs = pairs.into_iter().map(pair).collect();
@@ -50,6 +51,8 @@ pub(super) fn write(t: &mut Translation<'_>) {
     t.deck.contact = Some(Contact {
         at,
         friction: 0.0,
+        friction_kinetic: None,
+        friction_decay: 0.0,
         default_interacts: false,
         self_interaction: None,
         pairs,

@@ -8,8 +8,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::exact::Quantum;
+use stick::Held;
 
 pub(super) mod lanes;
+pub(super) mod stick;
 
 /// `omega dt` of a node between all its springs at most: the energy of a bounce is then right to 2.6 %.
 pub const OMEGA_DT: f64 = 0.4;
@@ -73,7 +75,7 @@ pub struct Reaction {
     pub corners: [[f64; 3]; 4],
     /// Force on the node: exactly minus the sum of the corners'.
     pub node: [f64; 3],
-    /// Energy in the spring, `k depth^2 / 2`, in multiples of the energy quantum.
+    /// Energy in the spring, `k depth^2 / 2`, and in that across it, in multiples of the energy quantum.
     pub energy: f64,
     /// Energy that friction takes out in this cycle, in multiples of the energy quantum.
     pub friction: f64,
@@ -145,6 +147,30 @@ pub fn react(
         }
         friction = energy_quantum.round(taken);
     }
+    let energy = energy_quantum.round(0.5 * normal * push.depth);
+    reaction(push, force, energy, friction, force_quantum)
+}
+
+/// The same with friction that sticks.
+#[inline(always)]
+pub(super) fn react_held(
+    push: &Push,
+    held: &Held,
+    force_quantum: Quantum,
+    energy_quantum: Quantum,
+) -> Reaction {
+    let normal = push.stiffness * push.depth;
+    let mut force = [0.0; 3];
+    for a in 0..3 {
+        force[a] = normal.mul_add(push.direction[a], held.force[a]);
+    }
+    let energy = energy_quantum.round((0.5 * normal).mul_add(push.depth, held.stored));
+    reaction(push, force, energy, energy_quantum.round(held.taken), force_quantum)
+}
+
+/// Puts the force of a hit on its node and corners.
+#[inline(always)]
+fn reaction(push: &Push, force: [f64; 3], energy: f64, friction: f64, force_quantum: Quantum) -> Reaction {
     let mut corners = [[0.0; 3]; 4];
     let mut node = [0.0; 3];
     for a in 0..3 {
@@ -153,7 +179,6 @@ pub fn react(
         }
         node[a] = -((corners[0][a] + corners[1][a]) + (corners[2][a] + corners[3][a]));
     }
-    let energy = energy_quantum.round(0.5 * normal * push.depth);
     Reaction { corners, node, energy, friction }
 }
 

@@ -10,9 +10,22 @@ use super::Settings;
 /// [`exposed`](super::node_face)).
 const EXPOSED: usize = 2;
 
+/// Numbers where friction sticks: elongation of the spring, by axis.
+const STICKS: usize = 3;
+
 impl Settings {
     /// Numbers that contact keeps by node.
     pub fn n_history(&self) -> usize {
+        self.first_of_stick() + if self.any_sticks() { STICKS } else { 0 }
+    }
+
+    /// Whether friction sticks anywhere.
+    pub fn any_sticks(&self) -> bool {
+        self.sticks && self.friction.iter().any(|&coefficient| coefficient > 0.0)
+    }
+
+    /// Where the numbers of friction begin among those of a node.
+    pub(super) fn first_of_stick(&self) -> usize {
         if self.erodes { EXPOSED } else { 0 }
     }
 }

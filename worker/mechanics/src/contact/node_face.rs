@@ -97,6 +97,8 @@ pub(super) struct NodeFace {
     watch: Watch,
     /// Where parts erode, what came out last.
     came_out: CameOut,
+    /// Whether friction sticks.
+    sticks: bool,
     work: Work,
 }
 
@@ -160,6 +162,7 @@ impl NodeFace {
             width,
             watch: Watch::default(),
             came_out: CameOut::default(),
+            sticks: settings.any_sticks(),
             work: Work::default(),
         };
         for (index, face) in index.iter_mut().zip(&batch.faces).filter(|(index, _)| **index == 0) {
@@ -398,8 +401,13 @@ impl NodeFace {
         let Books { vote, by_pair } = books;
         let (approach, statics) = (&work.approach, &self.statics);
         let mut frequency2 = 0.0_f64;
+        let (mut end, mut deepest) = (0, 0);
         for i in 0..n {
             let node = work.near_pairs.node()[i] as usize;
+            if self.sticks && i == end {
+                (end, deepest) = stick::deepest(work.near_pairs.node(), &approach.depth, i, n);
+            }
+            let sticks_here = i == deepest;
             let face = work.face[i] as usize;
             let nodes = self.faces[face];
             let weights = [0, 1, 2, 3].map(|k| approach.weights[k][i]);
@@ -419,16 +427,23 @@ impl NodeFace {
                 direction: [0, 1, 2].map(|a| approach.direction[a][i]),
                 weights,
             };
-            let coefficient =
-                self.settings.friction[self.part[node] as usize * self.n_parts + self.parts[face] as usize];
-            let sliding = (coefficient > 0.0).then(|| force::Sliding {
-                coefficient,
-                regular: self.settings.friction_velocity,
-                velocity: against(cycle.v, node, &nodes, &weights),
-                inverse_mass,
-                dt: cycle.dt,
-            });
-            let reaction = force::react(&push, sliding.as_ref(), cycle.force_quantum, cycle.energy_quantum);
+            let between = self.part[node] as usize * self.n_parts + self.parts[face] as usize;
+            let coefficient = self.settings.friction[between];
+            let quanta = (cycle.force_quantum, cycle.energy_quantum);
+            let reaction = if coefficient > 0.0 && self.sticks {
+                let velocity = against(cycle.v, node, &nodes, &weights);
+                let sticking = self.sticking(between, velocity, inverse_mass, cycle.dt);
+                self.hold(&push, sticking, (node, sticks_here), quanta, cycle.history)
+            } else {
+                let sliding = (coefficient > 0.0).then(|| force::Sliding {
+                    coefficient,
+                    regular: self.settings.friction_velocity,
+                    velocity: against(cycle.v, node, &nodes, &weights),
+                    inverse_mass,
+                    dt: cycle.dt,
+                });
+                force::react(&push, sliding.as_ref(), quanta.0, quanta.1)
+            };
             vote.count(&reaction);
             let parts = (self.part[node], self.parts[face]);
             by_pair.energies.add(parts.0, parts.1, reaction.energy, reaction.friction);
@@ -497,5 +512,6 @@ fn against(v: &[Vec<f64>; 3], node: usize, corners: &[u32; 4], weights: &[f64; 4
 }
 
 mod exposed;
+mod stick;
 #[cfg(test)]
 mod tests;
