@@ -625,23 +625,3 @@ fn beams_of_elform_3_are_trusses_with_the_area_of_their_section() {
     let faults = read(&cube(&more.replace("2,2,1", "2,1,1"))).expect_err("a section of solids");
     assert!(lines(&faults).contains("*SECTION_BEAM"), "{}", lines(&faults));
 }
-
-#[test]
-fn a_tied_contact_ties_the_nodes_of_its_first_part_to_faces_of_its_second() {
-    let nodes: String = (0..8)
-        .map(|i: u32| {
-            let x = [(i ^ i >> 1) & 1, i >> 1 & 1, i >> 2];
-            let [x, y, z] = [f64::from(x[0]) * 0.5 + 0.2, f64::from(x[1]) * 0.5 + 0.2, f64::from(x[2]) + 1.0];
-            format!("{:8}{x:16}{y:16}{z:16}\n", i + 11)
-        })
-        .collect();
-    let more = format!(
-        "*PART\nlid\n2,1,1\n*NODE\n{nodes}*ELEMENT_SOLID\n       2       2      11      12      13      14      15      16      17      18\n\
-         *CONTACT_TIED_NODES_TO_SURFACE\n2,1,3,3\n\n\n"
-    );
-    let ties = good(&more).setup.contact.expect("contact").ties;
-    assert_eq!(ties.iter().map(|tie| tie.parts).collect::<Vec<_>>(), [[1, 0]; 4]);
-    let far = more.replace("2,1,3,3", "1,2,3,3");
-    let faults = read(&cube(&far)).expect_err("no node of the cube is on a face of the lid");
-    assert!(lines(&faults).contains("none of which lies on a face"), "{}", lines(&faults));
-}

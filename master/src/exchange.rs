@@ -46,7 +46,7 @@ impl Exchange {
         let n_history = state.contact.len();
         let stride = (if moments { 6 } else { 3 }) + n_history;
         let empty = Plan { moments, n_history: n_history as u32, ..Plan::default() };
-        let mut plans: Vec<Plan> = vec![empty; node_owners.n_workers() as usize];
+        let mut plans: Vec<Plan> = vec![empty; node_owners.n_workers()];
         // Ghosts: node and worker.
         let mut ghosts: Vec<(u32, u32)> = Vec::new();
         for (worker, batch) in (0..).zip(&batches) {

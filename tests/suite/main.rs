@@ -11,6 +11,7 @@ mod fuzz;
 mod holders;
 mod hourglass;
 mod late;
+mod pairs;
 mod seeds;
 mod sums;
 mod trusses;

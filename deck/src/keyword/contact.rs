@@ -47,6 +47,8 @@ pub(super) struct ContactCard {
     /// None where the first meets itself.
     pub(super) second: Option<Side>,
     pub(super) friction: f64,
+    /// Coefficient of fast sliding and how fast it is reached (time per length), where friction depends on the velocity.
+    pub(super) decay: Option<(f64, f64)>,
     /// Whether it follows the surface that erosion leaves.
     pub(super) erodes: bool,
     /// Whether nodes of the first are tied to faces of the second.
@@ -103,17 +105,13 @@ impl ContactCard {
             );
             return None;
         }
-        let decays = decay != 0.0 && fixed != moving;
-        if decays {
-            log.warn(g.at, format!("friction does not depend on the velocity: FD {moving} is taken"));
-        }
         if g.real(3, 0.0) != 0.0 {
             log.warn(g.at, "VC: friction is not bounded by a stress");
         }
         let second = if single { None } else { Some(side(1)?) };
-        let friction = if decays { moving } else { fixed };
+        let decay = (decay != 0.0 && fixed != moving).then_some((moving, decay));
         let tied = word.starts_with("TIED");
-        Some(Self { at: f.at, first: side(0)?, second, friction, erodes, tied })
+        Some(Self { at: f.at, first: side(0)?, second, friction: fixed, decay, erodes, tied })
     }
 
     /// Reads `*CONTACT_FORCE_TRANSDUCER_`; none where its surfaces are of a kind that is not known.
@@ -130,13 +128,7 @@ impl ContactCard {
             return None;
         }
         let second = if f.id(1) == 0 { None } else { Some(Side::read(&f, 1, false)?) };
-        Some(Self {
-            at: f.at,
-            first: Side::read(&f, 0, true)?,
-            second,
-            friction: 0.0,
-            erodes: false,
-            tied: false,
-        })
+        let first = Side::read(&f, 0, true)?;
+        Some(Self { at: f.at, first, second, friction: 0.0, decay: None, erodes: false, tied: false })
     }
 }

@@ -13,10 +13,8 @@
 //! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
 //!
 //! That is a node against a face. Two edges that cross while no node is in a zone are not seen so; where the deck has them meet
-//! too, they are a kind of pairs of their own ([`edges`]). What a kind does for the sort, the batch and the cycle is said in `pair`;
+//! too, they are a kind of pairs of their own ([`edges`]), and so are nodes that are tied to faces (`ties`). What a kind does for the sort, the batch and the cycle is said in `pair`;
 //! `kinds` lists them.
-//!
-//! Nodes that are tied to faces are another (`ties`).
 //!
 //! Search, geometry (zone and joint) and force know nothing of each other; only `node_face` knows all three.
 

@@ -17,7 +17,7 @@ use crate::{
 /// Adds contact to the deck.
 pub(super) fn write(t: &mut Translation<'_>) {
     let problem = t.problem;
-    let mut pairs: BTreeMap<(u32, u32), (Place, f64)> = BTreeMap::new();
+    let mut pairs: BTreeMap<(u32, u32), &ContactCard> = BTreeMap::new();
     let mut ties = Vec::new();
     for contact in &problem.contacts {
         if contact.tied {
@@ -27,7 +27,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
         for (a, b) in pairs_of(contact, t) {
             let known = t.names.contains_key(&a) && t.names.contains_key(&b);
             if known && !t.bodies.same(a, b) {
-                pairs.entry((a, b)).or_insert((contact.at, contact.friction));
+                pairs.entry((a, b)).or_insert(contact);
             }
         }
     }
@@ -38,12 +38,13 @@ pub(super) fn write(t: &mut Translation<'_>) {
     };
     write_freed_nodes(t);
     t.met = pairs.keys().copied().collect();
-    let pair = |((a, b), (at, friction)): ((u32, u32), (Place, f64))| Pair {
-        origin: Origin::card(at),
-        parts: [a, b].map(|id| made(t.names[&id].clone(), at)),
+    let decay = the_decay(&pairs, t);
+    let pair = |((a, b), card): ((u32, u32), &ContactCard)| Pair {
+        origin: Origin::card(card.at),
+        parts: [a, b].map(|id| made(t.names[&id].clone(), card.at)),
         interacts: true,
-        friction: (friction != 0.0).then_some(friction),
-        friction_kinetic: None,
+        friction: (card.friction != 0.0 || card.decay.is_some()).then_some(card.friction),
+        friction_kinetic: card.decay.map(|(kinetic, _)| kinetic),
     };
     let met = !pairs.is_empty();
     let pairs = pairs.into_iter().map(pair).collect();
@@ -52,7 +53,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
         at,
         friction: 0.0,
         friction_kinetic: None,
-        friction_decay: 0.0,
+        friction_decay: decay,
         default_interacts: false,
         self_interaction: None,
         pairs,
@@ -64,6 +65,17 @@ pub(super) fn write(t: &mut Translation<'_>) {
         edges: false,
         ignores_initial: false,
     });
+}
+
+/// How fast friction falls with the velocity: what the first contact says of which it does.
+fn the_decay(pairs: &BTreeMap<(u32, u32), &ContactCard>, t: &Translation<'_>) -> f64 {
+    let decays = |card: &&ContactCard| card.decay.map(|(_, decay)| (card.at, decay));
+    let given: BTreeMap<Place, f64> = pairs.values().filter_map(decays).collect();
+    let Some(&first) = given.values().next() else { return 0.0 };
+    for (&at, _) in given.iter().filter(|(_, decay)| **decay != first) {
+        t.log.warn(at, format!("DC of the first contact of which friction falls is that of all: {first}"));
+    }
+    first
 }
 
 /// Distance of a tied node from its face over the smallest edge of both parts: LS-DYNA takes nodes within 5 % of a face's diagonal.

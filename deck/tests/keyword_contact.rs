@@ -1,0 +1,59 @@
+//! Contact in keyword decks: ties, and friction that falls with the velocity.
+
+use deck::Model;
+
+/// A cube of 5 above the middle of a cube of 10, `gap` above it.
+fn deck_of(gap: f64, contact: &str) -> String {
+    let mut nodes = String::new();
+    let mut id = 0;
+    for ([low, high], bottom) in [([0.0, 10.0], 0.0), ([2.0, 7.0], 10.0 + gap)] {
+        for z in [bottom, bottom + high - low] {
+            for [x, y] in [[low, low], [high, low], [high, high], [low, high]] {
+                id += 1;
+                nodes += &format!("{id},{x},{y},{z}\n");
+            }
+        }
+    }
+    format!(
+        "*KEYWORD\n*CONTROL_TERMINATION\n1e-6\n*PART\nbelow\n1,1,1\nabove\n2,1,1\n*SECTION_SOLID\n1,1\n\
+         *MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n*NODE\n{nodes}\
+         *ELEMENT_SOLID\n1,1,1,2,3,4,5,6,7,8\n2,2,9,10,11,12,13,14,15,16\n{contact}*END\n"
+    )
+}
+
+fn good(gap: f64, contact: &str) -> Model {
+    deck::read(&deck_of(gap, contact), "a.k").unwrap_or_else(|faults| panic!("{faults:?}"))
+}
+
+#[test]
+fn tied_contact_ties_the_nodes_of_the_first_side_to_faces_of_the_second() {
+    for keyword in ["TIED_NODES_TO_SURFACE", "TIED_SURFACE_TO_SURFACE_ID\n1,glue"] {
+        let model = good(0.0, &format!("*CONTACT_{keyword}\n2,1,3,3\n\n\n"));
+        let settings = model.setup.contact.expect("they are tied");
+        assert_eq!(settings.ties.len(), 4);
+        assert!(settings.ties.iter().all(|tie| tie.parts == [1, 0]));
+        assert!(!settings.interacts.contains(&true), "parts that are tied do not meet besides");
+    }
+    let faults = deck::read(&deck_of(1.0, "*CONTACT_TIED_NODES_TO_SURFACE\n2,1,3,3\n\n\n"), "a.k");
+    let faults = faults.expect_err("they are apart");
+    assert!(faults.iter().any(|fault| fault.to_string().contains("none of which lies on a face")), "{faults:?}");
+}
+
+#[test]
+fn friction_falls_from_fs_to_fd_by_dc() {
+    let of = |card: &str| {
+        good(1.0, &format!("*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE\n2,1,3,3\n{card}\n\n"))
+            .setup
+            .contact
+            .expect("they meet")
+    };
+    let falls = of("0.3,0.1,2.0");
+    assert_eq!((falls.friction[1], falls.friction_kinetic[1], falls.friction_decay), (0.3, 0.1, 2.0));
+    assert!(falls.sticks);
+    // Without DC the coefficient is FS.
+    let constant = of("0.3,0.1,0.0");
+    assert_eq!(
+        (constant.friction[1], constant.friction_kinetic[1], constant.friction_decay),
+        (0.3, 0.3, 0.0)
+    );
+}
