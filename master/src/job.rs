@@ -101,7 +101,7 @@ impl Job {
 
     /// What computes contact again from a state; none without contact.
     pub fn probe(&self) -> Option<Probe> {
-        let Problem { model, quanta, touching } = &self.problem;
+        let Problem { model, quanta, touching, .. } = &self.problem;
         let (touching, settings) = touching.as_ref().zip(model.setup.contact.clone())?;
         let (surface, exclusions) = (Arc::clone(&touching.surface), Arc::clone(&touching.exclusions));
         Some(Probe { surface, settings, exclusions, quantum: quanta.force })
@@ -125,6 +125,10 @@ impl Job {
     /// How often it was dealt out anew.
     pub fn epoch(&self) -> u32 {
         self.epoch.number
+    }
+
+    pub fn n_elements(&self) -> usize {
+        self.problem.model.mesh.n_elements()
     }
 
     /// Workers of the present epoch, in the order by which peers and plans name them.

@@ -19,6 +19,8 @@ use crate::{results::history::HistoryRow, run_totals::RunTotals};
 /// All that a run needs to go on with the same bits, on any workers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
+    /// BLAKE3 of the problem but its end, and of the release that computes it: no other may go on with it.
+    pub problem: [u8; 32],
     /// State at the start of a cycle.
     pub state: Arc<GlobalState>,
     /// `dt` of the cycle before (time).

@@ -21,6 +21,16 @@ pub const MESSAGE_LIMIT: usize = 1 << 30;
 /// Messages that one side sends in chunks at a time, and that the other assembles at a time.
 pub const OPEN_STREAMS: usize = 16;
 
+/// Writes the bytes of a value of any length, such as into a checksum.
+///
+/// # Errors
+/// What the writer refused.
+pub fn encode_into<T: Serialize>(value: &T, into: &mut impl std::io::Write) -> Result<()> {
+    let config = bincode::config::standard().with_little_endian().with_fixed_int_encoding();
+    let written = bincode::serde::encode_into_std_write(value, into, config);
+    written.map(|_| ()).map_err(|error| Error::Message(error.to_string()))
+}
+
 /// The bytes of `value`.
 ///
 /// # Errors

@@ -68,7 +68,8 @@ impl Checkpoint {
         start: &GlobalState,
     ) -> Result<(Self, Vec<Arc<HistoryRow>>), Error> {
         let setup = &problem.model.setup;
-        if shape(&snapshot.state) != shape(start)
+        if snapshot.problem != problem.sum
+            || shape(&snapshot.state) != shape(start)
             || snapshot.state.initial_volume != start.initial_volume
             || snapshot.walls.len() != mechanics::wall::first_poses(&setup.walls).len()
             || snapshot.vote.bodies.len() != setup.bodies.len()
@@ -94,9 +95,10 @@ impl Checkpoint {
     }
 
     /// As it is stored; none at the start of a run, which the deck gives as well.
-    pub(super) fn as_snapshot(&self, rows: &[Arc<HistoryRow>]) -> Option<Box<Snapshot>> {
+    pub(super) fn as_snapshot(&self, problem: &Problem, rows: &[Arc<HistoryRow>]) -> Option<Box<Snapshot>> {
         let Self { state, continuation } = self;
         Some(Box::new(Snapshot {
+            problem: problem.sum,
             state: Arc::clone(state),
             dt_previous: continuation.dt_previous,
             dt: continuation.dt?,

@@ -136,7 +136,7 @@ impl Job {
 
     /// Gives the newest checkpoint to the sink, where that is asked for.
     pub(super) fn store(&self, cycle: u64, actions: &mut Vec<Action>) {
-        let snapshot = || self.checkpoints.newest().as_snapshot(&self.account.rows);
+        let snapshot = || self.checkpoints.newest().as_snapshot(&self.problem, &self.account.rows);
         if self.options.asked.snapshot_at == Some(cycle) {
             actions.extend(snapshot().map(Action::Snapshot));
         }

@@ -18,6 +18,8 @@ pub enum Error {
     Zones(Box<Overlap>),
     /// The snapshot does not fit the deck.
     AnotherProblem,
+    /// The problem has no bytes to take the checksum of.
+    Unencoded(String),
     /// A worker broke a rule of the messages.
     Worker(usize, Breach),
     /// A worker that there is not is lost.
@@ -193,9 +195,12 @@ impl fmt::Display for Error {
             Self::NoWorker => f.write_str("no worker: start one with `bolide worker --master HOST`"),
             Self::Problem(why) | Self::Element(why) => f.write_str(why),
             Self::Zones(overlap) => overlap.fmt(f),
-            Self::AnotherProblem => f.write_str(
-                "the snapshot is of another problem: its mesh, its walls or its rigid bodies are not this deck's",
+            Self::AnotherProblem => write!(
+                f,
+                "the snapshot is of another problem or release: title, mesh, materials and conditions must be this deck's, computed by Bolide {}; run without the snapshot",
+                env!("CARGO_PKG_VERSION")
             ),
+            Self::Unencoded(why) => write!(f, "the checksum of the problem: {why}"),
             Self::Worker(worker, breach) => breach.write(*worker, f),
             Self::Unknown { worker, known } => write!(f, "worker {worker} of {known} is lost"),
             Self::LastLost { worker, why } => {

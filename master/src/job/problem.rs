@@ -21,6 +21,8 @@ pub(super) struct Problem {
     pub(super) quanta: Quanta,
     /// None without contact.
     pub(super) touching: Option<Touching>,
+    /// BLAKE3 of all that decides a result but the end of the run, and of the release.
+    pub(super) sum: [u8; 32],
 }
 
 /// What of the contact stays the same in all epochs.
@@ -48,8 +50,23 @@ impl Problem {
             model = Arc::new(with_walls);
         }
         let touching = Touching::of(&model)?;
-        Ok((Self { model, quanta, touching }, start))
+        let sum = sum_of(&model)?;
+        Ok((Self { model, quanta, touching, sum }, start))
     }
+}
+
+/// The sum that binds a snapshot to its problem. A run may be gone on with to another end, with other results on the way, and with
+/// other sorts, which change no bit.
+fn sum_of(model: &Model) -> Result<[u8; 32], Error> {
+    let Model { title, units, mesh, velocity, spin, constraint, join_energy, setup, output: _ } = model;
+    let mut setup = setup.clone();
+    let control = &mut setup.control;
+    (control.end_time, control.end_cycle, control.sort_lag, control.plan_interval) = (0.0, 0, 0, 0);
+    let mut hasher = blake3::Hasher::new();
+    let release = env!("CARGO_PKG_VERSION");
+    let whole = (release, title, units, mesh, velocity, spin, constraint, join_energy, setup);
+    protocol::codec::encode_into(&whole, &mut hasher).map_err(|e| Error::Unencoded(e.to_string()))?;
+    Ok(*hasher.finalize().as_bytes())
 }
 
 impl Touching {

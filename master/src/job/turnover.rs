@@ -204,7 +204,7 @@ impl Job {
 
     fn give_last_checkpoint(&self, actions: &mut Vec<Action>) {
         if self.options.store
-            && let Some(snapshot) = self.checkpoints.newest().as_snapshot(&self.account.rows)
+            && let Some(snapshot) = self.checkpoints.newest().as_snapshot(&self.problem, &self.account.rows)
         {
             actions.push(Action::Checkpoint { snapshot, last: true });
         }

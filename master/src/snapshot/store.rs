@@ -209,6 +209,12 @@ pub fn remove(folder: &Path) -> Result<(), String> {
     Ok(())
 }
 
+/// Number of the newest snapshot that a manifest names; 0 where there is none that can be read.
+pub fn newest(folder: &Path) -> u64 {
+    let manifest = read_manifest(folder).ok().flatten();
+    manifest.and_then(|manifest| manifest.generations.first().map(|g| g.number)).unwrap_or_default()
+}
+
 fn read_manifest(folder: &Path) -> Result<Option<Manifest>, String> {
     let path = folder.join(MANIFEST);
     let fault = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
@@ -261,6 +267,7 @@ mod tests {
         let x = (0..100_000).map(|n| [n as f64, 0.5, cycle as f64]).collect();
         let state = GlobalState { cycle, x, ..GlobalState::default() };
         Snapshot {
+            problem: [7; 32],
             state: Arc::new(state),
             dt_previous: 0.1,
             dt: 0.2,
