@@ -24,6 +24,7 @@ use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
     net::{TcpListener, TcpStream},
     sync::{OwnedSemaphorePermit, Semaphore, mpsc},
+    time::Sleep,
 };
 use tokio_rustls::{TlsAcceptor, server::TlsStream};
 use tracing::{debug, warn};
@@ -43,6 +44,13 @@ use guard::Refusal;
 pub const CONNECTIONS: usize = 256;
 /// The longest that a TLS handshake may take.
 const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
+/// The longest that a caller may take to say what it asks for.
+const HEADER_LIMIT: Duration = Duration::from_secs(5);
+/// More bytes than these are no headers any more, but a deck on its way.
+const HEADER_BYTES: usize = 16 << 10;
+/// The longest that a deck may be on its way, and that a connection may stand after something was answered; a stream of events says
+/// something every 15 s.
+const IDLE_LIMIT: Duration = Duration::from_secs(60);
 /// What pages may load: their own files and nothing else.
 const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
@@ -164,10 +172,8 @@ async fn take(place: Place, send: mpsc::Sender<Wire>) {
                 continue;
             }
         };
-        let Ok(permit) = Arc::clone(&places).try_acquire_owned() else {
-            warn!("connection of the page from {from} not taken: {CONNECTIONS} stand, at most {CONNECTIONS}");
-            continue;
-        };
+        // Callers that say nothing give their places back within HEADER_LIMIT; until then this one waits its turn.
+        let Ok(permit) = Arc::clone(&places).acquire_owned().await else { return };
         // What is said at once is not kept waiting for more; without it answers are a little later.
         let _ = stream.set_nodelay(true);
         let (send, tls) = (send.clone(), place.tls.clone());
@@ -184,7 +190,8 @@ async fn take(place: Place, send: mpsc::Sender<Wire>) {
                 }
             };
             // The server is gone only when the daemon ends.
-            let _ = send.send(Wire { stream, from, _place: permit }).await;
+            let deadline = Box::pin(tokio::time::sleep(HEADER_LIMIT));
+            let _ = send.send(Wire { stream, from, deadline, taken: 0, _place: permit }).await;
         });
     }
 }
@@ -218,7 +225,17 @@ impl axum::serve::Listener for Door {
 struct Wire {
     stream: Stream,
     from: SocketAddr,
+    /// Ends it.
+    deadline: Pin<Box<Sleep>>,
+    /// Bytes read since something was answered.
+    taken: usize,
     _place: OwnedSemaphorePermit,
+}
+
+impl Wire {
+    fn grant(&mut self, time: Duration) {
+        self.deadline.as_mut().reset(tokio::time::Instant::now() + time);
+    }
 }
 
 enum Stream {
@@ -232,10 +249,20 @@ impl AsyncRead for Wire {
         cx: &mut Context<'_>,
         into: &mut ReadBuf<'_>,
     ) -> Poll<std::io::Result<()>> {
-        match &mut self.stream {
+        if self.deadline.as_mut().poll(cx).is_ready() {
+            return Poll::Ready(Err(std::io::ErrorKind::TimedOut.into()));
+        }
+        let before = into.filled().len();
+        let read = match &mut self.stream {
             Stream::Plain(stream) => Pin::new(stream).poll_read(cx, into),
             Stream::Tls(stream) => Pin::new(stream).poll_read(cx, into),
+        };
+        let only_headers = self.taken <= HEADER_BYTES;
+        self.taken += into.filled().len() - before;
+        if only_headers && self.taken > HEADER_BYTES {
+            self.grant(IDLE_LIMIT);
         }
+        read
     }
 }
 
@@ -245,6 +272,8 @@ impl AsyncWrite for Wire {
         cx: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<std::io::Result<usize>> {
+        self.taken = 0;
+        self.grant(IDLE_LIMIT);
         match &mut self.stream {
             Stream::Plain(stream) => Pin::new(stream).poll_write(cx, bytes),
             Stream::Tls(stream) => Pin::new(stream).poll_write(cx, bytes),
