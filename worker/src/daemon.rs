@@ -251,12 +251,19 @@ fn is_final(error: &Error) -> bool {
         | Error::Message(_)
         | Error::Magic { .. }
         | Error::FrameVersion { .. } => true,
+        // A clock that jumps, here or there, comes back.
+        Error::Io { kind: std::io::ErrorKind::InvalidData, why, .. } if is_of_clocks(why) => false,
         // What TLS refuses.
         Error::Io { kind: std::io::ErrorKind::InvalidData, .. } => true,
         // The port for other workers.
         Error::Io { kind, .. } => *kind == std::io::ErrorKind::AddrInUse,
         _ => false,
     }
+}
+
+/// Whether TLS was refused for a date, which is tried again for as long as a master that is away is dialled.
+fn is_of_clocks(why: &str) -> bool {
+    why.contains("has expired") || why.contains("not valid yet")
 }
 
 /// Computes for the master at the other end until the connection ends; gives the reason.
