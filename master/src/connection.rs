@@ -37,7 +37,7 @@ use crate::{
     client_requests,
     drive::{Delivery, Input, WorkerLink},
     event::WorkerSpec,
-    newcomer,
+    files, newcomer,
     notice::Notice,
 };
 
@@ -376,7 +376,9 @@ async fn hand_on(
 
 /// Takes connections for ever; each fault of one is one line in the log.
 pub async fn listen(listener: TcpListener, acceptor: Arc<Acceptor>) {
-    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    // The rest is for results: callers that only stay may not take the files that a run writes.
+    let most = CONNECTIONS.min(files::raise_limit());
+    let places = Arc::new(Semaphore::new(most));
     loop {
         let (stream, address) = match listener.accept().await {
             Ok(taken) => taken,
@@ -388,7 +390,7 @@ pub async fn listen(listener: TcpListener, acceptor: Arc<Acceptor>) {
             }
         };
         let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
-            warn!("connection from {address} not taken: {CONNECTIONS} stand, at most {CONNECTIONS}");
+            warn!("connection from {address} not taken: {most} stand, at most {most}");
             continue;
         };
         let acceptor = Arc::clone(&acceptor);

@@ -39,6 +39,8 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
+    // Decks, results and the queue are the owner's alone.
+    rustix::process::umask(rustix::fs::Mode::RWXG | rustix::fs::Mode::RWXO);
     let port = args.link.map(|rate| Shape::port(Wire::ethernet(rate)));
     let (spool, left) = Spool::open(&args.spool)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()

@@ -24,6 +24,7 @@ pub mod embedded;
 pub mod erosion;
 pub mod event;
 pub mod exchange;
+pub mod files;
 pub mod hosts;
 pub mod http;
 pub mod incident;
