@@ -15,7 +15,6 @@ use std::{
 };
 
 use protocol::{
-    Error,
     frame::Header,
     link::Sender,
     message::{ToMaster, ToWorker},
@@ -30,6 +29,7 @@ use crate::{
     embedded::{Sink, Traffic, timed_sort},
     event::{Action, Event, Outcome, WorkerSpec},
     job::Job,
+    pace::{Pace, Waiting},
     peers,
     sort::{Gathered, SortBasis, Sorted},
 };
@@ -159,7 +159,7 @@ impl Delivery {
     pub fn find(&self, header: &Header) -> protocol::Result<Option<(usize, mpsc::Sender<Input>)>> {
         let port = self.port();
         if header.job > port.job || header.job == 0 {
-            return Err(Error::Message(format!(
+            return Err(protocol::Error::Message(format!(
                 "{} frame of job {}, the worker was given job {}",
                 header.kind, header.job, port.job
             )));
@@ -179,7 +179,7 @@ impl Delivery {
 /// and `line` is its [`channel`].
 ///
 /// # Errors
-/// What the sink refused; the workers are released all the same.
+/// What the sink refused, or that workers die of the job; the workers are released all the same.
 pub fn drive(
     job: Job,
     first: Vec<Action>,
@@ -188,8 +188,9 @@ pub fn drive(
     line: (mpsc::Sender<Input>, mpsc::Receiver<Input>),
     sink: &mut dyn Sink,
     stop: &AtomicBool,
-) -> Result<(Outcome, Traffic), String> {
+) -> Result<(Outcome, Traffic), Error> {
     let (send, input) = line;
+    let n_elements = job.n_elements();
     let mut driver = Driver {
         place: Place { job: number, epoch: job.epoch(), plan: 0 },
         job,
@@ -200,12 +201,19 @@ pub fn drive(
         lost: VecDeque::new(),
         timer: None,
         sort_ns: 0,
+        sorting: 0,
         outcome: None,
+        began: Instant::now(),
+        pace: Pace::new(n_elements),
+        suspect: None,
+        ends: false,
+        deaths: Deaths::default(),
     };
     for worker_link in worker_links {
         driver.worker_link(worker_link.clone());
     }
     driver.introduce();
+    driver.begin_pace();
     let result = driver.run(first, sink, stop);
     for worker_link in &driver.worker_links {
         worker_link.delivery.close();
@@ -235,7 +243,81 @@ struct Driver {
     /// When the job is told that its time has passed.
     timer: Option<Instant>,
     sort_ns: u64,
+    /// Sorts under way: the workers may have nothing to do.
+    sorting: usize,
     outcome: Option<Outcome>,
+    began: Instant,
+    pace: Pace,
+    /// The worker that the others were told is suspect.
+    suspect: Option<usize>,
+    /// Somebody waits for the end of the job.
+    ends: bool,
+    deaths: Deaths,
+}
+
+/// Why a job cannot be driven any further.
+#[derive(Debug)]
+pub enum Error {
+    /// What the disk or this host refused.
+    Sink(String),
+    /// Workers were lost again and again, and the job came no further.
+    Deaths { deaths: usize, cycle: u64, last: String },
+}
+
+impl From<String> for Error {
+    fn from(reason: String) -> Self {
+        Self::Sink(reason)
+    }
+}
+
+impl std::fmt::Display for Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Sink(reason) => f.write_str(reason),
+            Self::Deaths { deaths, cycle, last } => write!(
+                f,
+                "{deaths} workers were lost and the job came no further than cycle {cycle}; the last one: {last}; look at their memory, then `bolide resume`"
+            ),
+        }
+    }
+}
+
+/// Losses of workers since the job last came further.
+#[derive(Default)]
+struct Deaths {
+    deaths: usize,
+    /// The furthest cycle, and the most workers at a time.
+    cycle: u64,
+    most: usize,
+}
+
+impl Deaths {
+    /// Times that each worker may be lost.
+    const EACH: usize = 3;
+
+    /// A worker is lost.
+    fn count(&mut self, last: &str) -> Result<(), Error> {
+        self.deaths += 1;
+        if self.deaths < Self::EACH * self.most.max(1) {
+            return Ok(());
+        }
+        Err(Error::Deaths { deaths: self.deaths, cycle: self.cycle, last: last.to_owned() })
+    }
+
+    fn progress(&mut self, cycle: u64) {
+        if cycle > self.cycle {
+            (self.cycle, self.deaths) = (cycle, 0);
+        }
+    }
+}
+
+/// How far a message says that its worker has come, as [`Pace`] counts it.
+const fn position(message: &ToMaster) -> Option<u64> {
+    match message {
+        ToMaster::Ready { .. } => Some(1),
+        ToMaster::Cycle { cycle, .. } => Some(cycle.saturating_add(2)),
+        _ => None,
+    }
 }
 
 impl Driver {
@@ -258,12 +340,58 @@ impl Driver {
         }
     }
 
-    fn run(&mut self, first: Vec<Action>, sink: &mut dyn Sink, stop: &AtomicBool) -> Result<Outcome, String> {
+    fn now(&self) -> f64 {
+        self.began.elapsed().as_secs_f64()
+    }
+
+    /// An epoch begins.
+    fn begin_pace(&mut self) {
+        let now = self.now();
+        self.pace.begin(self.job.at_work(), now);
+        self.deaths.most = self.deaths.most.max(self.job.at_work().len());
+    }
+
+    /// Names the worker that the job waits for, and gives it up when it is late.
+    fn look_for_late(&mut self, sink: &mut dyn Sink) -> Result<(), Error> {
+        if self.sorting > 0 {
+            return Ok(());
+        }
+        let Some(waiting) = self.pace.waits_for(self.ends, self.now()) else { return Ok(()) };
+        let Waiting { worker, silence, longest, late } = waiting;
+        let worker_link = &self.worker_links[worker];
+        let words = format!(
+            "the job waits for it for {silence:.1} s, the longest wait before was {longest:.3} s; its link lives, so its computing is stuck"
+        );
+        if !late {
+            if self.suspect != Some(worker) {
+                warn!("worker {} is suspect: {words}", worker_link.spec.name);
+                sink.suspect(worker_link.incarnation, Some(format!("suspect: {words}")));
+                self.suspect = Some(worker);
+            }
+            return Ok(());
+        }
+        let why = format!("{} at {}: {words}", worker_link.spec.name, worker_link.address);
+        warn!("worker {} is given up: {words}", worker_link.spec.name);
+        worker_link.sender().abort(protocol::Error::Message(why.clone()));
+        worker_link.delivery.close();
+        self.suspect = None;
+        self.lose(worker, why, sink)
+    }
+
+    fn lose(&mut self, worker: usize, why: String, sink: &mut dyn Sink) -> Result<(), Error> {
+        if self.job.at_work().contains(&worker) && !self.ends {
+            self.deaths.count(&why)?;
+        }
+        self.apply(Event::Lost(worker, why), sink)
+    }
+
+    fn run(&mut self, first: Vec<Action>, sink: &mut dyn Sink, stop: &AtomicBool) -> Result<Outcome, Error> {
         self.act(first, sink)?;
         let mut stopping = false;
         loop {
             if !stopping && stop.load(Ordering::Relaxed) {
                 stopping = true;
+                self.ends = true;
                 self.apply(Event::Stop, sink)?;
             }
             if self.timer.is_some_and(|due| Instant::now() >= due) {
@@ -275,12 +403,20 @@ impl Driver {
             }
             let input = match self.lost.pop_front() {
                 Some((worker, why)) => Input::Lost(worker, why),
-                None => self.input.blocking_recv().ok_or("every way to the job is closed")?,
+                None => {
+                    self.input.blocking_recv().ok_or_else(|| "every way to the job is closed".to_owned())?
+                }
             };
+            let woken = matches!(input, Input::Wake);
             match input {
                 Input::Message(worker, header, message) => match self.check(&header, &message) {
                     Ok(()) => {
                         if header.epoch == self.job.epoch() {
+                            self.pace.hear(worker, position(&message), self.now());
+                            if self.suspect == Some(worker) {
+                                self.suspect = None;
+                                sink.suspect(self.worker_links[worker].incarnation, None);
+                            }
                             sink.heard(&self.worker_links[worker].spec.name, &message);
                         }
                         self.apply(Event::Message(worker, header.epoch, message), sink)?;
@@ -288,14 +424,15 @@ impl Driver {
                     Err(why) => {
                         let worker_link = &self.worker_links[worker];
                         let why = format!("{} at {}: {why}", worker_link.spec.name, worker_link.address);
-                        worker_link.sender().abort(Error::Message(why.clone()));
-                        self.apply(Event::Lost(worker, why), sink)?;
+                        worker_link.sender().abort(protocol::Error::Message(why.clone()));
+                        self.lose(worker, why, sink)?;
                     }
                 },
-                Input::Lost(worker, why) => self.apply(Event::Lost(worker, why), sink)?,
+                Input::Lost(worker, why) => self.lose(worker, why, sink)?,
                 Input::Sorted(sorted) => {
                     let (sorted, ns) = sorted?;
                     self.sort_ns += ns;
+                    self.sorting = self.sorting.saturating_sub(1);
                     self.apply(Event::Sorted(sorted), sink)?;
                 }
                 Input::Joined(worker_link) => {
@@ -303,8 +440,14 @@ impl Driver {
                     self.worker_link(worker_link);
                     self.apply(Event::Joined(spec), sink)?;
                 }
-                Input::Wake => {}
-                Input::Suspend => self.apply(Event::Suspend, sink)?,
+                Input::Wake => self.look_for_late(sink)?,
+                Input::Suspend => {
+                    self.ends = true;
+                    self.apply(Event::Suspend, sink)?;
+                }
+            }
+            if !woken {
+                self.pace.touch(self.now());
             }
         }
     }
@@ -332,15 +475,16 @@ impl Driver {
         Ok(())
     }
 
-    fn apply(&mut self, event: Event, sink: &mut dyn Sink) -> Result<(), String> {
+    fn apply(&mut self, event: Event, sink: &mut dyn Sink) -> Result<(), Error> {
         let actions = self.job.apply(event);
         self.act(actions, sink)
     }
 
-    fn act(&mut self, actions: Vec<Action>, sink: &mut dyn Sink) -> Result<(), String> {
+    fn act(&mut self, actions: Vec<Action>, sink: &mut dyn Sink) -> Result<(), Error> {
         if self.place.epoch != self.job.epoch() {
             self.place.epoch = self.job.epoch();
             self.introduce();
+            self.begin_pace();
         }
         for action in actions {
             match action {
@@ -351,7 +495,10 @@ impl Driver {
                         self.lost.push_back((worker, why));
                     }
                 }
-                Action::Sort(bench, x) => self.sort(bench, x),
+                Action::Sort(bench, x) => {
+                    self.sorting += 1;
+                    self.sort(bench, x);
+                }
                 Action::Timer(seconds) => {
                     self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
                 }
@@ -361,7 +508,12 @@ impl Driver {
                     worker_link.delivery.dismiss(why);
                 }
                 Action::Over(outcome) => self.outcome = Some(*outcome),
-                other => sink.take(other)?,
+                other => {
+                    if let Action::Progress(progress) = &other {
+                        self.deaths.progress(progress.cycle);
+                    }
+                    sink.take(other)?;
+                }
             }
         }
         Ok(())

@@ -42,6 +42,9 @@ pub trait Sink {
 
     /// Looks at a message of a worker before the job takes it.
     fn heard(&mut self, _worker: &str, _message: &ToMaster) {}
+
+    /// A worker, by its connection, is waited for, in words; or it is heard again.
+    fn suspect(&mut self, _incarnation: u32, _note: Option<String>) {}
 }
 
 /// What a run cost beside its outcome.

@@ -37,6 +37,7 @@ pub mod node_owners;
 pub mod notice;
 pub mod options;
 pub mod output;
+pub mod pace;
 pub mod peers;
 pub mod picture;
 pub mod processes;

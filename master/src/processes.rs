@@ -94,7 +94,8 @@ impl Processes {
         sink: &mut dyn Sink,
         stop: &AtomicBool,
     ) -> Result<(Outcome, Traffic), String> {
-        drive(job, first, 1, &self.worker_links, drive::channel(self.worker_links.len()), sink, stop)
+        let line = drive::channel(self.worker_links.len());
+        drive(job, first, 1, &self.worker_links, line, sink, stop).map_err(|e| e.to_string())
     }
 }
 

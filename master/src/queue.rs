@@ -5,6 +5,7 @@
 use std::{cmp::Reverse, collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use protocol::{options::JobOptions, request::State};
+use serde::{Deserialize, Serialize};
 
 /// Most jobs that may wait.
 pub const QUEUED_LIMIT: usize = 1000;
@@ -24,8 +25,34 @@ pub enum Change {
     Cancel,
     /// Its master has to leave: it is stored, to be gone on with by the next one.
     Suspend,
-    /// A user wants what failed to be gone on with.
+    /// A user wants what failed or was held to be gone on with.
     Resume,
+    /// Master or workers die of it again and again: the next one goes on.
+    Hold,
+}
+
+/// Starts of a job that ended neither with it nor in good order, since it last came further.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Starts {
+    pub count: u32,
+    /// Number of the newest snapshot at that time; 0 for none.
+    pub snapshot: u64,
+}
+
+impl Starts {
+    /// Masters that may die of a job, none of which stored it anew.
+    pub const LIMIT: u32 = 3;
+
+    /// The job starts once more, with this newest snapshot.
+    pub const fn start(&mut self, snapshot: u64) {
+        self.count = if snapshot == self.snapshot { self.count.saturating_add(1) } else { 1 };
+        self.snapshot = snapshot;
+    }
+
+    /// Whether so many masters died of it that it is to be held.
+    pub const fn are_too_many(self, snapshot: u64) -> bool {
+        self.count >= Self::LIMIT && snapshot == self.snapshot
+    }
 }
 
 /// The state after a change.
@@ -35,13 +62,16 @@ pub enum Change {
 pub fn after(state: State, change: Change) -> Result<State, String> {
     match (state, change) {
         (State::Queued, Change::Start) => Ok(State::Running),
-        (State::Queued | State::Running, Change::Cancel) => Ok(State::Cancelled),
+        (State::Queued | State::Running | State::Held, Change::Cancel) => Ok(State::Cancelled),
         (State::Running, Change::Finish) => Ok(State::Done),
         (State::Running, Change::Fail) => Ok(State::Failed),
-        (State::Running, Change::Suspend) | (State::Failed, Change::Resume) => Ok(State::Queued),
+        (State::Running, Change::Suspend) | (State::Failed | State::Held, Change::Resume) => {
+            Ok(State::Queued)
+        }
+        (State::Queued | State::Running, Change::Hold) => Ok(State::Held),
         (State::Queued, Change::Finish | Change::Fail | Change::Suspend | Change::Resume)
         | (State::Running, Change::Start | Change::Resume)
-        | (State::Done | State::Failed | State::Cancelled, _) => {
+        | (State::Done | State::Failed | State::Held | State::Cancelled, _) => {
             Err(format!("a job that is {} cannot {change:?}", state.name()).to_lowercase())
         }
     }
@@ -64,6 +94,11 @@ pub struct Entry {
     pub folder: Option<PathBuf>,
     /// Of a job that was under way before: the workers it had. It goes on before all others.
     pub before: Option<Vec<String>>,
+    /// BLAKE3 of the deck, hexadecimal; empty where an earlier release queued it.
+    pub deck_sum: String,
+    pub starts: Starts,
+    /// A user has taken it back, which it has still to come to.
+    pub cancelled: bool,
 }
 
 /// All jobs, by number.
@@ -100,14 +135,30 @@ impl Queue {
             job.text = Arc::new(text);
             // Any workers will do.
             job.before = Some(Vec::new());
+            job.starts = Starts::default();
         }
         Ok(state)
     }
 
-    /// A job begins with these workers.
-    pub fn set_at_work(&mut self, id: u32, at_work: Vec<String>) {
+    /// A job begins with these workers, from this newest snapshot.
+    pub fn set_at_work(&mut self, id: u32, at_work: Vec<String>, snapshot: u64) {
         if let Some(job) = self.jobs.get_mut(&id) {
             job.before = Some(at_work);
+            job.starts.start(snapshot);
+        }
+    }
+
+    /// The session of a job ended in good order, whatever came of the job.
+    pub fn forget_starts(&mut self, id: u32) {
+        if let Some(job) = self.jobs.get_mut(&id) {
+            job.starts = Starts::default();
+        }
+    }
+
+    /// A user takes back a job under way.
+    pub fn set_cancelled(&mut self, id: u32, cancelled: bool) {
+        if let Some(job) = self.jobs.get_mut(&id) {
+            job.cancelled = cancelled;
         }
     }
 
@@ -130,7 +181,10 @@ impl Queue {
         self.next += 1;
         let folder = (!options.no_output).then(|| spool.join(format!("job-{id}")));
         let text = Arc::new(text);
-        self.jobs.insert(id, Entry { id, name, text, options, state: State::Queued, folder, before: None });
+        let deck_sum = sum_of(&text);
+        let (state, before, starts, cancelled) = (State::Queued, None, Starts::default(), false);
+        let entry = Entry { id, name, text, options, state, folder, before, deck_sum, starts, cancelled };
+        self.jobs.insert(id, entry);
         Ok(id)
     }
 
@@ -172,19 +226,32 @@ impl Queue {
 
 /// Whether nothing more can happen to a job.
 pub const fn is_over(state: State) -> bool {
-    matches!(state, State::Done | State::Failed | State::Cancelled)
+    matches!(state, State::Done | State::Failed | State::Held | State::Cancelled)
+}
+
+/// BLAKE3 of a deck, hexadecimal.
+pub fn sum_of(text: &str) -> String {
+    blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const STATES: [State; 5] = [State::Queued, State::Running, State::Done, State::Failed, State::Cancelled];
-    const CHANGES: [Change; 6] =
-        [Change::Start, Change::Finish, Change::Fail, Change::Cancel, Change::Suspend, Change::Resume];
+    const STATES: [State; 6] =
+        [State::Queued, State::Running, State::Done, State::Failed, State::Held, State::Cancelled];
+    const CHANGES: [Change; 7] = [
+        Change::Start,
+        Change::Finish,
+        Change::Fail,
+        Change::Cancel,
+        Change::Suspend,
+        Change::Resume,
+        Change::Hold,
+    ];
 
     #[test]
-    fn only_seven_changes_are_legal_and_none_leaves_an_end_but_that_of_a_failed_job() {
+    fn only_eleven_changes_are_legal_and_none_leaves_an_end_but_those_of_a_failed_or_held_job() {
         let mut legal = Vec::new();
         for state in STATES {
             for change in CHANGES {
@@ -194,17 +261,32 @@ mod tests {
                 }
             }
         }
-        use State::{Cancelled, Done, Failed, Queued, Running};
+        use State::{Cancelled, Done, Failed, Held, Queued, Running};
         let expected = [
             (Queued, Running),
             (Queued, Cancelled),
+            (Queued, Held),
             (Running, Done),
             (Running, Failed),
             (Running, Cancelled),
             (Running, Queued),
+            (Running, Held),
             (Failed, Queued),
+            (Held, Cancelled),
+            (Held, Queued),
         ];
         assert_eq!(legal, expected);
+    }
+
+    #[test]
+    fn three_starts_without_a_snapshot_between_are_too_many() {
+        let mut starts = Starts::default();
+        for snapshot in [0, 0, 4, 4] {
+            starts.start(snapshot);
+            assert!(!starts.are_too_many(snapshot), "{starts:?}");
+        }
+        starts.start(4);
+        assert!(starts.are_too_many(4) && !starts.are_too_many(5));
     }
 
     fn add(queue: &mut Queue) -> Result<u32, String> {

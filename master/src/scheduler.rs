@@ -28,8 +28,9 @@ use crate::{
     hosts::Hosts,
     http::board::Board,
     notice::Notice,
-    queue::{self, Change, Entry, Queue, is_over},
+    queue::{self, Change, Entry, Queue, Starts, is_over},
     service::{self, Order},
+    snapshot::store,
     spool::{Left, Record, Spool},
 };
 
@@ -39,6 +40,10 @@ use allotment::Allotment;
 
 /// The longest that an ending master waits until the jobs under way are stored.
 const END_LIMIT: Duration = Duration::from_secs(60);
+/// Between two looks of a job at the time that its workers take.
+const WAKE_EVERY: Duration = Duration::from_secs(1);
+/// The first and the longest pause of a queue whose host is short of something (s).
+const PAUSES: [u64; 2] = [2, 30];
 
 /// The owner of hosts and queue, and of all jobs under way.
 pub struct Scheduler {
@@ -57,6 +62,15 @@ pub struct Scheduler {
     running: BTreeMap<u32, Running>,
     /// What the page shows; none without a page.
     board: Option<Arc<Board>>,
+    /// Set while this host is short of what a job needs.
+    pause: Option<Pause>,
+}
+
+/// The queue waits: this host has no room, files or memory left. The job that met it is tried again and goes on where it was stored.
+struct Pause {
+    why: String,
+    until: Instant,
+    seconds: u64,
 }
 
 /// A job under way.
@@ -68,10 +82,14 @@ struct Running {
 }
 
 impl Running {
-    fn stop(&self) {
-        self.stop.store(true, Ordering::Relaxed);
-        // A full line keeps its thread awake anyway.
-        let _ = self.line.try_send(Input::Wake);
+    /// What ends it.
+    fn stopper(&self) -> impl FnOnce() + use<> {
+        let (stop, line) = (Arc::clone(&self.stop), self.line.clone());
+        move || {
+            stop.store(true, Ordering::Relaxed);
+            // A full line keeps its thread awake anyway.
+            let _ = line.try_send(Input::Wake);
+        }
     }
 }
 
@@ -96,6 +114,7 @@ impl Scheduler {
             status: BTreeMap::new(),
             running: BTreeMap::new(),
             board,
+            pause: None,
         };
         for why in &left.warnings {
             warn!("{why}");
@@ -108,7 +127,8 @@ impl Scheduler {
 
     /// A job of an earlier master; one that was under way goes on.
     fn restore(&mut self, record: Record, text: String) {
-        let Record { job, name, title, state, options, at_work, cycle, time, ended } = record;
+        let Record { job, name, title, state, options, at_work, cycle, time, ended, .. } = record.clone();
+        let Record { deck_sum, starts, cancelled, .. } = record;
         let interrupted = state == State::Running;
         let state = if interrupted { State::Queued } else { state };
         if !is_over(state) {
@@ -120,7 +140,26 @@ impl Scheduler {
         );
         let folder = (!options.no_output).then(|| self.spool.results(job));
         let before = interrupted.then_some(at_work);
-        self.queue.restore(Entry { id: job, name, text: Arc::new(text), options, state, folder, before });
+        let text = Arc::new(text);
+        let entry =
+            Entry { id: job, name, text, options, state, folder, before, deck_sum, starts, cancelled };
+        self.queue.restore(entry);
+        let verdict = if interrupted && cancelled {
+            Some((Change::Cancel, Ended::default()))
+        } else if interrupted && starts.are_too_many(store::newest(&self.spool.snapshots(job))) {
+            let failure = Some(format!(
+                "held: {} masters ended while they ran it, and none of them stored it anew; look at the memory of this host, then `bolide resume {job}`",
+                starts.count
+            ));
+            Some((Change::Hold, Ended { failure, ..Ended::default() }))
+        } else {
+            None
+        };
+        let Some((change, ended)) = verdict else { return };
+        warn!(job, "{}", ended.failure.as_deref().unwrap_or("it was cancelled before the master ended"));
+        if let Err(why) = self.change(job, change, Some(ended)) {
+            warn!(job, "{why}");
+        }
     }
 
     /// Puts on disk how a job stands, before anybody is told. One that was begun is called running until it is over.
@@ -139,6 +178,9 @@ impl Scheduler {
                 cycle: status.cycle,
                 time: status.time,
                 ended,
+                deck_sum: entry.deck_sum.clone(),
+                starts: entry.starts,
+                cancelled: entry.cancelled,
             }
         };
         // A few kilobytes; the job's own thread does not wait for it.
@@ -149,6 +191,7 @@ impl Scheduler {
     pub async fn run(mut self, mut heard: mpsc::Receiver<Notice>, stop: &AtomicBool, acceptor: &Acceptor) {
         let mut look = tokio::time::interval(Duration::from_millis(100));
         let (alive, mut said) = (notify::interval(), Instant::now());
+        let mut wake = tokio::time::interval(WAKE_EVERY);
         while !stop.load(Ordering::Relaxed) {
             tokio::select! {
                 notice = heard.recv() => if let Some(notice) = notice {
@@ -157,6 +200,7 @@ impl Scheduler {
                 },
                 // An interrupted job waits for its workers for a while.
                 _ = look.tick() => self.start_next(),
+                _ = wake.tick() => self.wake(),
             }
             // Here, so that a manager sees a scheduler that is stuck.
             if alive.is_some_and(|interval| said.elapsed() >= interval) {
@@ -178,10 +222,15 @@ impl Scheduler {
             tokio::spawn(async move { line.send(Input::Suspend).await.is_ok() });
         }
         let _ = tokio::time::timeout(END_LIMIT, async {
-            while !self.running.is_empty()
-                && let Some(notice) = heard.recv().await
-            {
-                self.hear(notice);
+            let mut wake = tokio::time::interval(WAKE_EVERY);
+            while !self.running.is_empty() {
+                tokio::select! {
+                    notice = heard.recv() => match notice {
+                        Some(notice) => self.hear(notice),
+                        None => return,
+                    },
+                    _ = wake.tick() => self.wake(),
+                }
             }
         })
         .await;
@@ -194,6 +243,22 @@ impl Scheduler {
             // A panic there would be a bug that the end of the process hides anyway.
             let _ = left.await;
         }
+    }
+
+    /// Lets the jobs under way look at the time that their workers take.
+    fn wake(&self) {
+        for running in self.running.values() {
+            // A full line keeps its thread awake anyway.
+            let _ = running.line.try_send(Input::Wake);
+        }
+    }
+
+    /// A job could not go on for want of something on this host.
+    fn pause(&mut self, job: u32, why: &str) {
+        let seconds = self.pause.as_ref().map_or(PAUSES[0], |pause| (2 * pause.seconds).min(PAUSES[1]));
+        warn!(job, "the queue pauses for {seconds} s: {why}");
+        let until = Instant::now() + Duration::from_secs(seconds);
+        self.pause = Some(Pause { why: why.to_owned(), until, seconds });
     }
 
     /// Changes the tables. A client that does not wait for its answer any more is none of our business.
@@ -240,10 +305,15 @@ impl Scheduler {
             Notice::Over(job, change, ended) => {
                 self.running.remove(&job);
                 self.hosts.release(job);
+                self.queue.forget_starts(job);
                 match &ended.failure {
+                    Some(why) if matches!(change, Change::Suspend) => self.pause(job, why),
                     _ if matches!(change, Change::Suspend) => {}
                     Some(why) => warn!(job, "job failed: {why}"),
-                    None => info!(job, digest = ended.digest, "job over"),
+                    None => {
+                        info!(job, digest = ended.digest, "job over");
+                        self.pause = None;
+                    }
                 }
                 if let Err(why) = self.change(job, change, Some(*ended)) {
                     warn!(job, "{why}");
@@ -290,6 +360,9 @@ impl Scheduler {
             cycle: 0,
             time: 0.0,
             ended: None,
+            deck_sum: self.queue.get(job).map(|entry| entry.deck_sum.clone()).unwrap_or_default(),
+            starts: Starts::default(),
+            cancelled: false,
         };
         let text = self.queue.get(job).map(|entry| Arc::clone(&entry.text)).unwrap_or_default();
         // Who is told that the job is queued finds it in the queue of the next master as well.
@@ -308,8 +381,14 @@ impl Scheduler {
     }
 
     fn cancel(&mut self, job: u32) -> Result<String, String> {
-        if let Some(running) = self.running.get(&job) {
-            running.stop();
+        if let Some(stop) = self.running.get(&job).map(Running::stopper) {
+            // Who is told so finds it cancelled after a death of this master as well.
+            self.queue.set_cancelled(job, true);
+            if let Err(why) = self.record(job, None) {
+                self.queue.set_cancelled(job, false);
+                return Err(format!("job {job} is not cancelled: {why}"));
+            }
+            stop();
             return Ok(format!("job {job} ends after its present cycle"));
         }
         self.change(job, Change::Cancel, Some(Ended::default()))?;
@@ -319,7 +398,8 @@ impl Scheduler {
     fn resume(&mut self, job: u32) -> Result<String, String> {
         let state = self.queue.get(job).ok_or_else(|| format!("no job {job}"))?.state;
         queue::after(state, Change::Resume)?;
-        let text = tokio::task::block_in_place(|| self.spool.text(job))?;
+        let sum = self.queue.get(job).map(|entry| entry.deck_sum.clone()).unwrap_or_default();
+        let text = tokio::task::block_in_place(|| self.spool.text(job, &sum)).map_err(|e| e.to_string())?;
         let state = self.queue.resume(job, text)?;
         self.record(job, None)?;
         if let Some(status) = self.status.get(&job) {
@@ -360,6 +440,9 @@ impl Scheduler {
     /// Starts the first job in the queue, if it may start on the workers that are idle.
     fn start_next(&mut self) {
         let Some(entry) = self.queue.first() else { return };
+        if let Some(pause) = self.pause.as_ref().filter(|pause| Instant::now() < pause.until) {
+            return self.wait_for(entry.id, format!("{}; tried again within {} s", pause.why, pause.seconds));
+        }
         let idle: Vec<&WorkerLink> =
             self.hosts.idle().filter_map(|host| self.worker_links.get(&host.incarnation)).collect();
         let names: Vec<&str> = idle.iter().map(|worker_link| worker_link.spec.name.as_str()).collect();
@@ -396,10 +479,11 @@ impl Scheduler {
             stop,
             status,
             board: self.board.clone(),
+            notices: self.notices.clone(),
         };
         self.hosts.occupy(&incarnations, job);
         self.running.insert(job, running);
-        self.queue.set_at_work(job, at_work);
+        self.queue.set_at_work(job, at_work, store::newest(&self.spool.snapshots(job)));
         info!(job, workers = incarnations.len(), "job starts");
         if let Err(why) = self.change(job, Change::Start, None) {
             warn!(job, "{why}");

@@ -25,6 +25,7 @@ use crate::{
     event::{Action, Deal, WorkerSpec},
     http::board::{self, Board, JobView},
     job::Job,
+    notice::Notice,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
     queue::Change,
@@ -61,6 +62,39 @@ pub struct Order {
     pub status: watch::Sender<Status>,
     /// What the page shows of runs, if there is a page.
     pub board: Option<Arc<Board>>,
+    /// The way to the scheduler.
+    pub notices: mpsc::Sender<Notice>,
+}
+
+/// Why a job does not go on.
+enum Failure {
+    /// It is to blame, or its deck, or its folder.
+    Job(String),
+    /// It is held: workers die of it.
+    Held(String),
+    /// This host is short of room, files or memory; the job waits for them.
+    Shortage(String),
+}
+
+impl From<String> for Failure {
+    fn from(reason: String) -> Self {
+        if is_shortage(&reason) { Self::Shortage(reason) } else { Self::Job(reason) }
+    }
+}
+
+impl From<drive::Error> for Failure {
+    fn from(error: drive::Error) -> Self {
+        match error {
+            drive::Error::Sink(reason) => reason.into(),
+            drive::Error::Deaths { .. } => Self::Held(error.to_string()),
+        }
+    }
+}
+
+/// Whether a reason ends in an error by which Linux says that it has none left of something: memory (12), files (23, 24), room on a
+/// disk (28, 122).
+fn is_shortage(reason: &str) -> bool {
+    [12, 23, 24, 28, 122].iter().any(|number| reason.contains(&format!("(os error {number})")))
 }
 
 /// Runs the job; gives how it ended. A bug becomes a failure of this job alone.
@@ -70,9 +104,16 @@ pub fn serve(order: &Order) -> (Change, Ended) {
         for worker_link in &order.worker_links {
             worker_link.sender().abort(protocol::Error::Message("a bug ended the job".into()));
         }
-        Err("a bug in the master; its log has the words".to_owned())
+        Err(Failure::Job("a bug in the master; its log has the words".to_owned()))
     });
-    result.unwrap_or_else(|reason| (Change::Fail, Ended { failure: Some(reason), ..Ended::default() }))
+    result.unwrap_or_else(|failure| {
+        let (change, reason) = match failure {
+            Failure::Job(reason) => (Change::Fail, reason),
+            Failure::Held(reason) => (Change::Hold, format!("held: {reason}")),
+            Failure::Shortage(reason) => (Change::Suspend, reason),
+        };
+        (change, Ended { failure: Some(reason), ..Ended::default() })
+    })
 }
 
 /// Whether an address is one of this machine: then it can be bound to.
@@ -97,10 +138,10 @@ fn share_with_sorts(model: &Model, specs: &mut [WorkerSpec], beside: &[bool]) {
     }
 }
 
-fn run(order: &Order) -> Result<(Change, Ended), String> {
+fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     let mut model = deck::read(&order.text, &order.name)
         .map_err(|faults| faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
-    bring_end_forward(&mut model, &order.options)?;
+    bring_end_forward(&mut model, &order.options).map_err(|e| Failure::Job(e.to_string()))?;
     let model = Arc::new(model);
     let mut specs: Vec<_> = order.worker_links.iter().map(|worker_link| worker_link.spec.clone()).collect();
     let beside: Vec<bool> =
@@ -114,14 +155,16 @@ fn run(order: &Order) -> Result<(Change, Ended), String> {
     let options = SessionOptions::of(&order.options, workers, all_take_peers);
     let options = SessionOptions { waits: true, keep, store: true, replay: true, ..options };
     if let Some(path) = order.folder.as_ref().filter(|path| path.is_symlink()) {
-        return Err(format!("{} is a link; results stay in the spool folder, remove it", path.display()));
+        let reason = format!("{} is a link; results stay in the spool folder, remove it", path.display());
+        return Err(Failure::Job(reason));
     }
     let (store, found) = Store::open(&order.snapshots)?;
     for why in &found.warnings {
         warn!(job = order.number, "{why}");
     }
     let states = found.snapshot.as_ref().map(|snapshot| snapshot.states.clone());
-    let (job, first) = Job::new(Arc::clone(&model), &specs, options, found.snapshot)?;
+    let (job, first) = Job::new(Arc::clone(&model), &specs, options, found.snapshot)
+        .map_err(|e| Failure::Job(e.to_string()))?;
     if order.at_work_before.is_some() {
         info!(job = order.number, cycle = job.start_state().cycle, "the job goes on");
     }
@@ -152,6 +195,7 @@ fn run(order: &Order) -> Result<(Change, Ended), String> {
         started,
         last: None,
         job_view: job_view.clone(),
+        notices: &order.notices,
     };
     let (outcome, traffic) =
         drive(job, first, order.number, &order.worker_links, line, &mut reporter, &order.stop)?;
@@ -210,6 +254,7 @@ struct Reporter<'a> {
     last: Option<Instant>,
     /// What the page shows.
     job_view: Option<Arc<Mutex<JobView>>>,
+    notices: &'a mpsc::Sender<Notice>,
 }
 
 impl Reporter<'_> {
@@ -246,6 +291,11 @@ impl Sink for Reporter<'_> {
         if let Some(job_view) = &self.job_view {
             board::lock(job_view).heard(worker, message);
         }
+    }
+
+    fn suspect(&mut self, incarnation: u32, note: Option<String>) {
+        // A scheduler that has more to hear than it can shows the note of a later look.
+        let _ = self.notices.try_send(Notice::Suspect { incarnation, note });
     }
 
     fn take(&mut self, action: Action) -> Result<(), String> {

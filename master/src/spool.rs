@@ -4,16 +4,22 @@
 //! SPOOL/lock                      held by the master that uses the folder
 //! SPOOL/job-7/                    results of job 7
 //! SPOOL/queue/job-7.json          its record: state, options, how it ended
+//! SPOOL/queue/job-7.json.copy     the same, for when the record is damaged
 //! SPOOL/queue/job-7.toml          its deck, until it is done or cancelled
 //! SPOOL/queue/job-7.snapshots/    where it can be gone on with, until then
 //! ```
 //!
 //! A record is replaced whole and synchronised at every change of state, before anybody is told of the change. A job that a
 //! record calls running, with no master to run it, was interrupted: it is the first to go on.
+//!
+//! A record stands behind its checksum and names that of its deck. A damaged record is read from its copy; a job whose deck is damaged
+//! fails with that reason instead of computing another problem.
 
 use std::{
+    collections::BTreeSet,
     fs::{self, File, TryLockError},
     io,
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
 
@@ -23,13 +29,17 @@ use protocol::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::snapshot::store::{self, write_durably};
+use crate::{
+    queue::{Starts, sum_of},
+    snapshot::store::{self, write_durably},
+};
 
 /// Longest record (bytes): a summary lists every worker.
 const RECORD_LIMIT: u64 = 64 << 20;
 
 /// What is on disk of a job beside its deck.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Record {
     /// Its number.
     pub job: u32,
@@ -49,6 +59,54 @@ pub struct Record {
     /// Time reached (deck's unit), where it is over.
     pub time: f64,
     pub ended: Option<Ended>,
+    /// BLAKE3 of the deck, hexadecimal; empty where an earlier release queued the job.
+    #[serde(default)]
+    pub deck_sum: String,
+    #[serde(default)]
+    pub starts: Starts,
+    /// A user has taken it back, which it has still to come to.
+    #[serde(default)]
+    pub cancelled: bool,
+}
+
+/// A record as it stands on disk.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sealed {
+    /// BLAKE3 of the record as compact JSON, hexadecimal.
+    sum: String,
+    record: Record,
+}
+
+/// What is wrong with a file of the spool.
+#[derive(Debug)]
+pub enum Fault {
+    /// It cannot be read.
+    Io(PathBuf, io::Error),
+    /// It is longer than any such file.
+    Long(PathBuf, u64),
+    /// It is no record.
+    Form(PathBuf, serde_json::Error),
+    /// Its bytes do not match their checksum.
+    Sum { path: PathBuf, stated: String, computed: String },
+    /// It is the record of another job.
+    Job(PathBuf, u32),
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Io(path, error) => write!(f, "{}: {error}", path.display()),
+            Self::Long(path, length) => {
+                write!(f, "{}: {length} bytes, at most {RECORD_LIMIT}", path.display())
+            }
+            Self::Form(path, error) => write!(f, "{}: {error}", path.display()),
+            Self::Sum { path, stated, computed } => {
+                write!(f, "{}: damaged: its checksum is {stated}, its bytes give {computed}", path.display())
+            }
+            Self::Job(path, job) => write!(f, "{}: it is of job {job}", path.display()),
+        }
+    }
 }
 
 /// The folder of a master.
@@ -79,6 +137,8 @@ impl Spool {
         let fault = |e: io::Error| format!("spool folder {}: {e}", folder.display());
         let queue = folder.join("queue");
         fs::create_dir_all(&queue).map_err(fault)?;
+        // An earlier release left it open to all.
+        fs::set_permissions(&queue, fs::Permissions::from_mode(0o700)).map_err(fault)?;
         let lock = File::create(folder.join("lock")).map_err(fault)?;
         match lock.try_lock() {
             Ok(()) => {}
@@ -92,6 +152,7 @@ impl Spool {
         }
         let spool = Self { folder: folder.to_owned(), _lock: lock };
         let mut left = Left { first: 1, ..Left::default() };
+        let mut records = BTreeSet::new();
         for folder in [folder, &queue] {
             for entry in fs::read_dir(folder).map_err(fault)? {
                 let name = entry.map_err(fault)?.file_name();
@@ -99,44 +160,54 @@ impl Spool {
                 let digits = digits.map(|rest| rest.split('.').next().unwrap_or(rest));
                 let Some(number) = digits.and_then(|digits| digits.parse::<u32>().ok()) else { continue };
                 left.first = left.first.max(number.saturating_add(1));
-                if name.to_str().is_some_and(|name| name.ends_with(".json")) {
-                    match spool.read(number) {
-                        Ok(job) => left.jobs.push(job),
-                        Err(why) => left.warnings.push(format!("{why}; the job is left out")),
-                    }
+                if name.to_str().is_some_and(|name| name.ends_with(".json") || name.ends_with(".json.copy")) {
+                    records.insert(number);
                 }
             }
         }
-        left.jobs.sort_by_key(|(record, _)| record.job);
+        for number in records {
+            spool.scrub(number, &mut left);
+        }
         Ok((spool, left))
     }
 
-    fn read(&self, job: u32) -> Result<(Record, String), String> {
-        let path = self.record(job);
-        let fault = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
-        let length = fs::metadata(&path).map_err(|e| fault(&e))?.len();
-        if length > RECORD_LIMIT {
-            return Err(fault(&format_args!("{length} bytes, at most {RECORD_LIMIT}")));
-        }
-        let bytes = fs::read(&path).map_err(|e| fault(&e))?;
-        let record: Record = serde_json::from_slice(&bytes).map_err(|e| fault(&e))?;
-        if record.job != job {
-            return Err(fault(&format_args!("it is of job {}", record.job)));
-        }
+    /// Reads a job, mends what has a copy and says what was damaged.
+    fn scrub(&self, job: u32, left: &mut Left) {
+        let mut record = match read_record(&self.record(job), job) {
+            Ok(record) => record,
+            Err(damage) => match read_record(&self.copy(job), job) {
+                Ok(record) => {
+                    left.warnings.push(format!("{damage}; its copy is used"));
+                    record
+                }
+                Err(copy) => return left.warnings.push(format!("{damage}; {copy}; the job is left out")),
+            },
+        };
         let text = match record.ended {
             Some(_) => String::new(),
-            None => self.text(job)?,
+            None => self.text(job, &record.deck_sum).unwrap_or_else(|damage| {
+                let failure = Some(format!("{damage}; submit the job again"));
+                left.warnings.push(format!("{damage}; job {job} fails"));
+                record.state = State::Failed;
+                record.ended = Some(Ended { failure, ..Ended::default() });
+                String::new()
+            }),
         };
-        Ok((record, text))
+        left.jobs.push((record, text));
     }
 
-    /// The deck of a job that is not done or cancelled.
+    /// The deck of a job that is not done or cancelled, which has this checksum; an empty one matches all.
     ///
     /// # Errors
-    /// If it cannot be read.
-    pub fn text(&self, job: u32) -> Result<String, String> {
+    /// If it cannot be read or is another.
+    pub fn text(&self, job: u32, stated: &str) -> Result<String, Fault> {
         let path = self.deck(job);
-        fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
+        let text = fs::read_to_string(&path).map_err(|e| Fault::Io(path.clone(), e))?;
+        let computed = sum_of(&text);
+        if stated.is_empty() || stated == computed {
+            return Ok(text);
+        }
+        Err(Fault::Sum { path, stated: stated.to_owned(), computed })
     }
 
     /// Where results of a job go.
@@ -151,6 +222,10 @@ impl Spool {
 
     fn record(&self, job: u32) -> PathBuf {
         self.queue(job, "json")
+    }
+
+    fn copy(&self, job: u32) -> PathBuf {
+        self.queue(job, "json.copy")
     }
 
     fn deck(&self, job: u32) -> PathBuf {
@@ -176,9 +251,12 @@ impl Spool {
     /// # Errors
     /// What the disk refused; the former record then stays.
     pub fn change(&self, record: &Record) -> Result<(), String> {
-        let path = self.record(record.job);
-        let text = serde_json::to_string_pretty(record).map_err(|e| e.to_string())?;
-        write_durably(&path, text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
+        let sum = sum_of(&serde_json::to_string(record).map_err(|e| e.to_string())?);
+        let sealed = Sealed { sum, record: record.clone() };
+        let text = serde_json::to_string_pretty(&sealed).map_err(|e| e.to_string())?;
+        for path in [self.record(record.job), self.copy(record.job)] {
+            write_durably(&path, text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
+        }
         if matches!(record.state, State::Done | State::Cancelled) {
             // What cannot be removed takes room and harms nobody.
             let _ = fs::remove_file(self.deck(record.job));
@@ -191,7 +269,89 @@ impl Spool {
     pub fn forget(&self, job: u32) {
         // As above.
         let _ = fs::remove_file(self.record(job));
+        let _ = fs::remove_file(self.copy(job));
         let _ = fs::remove_file(self.deck(job));
         let _ = store::remove(&self.snapshots(job));
+    }
+}
+
+/// Reads the record of a job; one of an earlier release has no checksum.
+fn read_record(path: &Path, job: u32) -> Result<Record, Fault> {
+    let io = |e| Fault::Io(path.to_owned(), e);
+    let form = |e| Fault::Form(path.to_owned(), e);
+    let length = fs::metadata(path).map_err(io)?.len();
+    if length > RECORD_LIMIT {
+        return Err(Fault::Long(path.to_owned(), length));
+    }
+    let bytes = fs::read(path).map_err(io)?;
+    let record = match serde_json::from_slice::<Record>(&bytes) {
+        Ok(record) => record,
+        Err(_) => {
+            let Sealed { sum: stated, record } = serde_json::from_slice(&bytes).map_err(form)?;
+            let computed = sum_of(&serde_json::to_string(&record).map_err(form)?);
+            if stated != computed {
+                return Err(Fault::Sum { path: path.to_owned(), stated, computed });
+            }
+            record
+        }
+    };
+    if record.job == job { Ok(record) } else { Err(Fault::Job(path.to_owned(), record.job)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(job: u32) -> Record {
+        Record {
+            job,
+            name: "deck.toml".into(),
+            title: "plates".into(),
+            state: State::Running,
+            options: JobOptions::default(),
+            at_work: vec!["a".into(), "b".into()],
+            cycle: 12,
+            time: 0.1 + 0.2,
+            ended: None,
+            deck_sum: sum_of("a deck"),
+            starts: Starts { count: 1, snapshot: 3 },
+            cancelled: false,
+        }
+    }
+
+    #[test]
+    fn a_flipped_bit_anywhere_in_a_record_is_mended_from_its_copy() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (spool, _) = Spool::open(folder.path()).expect("new");
+        spool.add(&record(7), "a deck").expect("room");
+        let path = spool.record(7);
+        drop(spool);
+        let whole = fs::read(&path).expect("written");
+        for at in 0..whole.len() {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 1 << (at % 8);
+            fs::write(&path, damaged).expect("room");
+            let (_, left) = Spool::open(folder.path()).expect("readable");
+            assert_eq!(left.jobs, [(record(7), "a deck".to_owned())], "byte {at}: {:?}", left.warnings);
+        }
+        fs::remove_file(&path).expect("it is there");
+        let (_, left) = Spool::open(folder.path()).expect("readable");
+        assert_eq!((left.jobs.len(), left.warnings.len()), (1, 1), "{:?}", left.warnings);
+    }
+
+    #[test]
+    fn a_job_with_a_damaged_deck_fails_with_the_reason_and_the_others_stay() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (spool, _) = Spool::open(folder.path()).expect("new");
+        spool.add(&record(7), "a deck").expect("room");
+        spool.add(&record(8), "a deck").expect("room");
+        fs::write(spool.deck(7), "a dock").expect("room");
+        assert!(spool.text(7, &sum_of("a deck")).is_err());
+        drop(spool);
+        let (_, left) = Spool::open(folder.path()).expect("readable");
+        let states: Vec<_> = left.jobs.iter().map(|(record, _)| (record.job, record.state)).collect();
+        assert_eq!(states, [(7, State::Failed), (8, State::Running)]);
+        let failure = left.jobs[0].0.ended.as_ref().and_then(|ended| ended.failure.clone());
+        assert!(failure.is_some_and(|why| why.contains("job-7.toml: damaged")), "{:?}", left.warnings);
     }
 }

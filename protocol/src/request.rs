@@ -103,6 +103,8 @@ pub enum State {
     Done,
     /// Something went wrong.
     Failed,
+    /// It was interrupted by deaths of master or workers again and again; a user may resume it.
+    Held,
     /// A user took it back; what it had computed is kept.
     Cancelled,
 }
@@ -115,6 +117,7 @@ impl State {
             Self::Running => "running",
             Self::Done => "done",
             Self::Failed => "failed",
+            Self::Held => "held",
             Self::Cancelled => "cancelled",
         }
     }

@@ -165,7 +165,7 @@ fn tint(state: &str) -> Tint {
     match state {
         "running" | "busy" => Tint::Cyan,
         "done" | "idle" => Tint::Green,
-        "failed" | "lost" => Tint::Red,
+        "failed" | "held" | "lost" => Tint::Red,
         _ => Tint::Yellow,
     }
 }

@@ -19,8 +19,14 @@ pub async fn text(State(api_state): State<ApiState>) -> impl IntoResponse {
 fn render(api_state: &ApiState, jobs: &[Status], hosts: &[HostRow]) -> String {
     let mut out = String::new();
     family(&mut out, "bolide_jobs", "gauge", "Jobs by state.");
-    for state in [JobState::Queued, JobState::Running, JobState::Done, JobState::Failed, JobState::Cancelled]
-    {
+    for state in [
+        JobState::Queued,
+        JobState::Running,
+        JobState::Done,
+        JobState::Failed,
+        JobState::Held,
+        JobState::Cancelled,
+    ] {
         let count = jobs.iter().filter(|job| job.state == state).count();
         sample(&mut out, "bolide_jobs", &[("state", state.name())], count as f64);
     }

@@ -66,6 +66,9 @@ mod tests {
             state: State::Queued,
             folder: None,
             before: before.map(|names| names.iter().map(|name| (*name).to_owned()).collect()),
+            deck_sum: String::new(),
+            starts: crate::queue::Starts::default(),
+            cancelled: false,
         }
     }
 
