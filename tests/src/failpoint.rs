@@ -85,6 +85,12 @@ pub fn compute(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
         Task::Sample { .. } => "die-in-sample",
     };
     die(name);
+    if matches!(task, Task::Load { .. }) && passes("stick-in-load") || in_cycle("stick", cycle) {
+        // The link lives on in threads of its own.
+        loop {
+            std::thread::park();
+        }
+    }
     if let Task::Border { gather: true, .. } | Task::Install { gather: true, .. } = &task {
         die("die-in-gather");
     }

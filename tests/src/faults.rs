@@ -22,6 +22,7 @@ use crate::{
 pub mod disks;
 pub mod links;
 pub mod masters;
+pub mod stuck;
 pub mod trust;
 pub mod workers;
 
@@ -72,7 +73,8 @@ pub struct Row {
 
 /// All faults, in the order of the table.
 pub fn cases() -> Vec<Case> {
-    let lists = [workers::cases(), masters::cases(), links::cases(), disks::cases(), trust::cases()];
+    let lists =
+        [workers::cases(), masters::cases(), links::cases(), disks::cases(), stuck::cases(), trust::cases()];
     lists.into_iter().flatten().collect()
 }
 
@@ -133,6 +135,12 @@ impl Scene {
             ["submit", "--wait", "--cycles", &cycles, "--min-workers", "3", "--snapshot-every", "0.2", &deck];
         let submitted = Process::start("submit", &mut cluster.command("client", &arguments));
         Running { cluster, _submitted: submitted }
+    }
+
+    /// A cluster whose job was submitted by a client that has left: one that follows it takes its place.
+    pub fn watch(&self, cluster: Cluster) -> Running {
+        let watching = Process::start("watch", &mut cluster.command("client", &["watch", "1"]));
+        Running { cluster, _submitted: watching }
     }
 
     /// Waits for the end of the job and compares what it left.

@@ -79,22 +79,22 @@ pub fn cases() -> Vec<Case> {
     ]
 }
 
-fn skipped() -> Seen {
+pub(super) fn skipped() -> Seen {
     Seen { note: "skipped: only root may mount a small file system".into(), ..Seen::default() }
 }
 
 /// A file system in memory, gone with this value.
-struct Disk(PathBuf);
+pub(super) struct Disk(PathBuf);
 
 impl Disk {
-    fn mount(folder: &Path, size: &str) -> Option<Self> {
+    pub(super) fn mount(folder: &Path, size: &str) -> Option<Self> {
         let mut command = Command::new("mount");
         command.args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(folder);
         command.output().is_ok_and(|o| o.status.success()).then(|| Self(folder.to_owned()))
     }
 
     /// The same with more room; unmounted with the folder that it is in.
-    fn grow(&self, size: &str) -> std::process::Output {
+    pub(super) fn grow(&self, size: &str) -> std::process::Output {
         let mut command = Command::new("mount");
         command.args(["-o", &format!("remount,size={size}")]).arg(&self.0);
         command.output().expect("mount is there")
