@@ -14,7 +14,7 @@ pub fn raise_limit() -> usize {
     if limit.current.is_some_and(|current| current < raised) {
         let before = limit.current;
         limit.current = Some(raised);
-        if setrlimit(Resource::Nofile, limit.clone()).is_err() {
+        if setrlimit(Resource::Nofile, limit).is_err() {
             limit.current = before;
         }
     }
