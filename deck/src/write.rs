@@ -8,7 +8,7 @@ mod value;
 
 use crate::typed::{
     Control, Deck, Gauge, Kind, Output, Spot,
-    contact::{Contact, Gap, Slack, TIE_TOLERANCE},
+    contact::{Contact, Gap, Slack},
 };
 use value::{Text, list, names, quoted, vector};
 

@@ -36,7 +36,10 @@ fn tied_contact_ties_the_nodes_of_the_first_side_to_faces_of_the_second() {
     }
     let faults = deck::read(&deck_of(1.0, "*CONTACT_TIED_NODES_TO_SURFACE\n2,1,3,3\n\n\n"), "a.k");
     let faults = faults.expect_err("they are apart");
-    assert!(faults.iter().any(|fault| fault.to_string().contains("none of which lies on a face")), "{faults:?}");
+    assert!(
+        faults.iter().any(|fault| fault.to_string().contains("none of which lies on a face")),
+        "{faults:?}"
+    );
 }
 
 #[test]

@@ -136,7 +136,10 @@ fn shape(state: &GlobalState) -> (Vec<usize>, Vec<usize>) {
     let of_history = history.iter().flat_map(|part| {
         [part.part as usize, part.first as usize].into_iter().chain(part.columns.iter().map(Vec::len))
     });
-    (fixed.into_iter().chain(elements.iter().chain(contact).map(Vec::len)).collect(), of_shells.chain(of_history).collect())
+    (
+        fixed.into_iter().chain(elements.iter().chain(contact).map(Vec::len)).collect(),
+        of_shells.chain(of_history).collect(),
+    )
 }
 
 /// A checkpoint of which parts have come.

@@ -51,7 +51,8 @@ pub(super) fn a_block_on_an_incline_rests_or_slides_after_coulomb(figures: &mut 
         let solved = run(model(&incline(degrees)));
         let mean = |from: f64| solved.gauge_mean(0, from, from + 1.0, |gauge| gauge.v[0]);
         if degrees < FRICTION.atan().to_degrees() {
-            let place = |time: f64| solved.gauge(0).find(|(at, _)| *at >= time).map_or(f64::NAN, |(_, row)| row.x[0]);
+            let place =
+                |time: f64| solved.gauge(0).find(|(at, _)| *at >= time).map_or(f64::NAN, |(_, row)| row.x[0]);
             figures.add(&format!("incline at rest @ {degrees} degrees, creep"), place(9.9) - place(8.9));
         } else {
             let ours = (mean(9.0) - mean(5.0)) / 4.0;

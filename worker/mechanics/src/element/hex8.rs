@@ -330,8 +330,17 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive, [one; 2]);
         end = End::of(&x, initial_volume);
     }
-    let Stressed { stress, power: deviatoric_power, history, plastic_before, strain, damage, failed, left, memory } =
-        stressed;
+    let Stressed {
+        stress,
+        power: deviatoric_power,
+        history,
+        plastic_before,
+        strain,
+        damage,
+        failed,
+        left,
+        memory,
+    } = stressed;
     let End {
         gradient: at_end,
         spread,

@@ -249,11 +249,17 @@ impl Group for Trusses {
             initial_volume: self.initial_volume.clone(),
             fields: self.fields.clone(),
             own: Vec::new(),
+            history: Vec::new(),
         }
     }
 
     fn into_image(self: Box<Self>, _x: &[Vec<f64>; 3]) -> ElementArrays {
-        ElementArrays { initial_volume: self.initial_volume, fields: self.fields, own: Vec::new() }
+        ElementArrays {
+            initial_volume: self.initial_volume,
+            fields: self.fields,
+            own: Vec::new(),
+            history: Vec::new(),
+        }
     }
 
     fn visit(&self, visit: &mut dyn FnMut(f64)) {

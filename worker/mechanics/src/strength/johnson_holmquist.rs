@@ -225,7 +225,10 @@ mod tests {
             fields: std::array::from_fn(|k| vec![if k == field::RELATIVE_VOLUME { 1.0 } else { 0.0 }]),
             erosion: None,
             history: vec![vec![0.0]; 2],
+            contact: Vec::new(),
             shells: ShellState::default(),
+            own: Vec::new(),
+            hourglass: crate::element::hourglass::Hourglass::NONE,
         })
     }
 
@@ -283,7 +286,6 @@ mod tests {
             dt: STEP,
             linear_viscosity: 0.0,
             quadratic_viscosity: 0.0,
-            hourglass: 0.0,
             force_quantum: Quantum::for_reference(1e12, 42),
             energy_quantum: Quantum::for_reference(1e12, 40),
             arm: 1.0,
