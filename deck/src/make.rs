@@ -78,8 +78,12 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let control = control?;
     let settings = contact.map(|contact| {
         let settings = contact.settings;
-        let steps =
-            initial::closing_steps(&assembly.mesh, &materials, &bodies, control.safety_factor, &settings);
+        // After a fault a part may have no material.
+        let steps = if log.count() == 0 {
+            initial::closing_steps(&assembly.mesh, &materials, &bodies, control.safety_factor, &settings)
+        } else {
+            Vec::new()
+        };
         Settings { erodes: erosion.is_on(), steps, ..settings }
     });
     Some(Model {
