@@ -435,7 +435,8 @@ impl Job {
         self.epoch.inflow.check(worker, cycle, &frame, &exchange)?;
         // Workers look at their forces before they send them; a master does not rely on it.
         let looked_at: &[f64] = if self.options.replay { &frame.partials } else { &[] };
-        if let Some(what) = not_a_number(frame.vote.as_deref(), looked_at) {
+        let n_parts = self.problem.model.mesh.parts.len();
+        if let Some(what) = not_a_number(frame.vote.as_deref(), looked_at, n_parts) {
             return self.blame(worker, cycle, &what, actions);
         }
         match self.epoch.inflow.add(worker, cycle, frame, &exchange)? {

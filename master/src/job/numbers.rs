@@ -1,10 +1,20 @@
-//! Whether what a worker sends are numbers.
+//! Whether what a worker sends are numbers, and of parts that there are.
 
 use mechanics::vote::Vote;
 
-/// What of a worker's frame is no number. A run that has blown up says so by the forces of its vote.
-pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64]) -> Option<String> {
+/// What of a worker's frame is no number, or of a part beyond `n_parts`. A run that has blown up says so by the forces of its vote.
+pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64], n_parts: usize) -> Option<String> {
     if let Some(vote) = vote {
+        let pairs = vote
+            .contact_energies
+            .pairs()
+            .iter()
+            .chain(vote.released.iter().flat_map(|released| released.pairs()));
+        if let Some(pair) =
+            pairs.map(|pair| pair.parts).find(|parts| parts.iter().any(|&part| part as usize >= n_parts))
+        {
+            return Some(format!("parts {pair:?} in contact in its vote, of {n_parts} parts"));
+        }
         if !vote.force_bound.is_finite() && !vote.force_bound.is_nan() {
             return None;
         }
