@@ -12,6 +12,7 @@ const SERIES = [
   { key: 'hourglass', name: 'hourglass', colour: '--c2', dash: [2, 3] },
   { key: 'contact', name: 'contact and friction', colour: '--c3', dash: [6, 3] },
   { key: 'eroded', name: 'eroded', colour: '--c5', dash: [10, 4] },
+  { key: 'wall_loss', name: 'lost at walls', colour: '--c6', dash: [3, 6] },
   { key: 'total', name: 'sum', colour: '--c4', dash: [9, 3, 2, 3] },
 ];
 const FIELD_NAMES = { von_mises: 'von Mises stress', plastic_strain: 'plastic strain', temperature: 'temperature (K)' };
@@ -146,8 +147,8 @@ function fields() {
 function panels() {
   const { energies, imbalance, units, workers, phases } = page.sheet;
   const latest = energies.at(-1);
-  // All shares of the sum; where nothing erodes one is zero throughout.
-  const series = SERIES.filter(s => s.key !== 'eroded' || energies.some(p => p.eroded));
+  // All shares of the sum; where nothing erodes or strikes a wall one is zero throughout.
+  const series = SERIES.filter(s => !['eroded', 'wall_loss'].includes(s.key) || energies.some(p => p[s.key]));
   curves.draw($('energies'), {
     x: energies.map(p => p.time), xName: `time (${units.time})`, yName: units.energy,
     series: series.map(s => ({ ...s, y: energies.map(p => p[s.key]) })),

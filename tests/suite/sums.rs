@@ -83,7 +83,14 @@ fn energies_add_up_wherever_they_are_shown() {
             let parts: Vec<f64> = columns.iter().map(|column| column[row]).collect();
             adds_up(&parts, total, 1e-6, "history");
             let point = Point::from(&solved.rows[row]);
-            let parts = [point.kinetic, point.internal, point.hourglass, point.contact, point.eroded];
+            let parts = [
+                point.kinetic,
+                point.internal,
+                point.hourglass,
+                point.contact,
+                point.eroded,
+                point.wall_loss,
+            ];
             adds_up(&parts, point.total, 1e-6, "page");
         }
         report::write(&out, &Summary::default(), &solved.model.units).expect("a report");
@@ -115,7 +122,7 @@ fn the_page_shows_every_share_of_the_sum() {
     let script = include_str!("../../master/page/main.js");
     let from = script.find("const SERIES = [").expect("the series");
     let series = &script[from..from + script[from..].find("];").expect("their end")];
-    for key in ["kinetic", "internal", "hourglass", "contact", "eroded", "total"] {
+    for key in ["kinetic", "internal", "hourglass", "contact", "eroded", "wall_loss", "total"] {
         assert!(series.contains(&format!("key: '{key}'")), "{key} is no curve of the page");
     }
 }

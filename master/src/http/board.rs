@@ -80,6 +80,8 @@ pub struct Point {
     pub contact: f64,
     /// Energy that left with eroded elements.
     pub eroded: f64,
+    /// Energy lost at walls.
+    pub wall_loss: f64,
     /// Their sum.
     pub total: f64,
 }
@@ -94,6 +96,7 @@ impl From<&HistoryRow> for Point {
             hourglass: row.hourglass,
             contact: row.contact + row.friction,
             eroded: row.eroded,
+            wall_loss: row.wall_loss,
             total: row.total,
         }
     }
