@@ -230,42 +230,6 @@ fn small_plates_that_slide_and_bounce_have_the_same_bits_for_longer() {
 }
 
 #[test]
-fn tied_blocks_that_are_struck_have_the_same_bits_and_after_losses_too() {
-    let model = model(
-        r#"
-        title = "tied blocks"
-        units = "cm-g-us"
-        [control]
-        end_cycle = 200
-        end_time = 1e3
-        [[part]]
-        name = "below"
-        material = "AL_2024_T351"
-        box = { origin = [0, 0, 0], size = [9, 8, 4], cells = [6, 5, 3] }
-        [[part]]
-        name = "above"
-        material = "STEEL_1006"
-        box = { origin = [1.3, 0.7, 4], size = [6, 6, 2], cells = [7, 6, 2] }
-        [[part]]
-        name = "striker"
-        material = "STEEL_1006"
-        velocity = [0.02, 0.01, -0.05]
-        box = { origin = [2, 1, 6.15], size = [4, 4, 3], cells = [4, 4, 3] }
-        [contact]
-        gap_length = 0.1
-        [[contact.tie]]
-        nodes = "above"
-        faces = "below"
-        [output]
-        history_cycles = 1
-        "#,
-    );
-    assert_eq!(model.setup.contact.as_ref().map(|contact| contact.ties.len()), Some(56));
-    same_bits(&model);
-    losing_a_worker_changes_no_bit(&model);
-}
-
-#[test]
 fn joined_parts_on_a_wall_have_the_same_bits() {
     same_bits(&model(
         r#"
