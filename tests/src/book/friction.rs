@@ -55,7 +55,9 @@ pub(super) fn a_block_on_an_incline_rests_or_slides_after_coulomb(figures: &mut 
                 |time: f64| solved.gauge(0).find(|(at, _)| *at >= time).map_or(f64::NAN, |(_, row)| row.x[0]);
             figures.add(&format!("incline at rest @ {degrees} degrees, creep"), place(9.9) - place(8.9));
         } else {
-            let ours = (mean(9.0) - mean(5.0)) / 4.0;
+            // The speed wavers by 0.015 mm/ms as the front edge of the block passes the nodes of the plate: the longer the stretch, the
+            // less of that is in its mean. The landing takes the first two milliseconds.
+            let ours = (mean(9.0) - mean(2.0)) / 7.0;
             let (sine, cosine) = degrees.to_radians().sin_cos();
             let exact = PULL * FRICTION.mul_add(-cosine, sine);
             figures.add(&format!("incline that slides @ {degrees} degrees, acceleration"), ours / exact);
