@@ -2,6 +2,9 @@
 //!
 //! The whole matrix, with worker processes, is the program `bits` of this package.
 
+mod edges;
+mod shells;
+
 use std::sync::Arc;
 
 use mechanics::{
@@ -476,98 +479,6 @@ fn nodes_that_a_wall_names_have_the_same_bits_and_the_others_pass() {
     assert!(lowest(true) > -1e-12 && lowest(false) < -0.1, "{} {}", lowest(true), lowest(false));
 }
 
-/// A tube of shells on a wall, a ball inside that its sides stop, a lid that falls on it, and a bar that the lid carries on a
-/// hinge along its edge.
-fn shells_and_solids() -> Model {
-    model(
-        r#"
-        title = "shells and solids"
-        units = "SI"
-        [control]
-        end_time = 1
-        end_cycle = 500
-        [[material]]
-        name = "steel"
-        density = 7830
-        eos = { type = "linear", bulk = 175e9 }
-        strength = { type = "von-mises", shear = 80e9, yield_stress = 250e6, hardening = 500e6, cowper_symonds = { reference = 40.4, exponent = 5 } }
-        [[part]]
-        name = "bar"
-        material = "steel"
-        velocity = [0, 0, -20]
-        box = { origin = [0.045, -0.045, 0.034], size = [0.01, 0.09, 0.01], cells = [1, 9, 1] }
-        [[part]]
-        name = "tube"
-        material = "steel"
-        velocity = [0, 0, -20]
-        shell = { thickness = 1.2e-3 }
-        prism = { axis = "z", base = [0, 0, 1e-4], radius = 0.0424, length = 0.04, sides = 4, cells = [40, 8] }
-        [[part]]
-        name = "ball"
-        material = "steel"
-        velocity = [60, 5, -20]
-        sphere = { centre = [0.012, 0, 0.023], radius = 0.015, sector = "full", cells = [1, 1] }
-        [[part]]
-        name = "lid"
-        material = "steel"
-        velocity = [0, 0, -30]
-        shell = { thickness = 2e-3, points = 5, rule = "lobatto" }
-        plate = { origin = [-0.045, -0.045, 0.044], side_i = [0.09, 0, 0], side_j = [0, 0.09, 0], cells = [9, 9] }
-        [[join]]
-        parts = ["bar", "lid"]
-        [[wall]]
-        point = [0, 0, 0]
-        normal = [0, 0, 1]
-        friction = 0.2
-        [[boundary]]
-        type = "fixed"
-        parts = ["lid"]
-        face = "i-min"
-        axes = ""
-        rotations = "y"
-        [contact]
-        gap_length = 0.6e-3
-        self_interaction = "all"
-        friction = 0.1
-        [output]
-        history_cycles = 1
-        [[gauge]]
-        name = "rim"
-        part = "lid"
-        point = [0.045, 0, 0.044]
-        "#,
-    )
-}
-
-#[test]
-fn shells_and_solids_in_contact_have_the_same_bits_on_both_routes() {
-    let model = shells_and_solids();
-    same_bits(&model);
-    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
-    let row = alone.rows.last().expect("rows");
-    assert!(row.error.abs() < 0.02, "energy error {}", row.error);
-    // Shells turn, layers yield, and bodies of both kinds meet: without the ball the bits are others.
-    assert!(alone.state.shells.spin.iter().flatten().any(|w| w.abs() > 1.0));
-    let one = Fingerprint::of(&alone);
-    same_bits_on_route_direct(&model, &one);
-    for pair in [[1, 2], [1, 3]] {
-        let mut other = model.clone();
-        let contact = other.setup.contact.as_mut().expect("the deck has contact");
-        let n = other.mesh.parts.len();
-        for [a, b] in [pair, [pair[1], pair[0]]] {
-            contact.interacts[a * n + b] = false;
-        }
-        assert_ne!(fingerprint(&other, Workers::default()).digest, one.digest, "parts {pair:?} never meet");
-    }
-}
-
-#[test]
-fn a_worker_of_shells_that_is_lost_changes_no_bit() {
-    let mut model = shells_and_solids();
-    model.setup.control.end_cycle = 120;
-    losing_a_worker_changes_no_bit(&model);
-}
-
 #[test]
 fn a_keyword_deck_of_a_ball_on_a_shell_has_the_same_bits() {
     let mut model = keyword("ball-on-shell");
@@ -664,90 +575,6 @@ fn rigid_bodies_have_the_same_bits_on_both_routes() {
     assert_ne!(without(&|m| m.setup.bodies[0].forces.clear()), one.digest);
     assert_ne!(without(&|m| m.setup.bodies[1].start.momentum[2] *= 1.001), one.digest);
     assert_ne!(without(&|m| m.setup.bodies[2].spin[1] = None), one.digest);
-}
-
-/// Ridge over ridge, bars across the rim of a sheet, one body rigid, one that erodes: edges meet edges before any node
-/// meets a face.
-fn crossing_edges() -> Model {
-    model(
-        r#"
-        title = "edges"
-        units = "mm-ms-kg"
-        [control]
-        end_cycle = 500
-        end_time = 1e3
-        [[part]]
-        name = "ridge"
-        material = "STEEL_4340"
-        box = { origin = [-3, -3, -3], size = [6, 6, 6], cells = [3, 3, 3] }
-        rotate = { axis = [1, 0, 0], degrees = 45 }
-        [[part]]
-        name = "across"
-        material = "STEEL_4340"
-        velocity = [10, 20, -300]
-        box = { origin = [-3, -3, -3], size = [6, 6, 6], cells = [3, 3, 3] }
-        rotate = { axis = [0.1, 1, 0], degrees = 45 }
-        translate = [0.3, 0.2, 8.9]
-        [[part]]
-        name = "soft"
-        material = "AL_2024_T351"
-        velocity = [-300, 0, 0]
-        box = { origin = [-3, -3, -3], size = [6, 6, 6], cells = [4, 4, 4] }
-        rotate = { axis = [0, 0.1, 1], degrees = 45 }
-        translate = [9.4, 0.1, 0.4]
-        erosion = { geometric_strain = 0.2 }
-        [[part]]
-        name = "sheet"
-        material = "MILD_STEEL"
-        shell = { thickness = 0.4 }
-        plate = { origin = [-12, -3, 0.3], side_i = [0, 6, 0], side_j = [-8, 0, 0], cells = [4, 5] }
-        [[part]]
-        name = "bar"
-        material = "STEEL_4340"
-        velocity = [-200, 0, 10]
-        box = { origin = [-11.6, -0.6, -4], size = [2, 2, 8], cells = [1, 1, 4] }
-        rotate = { axis = [0, 0, 1], degrees = 45, point = [-10.6, 0.4, 0] }
-        translate = [0.6, 0, 0]
-        [[rigid]]
-        parts = ["bar"]
-        [contact]
-        gap_fraction = 0.15
-        friction = 0.1
-        edges = true
-        [output]
-        history_cycles = 1
-        contact_forces = [["ridge", "across"], ["bar", "sheet"]]
-        "#,
-    )
-}
-
-#[test]
-fn edges_that_meet_edges_have_the_same_bits_on_both_routes() {
-    let model = crossing_edges();
-    same_bits(&model);
-    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
-    let row = alone.rows.last().expect("rows");
-    assert!(row.error.abs() < 0.02, "energy error {}", row.error);
-    for pair in 0..2 {
-        let met =
-            alone.rows.iter().any(|row| row.contacts.iter().any(|(p, vote)| *p == pair && vote.hits > 0));
-        assert!(met, "pair {pair} never met");
-    }
-    println!("{} eroded, energy error {}", alone.outcome.run_totals.eroded_elements, row.error);
-    assert!(alone.outcome.run_totals.eroded_elements > 0, "nothing eroded");
-    let one = Fingerprint::of(&alone);
-    same_bits_on_route_direct(&model, &one);
-    let mut without = model.clone();
-    without.setup.contact.as_mut().expect("the deck has contact").edges = false;
-    let without = solve(without, Workers::default()).unwrap_or_else(|e| panic!("{e}"));
-    assert_ne!(without.outcome.digest, one.digest, "edges change nothing");
-}
-
-#[test]
-fn a_worker_with_edges_that_is_lost_changes_no_bit() {
-    let mut model = crossing_edges();
-    model.setup.control.end_cycle = 240;
-    losing_a_worker_changes_no_bit(&model);
 }
 
 #[test]
