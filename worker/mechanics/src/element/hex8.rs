@@ -5,31 +5,33 @@
 
 use std::ops::Range;
 
+mod end;
 pub(crate) mod group;
 mod pass;
 mod stress;
+mod view;
 
 use super::{
     ElementVote, Fault, Step,
-    hourglass::{
-        Amplitudes, Frame, LEAST_STRAIN, N_FORCES, PLASTIC, Resistance, amplitude, growth, stress_square,
-    },
+    hourglass::{Amplitudes, Frame, LEAST_STRAIN, PLASTIC, Resistance, amplitude, growth, stress_square},
     layout::{Corners, Layout},
     modes::{Gradient, Modes, corner_values, modes_of},
     place::{Bases, Nodal, PACKED, Packed, Place, Rows},
     rotation::rotation,
     vector::{Tensor, Vector},
-    viscosity::{Spread, Swing},
+    viscosity::Swing,
 };
 use crate::{
     eos::EquationOfState,
     exact::{EXACT, rounded},
     failure::{FailureLaw, Loading},
     lanes::{Lane, SET, scalar::Scalar},
-    state::{N_FIELDS, field},
+    state::field,
     strength::StrengthLaw,
 };
+use end::End;
 use stress::Stressed;
+use view::{BySlot, View};
 
 /// Volume of a hexahedron with these corners, as the kernel computes it, to the bit.
 pub fn volume(corners: &[[f64; 3]; 8]) -> f64 {
@@ -52,72 +54,6 @@ fn scalar_modes(corners: &[[f64; 3]; 8]) -> Modes<Scalar> {
     Modes::of(axis(0), axis(1), axis(2))
 }
 
-/// The arrays of a block as a kernel sees them. State arrays are by slot, node arrays by local node and padded.
-pub(crate) struct View<'a> {
-    pub layout: &'a Layout,
-    /// Entries of a node array that the kernel may touch.
-    pub reach: usize,
-    pub nodes: Nodal<'a>,
-    pub slots: BySlot<'a>,
-}
-
-/// Arrays by slot or set.
-pub(crate) struct BySlot<'a> {
-    pub fields: [&'a mut [f64]; N_FIELDS],
-    /// Forces of elastic hourglass control; empty without it.
-    pub hourglass: [&'a mut [f64]; N_FORCES],
-    /// One array per history variable of the material.
-    pub history: &'a mut [Vec<f64>],
-    /// Volume at time zero by slot; 1 in phantoms.
-    pub initial_volume: &'a [f64],
-    /// Bits of the slots of a set whose elements take part; phantoms do not.
-    pub alive: &'a [u8],
-    /// Global element index by slot.
-    pub elements: &'a [u32],
-    /// Lowest global element index by set.
-    pub lowest: &'a [u32],
-}
-
-impl BySlot<'_> {
-    /// A state field of the slots from `slot` on, which is inside the arrays.
-    #[inline(always)]
-    fn state<L: Lane>(&self, slot: usize, field: usize) -> L {
-        // SAFETY: the kernel keeps slots inside the state arrays.
-        unsafe { L::load(self.fields[field], slot) }
-    }
-
-    /// Writes a state field of the active lanes; the others keep theirs.
-    #[inline(always)]
-    fn set_state<L: Lane>(&mut self, slot: usize, field: usize, value: L, active: L::Mask) {
-        let kept = self.state(slot, field);
-        // SAFETY: the kernel keeps slots inside the state arrays.
-        unsafe { L::select(active, value, kept).store(self.fields[field], slot) };
-    }
-
-    /// Forces of elastic hourglass control of the slots from `slot` on; they have such control.
-    #[inline(always)]
-    fn hourglass<L: Lane>(&self, slot: usize) -> Amplitudes<L> {
-        let mut forces = [L::splat(0.0); N_FORCES];
-        for (force, array) in forces.iter_mut().zip(&self.hourglass) {
-            // SAFETY: the kernel keeps slots inside the state arrays, which these are with elastic control.
-            *force = unsafe { L::load(array, slot) };
-        }
-        Amplitudes::from_array(forces)
-    }
-
-    /// Writes them for the active lanes; the others keep theirs.
-    #[inline(always)]
-    fn set_hourglass<L: Lane>(&mut self, slot: usize, forces: Amplitudes<L>, active: L::Mask) {
-        for (value, array) in forces.to_array().into_iter().zip(&mut self.hourglass) {
-            // SAFETY: as in `hourglass`.
-            unsafe {
-                let kept = L::load(array, slot);
-                L::select(active, value, kept).store(array, slot);
-            }
-        }
-    }
-}
-
 /// A material made ready for kernels.
 #[derive(Clone, Copy)]
 pub(crate) struct Laws<E, S, F> {
@@ -126,6 +62,14 @@ pub(crate) struct Laws<E, S, F> {
     pub strength: S,
     pub failure: F,
     pub hourglass: Resistance,
+}
+
+impl<E: EquationOfState, S, F> Laws<E, S, F> {
+    /// Whether elements keep forces of hourglass control. Kernels that know their laws are for viscous control.
+    #[inline(always)]
+    fn elastic_control(&self) -> bool {
+        E::IS_CHOSEN && self.hourglass.elastic
+    }
 }
 
 /// Running sums and extremes by lane. Sums are exact and extremes order-free, so lanes join in any way.
@@ -178,7 +122,7 @@ impl<L: Lane> Tally<L> {
 /// Sets are below the number of sets of the block, and every corner of every slot, phantoms included, is
 /// inside the node arrays with [`SET`] lanes behind it in a structured layout.
 #[inline(always)]
-unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool>(
+unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     view: &mut View<'_>,
     laws: &Laws<E, S, F>,
     step: &Step,
@@ -194,7 +138,7 @@ unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw, co
             Layout::Structured { row, plane, base } => {
                 let place = Rows { row: *row, plane: *plane, base };
                 for set in sets.iter().cloned().flatten() {
-                    of_set::<L, _, E, S, F, ELASTIC>(place, nodes, slots, laws, step, set, &mut tally, vote);
+                    of_set::<L, _, E, S, F>(place, nodes, slots, laws, step, set, &mut tally, vote);
                 }
             }
             Layout::Explicit { sets: places, lists } => {
@@ -212,16 +156,7 @@ unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw, co
                             (PACKED, packed.nodal(), Some(list))
                         }
                     };
-                    of_set::<L, _, E, S, F, ELASTIC>(
-                        place,
-                        &mut arrays,
-                        slots,
-                        laws,
-                        step,
-                        set,
-                        &mut tally,
-                        vote,
-                    );
+                    of_set::<L, _, E, S, F>(place, &mut arrays, slots, laws, step, set, &mut tally, vote);
                     if let Some(list) = list {
                         packed.scatter(nodes, list);
                     }
@@ -238,14 +173,7 @@ unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw, co
 /// As [`compute`].
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "one level of the kernel")]
-unsafe fn of_set<
-    L: Lane,
-    P: Place,
-    E: EquationOfState,
-    S: StrengthLaw,
-    F: FailureLaw,
-    const ELASTIC: bool,
->(
+unsafe fn of_set<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     place: P,
     nodes: &mut Nodal<'_>,
     view: &mut BySlot<'_>,
@@ -259,7 +187,7 @@ unsafe fn of_set<
     while lane < SET {
         let slot = set as usize * SET + lane;
         // SAFETY: handed on from the caller.
-        unsafe { slots::<L, P, E, S, F, ELASTIC>(place, nodes, view, laws, step, slot, tally, vote) };
+        unsafe { slots::<L, P, E, S, F>(place, nodes, view, laws, step, slot, tally, vote) };
         lane += L::N;
     }
 }
@@ -270,7 +198,7 @@ unsafe fn of_set<
 /// As [`compute`].
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "one level of the kernel")]
-unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool>(
+unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
     place: P,
     nodes: &mut Nodal<'_>,
     view: &mut BySlot<'_>,
@@ -282,6 +210,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
 ) {
     let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
     let dt = L::splat(step.dt);
+    let elastic_control = laws.elastic_control();
     for axis in 0..3 {
         for array in [nodes.x[axis], nodes.v[axis], &*nodes.f[axis]] {
             place.fetch_ahead(array, slot);
@@ -325,9 +254,9 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     if E::IS_CHOSEN || S::REMEMBERS {
         end = End::of(&x, initial_volume);
         let size = [end.relative_volume, end.length];
-        stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive, size);
+        stressed = Stressed::of::<E, S, F>(&gradient, view, slot, laws, step.dt, alive, size);
     } else {
-        stressed = Stressed::of::<E, S, F, ELASTIC>(&gradient, view, slot, laws, step.dt, alive, [one; 2]);
+        stressed = Stressed::of::<E, S, F>(&gradient, view, slot, laws, step.dt, alive, [one; 2]);
         end = End::of(&x, initial_volume);
     }
     let Stressed {
@@ -427,11 +356,14 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         temperature = (energy - cold) * L::splat(by_energy);
     }
 
-    // 7. Hourglass forces: turned, grown, and yielding as the stress does.
+    // 7. Hourglass forces: turned, grown, and yielding as the stress does. What they keep is written here, so that nothing of it
+    //    stays in registers.
+    let modes_square = hourglass.square();
+    let mut check = energy + pressure + viscosity + modes_square + stress.sum();
     let mut resist = L::splat(2.0 * laws.hourglass.viscous) * density * sound * area;
-    let mut elastic = hourglass;
-    let mut elastic_power = zero;
-    if ELASTIC {
+    let mut taken = L::splat(step.dt / 8.0) * resist * modes_square;
+    let mut resisted = hourglass;
+    if elastic_control {
         let spin = spin_of(&gradient, L::splat(0.5 * step.dt));
         let turned = view.hourglass::<L>(slot).turned(&rotation(&spin));
         let frame = Frame {
@@ -440,7 +372,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
             stiffness: stiffness * area * area * inverse_volume,
         };
         let trial = growth(&laws.hourglass, &hourglass, &frame, step.dt);
-        elastic = trial.mul_add(one, &turned).scaled(left);
+        let mut elastic = trial.mul_add(one, &turned).scaled(left);
         let bent = stress_square(&elastic, &frame);
         if L::any(L::splat(laws.hourglass.sound).less(bent)) {
             let factor = laws.strength.factor(strain.rate, history.temperature);
@@ -450,18 +382,22 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
             let share = L::select((most * most).less(bent), most / bent.sqrt(), one);
             elastic = elastic.scaled(share);
         }
-        elastic_power = elastic.mul_add(one, &turned).dot(&hourglass);
         if laws.failure.fails() {
             resist = L::splat(2.0 * laws.hourglass.failed) * density * sound * area;
             resist = L::select(failed, resist, zero);
         }
+        let power = elastic.mul_add(one, &turned).dot(&hourglass);
+        let damped = L::splat(step.dt / 8.0) * resist * modes_square;
+        taken = L::splat(0.5 * step.dt).mul_add(power, damped);
+        check = check + elastic.square();
+        if step.dt != 0.0 {
+            view.set_hourglass(slot, elastic, alive);
+        }
+        resisted = hourglass.mul_add(resist * L::splat(1.0 / 8.0), &elastic);
+        resist = L::splat(8.0);
     }
 
     // 8. Which elements count.
-    let mut check = energy + pressure + viscosity + hourglass.square() + stress.sum();
-    if ELASTIC {
-        check = check + elastic.square();
-    }
     let upright = L::both(zero.less(at_mid.volume_times_64), zero.less(at_end.volume_times_64));
     let finite = check.abs().less_equal(L::splat(f64::MAX));
     let active = L::both(alive, L::both(upright, finite));
@@ -493,10 +429,6 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     }
     let energy_magic = L::splat(step.energy_quantum.magic());
     let internal = energy * initial_volume;
-    let mut taken = L::splat(step.dt / 8.0) * resist * hourglass.square();
-    if ELASTIC {
-        taken = L::splat(0.5 * step.dt).mul_add(elastic_power, taken);
-    }
     let squeezed = -(heating * volume_change * initial_volume);
     tally.internal = tally.internal + L::select(active, rounded(internal, energy_magic), zero);
     tally.hourglass = tally.hourglass + L::select(active, rounded(taken, energy_magic), zero);
@@ -528,9 +460,6 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         if laws.eos.burns() {
             view.set_state(slot, field::TIME_TO_LIGHT, time_to_light, active);
         }
-        if ELASTIC {
-            view.set_hourglass(slot, elastic, active);
-        }
         view.set_state(slot, field::PRESSURE, pressure, active);
         view.set_state(slot, field::ENERGY, energy, active);
         view.set_state(slot, field::RELATIVE_VOLUME, relative_volume, active);
@@ -540,12 +469,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     //     The factor 1/64 takes back what the gradient is too large by.
     let squeeze = (pressure + viscosity) * L::splat(1.0 / 64.0);
     let stress = stress.scaled(L::splat(1.0 / 64.0));
-    let mut resist = resist * L::splat(1.0 / 8.0);
-    let mut resisted = hourglass;
-    if ELASTIC {
-        resisted = hourglass.mul_add(resist, &elastic);
-        resist = one;
-    }
+    let resist = resist * L::splat(1.0 / 8.0);
     let bent = resisted.against(&x.d, &x.e, &x.f, &x.g).scaled(resist * inverse_by_64);
     let rows = [
         Vector { x: bent.x.x - (stress.xx - squeeze), y: bent.x.y - stress.xy, z: bent.x.z - stress.zx },
@@ -572,45 +496,6 @@ fn spin_of<L: Lane>(gradient: &Tensor<L>, half_dt: L) -> Vector<L> {
         x: half_dt * (gradient.z.y - gradient.y.z),
         y: half_dt * (gradient.x.z - gradient.z.x),
         z: half_dt * (gradient.y.x - gradient.x.y),
-    }
-}
-
-/// The geometry at the end of a step.
-struct End<L> {
-    gradient: Gradient<L>,
-    spread: Spread<L>,
-    /// `sqrt(2/3 tr S)`.
-    area: L,
-    volume: L,
-    /// That of the viscosity.
-    length: L,
-    /// `1 / (64 volume)`.
-    inverse_by_64: L,
-    /// `1 / initial volume`.
-    inverse_initial: L,
-    /// Exactly 1 as long as nothing moves.
-    relative_volume: L,
-}
-
-impl<L: Lane> End<L> {
-    #[inline(always)]
-    fn of(x: &Modes<L>, initial_volume: L) -> Self {
-        let one = L::splat(1.0);
-        let gradient = Gradient::of(x);
-        let spread =
-            Spread::of([&gradient.a, &gradient.b, &gradient.c, &gradient.d, &gradient.e, &gradient.f]);
-        let area_square = L::splat(2.0 / 3.0 / 512.0) * spread.trace();
-        let area = area_square.sqrt();
-        // One division inverts volume, initial volume and area: it is much slower than products.
-        let starting = initial_volume * area_square;
-        let inverse = one / (gradient.volume_times_64 * starting);
-        let inverse_by_64 = inverse * starting;
-        let inverse_others = inverse * gradient.volume_times_64;
-        let inverse_initial = inverse_others * area_square;
-        let volume = gradient.volume();
-        let length = volume * (inverse_others * initial_volume * area);
-        let relative_volume = (volume - initial_volume).mul_add(inverse_initial, one);
-        Self { gradient, spread, area, volume, length, inverse_by_64, inverse_initial, relative_volume }
     }
 }
 

@@ -106,6 +106,8 @@ impl Hourglass {
 /// Constants of hourglass control, made ready for a material.
 #[derive(Clone, Copy)]
 pub(crate) struct Resistance {
+    /// Whether elements keep forces of it.
+    pub elastic: bool,
     /// Of viscous control.
     pub viscous: f64,
     /// Of viscous control where an element has failed.
@@ -133,6 +135,7 @@ impl Resistance {
         let young = 9.0 * bulk * shear / (3.0 * bulk + shear);
         let poisson = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear));
         Self {
+            elastic: control.is_elastic(),
             viscous: if control.is_elastic() { 0.0 } else { coefficient },
             failed: control.damping(),
             stiffness: coefficient,

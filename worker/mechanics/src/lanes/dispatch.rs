@@ -40,38 +40,6 @@ impl Width {
             _ => task.run::<Scalar>(),
         }
     }
-}
-
-impl Width {
-    /// Whether the lanes of this width multiply and add in one instruction, as far as this build knows.
-    pub(crate) fn is_fused(self) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        if self == Width::Scalar {
-            return is_x86_feature_detected!("fma");
-        }
-        true
-    }
-
-    /// [`Width::run`] of a task that is not compiled for lanes without fused products.
-    ///
-    /// # Panics
-    /// If the machine lacks the width, or the width is not [fused](Width::is_fused).
-    pub(crate) fn run_fused<T: Task>(self, task: T) -> T::Output {
-        assert!(self.available() && self.is_fused(), "lane width {self} is not on this machine");
-        match self {
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the machine has the width.
-            Width::Avx2 => unsafe { on_avx2(task) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above.
-            Width::Avx512 => unsafe { on_avx512(task) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the machine has FMA.
-            Width::Scalar => unsafe { on_scalar_with_fma(task) },
-            #[cfg(not(target_arch = "x86_64"))]
-            _ => task.run::<Scalar>(),
-        }
-    }
 
     /// [`Width::run`] of a task that is compiled for wide lanes alone.
     ///

@@ -42,51 +42,36 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vo
     assert!(n_columns == n_variables, "{n_columns} columns for {n_variables} history variables");
     if let Some(strength) = AnyRemembering::of(material) {
         let laws = Laws { density, eos: AnyEos::of(material), strength, failure: Unfailing, hourglass };
-        Pass { view, laws, step, sets, vote }.on(width, elastic);
-        return;
+        return width.run(Pass { view, laws, step, sets, vote });
     }
-    let laws = (AnyEos::of(material), AnyStrength::of(material), AnyFailure::of(material));
-    // Copies of their own for the commonest of each kind: see benches/TRIED.md.
+    let (eos, strength, failure) =
+        (AnyEos::of(material), AnyStrength::of(material), AnyFailure::of(material));
+    // Copies of their own for the commonest of each kind, where they pay: see benches/TRIED.md.
     macro_rules! alone {
         ($run:ident, $eos:expr, $strength:expr) => {{
             let laws = Laws { density, eos: $eos, strength: $strength, failure: Unfailing, hourglass };
-            return width.$run(Controlled::<_, false>(Pass { view, laws, step, sets, vote }));
+            return width.$run(Pass { view, laws, step, sets, vote });
         }};
     }
-    match (width, laws) {
-        (width, (eos, strength, failure)) if elastic => {
-            let laws = Laws { density, eos, strength, failure, hourglass };
-            Pass { view, laws, step, sets, vote }.on(width, true);
-        }
-        (width, (AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength), AnyFailure::Unfailing(_)))
-            if width.is_fused() && strength.by_energy == 0.0 =>
-        {
-            alone!(run_fused, eos, strength)
-        }
-        (Width::Avx2, (AnyEos::Linear(eos), AnyStrength::Hydro(strength), AnyFailure::Unfailing(_))) => {
-            alone!(run_avx2, eos, strength)
-        }
-        (
-            Width::Avx2 | Width::Avx512,
-            (AnyEos::Jwl(eos), AnyStrength::Hydro(strength), AnyFailure::Unfailing(_)),
-        ) => alone!(run_wide, eos, strength),
-        (
-            Width::Avx2 | Width::Avx512,
-            (AnyEos::Linear(eos), AnyStrength::Elastic(strength), AnyFailure::Unfailing(_)),
-        ) => alone!(run_wide, eos, strength),
-        (
-            Width::Avx2 | Width::Avx512,
-            (AnyEos::Shock(eos), AnyStrength::VonMises(strength), AnyFailure::Unfailing(_)),
-        ) => alone!(run_wide, eos, strength),
-        (
-            Width::Avx2 | Width::Avx512,
-            (AnyEos::Polynomial(eos), AnyStrength::Tabulated(strength), AnyFailure::Unfailing(_)),
-        ) => alone!(run_wide, eos, strength),
-        (width, (eos, strength, failure)) => {
-            let laws = Laws { density, eos, strength, failure, hourglass };
-            Pass { view, laws, step, sets, vote }.on(width, false);
+    if !elastic && matches!(failure, AnyFailure::Unfailing(_)) {
+        match (width, eos, strength) {
+            (Width::Scalar, ..) => {}
+            (_, AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength)) if strength.by_energy == 0.0 => {
+                alone!(run_wide, eos, strength)
+            }
+            (_, AnyEos::Shock(eos), AnyStrength::VonMises(strength)) => alone!(run_wide, eos, strength),
+            (_, AnyEos::Linear(eos), AnyStrength::Elastic(strength)) => alone!(run_wide, eos, strength),
+            (Width::Avx2, AnyEos::Linear(eos), AnyStrength::Hydro(strength)) => {
+                alone!(run_avx2, eos, strength)
+            }
+            (_, AnyEos::Jwl(eos), AnyStrength::Hydro(strength)) => alone!(run_wide, eos, strength),
+            (_, AnyEos::Polynomial(eos), AnyStrength::Tabulated(strength)) => {
+                alone!(run_wide, eos, strength)
+            }
+            _ => {}
         }
     }
+    width.run(Pass { view, laws: Laws { density, eos, strength, failure, hourglass }, step, sets, vote });
 }
 
 /// The elements of some sets, checked.
@@ -98,23 +83,7 @@ struct Pass<'a, E, S, F> {
     vote: &'a mut ElementVote,
 }
 
-impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw> Pass<'_, E, S, F> {
-    /// Runs on a width, with elastic hourglass control or without.
-    fn on(self, width: Width, elastic: bool) {
-        if elastic {
-            width.run(Controlled::<_, true>(self));
-        } else {
-            width.run(Controlled::<_, false>(self));
-        }
-    }
-}
-
-/// A pass whose hourglass control is elastic or not.
-struct Controlled<P, const ELASTIC: bool>(P);
-
-impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool> Task
-    for Controlled<Pass<'_, E, S, F>, ELASTIC>
-{
+impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw> Task for Pass<'_, E, S, F> {
     type Output = ();
 
     const PAIRED: bool = true;
@@ -123,10 +92,10 @@ impl<E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool> Tas
     fn run<L: Lane>(self) {
         // Copies of its own: what is behind a reference that a task carries could be what the kernel writes, for all the compiler
         // knows, and would be loaded again after each store.
-        let Pass { mut view, laws, step, sets, vote } = self.0;
+        let Pass { mut view, laws, step, sets, vote } = self;
         let (step, mut own) = (*step, *vote);
         // SAFETY: `run` above, which alone makes a pass, has checked it or has the promise of its caller.
-        unsafe { compute::<L, E, S, F, ELASTIC>(&mut view, &laws, &step, sets, &mut own) }
+        unsafe { compute::<L, E, S, F>(&mut view, &laws, &step, sets, &mut own) }
         *vote = own;
     }
 }

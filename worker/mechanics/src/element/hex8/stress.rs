@@ -61,7 +61,7 @@ pub(super) struct Stressed<L: Lane> {
 impl<L: Lane> Stressed<L> {
     /// Rotation, elastic increment, yield. `size` is relative volume and length at the end of the step, for a law that remembers.
     #[inline(always)]
-    pub fn of<E: EquationOfState, S: StrengthLaw, F: FailureLaw, const ELASTIC: bool>(
+    pub fn of<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
         gradient: &Tensor<L>,
         view: &BySlot<'_>,
         slot: usize,
@@ -142,7 +142,7 @@ impl<L: Lane> Stressed<L> {
             // The stress before, turned, is `turned` less its half of the increment.
             let sum = turned.plus(&stress);
             power = half * half_increment.neg_mul_add(rate_square, sum.contract(&rate));
-            if ELASTIC {
+            if laws.elastic_control() {
                 left = L::select(failed, zero, one);
                 let yields = plastic_before.less(history.plastic_strain);
                 if L::any(yields) {
