@@ -415,9 +415,11 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     // The burn crosses elements faster than sound, and the step follows it.
     let sound_square = if laws.eos.burns() { sound_square.max(pace_square) } else { sound_square };
     let swing = Swing { damping, sound_square, shear_square, trace: spread.trace() * double_inverse_square };
-    let bound = swing.frequency(spread.eigenvalue_bound() * double_inverse_square);
     let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);
-    if L::any(L::both(L::splat(to_beat).less(bound), active)) {
+    let largest = spread.eigenvalue_bound() * double_inverse_square;
+    if L::any(L::both(swing.may_exceed(to_beat, largest), active))
+        && L::any(L::both(L::splat(to_beat).less(swing.frequency(largest)), active))
+    {
         let exact = swing.frequency(spread.largest_eigenvalue() * double_inverse_square);
         let (frequencies, limits) = (exact.to_array(), (one / exact).to_array());
         for lane in 0..L::N {

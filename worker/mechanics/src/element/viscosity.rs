@@ -134,6 +134,20 @@ impl<L: Lane> Swing<L> {
         let alone = rate + rate.mul_add(rate, square).sqrt();
         frequency(largest, self.damping, self.sound_square).max(alone)
     }
+
+    /// Whether [`Swing::frequency`] may exceed `least` in a lane: never false where it does. A frequency `a + sqrt(a^2 + b)` exceeds t
+    /// where `t^2 < b + 2 a t`, which takes no root.
+    #[inline(always)]
+    pub fn may_exceed(&self, least: f64, largest: L) -> L::Mask {
+        // More than rounding can do here and in `frequency`.
+        let least = least * (1.0 - 1e-14);
+        let two_shears = self.shear_square + self.shear_square;
+        let square = (self.sound_square - two_shears).mul_add(self.trace, two_shears * largest);
+        let damping = L::splat(least) * self.damping;
+        let in_mesh = largest * (damping + damping + self.sound_square);
+        let alone = L::splat(FREE * FREE).mul_add(square, L::splat(FREE) * damping * self.trace);
+        L::splat(least * least).less(in_mesh.max(alone))
+    }
 }
 
 /// The frequency whose inverse is the Courant limit in a mesh, `L_e / (Q + sqrt(Q^2 + c^2))` with
@@ -172,6 +186,28 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-11, "{found} {expected}");
             assert!(s.eigenvalue_bound().0 >= found);
         }
+    }
+
+    #[test]
+    fn the_test_without_roots_misses_no_frequency_that_exceeds() {
+        let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut draw = || {
+            seed ^= seed << 13;
+            seed ^= seed >> 7;
+            seed ^= seed << 17;
+            seed as f64 / u64::MAX as f64
+        };
+        let (mut passed, mut refused) = (0, 0);
+        for _ in 0..100_000 {
+            let [damping, sound, shear, trace] = [draw(), draw(), draw(), draw()].map(Scalar);
+            let swing = Swing { damping, sound_square: sound, shear_square: shear * sound, trace };
+            let largest = trace * Scalar(draw());
+            let frequency = swing.frequency(largest).0;
+            assert!(swing.may_exceed(frequency, largest), "{frequency} of {largest:?}");
+            let above = frequency * (1.0 + 1e-12);
+            if swing.may_exceed(above, largest) { passed += 1 } else { refused += 1 }
+        }
+        assert!(refused > 99_000, "{passed} pass, {refused} do not");
     }
 
     #[test]
