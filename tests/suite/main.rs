@@ -14,6 +14,7 @@ mod late;
 mod pairs;
 mod seeds;
 mod sums;
+mod tearing;
 mod trusses;
 
 /// A row that nobody computes would look like one that holds.

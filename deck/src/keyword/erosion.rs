@@ -158,7 +158,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
         (1, 7, "FAILTM", "elements do not leave at a time"),
         (2, 0, "IDAM", "damage models of *MAT_ADD_EROSION are not computed"),
         (3, 0, "LCFLD", "forming limits do not erode elements"),
-        (3, 2, "EPSTHIN", "shells do not erode"),
+        (3, 2, "EPSTHIN", "shells erode by plastic strain, not by thinning"),
         (3, 3, "ENGCRT", "energy release does not erode elements"),
         (3, 5, "LCEPS12", "curves of strain do not erode elements"),
         (3, 6, "LCEPS13", "curves of strain do not erode elements"),

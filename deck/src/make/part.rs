@@ -6,6 +6,7 @@ use mechanics::{
     element::hourglass::Hourglass,
     erosion::{Criteria, GEOMETRIC_STRAIN},
     material::{Failure, Material, Strength},
+    mesh::Topology,
 };
 
 use super::material::Materials;
@@ -15,7 +16,7 @@ use crate::{
     limits::{MAX_ELEMENTS, MAX_NODES},
     log::Log,
     mesh_file::Body,
-    place::{Place, Placed},
+    place::{Origin, Place, Placed},
     typed::{
         mesh::{Meshes, Numbers, PartMesh, Places, Source},
         part::{Criterion, Erosion, Kind, Part},
@@ -65,19 +66,7 @@ pub(super) fn make(
         first.entry(&part.name).or_insert(part.at);
         let material = materials.resolve(part);
         let of_material = material.map(|m| &materials.list[m as usize]);
-        let erosion = part.erosion.as_ref().map(|given| {
-            if part.kind != Kind::Solids {
-                log.fault_of(
-                    given.origin,
-                    format!("solids: {} do not erode", part.kind.elements()),
-                    log.say(
-                        "remove erosion, or make the part of solids",
-                        "leave the limit blank, or make the part of solids",
-                    ),
-                );
-            }
-            criteria(given, of_material, log)
-        });
+        let erosion = part.erosion.as_ref().map(|given| criteria(given, part.kind, of_material, log));
         let hourglass = hourglass_of(part, of_material, hourglass, log);
         let (mut block, numbers) = mesh_of(part, meshes, &mut budget, log);
         match &mut block {
@@ -91,6 +80,9 @@ pub(super) fn make(
             None => {}
         }
         let (name, at, velocity) = (part.name.clone(), part.at, part.velocity);
+        if let Some(Topology::Shells { section, .. }) = block.as_mut().map(|block| &mut block.topology) {
+            section.breaks = erosion.and_then(|criteria| criteria.plastic_strain);
+        }
         drafts.push(PartDraft { name, at, material, velocity, hourglass, erosion, block, numbers });
     }
     drafts
@@ -116,7 +108,16 @@ fn hourglass_of(part: &Part, material: Option<&Material>, of_deck: Hourglass, lo
 }
 
 /// The criteria of a part, whose material is `material` if that could be read.
-fn criteria(given: &Erosion, material: Option<&Material>, log: &Log<'_>) -> Criteria {
+fn criteria(given: &Erosion, kind: Kind, material: Option<&Material>, log: &Log<'_>) -> Criteria {
+    match kind {
+        Kind::Solids => {}
+        Kind::Shells(_) => check_shells(given, log),
+        Kind::Trusses { .. } => log.fault_of(
+            given.origin,
+            "solids or shells: trusses do not erode",
+            log.say("remove erosion", "leave the limit blank"),
+        ),
+    }
     let mut criteria = Criteria::default();
     for (criterion, limit) in &given.limits {
         *criterion.of(&mut criteria) = Some(limit.value);
@@ -160,6 +161,22 @@ fn criteria(given: &Erosion, material: Option<&Material>, log: &Log<'_>) -> Crit
         criteria.geometric_strain = Some(GEOMETRIC_STRAIN);
     }
     criteria
+}
+
+/// Shells erode by the plastic strain of their layers, which is to be given, and by nothing else.
+fn check_shells(given: &Erosion, log: &Log<'_>) {
+    let (expected, advice) =
+        ("plastic_strain: shells erode by that of their layers alone", "give plastic_strain");
+    let others = given.limits.iter().filter(|(criterion, _)| *criterion != Criterion::PlasticStrain);
+    let origins = others.map(|(_, limit)| limit.origin);
+    let origins = origins.chain(given.failure.as_ref().filter(|on| on.value).map(|on| on.origin));
+    let mut origins: Vec<Origin> = origins.collect();
+    if origins.is_empty() && given.limits.is_empty() {
+        origins.push(given.origin);
+    }
+    for origin in origins {
+        log.fault_of(origin, expected, log.say(advice, "leave it blank, or make the part of solids"));
+    }
 }
 
 /// Nodes and elements that may still be made.

@@ -122,7 +122,7 @@ fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
     let thins = table.get("thinning").map_or(Some(true), |v| v.boolean());
     table.finish();
     let rule = if rule? == 1 { Rule::Lobatto(points) } else { Rule::Gauss(points) };
-    Some(Section { thickness: thickness?, rule, thins: thins? })
+    Some(Section { thickness: thickness?, rule, thins: thins?, breaks: None })
 }
 
 /// The key that says the kind of elements.

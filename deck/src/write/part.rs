@@ -157,7 +157,7 @@ fn write_part(text: &mut Text, part: &Part) {
     if let Kind::Trusses { area } = part.kind {
         text.key("truss", table(&[("area", format!("{area:?}"))]));
     }
-    if let Kind::Shells(Section { thickness, rule, thins }) = part.kind {
+    if let Kind::Shells(Section { thickness, rule, thins, .. }) = part.kind {
         let (rule, points) = match rule {
             Rule::Gauss(points) => ("gauss", points),
             Rule::Lobatto(points) => ("lobatto", points),

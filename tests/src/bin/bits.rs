@@ -269,6 +269,7 @@ const WHOLE: u64 = 1_000_000;
 const EXAMPLES: [(&str, u64, Event); 17] = [
     ("ball-on-shell.k", WHOLE, Event::Contact),
     ("bar-on-wall.k", WHOLE, Event::None),
+    ("ball-tears-sheet.toml", 400, Event::Erosion),
     ("block-on-plate.k", WHOLE, Event::Contact),
     ("explosive-on-plate.toml", WHOLE, Event::Contact),
     ("fragment-on-water-box.toml", 300, Event::Contact),

@@ -15,7 +15,7 @@ use crate::{
         hourglass::Hourglass,
         place::Nodal,
     },
-    erosion::PieceErosion,
+    erosion::{Criteria, PieceErosion},
     lanes::{SET, Width},
     material::Material,
     mesh::Topology,
@@ -217,9 +217,14 @@ impl Block {
         self.alive()[slot / SET] >> (slot % SET) & 1 == 1
     }
 
-    /// The arrays for the pass of erosion, if these elements can erode.
+    /// The arrays for the pass of erosion, of elements of a kind that it scans.
     pub(crate) fn scanned(&self) -> Option<Scanned<'_>> {
         self.group.scanned()
+    }
+
+    /// The slots of `sets` whose elements meet a criterion, of elements of another kind.
+    pub(crate) fn met(&self, criteria: &Criteria, sets: &[Range<u32>]) -> Vec<u32> {
+        self.group.met(criteria, sets)
     }
 
     /// Every number that a cycle changes of the elements, in a fixed order.

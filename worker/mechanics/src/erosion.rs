@@ -81,7 +81,7 @@ pub struct Criteria {
     /// Incremental geometric strain: `sqrt(2/3 D:D)` over time, with the rate of deformation `D`. It never falls. An element
     /// that is turned inside out has met it.
     pub incremental_strain: Option<f64>,
-    /// Effective plastic strain.
+    /// Effective plastic strain; of shells, whose layers break at it one by one, that of the last of them. Shells erode by nothing else.
     pub plastic_strain: Option<f64>,
     /// The failure law of the material: damage has reached 1.
     pub failure: bool,
@@ -216,8 +216,29 @@ impl Eroding {
         cycle: u64,
         width: Width,
     ) {
+        let found = match block.scanned() {
+            Some(scanned) => self.scan(scanned, block, sets, step, width),
+            None => block.met(&self.criteria, sets),
+        };
+        for slot in found.into_iter().map(|slot| slot as usize) {
+            let (element, internal) = block.take_out(slot);
+            self.eroded[slot] = cycle;
+            self.eroded_now.elements.push(element);
+            self.eroded_now.internal += step.energy_quantum.round(internal);
+            self.changed = true;
+        }
+    }
+
+    /// The slots of `sets` that a pass over the nodes and states of hexahedra finds.
+    fn scan(
+        &mut self,
+        Scanned { layout, reach, alive, fields }: Scanned<'_>,
+        block: &Block,
+        sets: &[Range<u32>],
+        step: &Step,
+        width: Width,
+    ) -> Vec<u32> {
         let Self { criteria, strain, inverse, .. } = self;
-        let Some(Scanned { layout, reach, alive, fields }) = block.scanned() else { return };
         let mut scan = Scan {
             layout,
             x: block.x.each_ref().map(Vec::as_slice),
@@ -235,14 +256,7 @@ impl Eroding {
             step: criteria.time_step.map(|_| (self.sound_square, self.frequency)),
             dt: step.dt,
         };
-        let found = scan::run(&mut scan, sets, reach, width);
-        for slot in found.into_iter().map(|slot| slot as usize) {
-            let (element, internal) = block.take_out(slot);
-            self.eroded[slot] = cycle;
-            self.eroded_now.elements.push(element);
-            self.eroded_now.internal += step.energy_quantum.round(internal);
-            self.changed = true;
-        }
+        scan::run(&mut scan, sets, reach, width)
     }
 
     /// What eroded since the last call.

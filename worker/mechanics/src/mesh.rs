@@ -77,6 +77,8 @@ pub struct Section {
     pub rule: Rule,
     /// Whether the thickness follows the strains in the plane; else it stays.
     pub thins: bool,
+    /// Plastic strain at which a layer breaks: it carries no stress from then on.
+    pub breaks: Option<f64>,
 }
 
 impl Section {

@@ -11,7 +11,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::edges::{Edge, features::features};
-use crate::{material::Material, mesh::Mesh};
+use crate::{
+    material::Material,
+    mesh::{Mesh, Part},
+};
 
 pub use crate::mesh::FACES as SIDES;
 
@@ -135,12 +138,7 @@ impl Surface {
             for n in nodes {
                 index[n as usize] = 0;
             }
-            let stiffness = match mesh.parts[part].section() {
-                // As the shell itself resists in its plane: across its thickness it would rule the time step.
-                Some(section) => bulk * section.thickness,
-                None if volume > 0.0 => bulk * area * area / volume,
-                None => 0.0,
-            };
+            let stiffness = stiffness_of(&mesh.parts[part], bulk, area, volume);
             let part = part as u32;
             faces.push(Face { nodes, element, side, part, stiffness, corners, own: [u32::MAX; 8] });
         }
@@ -183,9 +181,10 @@ impl Surface {
                     }
                     // A node without faces is as stiff as the sides that it was a corner of.
                     node_part[n] = node_part[n].min(p);
-                    for side in SIDES.iter().filter(|side| active[n] && side.contains(&corner)) {
+                    let sides = part.sides().iter().map(|&side| SIDES[side]);
+                    for side in sides.filter(|side| active[n] && side.contains(&corner)) {
                         let area = area(side.map(|c| positions[c]));
-                        node_stiffness[n] += if volume > 0.0 { bulk * area * area / volume } else { 0.0 };
+                        node_stiffness[n] += stiffness_of(part, bulk, area, volume);
                         node_share[n] += volume;
                         count[n] += 1;
                     }
@@ -336,6 +335,16 @@ impl Surface {
     /// Face index of a key ([`Face::key`]), if that face is outside.
     pub fn face_index(&self, key: u64) -> Option<u32> {
         self.faces.binary_search_by_key(&key, Face::key).ok().map(|i| i as u32)
+    }
+}
+
+/// Penalty stiffness of a side of an element of a part.
+fn stiffness_of(part: &Part, bulk: f64, area: f64, volume: f64) -> f64 {
+    match part.section() {
+        // As the shell itself resists in its plane: across its thickness it would rule the time step.
+        Some(section) => bulk * section.thickness,
+        None if volume > 0.0 => bulk * area * area / volume,
+        None => 0.0,
     }
 }
 

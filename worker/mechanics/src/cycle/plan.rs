@@ -222,11 +222,17 @@ impl Domain {
                 let held_block = &mut self.held_blocks[held_block as usize];
                 let booked = held_block.drop_node(local);
                 let (v, mass) = (&mut held_block.block.v, held_block.block.mass[local as usize]);
-                let velocity: [f64; 3] = std::array::from_fn(|a| std::mem::take(&mut v[a][local as usize]));
+                let taken = |along: &mut [Vec<f64>; 3]| {
+                    along.each_mut().map(|v| std::mem::take(&mut v[local as usize]))
+                };
+                let velocity = taken(v);
+                let turning = held_block.block.turning.as_mut();
+                let (spin, inertia) =
+                    turning.map_or(([0.0; 3], 0.0), |t| (taken(&mut t.w), t.inertia[local as usize]));
                 if booked {
-                    let [x, y, z] = velocity;
-                    let square = x.mul_add(x, y.mul_add(y, z * z));
-                    let kinetic = self.quanta.energy.round(0.5 * mass * square);
+                    let square = |[x, y, z]: [f64; 3]| x.mul_add(x, y.mul_add(y, z * z));
+                    let kinetic = self.quanta.energy.round(0.5 * mass * square(velocity))
+                        + self.quanta.energy.round(0.5 * inertia * square(spin));
                     self.gone.kinetic += kinetic;
                     self.vote.parts[held_block.block.part as usize].gone += kinetic;
                     for (sum, v) in self.gone.momentum.iter_mut().zip(velocity) {

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::{
     block::Piece,
+    erosion::Criteria,
     lanes::Width,
     material::Material,
     mesh::Topology,
@@ -100,9 +101,15 @@ pub(crate) trait Group: Send + Sync {
     /// internal energy.
     fn take_out(&mut self, slot: usize) -> (u32, f64);
 
-    /// The arrays for the pass of erosion; none of a kind that does not erode.
+    /// The arrays for the pass of erosion; none of a kind that looks for itself, see [`Group::met`].
     fn scanned(&self) -> Option<Scanned<'_>> {
         None
+    }
+
+    /// The slots of `sets` whose elements take part and meet a criterion of erosion, of a kind that is not [scanned](Group::scanned);
+    /// none of a kind that does not erode.
+    fn met(&self, _criteria: &Criteria, _sets: &[Range<u32>]) -> Vec<u32> {
+        Vec::new()
     }
 
     /// A number of the stress of the first element, for tests that change it; none without elements.

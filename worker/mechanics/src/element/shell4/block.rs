@@ -2,13 +2,17 @@
 
 use std::{fmt, ops::Range};
 
-use super::{Rule, kernel};
+use super::{
+    Rule,
+    kernel::{self, PLASTIC_STRAIN},
+};
 use crate::{
     element::{
         ElementVote,
         group::{Call, ElementArrays, Group},
         place::Nodal,
     },
+    erosion::Criteria,
     exact::Quantum,
     lanes::{SET, Width},
     material::Material,
@@ -90,6 +94,8 @@ pub(crate) struct Core {
     points: Vec<(f64, f64)>,
     /// Share of the strain across the thickness that this follows: 1, or 0 where it stays.
     thinning: f64,
+    /// Plastic strain at which a layer breaks.
+    breaks: Option<f64>,
     law: PlaneLaw,
 }
 
@@ -159,6 +165,7 @@ impl Core {
             elements: (0..n_slots).map(|slot| elements.get(slot).copied().unwrap_or(u32::MAX)).collect(),
             points,
             thinning: f64::from(section.thins),
+            breaks: section.breaks,
             law,
         })
     }
@@ -180,7 +187,7 @@ impl Core {
         (fields[field::SXY], fields[field::SYZ], fields[field::SZX]) = (mean(2), mean(3), mean(4));
         fields[field::PRESSURE] = pressure;
         fields[field::ENERGY] = self.state[kernel::INTERNAL][element] / volume;
-        fields[field::PLASTIC_STRAIN] = most(5);
+        fields[field::PLASTIC_STRAIN] = most(PLASTIC_STRAIN);
         fields[field::TEMPERATURE] = most(6);
         fields[field::RELATIVE_VOLUME] = area * self.state[kernel::THICKNESS][element] / volume;
         fields
@@ -212,6 +219,7 @@ impl Core {
             law: self.law,
             points: &self.points,
             thinning: self.thinning,
+            breaks: self.breaks,
             dt: step.dt,
             force_magic: step.force_quantum.magic(),
             moment_magic: step.moment_quantum.magic(),
@@ -297,6 +305,19 @@ impl Group for Core {
         }
     }
 
+    fn met(&self, criteria: &Criteria, sets: &[Range<u32>]) -> Vec<u32> {
+        let Some(limit) = criteria.plastic_strain else { return Vec::new() };
+        let strains = || self.layers.iter().skip(PLASTIC_STRAIN).step_by(kernel::LAYER);
+        let slots = sets.iter().flat_map(|range| range.start * SET as u32..range.end * SET as u32);
+        slots
+            .filter(|&slot| {
+                let slot = slot as usize;
+                let takes_part = self.alive[slot / SET] >> (slot % SET) & 1 == 1;
+                takes_part && strains().all(|strain| strain[slot] >= limit)
+            })
+            .collect()
+    }
+
     fn take_out(&mut self, slot: usize) -> (u32, f64) {
         self.alive[slot / SET] &= !(1 << (slot % SET));
         (self.elements[slot], self.state[kernel::INTERNAL][slot])
@@ -338,7 +359,7 @@ impl Shells {
         rule: Rule,
         material: &Material,
     ) -> Result<Shells, SectionError> {
-        let section = Section { thickness, rule, thins: true };
+        let section = Section { thickness, rule, thins: true, breaks: None };
         section.check(material)?;
         let (n_nodes, n_elements) = (x.len(), corners.len());
         let n_padded = n_nodes.next_multiple_of(SET);
@@ -397,7 +418,7 @@ impl Shells {
 
     /// Effective plastic strain of a layer.
     pub fn plastic_strain(&self, element: usize, layer: usize) -> f64 {
-        self.core.layers[layer * kernel::LAYER + 5][element]
+        self.core.layers[layer * kernel::LAYER + PLASTIC_STRAIN][element]
     }
 
     /// Sets forces and moments to zero, adds those of all elements at `x_n`, brings their state from `n-1` to `n` and

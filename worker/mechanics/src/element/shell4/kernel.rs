@@ -12,6 +12,8 @@ use crate::{
 
 /// State of a layer: stress xx, yy, xy, yz, zx, plastic strain, temperature.
 pub const LAYER: usize = 7;
+/// Index of the plastic strain in the state of a layer.
+pub(super) const PLASTIC_STRAIN: usize = 5;
 /// State of an element beside its layers: hourglass forces of membrane x and y, bending about x and y, deflection and
 /// twist; thickness; internal energy; hourglass energy.
 pub const ELEMENT: usize = 9;
@@ -49,6 +51,8 @@ pub(super) struct Constants<'a> {
     pub points: &'a [(f64, f64)],
     /// Share of the strain across the thickness that the thickness follows.
     pub thinning: f64,
+    /// Plastic strain at which a layer breaks.
+    pub breaks: Option<f64>,
     pub dt: f64,
     pub force_magic: f64,
     pub moment_magic: f64,
@@ -247,8 +251,14 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         let rate = dxx.mul_add(dxx, dyy.mul_add(dyy, dxx * dyy));
         let rate = (quarter * dxy).mul_add(dxy, rate);
         let rate = (L::splat(4.0 / 3.0) * rate).sqrt();
-        let yields = c.law.update(&mut layer, rate);
-        let s = layer.stress;
+        let mut yields = c.law.update(&mut layer, rate);
+        let mut s = layer.stress;
+        if let Some(limit) = c.breaks {
+            let broken = L::splat(limit).less_equal(layer.plastic_strain);
+            yields = L::either(yields, broken);
+            let left = L::select(broken, zero, one);
+            s = Plane { xx: s.xx * left, yy: s.yy * left, xy: s.xy * left, yz: s.yz * left, zx: s.zx * left };
+        }
         elastic = elastic + L::select(yields, zero, weight);
         // The layer's strain across the thickness: elastic part by Hooke, plastic part keeps the volume.
         let rise = (s.xx - old[0]) + (s.yy - old[1]);
