@@ -20,6 +20,7 @@ mod hexahedron;
 mod law;
 mod load;
 mod modes;
+mod order;
 mod rigid;
 mod shell;
 mod soft;
@@ -76,6 +77,7 @@ macro_rules! each_case_of_the_book {
             gas: gas_that_runs_together_is_compressed_as_noh_says long;
             gas: the_blast_of_lulesh_reaches_sedovs_radius quick;
             gas: a_point_blast_has_sedovs_radius_at_two_times long;
+            order: shocks_converge_with_the_cells quick;
             law: products_have_their_chapman_jouguet_state_and_follow_its_isentrope quick;
             law: a_detonation_runs_at_its_speed_with_its_pressure_behind quick;
             law: detonations_at_default_settings_reach_the_state_of_chapman_and_jouguet quick;

@@ -238,6 +238,12 @@ impl Block {
         self.group.take_out(slot)
     }
 
+    /// Energy that the element of a slot took of its nodes since its state, if it has no forces any more; `dt` is the step to the
+    /// positions of now.
+    pub(crate) fn half_work(&self, slot: usize, dt: f64, material: &Material) -> f64 {
+        self.group.half_work(slot, [&self.x, &self.v], dt, material)
+    }
+
     /// Number of lane sets.
     pub fn n_sets(&self) -> u32 {
         self.alive().len() as u32

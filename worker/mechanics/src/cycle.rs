@@ -218,10 +218,16 @@ impl Domain {
             let material = &materials[held_block.block.material as usize];
             if let Some(eroding) = held_block.eroding.as_mut().filter(|_| dt > 0.0) {
                 if sets != Sets::Interior {
-                    eroding.watch(&mut held_block.block, &held_block.border, &step, cycle, width);
+                    eroding.watch(&mut held_block.block, material, &held_block.border, (&step, cycle), width);
                 }
                 if sets != Sets::Border {
-                    eroding.watch(&mut held_block.block, &held_block.interior, &step, cycle, width);
+                    eroding.watch(
+                        &mut held_block.block,
+                        material,
+                        &held_block.interior,
+                        (&step, cycle),
+                        width,
+                    );
                 }
             }
             if sets != Sets::Interior {

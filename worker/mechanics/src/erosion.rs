@@ -2,7 +2,7 @@
 //!
 //! [`Criteria`] say by part when an element is taken out. An element that meets one at the start of its pass of cycle `n` gives
 //! no force in that cycle nor in any after it, has no vote, and keeps its last state; its internal energy is booked as
-//! eroded in the vote of `n`. Its faces stay on the contact surface until that vote has been answered: from cycle
+//! eroded in the vote of `n`, with the work that its last forces did in the second half of the step to `n`. Its faces stay on the contact surface until that vote has been answered: from cycle
 //! `n + `[`SURFACE_LAG`] on they are gone and the faces that they hid are outside. So neither cycle depends on how a run is cut,
 //! sorted or timed.
 //!
@@ -136,7 +136,7 @@ pub struct PieceErosion {
 pub(crate) struct Casualties {
     /// Global indices of the elements that eroded.
     pub elements: Vec<u32>,
-    /// Their internal energy, an exact sum.
+    /// Their internal energy, and what they took of their nodes since, an exact sum.
     pub internal: f64,
 }
 
@@ -211,9 +211,9 @@ impl Eroding {
     pub(crate) fn watch(
         &mut self,
         block: &mut Block,
+        material: &Material,
         sets: &[Range<u32>],
-        step: &Step,
-        cycle: u64,
+        (step, cycle): (&Step, u64),
         width: Width,
     ) {
         let found = match block.scanned() {
@@ -221,10 +221,11 @@ impl Eroding {
             None => block.met(&self.criteria, sets),
         };
         for slot in found.into_iter().map(|slot| slot as usize) {
+            let since = block.half_work(slot, step.dt, material);
             let (element, internal) = block.take_out(slot);
             self.eroded[slot] = cycle;
             self.eroded_now.elements.push(element);
-            self.eroded_now.internal += step.energy_quantum.round(internal);
+            self.eroded_now.internal += step.energy_quantum.round(internal + since);
             self.changed = true;
         }
     }

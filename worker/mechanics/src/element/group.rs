@@ -101,6 +101,12 @@ pub(crate) trait Group: Send + Sync {
     /// internal energy.
     fn take_out(&mut self, slot: usize) -> (u32, f64);
 
+    /// Energy that the element of a slot takes of its nodes in the second half of the step `dt` to the positions `x` of now, with the
+    /// velocities `v`, by the forces that it had before the step; for kinds that erode.
+    fn half_work(&self, _slot: usize, _moved: [&[Vec<f64>; 3]; 2], _dt: f64, _material: &Material) -> f64 {
+        0.0
+    }
+
     /// The arrays for the pass of erosion; none of a kind that looks for itself, see [`Group::met`].
     fn scanned(&self) -> Option<Scanned<'_>> {
         None

@@ -7,6 +7,7 @@ use std::ops::Range;
 
 mod end;
 pub(crate) mod group;
+mod leaving;
 mod pass;
 mod stress;
 mod view;

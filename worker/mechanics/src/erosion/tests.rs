@@ -3,6 +3,10 @@
 use super::*;
 use crate::{
     block::Piece,
+    element::{
+        ElementVote,
+        hourglass::{Hourglass, Kind, N_FORCES},
+    },
     exact::Quantum,
     material::{Eos, Failure, Strength},
     mesh::Topology,
@@ -130,7 +134,7 @@ fn watched(criteria: &Criteria, structured: bool, width: Width) -> (Casualties, 
     let mut block = Block::of(piece, &materials);
     let mut eroding = Eroding::new(criteria, Some(&state), &mut block, &materials[0], 0.6666);
     let all = 0..block.n_sets();
-    eroding.watch(&mut block, std::slice::from_ref(&all), &step(), 17, width);
+    eroding.watch(&mut block, &materials[0], std::slice::from_ref(&all), (&step(), 17), width);
     let mut eroded_now = eroding.take_casualties();
     eroded_now.elements.sort_unstable();
     (eroded_now, eroding.state(&block))
@@ -163,17 +167,53 @@ fn the_energy_of_those_that_leave_is_booked_once_and_their_cycle_is_kept() {
     for criteria in criteria() {
         let (gone, state) = watched(&criteria, true, Width::Scalar);
         let (piece, before) = bent(true);
-        let expected = gone
-            .elements
-            .iter()
-            .map(|&e| e as usize - 100)
-            .map(|e| step().energy_quantum.round(piece.fields[field::ENERGY][e] * piece.initial_volume[e]))
-            .fold(0.0, |sum: f64, energy| sum + energy);
+        let block = Block::of(piece.clone(), &[steel()]);
+        let mut expected = 0.0;
+        for e in gone.elements.iter().map(|&e| e as usize - 100) {
+            let internal = piece.fields[field::ENERGY][e] * piece.initial_volume[e];
+            let since = block.half_work(block.slot(e), step().dt, &steel());
+            expected += step().energy_quantum.round(internal + since);
+        }
         assert_eq!(gone.internal.to_bits(), expected.to_bits(), "{criteria:?}");
         assert!(!gone.elements.contains(&105), "one that had gone before goes no second time");
         for (e, (&was, &is)) in before.eroded.iter().zip(&state.eroded).enumerate() {
             let left = gone.elements.contains(&(e as u32 + 100));
             assert_eq!(is, if left { 17 } else { was }, "{criteria:?}: element {e}");
+        }
+    }
+}
+
+#[test]
+fn the_last_forces_of_elements_do_half_of_their_work_after_them() {
+    for kind in [None, Some(Kind::Stiffness), Some(Kind::AssumedStrain)] {
+        for structured in [true, false] {
+            let (mut piece, _) = bent(structured);
+            piece.hourglass = kind.map_or(Hourglass::NONE, |kind| Hourglass { kind, coefficient: 0.5 });
+            if kind.is_some() {
+                let mut draw = draws(7);
+                let n = piece.elements.len();
+                piece.own = (0..N_FORCES).map(|_| (0..n).map(|_| 1e4 * draw()).collect()).collect();
+                piece.fields[field::DAMAGE].fill(0.0);
+            }
+            let mut block = Block::of(piece, &[steel()]);
+            let all = 0..block.n_sets();
+            let mut vote = ElementVote::default();
+            let step = Step { quadratic_viscosity: 1.5, linear_viscosity: 0.06, ..step() };
+            block.compute(&steel(), std::slice::from_ref(&all), &step, Width::Scalar, &mut vote);
+            assert_eq!(vote.fault, None);
+            let dt = 0.7 * step.dt;
+            let (mut work, mut size) = (0.0, 0.0);
+            for axis in 0..3 {
+                for ((x, v), f) in block.x[axis].iter_mut().zip(&block.v[axis]).zip(&block.f[axis]) {
+                    *x += dt * v;
+                    work -= 0.5 * dt * f * v;
+                    size += 0.5 * dt * (f * v).abs();
+                }
+            }
+            let elements = 0..block.elements.len();
+            let half: f64 = elements.map(|e| block.half_work(block.slot(e), dt, &steel())).sum();
+            assert!(work.abs() > 1e-3 * size, "{work} of {size}");
+            assert!((half - work).abs() < 1e-9 * size, "{kind:?}: {half}, forces did {work}, of {size}");
         }
     }
 }
@@ -188,7 +228,7 @@ fn an_element_that_has_left_gives_no_force_and_no_vote() {
     let mut eroding = Eroding::new(&criteria, Some(&state), &mut block, &materials[0], 0.6666);
     assert!(block.alive().iter().all(|&bits| bits == 0));
     let all = 0..block.n_sets();
-    eroding.watch(&mut block, std::slice::from_ref(&all), &step(), 17, Width::Scalar);
+    eroding.watch(&mut block, &materials[0], std::slice::from_ref(&all), (&step(), 17), Width::Scalar);
     assert_eq!(eroding.take_casualties(), Casualties::default());
     assert!(!eroding.take_change());
 }

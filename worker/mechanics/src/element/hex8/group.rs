@@ -5,22 +5,23 @@
 
 use std::mem::take;
 
-use super::{BySlot, View, pass};
+use super::{BySlot, View, leaving::Leaving, pass};
 use crate::{
     block::Piece,
     element::{
         ElementVote,
         group::{Call, ElementArrays, Group, PHANTOM, Scanned},
-        hourglass::{Hourglass, N_FORCES},
+        hourglass::{Amplitudes, Hourglass, N_FORCES},
         layout::{Corners, Layout, explicit, in_runs, structured},
         place::Nodal,
     },
-    lanes::SET,
+    lanes::{SET, scalar::Scalar},
+    material::Material,
     mesh::Topology,
     spin::Turning,
     state::{
         N_FIELDS,
-        field::{ENERGY, PRESSURE},
+        field::{DAMAGE, ENERGY, PRESSURE, SXX, SXY, SYY, SYZ, SZX, VISCOSITY},
         sparse, write_changed,
     },
 };
@@ -108,6 +109,24 @@ impl Solids {
         let kept = self.hourglass.iter().filter(|array| !array.is_empty());
         kept.map(|array| self.by_element(array)).collect()
     }
+
+    /// Nodes of the corners of the element of a slot.
+    fn corners_of(&self, slot: usize) -> [u32; 8] {
+        match &self.layout {
+            Layout::Structured { row, plane, base } => {
+                let n = base[slot / SET] + (slot % SET) as u32;
+                let (row, plane) = (*row as u32, *plane as u32);
+                [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| n + d)
+            }
+            Layout::Explicit { sets, lists } => {
+                let lane = slot % SET;
+                match sets[slot / SET] {
+                    Corners::Run(_, first) => first.map(|node| node + lane as u32),
+                    Corners::List(list) => lists[list as usize].map(|nodes| nodes[lane]),
+                }
+            }
+        }
+    }
 }
 
 impl Group for Solids {
@@ -124,21 +143,36 @@ impl Group for Solids {
     }
 
     fn corners(&self, element: usize) -> [u32; 8] {
-        let slot = self.slot(element);
-        match &self.layout {
-            Layout::Structured { row, plane, base } => {
-                let n = base[slot / SET] + (slot % SET) as u32;
-                let (row, plane) = (*row as u32, *plane as u32);
-                [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| n + d)
-            }
-            Layout::Explicit { sets, lists } => {
-                let lane = slot % SET;
-                match sets[slot / SET] {
-                    Corners::Run(_, first) => first.map(|node| node + lane as u32),
-                    Corners::List(list) => lists[list as usize].map(|nodes| nodes[lane]),
-                }
-            }
-        }
+        self.corners_of(self.slot(element))
+    }
+
+    fn half_work(&self, slot: usize, [x, v]: [&[Vec<f64>; 3]; 2], dt: f64, material: &Material) -> f64 {
+        let corners = self.corners_of(slot);
+        let at = |of: &[Vec<f64>; 3]| corners.map(|n| [0, 1, 2].map(|axis| of[axis][n as usize]));
+        let state = |field: usize| self.fields[field][slot];
+        let is_elastic = self.control.is_elastic();
+        let hourglass = is_elastic
+            .then(|| Amplitudes::from_array(self.hourglass.each_ref().map(|array| Scalar(array[slot]))));
+        let viscous = if !is_elastic {
+            self.control.coefficient
+        // One that failed in its last step still had forces of elastic control then.
+        } else if state(DAMAGE) >= 1.0 && hourglass.is_some_and(|forces| forces.square().0 == 0.0) {
+            self.control.damping()
+        } else {
+            0.0
+        };
+        let stiffness = material.bulk() + 4.0 / 3.0 * material.shear();
+        let sound = (stiffness / material.density).sqrt();
+        let leaving = Leaving {
+            x: at(x),
+            v: at(v),
+            dt,
+            deviator: [SXX, SYY, SXY, SYZ, SZX].map(state),
+            pressure: state(PRESSURE) + state(VISCOSITY),
+            hourglass: hourglass.as_ref(),
+            viscous: viscous * material.density * self.initial_volume[slot] * sound,
+        };
+        leaving.half_work()
     }
 
     fn compute(
