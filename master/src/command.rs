@@ -189,7 +189,7 @@ pub struct RunArgs {
     /// Relative speeds of the workers, separated by commas; missing ones are 1
     #[arg(long, value_delimiter = ',')]
     pub speeds: Vec<f64>,
-    /// Compute threads per worker [default: all cores]
+    /// Compute threads per worker [default: the cores that it may use]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
     /// A process for each worker, over loopback TCP
@@ -318,7 +318,7 @@ pub struct WorkerArgs {
     /// Use only these processors, as in 0,2-3
     #[arg(long, value_name = "LIST")]
     pub pin: Option<Processors>,
-    /// Compute threads [default: all cores]
+    /// Compute threads [default: the cores that it may use]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
     /// Name, unlike that of any other worker [default: host name and process id]

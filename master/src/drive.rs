@@ -225,7 +225,7 @@ pub fn drive(
     let bytes = driver.worker_links.iter().map(WorkerLink::bytes).sum::<u64>() - driver.bytes_before;
     result.map(|outcome| {
         let peer_bytes = outcome.reports.iter().map(|report| report.peer_bytes).sum();
-        (outcome, Traffic { bytes: bytes + peer_bytes, peer_bytes, sort_ns: driver.sort_ns })
+        (outcome, Traffic { bytes: bytes + peer_bytes, peer_bytes, sort_ns: driver.sort_ns, serial_ns: None })
     })
 }
 

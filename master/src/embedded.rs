@@ -6,6 +6,7 @@
 
 use std::{
     collections::{BTreeMap, VecDeque},
+    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -20,7 +21,7 @@ use protocol::{
     phase::{Phase, Report},
 };
 use worker::{
-    compute::{Machine, ThreadClock},
+    compute::{Machine, ThreadClock, thread_cpu_ns},
     session::{self, Task},
     stopwatch::{Lap, Stopwatch},
 };
@@ -56,6 +57,9 @@ pub struct Traffic {
     pub peer_bytes: u64,
     /// Thread-CPU time of sorts (ns).
     pub sort_ns: u64,
+    /// With one worker in this process: thread-CPU time of the cycles that one thread spends while the others have nothing to
+    /// do (ns).
+    pub serial_ns: Option<u64>,
 }
 
 /// What befalls the workers of a run.
@@ -149,6 +153,7 @@ pub fn run_through(
         away: 0,
         timer: None,
         send_began: Instant::now(),
+        cycles_from: None,
         traffic: Traffic::default(),
     };
     let mut world = World::new(n_workers, process);
@@ -175,6 +180,9 @@ struct Process<'a> {
     timer: Option<Instant>,
     /// When the message that is being packed was begun.
     send_began: Instant,
+    /// CPU time of the thread that runs tasks, without what all threads share, when the first cycle began, and the sorts until
+    /// then (ns).
+    cycles_from: Option<[u64; 2]>,
     traffic: Traffic,
 }
 
@@ -289,7 +297,16 @@ impl Surroundings for Process<'_> {
         let mut machine = self.places[host].machine.take().ok_or(Error::TwoTasks)?;
         match &self.pool {
             None => {
+                if self.cycles_from.is_none() && matches!(task, Task::Border { .. }) {
+                    self.cycles_from = Some([alone(&machine), self.traffic.sort_ns]);
+                }
+                let ends_cycle = matches!(task, Task::Integrate { .. });
                 let outcome = machine.run(task);
+                if ends_cycle && let Some([from, sorted]) = self.cycles_from {
+                    // Where there is another thread a sort runs beside the cycles.
+                    let sorts = if self.threads == 1 { self.traffic.sort_ns - sorted } else { 0 };
+                    self.traffic.serial_ns = Some(alone(&machine).saturating_sub(from + sorts));
+                }
                 self.queue.push_back(Arrival::Done(host, machine, outcome));
             }
             Some(pool) => {
@@ -320,7 +337,23 @@ impl Surroundings for Process<'_> {
         };
         match &self.pool {
             Some(pool) => pool.spawn(work),
-            None => rayon::spawn(work),
+            None => {
+                // On the pool a thread that waits for the end of a phase would begin it, and the others would wait for the sort.
+                let beside = self.places.first().and_then(|place| Some(place.machine.as_ref()?.beside()));
+                let beside = beside.unwrap_or_default();
+                beside.fetch_add(1, Ordering::Relaxed);
+                let work = move || {
+                    work();
+                    beside.fetch_sub(1, Ordering::Relaxed);
+                };
+                std::thread::Builder::new()
+                    .name("sort".to_owned())
+                    .spawn(|| {
+                        // As on the pool: nobody could go on without what it would have found.
+                        catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| std::process::abort());
+                    })
+                    .map_err(|e| Error::Surroundings(format!("a thread for the sort: {e}")))?;
+            }
         }
         Ok(())
     }
@@ -373,6 +406,11 @@ impl Surroundings for Process<'_> {
         let lap = Lap { phase: Phase::Send, from: self.send_began, to: Instant::now() };
         self.places[host].stopwatch.book(cycle, lap);
     }
+}
+
+/// CPU time of the calling thread, which runs the tasks of a machine, without what all threads share (ns).
+fn alone(machine: &Machine) -> u64 {
+    thread_cpu_ns().saturating_sub(machine.dealt_ns())
 }
 
 /// A sort and its thread-CPU time (ns).

@@ -85,7 +85,7 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
     if let Some(pin) = &args.pin {
         pin.apply()?;
     }
-    let cores = std::thread::available_parallelism().map_or(1, usize::from) as u32;
+    let cores = worker::processors::cores() as u32;
     let speed = match args.speed {
         Speed::Given(speed) => speed,
         Speed::Auto => {

@@ -51,7 +51,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     bring_end_forward(&mut model, asked)?;
     let model = Arc::new(model);
     let n = args.workers as usize;
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let cores = worker::processors::cores();
     let threads = args.threads.map_or(cores, |t| t as usize);
     let specs: Vec<WorkerSpec> = speeds_for(n, &args.speeds)?
         .into_iter()

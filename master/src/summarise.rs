@@ -80,6 +80,10 @@ pub fn summarise(
         wall_s,
         grind_ns: per(compute as f64, elements as f64 * run_cycles),
         contact_share: per(contact as f64, compute as f64),
+        serial_share: traffic.serial_ns.map(|serial| {
+            let cycles = compute.saturating_sub(traffic.sort_ns) + serial;
+            per(serial as f64, cycles as f64)
+        }),
         sorts: outcome.sorts,
         work_units: WorkUnits {
             count: units.units as u64,

@@ -1,7 +1,10 @@
 //! Does what a session asks: the domain, the lanes, the clock of compute threads.
 
 use std::{
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, AtomicUsize, Ordering},
+    },
     time::Instant,
 };
 
@@ -24,6 +27,8 @@ use crate::{
 pub struct ThreadClock {
     all: AtomicU64,
     contact: AtomicU64,
+    dealt: AtomicU64,
+    beside: Arc<AtomicUsize>,
 }
 
 impl Meter for ThreadClock {
@@ -32,15 +37,37 @@ impl Meter for ThreadClock {
     }
 
     fn stop(&self, mark: u64, contact: bool) {
-        let used = thread_cpu_ns().saturating_sub(mark);
+        self.book(thread_cpu_ns().saturating_sub(mark), contact);
+    }
+
+    fn dealt(&self, mark: u64) {
+        self.dealt.fetch_add(thread_cpu_ns().saturating_sub(mark), Ordering::Relaxed);
+    }
+
+    fn beside(&self) -> usize {
+        self.beside.load(Ordering::Relaxed)
+    }
+
+    fn stop_dealt(&self, mark: u64, contact: bool) {
+        let now = thread_cpu_ns();
+        self.book(now.saturating_sub(mark), contact);
+        self.dealt.fetch_add(now.saturating_sub(mark), Ordering::Relaxed);
+    }
+}
+
+impl ThreadClock {
+    fn book(&self, used: u64, contact: bool) {
         self.all.fetch_add(used, Ordering::Relaxed);
         if contact {
             self.contact.fetch_add(used, Ordering::Relaxed);
         }
     }
-}
 
-impl ThreadClock {
+    /// Thread-CPU time that the thread which runs tasks spent where all threads work (ns): what else it spends is serial.
+    pub fn dealt_ns(&self) -> u64 {
+        self.dealt.load(Ordering::Relaxed)
+    }
+
     /// What has been counted so far.
     pub fn work(&self) -> Work {
         Work {
@@ -70,17 +97,18 @@ pub fn pin(processors: &[usize]) -> Result<(), String> {
 /// The highest nice value of Linux.
 const LOWEST: i32 = 19;
 
-fn thread_cpu_ns() -> u64 {
+/// CPU time of the calling thread so far (ns).
+pub fn thread_cpu_ns() -> u64 {
     let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
 }
 
 /// Positions for a sort, if one is due; a blocking one replaces those under way.
-fn gathered(domain: &mut Domain, gather: bool, blocking: bool) -> Vec<f64> {
+fn gathered(domain: &mut Domain, gather: bool, blocking: bool, clock: &ThreadClock) -> Vec<f64> {
     if blocking {
         domain.end_surface();
     }
-    if gather { domain.gather() } else { Vec::new() }
+    if gather { domain.gather(clock) } else { Vec::new() }
 }
 
 /// A worker's domain and clock. `run` is called by one thread at a time; blocks spread over the current rayon pool.
@@ -125,6 +153,16 @@ impl Machine {
         self.clock.work()
     }
 
+    /// Counts threads of the pool that have something else to do: whoever has one begin adds it, and takes it off when it ends.
+    pub fn beside(&self) -> Arc<AtomicUsize> {
+        Arc::clone(&self.clock.beside)
+    }
+
+    /// See [`ThreadClock::dealt_ns`].
+    pub fn dealt_ns(&self) -> u64 {
+        self.clock.dealt_ns()
+    }
+
     /// What the tasks since the last call took, by wall clock, in their order.
     pub fn take_laps(&mut self) -> impl Iterator<Item = Lap> + use<> {
         std::mem::take(&mut self.laps.0).into_iter()
@@ -164,17 +202,18 @@ impl Machine {
             }
             Task::Install { plan, ghost_state, dt_previous, gather, blocking } => {
                 laps.time(Phase::Contact, || {
-                    let mark = clock.start();
-                    domain.install(&plan, &ghost_state)?;
-                    clock.stop(mark, true);
-                    let gathered = gathered(domain, gather, blocking);
+                    let (mark, dealt) = (clock.start(), clock.dealt_ns());
+                    domain.install(&plan, &ghost_state, clock)?;
+                    // What was dealt has been booked.
+                    clock.stop(mark + (clock.dealt_ns() - dealt), true);
+                    let gathered = gathered(domain, gather, blocking, clock);
                     domain.contact(dt_previous, clock);
                     Ok::<_, String>(Outcome::Forces { partials: domain.partials(clock), gathered })
                 })?
             }
             Task::Border { dt_previous, quantum, time, gather, blocking } => {
                 let gathered = laps.time(Phase::Contact, || {
-                    let gathered = gathered(domain, gather, blocking);
+                    let gathered = gathered(domain, gather, blocking, clock);
                     domain.begin(quantum, time);
                     domain.contact(dt_previous, clock);
                     gathered
@@ -225,7 +264,7 @@ impl Machine {
         );
         domain.place_bodies(&assign.bodies)?;
         domain.watch(&assign.watched);
-        domain.install(&assign.plan, &assign.ghost_state)?;
+        domain.install(&assign.plan, &assign.ghost_state, &self.clock)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
         if !further_epoch {
             self.clock = ThreadClock::default();

@@ -53,7 +53,7 @@ pub struct Way {
     pub path: String,
     /// Relative speed, or `auto`.
     pub speed: String,
-    /// Compute threads; all cores by default.
+    /// Compute threads; by default one for each core that the worker may use.
     pub threads: Option<u32>,
     /// Folder with the host's certificates, there.
     pub certs: Option<String>,

@@ -167,6 +167,8 @@ struct Taken {
     contact_ns: f64,
     /// Wall clock of a cycle (ns), the start of the run left out as far as its own phases go.
     wall_ns: f64,
+    /// Share of a cycle that one thread does alone.
+    serial: f64,
 }
 
 fn once(model: &Arc<Model>, threads: u32, lanes: Option<Width>) -> Result<Taken, String> {
@@ -191,6 +193,9 @@ fn once(model: &Arc<Model>, threads: u32, lanes: Option<Width>) -> Result<Taken,
         element_ns: all as f64 / (cycles * model.mesh.n_elements() as f64),
         contact_ns: contact as f64 / (cycles * surface_nodes.max(1) as f64),
         wall_ns: wall / cycles,
+        serial: traffic.serial_ns.map_or(0.0, |serial| {
+            serial as f64 / (serial + all.saturating_sub(traffic.sort_ns)).max(1) as f64
+        }),
     })
 }
 
@@ -238,6 +243,8 @@ pub struct Report {
     pub message_ns: f64,
     /// A byte of a long one, at each end (ns).
     pub byte_ns: f64,
+    /// Share of a cycle that one thread does alone, however many there are: joined plates and plates in contact.
+    pub serial_shares: [Spread; 2],
     /// Wall clock of one thread over that of two and by two, by turns; none where there is one processor.
     pub two_threads: Option<Spread>,
     /// What `--speed auto` says with one thread.
@@ -274,13 +281,19 @@ fn measured(rounds: u32, side: u32, lanes: Option<Width>) -> Result<Report, Stri
     cases.push(("shells of five points, von Mises".to_owned(), model(&shells(side), false)?));
     let touching = model(&plates(side, None, 0.1), false)?;
     let mut times = vec![Vec::new(); cases.len()];
-    let (mut contact, mut two) = (Vec::new(), Vec::new());
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let (mut contact, mut two, mut serial) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
+    let cores = worker::processors::cores();
     for _ in 0..rounds {
-        for ((_, model), times) in cases.iter().zip(&mut times) {
-            times.push(once(model, 1, lanes)?.element_ns);
+        for (case, ((_, model), times)) in cases.iter().zip(&mut times).enumerate() {
+            let taken = once(model, 1, lanes)?;
+            times.push(taken.element_ns);
+            if case == 0 {
+                serial[0].push(taken.serial);
+            }
         }
-        contact.push(once(&touching, 1, lanes)?.contact_ns);
+        let taken = once(&touching, 1, lanes)?;
+        contact.push(taken.contact_ns);
+        serial[1].push(taken.serial);
         if cores > 1 {
             let (_, joined) = &cases[0];
             two.push(once(joined, 1, lanes)?.wall_ns / (2.0 * once(joined, 2, lanes)?.wall_ns));
@@ -302,6 +315,7 @@ fn measured(rounds: u32, side: u32, lanes: Option<Width>) -> Result<Report, Stri
         sort_node_ns: sort * pair * element_ns,
         message_ns,
         byte_ns,
+        serial_shares: serial.map(Spread::of),
         two_threads: (cores > 1).then(|| Spread::of(two)),
     })
 }
@@ -324,6 +338,11 @@ fn table(report: &Report) -> String {
     lines.push(format!(
         "{:<44}{:>9.0} ns, and {:.3} ns per byte, at each end",
         "message over loopback", report.message_ns, report.byte_ns
+    ));
+    let [joined, touching] = report.serial_shares.map(|share| 100.0 * share.median);
+    lines.push(format!(
+        "{:<44}{joined:>9.1} % of a cycle of joined plates, {touching:.1} % with contact",
+        "done by one thread alone"
     ));
     if let Some(Spread { median, .. }) = report.two_threads {
         lines.push(format!(
@@ -400,7 +419,7 @@ mod tests {
         for (name, ns) in of_elements.chain(others) {
             assert!(ns > 0.0 && ns.is_finite(), "{name}: {ns} ns");
         }
-        let lines = 1 + 7 + 5 + usize::from(report.two_threads.is_some());
+        let lines = 1 + 7 + 6 + usize::from(report.two_threads.is_some());
         assert_eq!(table(&report).lines().count(), lines, "{}", table(&report));
     }
 

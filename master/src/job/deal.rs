@@ -230,11 +230,9 @@ impl Division {
         let n = threads.len();
         let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
         let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
-        for (id, subdomain) in layout.iter().enumerate() {
-            let pieces: Vec<Piece> = blocks(subdomain, threads)
-                .iter()
-                .map(|region| piece::cut(&model.mesh, state, subdomain.part, region))
-                .collect();
+        for ((id, subdomain), regions) in layout.iter().enumerate().zip(blocks(layout, threads)) {
+            let pieces: Vec<Piece> =
+                regions.iter().map(|region| piece::cut(&model.mesh, state, subdomain.part, region)).collect();
             let mut nodes: Vec<u32> = pieces.iter().flat_map(|p| p.nodes.iter().copied()).collect();
             nodes.sort_unstable();
             nodes.dedup();
@@ -268,16 +266,29 @@ impl Division {
     }
 }
 
-/// The blocks of a sub-domain, one for each thread of its worker.
-fn blocks(subdomain: &decompose::Subdomain, threads: &[u32]) -> Vec<Region> {
-    subdomain.region.split(threads[subdomain.worker].max(1) as usize)
+/// Blocks for each thread of a worker that has several: whoever is free takes the next, so that unequal blocks and unequal cores
+/// come out even.
+const BLOCKS: usize = 4;
+
+/// Elements of a block below which its nodes, which other blocks have too, cost more than an even share gains.
+const ELEMENTS: usize = 2000;
+
+/// The blocks of each sub-domain: of a worker with several threads at least one for each, in proportion to the elements.
+fn blocks(layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<Region>> {
+    let mut elements = vec![0; threads.len()];
+    layout.iter().for_each(|subdomain| elements[subdomain.worker] += subdomain.region.n_elements());
+    let of_subdomain = |subdomain: &decompose::Subdomain| {
+        let (all, threads) = (elements[subdomain.worker].max(1), threads[subdomain.worker].max(1) as usize);
+        let n = if threads > 1 { (all / ELEMENTS).clamp(threads, BLOCKS * threads) } else { 1 };
+        subdomain.region.split((n * subdomain.region.n_elements()).div_ceil(all).max(1))
+    };
+    layout.iter().map(of_subdomain).collect()
 }
 
 /// By worker: part and elements of each of its blocks, in the worker's order.
 fn blocks_of(layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<(usize, Region)>> {
     let mut by_worker = vec![Vec::new(); threads.len()];
-    for subdomain in layout {
-        let regions = blocks(subdomain, threads);
+    for (subdomain, regions) in layout.iter().zip(blocks(layout, threads)) {
         by_worker[subdomain.worker].extend(regions.into_iter().map(|region| (subdomain.part, region)));
     }
     by_worker

@@ -51,6 +51,9 @@ pub struct Summary {
     pub grind_ns: f64,
     /// Share of `grind_ns` in contact and sorts.
     pub contact_share: f64,
+    /// Share of a cycle of one thread that is done by one thread however many there are; known of one worker in this process.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub serial_share: Option<f64>,
     /// Sorts that took effect.
     pub sorts: u64,
     /// Contact work units of the sort in force in the last cycle.

@@ -187,6 +187,7 @@ fn summary(model: &Model) -> Summary {
         wall_s: 12.345,
         grind_ns: 47.3,
         contact_share: 0.051,
+        serial_share: Some(0.012),
         sorts: 37,
         work_units: WorkUnits {
             count: 2760,
@@ -544,7 +545,7 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
     assert_eq!(
         keys(&json),
         "bytes_per_cycle contact_share cycles digest elements end_time energies eroded_elements eroded_energy eroded_mass grind_ns imbalance lanes \
-         linked_pairs losses master_bytes_per_cycle momentum_error nodes rebalances relayed_pairs route sorts surface_elements surface_faces surface_nodes threads title wall_s \
+         linked_pairs losses master_bytes_per_cycle momentum_error nodes rebalances relayed_pairs route serial_share sorts surface_elements surface_faces surface_nodes threads title wall_s \
          warnings work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
     );
     assert_eq!(

@@ -11,6 +11,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "bodies of measurements, whose digests nobody compares")]
 
+use laws::{SHOCK, johnson_cook, steel, steels};
 use mechanics::{
     block::{Block, Piece},
     cycle::{self, Domain, Interval, Meter, Plan, Subdomain},
@@ -21,13 +22,17 @@ use mechanics::{
     exact::Quantum,
     initial,
     lanes::Width,
-    material::{Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
+    material::{Eos, Failure, Heat, Material, Strength},
     mesh::{Mesh, Part, Section, Topology},
     piece::{Region, cut},
     setup::{Constraint, Control, Setup},
     state::{N_FIELDS, field},
 };
 use rustix::time::{ClockId, clock_gettime};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+#[path = "kernels/laws.rs"]
+mod laws;
 
 /// Elements along each index.
 const CELLS: [u32; 3] = [30, 30, 30];
@@ -313,7 +318,7 @@ fn plates(
     let n_parts = mesh.parts.len();
     let mut domain = Domain::new(setup, n_parts, quanta, (subdomains, 0), &[], width);
     let plan = Plan { moments: kind == Kind::Shells, ..Plan::default() };
-    domain.install(&plan, &[]).expect("a plan without other workers");
+    domain.install(&plan, &[], &Silent).expect("a plan without other workers");
     (domain, quanta.force, n_elements)
 }
 
@@ -328,31 +333,54 @@ impl Meter for Silent {
     fn stop(&self, _mark: u64, _contact: bool) {}
 }
 
+/// Counts thread-CPU time of the calling thread in work that is dealt to all (ns).
+#[derive(Default)]
+struct Dealt(AtomicU64);
+
+impl Meter for Dealt {
+    fn start(&self) -> u64 {
+        (now() * 1e9) as u64
+    }
+
+    fn stop(&self, _mark: u64, _contact: bool) {}
+
+    fn dealt(&self, mark: u64) {
+        self.0.fetch_add(self.start().saturating_sub(mark), Ordering::Relaxed);
+    }
+}
+
 /// Median and least over `n_cycles` cycles of the nanoseconds per element of a whole cycle by `clock` (seconds), from the
 /// impact on.
-fn whole_cycle(
-    (mut domain, quantum, n_elements): (Domain, Quantum, usize),
+fn whole_cycle(domain: (Domain, Quantum, usize), n_cycles: usize, clock: &dyn Fn() -> f64) -> [f64; 2] {
+    let n_elements = domain.2 as f64;
+    let mut times = cycle_times(domain, n_cycles, clock, &Silent);
+    times.sort_by(f64::total_cmp);
+    [times[times.len() / 2], times[0]].map(|time| time * 1e9 / n_elements)
+}
+
+/// Times of whole cycles by `clock` (seconds), from the impact on; `meter` hears of them.
+fn cycle_times(
+    (mut domain, quantum, _): (Domain, Quantum, usize),
     n_cycles: usize,
     clock: &dyn Fn() -> f64,
-) -> [f64; 2] {
+    meter: &dyn Meter,
+) -> Vec<f64> {
     let mut vote = domain.prepare(&Silent);
     let mut dt_previous = 0.0;
-    let mut times: Vec<f64> = (0..n_cycles)
+    (0..n_cycles)
         .map(|cycle| {
             let limit = 0.6666 * vote.courant.min(vote.volume_limit);
             let dt = if cycle == 0 { 0.5 * limit } else { limit.min(1.05 * dt_previous) };
             let now = Interval { time: 0.0, dt_previous, dt, quantum };
             let start = clock();
-            vote = cycle::step(&mut domain, &now, &[], |_, partials| partials, &Silent)
+            vote = cycle::step(&mut domain, &now, &[], |_, partials| partials, meter)
                 .expect("totals of the exchange");
             let spent = clock() - start;
             assert!(vote.fault.is_none(), "fault {:?}", vote.fault);
             dt_previous = dt;
             spent
         })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    [times[times.len() / 2], times[0]].map(|time| time * 1e9 / n_elements as f64)
+        .collect()
 }
 
 /// The table of whole cycles; `only` chooses a number of elements.
@@ -421,6 +449,18 @@ fn threads() {
         .collect();
     found.sort_by(f64::total_cmp);
     println!("median {:.3}, best {:.3}", found[5], found[10]);
+    println!(
+        "blocks of each plate on one thread: thread-CPU ns, and the share of a cycle that no other thread could take"
+    );
+    for n in [1, 2, 4, 8, 16] {
+        let (domain, dealt) = (plates(40, (30, 10), Kind::Structured, Width::best(), n), Dealt::default());
+        let n_elements = domain.2 as f64;
+        let cycles = pools[0].install(|| cycle_times(domain, 120, &now, &dealt));
+        let all: f64 = cycles.iter().sum();
+        let ns = |seconds: f64| 1e9 * seconds / (n_elements * cycles.len() as f64);
+        let share = 1.0 - dealt.0.into_inner() as f64 * 1e-9 / all;
+        println!("{n:>3} {:>6.1} {share:.4}", ns(all));
+    }
 }
 
 fn main() {
@@ -447,63 +487,6 @@ fn tables(words: &[String]) {
     if only.is_none() && !asks("cycles") {
         kernels();
     }
-}
-
-const SHOCK: Eos = Eos::Shock { c0: 4569.0, s: 1.49, gamma: 2.17 };
-const SHEAR: f64 = 81.8e9;
-
-/// Strength of the steel, by its thermal exponent.
-fn johnson_cook(m: f64) -> Strength {
-    let (a, b, n, c) = (350e6, 275e6, 0.36, 0.022);
-    let (t_melt, t_room, specific_heat, rate0) = (1811.0, 300.0, 452.0, 1.0);
-    Strength::JohnsonCook {
-        shear: SHEAR,
-        a,
-        b,
-        n,
-        c,
-        m,
-        t_melt,
-        t_room,
-        specific_heat,
-        rate0,
-        heat: Heat::PlasticWork,
-    }
-}
-
-/// A steel by these laws.
-fn steel(name: &str, eos: Eos, strength: Strength) -> Material {
-    Material { name: name.into(), density: 7896.0, eos, strength, failure: Failure::None }
-}
-
-/// Steels by the laws that are measured.
-fn steels() -> Vec<Material> {
-    let shear = SHEAR;
-    let bulk = Eos::Linear { bulk: 164e9 };
-    let (b0, b1) = (1.6, 1.6);
-    let cubic = Eos::Polynomial { a1: 164e9, a2: 294e9, a3: 500e9, b0, b1, t1: 164e9, t2: 0.0 };
-    let von_mises = Strength::VonMises { shear, yield_stress: 350e6, hardening: 1e8, rate: None };
-    let (mut strain, mut stress) = ([0.0; MAX_HARDENING], [0.0; MAX_HARDENING]);
-    (strain[1], strain[2], stress[0], stress[1], stress[2]) = (0.02, 0.3, 350e6, 420e6, 600e6);
-    let hardening = Hardening { n_points: 3, strain, stress };
-    let tabulated = Strength::Tabulated { shear, hardening, rate: None };
-    let d = [0.05, 3.44, -2.12, 0.002, 0.61];
-    let (r1, r2, omega, energy) = (4.15, 0.95, 0.3, 7e9);
-    let jwl =
-        Eos::Jwl { a: 371.2e9, b: 3.231e9, r1, r2, omega, energy, detonation: 6930.0, cj_pressure: 21e9 };
-    vec![
-        steel("hydro + linear", bulk, Strength::Hydro),
-        steel("elastic + linear", bulk, Strength::Elastic { shear }),
-        steel("von Mises + shock", SHOCK, von_mises),
-        steel("Johnson-Cook (m = 1) + shock", SHOCK, johnson_cook(1.0)),
-        steel("Johnson-Cook (m = 1.03) + shock", SHOCK, johnson_cook(1.03)),
-        Material {
-            failure: Failure::JohnsonCook { d },
-            ..steel("the same, which fails", SHOCK, johnson_cook(1.03))
-        },
-        steel("tabulated + polynomial", cubic, tabulated),
-        steel("products of detonation", jwl, Strength::Hydro),
-    ]
 }
 
 /// The table of the quietest chunks; words that name lane widths choose columns.

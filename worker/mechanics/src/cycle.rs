@@ -7,6 +7,7 @@
 
 mod assembly;
 mod bodies;
+mod deal;
 mod ghosts;
 mod held_block;
 mod image;
@@ -15,6 +16,7 @@ mod report;
 mod sharing;
 #[cfg(test)]
 mod tests;
+mod touch;
 
 use serde::{Deserialize, Serialize};
 
@@ -22,23 +24,23 @@ use crate::{
     contact::Settings,
     copy_index::CopyIndex,
     element::{ElementVote, Step},
-    erosion::Eroding,
     exact::Quantum,
     lanes::Width,
     load::face,
-    nodes::{Advance, Nodes, share_before},
+    nodes::{Advance, share_before},
     setup::Setup,
-    spin,
     vote::{Gone, Quanta, Vote},
     wall::{self, Pose, WallVote},
 };
 
 pub use assembly::Subdomain;
-use bodies::Held;
-use ghosts::{Ghosts, HeldContact};
-use held_block::{HeldBlock, each};
+use bodies::{Bodies, Held};
+use deal::Order;
+use ghosts::Ghosts;
+use held_block::HeldBlock;
 pub use plan::{Ghost, Neighbour, Plan};
-use sharing::{Exchange, Groups};
+use sharing::{Exchange, Groups, Holders, Numbers};
+use touch::HeldContact;
 
 /// The time of a cycle, its steps, and the quantum of its forces.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +84,17 @@ pub trait Meter: Sync {
     fn start(&self) -> u64;
     /// Books what the calling thread did since the mark.
     fn stop(&self, mark: u64, contact: bool);
+    /// The calling thread dealt work to all threads since the mark, and did its part of it: what else it does is serial.
+    fn dealt(&self, _mark: u64) {}
+    /// Threads of the pool that have something else to do now, such as a sort: work is dealt to the others.
+    fn beside(&self) -> usize {
+        0
+    }
+    /// Both, of a thread that is the only one.
+    fn stop_dealt(&self, mark: u64, contact: bool) {
+        self.stop(mark, contact);
+        self.dealt(mark);
+    }
 }
 
 /// Which element sets a pass computes.
@@ -116,12 +129,16 @@ pub struct Domain {
     quanta: Quanta,
     width: Width,
     held_blocks: Vec<HeldBlock>,
+    order: Order,
     ghosts: Ghosts,
-    contact: Option<HeldContact>,
+    /// Shares of the contact, one for each task of a thread; none without any.
+    contact: Vec<HeldContact>,
     /// Whether nodes turn anywhere in the run.
     moments: bool,
     exchange: Exchange,
     groups: Groups,
+    /// Whether any element touches a node of the exchange.
+    has_border: bool,
     bodies: Vec<Held>,
     /// Pushes on bodies travel: there are other workers.
     sends_pushes: bool,
@@ -156,33 +173,6 @@ impl Domain {
         self.time = time;
     }
 
-    /// Contact forces of the work units at `x_n` and loads on faces; `dt` is `dt_{n-1}`.
-    pub fn contact(&mut self, dt: f64, meter: &dyn Meter) {
-        let mark = meter.start();
-        if let Some(packed) = &mut self.contact {
-            packed.pack(&self.held_blocks, &self.ghosts);
-            packed.contact.history.cycle = self.cycle;
-            for f in &mut packed.f {
-                f.fill(0.0);
-            }
-            let vote = packed.contact.forces(
-                &packed.x,
-                &packed.v,
-                dt,
-                self.quanta.force,
-                self.quanta.energy,
-                &mut packed.f,
-            );
-            self.vote.add_contact(&vote);
-            self.vote.contact_energies.merge(packed.contact.energies());
-            if !self.watched_pairs.is_empty() {
-                self.vote.add_contacts(&packed.contact.pair_votes());
-            }
-        }
-        meter.stop(mark, true);
-        self.load_faces(meter);
-    }
-
     /// Adds the loads on faces to the forces of the blocks.
     fn load_faces(&mut self, meter: &dyn Meter) {
         if self.setup.loads.surfaces.is_empty() {
@@ -190,16 +180,18 @@ impl Domain {
         }
         let Setup { loads, control, .. } = &self.setup;
         let (time, quantum) = (self.time, self.quanta.force);
-        each(&mut self.held_blocks, |held_block| {
-            let mark = meter.start();
+        self.order.deal(&mut self.held_blocks, meter, |held_block| {
             held_block.face_vote =
                 face::apply(&mut held_block.faces, &mut held_block.block, loads, control, time, quantum);
-            meter.stop(mark, false);
         });
     }
 
     /// Forces of element sets at `x_n`, added to forces that integration has cleared; `dt` is `dt_{n-1}`.
     pub fn elements(&mut self, sets: Sets, dt: f64, meter: &dyn Meter) {
+        if sets == Sets::Border && !self.has_border {
+            self.held_blocks.iter_mut().for_each(|held_block| held_block.vote = ElementVote::default());
+            return;
+        }
         let control = &self.setup.control;
         let step = Step {
             dt,
@@ -214,7 +206,6 @@ impl Domain {
             if held_block.is_rigid {
                 return;
             }
-            let mark = meter.start();
             let material = &materials[held_block.block.material as usize];
             if let Some(eroding) = held_block.eroding.as_mut().filter(|_| dt > 0.0) {
                 if sets != Sets::Interior {
@@ -237,27 +228,31 @@ impl Domain {
             if sets != Sets::Border {
                 held_block.block.compute(material, &held_block.interior, &step, width, &mut held_block.vote);
             }
-            meter.stop(mark, false);
         };
-        each(&mut self.held_blocks, work);
+        self.order.deal(&mut self.held_blocks, meter, work);
     }
 
     /// Partial forces of the nodes of the exchange, three numbers each, with moments six, with what contact keeps of nodes more, and behind
     /// them pushes on rigid bodies.
     pub fn partials(&mut self, meter: &dyn Meter) -> Vec<f64> {
-        let mark = meter.start();
-        self.push_bodies();
-        let mut out = Vec::with_capacity(self.stride() * self.exchange.len() + self.n_pushes());
-        let numbers = (self.moments, self.n_history());
-        self.exchange.pack(&self.held_blocks, self.contact.as_ref(), numbers, &mut out);
+        self.push_bodies(meter);
+        let (numbers, n) = (self.numbers(), self.exchange.len());
+        let mut out = Vec::with_capacity(numbers.stride() * n + self.n_pushes());
+        out.resize(numbers.stride() * n, 0.0);
+        let holders = Holders { blocks: &self.held_blocks, contact: &self.contact };
+        self.exchange.pack(holders, numbers, &mut out, meter);
         self.pack_pushes(&mut out);
-        meter.stop(mark, false);
         out
+    }
+
+    /// Numbers of a node that has several holders.
+    fn numbers(&self) -> Numbers {
+        Numbers { moments: self.moments, n_history: self.n_history() }
     }
 
     /// Numbers that travel for each entry of the exchange.
     fn stride(&self) -> usize {
-        (if self.moments { 6 } else { 3 }) + self.n_history()
+        self.numbers().stride()
     }
 
     /// Numbers that contact keeps of each node.
@@ -286,16 +281,10 @@ impl Domain {
                 self.exchange.len()
             ));
         }
-        let mark = meter.start();
         let (totals, pushes) = totals.split_at(totals.len() - n_pushes);
-        let numbers = (self.moments, self.n_history());
-        self.exchange.put(totals, numbers, &mut self.held_blocks, &mut self.ghosts);
-        let of_contact = self.contact.as_ref().map(|contact| &contact.f);
-        self.groups.add_up(&mut self.held_blocks, of_contact, self.moments);
-        if let Some(packed) = &self.contact {
-            packed.keep(&mut self.held_blocks);
-        }
-        meter.stop(mark, false);
+        let numbers = self.numbers();
+        let holders = Holders { blocks: &self.held_blocks, contact: &self.contact };
+        self.groups.add_up(holders, numbers, meter);
         self.move_bodies(pushes, dt_previous, dt);
         self.gauges_before = self.read_gauges();
         let setup = &self.setup;
@@ -310,61 +299,27 @@ impl Domain {
             loads: &setup.loads,
             quanta: self.quanta,
         };
-        let width = self.width;
-        each(&mut self.held_blocks, |held_block| {
-            let mark = meter.start();
-            let block = &mut held_block.block;
-            let mut nodes = Nodes {
-                x: &mut block.x,
-                v: &mut block.v,
-                f: &mut block.f,
-                mass: &block.mass,
-                constraint: &block.constraint,
-                sets: &held_block.sets,
-                reference: &held_block.reference,
-                walls: &mut held_block.walls,
-            };
-            held_block.booked = advance.run(&mut nodes, width);
-            if let Some(turning) = &mut block.turning {
-                let (kinetic, external) =
-                    spin::advance(&advance, turning, &block.constraint, &held_block.sets);
-                held_block.booked.kinetic += kinetic;
-                held_block.booked.external.merge(external);
-            }
-            if !held_block.faces.is_empty() {
-                let half_steps = 0.5 * (dt_previous + dt);
-                let work = face::work(&held_block.faces, block, half_steps, advance.quanta.energy);
-                held_block.booked.external.merge(work);
-            }
-            if dt_previous == 0.0 {
-                held_block.booked.external.put_off();
-            }
-            if held_block.eroding.as_mut().is_some_and(Eroding::take_change) {
-                // Loads leave with the faces of eroded elements.
-                held_block.leave_out_dead();
-                if !held_block.faces.is_empty() {
-                    let material = &setup.materials[held_block.block.material as usize];
-                    held_block.faces = face::faces_of(&held_block.block, &setup.loads, material);
-                }
-            }
-            meter.stop(mark, false);
-        });
-        let ghosts = &mut self.ghosts;
-        let mut nodes = Nodes {
-            x: &mut ghosts.x,
-            v: &mut ghosts.v,
-            f: &mut ghosts.f,
-            mass: &ghosts.mass,
-            constraint: &ghosts.constraint,
-            sets: &ghosts.sets,
-            reference: &Default::default(),
-            walls: &mut self.unbooked,
+        let (width, bodies) = (self.width, Bodies { held: &self.bodies, of: &setup.bodies });
+        let (of_groups, contact) = (self.groups.totals(), &self.contact);
+        let of_block = |held_block: &mut HeldBlock| {
+            held_block.take_totals(totals, of_groups, contact, numbers);
+            held_block.lead(bodies, &advance);
+            held_block.integrate(&advance, setup, width);
         };
-        advance.run(&mut nodes, width);
+        let (held_blocks, order) = (&mut self.held_blocks, &mut self.order);
+        let (ghosts, unbooked) = (&mut self.ghosts, &mut self.unbooked);
+        if ghosts.node.is_empty() {
+            order.deal(held_blocks, meter, of_block);
+        } else {
+            let of_ghosts = || {
+                ghosts.take_totals(totals, numbers);
+                ghosts.lead(bodies, &advance);
+                ghosts.integrate(&advance, unbooked, width);
+            };
+            rayon::join(|| order.deal(held_blocks, meter, of_block), of_ghosts);
+        }
         if std::mem::take(&mut self.surface_ends) {
-            let mark = meter.start();
-            self.vote.released = Some(self.spring_energies(dt));
-            meter.stop(mark, true);
+            self.vote.released = Some(self.spring_energies(dt, meter));
         }
         self.cycle += 1;
         Ok(self.finish_vote(share_before(dt_previous, dt)))

@@ -9,6 +9,7 @@ use crate::{
     block::Piece,
     element::layout::n_runs,
     erosion::PieceErosion,
+    lanes::SET,
     mesh::{Mesh, Topology},
     state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},
 };
@@ -36,25 +37,27 @@ impl Region {
     }
 
     /// Cuts into `n` regions of nearly equal size (fewer when it is too small), for the threads of a worker:
-    /// structured along the slowest index that is long enough, lists in their order.
+    /// structured along the indices where that costs least, lists in their order.
     pub fn split(&self, n: usize) -> Vec<Self> {
         match self {
             Self::Cells { low, high } => {
-                let axis = if (high[2] - low[2]) as usize >= n {
-                    2
-                } else {
-                    (0..3).max_by_key(|&a| (high[a] - low[a], a)).unwrap_or(2)
-                };
-                let length = (high[axis] - low[axis]) as usize;
-                let n = n.clamp(1, length.max(1));
-                (0..n)
-                    .map(|i| {
-                        let (mut l, mut h) = (*low, *high);
-                        l[axis] = low[axis] + (length * i / n) as u32;
-                        h[axis] = low[axis] + (length * (i + 1) / n) as u32;
-                        Self::Cells { low: l, high: h }
-                    })
-                    .collect()
+                let cells = std::array::from_fn(|a| high[a] - low[a]);
+                let n = cuts(cells, n);
+                let bound =
+                    |a: usize, i: u32| low[a] + (u64::from(cells[a]) * u64::from(i) / u64::from(n[a])) as u32;
+                let mut regions = Vec::with_capacity(n.iter().map(|&n| n as usize).product());
+                for k in 0..n[2] {
+                    for j in 0..n[1] {
+                        for i in 0..n[0] {
+                            let place = [i, j, k];
+                            regions.push(Self::Cells {
+                                low: std::array::from_fn(|a| bound(a, place[a])),
+                                high: std::array::from_fn(|a| bound(a, place[a] + 1)),
+                            });
+                        }
+                    }
+                }
+                regions
             }
             Self::List(elements) => {
                 let n = n.clamp(1, elements.len().max(1));
@@ -66,6 +69,35 @@ impl Region {
             }
         }
     }
+}
+
+/// What a lane of an element costs against a node.
+const ELEMENT: u64 = 8;
+
+/// Into how many pieces to cut cells along each index for `n` in all, fewer where they are too few: those with the fewest idle
+/// lanes, of rows that do not fill their sets, and the fewest nodes twice.
+fn cuts(cells: [u32; 3], n: usize) -> [u32; 3] {
+    let all: u64 = cells.iter().map(|&c| u64::from(c)).product();
+    let cost = |n: [u32; 3]| {
+        let [j, k] = [1, 2].map(|a| u64::from(cells[a]));
+        let row = u64::from(n[0]) * u64::from(cells[0].div_ceil(n[0])).next_multiple_of(SET as u64);
+        let nodes: u64 = [0, 1, 2].map(|a| u64::from(cells[a] + n[a])).into_iter().product();
+        ELEMENT * row * j * k + nodes
+    };
+    let fits = |m: u32| {
+        let mut best: Option<[u32; 3]> = None;
+        for k in (1..=m.min(cells[2])).filter(|&k| m.is_multiple_of(k)) {
+            for j in (1..=(m / k).min(cells[1])).filter(|&j| (m / k).is_multiple_of(j)) {
+                let found = [m / k / j, j, k];
+                if found[0] <= cells[0] && best.is_none_or(|best| cost(found) < cost(best)) {
+                    best = Some(found);
+                }
+            }
+        }
+        best
+    };
+    let most = (n as u64).min(all) as u32;
+    (1..=most).rev().find_map(fits).unwrap_or([1; 3])
 }
 
 /// Cuts the piece of `region` of part `part` out of the global state.
@@ -282,6 +314,26 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cells_are_cut_across_rows_before_along_them() {
+        for (cells, n, expected) in [
+            ([40, 40, 30], 1, [1, 1, 1]),
+            ([40, 40, 30], 2, [1, 2, 1]),
+            ([40, 40, 30], 6, [1, 3, 2]),
+            ([40, 40, 30], 7, [1, 7, 1]),
+            ([40, 1, 1], 4, [4, 1, 1]),
+            ([3, 1, 1], 4, [3, 1, 1]),
+            ([2, 2, 1], 5, [2, 2, 1]),
+        ] {
+            assert_eq!(cuts(cells, n), expected, "{cells:?} in {n}");
+            let whole = Region::Cells { low: [5, 0, 9], high: [5 + cells[0], cells[1], 9 + cells[2]] };
+            let regions = whole.split(n);
+            assert_eq!(regions.len() as u32, expected.iter().product());
+            assert_eq!(regions.iter().map(Region::n_elements).sum::<usize>(), whole.n_elements());
+            assert!(regions.iter().all(|region| region.n_elements() > 0));
+        }
+    }
 
     #[test]
     fn nodes_keep_the_order_of_the_mesh_where_that_makes_runs() {

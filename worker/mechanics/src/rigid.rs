@@ -123,6 +123,14 @@ impl Push {
         }
     }
 
+    /// Adds another sum.
+    pub fn join(&mut self, other: &Self) {
+        for a in 0..3 {
+            self.force[a] += other.force[a];
+            self.torque[a] += other.torque[a];
+        }
+    }
+
     /// As numbers that add up exactly whatever their order, if no more than 64 are added.
     pub fn pack(&self) -> [f64; PUSH] {
         let mut out = [0.0; PUSH];

@@ -129,7 +129,7 @@ fn domain() -> Domain {
     let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: (0..base).collect() };
     let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], Width::best());
     let plan = Plan { exchange: (n_nodes / 2..n_nodes).collect(), ..Plan::default() };
-    domain.install(&plan, &[]).expect("all nodes are held");
+    domain.install(&plan, &[], &Silent).expect("all nodes are held");
     domain
 }
 

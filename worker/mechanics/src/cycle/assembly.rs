@@ -2,14 +2,16 @@
 
 use std::collections::VecDeque;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
     Domain,
     bodies::Held,
+    deal::Order,
     ghosts::Ghosts,
     held_block::HeldBlock,
-    sharing::{Exchange, Groups},
+    sharing::{Exchange, Groups, Share},
 };
 use crate::{
     block::{Block, Piece},
@@ -40,6 +42,39 @@ pub struct Subdomain {
 /// What a block without loads on faces says.
 const NO_FACES: FaceVote = FaceVote { force_bound: 0.0, limit: f64::INFINITY };
 
+impl HeldBlock {
+    /// Lays out a piece. Which of its nodes others have too is still to be said.
+    fn of(mut piece: Piece, setup: &Setup) -> Self {
+        let erosion = piece.erosion.take();
+        let contact_history = std::mem::take(&mut piece.contact);
+        let mut block = Block::of(piece, &setup.materials);
+        let all = 0..block.n_sets();
+        let material = &setup.materials[block.material as usize];
+        let eroding = setup.erosion.of_part(block.part as usize).map(|criteria| {
+            Eroding::new(criteria, erosion.as_ref(), &mut block, material, setup.control.safety_factor)
+        });
+        let part = block.part;
+        Self {
+            is_rigid: setup.bodies.iter().any(|body| body.parts.binary_search(&part).is_ok()),
+            sets: NodeSet::all(&block.constraint),
+            faces: face::faces_of(&block, &setup.loads, material),
+            block,
+            border: Vec::new(),
+            interior: vec![all],
+            reference: Default::default(),
+            gathered: VecDeque::new(),
+            vote: ElementVote::default(),
+            booked: Booked::default(),
+            face_vote: NO_FACES,
+            walls: vec![WallVote::default(); setup.n_holders()],
+            eroding,
+            contact_history,
+            shared: Share::default(),
+            led: Vec::new(),
+        }
+    }
+}
+
 impl Domain {
     /// Builds the blocks of the sub-domains at the start of a cycle. `gauges` are global node indices by gauge.
     pub fn new(
@@ -50,48 +85,22 @@ impl Domain {
         gauges: &[u32],
         width: Width,
     ) -> Self {
-        let mut held_blocks: Vec<HeldBlock> = Vec::new();
         let pieces = subdomains.iter().flat_map(|subdomain| &subdomain.pieces);
         let copy_index = CopyIndex::new(pieces.map(|piece| piece.nodes.as_slice()));
         let mut gather = Vec::new();
-        for Subdomain { pieces, unowned, surface, .. } in subdomains {
-            let first = held_blocks.len();
-            for mut piece in pieces {
-                let erosion = piece.erosion.take();
-                let contact_history = std::mem::take(&mut piece.contact);
-                let mut block = Block::of(piece, &setup.materials);
-                let all = 0..block.n_sets();
-                let material = &setup.materials[block.material as usize];
-                let eroding = setup.erosion.of_part(block.part as usize).map(|criteria| {
-                    Eroding::new(
-                        criteria,
-                        erosion.as_ref(),
-                        &mut block,
-                        material,
-                        setup.control.safety_factor,
-                    )
-                });
-                let faces = face::faces_of(&block, &setup.loads, material);
-                let part = block.part;
-                let is_rigid = setup.bodies.iter().any(|body| body.parts.binary_search(&part).is_ok());
-                held_blocks.push(HeldBlock {
-                    is_rigid,
-                    sets: NodeSet::all(&block.constraint),
-                    block,
-                    border: Vec::new(),
-                    interior: vec![all],
-                    reference: Default::default(),
-                    gathered: VecDeque::new(),
-                    vote: ElementVote::default(),
-                    booked: Booked::default(),
-                    faces,
-                    face_vote: NO_FACES,
-                    walls: vec![WallVote::default(); setup.n_holders()],
-                    eroding,
-                    contact_history,
-                });
-            }
-            let own = first as u32..held_blocks.len() as u32;
+        let n_pieces: Vec<usize> = subdomains.iter().map(|subdomain| subdomain.pieces.len()).collect();
+        let mut pieces = Vec::with_capacity(n_pieces.iter().sum());
+        let mut borders = Vec::with_capacity(subdomains.len());
+        for subdomain in subdomains {
+            pieces.extend(subdomain.pieces);
+            borders.push((subdomain.unowned, subdomain.surface));
+        }
+        let mut held_blocks: Vec<HeldBlock> =
+            pieces.into_par_iter().map(|piece| HeldBlock::of(piece, &setup)).collect();
+        let mut end = 0;
+        for (n_pieces, (unowned, surface)) in n_pieces.into_iter().zip(borders) {
+            let own = end as u32..(end + n_pieces) as u32;
+            end += n_pieces;
             let first_copy =
                 |node: u32| copy_index.get(node).iter().copied().find(|(block, _)| own.contains(block));
             for held_block in own.clone() {
@@ -140,11 +149,13 @@ impl Domain {
             quanta,
             width,
             held_blocks,
+            order: Order::default(),
             ghosts: Ghosts::default(),
-            contact: None,
+            contact: Vec::new(),
             moments: false,
             exchange: Exchange::default(),
             groups: Groups::default(),
+            has_border: false,
             bodies,
             sends_pushes: false,
             copy_index,

@@ -7,26 +7,62 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::{Domain, Ghosts, HeldBlock, NONE};
+use super::{Domain, Ghosts, HeldBlock, Meter, NONE, deal::deal, touch::Places};
 use crate::{
+    block::Block,
     copy_index::CopyIndex,
     exact::Quantum,
     lanes::SET,
     nodes,
     rigid::{self, Body, Booked, ENTRIES, PUSH, Push, State},
     setup::Setup,
+    spin::Turning,
     vote::Vote,
 };
 
-/// A body and its nodes here.
+/// Nodes of a body in a block or in a share of contact, and what pushes the body there.
+pub(super) struct Led {
+    body: u32,
+    /// Local node and place in the body.
+    nodes: Vec<[u32; 2]>,
+    push: Push,
+}
+
+impl Led {
+    /// Those of one body among `list`.
+    fn of(list: &mut Vec<Self>, body: u32) -> &mut Self {
+        let at = list.iter().position(|led| led.body == body).unwrap_or_else(|| {
+            list.push(Self { body, nodes: Vec::new(), push: Push::default() });
+            list.len() - 1
+        });
+        &mut list[at]
+    }
+
+    /// Adds up what pushes the body here.
+    fn add_up(&mut self, f: &[Vec<f64>; 3], turning: Option<&Turning>, bodies: Bodies<'_>, force: Quantum) {
+        let (state, body) = (&bodies.held[self.body as usize].state, &bodies.of[self.body as usize]);
+        self.push = Push::default();
+        for &[local, place] in &self.nodes {
+            push(&mut self.push, at(f, local), body, state, place, force);
+            if let Some(turning) = turning {
+                self.push.add_moment(at(&turning.m, local), force, body.length);
+            }
+        }
+    }
+}
+
+/// All bodies: their states, and what they are.
+#[derive(Clone, Copy)]
+pub(super) struct Bodies<'a> {
+    pub held: &'a [Held],
+    pub of: &'a [Body],
+}
+
+/// A body and its nodes here, apart from those in blocks and in shares of contact.
 pub(super) struct Held {
     state: State,
-    /// Room, local node and place of every copy in a block.
-    copies: Vec<[u32; 3]>,
     /// Ghost and place.
     ghosts: Vec<[u32; 2]>,
-    /// Contact node and place.
-    contact: Vec<[u32; 2]>,
     /// Whether this domain books it.
     is_booked: bool,
     push: Push,
@@ -36,7 +72,7 @@ pub(super) struct Held {
 impl Held {
     /// Finds the copies of all bodies; from now on their nodes book nothing.
     pub(super) fn all(setup: &Setup, copy_index: &CopyIndex, held_blocks: &mut [HeldBlock]) -> Vec<Self> {
-        let held = setup.bodies.iter().map(|body| {
+        let held = (0..).zip(&setup.bodies).map(|(index, body)| {
             let mut copies = Vec::new();
             for (place, &node) in (0..).zip(&body.nodes) {
                 copies.extend(
@@ -47,15 +83,14 @@ impl Held {
                 place == 0 && held_blocks[held_block as usize].is_booked(local)
             };
             let is_booked = copies.iter().any(booked);
-            for &[held_block, local, _] in &copies {
-                held_blocks[held_block as usize].sets[local as usize / SET].booked &=
-                    !(1 << (local as usize % SET));
+            for &[held_block, local, place] in &copies {
+                let held_block = &mut held_blocks[held_block as usize];
+                held_block.sets[local as usize / SET].booked &= !(1 << (local as usize % SET));
+                Led::of(&mut held_block.led, index).nodes.push([local, place]);
             }
             Self {
                 state: body.start,
-                copies,
                 ghosts: Vec::new(),
-                contact: Vec::new(),
                 is_booked,
                 push: Push::default(),
                 booked: Booked::default(),
@@ -84,42 +119,46 @@ impl Domain {
         Ok(())
     }
 
-    /// Finds the nodes of bodies among ghosts and contact nodes (global indices, ascending), and adds all of them to
+    /// Finds the nodes of bodies among ghosts and contact nodes (global indices, ascending, and where they are), and adds all of them to
     /// `exchanged`: elements that push them are computed before partial forces travel.
     pub(super) fn find_bodies(
         &mut self,
         ghost_of: &HashMap<u32, u32>,
-        contact_nodes: &[u32],
+        (contact_nodes, places): (&[u32], &Places),
         exchanged: &mut HashSet<u32>,
     ) {
-        for (held, body) in self.bodies.iter_mut().zip(&self.setup.bodies) {
+        for (index, (held, body)) in (0..).zip(self.bodies.iter_mut().zip(&self.setup.bodies)) {
             exchanged.extend(&body.nodes);
-            let among = |find: &dyn Fn(&u32) -> Option<u32>| {
-                (0..).zip(&body.nodes).filter_map(|(place, node)| Some([find(node)?, place])).collect()
-            };
-            held.ghosts = among(&|node| ghost_of.get(node).copied());
-            held.contact = among(&|node| contact_nodes.binary_search(node).ok().map(|i| i as u32));
+            let nodes = || (0..).zip(&body.nodes);
+            held.ghosts = nodes().filter_map(|(place, node)| Some([*ghost_of.get(node)?, place])).collect();
+            for (place, node) in nodes() {
+                let Ok(node) = contact_nodes.binary_search(node) else { continue };
+                for &(share, local) in places.of(node) {
+                    Led::of(&mut self.contact[share as usize].led, index).nodes.push([local, place]);
+                }
+            }
         }
     }
 
     /// Adds up what pushes the bodies here, at `x_n`.
-    pub(super) fn push_bodies(&mut self) {
+    pub(super) fn push_bodies(&mut self, meter: &dyn Meter) {
+        if self.bodies.is_empty() {
+            return;
+        }
         let force = self.quanta.force;
-        for (held, body) in self.bodies.iter_mut().zip(&self.setup.bodies) {
-            held.push = Push::default();
-            let state = &held.state;
-            for &[held_block, local, place] in &held.copies {
-                let block = &self.held_blocks[held_block as usize].block;
-                push(&mut held.push, at(&block.f, local), body, state, place, force);
-                if let Some(turning) = &block.turning {
-                    held.push.add_moment(at(&turning.m, local), force, body.length);
-                }
-            }
-            if let Some(contact) = &self.contact {
-                for &[node, place] in &held.contact {
-                    push(&mut held.push, at(&contact.f, node), body, state, place, force);
-                }
-            }
+        let bodies = Bodies { held: &self.bodies, of: &self.setup.bodies };
+        let of_block = |held_block: &mut HeldBlock| {
+            let Block { f, turning, .. } = &held_block.block;
+            held_block.led.iter_mut().for_each(|led| led.add_up(f, turning.as_ref(), bodies, force));
+        };
+        deal(self.held_blocks.iter_mut(), meter, false, of_block);
+        deal(self.contact.iter_mut(), meter, false, |held| {
+            held.led.iter_mut().for_each(|led| led.add_up(&held.f, None, bodies, force));
+        });
+        self.bodies.iter_mut().for_each(|held| held.push = Push::default());
+        let of_blocks = self.held_blocks.iter().flat_map(|held_block| &held_block.led);
+        for led in of_blocks.chain(self.contact.iter().flat_map(|held| &held.led)) {
+            self.bodies[led.body as usize].push.join(&led.push);
         }
     }
 
@@ -141,18 +180,11 @@ impl Domain {
         if self.sends_pushes { ENTRIES as usize * self.stride() * self.bodies.len() } else { 0 }
     }
 
-    /// Moves the bodies to `t_{n+1}` by the totals of their pushes (those here, if they do not travel), and gives their
-    /// nodes the forces that bring these along.
+    /// Moves the bodies to `t_{n+1}` by the totals of their pushes (those here, if they do not travel).
     pub(super) fn move_bodies(&mut self, totals: &[f64], dt_previous: f64, dt: f64) {
-        if self.bodies.is_empty() {
-            return;
-        }
         let stride = self.stride();
         let (time, loads, quanta) = (self.time, &self.setup.loads, self.quanta);
         let advance = rigid::Advance { dt_previous, dt, time, loads, quanta };
-        let of_nodes =
-            nodes::Advance { dt_previous, dt, time, constraints: &[], walls: &[], poses: &[], loads, quanta };
-        let Ghosts { x, v, f, mass, .. } = &mut self.ghosts;
         for (b, (held, body)) in self.bodies.iter_mut().zip(&self.setup.bodies).enumerate() {
             if self.sends_pushes {
                 let first = ENTRIES as usize * b * stride;
@@ -163,23 +195,6 @@ impl Domain {
             held.booked = advance.run(body, &held.push, &mut held.state);
             if dt_previous == 0.0 {
                 held.booked.external.put_off();
-            }
-            for &[held_block, local, place] in &held.copies {
-                let block = &mut self.held_blocks[held_block as usize].block;
-                let target = held.state.at(body.places[place as usize]);
-                let (x, v) = (at(&block.x, local), at(&block.v, local));
-                let force = of_nodes.leading(x, v, block.mass[local as usize], target);
-                (0..3).for_each(|a| block.f[a][local as usize] = force[a]);
-                if let Some(turning) = &mut block.turning {
-                    let (spin, inertia) = (at(&turning.w, local), turning.inertia[local as usize]);
-                    let moment = of_nodes.turning(spin, inertia, held.state.spin);
-                    (0..3).for_each(|a| turning.m[a][local as usize] = moment[a]);
-                }
-            }
-            for &[ghost, place] in &held.ghosts {
-                let target = held.state.at(body.places[place as usize]);
-                let force = of_nodes.leading(at(x, ghost), at(v, ghost), mass[ghost as usize], target);
-                (0..3).for_each(|a| f[a][ghost as usize] = force[a]);
             }
         }
     }
@@ -201,6 +216,41 @@ impl Domain {
             vote.parts[part].external.merge(held.booked.external);
             vote.external.merge(held.booked.external);
             (0..3).for_each(|a| vote.momentum[a] += held.booked.momentum[a]);
+        }
+    }
+}
+
+impl HeldBlock {
+    /// Gives the nodes of bodies the forces that bring them along.
+    pub(super) fn lead(&mut self, bodies: Bodies<'_>, advance: &nodes::Advance<'_>) {
+        let block = &mut self.block;
+        for Led { body, nodes, .. } in &self.led {
+            let (state, body) = (&bodies.held[*body as usize].state, &bodies.of[*body as usize]);
+            for &[local, place] in nodes {
+                let target = state.at(body.places[place as usize]);
+                let (x, v) = (at(&block.x, local), at(&block.v, local));
+                let force = advance.leading(x, v, block.mass[local as usize], target);
+                (0..3).for_each(|a| block.f[a][local as usize] = force[a]);
+                if let Some(turning) = &mut block.turning {
+                    let (spin, inertia) = (at(&turning.w, local), turning.inertia[local as usize]);
+                    let moment = advance.turning(spin, inertia, state.spin);
+                    (0..3).for_each(|a| turning.m[a][local as usize] = moment[a]);
+                }
+            }
+        }
+    }
+}
+
+impl Ghosts {
+    /// Likewise.
+    pub(super) fn lead(&mut self, bodies: Bodies<'_>, advance: &nodes::Advance<'_>) {
+        let Self { x, v, f, mass, .. } = self;
+        for (held, body) in bodies.held.iter().zip(bodies.of) {
+            for &[ghost, place] in &held.ghosts {
+                let target = held.state.at(body.places[place as usize]);
+                let force = advance.leading(at(x, ghost), at(v, ghost), mass[ghost as usize], target);
+                (0..3).for_each(|a| f[a][ghost as usize] = force[a]);
+            }
         }
     }
 }

@@ -1,14 +1,17 @@
-//! A block of a domain with what stands beside it, and work on all of them.
+//! A block of a domain with what stands beside it.
 
 use std::{collections::VecDeque, ops::Range};
 
+use super::{bodies::Led, sharing::Share};
 use crate::{
     block::Block,
     element::ElementVote,
     erosion::{Eroding, PieceErosion},
-    lanes::SET,
-    load::face::{FaceVote, LoadedFace},
-    nodes::{Booked, NodeSet},
+    lanes::{SET, Width},
+    load::face::{self, FaceVote, LoadedFace},
+    nodes::{Advance, Booked, NodeSet, Nodes},
+    setup::Setup,
+    spin,
     wall::WallVote,
 };
 
@@ -36,7 +39,14 @@ pub(super) struct HeldBlock {
     pub eroding: Option<Eroding>,
     /// What contact keeps of each node, by number; no array where it keeps nothing.
     pub contact_history: Vec<Vec<f64>>,
+    /// Its nodes with other holders.
+    pub shared: Share,
+    /// Its nodes of rigid bodies.
+    pub led: Vec<Led>,
 }
+
+/// What a set of a kind of elements that turns its nodes costs, in sets of one that does not.
+const TURNING: u64 = 8;
 
 impl HeldBlock {
     /// Positions as of now of the sets with nodes on the surface.
@@ -71,31 +81,49 @@ impl HeldBlock {
         self.eroding.as_ref().map(|eroding| eroding.state(&self.block))
     }
 
+    /// What its elements cost, about, to be compared with other blocks.
+    pub fn cost(&self) -> u64 {
+        u64::from(self.block.n_sets()) * if self.block.turning.is_some() { TURNING } else { 1 }
+    }
+
     pub fn is_booked(&self, local: u32) -> bool {
         self.sets[local as usize / SET].booked >> (local as usize % SET) & 1 == 1
     }
-}
 
-/// Runs `work` on each block, in parallel on the current pool when there are several.
-pub(super) fn each(held_blocks: &mut [HeldBlock], work: impl Fn(&mut HeldBlock) + Send + Sync) {
-    one_by_one(held_blocks, &work);
-}
-
-/// So many blocks are taken one by one at most: each is handed to the next thread by the one before.
-const ONE_BY_ONE: usize = 32;
-
-/// Whichever thread is free takes the next block: blocks of a small part and of a large one are not alike, and halves of the
-/// list would leave a thread with all the large ones. Longer lists are halved first.
-fn one_by_one(held_blocks: &mut [HeldBlock], work: &(impl Fn(&mut HeldBlock) + Send + Sync)) {
-    match held_blocks {
-        [] => {}
-        [one] => work(one),
-        [first, rest @ ..] if rest.len() < ONE_BY_ONE => {
-            rayon::join(|| work(first), || one_by_one(rest, work));
+    /// Integrates its nodes and books what they say; elements that have eroded leave.
+    pub fn integrate(&mut self, advance: &Advance<'_>, setup: &Setup, width: Width) {
+        let block = &mut self.block;
+        let mut nodes = Nodes {
+            x: &mut block.x,
+            v: &mut block.v,
+            f: &mut block.f,
+            mass: &block.mass,
+            constraint: &block.constraint,
+            sets: &self.sets,
+            reference: &self.reference,
+            walls: &mut self.walls,
+        };
+        self.booked = advance.run(&mut nodes, width);
+        if let Some(turning) = &mut block.turning {
+            let (kinetic, external) = spin::advance(advance, turning, &block.constraint, &self.sets);
+            self.booked.kinetic += kinetic;
+            self.booked.external.merge(external);
         }
-        many => {
-            let (left, right) = many.split_at_mut(many.len() / 2);
-            rayon::join(|| one_by_one(left, work), || one_by_one(right, work));
+        if !self.faces.is_empty() {
+            let half_steps = 0.5 * (advance.dt_previous + advance.dt);
+            let work = face::work(&self.faces, block, half_steps, advance.quanta.energy);
+            self.booked.external.merge(work);
+        }
+        if advance.dt_previous == 0.0 {
+            self.booked.external.put_off();
+        }
+        if self.eroding.as_mut().is_some_and(Eroding::take_change) {
+            // Loads leave with the faces of eroded elements.
+            self.leave_out_dead();
+            if !self.faces.is_empty() {
+                let material = &setup.materials[self.block.material as usize];
+                self.faces = face::faces_of(&self.block, &setup.loads, material);
+            }
         }
     }
 }

@@ -1,6 +1,8 @@
 //! What of a domain's state leaves it: states, samples, positions for a sort, states for ghosts elsewhere.
 
-use super::{Domain, held_block::HeldBlock};
+use rayon::prelude::*;
+
+use super::{Domain, Meter, deal::deal, held_block::HeldBlock};
 use crate::block::Piece;
 
 impl Domain {
@@ -26,22 +28,26 @@ impl Domain {
     }
 
     /// Positions of the owned surface nodes in the order the master expects; a sort will use them.
-    pub fn gather(&mut self) -> Vec<f64> {
-        for held_block in &mut self.held_blocks {
+    pub fn gather(&mut self, meter: &dyn Meter) -> Vec<f64> {
+        self.order.deal(&mut self.held_blocks, meter, |held_block| {
             held_block.gathered.push_back(held_block.surface_positions());
-        }
-        let mut out = Vec::with_capacity(3 * self.gather.len());
-        for &(held_block, local) in &self.gather {
-            let block = &self.held_blocks[held_block as usize].block;
-            out.extend((0..3).map(|a| block.x[a][local as usize]));
-        }
+        });
+        let mut out = vec![0.0; 3 * self.gather.len()];
+        let (held_blocks, at_a_time) = (&self.held_blocks, 1024);
+        let parts = out.chunks_mut(3 * at_a_time).zip(self.gather.chunks(at_a_time));
+        deal(parts, meter, true, |(out, nodes)| {
+            for (x, &(held_block, local)) in out.chunks_exact_mut(3).zip(nodes) {
+                let block = &held_blocks[held_block as usize].block;
+                (0..3).for_each(|a| x[a] = block.x[a][local as usize]);
+            }
+        });
         out
     }
 
     /// The state of all blocks, to be put back into a global state.
     pub fn pieces(&self) -> Vec<Piece> {
         self.held_blocks
-            .iter()
+            .par_iter()
             .map(|held_block| Piece {
                 erosion: held_block.erosion(),
                 contact: held_block.contact_history.clone(),

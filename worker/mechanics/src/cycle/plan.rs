@@ -8,13 +8,9 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Domain, NONE, bodies,
-    ghosts::{Ghosts, HeldContact, pack, positions},
-    held_block::HeldBlock,
-};
+use super::{Domain, Meter, bodies, ghosts::Ghosts, held_block::HeldBlock, touch::Places};
 use crate::{
-    contact::{Batch, BatchNode, Contact, PairEnergies},
+    contact::{Batch, BatchNode},
     lanes::SET,
     nodes::NodeSet,
 };
@@ -74,7 +70,7 @@ impl Domain {
     ///
     /// # Errors
     /// If the plan names a node that is neither held nor a ghost, or the state has the wrong length.
-    pub fn install(&mut self, plan: &Plan, ghost_state: &[f64]) -> Result<(), String> {
+    pub fn install(&mut self, plan: &Plan, ghost_state: &[f64], meter: &dyn Meter) -> Result<(), String> {
         let n_history = self.n_history();
         let each = 6 + n_history;
         if ghost_state.len() != each * plan.ghosts.len() {
@@ -107,6 +103,7 @@ impl Domain {
             contact_history: (0..n_history).map(|k| number(6 + k)).collect(),
             constraint,
             sets,
+            exchanged: Vec::new(),
         };
         if let Some(ghost) = plan.ghosts.iter().find(|ghost| !self.copy_index.get(ghost.node).is_empty()) {
             return Err(format!("ghost {} is held here, must be a node of other workers alone", ghost.node));
@@ -117,66 +114,66 @@ impl Domain {
         if !contact_nodes.is_sorted_by(|a, b| a.global < b.global) {
             return Err("contact nodes are not in ascending order".to_owned());
         }
-        self.contact = None;
-        if let (Some(batch), Some(settings)) = (&plan.batch, &self.setup.contact) {
-            let mut sources = Vec::with_capacity(batch.nodes.len());
-            for node in &batch.nodes {
-                let source = match (self.copy_index.get(node.global), ghost_of.get(&node.global)) {
-                    ([first, ..], _) => *first,
-                    ([], Some(&ghost)) => (NONE, ghost),
-                    ([], None) => {
-                        return Err(format!("contact node {} is neither held nor a ghost", node.global));
-                    }
-                };
-                sources.push(source);
-            }
-            let n = sources.len();
-            let zeros = || std::array::from_fn(|_| vec![0.0; n]);
-            let mut x = zeros();
-            pack(&sources, |held_block| positions(&self.held_blocks, &self.ghosts, held_block), &mut x);
-            let mut contact = Contact::new(batch, settings, &x, self.width);
-            contact.watch_pairs(&self.watched_pairs);
-            self.contact =
-                Some(HeldContact { contact, sources, x, v: zeros(), f: zeros(), keepers: Vec::new() });
-        }
+        let places = self.take_contact(plan.batch.as_ref(), &|node| ghost_of.get(&node).copied(), meter)?;
         // Every node with more than one copy, here or elsewhere, and every contact node.
         self.moments = plan.moments;
         self.exchange.clear();
         self.groups.clear();
+        let n_shares = self.contact.len();
+        self.held_blocks.iter_mut().for_each(|held_block| held_block.shared.clear(n_shares));
         let mut exchanged = HashSet::with_capacity(plan.exchange.len());
         let n_entries = bodies::entries_of(&plan.exchange, self.bodies.len())?;
         self.sends_pushes = n_entries > 0;
-        for &node in &plan.exchange[..plan.exchange.len() - n_entries] {
+        for (place, &node) in (0..).zip(&plan.exchange[..plan.exchange.len() - n_entries]) {
             exchanged.insert(node);
-            let contact = contact_nodes.binary_search_by_key(&node, |n| n.global);
-            let (copies, ghost) = (self.copy_index.get(node), ghost_of.get(&node).copied().unwrap_or(NONE));
-            if copies.is_empty() && ghost == NONE {
+            let copies = self.copy_index.get(node);
+            let ghost = ghost_of.get(&node).copied();
+            if copies.is_empty() && ghost.is_none() {
                 return Err(format!("node {node} of the exchange is neither held nor a ghost"));
             }
-            self.exchange.push(copies, contact.map_or(NONE, |i| i as u32), ghost);
+            for &(held_block, local) in copies {
+                self.held_blocks[held_block as usize].shared.exchanged.push([local, place]);
+            }
+            self.ghosts.exchanged.extend(ghost.map(|ghost| [ghost, place]));
+            let contact = contact_nodes.binary_search_by_key(&node, |n| n.global).ok();
+            let touching = contact.map_or(&[][..], |node| places.of(node));
+            let n_blocks = self.held_blocks.len() as u32;
+            let touching = touching.iter().map(|&(share, local)| (n_blocks + share, local));
+            let keeper = contact.map(|node| places.own(node));
+            self.exchange.push(copies.iter().copied().chain(touching), keeper);
         }
         // Nodes of rigid bodies have histories too, though their forces are not added up here.
         if n_history > 0 {
-            self.share_histories(contact_nodes, &exchanged);
+            self.share_histories(contact_nodes, &places, &exchanged, meter);
         }
         if !self.bodies.is_empty() {
             let nodes: Vec<u32> = contact_nodes.iter().map(|node| node.global).collect();
-            self.find_bodies(&ghost_of, &nodes, &mut exchanged);
+            self.find_bodies(&ghost_of, (&nodes, &places), &mut exchanged);
         }
         // Both lists ascend, so one walk over them finds the contact node of each.
+        let mut holders = Vec::new();
         let (mut next, n_several) = (0, self.copy_index.several().len());
-        for (i, node) in (0_u32..).zip(contact_nodes.iter().map(|n| n.global)) {
+        for (i, node) in contact_nodes.iter().map(|n| n.global).enumerate() {
             while next < n_several && self.copy_index.several()[next] < node {
-                self.share_locally(self.copy_index.several()[next], NONE, &exchanged);
+                self.share_locally(self.copy_index.several()[next], &[], &exchanged, &mut holders);
                 next += 1;
             }
             next += usize::from(next < n_several && self.copy_index.several()[next] == node);
-            self.share_locally(node, i, &exchanged);
+            self.share_locally(node, places.of(i), &exchanged, &mut holders);
         }
         for i in next..n_several {
-            self.share_locally(self.copy_index.several()[i], NONE, &exchanged);
+            self.share_locally(self.copy_index.several()[i], &[], &exchanged, &mut holders);
         }
-        for held_block in &mut self.held_blocks {
+        let numbers = self.numbers();
+        self.groups.place(&mut self.held_blocks, numbers);
+        self.split_sets(&exchanged, meter);
+        self.drop_nodes(&plan.dropped);
+        Ok(())
+    }
+
+    /// Says which sets are computed before partial forces travel, and takes the positions of the sort that acts now.
+    fn split_sets(&mut self, exchanged: &HashSet<u32>, meter: &dyn Meter) {
+        self.order.deal(&mut self.held_blocks, meter, |held_block| {
             (held_block.border, held_block.interior) = if exchanged.is_empty() {
                 let all = 0..held_block.block.n_sets();
                 (Vec::new(), vec![all])
@@ -191,26 +188,34 @@ impl Domain {
             if let Some(gathered) = held_block.gathered.pop_front() {
                 held_block.reference = gathered;
             }
-        }
-        self.drop_nodes(&plan.dropped);
-        Ok(())
+        });
+        self.has_border = self.held_blocks.iter().any(|held_block| !held_block.border.is_empty());
     }
 
     /// Says which copies of contact nodes take their histories from contact here. Nodes that can meet nothing have none.
-    fn share_histories(&mut self, contact_nodes: &[BatchNode], exchanged: &HashSet<u32>) {
+    fn share_histories(
+        &mut self,
+        contact_nodes: &[BatchNode],
+        places: &Places,
+        exchanged: &HashSet<u32>,
+        meter: &dyn Meter,
+    ) {
         let of_contact = |node: u32| contact_nodes.binary_search_by_key(&node, |n| n.global).is_ok();
-        for held_block in &mut self.held_blocks {
+        self.order.deal(&mut self.held_blocks, meter, |held_block| {
             for (local, &node) in held_block.block.nodes.iter().enumerate() {
                 let kept = held_block.contact_history.iter().any(|number| number[local] != 0.0);
                 if kept && !exchanged.contains(&node) && !of_contact(node) {
                     held_block.contact_history.iter_mut().for_each(|number| number[local] = 0.0);
                 }
             }
-        }
-        let Some(packed) = &mut self.contact else { return };
-        for (i, node) in (0..).zip(contact_nodes).filter(|(_, node)| !exchanged.contains(&node.global)) {
-            let copies = self.copy_index.get(node.global);
-            packed.keepers.extend(copies.iter().map(|&(held_block, local)| [i, held_block, local]));
+        });
+        for (i, node) in
+            contact_nodes.iter().enumerate().filter(|(_, node)| !exchanged.contains(&node.global))
+        {
+            let (share, in_share) = places.own(i);
+            for &(held_block, local) in self.copy_index.get(node.global) {
+                self.held_blocks[held_block as usize].shared.kept.push([local, share, in_share]);
+            }
         }
     }
 
@@ -252,22 +257,28 @@ impl Domain {
         }
     }
 
-    /// Energies that the springs on the surface in force have at the positions as of now; `dt` is the step that led to them.
-    pub(super) fn spring_energies(&mut self, dt: f64) -> PairEnergies {
-        let Some(packed) = &mut self.contact else { return PairEnergies::default() };
-        packed.pack(&self.held_blocks, &self.ghosts);
-        packed.contact.history.cycle = self.cycle + 1;
-        // Forces are added to what is cleared before the next ones.
-        packed.contact.forces(&packed.x, &packed.v, dt, self.quanta.force, self.quanta.energy, &mut packed.f);
-        packed.contact.energies().of_springs()
-    }
-
-    /// Adds a node to the groups, if it is held here and not exchanged.
-    fn share_locally(&mut self, node: u32, contact: u32, exchanged: &HashSet<u32>) {
+    /// Has a node added up here that is held here and not exchanged; `touching` are its places in the shares of contact.
+    fn share_locally(
+        &mut self,
+        node: u32,
+        touching: &[(u32, u32)],
+        exchanged: &HashSet<u32>,
+        holders: &mut Vec<(u32, u32)>,
+    ) {
         let copies = self.copy_index.get(node);
-        if !copies.is_empty() && !exchanged.contains(&node) {
-            self.groups.push(copies, contact);
+        if copies.is_empty() || exchanged.contains(&node) {
+            return;
         }
+        if let &[(held_block, local)] = copies {
+            let touched = &mut self.held_blocks[held_block as usize].shared.touched;
+            touching.iter().for_each(|&(share, in_share)| touched[share as usize].push([local, in_share]));
+            return;
+        }
+        let n_blocks = self.held_blocks.len() as u32;
+        holders.clear();
+        holders.extend_from_slice(copies);
+        holders.extend(touching.iter().map(|&(share, in_share)| (n_blocks + share, in_share)));
+        self.groups.push(holders);
     }
 }
 

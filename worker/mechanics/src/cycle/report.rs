@@ -22,7 +22,7 @@ impl Domain {
             load.nodes += held_block.block.nodes.len() as u64;
         }
         load.nodes += self.ghosts.node.len() as u64;
-        load.pairs = self.contact.as_ref().map_or(0, |packed| packed.contact.n_pairs() as u64);
+        load.pairs = self.contact.iter().map(|held| held.contact.n_pairs() as u64).sum();
         load
     }
 

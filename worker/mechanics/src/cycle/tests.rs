@@ -118,7 +118,9 @@ fn touching(friction: f64, width: Width) -> Domain {
     let pieces = (0..2).map(|part| cut(&mesh, &state, part, &whole)).collect();
     let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: surface.nodes.clone() };
     let mut domain = Domain::new(setup, 2, quanta, (vec![subdomain], 0), &[], width);
-    domain.install(&Plan { batch: Some(batch), ..Plan::default() }, &[]).expect("all nodes are held");
+    domain
+        .install(&Plan { batch: Some(batch), ..Plan::default() }, &[], &Silent)
+        .expect("all nodes are held");
     domain
 }
 
@@ -130,9 +132,9 @@ fn run(friction: f64, width: Width) -> (Vec<u64>, u64) {
     for cycle in 0..20 {
         domain.begin(domain.quanta.force, DT * f64::from(cycle));
         domain.contact(dt_previous, &Silent);
-        let held_block = domain.contact.as_ref().expect("the plan has a batch");
-        assert_eq!(held_block.contact.width(), width, "contact on other lanes than those of the elements");
-        bits.extend(held_block.f.iter().flatten().map(|f| f.to_bits()));
+        let held = domain.contact.first().expect("the plan has a batch");
+        assert_eq!(held.contact.width(), width, "contact on other lanes than those of the elements");
+        bits.extend(held.f.iter().flatten().map(|f| f.to_bits()));
         domain.elements(Sets::All, dt_previous, &Silent);
         let vote = domain.integrate(&[], dt_previous, DT, &[], &Silent).expect("no node is exchanged");
         hits = hits.max(vote.hits);
@@ -194,7 +196,7 @@ fn folding_plate() -> Domain {
     let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: Vec::new() };
     let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], Width::best());
     domain.watch(&Watched { elements: vec![7, 0], contacts: Vec::new() });
-    domain.install(&Plan { moments: true, ..Plan::default() }, &[]).expect("all nodes are held");
+    domain.install(&Plan { moments: true, ..Plan::default() }, &[], &Silent).expect("all nodes are held");
     domain
 }
 

@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::{
-    contact::{BatchFace, BatchNode, BatchUnit, Contact, ContactVote, History},
+    contact::{
+        BatchEdge, BatchFace, BatchNode, BatchUnit, Contact, ContactVote, Cut, History, PairEnergies, Share,
+    },
     exact::Quantum,
 };
 
@@ -212,4 +214,59 @@ fn watching_few_pairs_for_several_cycles_loses_no_bit_of_bodies_that_move() {
     let all = contact.kinds.faces.candidates.faces.len();
     assert!(4 * fewest < 3 * all, "{fewest} of {all} pairs");
     assert!(hits.iter().any(|&n| n != hits[0]), "nothing changed: {hits:?}");
+}
+
+/// A patch whose nodes are in units of fifty, with edges on it that others cross.
+fn patch_in_units(random: &mut Random) -> (Batch, [Vec<f64>; 3]) {
+    let (mut batch, x) = patch(random, 0.4);
+    let faces = batch.units[0].faces.clone();
+    batch.units = (49..449)
+        .step_by(50)
+        .map(|n| BatchUnit { nodes: (n..n + 50).collect(), faces: faces.clone() })
+        .collect();
+    let edge = |nodes: [u32; 2], part: u32| BatchEdge { nodes, part, stiffness: 1.0, share: 0.5 };
+    let edges = &mut batch.listed.edges;
+    edges.edges.extend((0..40).map(|i| edge([i, i + 7], 0)));
+    edges.edges.extend((0..199).map(|i| edge([49 + 2 * i, 50 + 2 * i], 1)));
+    edges.pairs.extend((0..40).flat_map(|a| (40..239).map(move |b| [a, b])));
+    (batch, x)
+}
+
+#[test]
+fn a_batch_in_any_number_of_shares_has_the_forces_and_votes_of_the_whole() {
+    let (batch, x) = patch_in_units(&mut Random(5));
+    let v = [x[1].clone(), x[2].clone(), x[0].clone()];
+    let quantum = Quantum::for_reference(1.0, 42);
+    for friction in [0.0, 0.3] {
+        let run = |n: usize| {
+            let cut = Cut::into(&batch, n);
+            let (mut vote, mut energies) = (ContactVote::default(), PairEnergies::default());
+            let mut sum = [0; 3].map(|_| vec![0.0; batch.nodes.len()]);
+            let mut n_nodes = 0;
+            for i in 0..cut.len() {
+                let Share { batch, nodes } = cut.share(&batch, i);
+                assert!(batch.is_sound(2));
+                let own = |all: &[Vec<f64>; 3]| {
+                    all.each_ref().map(|all| nodes.iter().map(|&node| all[node as usize]).collect::<Vec<_>>())
+                };
+                let (x, v, mut f) = (own(&x), own(&v), [0; 3].map(|_| vec![0.0; nodes.len()]));
+                let mut contact = Contact::new(&batch, &settings(friction), &x, Width::best());
+                vote.merge(&contact.forces(&x, &v, 0.1, quantum, quantum, &mut f));
+                energies.merge(contact.energies());
+                for (sum, f) in sum.iter_mut().zip(&f) {
+                    nodes.iter().zip(f).for_each(|(&node, f)| sum[node as usize] += f);
+                }
+                n_nodes += nodes.len();
+            }
+            let bits: Vec<u64> = sum.iter().flatten().map(|f| f.to_bits()).collect();
+            ((vote, energies, bits), n_nodes)
+        };
+        let (whole, n_nodes) = run(1);
+        assert!(whole.0.hits > 100 && n_nodes == batch.nodes.len(), "{:?}", whole.0);
+        for n in [2, 3, 8, 11] {
+            let (shares, with_copies) = run(n);
+            assert!(shares == whole, "{n} shares, friction {friction}: {:?} {:?}", shares.0, whole.0);
+            assert!(with_copies > n_nodes, "no node is in two of {n} shares");
+        }
+    }
 }

@@ -1,0 +1,184 @@
+//! A batch cut into shares for threads: whole units, with what contact needs of their nodes and faces.
+//!
+//! A node on a face of one share may be a node of another: it is in both, and both add to its force. All sums are exact, so
+//! the cut changes no bit.
+
+use std::ops::Range;
+
+use super::{
+    edges::BatchEdges,
+    kinds::Listed,
+    surface::Exposed,
+    ties::BatchTies,
+    work_unit::{Batch, BatchUnit},
+};
+
+/// Nodes of units for which another share is worth its own lists.
+const NODES: usize = 256;
+/// Pairs that are listed one by one likewise.
+const PAIRS: usize = 256;
+
+/// No index.
+const NONE: u32 = u32::MAX;
+
+/// A part of a batch, a batch itself.
+#[derive(Clone, Debug)]
+pub(crate) struct Share {
+    pub(crate) batch: Batch,
+    /// Index in the whole batch of each node, ascending.
+    pub(crate) nodes: Vec<u32>,
+}
+
+/// How a batch is cut.
+#[derive(Clone, Debug)]
+pub(crate) struct Cut {
+    units: Vec<Range<usize>>,
+    edges: Vec<Range<usize>>,
+    ties: Vec<Range<usize>>,
+}
+
+impl Cut {
+    /// Cuts a batch into `most` shares of like work, fewer if it is small; one at least.
+    pub(crate) fn new(batch: &Batch, most: usize) -> Self {
+        let n_nodes: usize = batch.units.iter().map(|unit| unit.nodes.len()).sum();
+        let n_pairs = batch.listed.edges.pairs.len() + batch.listed.ties.nodes.len();
+        Self::into(batch, (n_nodes / NODES + n_pairs / PAIRS).clamp(1, most.max(1)))
+    }
+
+    /// Cuts a batch into `n` shares, which may be empty.
+    pub(super) fn into(batch: &Batch, n: usize) -> Self {
+        let n_nodes: usize = batch.units.iter().map(|unit| unit.nodes.len()).sum();
+        let even = |len: usize| (0..n).map(|i| len * i / n..len * (i + 1) / n).collect();
+        let (mut units, mut taken, mut first) = (Vec::with_capacity(n), 0, 0);
+        for i in 1..=n {
+            let mut end = first;
+            while end < batch.units.len() && (i == n || taken < n_nodes * i / n) {
+                taken += batch.units[end].nodes.len();
+                end += 1;
+            }
+            units.push(first..end);
+            first = end;
+        }
+        Self { units, edges: even(batch.listed.edges.pairs.len()), ties: even(batch.listed.ties.nodes.len()) }
+    }
+
+    /// Number of shares.
+    pub(crate) fn len(&self) -> usize {
+        self.units.len()
+    }
+
+    /// By node of the batch the share that has it in a unit, which knows all faces that it may meet; the first for nodes of none.
+    pub(crate) fn owners(&self, batch: &Batch) -> Vec<u32> {
+        let mut owners = vec![0; batch.nodes.len()];
+        for (share, units) in (0..).zip(&self.units) {
+            for &node in batch.units[units.clone()].iter().flat_map(|unit| &unit.nodes) {
+                owners[node as usize] = share;
+            }
+        }
+        owners
+    }
+
+    /// One of the shares.
+    pub(crate) fn share(&self, batch: &Batch, share: usize) -> Share {
+        let units = &batch.units[self.units[share].clone()];
+        let Listed { edges, ties, exposed } = &batch.listed;
+        let pairs = &edges.pairs[self.edges[share].clone()];
+        let ties = &ties.nodes[self.ties[share].clone()];
+
+        let mut faces = Indices::new(batch.faces.len());
+        let mut edge_indices = Indices::new(edges.edges.len());
+        let mut nodes = Indices::new(batch.nodes.len());
+        units.iter().flat_map(|unit| &unit.faces).for_each(|&face| faces.mark(face));
+        pairs.iter().flatten().for_each(|&edge| edge_indices.mark(edge));
+        let (faces, edge_indices) = (faces.number(), edge_indices.number());
+        units.iter().flat_map(|unit| &unit.nodes).for_each(|&node| nodes.mark(node));
+        faces
+            .list
+            .iter()
+            .flat_map(|&face| batch.faces[face as usize].nodes)
+            .for_each(|node| nodes.mark(node));
+        let of_edges = edge_indices.list.iter().flat_map(|&edge| edges.edges[edge as usize].nodes);
+        of_edges.for_each(|node| nodes.mark(node));
+        ties.iter().flatten().for_each(|&node| nodes.mark(node));
+        let nodes = nodes.number();
+
+        let excluded = batch.excluded.iter().copied().filter(|&(node, face)| {
+            let known = batch.nodes.binary_search_by_key(&node, |n| n.global);
+            let face = batch.faces.binary_search_by_key(&face, |f| f.id);
+            known.is_ok_and(|at| nodes.has(at)) && face.is_ok_and(|at| faces.has(at))
+        });
+        let of_unit = |unit: &BatchUnit| BatchUnit {
+            nodes: unit.nodes.iter().map(|&node| nodes.of(node)).collect(),
+            faces: unit.faces.iter().map(|&face| faces.of(face)).collect(),
+        };
+        let came_out = exposed.nodes.iter().filter(|&&node| nodes.has(node as usize));
+        let batch = Batch {
+            nodes: nodes.list.iter().map(|&node| batch.nodes[node as usize]).collect(),
+            faces: faces
+                .list
+                .iter()
+                .map(|&face| {
+                    let mut face = batch.faces[face as usize];
+                    face.nodes = face.nodes.map(|node| nodes.of(node));
+                    face
+                })
+                .collect(),
+            units: units.iter().map(of_unit).collect(),
+            excluded: excluded.collect(),
+            listed: Listed {
+                edges: BatchEdges {
+                    edges: edge_indices
+                        .list
+                        .iter()
+                        .map(|&edge| {
+                            let mut edge = edges.edges[edge as usize];
+                            edge.nodes = edge.nodes.map(|node| nodes.of(node));
+                            edge
+                        })
+                        .collect(),
+                    pairs: pairs.iter().map(|pair| pair.map(|edge| edge_indices.of(edge))).collect(),
+                },
+                ties: BatchTies { nodes: ties.iter().map(|tie| tie.map(|node| nodes.of(node))).collect() },
+                exposed: Exposed {
+                    at: exposed.at,
+                    nodes: came_out.map(|&node| nodes.of(node)).collect(),
+                    faces: exposed.faces.clone(),
+                },
+            },
+        };
+        Share { batch, nodes: nodes.list }
+    }
+}
+
+/// Some of the entries of a list, and their numbers among themselves.
+struct Indices {
+    number: Vec<u32>,
+    list: Vec<u32>,
+}
+
+impl Indices {
+    fn new(n: usize) -> Self {
+        Self { number: vec![NONE; n], list: Vec::new() }
+    }
+
+    fn mark(&mut self, index: u32) {
+        self.number[index as usize] = 0;
+    }
+
+    /// Numbers those that are marked in ascending order.
+    fn number(mut self) -> Self {
+        for (index, number) in (0..).zip(&mut self.number).filter(|(_, number)| **number != NONE) {
+            *number = self.list.len() as u32;
+            self.list.push(index);
+        }
+        self
+    }
+
+    fn has(&self, index: usize) -> bool {
+        self.number[index] != NONE
+    }
+
+    fn of(&self, index: u32) -> u32 {
+        self.number[index as usize]
+    }
+}
