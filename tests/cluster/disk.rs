@@ -260,6 +260,11 @@ fn an_interrupted_run_says_the_command_that_goes_on_with_it() {
 }
 
 #[test]
+fn a_state_due_where_a_run_is_interrupted_is_kept() {
+    tests::faults::disks::interrupted(BOLIDE.as_ref(), small().as_ref(), 200);
+}
+
+#[test]
 fn a_killed_run_goes_on_from_its_newest_whole_snapshot_into_the_same_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
