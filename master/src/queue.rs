@@ -188,10 +188,12 @@ impl Queue {
         Ok(id)
     }
 
-    /// The job that is to start next: one that was interrupted, else of the highest priority the first come.
-    pub fn first(&self) -> Option<&Entry> {
-        let waiting = self.jobs.values().filter(|job| job.state == State::Queued);
-        waiting.min_by_key(|job| (job.before.is_none(), Reverse(job.options.priority), job.id))
+    /// The jobs that wait, in the order in which they are to start: those that were interrupted, then by priority, the first come
+    /// first.
+    pub fn waiting(&self) -> Vec<&Entry> {
+        let mut waiting: Vec<&Entry> = self.jobs.values().filter(|job| job.state == State::Queued).collect();
+        waiting.sort_by_key(|job| (job.before.is_none(), Reverse(job.options.priority), job.id));
+        waiting
     }
 
     /// A job.
@@ -297,10 +299,10 @@ mod tests {
     fn the_first_come_is_the_first_served() {
         let mut queue = Queue::new(5);
         assert_eq!((add(&mut queue), add(&mut queue), add(&mut queue)), (Ok(5), Ok(6), Ok(7)));
-        assert_eq!(queue.first().map(|job| job.id), Some(5));
+        assert_eq!(queue.waiting().first().map(|job| job.id), Some(5));
         assert_eq!(queue.apply(6, Change::Cancel), Ok((State::Cancelled, vec![])));
         assert_eq!(queue.apply(5, Change::Start), Ok((State::Running, vec![])));
-        assert_eq!(queue.first().map(|job| job.id), Some(7));
+        assert_eq!(queue.waiting().first().map(|job| job.id), Some(7));
         assert_eq!(queue.apply(5, Change::Fail), Ok((State::Failed, vec![])));
         assert_eq!(queue.get(5).map(|job| job.text.as_str()), Some(""), "the deck is not kept");
         assert_eq!(queue.apply(9, Change::Start), Err("no job 9".to_owned()));
@@ -317,7 +319,7 @@ mod tests {
             Entry { id: 9, before: Some(vec!["a".into()]), ..queue.get(4).expect("added").clone() };
         queue.restore(interrupted);
         let mut order = Vec::new();
-        while let Some(next) = queue.first().map(|job| job.id) {
+        while let Some(next) = queue.waiting().first().map(|job| job.id) {
             order.push(next);
             queue.apply(next, Change::Start).expect("it waits");
         }

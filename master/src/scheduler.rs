@@ -36,8 +36,6 @@ use crate::{
 
 mod allotment;
 
-use allotment::Allotment;
-
 /// The longest that an ending master waits until the jobs under way are stored.
 const END_LIMIT: Duration = Duration::from_secs(60);
 /// Between two looks of a job at the time that its workers take.
@@ -269,7 +267,14 @@ impl Scheduler {
             }
             Notice::Joined(worker_link) => {
                 let WorkerLink { spec, address, .. } = &worker_link;
-                info!(address, speed = spec.speed, threads = spec.threads, "worker {} joined", spec.name);
+                info!(
+                    address,
+                    certificate,
+                    speed = spec.speed,
+                    threads = spec.threads,
+                    "worker {} joined",
+                    spec.name
+                );
                 self.offer(&worker_link);
                 self.worker_links.insert(worker_link.incarnation, worker_link);
             }
@@ -437,22 +442,27 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Starts the first job in the queue, if it may start on the workers that are idle.
+    /// Starts the first of the waiting jobs that may start on the workers that are idle, and says what each of the others waits for.
     fn start_next(&mut self) {
-        let Some(entry) = self.queue.first() else { return };
+        let waiting = self.queue.waiting();
+        if waiting.is_empty() {
+            return;
+        }
         if let Some(pause) = self.pause.as_ref().filter(|pause| Instant::now() < pause.until) {
-            return self.wait_for(entry.id, format!("{}; tried again within {} s", pause.why, pause.seconds));
+            let what = format!("{}; tried again within {} s", pause.why, pause.seconds);
+            return waiting.iter().for_each(|entry| self.wait_for(entry.id, what.clone()));
         }
         let idle: Vec<&WorkerLink> =
             self.hosts.idle().filter_map(|host| self.worker_links.get(&host.incarnation)).collect();
         let names: Vec<&str> = idle.iter().map(|worker_link| worker_link.spec.name.as_str()).collect();
         let running: Vec<u32> = self.running.keys().copied().collect();
-        match allotment::of(entry, &running, &names, self.started.elapsed()) {
-            Allotment::Wait(what) => self.wait_for(entry.id, what),
-            Allotment::Start => {
-                let (job, worker_links) = (entry.id, idle.into_iter().cloned().collect());
-                self.start(job, worker_links);
-            }
+        let allotments = allotment::among(&waiting, &running, &names, self.started.elapsed());
+        for (job, what) in allotments.waits {
+            self.wait_for(job, what);
+        }
+        if let Some(job) = allotments.starts {
+            let worker_links = idle.into_iter().cloned().collect();
+            self.start(job, worker_links);
         }
     }
 

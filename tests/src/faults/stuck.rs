@@ -84,6 +84,21 @@ pub fn cases() -> Vec<Case> {
             let note = "held with the reason; the next one done by another worker";
             Seen { note: note.into(), ..Seen::default() }
         }),
+        case("job that wants two workers of which there is one; another behind it", |scene, _| {
+            let mut cluster = scene.cluster(&[], None, &[]);
+            let deck = scene.deck.display().to_string();
+            cluster.json(&["submit", &deck, "--cycles", "60", "--min-workers", "2"]);
+            cluster.json(&["submit", &deck, "--cycles", "60"]);
+            cluster.worker("a", "1");
+            wait_for_state(&cluster, 2, "done");
+            until(
+                || format!("a reason: {}", cluster.job(1)),
+                || (cluster.job(1)["waits_for"] == "2 workers, 1 are idle").then_some(()),
+            );
+            cluster.worker("b", "1");
+            wait_for_state(&cluster, 1, "done");
+            Seen { note: "the other one passes it; `jobs` says why it waits".into(), ..Seen::default() }
+        }),
         case("cancel acknowledged, then the master killed", |scene, k| {
             let mut running = scene.begin(&[], None);
             running.wait_for_cycle(scene.instant(900 + k));
