@@ -19,6 +19,7 @@ use protocol::{
     wire::Packed,
 };
 use tokio::sync::{mpsc, oneshot};
+use tracing::info;
 
 use crate::notice::Notice;
 
@@ -32,10 +33,11 @@ pub async fn serve(
     notices: &mpsc::Sender<Notice>,
     sender: &Sender,
     receiver: &mut Receiver,
-    incarnation: u32,
+    (incarnation, caller): (u32, String),
 ) -> Error {
     let mut client_requests = ClientRequests {
         notices,
+        caller,
         outbox: Outbox::new(sender.clone(), 0),
         inbox: Inbox::new(incarnation, (DECK_LIMIT + AROUND_A_DECK) as u64),
     };
@@ -48,6 +50,8 @@ pub async fn serve(
 
 struct ClientRequests<'a> {
     notices: &'a mpsc::Sender<Notice>,
+    /// Who asks: its certificate, else its address.
+    caller: String,
     outbox: Outbox,
     inbox: Inbox,
 }
@@ -93,8 +97,14 @@ impl ClientRequests<'_> {
             Request::Submit { name, text, options } => self.submit(name, text, options).await?,
             Request::Jobs => Reply::Jobs(self.ask(Notice::Jobs).await?),
             Request::Hosts => Reply::Hosts(self.ask(Notice::Hosts).await?),
-            Request::Cancel { job } => Reply::Done(self.ask(|answer| Notice::Cancel(job, answer)).await??),
-            Request::Resume { job } => Reply::Done(self.ask(|answer| Notice::Resume(job, answer)).await??),
+            Request::Cancel { job } => {
+                info!(job, by = self.caller, "asked to cancel");
+                Reply::Done(self.ask(|answer| Notice::Cancel(job, answer)).await??)
+            }
+            Request::Resume { job } => {
+                info!(job, by = self.caller, "asked to resume");
+                Reply::Done(self.ask(|answer| Notice::Resume(job, answer)).await??)
+            }
             Request::Files { job } => {
                 let folder = self.folder(job).await?;
                 Reply::Files(blocking(move || list(&folder)).await?)
@@ -132,7 +142,9 @@ impl ClientRequests<'_> {
             Err(faults) => Ok(Reply::Faults(faults)),
             Ok((text, title)) => {
                 let submit = |answer| Notice::Submit { name, title, text, options, answer };
-                Ok(Reply::Submitted { job: self.ask(submit).await?? })
+                let job = self.ask(submit).await??;
+                info!(job, by = self.caller, "submitted");
+                Ok(Reply::Submitted { job })
             }
         }
     }

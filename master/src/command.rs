@@ -321,7 +321,8 @@ pub struct WorkerArgs {
     /// Compute threads [default: all cores]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
-    /// Name, unlike that of any other worker [default: host name and process id]
+    /// Name, unlike that of any other worker: with certificates, that in this host's, or NAME@ANY [default: host name and process
+    /// id]
     #[arg(long)]
     pub name: Option<String>,
     /// Folder with this host's certificates, as `bolide certs host` makes it

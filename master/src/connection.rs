@@ -6,7 +6,7 @@
 use std::{
     net::SocketAddr,
     sync::{
-        Arc, Mutex,
+        Arc, Mutex, OnceLock,
         atomic::{AtomicBool, AtomicU32, Ordering},
     },
     time::Duration,
@@ -49,6 +49,13 @@ pub const GREETINGS: usize = 256;
 const PLACE_LIMIT: Duration = Duration::from_secs(30);
 /// A worker is suspect after this part of the silence after which it is dead.
 const SUSPECT: f64 = 0.3;
+
+/// Who calls.
+struct Caller {
+    address: String,
+    /// The certificate that it showed, in words.
+    certificate: Option<String>,
+}
 
 /// What every connection needs of the daemon.
 pub struct Acceptor {
@@ -128,11 +135,23 @@ impl Acceptor {
         self.ending.load(Ordering::Relaxed)
     }
 
-    /// Serves a TCP connection to its end.
-    ///
-    /// # Errors
-    /// Why it ended, unless a client left.
-    pub async fn take(self: Arc<Self>, stream: TcpStream, address: String) -> Result<()> {
+    /// Serves a TCP connection to its end; a fault is one line in the log, with the certificate that was shown.
+    async fn attend(self: Arc<Self>, stream: TcpStream, address: SocketAddr) {
+        let certificate = OnceLock::new();
+        if let Err(error) = Arc::clone(&self).take(stream, address.to_string(), &certificate).await
+            && !self.is_ending()
+        {
+            warn!(certificate = certificate.get(), "connection from {address}: {error}");
+        }
+    }
+
+    /// The same; gives why it ended, unless a client left.
+    async fn take(
+        self: Arc<Self>,
+        stream: TcpStream,
+        address: String,
+        certificate: &OnceLock<String>,
+    ) -> Result<()> {
         let socket = link::Socket::new(stream)?;
         // A connection costs its socket until there is a place to greet it; strangers hold a place no longer than a
         // handshake and a greeting may take.
@@ -144,12 +163,16 @@ impl Acceptor {
             None => {
                 let policy = Policy { roles: self.roles.clone(), ..Policy::default() };
                 let (sender, receiver) = link::split(stream, self.settings());
-                self.greet(sender, receiver, address, policy, Some(place)).await
+                self.greet(sender, receiver, Caller { address, certificate: None }, policy, Some(place)).await
             }
             Some(config) => {
                 let (stream, identity) = tls::accept_any(stream, &config).await?;
                 let (sender, receiver) = link::split(stream, self.settings());
                 let policy = self.policy_for(identity.as_ref());
+                let shown = identity.as_ref().map(ToString::to_string);
+                if let Some(words) = &shown {
+                    certificate.get_or_init(|| words.clone());
+                }
                 if let Some(identity) = identity {
                     tls::watch(
                         &sender,
@@ -157,7 +180,8 @@ impl Acceptor {
                         self.ca_folder.as_ref().map(|(_, revoked)| revoked.clone()),
                     );
                 }
-                self.greet(sender, receiver, address, policy, Some(place)).await
+                self.greet(sender, receiver, Caller { address, certificate: shown }, policy, Some(place))
+                    .await
             }
         }
     }
@@ -170,6 +194,8 @@ impl Acceptor {
             Some(identity) => Policy {
                 roles: self.roles.clone(),
                 certificate: Some(identity.role),
+                // Whoever may be a master may start workers of any name.
+                name: (identity.role == tls::Role::Worker).then(|| identity.name.clone()),
                 refusal: identity.fault(revoked, std::time::SystemTime::now()),
                 ..Policy::default()
             },
@@ -191,14 +217,14 @@ impl Acceptor {
     {
         let (sender, receiver) = link::split(stream, self.settings());
         let policy = Policy { roles: self.roles.clone(), certificate, ..Policy::default() };
-        self.greet(sender, receiver, address, policy, None).await
+        self.greet(sender, receiver, Caller { address, certificate: None }, policy, None).await
     }
 
     async fn greet(
         self: Arc<Self>,
         sender: Sender,
         mut receiver: Receiver,
-        address: String,
+        caller: Caller,
         policy: Policy,
         place: Option<OwnedSemaphorePermit>,
     ) -> Result<()> {
@@ -209,7 +235,7 @@ impl Acceptor {
         let incarnation = self.incarnations.fetch_add(1, Ordering::Relaxed) + 1;
         if hello.role == Role::Worker {
             drop(place);
-            return self.worker(server, &hello, sender, receiver, address, incarnation).await;
+            return self.worker(server, &hello, sender, receiver, caller, incarnation).await;
         }
         let welcome = Welcome { incarnation, host: 0, heartbeat_ms: self.heartbeat_ms() };
         link::admit(server, &sender, &mut receiver, welcome)?;
@@ -217,12 +243,13 @@ impl Acceptor {
             let (ca_folder, _) =
                 self.ca_folder.as_ref().ok_or_else(|| Error::Message("no lab to join here".into()))?;
             // It keeps its place: nobody knows it yet.
-            let served = newcomer::serve(ca_folder, &hello, &address, &sender, &mut receiver).await;
+            let served = newcomer::serve(ca_folder, &hello, &caller.address, &sender, &mut receiver).await;
             drop(place);
             return served;
         }
         drop(place);
-        match client_requests::serve(&self.notices, &sender, &mut receiver, incarnation).await {
+        let caller = caller.certificate.unwrap_or(caller.address);
+        match client_requests::serve(&self.notices, &sender, &mut receiver, (incarnation, caller)).await {
             // A client may go as it likes.
             Error::Closed | Error::Left { .. } | Error::Io { .. } => Ok(()),
             error => {
@@ -238,7 +265,7 @@ impl Acceptor {
         hello: &Hello,
         sender: Sender,
         mut receiver: Receiver,
-        address: String,
+        Caller { address, certificate }: Caller,
         incarnation: u32,
     ) -> Result<()> {
         let (answer, answered) = oneshot::channel();
@@ -264,6 +291,7 @@ impl Acceptor {
                 let worker_link = WorkerLink {
                     spec: WorkerSpec { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
                     address: address.clone(),
+                    certificate,
                     peer: peer_address(&address, hello.peer_port),
                     incarnation,
                     outbox: Arc::new(Mutex::new(Outbox::new(sender.clone(), 0))),
@@ -395,11 +423,7 @@ pub async fn listen(listener: TcpListener, acceptor: Arc<Acceptor>) {
         };
         let acceptor = Arc::clone(&acceptor);
         tokio::spawn(async move {
-            if let Err(error) = Arc::clone(&acceptor).take(stream, address.to_string()).await
-                && !acceptor.is_ending()
-            {
-                warn!("connection from {address}: {error}");
-            }
+            acceptor.attend(stream, address).await;
             drop(place);
         });
     }

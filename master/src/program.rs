@@ -96,7 +96,10 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
     };
     let options = worker::daemon::Options {
         master: args.master,
-        name: args.name.unwrap_or_else(|| format!("{}-{}", machine::host_name(), std::process::id())),
+        name: match args.name {
+            Some(name) => name,
+            None => name_of(args.certs.as_deref())?,
+        },
         speed,
         threads: args.threads.unwrap_or(cores),
         certs: args.certs,
@@ -112,6 +115,15 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
         compute,
     };
     worker::daemon::run(&options).map(|()| ExitCode::SUCCESS)
+}
+
+/// The name of a worker that was given none: its host's, as its certificate says where it has one, and the process.
+fn name_of(certs: Option<&Path>) -> Result<String, String> {
+    let process = std::process::id();
+    let Some(folder) = certs else { return Ok(format!("{}-{process}", machine::host_name())) };
+    let path = tls::Paths::in_folder(folder).certificate;
+    let identity = tls::identity_of_file(&path).map_err(|e| e.to_string())?;
+    Ok(format!("{}@{process}", identity.name))
 }
 
 fn make_certificates(what: Certs) -> Result<ExitCode, String> {

@@ -266,7 +266,7 @@ impl Scheduler {
                 let _ = answer.send(self.admit(&hello, &address, incarnation));
             }
             Notice::Joined(worker_link) => {
-                let WorkerLink { spec, address, .. } = &worker_link;
+                let WorkerLink { spec, address, certificate, .. } = &worker_link;
                 info!(
                     address,
                     certificate,
