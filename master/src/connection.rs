@@ -4,7 +4,7 @@
 //! to the [`crate::client_requests`]. Every fault ends this connection with one line in the log, and nothing else.
 
 use std::{
-    net::SocketAddr,
+    net::{IpAddr, Ipv4Addr, SocketAddr},
     sync::{
         Arc, Mutex, OnceLock,
         atomic::{AtomicBool, AtomicU32, Ordering},
@@ -27,7 +27,7 @@ use protocol::{
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpStream},
-    sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot},
+    sync::{mpsc, oneshot},
     time::Instant,
 };
 use tracing::{info, warn};
@@ -37,8 +37,9 @@ use crate::{
     client_requests,
     drive::{Delivery, Input, WorkerLink},
     event::WorkerSpec,
-    files, newcomer,
+    files, neighbour, newcomer,
     notice::Notice,
+    places::{Place, Places},
 };
 
 /// Most connections at a time, those in their greeting included.
@@ -47,6 +48,8 @@ pub const CONNECTIONS: usize = 4096;
 pub const GREETINGS: usize = 256;
 /// The longest that a connection waits for a place among them.
 const PLACE_LIMIT: Duration = Duration::from_secs(30);
+/// Whoever has no address shares this one's places.
+const UNKNOWN: IpAddr = IpAddr::V4(Ipv4Addr::UNSPECIFIED);
 /// A worker is suspect after this part of the silence after which it is dead.
 const SUSPECT: f64 = 0.3;
 
@@ -70,11 +73,13 @@ pub struct Acceptor {
     /// Where newcomers exchange their tokens, and the certificates that count no more.
     ca_folder: Option<(CaFolder, Revoked)>,
     /// Places for connections that are not welcomed yet.
-    greetings: Arc<Semaphore>,
+    greetings: Places,
     /// This host's emulated port, which all connections pass.
     port: Option<Shape>,
     /// Without a byte for so long, a peer is dead.
     dead_after: Duration,
+    /// Without certificates, callers of any user of this PC are taken in.
+    shared: bool,
     /// The last incarnation that was given.
     incarnations: AtomicU32,
     ending: AtomicBool,
@@ -89,9 +94,21 @@ impl Acceptor {
         tls: Option<Arc<ServerConfig>>,
     ) -> Self {
         let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
-        let greetings = Arc::new(Semaphore::new(GREETINGS));
-        let (ca_folder, port, dead_after) = (None, None, Settings::default().silence);
-        Self { notices, roles, token, tls, ca_folder, greetings, port, dead_after, incarnations, ending }
+        let greetings = Places::new(GREETINGS);
+        let (ca_folder, port, dead_after, shared) = (None, None, Settings::default().silence, false);
+        Self {
+            notices,
+            roles,
+            token,
+            tls,
+            ca_folder,
+            greetings,
+            port,
+            dead_after,
+            shared,
+            incarnations,
+            ending,
+        }
     }
 
     /// Newcomers may exchange tokens of this lab, and certificates on its list are not accepted.
@@ -105,6 +122,13 @@ impl Acceptor {
     #[must_use]
     pub fn behind(mut self, port: Option<Shape>) -> Self {
         self.port = port;
+        self
+    }
+
+    /// Without certificates, callers of any user of this PC are taken in.
+    #[must_use]
+    pub fn shared(mut self, shared: bool) -> Self {
+        self.shared = shared;
         self
     }
 
@@ -152,16 +176,32 @@ impl Acceptor {
         address: String,
         certificate: &OnceLock<String>,
     ) -> Result<()> {
+        let ends = stream.local_addr().ok().zip(stream.peer_addr().ok());
         let socket = link::Socket::new(stream)?;
         // A connection costs its socket until there is a place to greet it; strangers hold a place no longer than a
         // handshake and a greeting may take.
-        let place = tokio::time::timeout(PLACE_LIMIT, Arc::clone(&self.greetings).acquire_owned()).await;
-        let full = || Error::Message(format!("{GREETINGS} others are being greeted, at most {GREETINGS}"));
-        let place = place.map_err(|_| full())?.map_err(|_| full())?;
+        let from = address.parse().map_or(UNKNOWN, |address: SocketAddr| address.ip());
+        let place = tokio::time::timeout(PLACE_LIMIT, self.greetings.wait(from)).await;
+        let full = || {
+            let of_address = self.greetings.most_of_an_address();
+            Error::Message(format!(
+                "others are being greeted, at most {GREETINGS}, and {of_address} of one address"
+            ))
+        };
+        let place = place.map_err(|_| full())?.ok_or_else(full)?;
         let stream = Shaped::new(socket, self.port.as_ref());
         match self.tls.clone() {
             None => {
-                let policy = Policy { roles: self.roles.clone(), ..Policy::default() };
+                let refusal = match ends.filter(|_| !self.shared) {
+                    Some((ours, theirs)) => {
+                        let check = move || neighbour::check(ours, theirs).err();
+                        let refusal = tokio::task::spawn_blocking(check).await;
+                        refusal.unwrap_or(Some(neighbour::Refusal::Unlisted(theirs)))
+                    }
+                    None => None,
+                };
+                let refusal = refusal.map(|refusal| refusal.to_string());
+                let policy = Policy { roles: self.roles.clone(), refusal, ..Policy::default() };
                 let (sender, receiver) = link::split(stream, self.settings());
                 self.greet(sender, receiver, Caller { address, certificate: None }, policy, Some(place)).await
             }
@@ -226,7 +266,7 @@ impl Acceptor {
         mut receiver: Receiver,
         caller: Caller,
         policy: Policy,
-        place: Option<OwnedSemaphorePermit>,
+        place: Option<Place>,
     ) -> Result<()> {
         let newcomer = policy.roles == [Role::Newcomer];
         let token = self.token.clone().filter(|_| !newcomer);
@@ -406,7 +446,7 @@ async fn hand_on(
 pub async fn listen(listener: TcpListener, acceptor: Arc<Acceptor>) {
     // The rest is for results: callers that only stay may not take the files that a run writes.
     let most = CONNECTIONS.min(files::raise_limit());
-    let places = Arc::new(Semaphore::new(most));
+    let places = Places::new(most);
     loop {
         let (stream, address) = match listener.accept().await {
             Ok(taken) => taken,
@@ -417,8 +457,9 @@ pub async fn listen(listener: TcpListener, acceptor: Arc<Acceptor>) {
                 continue;
             }
         };
-        let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
-            warn!("connection from {address} not taken: {most} stand, at most {most}");
+        let Some(place) = places.take(address.ip()) else {
+            let of_address = places.most_of_an_address();
+            warn!("connection from {address} not taken: at most {most} stand, {of_address} of one address");
             continue;
         };
         let acceptor = Arc::clone(&acceptor);

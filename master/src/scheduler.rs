@@ -25,21 +25,27 @@ use worker::notify;
 use crate::{
     connection::Acceptor,
     drive::{self, Input, WorkerLink},
+    footprint,
     hosts::Hosts,
     http::board::Board,
     notice::Notice,
     queue::{self, Change, Entry, Queue, Starts, is_over},
+    results,
+    scheduler::retention::{Kept, Limits},
     service::{self, Order},
     snapshot::store,
     spool::{Left, Record, Spool},
 };
 
 mod allotment;
+pub mod retention;
 
 /// The longest that an ending master waits until the jobs under way are stored.
 const END_LIMIT: Duration = Duration::from_secs(60);
 /// Between two looks of a job at the time that its workers take.
 const WAKE_EVERY: Duration = Duration::from_secs(1);
+/// Between two looks at what jobs that are over take.
+const LOOK_EVERY: Duration = Duration::from_secs(10);
 /// The first and the longest pause of a queue whose host is short of something (s).
 const PAUSES: [u64; 2] = [2, 30];
 
@@ -62,6 +68,10 @@ pub struct Scheduler {
     board: Option<Arc<Board>>,
     /// Set while this host is short of what a job needs.
     pause: Option<Pause>,
+    /// What is kept of jobs that are over.
+    limits: Limits,
+    /// When that was looked at last.
+    looked: Option<Instant>,
 }
 
 /// The queue waits: this host has no room, files or memory left. The job that met it is tried again and goes on where it was stored.
@@ -69,6 +79,22 @@ struct Pause {
     why: String,
     until: Instant,
     seconds: u64,
+}
+
+/// Why a job is not removed.
+#[derive(Debug)]
+enum RemoveError {
+    Queue(queue::Error),
+    Results(results::Error),
+}
+
+impl std::fmt::Display for RemoveError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Queue(error) => error.fmt(f),
+            Self::Results(error) => error.fmt(f),
+        }
+    }
 }
 
 /// A job under way.
@@ -113,6 +139,8 @@ impl Scheduler {
             running: BTreeMap::new(),
             board,
             pause: None,
+            limits: Limits::default(),
+            looked: None,
         };
         for why in &left.warnings {
             warn!("{why}");
@@ -123,10 +151,17 @@ impl Scheduler {
         owner
     }
 
+    /// Keeps no more than this of jobs that are over.
+    #[must_use]
+    pub fn keeping(mut self, limits: Limits) -> Self {
+        self.limits = limits;
+        self
+    }
+
     /// A job of an earlier master; one that was under way goes on.
     fn restore(&mut self, record: Record, text: String) {
         let Record { job, name, title, state, options, at_work, cycle, time, ended, .. } = record.clone();
-        let Record { deck_sum, starts, cancelled, .. } = record;
+        let Record { deck_sum, starts, cancelled, elements, .. } = record;
         let interrupted = state == State::Running;
         let state = if interrupted { State::Queued } else { state };
         if !is_over(state) {
@@ -139,8 +174,19 @@ impl Scheduler {
         let folder = (!options.no_output).then(|| self.spool.results(job));
         let before = interrupted.then_some(at_work);
         let text = Arc::new(text);
-        let entry =
-            Entry { id: job, name, text, options, state, folder, before, deck_sum, starts, cancelled };
+        let entry = Entry {
+            id: job,
+            name,
+            text,
+            options,
+            state,
+            folder,
+            before,
+            deck_sum,
+            starts,
+            cancelled,
+            elements,
+        };
         self.queue.restore(entry);
         let verdict = if interrupted && cancelled {
             Some((Change::Cancel, Ended::default()))
@@ -179,6 +225,7 @@ impl Scheduler {
                 deck_sum: entry.deck_sum.clone(),
                 starts: entry.starts,
                 cancelled: entry.cancelled,
+                elements: entry.elements,
             }
         };
         // A few kilobytes; the job's own thread does not wait for it.
@@ -198,7 +245,10 @@ impl Scheduler {
                 },
                 // An interrupted job waits for its workers for a while.
                 _ = look.tick() => self.start_next(),
-                _ = wake.tick() => self.wake(),
+                _ = wake.tick() => {
+                    self.wake();
+                    self.remove_expired();
+                }
             }
             // Here, so that a manager sees a scheduler that is stuck.
             if alive.is_some_and(|interval| said.elapsed() >= interval) {
@@ -286,8 +336,11 @@ impl Scheduler {
                 }
             }
             Notice::Suspect { incarnation, note } => self.hosts.suspect(incarnation, note),
-            Notice::Submit { name, title, text, options, answer } => {
-                let _ = answer.send(self.submit(name, title, text, options));
+            Notice::Submit { name, title, text, elements, options, answer } => {
+                let _ = answer.send(self.submit(name, title, (text, elements), options));
+            }
+            Notice::Alive(answer) => {
+                let _ = answer.send(());
             }
             Notice::Jobs(answer) => {
                 let _ = answer.send(self.status.values().map(|s| s.borrow().clone()).collect());
@@ -303,6 +356,10 @@ impl Scheduler {
             }
             Notice::Resume(job, answer) => {
                 let _ = answer.send(self.resume(job));
+            }
+            Notice::Remove(job, answer) => {
+                let removed = self.remove(job).map(|()| format!("job {job} is removed"));
+                let _ = answer.send(removed.map_err(|error| error.to_string()));
             }
             Notice::Folder(job, answer) => {
                 let _ = answer.send(self.folder(job));
@@ -351,10 +408,10 @@ impl Scheduler {
         &mut self,
         name: String,
         title: String,
-        text: String,
+        (text, elements): (String, u64),
         options: JobOptions,
     ) -> Result<u32, String> {
-        let job = self.queue.add(name.clone(), text, options.clone(), &self.folder)?;
+        let job = self.queue.add(name.clone(), (text, elements), options.clone(), &self.folder)?;
         let record = Record {
             job,
             name,
@@ -368,6 +425,7 @@ impl Scheduler {
             deck_sum: self.queue.get(job).map(|entry| entry.deck_sum.clone()).unwrap_or_default(),
             starts: Starts::default(),
             cancelled: false,
+            elements,
         };
         let text = self.queue.get(job).map(|entry| Arc::clone(&entry.text)).unwrap_or_default();
         // Who is told that the job is queued finds it in the queue of the next master as well.
@@ -413,6 +471,45 @@ impl Scheduler {
         Ok(format!("job {job} goes on where it was stored"))
     }
 
+    /// Removes a job that is over with all that it left.
+    fn remove(&mut self, job: u32) -> Result<(), RemoveError> {
+        let entry = self.queue.remove(job).map_err(RemoveError::Queue)?;
+        let removed = tokio::task::block_in_place(|| match &entry.folder {
+            Some(folder) => retention::remove_results(folder),
+            None => Ok(()),
+        });
+        if let Err(error) = removed {
+            self.queue.restore(entry);
+            return Err(RemoveError::Results(error));
+        }
+        tokio::task::block_in_place(|| self.spool.forget(job));
+        self.status.remove(&job);
+        Ok(())
+    }
+
+    /// Removes what is older or more than is kept.
+    fn remove_expired(&mut self) {
+        if self.limits.are_none() || self.looked.is_some_and(|at| at.elapsed() < LOOK_EVERY) {
+            return;
+        }
+        self.looked = Some(Instant::now());
+        let kept = |entry: &Entry| Kept {
+            job: entry.id,
+            age: retention::age_of(&self.spool.record(entry.id)),
+            bytes: entry.folder.as_deref().map(retention::bytes_of).unwrap_or_default()
+                + retention::bytes_of(&self.spool.snapshots(entry.id)),
+        };
+        // A held job waits for its user.
+        let over = self.queue.over().filter(|entry| entry.state != State::Held);
+        let kept: Vec<Kept> = tokio::task::block_in_place(|| over.map(kept).collect());
+        for job in retention::expired(&kept, &self.limits) {
+            match self.remove(job) {
+                Ok(()) => info!(job, "removed: no more is kept (--keep-days, --keep-gb)"),
+                Err(error) => warn!(job, "not removed: {error}"),
+            }
+        }
+    }
+
     fn folder(&self, job: u32) -> Result<PathBuf, String> {
         let entry = self.queue.get(job).ok_or_else(|| format!("no job {job}"))?;
         let folder = entry.folder.clone().ok_or_else(|| format!("job {job} writes no results"))?;
@@ -456,7 +553,8 @@ impl Scheduler {
             self.hosts.idle().filter_map(|host| self.worker_links.get(&host.incarnation)).collect();
         let names: Vec<&str> = idle.iter().map(|worker_link| worker_link.spec.name.as_str()).collect();
         let running: Vec<u32> = self.running.keys().copied().collect();
-        let allotments = allotment::among(&waiting, &running, &names, self.started.elapsed());
+        let available = footprint::available();
+        let allotments = allotment::among(&waiting, &running, &names, self.started.elapsed(), available);
         for (job, what) in allotments.waits {
             self.wait_for(job, what);
         }
