@@ -30,8 +30,7 @@ use crate::{
     http::board::Board,
     notice::Notice,
     queue::{self, Change, Entry, Queue, Starts, is_over},
-    results,
-    scheduler::retention::{Kept, Limits},
+    scheduler::retention::Limits,
     service::{self, Order},
     snapshot::store,
     spool::{Left, Record, Spool},
@@ -44,8 +43,6 @@ pub mod retention;
 const END_LIMIT: Duration = Duration::from_secs(60);
 /// Between two looks of a job at the time that its workers take.
 const WAKE_EVERY: Duration = Duration::from_secs(1);
-/// Between two looks at what jobs that are over take.
-const LOOK_EVERY: Duration = Duration::from_secs(10);
 /// The first and the longest pause of a queue whose host is short of something (s).
 const PAUSES: [u64; 2] = [2, 30];
 
@@ -79,22 +76,6 @@ struct Pause {
     why: String,
     until: Instant,
     seconds: u64,
-}
-
-/// Why a job is not removed.
-#[derive(Debug)]
-enum RemoveError {
-    Queue(queue::Error),
-    Results(results::Error),
-}
-
-impl std::fmt::Display for RemoveError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Queue(error) => error.fmt(f),
-            Self::Results(error) => error.fmt(f),
-        }
-    }
 }
 
 /// A job under way.
@@ -469,45 +450,6 @@ impl Scheduler {
             status.send_modify(|status| (status.state, status.ended) = (state, None));
         }
         Ok(format!("job {job} goes on where it was stored"))
-    }
-
-    /// Removes a job that is over with all that it left.
-    fn remove(&mut self, job: u32) -> Result<(), RemoveError> {
-        let entry = self.queue.remove(job).map_err(RemoveError::Queue)?;
-        let removed = tokio::task::block_in_place(|| match &entry.folder {
-            Some(folder) => retention::remove_results(folder),
-            None => Ok(()),
-        });
-        if let Err(error) = removed {
-            self.queue.restore(entry);
-            return Err(RemoveError::Results(error));
-        }
-        tokio::task::block_in_place(|| self.spool.forget(job));
-        self.status.remove(&job);
-        Ok(())
-    }
-
-    /// Removes what is older or more than is kept.
-    fn remove_expired(&mut self) {
-        if self.limits.are_none() || self.looked.is_some_and(|at| at.elapsed() < LOOK_EVERY) {
-            return;
-        }
-        self.looked = Some(Instant::now());
-        let kept = |entry: &Entry| Kept {
-            job: entry.id,
-            age: retention::age_of(&self.spool.record(entry.id)),
-            bytes: entry.folder.as_deref().map(retention::bytes_of).unwrap_or_default()
-                + retention::bytes_of(&self.spool.snapshots(entry.id)),
-        };
-        // A held job waits for its user.
-        let over = self.queue.over().filter(|entry| entry.state != State::Held);
-        let kept: Vec<Kept> = tokio::task::block_in_place(|| over.map(kept).collect());
-        for job in retention::expired(&kept, &self.limits) {
-            match self.remove(job) {
-                Ok(()) => info!(job, "removed: no more is kept (--keep-days, --keep-gb)"),
-                Err(error) => warn!(job, "not removed: {error}"),
-            }
-        }
     }
 
     fn folder(&self, job: u32) -> Result<PathBuf, String> {

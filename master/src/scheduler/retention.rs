@@ -1,10 +1,22 @@
-//! RETENTION: which jobs that are over are removed, with their results. It decides and removes nothing.
+//! RETENTION: which jobs that are over are removed, and removing them with their results.
 
 use std::{
     fs, io,
     path::Path,
-    time::{Duration, SystemTime},
+    time::{Duration, Instant, SystemTime},
 };
+
+use protocol::request::State;
+use tracing::{info, warn};
+
+use super::Scheduler;
+use crate::{
+    queue::{self, Entry},
+    results,
+};
+
+/// Between two looks at what jobs that are over take.
+const LOOK_EVERY: Duration = Duration::from_secs(10);
 
 /// How long and how much is kept of jobs that are over.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,16 +36,16 @@ impl Limits {
 
 /// What a job that is over takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Kept {
-    pub(super) job: u32,
+struct Kept {
+    job: u32,
     /// Since its end.
-    pub(super) age: Duration,
+    age: Duration,
     /// Of its results and snapshots.
-    pub(super) bytes: u64,
+    bytes: u64,
 }
 
 /// The jobs that are removed, the oldest first.
-pub(super) fn expired(kept: &[Kept], limits: &Limits) -> Vec<u32> {
+fn expired(kept: &[Kept], limits: &Limits) -> Vec<u32> {
     let mut oldest_first = kept.to_vec();
     oldest_first.sort_by_key(|kept| std::cmp::Reverse((kept.age, std::cmp::Reverse(kept.job))));
     let mut left: u64 = kept.iter().map(|kept| kept.bytes).sum();
@@ -50,13 +62,13 @@ pub(super) fn expired(kept: &[Kept], limits: &Limits) -> Vec<u32> {
 }
 
 /// How long ago a file was written; nothing if that is not known, or the clock has been set back since.
-pub(super) fn age_of(path: &Path) -> Duration {
+fn age_of(path: &Path) -> Duration {
     let written = fs::metadata(path).and_then(|meta| meta.modified());
     written.ok().and_then(|at| SystemTime::now().duration_since(at).ok()).unwrap_or_default()
 }
 
 /// Bytes of the files of a folder; a folder that is not there has none.
-pub(super) fn bytes_of(folder: &Path) -> u64 {
+fn bytes_of(folder: &Path) -> u64 {
     let Ok(entries) = fs::read_dir(folder) else { return 0 };
     let files = entries.filter_map(Result::ok).filter_map(|entry| entry.metadata().ok());
     files.filter(fs::Metadata::is_file).map(|meta| meta.len()).sum()
@@ -66,19 +78,74 @@ pub(super) fn bytes_of(folder: &Path) -> u64 {
 ///
 /// # Errors
 /// What the disk refused.
-pub(super) fn remove_results(folder: &Path) -> Result<(), crate::results::Error> {
+fn remove_results(folder: &Path) -> Result<(), results::Error> {
     if folder.is_symlink() || !folder.is_dir() {
         return Ok(());
     }
-    crate::results::Folder::create(folder, true)?;
+    results::Folder::create(folder, true)?;
     match fs::remove_dir(folder) {
         // Somebody's files stay.
         Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => Ok(()),
-        other => other.map_err(|source| crate::results::Error::Io {
-            action: "remove",
-            path: folder.to_owned(),
-            source,
-        }),
+        other => {
+            other.map_err(|source| results::Error::Io { action: "remove", path: folder.to_owned(), source })
+        }
+    }
+}
+
+/// Why a job is not removed.
+#[derive(Debug)]
+pub(super) enum RemoveError {
+    Queue(queue::Error),
+    Results(results::Error),
+}
+
+impl std::fmt::Display for RemoveError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Queue(error) => error.fmt(f),
+            Self::Results(error) => error.fmt(f),
+        }
+    }
+}
+
+impl Scheduler {
+    /// Removes a job that is over with all that it left.
+    pub(super) fn remove(&mut self, job: u32) -> Result<(), RemoveError> {
+        let entry = self.queue.remove(job).map_err(RemoveError::Queue)?;
+        let removed = tokio::task::block_in_place(|| match &entry.folder {
+            Some(folder) => remove_results(folder),
+            None => Ok(()),
+        });
+        if let Err(error) = removed {
+            self.queue.restore(entry);
+            return Err(RemoveError::Results(error));
+        }
+        tokio::task::block_in_place(|| self.spool.forget(job));
+        self.status.remove(&job);
+        Ok(())
+    }
+
+    /// Removes what is older or more than is kept.
+    pub(super) fn remove_expired(&mut self) {
+        if self.limits.are_none() || self.looked.is_some_and(|at| at.elapsed() < LOOK_EVERY) {
+            return;
+        }
+        self.looked = Some(Instant::now());
+        let kept = |entry: &Entry| Kept {
+            job: entry.id,
+            age: age_of(&self.spool.record(entry.id)),
+            bytes: entry.folder.as_deref().map(bytes_of).unwrap_or_default()
+                + bytes_of(&self.spool.snapshots(entry.id)),
+        };
+        // A held job waits for its user.
+        let over = self.queue.over().filter(|entry| entry.state != State::Held);
+        let kept: Vec<Kept> = tokio::task::block_in_place(|| over.map(kept).collect());
+        for job in expired(&kept, &self.limits) {
+            match self.remove(job) {
+                Ok(()) => info!(job, "removed: no more is kept (--keep-days, --keep-gb)"),
+                Err(error) => warn!(job, "not removed: {error}"),
+            }
+        }
     }
 }
 
