@@ -64,6 +64,19 @@ pub fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     read_whole(text, file_name).map(|reading| reading.model)
 }
 
+/// As [`read`], for a deck that may ask for no more elements than this: who reads it has no memory for more.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_at_most(text: &str, file_name: &str, most_elements: u64) -> Result<Model, Vec<Fault>> {
+    let bundle = Bundle::of(text, file_name)?;
+    let reading = match Kind::of(bundle.files[0].1) {
+        Kind::Keyword => read_keyword(&bundle, MESH, most_elements).map(|whole| whole.reading),
+        _ => read_toml(&bundle, most_elements),
+    };
+    reading.map(|reading| reading.model)
+}
+
 /// As [`read`], with the warnings.
 ///
 /// # Errors
@@ -71,8 +84,8 @@ pub fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
 pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
     let bundle = Bundle::of(text, file_name)?;
     match Kind::of(bundle.files[0].1) {
-        Kind::Keyword => read_keyword(&bundle, MESH).map(|whole| whole.reading),
-        _ => read_toml(&bundle),
+        Kind::Keyword => read_keyword(&bundle, MESH, MAX_ELEMENTS).map(|whole| whole.reading),
+        _ => read_toml(&bundle, MAX_ELEMENTS),
     }
 }
 
@@ -80,9 +93,9 @@ pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
 const MESH: &str = "keyword.mesh";
 
 /// Reads and checks a TOML deck with its mesh files.
-fn read_toml(bundle: &Bundle<'_>) -> Result<Reading, Vec<Fault>> {
+fn read_toml(bundle: &Bundle<'_>, most_elements: u64) -> Result<Reading, Vec<Fault>> {
     let (name, text) = bundle.files[0];
-    let log = Log::toml(name, text);
+    let log = Log::toml(name, text).with_most_elements(most_elements);
     let mut of_meshes = Vec::new();
     let mut meshes = Meshes::new();
     for (path, text) in &bundle.files[1..] {
@@ -109,8 +122,12 @@ struct WholeKeyword {
 }
 
 /// Reads and checks a keyword deck.
-fn read_keyword(bundle: &Bundle<'_>, mesh_name: &str) -> Result<WholeKeyword, Vec<Fault>> {
-    let log = Log::keyword(&bundle.files);
+fn read_keyword(
+    bundle: &Bundle<'_>,
+    mesh_name: &str,
+    most_elements: u64,
+) -> Result<WholeKeyword, Vec<Fault>> {
+    let log = Log::keyword(&bundle.files).with_most_elements(most_elements);
     let (deck, mesh) = keyword::read(bundle, mesh_name, &log);
     let meshes = Meshes::from([(mesh_name.to_string(), Some(mesh))]);
     let model = make::model(&deck, &meshes, &log);
@@ -151,7 +168,7 @@ pub fn convert(text: &str, file_name: &str, mesh_name: &str) -> Result<Converted
         faults.add(0, faults.quote(0, 60), "an LS-DYNA keyword deck", "run a TOML deck as it is");
         return Err(faults.into_list());
     }
-    let WholeKeyword { reading, deck, mesh } = read_keyword(&bundle, mesh_name)?;
+    let WholeKeyword { reading, deck, mesh } = read_keyword(&bundle, mesh_name, MAX_ELEMENTS)?;
     Ok(Converted { deck: write::text(&deck), mesh: mesh.text(), warnings: reading.warnings })
 }
 

@@ -4,6 +4,7 @@ use std::{cell::RefCell, collections::BTreeMap, fmt};
 
 use crate::{
     fault::{Fault, Faults, MAX_FAULTS},
+    limits::MAX_ELEMENTS,
     place::{Origin, Place},
 };
 
@@ -40,6 +41,8 @@ pub(crate) struct Log<'a> {
     warnings: RefCell<Vec<(Place, String)>>,
     /// Keywords that change nothing here, by name: the first line of each.
     ignored: RefCell<BTreeMap<String, Place>>,
+    /// Most elements that the deck may ask for, where that is fewer than any deck may.
+    most_elements: Option<u64>,
 }
 
 impl<'a> Log<'a> {
@@ -60,6 +63,7 @@ impl<'a> Log<'a> {
             files: files.iter().map(|(name, _)| *name).collect(),
             warnings: RefCell::new(Vec::new()),
             ignored: RefCell::new(BTreeMap::new()),
+            most_elements: None,
         }
     }
 
@@ -136,6 +140,17 @@ impl<'a> Log<'a> {
     /// `line 12`, with its file where that is not the one of `from`.
     pub(crate) fn line(&self, at: Place, from: Place) -> String {
         self.faults.line_seen_from(at, from)
+    }
+
+    /// Most elements that the deck may ask for.
+    pub(crate) fn most_elements(&self) -> u64 {
+        self.most_elements.unwrap_or(MAX_ELEMENTS)
+    }
+
+    /// Has the deck ask for no more elements.
+    pub(crate) fn with_most_elements(mut self, most: u64) -> Self {
+        self.most_elements = Some(most.min(MAX_ELEMENTS));
+        self
     }
 
     pub(crate) fn warn(&self, at: Place, words: impl Into<String>) {

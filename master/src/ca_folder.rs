@@ -10,7 +10,7 @@ use std::{
     io::ErrorKind,
     net::IpAddr,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, Mutex, PoisonError},
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
@@ -29,6 +29,9 @@ const LOOK: Duration = Duration::from_secs(1);
 pub const TOKENS_LIMIT: usize = 10_000;
 /// Most bytes of the list of revoked certificates.
 const REVOKED_LIMIT: u64 = 16 << 20;
+
+/// Held while a token is exchanged, so that a name is given once.
+static ISSUING: Mutex<()> = Mutex::new(());
 
 /// What a token is good for.
 #[derive(Debug, Serialize, Deserialize)]
@@ -107,6 +110,16 @@ impl CaFolder {
         if now() > grant.expires {
             return Err(refuse("the token is out of date"));
         }
+        let _issuing = ISSUING.lock().unwrap_or_else(PoisonError::into_inner);
+        certs::check_host(name, grant.role)?;
+        if let Some(standing) = self.standing(name, grant.role)? {
+            if used.exists() {
+                return Err(refuse("the token was used before"));
+            }
+            return Err(Error::Rule(format!(
+                "a certificate of {name:?} stands ({standing}); join under another name, or `bolide certs revoke` that one first"
+            )));
+        }
         // Whoever renames it has it; then it is used up, even if nothing comes of it.
         fs::rename(&path, &used).map_err(|error| match error.kind() {
             ErrorKind::NotFound => refuse("the token was used before"),
@@ -117,6 +130,25 @@ impl CaFolder {
         synced.map_err(|error| Error::Io { path: tokens, error })?;
         let addresses: Vec<String> = address.iter().map(ToString::to_string).collect();
         certs::sign_request(&self.folder, request, name, &addresses, grant.role)
+    }
+
+    /// The fingerprint of a certificate of this name and role that was issued, counts still and is not out of date.
+    fn standing(&self, name: &str, role: Role) -> Result<Option<String>, Error> {
+        let (issued, revoked) = (self.folder.join("issued"), self.revoked()?);
+        let fault = |error| Error::Io { path: issued.clone(), error };
+        let entries = match fs::read_dir(&issued) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            entries => entries.map_err(fault)?,
+        };
+        for entry in entries {
+            let path = entry.map_err(fault)?.path();
+            let identity = tls::identity_of_file(&path).map_err(|e| Error::Rule(e.to_string()))?;
+            let counts = !revoked.contains(&identity.fingerprint) && identity.expires > now() as i64;
+            if identity.role == role && identity.name.eq_ignore_ascii_case(name) && counts {
+                return Ok(Some(identity.fingerprint));
+            }
+        }
+        Ok(None)
     }
 
     /// The files of a token, before and after its use.
@@ -274,6 +306,24 @@ mod tests {
         assert!(error.to_string().contains("damaged"), "{error}");
         fs::write(&path, record).expect("room");
         assert!(redeem(&ca_folder, &token.to_string()).is_ok());
+    }
+
+    #[test]
+    fn a_newcomer_takes_no_reserved_name_and_none_that_stands_and_keeps_its_token() {
+        let (_folder, ca_folder) = ca_folder();
+        redeem(&ca_folder, &ca_folder.issue(Role::Worker, 1).expect("a token").to_string()).expect("pc-1");
+        let token = ca_folder.issue(Role::Worker, 1).expect("a token").to_string();
+        let (_, request) = certs::make_request().expect("a key");
+        for (name, words) in [
+            ("master", "it is reserved"),
+            ("Issued", "it is reserved"),
+            ("PC-1", "a certificate of \"PC-1\" stands"),
+        ] {
+            let error = ca_folder.redeem(&token, name, None, &request).expect_err(name).to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        ca_folder.revoke("pc-1").expect("there is one");
+        ca_folder.redeem(&token, "pc-1", None, &request).expect("the name is free, the token not used");
     }
 
     #[tokio::test]

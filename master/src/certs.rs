@@ -187,13 +187,30 @@ fn authority() -> CertificateParams {
     params
 }
 
-fn host(name: &str, addresses: &[String], role: Role) -> Result<CertificateParams, Error> {
+/// Names that no worker and no client may have: that of the master, and folders of the lab.
+const RESERVED: [&str; 4] = ["master", "localhost", "issued", "tokens"];
+
+/// Whether a host of this role may have a name.
+///
+/// # Errors
+/// [`Error::Name`].
+pub(crate) fn check_host(name: &str, role: Role) -> Result<(), Error> {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     let (first, length) = (name.chars().next(), name.len());
     if length > 64 || !first.is_some_and(|c| c.is_ascii_alphanumeric()) || !name.chars().all(plain) {
         let expected = "1 to 64 letters, digits, - _ or ., starting with a letter or digit";
         return Err(Error::Name { given: name.to_owned(), expected });
     }
+    if RESERVED.iter().any(|reserved| name.eq_ignore_ascii_case(reserved))
+        && (role != Role::Master || name != "master")
+    {
+        return Err(Error::Name { given: name.to_owned(), expected: "the name of a host: it is reserved" });
+    }
+    Ok(())
+}
+
+fn host(name: &str, addresses: &[String], role: Role) -> Result<CertificateParams, Error> {
+    check_host(name, role)?;
     if addresses.len() > ADDRESS_LIMIT {
         let given = format!("{} addresses", addresses.len());
         return Err(Error::Name { given, expected: "at most 64 addresses" });

@@ -297,6 +297,16 @@ pub fn resume(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// `bolide rm`.
+///
+/// # Errors
+/// If there is no such job or it has not failed, or whatever went wrong on the way.
+pub fn remove(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
+    let Reply::Done(what) = Client::new(at)?.ask(&Request::Remove { job })? else { return Err(surprise()) };
+    println!("{what}");
+    Ok(ExitCode::SUCCESS)
+}
+
 /// `bolide results`.
 ///
 /// # Errors

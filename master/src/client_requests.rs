@@ -6,24 +6,31 @@ use std::{
     fs::File,
     io::{Read, Seek, SeekFrom},
     path::{Path, PathBuf},
+    sync::atomic::{AtomicUsize, Ordering},
     time::Duration,
 };
 
 use protocol::{
     Error, Result, codec,
-    frame::Kind,
+    frame::{Frame, Kind},
     link::{Receiver, Sender},
     options::JobOptions,
-    order::{Inbox, Outbox, Place},
+    order::{Inbox, Outbox, Place, WAITING_BYTES_OF_A_CLIENT},
     request::{DECK_LIMIT, PIECE_LIMIT, Reply, Request, check_file_name},
     wire::Packed,
 };
 use tokio::sync::{mpsc, oneshot};
+use tracing::info;
 
-use crate::notice::Notice;
+use crate::{
+    desk::{self, Brought},
+    notice::Notice,
+};
 
 /// Bytes of a request around a deck.
 const AROUND_A_DECK: usize = 4096;
+/// Frames that a client may send before it has its answer.
+const EARLY_FRAMES: usize = 8;
 /// The shortest time between two reports to a client that watches.
 const REPORT_EVERY: Duration = Duration::from_millis(250);
 
@@ -32,12 +39,15 @@ pub async fn serve(
     notices: &mpsc::Sender<Notice>,
     sender: &Sender,
     receiver: &mut Receiver,
-    incarnation: u32,
+    (incarnation, caller): (u32, String),
 ) -> Error {
     let mut client_requests = ClientRequests {
         notices,
+        caller,
         outbox: Outbox::new(sender.clone(), 0),
-        inbox: Inbox::new(incarnation, (DECK_LIMIT + AROUND_A_DECK) as u64),
+        inbox: Inbox::new(incarnation, (DECK_LIMIT + AROUND_A_DECK) as u64)
+            .with_waiting_limit(WAITING_BYTES_OF_A_CLIENT),
+        held: Held(0),
     };
     loop {
         if let Err(error) = client_requests.next(receiver).await {
@@ -48,28 +58,84 @@ pub async fn serve(
 
 struct ClientRequests<'a> {
     notices: &'a mpsc::Sender<Notice>,
+    /// Who asks: its certificate, else its address.
+    caller: String,
     outbox: Outbox,
     inbox: Inbox,
+    held: Held,
+}
+
+/// Bytes of requests that are on their way, of all clients together.
+static ON_THE_WAY: AtomicUsize = AtomicUsize::new(0);
+/// Most of them: four decks of the greatest length.
+const ON_THE_WAY_LIMIT: usize = 4 * DECK_LIMIT;
+
+/// What of these bytes is this client's.
+struct Held(usize);
+
+impl Held {
+    fn add(&mut self, bytes: usize) -> Result<()> {
+        self.0 += bytes;
+        let all = ON_THE_WAY.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        if all > ON_THE_WAY_LIMIT {
+            let what = "bytes of requests of all clients that are on their way";
+            return Err(Error::TooLong { what, length: all as u64, limit: ON_THE_WAY_LIMIT as u64 });
+        }
+        Ok(())
+    }
+
+    fn clear(&mut self) {
+        ON_THE_WAY.fetch_sub(std::mem::take(&mut self.0), Ordering::Relaxed);
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        self.clear();
+    }
 }
 
 impl ClientRequests<'_> {
     async fn next(&mut self, receiver: &mut Receiver) -> Result<()> {
-        self.inbox.accept(receiver.receive().await?)?;
+        self.take(receiver.receive().await?)?;
         while let Some(letter) = self.inbox.take() {
             if letter.header.kind != Kind::Control {
                 return Err(Error::Unexpected { found: letter.header.kind, expected: "a request" });
             }
             let request = codec::decode(&letter.bytes, DECK_LIMIT + AROUND_A_DECK)?;
             drop(letter);
+            self.held.clear();
             match request {
                 Request::Watch { job } => self.watch(job, receiver).await?,
                 request => {
-                    let reply = self.answer(request).await.unwrap_or_else(Reply::No);
+                    let reply = self.answer_while_there(request, receiver).await?;
                     self.reply(&reply)?;
                 }
             }
         }
         Ok(())
+    }
+
+    fn take(&mut self, frame: Frame) -> Result<()> {
+        self.held.add(frame.payload.len())?;
+        self.inbox.accept(frame)
+    }
+
+    /// An answer that nobody waits for any more is not made.
+    async fn answer_while_there(&mut self, request: Request, receiver: &mut Receiver) -> Result<Reply> {
+        let mut early = Vec::new();
+        let reply = {
+            let answer = self.answer(request);
+            tokio::pin!(answer);
+            loop {
+                tokio::select! {
+                    reply = &mut answer => break reply.unwrap_or_else(Reply::No),
+                    frame = receiver.receive(), if early.len() < EARLY_FRAMES => early.push(frame?),
+                }
+            }
+        };
+        early.into_iter().try_for_each(|frame| self.take(frame))?;
+        Ok(reply)
     }
 
     fn reply(&mut self, reply: &Reply) -> Result<()> {
@@ -93,8 +159,18 @@ impl ClientRequests<'_> {
             Request::Submit { name, text, options } => self.submit(name, text, options).await?,
             Request::Jobs => Reply::Jobs(self.ask(Notice::Jobs).await?),
             Request::Hosts => Reply::Hosts(self.ask(Notice::Hosts).await?),
-            Request::Cancel { job } => Reply::Done(self.ask(|answer| Notice::Cancel(job, answer)).await??),
-            Request::Resume { job } => Reply::Done(self.ask(|answer| Notice::Resume(job, answer)).await??),
+            Request::Cancel { job } => {
+                info!(job, by = self.caller, "asked to cancel");
+                Reply::Done(self.ask(|answer| Notice::Cancel(job, answer)).await??)
+            }
+            Request::Resume { job } => {
+                info!(job, by = self.caller, "asked to resume");
+                Reply::Done(self.ask(|answer| Notice::Resume(job, answer)).await??)
+            }
+            Request::Remove { job } => {
+                info!(job, by = self.caller, "asked to remove");
+                Reply::Done(self.ask(|answer| Notice::Remove(job, answer)).await??)
+            }
             Request::Files { job } => {
                 let folder = self.folder(job).await?;
                 Reply::Files(blocking(move || list(&folder)).await?)
@@ -118,23 +194,18 @@ impl ClientRequests<'_> {
         text: String,
         options: JobOptions,
     ) -> std::result::Result<Reply, String> {
-        if options.end_time.is_some_and(|time| !(time.is_finite() && time > 0.0)) {
-            return Err("the end time must be a positive number".to_owned());
-        }
-        let (deck, file) = (text, name.clone());
-        let read = blocking(move || {
-            Ok(match deck::read(&deck, &file) {
-                Ok(model) => Ok((deck, model.title)),
-                Err(faults) => Err(faults.iter().map(ToString::to_string).collect()),
-            })
-        });
-        match read.await? {
-            Err(faults) => Ok(Reply::Faults(faults)),
-            Ok((text, title)) => {
-                let submit = |answer| Notice::Submit { name, title, text, options, answer };
-                Ok(Reply::Submitted { job: self.ask(submit).await?? })
+        options.check().map_err(|error| error.to_string())?;
+        let Brought { text, title, elements, .. } = match desk::read(name.clone(), text).await {
+            Ok(brought) => brought,
+            Err(desk::Error::Faults(faults)) => {
+                return Ok(Reply::Faults(faults.iter().map(ToString::to_string).collect()));
             }
-        }
+            Err(error) => return Err(error.to_string()),
+        };
+        let submit = |answer| Notice::Submit { name, title, text, elements, options, answer };
+        let job = self.ask(submit).await??;
+        info!(job, by = self.caller, "submitted");
+        Ok(Reply::Submitted { job })
     }
 
     /// Reports on a job until it has ended or the client leaves.

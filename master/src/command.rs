@@ -82,6 +82,14 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
+    /// Remove a job that is over, with its results and checkpoints
+    Rm {
+        /// The job
+        job: u32,
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
     /// Fetch the results of a job
     Results {
         /// The job
@@ -297,6 +305,23 @@ pub struct MasterArgs {
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
     #[arg(long, value_name = "RATE")]
     pub link: Option<Rate>,
+    /// Remove jobs that are over, with their results, after so many days [default: never]
+    #[arg(long, value_name = "DAYS", value_parser = amount)]
+    pub keep_days: Option<f64>,
+    /// Remove the oldest jobs that are over, with their results, when those of all take more gigabytes [default: never]
+    #[arg(long, value_name = "GB", value_parser = amount)]
+    pub keep_gb: Option<f64>,
+    /// Without certificates serve every user of this PC, not only its own and root
+    #[arg(long, conflicts_with = "certs")]
+    pub share: bool,
+}
+
+/// A number of days or gigabytes.
+fn amount(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(amount) if (0.0..=1e6).contains(&amount) => Ok(amount),
+        _ => Err("expected a number from 0 to 1e6".to_owned()),
+    }
 }
 
 fn deadline(text: &str) -> Result<f64, String> {
@@ -321,7 +346,8 @@ pub struct WorkerArgs {
     /// Compute threads [default: the cores that it may use]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
-    /// Name, unlike that of any other worker [default: host name and process id]
+    /// Name, unlike that of any other worker: with certificates, that in this host's, or NAME@ANY [default: host name and process
+    /// id]
     #[arg(long)]
     pub name: Option<String>,
     /// Folder with this host's certificates, as `bolide certs host` makes it
@@ -336,7 +362,8 @@ pub struct WorkerArgs {
     /// Send and receive no faster than this: 10mbit, 100mbit, 1gbit or bits per second
     #[arg(long, value_name = "RATE")]
     pub link: Option<Rate>,
-    /// Exchange this token at the master for a certificate, into the folder of --certs, unless it holds one
+    /// Exchange this token at the master for a certificate, into the folder of --certs, unless it holds one; @FILE or - reads it from a
+    /// file or standard input, and BOLIDE_JOIN may hold it: no list of processes shows it then
     #[arg(long, value_name = "TOKEN", requires = "certs")]
     pub join: Option<String>,
     /// Port for other workers, on the interface that leads to the master [default: any]

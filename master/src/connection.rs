@@ -4,9 +4,9 @@
 //! to the [`crate::client_requests`]. Every fault ends this connection with one line in the log, and nothing else.
 
 use std::{
-    net::SocketAddr,
+    net::{IpAddr, Ipv4Addr, SocketAddr},
     sync::{
-        Arc, Mutex,
+        Arc, Mutex, OnceLock,
         atomic::{AtomicBool, AtomicU32, Ordering},
     },
     time::Duration,
@@ -27,7 +27,7 @@ use protocol::{
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpStream},
-    sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot},
+    sync::{mpsc, oneshot},
     time::Instant,
 };
 use tracing::{info, warn};
@@ -37,8 +37,9 @@ use crate::{
     client_requests,
     drive::{Delivery, Input, WorkerLink},
     event::WorkerSpec,
-    files, newcomer,
+    files, neighbour, newcomer,
     notice::Notice,
+    places::{Place, Places},
 };
 
 /// Most connections at a time, those in their greeting included.
@@ -47,8 +48,17 @@ pub const CONNECTIONS: usize = 4096;
 pub const GREETINGS: usize = 256;
 /// The longest that a connection waits for a place among them.
 const PLACE_LIMIT: Duration = Duration::from_secs(30);
+/// Whoever has no address shares this one's places.
+const UNKNOWN: IpAddr = IpAddr::V4(Ipv4Addr::UNSPECIFIED);
 /// A worker is suspect after this part of the silence after which it is dead.
 const SUSPECT: f64 = 0.3;
+
+/// Who calls.
+struct Caller {
+    address: String,
+    /// The certificate that it showed, in words.
+    certificate: Option<String>,
+}
 
 /// What every connection needs of the daemon.
 pub struct Acceptor {
@@ -63,11 +73,13 @@ pub struct Acceptor {
     /// Where newcomers exchange their tokens, and the certificates that count no more.
     ca_folder: Option<(CaFolder, Revoked)>,
     /// Places for connections that are not welcomed yet.
-    greetings: Arc<Semaphore>,
+    greetings: Places,
     /// This host's emulated port, which all connections pass.
     port: Option<Shape>,
     /// Without a byte for so long, a peer is dead.
     dead_after: Duration,
+    /// Without certificates, callers of any user of this PC are taken in.
+    shared: bool,
     /// The last incarnation that was given.
     incarnations: AtomicU32,
     ending: AtomicBool,
@@ -82,9 +94,21 @@ impl Acceptor {
         tls: Option<Arc<ServerConfig>>,
     ) -> Self {
         let (incarnations, ending) = (AtomicU32::new(0), AtomicBool::new(false));
-        let greetings = Arc::new(Semaphore::new(GREETINGS));
-        let (ca_folder, port, dead_after) = (None, None, Settings::default().silence);
-        Self { notices, roles, token, tls, ca_folder, greetings, port, dead_after, incarnations, ending }
+        let greetings = Places::new(GREETINGS);
+        let (ca_folder, port, dead_after, shared) = (None, None, Settings::default().silence, false);
+        Self {
+            notices,
+            roles,
+            token,
+            tls,
+            ca_folder,
+            greetings,
+            port,
+            dead_after,
+            shared,
+            incarnations,
+            ending,
+        }
     }
 
     /// Newcomers may exchange tokens of this lab, and certificates on its list are not accepted.
@@ -98,6 +122,13 @@ impl Acceptor {
     #[must_use]
     pub fn behind(mut self, port: Option<Shape>) -> Self {
         self.port = port;
+        self
+    }
+
+    /// Without certificates, callers of any user of this PC are taken in.
+    #[must_use]
+    pub fn shared(mut self, shared: bool) -> Self {
+        self.shared = shared;
         self
     }
 
@@ -128,28 +159,60 @@ impl Acceptor {
         self.ending.load(Ordering::Relaxed)
     }
 
-    /// Serves a TCP connection to its end.
-    ///
-    /// # Errors
-    /// Why it ended, unless a client left.
-    pub async fn take(self: Arc<Self>, stream: TcpStream, address: String) -> Result<()> {
+    /// Serves a TCP connection to its end; a fault is one line in the log, with the certificate that was shown.
+    async fn attend(self: Arc<Self>, stream: TcpStream, address: SocketAddr) {
+        let certificate = OnceLock::new();
+        if let Err(error) = Arc::clone(&self).take(stream, address.to_string(), &certificate).await
+            && !self.is_ending()
+        {
+            warn!(certificate = certificate.get(), "connection from {address}: {error}");
+        }
+    }
+
+    /// The same; gives why it ended, unless a client left.
+    async fn take(
+        self: Arc<Self>,
+        stream: TcpStream,
+        address: String,
+        certificate: &OnceLock<String>,
+    ) -> Result<()> {
+        let ends = stream.local_addr().ok().zip(stream.peer_addr().ok());
         let socket = link::Socket::new(stream)?;
         // A connection costs its socket until there is a place to greet it; strangers hold a place no longer than a
         // handshake and a greeting may take.
-        let place = tokio::time::timeout(PLACE_LIMIT, Arc::clone(&self.greetings).acquire_owned()).await;
-        let full = || Error::Message(format!("{GREETINGS} others are being greeted, at most {GREETINGS}"));
-        let place = place.map_err(|_| full())?.map_err(|_| full())?;
+        let from = address.parse().map_or(UNKNOWN, |address: SocketAddr| address.ip());
+        let place = tokio::time::timeout(PLACE_LIMIT, self.greetings.wait(from)).await;
+        let full = || {
+            let of_address = self.greetings.most_of_an_address();
+            Error::Message(format!(
+                "others are being greeted, at most {GREETINGS}, and {of_address} of one address"
+            ))
+        };
+        let place = place.map_err(|_| full())?.ok_or_else(full)?;
         let stream = Shaped::new(socket, self.port.as_ref());
         match self.tls.clone() {
             None => {
-                let policy = Policy { roles: self.roles.clone(), ..Policy::default() };
+                let refusal = match ends.filter(|_| !self.shared) {
+                    Some((ours, theirs)) => {
+                        let check = move || neighbour::check(ours, theirs).err();
+                        let refusal = tokio::task::spawn_blocking(check).await;
+                        refusal.unwrap_or(Some(neighbour::Refusal::Unlisted(theirs)))
+                    }
+                    None => None,
+                };
+                let refusal = refusal.map(|refusal| refusal.to_string());
+                let policy = Policy { roles: self.roles.clone(), refusal, ..Policy::default() };
                 let (sender, receiver) = link::split(stream, self.settings());
-                self.greet(sender, receiver, address, policy, Some(place)).await
+                self.greet(sender, receiver, Caller { address, certificate: None }, policy, Some(place)).await
             }
             Some(config) => {
                 let (stream, identity) = tls::accept_any(stream, &config).await?;
                 let (sender, receiver) = link::split(stream, self.settings());
                 let policy = self.policy_for(identity.as_ref());
+                let shown = identity.as_ref().map(ToString::to_string);
+                if let Some(words) = &shown {
+                    certificate.get_or_init(|| words.clone());
+                }
                 if let Some(identity) = identity {
                     tls::watch(
                         &sender,
@@ -157,7 +220,8 @@ impl Acceptor {
                         self.ca_folder.as_ref().map(|(_, revoked)| revoked.clone()),
                     );
                 }
-                self.greet(sender, receiver, address, policy, Some(place)).await
+                self.greet(sender, receiver, Caller { address, certificate: shown }, policy, Some(place))
+                    .await
             }
         }
     }
@@ -170,6 +234,8 @@ impl Acceptor {
             Some(identity) => Policy {
                 roles: self.roles.clone(),
                 certificate: Some(identity.role),
+                // Whoever may be a master may start workers of any name.
+                name: (identity.role == tls::Role::Worker).then(|| identity.name.clone()),
                 refusal: identity.fault(revoked, std::time::SystemTime::now()),
                 ..Policy::default()
             },
@@ -191,16 +257,16 @@ impl Acceptor {
     {
         let (sender, receiver) = link::split(stream, self.settings());
         let policy = Policy { roles: self.roles.clone(), certificate, ..Policy::default() };
-        self.greet(sender, receiver, address, policy, None).await
+        self.greet(sender, receiver, Caller { address, certificate: None }, policy, None).await
     }
 
     async fn greet(
         self: Arc<Self>,
         sender: Sender,
         mut receiver: Receiver,
-        address: String,
+        caller: Caller,
         policy: Policy,
-        place: Option<OwnedSemaphorePermit>,
+        place: Option<Place>,
     ) -> Result<()> {
         let newcomer = policy.roles == [Role::Newcomer];
         let token = self.token.clone().filter(|_| !newcomer);
@@ -209,7 +275,7 @@ impl Acceptor {
         let incarnation = self.incarnations.fetch_add(1, Ordering::Relaxed) + 1;
         if hello.role == Role::Worker {
             drop(place);
-            return self.worker(server, &hello, sender, receiver, address, incarnation).await;
+            return self.worker(server, &hello, sender, receiver, caller, incarnation).await;
         }
         let welcome = Welcome { incarnation, host: 0, heartbeat_ms: self.heartbeat_ms() };
         link::admit(server, &sender, &mut receiver, welcome)?;
@@ -217,12 +283,13 @@ impl Acceptor {
             let (ca_folder, _) =
                 self.ca_folder.as_ref().ok_or_else(|| Error::Message("no lab to join here".into()))?;
             // It keeps its place: nobody knows it yet.
-            let served = newcomer::serve(ca_folder, &hello, &address, &sender, &mut receiver).await;
+            let served = newcomer::serve(ca_folder, &hello, &caller.address, &sender, &mut receiver).await;
             drop(place);
             return served;
         }
         drop(place);
-        match client_requests::serve(&self.notices, &sender, &mut receiver, incarnation).await {
+        let caller = caller.certificate.unwrap_or(caller.address);
+        match client_requests::serve(&self.notices, &sender, &mut receiver, (incarnation, caller)).await {
             // A client may go as it likes.
             Error::Closed | Error::Left { .. } | Error::Io { .. } => Ok(()),
             error => {
@@ -238,7 +305,7 @@ impl Acceptor {
         hello: &Hello,
         sender: Sender,
         mut receiver: Receiver,
-        address: String,
+        Caller { address, certificate }: Caller,
         incarnation: u32,
     ) -> Result<()> {
         let (answer, answered) = oneshot::channel();
@@ -264,6 +331,7 @@ impl Acceptor {
                 let worker_link = WorkerLink {
                     spec: WorkerSpec { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
                     address: address.clone(),
+                    certificate,
                     peer: peer_address(&address, hello.peer_port),
                     incarnation,
                     outbox: Arc::new(Mutex::new(Outbox::new(sender.clone(), 0))),
@@ -378,7 +446,7 @@ async fn hand_on(
 pub async fn listen(listener: TcpListener, acceptor: Arc<Acceptor>) {
     // The rest is for results: callers that only stay may not take the files that a run writes.
     let most = CONNECTIONS.min(files::raise_limit());
-    let places = Arc::new(Semaphore::new(most));
+    let places = Places::new(most);
     loop {
         let (stream, address) = match listener.accept().await {
             Ok(taken) => taken,
@@ -389,17 +457,14 @@ pub async fn listen(listener: TcpListener, acceptor: Arc<Acceptor>) {
                 continue;
             }
         };
-        let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
-            warn!("connection from {address} not taken: {most} stand, at most {most}");
+        let Some(place) = places.take(address.ip()) else {
+            let of_address = places.most_of_an_address();
+            warn!("connection from {address} not taken: at most {most} stand, {of_address} of one address");
             continue;
         };
         let acceptor = Arc::clone(&acceptor);
         tokio::spawn(async move {
-            if let Err(error) = Arc::clone(&acceptor).take(stream, address.to_string()).await
-                && !acceptor.is_ending()
-            {
-                warn!("connection from {address}: {error}");
-            }
+            acceptor.attend(stream, address).await;
             drop(place);
         });
     }

@@ -20,7 +20,7 @@ use crate::{
     interrupt::stop_on_interrupt,
     machine::host_name,
     notice::{Notice, WAITING_NOTICES},
-    scheduler::Scheduler,
+    scheduler::{Scheduler, retention::Limits},
     spool::Spool,
 };
 
@@ -62,13 +62,19 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
             Acceptor::new(notices.clone(), vec![Role::Worker, Role::Client], None, tls)
                 .behind(port)
                 .of(ca_folder)
+                .shared(args.share)
                 .patient_for(dead_after),
         );
         tokio::spawn(listen(listener, Arc::clone(&acceptor)));
         let board = open_page(args, join, &notices).await?;
         let stop = stop_on_interrupt("ending; the job under way is stored for the next master");
         notify::say(&format!("READY=1\nSTATUS=listening on {address}"));
-        Scheduler::new(args.spool.clone(), spool, left, notices, board).run(heard, &stop, &acceptor).await;
+        let limits = Limits {
+            age: args.keep_days.map(|days| Duration::from_secs_f64(days * 86_400.0)),
+            bytes: args.keep_gb.map(|gigabytes| (gigabytes * 1e9) as u64),
+        };
+        let scheduler = Scheduler::new(args.spool.clone(), spool, left, notices, board).keeping(limits);
+        scheduler.run(heard, &stop, &acceptor).await;
         Ok(ExitCode::SUCCESS)
     });
     runtime.shutdown_background();

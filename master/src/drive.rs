@@ -65,6 +65,8 @@ pub struct WorkerLink {
     pub spec: WorkerSpec,
     /// Where it calls from.
     pub address: String,
+    /// The certificate that it showed, in words.
+    pub certificate: Option<String>,
     /// Where it takes other workers, if it does.
     pub peer: Option<SocketAddr>,
     /// Its connection.

@@ -5,9 +5,13 @@
 //! any client does; what runs show while they run stands on the [`board`].
 
 use std::{
-    net::SocketAddr,
+    collections::VecDeque,
+    net::{IpAddr, SocketAddr},
     pin::Pin,
-    sync::Arc,
+    sync::{
+        Arc, Mutex, PoisonError, Weak,
+        atomic::{AtomicBool, Ordering},
+    },
     task::{Context, Poll},
     time::Duration,
 };
@@ -23,7 +27,7 @@ use protocol::tls::{self, ServerConfig};
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
     net::{TcpListener, TcpStream},
-    sync::{OwnedSemaphorePermit, Semaphore, mpsc},
+    sync::{mpsc, oneshot},
     time::Sleep,
 };
 use tokio_rustls::{TlsAcceptor, server::TlsStream};
@@ -40,6 +44,11 @@ pub mod surface;
 use api_state::ApiState;
 use guard::Refusal;
 
+use crate::{
+    notice::Notice,
+    places::{self, Places},
+};
+
 /// Most connections at a time.
 pub const CONNECTIONS: usize = 256;
 /// The longest that a TLS handshake may take.
@@ -51,6 +60,8 @@ const HEADER_BYTES: usize = 16 << 10;
 /// The longest that a deck may be on its way, and that a connection may stand after something was answered; a stream of events says
 /// something every 15 s.
 const IDLE_LIMIT: Duration = Duration::from_secs(60);
+/// The longest that the owner of the queue may take to say that it is well.
+const HEALTH_LIMIT: Duration = Duration::from_secs(2);
 /// What pages may load: their own files and nothing else.
 const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
@@ -120,11 +131,7 @@ async fn check_request(State(api_state): State<ApiState>, request: Request, next
     let guard = &api_state.guard;
     let answer = match guard.names(request.headers()) {
         Err(refusal) => refuse(refusal),
-        Ok(()) if request.uri().path() == "/healthz" => {
-            let ending = api_state.notices.is_closed();
-            if ending { (StatusCode::SERVICE_UNAVAILABLE, "ending\n") } else { (StatusCode::OK, "ok\n") }
-                .into_response()
-        }
+        Ok(()) if request.uri().path() == "/healthz" => health(&api_state).await.into_response(),
         Ok(()) => match (token_in_address(&request), guard.pass(request.headers())) {
             (Some(guess), _) if guard.is_token(&guess) => {
                 // The token leaves the address bar, and the history with it.
@@ -139,6 +146,18 @@ async fn check_request(State(api_state): State<ApiState>, request: Request, next
         },
     };
     with_headers(answer)
+}
+
+/// Asks the owner of the queue, which has to answer in time.
+async fn health(api_state: &ApiState) -> (StatusCode, &'static str) {
+    if api_state.notices.is_closed() {
+        return (StatusCode::SERVICE_UNAVAILABLE, "ending\n");
+    }
+    match tokio::time::timeout(HEALTH_LIMIT, api::ask(api_state, Notice::Alive)).await {
+        Ok(Ok(())) => (StatusCode::OK, "ok\n"),
+        Ok(Err(_)) => (StatusCode::SERVICE_UNAVAILABLE, "ending\n"),
+        Err(_) => (StatusCode::SERVICE_UNAVAILABLE, "the owner of the queue does not answer\n"),
+    }
 }
 
 fn token_in_address(request: &Request) -> Option<String> {
@@ -162,7 +181,8 @@ fn with_headers(mut answer: Response) -> Response {
 
 /// Takes connections; handshakes go on beside each other, so that a silent caller holds up nobody.
 async fn take(place: Place, send: mpsc::Sender<Wire>) {
-    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    let places = Arc::new(Places::new(CONNECTIONS));
+    let mut waiting = Waiting::default();
     loop {
         let (stream, from) = match place.listener.accept().await {
             Ok(taken) => taken,
@@ -172,12 +192,27 @@ async fn take(place: Place, send: mpsc::Sender<Wire>) {
                 continue;
             }
         };
-        // Callers that say nothing give their places back within HEADER_LIMIT; until then this one waits its turn.
-        let Ok(permit) = Arc::clone(&places).acquire_owned().await else { return };
+        let permit = match places.take(from.ip()) {
+            Some(permit) => Some(permit),
+            // Whoever has said nothing for longest makes room for who comes.
+            None if waiting.end_oldest(from.ip(), &places) => None,
+            None => {
+                debug!("the page, {from}: not taken, {CONNECTIONS} are served at most");
+                continue;
+            }
+        };
+        let (caller, ended) = waiting.add(from.ip());
         // What is said at once is not kept waiting for more; without it answers are a little later.
         let _ = stream.set_nodelay(true);
-        let (send, tls) = (send.clone(), place.tls.clone());
+        let (send, tls, places) = (send.clone(), place.tls.clone(), Arc::clone(&places));
         tokio::spawn(async move {
+            let permit = match permit {
+                Some(permit) => permit,
+                None => match tokio::time::timeout(HEADER_LIMIT, places.wait(from.ip())).await {
+                    Ok(Some(permit)) => permit,
+                    _ => return debug!("the page, {from}: no place within {HEADER_LIMIT:?}"),
+                },
+            };
             let stream = match tls {
                 None => Stream::Plain(stream),
                 Some(config) => {
@@ -191,8 +226,47 @@ async fn take(place: Place, send: mpsc::Sender<Wire>) {
             };
             // The server is gone only when the daemon ends.
             let deadline = Box::pin(tokio::time::sleep(HEADER_LIMIT));
-            let _ = send.send(Wire { stream, from, deadline, taken: 0, _place: permit }).await;
+            let _ = send.send(Wire { stream, from, deadline, taken: 0, caller, ended, _place: permit }).await;
         });
+    }
+}
+
+/// A caller that may have to make room for another.
+struct Caller {
+    address: IpAddr,
+    /// It has not said what it asks for.
+    silent: AtomicBool,
+    /// Ends it.
+    end: Mutex<Option<oneshot::Sender<()>>>,
+}
+
+/// Callers by age, the oldest first.
+#[derive(Default)]
+struct Waiting(VecDeque<Weak<Caller>>);
+
+impl Waiting {
+    /// With what tells it to end.
+    fn add(&mut self, address: IpAddr) -> (Arc<Caller>, oneshot::Receiver<()>) {
+        let (end, ended) = oneshot::channel();
+        let caller = Caller { address, silent: AtomicBool::new(true), end: Mutex::new(Some(end)) };
+        let caller = Arc::new(caller);
+        self.0.push_back(Arc::downgrade(&caller));
+        (caller, ended)
+    }
+
+    /// Ends the oldest that is silent, of the same address where that has all its places; gives whether there was one.
+    fn end_oldest(&mut self, address: IpAddr, places: &Places) -> bool {
+        self.0.retain(|caller| caller.strong_count() > 0);
+        let living = self.0.iter().filter_map(Weak::upgrade);
+        let of_address = living.filter(|caller| caller.address == address).count();
+        let same = of_address >= places.most_of_an_address();
+        let found = self.0.iter().position(|caller| {
+            let caller = caller.upgrade();
+            caller.is_some_and(|c| (!same || c.address == address) && c.silent.load(Ordering::Relaxed))
+        });
+        let oldest = found.and_then(|at| self.0.remove(at)).and_then(|caller| caller.upgrade());
+        let end = oldest.and_then(|caller| caller.end.lock().unwrap_or_else(PoisonError::into_inner).take());
+        end.is_some_and(|end| end.send(()).is_ok())
     }
 }
 
@@ -229,7 +303,10 @@ struct Wire {
     deadline: Pin<Box<Sleep>>,
     /// Bytes read since something was answered.
     taken: usize,
-    _place: OwnedSemaphorePermit,
+    caller: Arc<Caller>,
+    /// Another one needs its place.
+    ended: oneshot::Receiver<()>,
+    _place: places::Place,
 }
 
 impl Wire {
@@ -252,6 +329,9 @@ impl AsyncRead for Wire {
         if self.deadline.as_mut().poll(cx).is_ready() {
             return Poll::Ready(Err(std::io::ErrorKind::TimedOut.into()));
         }
+        if Pin::new(&mut self.ended).poll(cx).is_ready() {
+            return Poll::Ready(Err(std::io::ErrorKind::ConnectionAborted.into()));
+        }
         let before = into.filled().len();
         let read = match &mut self.stream {
             Stream::Plain(stream) => Pin::new(stream).poll_read(cx, into),
@@ -260,6 +340,7 @@ impl AsyncRead for Wire {
         let only_headers = self.taken <= HEADER_BYTES;
         self.taken += into.filled().len() - before;
         if only_headers && self.taken > HEADER_BYTES {
+            self.caller.silent.store(false, Ordering::Relaxed);
             self.grant(IDLE_LIMIT);
         }
         read
@@ -273,6 +354,7 @@ impl AsyncWrite for Wire {
         bytes: &[u8],
     ) -> Poll<std::io::Result<usize>> {
         self.taken = 0;
+        self.caller.silent.store(false, Ordering::Relaxed);
         self.grant(IDLE_LIMIT);
         match &mut self.stream {
             Stream::Plain(stream) => Pin::new(stream).poll_write(cx, bytes),

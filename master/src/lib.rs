@@ -1,9 +1,9 @@
 //! The master: owns the problem, decides, adds partial forces, writes results.
 //!
 //! [`job`] is the pure session of one run; a [`world`] has it and the sessions of its workers in one process, in which
-//! [`embedded`] runs them, and [`drive`] has workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`] and hears [`notice`]s: each
-//! [`connection`] is one task that carries messages, the [`client_requests`] answers clients, [`service`] runs one job of the queue. [`client`] is the other end of the client requests;
-//! [`ca_folder`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`processes`] starts workers as
+//! [`embedded`] runs them, and [`drive`] has workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`], asks [`footprint`] for the memory of a job, and hears [`notice`]s: each
+//! [`connection`] is one task that carries messages, which waits for one of the [`places`], the [`client_requests`] answers clients, the [`desk`] reads their decks, [`service`] runs one job of the queue. [`client`] is the other end of the client requests;
+//! [`ca_folder`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`neighbour`] whose process calls on loopback; [`processes`] starts workers as
 //! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster. [`program`] is the command line.
 
 pub mod add;
@@ -19,12 +19,14 @@ pub mod convert;
 pub mod daemon;
 pub mod deck_file;
 pub mod decompose;
+pub mod desk;
 pub mod drive;
 pub mod embedded;
 pub mod erosion;
 pub mod event;
 pub mod exchange;
 pub mod files;
+pub mod footprint;
 pub mod hosts;
 pub mod http;
 pub mod incident;
@@ -32,6 +34,7 @@ pub mod interrupt;
 pub mod job;
 pub mod machine;
 pub mod memory;
+pub mod neighbour;
 pub mod newcomer;
 pub mod node_owners;
 pub mod notice;
@@ -40,6 +43,7 @@ pub mod output;
 pub mod pace;
 pub mod peers;
 pub mod picture;
+pub mod places;
 pub mod processes;
 pub mod program;
 pub mod queue;

@@ -4,13 +4,13 @@
 //! made by itself and never travels: what it sends is a request to have the key signed. It then dials anew as what the
 //! certificate says.
 
-use std::{net::SocketAddr, path::Path};
+use std::{io::Read, net::SocketAddr, path::Path};
 
 use protocol::{
     Error, Result, codec,
     dial::{self, leave},
     frame::{Frame, Header, Kind},
-    handshake::{Hello, Role},
+    handshake::{Hello, Role, TOKEN_LIMIT},
     link::{Receiver, Sender},
     request::{JOINING_LIMIT, Joined, Joining},
     tls,
@@ -19,6 +19,9 @@ use protocol::{
 use tracing::info;
 
 use crate::{ca_folder::CaFolder, certs};
+
+/// The environment variable that may hold a worker's token.
+pub const TOKEN: &str = "BOLIDE_JOIN";
 
 /// Master's side, after Welcome: takes the request, exchanges the token, ends the connection.
 pub(crate) async fn serve(
@@ -86,6 +89,27 @@ pub fn join(master: &str, token: &str, name: &str, folder: &Path) -> std::result
     let joined = runtime.block_on(exchange(master, &token, name, request)).map_err(|e| e.to_string())?;
     certs::install(folder, &key, &joined.certificate, &joined.ca).map_err(|e| e.to_string())?;
     Ok(())
+}
+
+/// The token that a user gave: itself, `@FILE`, or `-` for standard input.
+///
+/// # Errors
+/// What the file says no to, as a sentence.
+pub fn token(given: &str) -> std::result::Result<String, String> {
+    let fault = |e: std::io::Error| format!("the token {given}: {e}");
+    let bytes = match given.strip_prefix('@') {
+        Some(path) => read_some(std::fs::File::open(path).map_err(fault)?),
+        None if given == "-" => read_some(std::io::stdin()),
+        None => return Ok(given.to_owned()),
+    };
+    Ok(String::from_utf8_lossy(&bytes.map_err(fault)?).trim().to_owned())
+}
+
+/// As much as a token has at most.
+fn read_some(from: impl Read) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    from.take(TOKEN_LIMIT as u64 + 2).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 async fn exchange(master: &str, token: &Token, name: &str, request: Vec<u8>) -> Result<Joined> {

@@ -50,11 +50,15 @@ pub enum Notice {
         name: String,
         title: String,
         text: String,
+        /// What its mesh has.
+        elements: u64,
         /// What is asked beside the deck.
         options: JobOptions,
         /// The job's number, or why it is refused.
         answer: oneshot::Sender<Result<u32, String>>,
     },
+    /// Somebody asks whether the owner of the queue still hears.
+    Alive(oneshot::Sender<()>),
     /// A client asks for all jobs.
     Jobs(oneshot::Sender<Vec<Status>>),
     /// A client asks for all hosts.
@@ -65,6 +69,8 @@ pub enum Notice {
     Cancel(u32, oneshot::Sender<Result<String, String>>),
     /// A client wants a job that failed to go on.
     Resume(u32, oneshot::Sender<Result<String, String>>),
+    /// A client removes a job that is over.
+    Remove(u32, oneshot::Sender<Result<String, String>>),
     /// A client asks where a job's results are.
     Folder(u32, oneshot::Sender<Result<PathBuf, String>>),
     /// A job's thread is done.

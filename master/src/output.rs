@@ -16,8 +16,11 @@ use crate::{
         vtu::Series,
         writer::Writer,
     },
-    snapshot::{self, keeper::Keeper},
+    snapshot::{self, Snapshot, keeper::Keeper},
 };
+
+/// Cycle and time of states that an earlier session wrote, and the checksums of their files.
+pub type WrittenStates = (Vec<(u64, f64)>, Vec<[u8; 32]>);
 
 /// Writes rows and states, shows progress.
 pub struct Output {
@@ -37,6 +40,8 @@ pub struct Output {
     row_ends: Vec<u64>,
     /// Cycle and time of each state written.
     states: Vec<(u64, f64)>,
+    /// BLAKE3 of the files of the first of them.
+    sums: Vec<[u8; 32]>,
 }
 
 impl Output {
@@ -64,6 +69,7 @@ impl Output {
             history,
             row_ends,
             states: Vec::new(),
+            sums: Vec::new(),
             writer,
             owners: None,
             bar,
@@ -73,11 +79,12 @@ impl Output {
     }
 
     /// Writes what belongs before the first cycle of a session: the rows so far, and the first state. `states` are those
-    /// that an earlier session wrote into this very folder before the snapshot that is gone on with; later ones go.
+    /// that an earlier session wrote into this very folder before the snapshot that is gone on with, with the checksums of their files; later
+    /// ones go.
     ///
     /// # Errors
     /// What the disk refused.
-    pub fn go_on(&mut self, job: &Job, states: Option<Vec<(u64, f64)>>) -> Result<(), String> {
+    pub fn go_on(&mut self, job: &Job, states: Option<WrittenStates>) -> Result<(), String> {
         for row in job.rows_before() {
             self.row(row)?;
         }
@@ -90,11 +97,11 @@ impl Output {
             writer.with(on).map_err(|e| e.to_string())?;
         }
         self.owners = job.owners();
-        let Some(states) = states else { return self.state(Box::new(job.start_state().clone())) };
+        let Some((states, sums)) = states else { return self.state(Box::new(job.start_state().clone())) };
         if let Some(folder) = &self.folder {
             folder.keep_states(states.len()).map_err(|e| e.to_string())?;
         }
-        self.states = states;
+        (self.states, self.sums) = (states, sums);
         self.roll_back()
     }
 
@@ -132,6 +139,7 @@ impl Output {
             history.roll_back(end).map_err(fault)?;
         }
         self.states.retain(|(written, _)| *written <= cycle);
+        self.sums.truncate(self.states.len());
         self.roll_back()
     }
 
@@ -148,6 +156,22 @@ impl Output {
             writer.put(state, self.owners.clone()).map_err(|e| e.to_string())?;
         }
         self.states.push(moment);
+        Ok(())
+    }
+
+    /// Names the states so far in a snapshot, which counts on them: they are on disk after this.
+    fn name_states(&mut self, snapshot: &mut Snapshot) -> Result<(), String> {
+        self.flush()?;
+        let cycle = snapshot.state.cycle;
+        let count = self.states.iter().take_while(|(written, _)| *written <= cycle).count();
+        if let Some(folder) = &self.folder {
+            for index in self.sums.len()..count {
+                // A file that was taken away is missed by whoever goes on.
+                self.sums.push(folder.sum_of_state(index as u32).unwrap_or_default());
+            }
+            snapshot.sums = self.sums[..count].to_vec();
+        }
+        snapshot.states = self.states[..count].to_vec();
         Ok(())
     }
 
@@ -205,25 +229,20 @@ impl Sink for Output {
         match action {
             Action::Row(row) => self.row(&row),
             Action::State(state) => self.state(state),
-            Action::Snapshot(stored) => match &self.folder {
-                Some(folder) => {
-                    self.flush()?;
-                    let mut stored = stored;
-                    let cycle = stored.state.cycle;
-                    stored.states.extend(self.states.iter().filter(|(written, _)| *written <= cycle));
-                    snapshot::write(&folder.file("snapshot.bolide"), &stored).map(|_| ())
+            Action::Snapshot(mut stored) => {
+                self.name_states(&mut stored)?;
+                match &self.folder {
+                    Some(folder) => snapshot::write(&folder.file("snapshot.bolide"), &stored).map(|_| ()),
+                    None => Err("a snapshot needs a results folder; leave out --no-output".to_owned()),
                 }
-                None => Err("a snapshot needs a results folder; leave out --no-output".to_owned()),
-            },
+            }
             Action::Checkpoint { mut snapshot, last } => {
                 let cycle = snapshot.state.cycle;
                 if self.keeper.as_ref().is_some_and(|keeper| last || keeper.is_due(cycle)) {
-                    // A snapshot counts on the states that it names.
-                    self.flush()?;
-                }
-                if let Some(keeper) = self.keeper.as_mut().filter(|keeper| last || keeper.is_due(cycle)) {
-                    snapshot.states.extend(self.states.iter().filter(|(written, _)| *written <= cycle));
-                    keeper.put(snapshot);
+                    self.name_states(&mut snapshot)?;
+                    if let Some(keeper) = &mut self.keeper {
+                        keeper.put(snapshot);
+                    }
                 }
                 Ok(())
             }

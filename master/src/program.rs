@@ -49,6 +49,7 @@ pub fn main(compute: Compute) -> ExitCode {
         Command::Hosts { at } => client::hosts(&at),
         Command::Cancel { job, at } => client::cancel(job, &at),
         Command::Resume { job, at } => client::resume(job, &at),
+        Command::Rm { job, at } => client::remove(job, &at),
         Command::Results { job, out, force, at } => client::results(job, out, force, &at),
         Command::Bench { what: Some(Bench::Messages(args)), .. } => bench::messages::run(&args),
         Command::Bench { what: None, grind } => bench::grind::run(&grind),
@@ -76,11 +77,12 @@ pub fn main(compute: Compute) -> ExitCode {
 }
 
 fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
-    if let (Some(token), Some(folder)) = (&args.join, &args.certs)
+    let join = args.join.clone().or_else(|| std::env::var(newcomer::TOKEN).ok());
+    if let (Some(token), Some(folder)) = (&join, &args.certs)
         && !tls::Paths::in_folder(folder).certificate.exists()
     {
         let name = args.name.clone().unwrap_or_else(machine::host_name);
-        newcomer::join(&args.master, token, &name, folder)?;
+        newcomer::join(&args.master, &newcomer::token(token)?, &name, folder)?;
     }
     if let Some(pin) = &args.pin {
         pin.apply()?;
@@ -96,7 +98,10 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
     };
     let options = worker::daemon::Options {
         master: args.master,
-        name: args.name.unwrap_or_else(|| format!("{}-{}", machine::host_name(), std::process::id())),
+        name: match args.name {
+            Some(name) => name,
+            None => name_of(args.certs.as_deref())?,
+        },
         speed,
         threads: args.threads.unwrap_or(cores),
         certs: args.certs,
@@ -114,6 +119,15 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
     worker::daemon::run(&options).map(|()| ExitCode::SUCCESS)
 }
 
+/// The name of a worker that was given none: its host's, as its certificate says where it has one, and the process.
+fn name_of(certs: Option<&Path>) -> Result<String, String> {
+    let process = std::process::id();
+    let Some(folder) = certs else { return Ok(format!("{}-{process}", machine::host_name())) };
+    let path = tls::Paths::in_folder(folder).certificate;
+    let identity = tls::identity_of_file(&path).map_err(|e| e.to_string())?;
+    Ok(format!("{}@{process}", identity.name))
+}
+
 fn make_certificates(what: Certs) -> Result<ExitCode, String> {
     match what {
         Certs::Ca { folder, force } => {
@@ -129,7 +143,12 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
             println!("{}", daemon::line_to_paste(&master, &token.map_err(|e| e.to_string())?, role.role()));
         }
         Certs::Join { master, token, folder, name } => {
-            newcomer::join(&master, &token, &name.unwrap_or_else(machine::host_name), &folder)?;
+            newcomer::join(
+                &master,
+                &newcomer::token(&token)?,
+                &name.unwrap_or_else(machine::host_name),
+                &folder,
+            )?;
             println!("made {}", tls::Paths::in_folder(&folder).certificate.display());
         }
         Certs::Revoke { folder, name } => {

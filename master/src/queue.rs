@@ -12,6 +12,26 @@ pub const QUEUED_LIMIT: usize = 1000;
 /// Most jobs that are remembered after their end.
 pub const ENDED_LIMIT: usize = 1000;
 
+/// Why a job is not removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Error {
+    /// There is none of this number.
+    Unknown(u32),
+    /// It waits or runs.
+    NotOver(u32, State),
+}
+
+impl std::fmt::Display for Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Unknown(job) => write!(f, "no job {job}"),
+            Self::NotOver(job, state) => {
+                write!(f, "job {job} is {}; `bolide cancel {job}` it first", state.name())
+            }
+        }
+    }
+}
+
 /// What happens to a job in the queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
@@ -99,6 +119,8 @@ pub struct Entry {
     pub starts: Starts,
     /// A user has taken it back, which it has still to come to.
     pub cancelled: bool,
+    /// Of its mesh; 0 where an earlier release queued it.
+    pub elements: u64,
 }
 
 /// All jobs, by number.
@@ -155,6 +177,23 @@ impl Queue {
         }
     }
 
+    /// Forgets a job that is over.
+    ///
+    /// # Errors
+    /// If there is none of this number, or it is not over.
+    pub fn remove(&mut self, id: u32) -> Result<Entry, Error> {
+        let state = self.jobs.get(&id).ok_or(Error::Unknown(id))?.state;
+        if !is_over(state) {
+            return Err(Error::NotOver(id, state));
+        }
+        self.jobs.remove(&id).ok_or(Error::Unknown(id))
+    }
+
+    /// The jobs that are over.
+    pub fn over(&self) -> impl Iterator<Item = &Entry> {
+        self.jobs.values().filter(|job| is_over(job.state))
+    }
+
     /// A user takes back a job under way.
     pub fn set_cancelled(&mut self, id: u32, cancelled: bool) {
         if let Some(job) = self.jobs.get_mut(&id) {
@@ -169,7 +208,7 @@ impl Queue {
     pub fn add(
         &mut self,
         name: String,
-        text: String,
+        (text, elements): (String, u64),
         options: JobOptions,
         spool: &std::path::Path,
     ) -> Result<u32, String> {
@@ -183,15 +222,18 @@ impl Queue {
         let text = Arc::new(text);
         let deck_sum = sum_of(&text);
         let (state, before, starts, cancelled) = (State::Queued, None, Starts::default(), false);
-        let entry = Entry { id, name, text, options, state, folder, before, deck_sum, starts, cancelled };
+        let entry =
+            Entry { id, name, text, options, state, folder, before, deck_sum, starts, cancelled, elements };
         self.jobs.insert(id, entry);
         Ok(id)
     }
 
-    /// The job that is to start next: one that was interrupted, else of the highest priority the first come.
-    pub fn first(&self) -> Option<&Entry> {
-        let waiting = self.jobs.values().filter(|job| job.state == State::Queued);
-        waiting.min_by_key(|job| (job.before.is_none(), Reverse(job.options.priority), job.id))
+    /// The jobs that wait, in the order in which they are to start: those that were interrupted, then by priority, the first come
+    /// first.
+    pub fn waiting(&self) -> Vec<&Entry> {
+        let mut waiting: Vec<&Entry> = self.jobs.values().filter(|job| job.state == State::Queued).collect();
+        waiting.sort_by_key(|job| (job.before.is_none(), Reverse(job.options.priority), job.id));
+        waiting
     }
 
     /// A job.
@@ -290,17 +332,17 @@ mod tests {
     }
 
     fn add(queue: &mut Queue) -> Result<u32, String> {
-        queue.add("d".into(), "text".into(), JobOptions::default(), "spool".as_ref())
+        queue.add("d".into(), ("text".into(), 1), JobOptions::default(), "spool".as_ref())
     }
 
     #[test]
     fn the_first_come_is_the_first_served() {
         let mut queue = Queue::new(5);
         assert_eq!((add(&mut queue), add(&mut queue), add(&mut queue)), (Ok(5), Ok(6), Ok(7)));
-        assert_eq!(queue.first().map(|job| job.id), Some(5));
+        assert_eq!(queue.waiting().first().map(|job| job.id), Some(5));
         assert_eq!(queue.apply(6, Change::Cancel), Ok((State::Cancelled, vec![])));
         assert_eq!(queue.apply(5, Change::Start), Ok((State::Running, vec![])));
-        assert_eq!(queue.first().map(|job| job.id), Some(7));
+        assert_eq!(queue.waiting().first().map(|job| job.id), Some(7));
         assert_eq!(queue.apply(5, Change::Fail), Ok((State::Failed, vec![])));
         assert_eq!(queue.get(5).map(|job| job.text.as_str()), Some(""), "the deck is not kept");
         assert_eq!(queue.apply(9, Change::Start), Err("no job 9".to_owned()));
@@ -311,13 +353,13 @@ mod tests {
         let mut queue = Queue::new(1);
         for priority in [0, 2, 2, -1, 0] {
             let options = JobOptions { priority, ..JobOptions::default() };
-            queue.add("d".into(), "text".into(), options, "spool".as_ref()).expect("room");
+            queue.add("d".into(), ("text".into(), 1), options, "spool".as_ref()).expect("room");
         }
         let interrupted =
             Entry { id: 9, before: Some(vec!["a".into()]), ..queue.get(4).expect("added").clone() };
         queue.restore(interrupted);
         let mut order = Vec::new();
-        while let Some(next) = queue.first().map(|job| job.id) {
+        while let Some(next) = queue.waiting().first().map(|job| job.id) {
             order.push(next);
             queue.apply(next, Change::Start).expect("it waits");
         }

@@ -39,6 +39,8 @@ pub const TRACE: &str = "trace.json";
 pub use deck::model::FIELD_NAMES;
 pub use summary::Summary;
 
+use crate::snapshot::{Snapshot, file::sync_folder};
+
 /// Why results could not be written or read.
 #[derive(Debug)]
 pub enum Error {
@@ -52,6 +54,8 @@ pub enum Error {
         /// The system's reason.
         source: io::Error,
     },
+    /// A file is not what was written.
+    Damaged { path: PathBuf },
     /// A file is not what a run writes.
     Malformed {
         path: PathBuf,
@@ -83,6 +87,9 @@ impl fmt::Display for Error {
                     }
                     _ => Ok(()),
                 }
+            }
+            Self::Damaged { path } => {
+                write!(f, "{}: damaged: its bytes do not match their checksum", path.display())
             }
             Self::Malformed { path, line, what } => write!(f, "{}, line {line}: {what}", path.display()),
             Self::UnknownField { name } => {
@@ -145,6 +152,14 @@ impl Folder {
         Ok(Self { path: path.to_owned() })
     }
 
+    /// BLAKE3 of the files of a state.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn sum_of_state(&self, index: u32) -> Result<[u8; 32], Error> {
+        sum_of_state(&self.path, index)
+    }
+
     /// Removes the files of all states but the first so many, of which one that is missing is an error.
     ///
     /// # Errors
@@ -175,6 +190,36 @@ impl Folder {
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
+}
+
+/// Looks whether the states in a folder are those that a snapshot counts on.
+///
+/// # Errors
+/// [`Error::Damaged`] or [`Error::Io`] of the first that is not.
+pub fn check_states(folder: &Path, snapshot: &Snapshot) -> Result<(), Error> {
+    for (index, stated) in snapshot.sums.iter().enumerate() {
+        let computed = sum_of_state(folder, index as u32)?;
+        if computed != *stated {
+            return Err(Error::Damaged { path: folder.join(state_name(index as u32)) });
+        }
+    }
+    Ok(())
+}
+
+fn sum_of_state(folder: &Path, index: u32) -> Result<[u8; 32], Error> {
+    let mut hasher = blake3::Hasher::new();
+    let state = folder.join(state_name(index));
+    let mut add = |path: &Path| {
+        let mut file = File::open(path).map_err(Error::io("read", path))?;
+        io::copy(&mut file, &mut hasher).map_err(Error::io("read", path)).map(|_| ())
+    };
+    add(&state)?;
+    match add(&folder.join(contact_name(index))) {
+        // Decks that do not ask for it have none.
+        Err(Error::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {}
+        other => other?,
+    }
+    Ok(*hasher.finalize().as_bytes())
 }
 
 /// Name of the file of state `index`; 16 to 20 bytes long.
@@ -233,7 +278,10 @@ pub fn write_whole(
     // Network file systems report a full disk only when the data is synchronised.
     let written = content(&mut out).and_then(|()| out.flush()).and_then(|()| out.get_ref().sync_data());
     let result = match written {
-        Ok(()) => fs::rename(&temporary, path).map_err(Error::io("rename", path)),
+        Ok(()) => {
+            let renamed = fs::rename(&temporary, path).map_err(Error::io("rename", path));
+            renamed.and_then(|()| sync_folder(path).map_err(Error::io("write", path)))
+        }
         Err(source) => {
             // What could not be written must not be written again when the buffer is dropped.
             drop(out.into_parts());

@@ -1,6 +1,7 @@
 //! `bolide run`: one deck, here, to its summary.
 
 use std::{
+    cell::Cell,
     path::{Path, PathBuf},
     process::ExitCode,
     sync::Arc,
@@ -20,7 +21,7 @@ use crate::{
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     processes::Processes,
-    results::{Folder, report, trace},
+    results::{self, Folder, report, trace},
     shell::quoted,
     snapshot::{
         self, Snapshot,
@@ -58,13 +59,14 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         .enumerate()
         .map(|(i, speed)| WorkerSpec { name: format!("worker-{i}"), speed, threads: threads as u32 })
         .collect();
-    let resume = args.resume.as_deref().map(resumed_from).transpose()?;
     let path = (!asked.no_output).then(|| folder_for(args));
     // A run that resumes from its own folder goes on writing there.
-    let in_place = path.is_some() && args.resume.is_some() && args.resume == path;
+    let own = path.is_some() && args.resume.is_some() && args.resume == path;
+    let resume = args.resume.as_deref().map(|path| resumed_from(path, own)).transpose()?.flatten();
+    let in_place = own && resume.is_some();
     let folder = path.as_deref().map(|path| match in_place {
         true => Folder::reopen(path),
-        false => Folder::create(path, args.force),
+        false => Folder::create(path, args.force || own),
     });
     let folder = folder.transpose().map_err(|e| e.to_string())?;
     let interval = interval_for(asked, &model, None);
@@ -78,7 +80,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         store: folder.is_some(),
         ..SessionOptions::of(asked, n, true)
     };
-    let states = resume.as_ref().filter(|_| in_place).map(|snapshot| snapshot.states.clone());
+    let states =
+        resume.as_ref().filter(|_| in_place).map(|snapshot| (snapshot.states.clone(), snapshot.sums.clone()));
     // Without contact the surface is found for its census alone, before there are states beside it.
     let bare = model.setup.contact.is_none().then(|| SurfaceCensus::without_contact(&model));
     let (mut job, first) = Job::new(Arc::clone(&model), &specs, options, resume)?;
@@ -121,21 +124,33 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     conclude(&model, &census, &outcome, traffic, total_threads, wall, &output, args.json)
 }
 
-/// The snapshot in a file, or the newest whole one of a results folder; what is wrong with newer ones is a warning.
-fn resumed_from(path: &Path) -> Result<Snapshot, String> {
+/// The snapshot in a file, or the newest whole one of a results folder; what is wrong with newer ones is a warning. One that goes on
+/// where its results are (`own`) counts on its states: where those are damaged whichever snapshot is used, the run begins anew.
+fn resumed_from(path: &Path, own: bool) -> Result<Option<Snapshot>, String> {
     if !path.is_dir() {
-        return snapshot::read(path);
+        return snapshot::read(path).map(Some);
     }
     let folder = path.join(store::FOLDER);
-    let (_, found) = Store::open(&folder)?;
+    let whole = Cell::new(false);
+    let check = |snapshot: &Snapshot| {
+        whole.set(true);
+        if own { results::check_states(path, snapshot) } else { Ok(()) }
+    };
+    let (_, found) = Store::open_for(&folder, check)?;
     for why in &found.warnings {
         warn!("{why}");
     }
-    let snapshot = found.snapshot.ok_or_else(|| {
-        format!("no whole snapshot in {}; start the run anew, with --force", folder.display())
-    })?;
-    info!("going on at cycle {}", snapshot.state.cycle);
-    Ok(snapshot)
+    match found.snapshot {
+        Some(snapshot) => {
+            info!("going on at cycle {}", snapshot.state.cycle);
+            Ok(Some(snapshot))
+        }
+        None if whole.get() => {
+            info!("going on at cycle 0");
+            Ok(None)
+        }
+        None => Err(format!("no whole snapshot in {}; start the run anew, with --force", folder.display())),
+    }
 }
 
 /// After an interrupt: the command that goes on.

@@ -25,18 +25,19 @@ use worker::notify;
 use crate::{
     connection::Acceptor,
     drive::{self, Input, WorkerLink},
+    footprint,
     hosts::Hosts,
     http::board::Board,
     notice::Notice,
     queue::{self, Change, Entry, Queue, Starts, is_over},
+    scheduler::retention::Limits,
     service::{self, Order},
     snapshot::store,
     spool::{Left, Record, Spool},
 };
 
 mod allotment;
-
-use allotment::Allotment;
+pub mod retention;
 
 /// The longest that an ending master waits until the jobs under way are stored.
 const END_LIMIT: Duration = Duration::from_secs(60);
@@ -64,6 +65,10 @@ pub struct Scheduler {
     board: Option<Arc<Board>>,
     /// Set while this host is short of what a job needs.
     pause: Option<Pause>,
+    /// What is kept of jobs that are over.
+    limits: Limits,
+    /// When that was looked at last.
+    looked: Option<Instant>,
 }
 
 /// The queue waits: this host has no room, files or memory left. The job that met it is tried again and goes on where it was stored.
@@ -115,6 +120,8 @@ impl Scheduler {
             running: BTreeMap::new(),
             board,
             pause: None,
+            limits: Limits::default(),
+            looked: None,
         };
         for why in &left.warnings {
             warn!("{why}");
@@ -125,10 +132,17 @@ impl Scheduler {
         owner
     }
 
+    /// Keeps no more than this of jobs that are over.
+    #[must_use]
+    pub fn keeping(mut self, limits: Limits) -> Self {
+        self.limits = limits;
+        self
+    }
+
     /// A job of an earlier master; one that was under way goes on.
     fn restore(&mut self, record: Record, text: String) {
         let Record { job, name, title, state, options, at_work, cycle, time, ended, .. } = record.clone();
-        let Record { deck_sum, starts, cancelled, .. } = record;
+        let Record { deck_sum, starts, cancelled, elements, .. } = record;
         let interrupted = state == State::Running;
         let state = if interrupted { State::Queued } else { state };
         if !is_over(state) {
@@ -141,8 +155,19 @@ impl Scheduler {
         let folder = (!options.no_output).then(|| self.spool.results(job));
         let before = interrupted.then_some(at_work);
         let text = Arc::new(text);
-        let entry =
-            Entry { id: job, name, text, options, state, folder, before, deck_sum, starts, cancelled };
+        let entry = Entry {
+            id: job,
+            name,
+            text,
+            options,
+            state,
+            folder,
+            before,
+            deck_sum,
+            starts,
+            cancelled,
+            elements,
+        };
         self.queue.restore(entry);
         let verdict = if interrupted && cancelled {
             Some((Change::Cancel, Ended::default()))
@@ -181,6 +206,7 @@ impl Scheduler {
                 deck_sum: entry.deck_sum.clone(),
                 starts: entry.starts,
                 cancelled: entry.cancelled,
+                elements: entry.elements,
             }
         };
         // A few kilobytes; the job's own thread does not wait for it.
@@ -200,7 +226,10 @@ impl Scheduler {
                 },
                 // An interrupted job waits for its workers for a while.
                 _ = look.tick() => self.start_next(),
-                _ = wake.tick() => self.wake(),
+                _ = wake.tick() => {
+                    self.wake();
+                    self.remove_expired();
+                }
             }
             // Here, so that a manager sees a scheduler that is stuck.
             if alive.is_some_and(|interval| said.elapsed() >= interval) {
@@ -268,8 +297,15 @@ impl Scheduler {
                 let _ = answer.send(self.admit(&hello, &address, incarnation));
             }
             Notice::Joined(worker_link) => {
-                let WorkerLink { spec, address, .. } = &worker_link;
-                info!(address, speed = spec.speed, threads = spec.threads, "worker {} joined", spec.name);
+                let WorkerLink { spec, address, certificate, .. } = &worker_link;
+                info!(
+                    address,
+                    certificate,
+                    speed = spec.speed,
+                    threads = spec.threads,
+                    "worker {} joined",
+                    spec.name
+                );
                 self.offer(&worker_link);
                 self.worker_links.insert(worker_link.incarnation, worker_link);
             }
@@ -281,8 +317,11 @@ impl Scheduler {
                 }
             }
             Notice::Suspect { incarnation, note } => self.hosts.suspect(incarnation, note),
-            Notice::Submit { name, title, text, options, answer } => {
-                let _ = answer.send(self.submit(name, title, text, options));
+            Notice::Submit { name, title, text, elements, options, answer } => {
+                let _ = answer.send(self.submit(name, title, (text, elements), options));
+            }
+            Notice::Alive(answer) => {
+                let _ = answer.send(());
             }
             Notice::Jobs(answer) => {
                 let _ = answer.send(self.status.values().map(|s| s.borrow().clone()).collect());
@@ -298,6 +337,10 @@ impl Scheduler {
             }
             Notice::Resume(job, answer) => {
                 let _ = answer.send(self.resume(job));
+            }
+            Notice::Remove(job, answer) => {
+                let removed = self.remove(job).map(|()| format!("job {job} is removed"));
+                let _ = answer.send(removed.map_err(|error| error.to_string()));
             }
             Notice::Folder(job, answer) => {
                 let _ = answer.send(self.folder(job));
@@ -346,10 +389,10 @@ impl Scheduler {
         &mut self,
         name: String,
         title: String,
-        text: String,
+        (text, elements): (String, u64),
         options: JobOptions,
     ) -> Result<u32, String> {
-        let job = self.queue.add(name.clone(), text, options.clone(), &self.folder)?;
+        let job = self.queue.add(name.clone(), (text, elements), options.clone(), &self.folder)?;
         let record = Record {
             job,
             name,
@@ -363,6 +406,7 @@ impl Scheduler {
             deck_sum: self.queue.get(job).map(|entry| entry.deck_sum.clone()).unwrap_or_default(),
             starts: Starts::default(),
             cancelled: false,
+            elements,
         };
         let text = self.queue.get(job).map(|entry| Arc::clone(&entry.text)).unwrap_or_default();
         // Who is told that the job is queued finds it in the queue of the next master as well.
@@ -437,22 +481,28 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Starts the first job in the queue, if it may start on the workers that are idle.
+    /// Starts the first of the waiting jobs that may start on the workers that are idle, and says what each of the others waits for.
     fn start_next(&mut self) {
-        let Some(entry) = self.queue.first() else { return };
+        let waiting = self.queue.waiting();
+        if waiting.is_empty() {
+            return;
+        }
         if let Some(pause) = self.pause.as_ref().filter(|pause| Instant::now() < pause.until) {
-            return self.wait_for(entry.id, format!("{}; tried again within {} s", pause.why, pause.seconds));
+            let what = format!("{}; tried again within {} s", pause.why, pause.seconds);
+            return waiting.iter().for_each(|entry| self.wait_for(entry.id, what.clone()));
         }
         let idle: Vec<&WorkerLink> =
             self.hosts.idle().filter_map(|host| self.worker_links.get(&host.incarnation)).collect();
         let names: Vec<&str> = idle.iter().map(|worker_link| worker_link.spec.name.as_str()).collect();
         let running: Vec<u32> = self.running.keys().copied().collect();
-        match allotment::of(entry, &running, &names, self.started.elapsed()) {
-            Allotment::Wait(what) => self.wait_for(entry.id, what),
-            Allotment::Start => {
-                let (job, worker_links) = (entry.id, idle.into_iter().cloned().collect());
-                self.start(job, worker_links);
-            }
+        let available = footprint::available();
+        let allotments = allotment::among(&waiting, &running, &names, self.started.elapsed(), available);
+        for (job, what) in allotments.waits {
+            self.wait_for(job, what);
+        }
+        if let Some(job) = allotments.starts {
+            let worker_links = idle.into_iter().cloned().collect();
+            self.start(job, worker_links);
         }
     }
 

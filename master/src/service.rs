@@ -29,8 +29,8 @@ use crate::{
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
     queue::Change,
-    results::{Folder, TRACE, report, trace},
-    snapshot::{keeper::Keeper, store::Store},
+    results::{self, Folder, TRACE, report, trace},
+    snapshot::{Snapshot, keeper::Keeper, store::Store},
     summarise::{SurfaceCensus, summarise},
 };
 
@@ -158,11 +158,15 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
         let reason = format!("{} is a link; results stay in the spool folder, remove it", path.display());
         return Err(Failure::Job(reason));
     }
-    let (store, found) = Store::open(&order.snapshots)?;
+    let check = |snapshot: &Snapshot| match &order.folder {
+        Some(folder) => results::check_states(folder, snapshot),
+        None => Ok(()),
+    };
+    let (store, found) = Store::open_for(&order.snapshots, check)?;
     for why in &found.warnings {
         warn!(job = order.number, "{why}");
     }
-    let states = found.snapshot.as_ref().map(|snapshot| snapshot.states.clone());
+    let states = found.snapshot.as_ref().map(|snapshot| (snapshot.states.clone(), snapshot.sums.clone()));
     let (job, first) = Job::new(Arc::clone(&model), &specs, options, found.snapshot)
         .map_err(|e| Failure::Job(e.to_string()))?;
     if order.at_work_before.is_some() {

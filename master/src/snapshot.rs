@@ -40,4 +40,6 @@ pub struct Snapshot {
     pub rows: Vec<Arc<HistoryRow>>,
     /// Cycle and time of each state file so far; filled in by whoever writes those.
     pub states: Vec<(u64, f64)>,
+    /// BLAKE3 of the files of each of them, so that a session which goes on finds out what was damaged or is missing.
+    pub sums: Vec<[u8; 32]>,
 }

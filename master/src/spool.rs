@@ -1,19 +1,19 @@
 //! SPOOL: the master's jobs on disk, so that a restarted master has them all.
 //!
 //! ```text
-//! SPOOL/lock                      held by the master that uses the folder
+//! SPOOL/                          locked by the master that uses it
 //! SPOOL/job-7/                    results of job 7
 //! SPOOL/queue/job-7.json          its record: state, options, how it ended
 //! SPOOL/queue/job-7.json.copy     the same, for when the record is damaged
-//! SPOOL/queue/job-7.toml          its deck, until it is done or cancelled
+//! SPOOL/queue/job-7.toml          its deck, until it is done or cancelled; and a copy of it
 //! SPOOL/queue/job-7.snapshots/    where it can be gone on with, until then
 //! ```
 //!
 //! A record is replaced whole and synchronised at every change of state, before anybody is told of the change. A job that a
 //! record calls running, with no master to run it, was interrupted: it is the first to go on.
 //!
-//! A record stands behind its checksum and names that of its deck. A damaged record is read from its copy; a job whose deck is damaged
-//! fails with that reason instead of computing another problem.
+//! A record stands behind its checksum and names that of its deck. A damaged record or deck is read from its copy and mended; a job whose
+//! deck is damaged twice fails with that reason instead of computing another problem.
 
 use std::{
     collections::BTreeSet,
@@ -67,6 +67,9 @@ pub struct Record {
     /// A user has taken it back, which it has still to come to.
     #[serde(default)]
     pub cancelled: bool,
+    /// Of its mesh; 0 where an earlier release queued the job.
+    #[serde(default)]
+    pub elements: u64,
 }
 
 /// A record as it stands on disk.
@@ -139,7 +142,8 @@ impl Spool {
         fs::create_dir_all(&queue).map_err(fault)?;
         // An earlier release left it open to all.
         fs::set_permissions(&queue, fs::Permissions::from_mode(0o700)).map_err(fault)?;
-        let lock = File::create(folder.join("lock")).map_err(fault)?;
+        // Of the folder itself, which nobody can take away from a master unnoticed, as a file in it could be.
+        let lock = File::open(folder).map_err(fault)?;
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -178,6 +182,9 @@ impl Spool {
             Err(damage) => match read_record(&self.copy(job), job) {
                 Ok(record) => {
                     left.warnings.push(format!("{damage}; its copy is used"));
+                    if let Err(why) = fs::copy(self.copy(job), self.record(job)) {
+                        left.warnings.push(format!("{}: not mended: {why}", self.record(job).display()));
+                    }
                     record
                 }
                 Err(copy) => return left.warnings.push(format!("{damage}; {copy}; the job is left out")),
@@ -185,7 +192,7 @@ impl Spool {
         };
         let text = match record.ended {
             Some(_) => String::new(),
-            None => self.text(job, &record.deck_sum).unwrap_or_else(|damage| {
+            None => self.text_or_copy(job, &record.deck_sum, left).unwrap_or_else(|damage| {
                 let failure = Some(format!("{damage}; submit the job again"));
                 left.warnings.push(format!("{damage}; job {job} fails"));
                 record.state = State::Failed;
@@ -201,13 +208,26 @@ impl Spool {
     /// # Errors
     /// If it cannot be read or is another.
     pub fn text(&self, job: u32, stated: &str) -> Result<String, Fault> {
-        let path = self.deck(job);
-        let text = fs::read_to_string(&path).map_err(|e| Fault::Io(path.clone(), e))?;
-        let computed = sum_of(&text);
-        if stated.is_empty() || stated == computed {
-            return Ok(text);
+        read_deck(self.deck(job), stated).or_else(|damage| {
+            let text = read_deck(self.deck_copy(job), stated).map_err(|_| damage)?;
+            // What cannot be mended is read from its copy again.
+            let _ = write_durably(&self.deck(job), text.as_bytes());
+            Ok(text)
+        })
+    }
+
+    /// [`Spool::text`], which says what was damaged.
+    fn text_or_copy(&self, job: u32, stated: &str, left: &mut Left) -> Result<String, Fault> {
+        let damage = read_deck(self.deck(job), stated).err();
+        let text = self.text(job, stated);
+        if let (Some(damage), Ok(_)) = (damage, &text) {
+            left.warnings.push(format!("{damage}; its copy is used"));
         }
-        Err(Fault::Sum { path, stated: stated.to_owned(), computed })
+        text
+    }
+
+    fn deck_copy(&self, job: u32) -> PathBuf {
+        self.queue(job, "toml.copy")
     }
 
     /// Where results of a job go.
@@ -220,7 +240,8 @@ impl Spool {
         self.queue(job, "snapshots")
     }
 
-    fn record(&self, job: u32) -> PathBuf {
+    /// The file that is written anew whenever a job changes.
+    pub fn record(&self, job: u32) -> PathBuf {
         self.queue(job, "json")
     }
 
@@ -242,7 +263,9 @@ impl Spool {
     /// What the disk refused; the job is then not there.
     pub fn add(&self, record: &Record, text: &str) -> Result<(), String> {
         let path = self.deck(record.job);
-        let written = write_durably(&path, text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()));
+        let written = [&path, &self.deck_copy(record.job)].into_iter().try_for_each(|path| {
+            write_durably(path, text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))
+        });
         written.and_then(|()| self.change(record)).inspect_err(|_| self.forget(record.job))
     }
 
@@ -260,6 +283,7 @@ impl Spool {
         if matches!(record.state, State::Done | State::Cancelled) {
             // What cannot be removed takes room and harms nobody.
             let _ = fs::remove_file(self.deck(record.job));
+            let _ = fs::remove_file(self.deck_copy(record.job));
             let _ = store::remove(&self.snapshots(record.job));
         }
         Ok(())
@@ -271,8 +295,18 @@ impl Spool {
         let _ = fs::remove_file(self.record(job));
         let _ = fs::remove_file(self.copy(job));
         let _ = fs::remove_file(self.deck(job));
+        let _ = fs::remove_file(self.deck_copy(job));
         let _ = store::remove(&self.snapshots(job));
     }
+}
+
+fn read_deck(path: PathBuf, stated: &str) -> Result<String, Fault> {
+    let text = fs::read_to_string(&path).map_err(|e| Fault::Io(path.clone(), e))?;
+    let computed = sum_of(&text);
+    if stated.is_empty() || stated == computed {
+        return Ok(text);
+    }
+    Err(Fault::Sum { path, stated: stated.to_owned(), computed })
 }
 
 /// Reads the record of a job; one of an earlier release has no checksum.
@@ -316,6 +350,7 @@ mod tests {
             deck_sum: sum_of("a deck"),
             starts: Starts { count: 1, snapshot: 3 },
             cancelled: false,
+            elements: 8,
         }
     }
 
@@ -333,6 +368,9 @@ mod tests {
             fs::write(&path, damaged).expect("room");
             let (_, left) = Spool::open(folder.path()).expect("readable");
             assert_eq!(left.jobs, [(record(7), "a deck".to_owned())], "byte {at}: {:?}", left.warnings);
+            // A digit past those that a number keeps changes nothing.
+            let mended = fs::read(&path).ok().as_ref() == Some(&whole);
+            assert!(mended || left.warnings.is_empty(), "byte {at}: {:?}", left.warnings);
         }
         fs::remove_file(&path).expect("it is there");
         let (_, left) = Spool::open(folder.path()).expect("readable");
@@ -340,12 +378,25 @@ mod tests {
     }
 
     #[test]
-    fn a_job_with_a_damaged_deck_fails_with_the_reason_and_the_others_stay() {
+    fn a_spool_has_one_master_whatever_is_removed_from_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (_spool, _) = Spool::open(folder.path()).expect("new");
+        let _ = fs::remove_file(folder.path().join("lock"));
+        let second = Spool::open(folder.path()).expect_err("one has it");
+        assert!(second.contains("another master uses it"), "{second}");
+    }
+
+    #[test]
+    fn a_job_whose_deck_is_damaged_twice_fails_with_the_reason_and_the_others_stay() {
         let folder = tempfile::tempdir().expect("a folder");
         let (spool, _) = Spool::open(folder.path()).expect("new");
         spool.add(&record(7), "a deck").expect("room");
         spool.add(&record(8), "a deck").expect("room");
         fs::write(spool.deck(7), "a dock").expect("room");
+        assert_eq!(spool.text(7, &sum_of("a deck")).ok().as_deref(), Some("a deck"), "its copy is used");
+        assert_eq!(fs::read_to_string(spool.deck(7)).ok().as_deref(), Some("a deck"), "it is mended");
+        fs::write(spool.deck(7), "a dock").expect("room");
+        fs::write(spool.deck_copy(7), "a duck").expect("room");
         assert!(spool.text(7, &sum_of("a deck")).is_err());
         drop(spool);
         let (_, left) = Spool::open(folder.path()).expect("readable");

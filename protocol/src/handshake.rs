@@ -21,7 +21,7 @@ use std::fmt;
 /// its time.
 /// 9: trusses, numbers of supports and hourglass control of pieces in assignments; nodes tied to faces in assignments and plans; in
 /// votes the work of each wall and support, and what nodes lost at walls,
-/// and readings of element gauges with history variables behind them.
+/// and readings of element gauges with history variables behind them; requests to remove a job.
 pub const VERSION: u16 = 9;
 
 /// Most characters of a host's name.
@@ -95,7 +95,7 @@ pub struct Hello {
     pub version: u16,
     /// What the sender wants to be.
     pub role: Role,
-    /// The host's name: 1 to [`NAME_LIMIT`] letters, digits, `-`, `_` or `.`.
+    /// The host's name: 1 to [`NAME_LIMIT`] letters, digits, `-`, `_` or `.`; behind an `@` which of its processes this is.
     pub name: String,
     /// Speed relative to the reference host, above 0 and at most [`SPEED_LIMIT`]; 1 for a client.
     pub speed: f64,
@@ -170,7 +170,13 @@ impl Hello {
         if self.version != VERSION {
             return Err(version_differs(self.version));
         }
-        check_name("name", &self.name, NAME_LIMIT)?;
+        let parts: Vec<&str> = self.name.splitn(2, '@').collect();
+        for part in parts {
+            check_name("name", part, NAME_LIMIT)?;
+        }
+        if self.name.len() > NAME_LIMIT {
+            return Err(format!("name of {} bytes, must have at most {NAME_LIMIT}", self.name.len()));
+        }
         check_name("lanes", &self.lanes, LANES_LIMIT)?;
         if !(self.speed > 0.0 && self.speed <= SPEED_LIMIT) {
             return Err(format!("speed {}, must be above 0 and at most {SPEED_LIMIT}", self.speed));
@@ -192,6 +198,11 @@ impl Hello {
 
 fn version_differs(theirs: u16) -> String {
     format!("protocol version {theirs}, this side speaks {VERSION}; install the same release on both")
+}
+
+/// The host in a worker's name: without what says which of its processes it is.
+pub fn host_of(name: &str) -> &str {
+    name.split('@').next().unwrap_or(name)
 }
 
 fn check_name(what: &str, name: &str, limit: usize) -> std::result::Result<(), String> {
@@ -328,6 +339,8 @@ pub struct Policy {
     pub roles: Vec<Role>,
     /// The role in the caller's certificate; `None` on a loopback address without certificates.
     pub certificate: Option<tls::Role>,
+    /// The name in the certificate of a worker, whose greeting has no other; behind an `@` it may say which process of its host it is.
+    pub name: Option<String>,
     /// The token that the greeting must hold, if any.
     pub token: Option<String>,
     /// Why nobody is taken on this connection, whatever the greeting says: its certificate was revoked.
@@ -423,6 +436,14 @@ impl Server {
             && !role.is_certified_by(certificate)
         {
             return Err(format!("role {role}, the certificate is for a {certificate}"));
+        }
+        if let Some(name) = &self.policy.name
+            && host_of(&hello.name) != name
+        {
+            return Err(format!(
+                "name {:?}, the certificate is of {name:?}; leave --name out, or give {name} or {name}@ANY",
+                hello.name
+            ));
         }
         if let Some(token) = &self.policy.token
             && !hello.holds(token)

@@ -89,6 +89,34 @@ fn period(text: &str) -> Result<Option<f64>, String> {
     seconds(text).map(|seconds| Some(seconds).filter(|seconds| *seconds > 0.0))
 }
 
+/// A number that no run can be asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Error {
+    /// A number outside of what it may be.
+    Number {
+        /// The flag.
+        name: &'static str,
+        value: f64,
+        expected: &'static str,
+    },
+    /// No such lane width.
+    Lanes(String),
+}
+
+impl std::fmt::Display for Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number { name, value, expected } => write!(f, "{name} {value}: must be {expected}"),
+            Self::Lanes(name) => {
+                let shown: String = name.chars().take(32).collect();
+                write!(f, "lanes {shown:?}: must be scalar, avx2 or avx512")
+            }
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
 /// What a user asks of a run beside its deck.
 #[expect(
     unused_qualifications,
@@ -145,6 +173,30 @@ pub struct JobOptions {
 }
 
 impl JobOptions {
+    /// Checks every number, which may have come from anybody over a link.
+    ///
+    /// # Errors
+    /// The first that cannot be.
+    pub fn check(&self) -> Result<(), Error> {
+        let number = |name, value: Option<f64>, good: fn(f64) -> bool, expected| match value {
+            Some(value) if !good(value) => Err(Error::Number { name, value, expected }),
+            _ => Ok(()),
+        };
+        let seconds = "a number of seconds above 0, at most 1e9";
+        number("end time", self.end_time, |t| t.is_finite() && t > 0.0, "a positive number")?;
+        number("keep-every", self.keep_every, |s| s > 0.0 && s <= 1e9, seconds)?;
+        number("snapshot-every", self.snapshot_every, |s| (0.0..=1e9).contains(&s), "seconds from 0 to 1e9")?;
+        let whole = |n: Option<u64>| n.map(|n| n as f64);
+        number("snapshot-cycles", whole(self.snapshot_cycles), |n| n >= 1.0, "1 or more")?;
+        number("min-workers", Some(f64::from(self.min_workers)), |n| n <= 10_000.0, "at most 10000")?;
+        match &self.lanes {
+            Some(name) if !["scalar", "avx2", "avx512"].contains(&name.as_str()) => {
+                Err(Error::Lanes(name.clone()))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Whether an extra sort is asked for at a cycle, for tests of bits: every so many cycles, or at pseudo-random ones, about
     /// one in four.
     pub fn forces_sort(&self, cycle: u64) -> bool {
@@ -192,6 +244,28 @@ mod tests {
         {
             let fault = flags(&bad).expect_err(bad[1]);
             assert!(fault.contains(bad[0]) && fault.contains(bad[1]), "{fault}");
+        }
+    }
+
+    #[test]
+    fn numbers_that_came_over_a_link_are_checked_one_and_all() {
+        let good = JobOptions { keep_every: Some(10.0), snapshot_every: Some(0.0), ..JobOptions::default() };
+        assert_eq!(good.check(), Ok(()));
+        for (bad, words) in [
+            (
+                JobOptions { keep_every: Some(-1.0), ..good.clone() },
+                "keep-every -1: must be a number of seconds",
+            ),
+            (JobOptions { keep_every: Some(1e300), ..good.clone() }, "keep-every 1"),
+            (JobOptions { snapshot_every: Some(f64::NAN), ..good.clone() }, "snapshot-every NaN"),
+            (JobOptions { snapshot_every: Some(f64::INFINITY), ..good.clone() }, "snapshot-every inf"),
+            (JobOptions { end_time: Some(0.0), ..good.clone() }, "end time 0: must be a positive number"),
+            (JobOptions { snapshot_cycles: Some(0), ..good.clone() }, "snapshot-cycles 0"),
+            (JobOptions { min_workers: u32::MAX, ..good.clone() }, "min-workers 4294967295"),
+            (JobOptions { lanes: Some("mmx".into()), ..good.clone() }, "lanes \"mmx\""),
+        ] {
+            let error = bad.check().expect_err(words).to_string();
+            assert!(error.starts_with(words), "{error}");
         }
     }
 

@@ -21,6 +21,8 @@ pub const BULK_ON_THE_WAY: u64 = 2 * MESSAGE_LIMIT as u64;
 pub const WAITING_LIMIT: usize = 1024;
 /// Most bytes of those messages.
 pub const WAITING_BYTES: usize = MESSAGE_LIMIT;
+/// The same from a client, which sends one request and waits for its answer.
+pub const WAITING_BYTES_OF_A_CLIENT: usize = 64 << 10;
 
 /// What the frames of a message say about the run it belongs to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -97,6 +99,7 @@ pub struct Inbox {
     next: u32,
     waiting: BTreeMap<u32, Letter>,
     waiting_bytes: usize,
+    waiting_limit: usize,
     ready: VecDeque<Letter>,
 }
 
@@ -109,8 +112,16 @@ impl Inbox {
             next: 0,
             waiting: BTreeMap::new(),
             waiting_bytes: 0,
+            waiting_limit: WAITING_BYTES,
             ready: VecDeque::new(),
         }
+    }
+
+    /// Has control messages that wait for others take no more bytes.
+    #[must_use]
+    pub const fn with_waiting_limit(mut self, bytes: usize) -> Self {
+        self.waiting_limit = bytes;
+        self
     }
 
     /// Takes the next frame of the link; [`Inbox::take`] gives what is whole with it.
@@ -166,11 +177,11 @@ impl Inbox {
             self.next += 1;
         }
         let (letters, bytes) = (self.waiting.len(), self.waiting_bytes);
-        if letters > WAITING_LIMIT || bytes > WAITING_BYTES {
+        if letters > WAITING_LIMIT || bytes > self.waiting_limit {
             let (what, length, limit) = if letters > WAITING_LIMIT {
                 ("control messages out of order", letters as u64, WAITING_LIMIT as u64)
             } else {
-                ("bytes of control messages out of order", bytes as u64, WAITING_BYTES as u64)
+                ("bytes of control messages out of order", bytes as u64, self.waiting_limit as u64)
             };
             return Err(Error::TooLong { what, length, limit });
         }
@@ -211,6 +222,17 @@ mod tests {
         assert!(letters.iter().all(|l| (l.header.job, l.header.plan) == (4, 9)));
         assert_eq!((letters[1].header.kind, &letters[1].bytes), (Kind::Control, &long));
         assert_eq!(letters[2].bytes, [1]);
+    }
+
+    #[test]
+    fn what_a_client_sends_out_of_order_is_bounded() {
+        let mut inbox = Inbox::new(2, 100).with_waiting_limit(WAITING_BYTES_OF_A_CLIENT);
+        let frame = |sequence| {
+            let header = Header { incarnation: 2, sequence, ..Header::new(Kind::Control) };
+            Frame::new(header, vec![0; CONTROL_LIMIT as usize])
+        };
+        let taken = (1..100).take_while(|&number| inbox.accept(frame(number)).is_ok()).count();
+        assert_eq!(taken, WAITING_BYTES_OF_A_CLIENT / CONTROL_LIMIT as usize);
     }
 
     #[test]

@@ -46,6 +46,8 @@ pub enum Request {
     },
     /// Put a failed job back into the queue, to resume from its last checkpoint. Answered by [`Reply::Done`].
     Resume { job: u32 },
+    /// Remove a job that is over, with its results. Answered by [`Reply::Done`].
+    Remove { job: u32 },
 }
 
 /// Most bytes of [`Joining`] and [`Joined`] as they travel.

@@ -79,12 +79,18 @@ impl fmt::Display for Role {
 pub struct Identity {
     /// What it may be.
     pub role: Role,
-    /// Its common name, for logs.
+    /// Its common name: the name of a worker's host.
     pub name: String,
     /// Hash of the certificate, in hexadecimal digits: what a list of revoked ones names.
     pub fingerprint: String,
     /// Its last second (s since 1970).
     pub expires: i64,
+}
+
+impl fmt::Display for Identity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} {}", self.role, self.name, self.fingerprint)
+    }
 }
 
 /// The three PEM files of a host.

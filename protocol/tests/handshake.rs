@@ -129,6 +129,27 @@ fn frames_that_are_no_greeting_are_refused() {
 #[test]
 fn roles_answer_to_the_policy_and_to_the_certificate() {
     let greeting = |role| Client::new(&Hello { role, ..hello() }).expect("a good greeting").1;
+    let named = |name: &str| Policy { name: Some(name.into()), ..policy() };
+    for (name, certificate, good) in [
+        ("pc1", "pc1", true),
+        ("pc1@4711", "pc1", true),
+        ("pc2", "pc1", false),
+        ("pc1-2", "pc1", false),
+        ("pc2@pc1", "pc1", false),
+    ] {
+        let greeting = Hello::new(Role::Worker, name, 1.0, 1, "scalar", 1);
+        let (_, frame) = Client::new(&greeting).expect("a good name");
+        let verdict = Server::new(named(certificate)).apply(&frame).expect("the first frame");
+        match verdict {
+            Verdict::Good(_) => assert!(good, "{name} with the certificate of {certificate}"),
+            Verdict::Bad { reason, .. } => {
+                assert!(!good && reason.contains("the certificate is of \"pc1\""), "{reason}");
+            }
+        }
+    }
+    for bad in ["@x", "pc1@", "a@b@c"] {
+        assert!(Client::new(&Hello::new(Role::Worker, bad, 1.0, 1, "scalar", 1)).is_err(), "{bad}");
+    }
     let certified = |certificate| Policy { certificate: Some(certificate), ..policy() };
     assert_eq!(refusal(policy(), &greeting(Role::Peer)), "role peer, this side takes worker and client");
     assert_eq!(

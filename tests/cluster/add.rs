@@ -59,6 +59,7 @@ speed = 2
 [[host]]
 name = "b"
 deferred = true
+certs = "CERTS_OF_B"
 
 [[host]]
 name = "no-binary"
@@ -75,8 +76,11 @@ certs = "/nowhere"
         cluster.address,
         sshd.port,
         sshd.config.display(),
-        cluster.folder().join("certs/worker").display(),
+        cluster.folder().join("certs/a").display(),
     );
+    cluster.certify("a");
+    cluster.certify("b");
+    let text = text.replace("CERTS_OF_B", &cluster.folder().join("certs/b").display().to_string());
     fs::write(&hosts, text.replace("address = \"127.0.0.1\"\n", "")).expect("room");
     let add = |arguments: &[&str]| {
         let mut command = Command::new(BOLIDE);

@@ -260,6 +260,31 @@ fn an_interrupted_run_says_the_command_that_goes_on_with_it() {
 }
 
 #[test]
+fn a_state_that_is_damaged_or_missing_is_computed_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let command = |more: &[&str]| {
+        let mut command = Command::new(BOLIDE);
+        command.arg("run").arg(small()).args(flags()).args(["--snapshot-cycles", "100"]).args(more).arg(&out);
+        command
+    };
+    let mut run = Process::start("run", &mut command(&["--out"]));
+    let third = out.join("snapshots/snapshot-000003.bolide");
+    until(|| format!("three snapshots; {}", run.text()), || third.is_file().then_some(()));
+    run.kill();
+    fs::remove_file(out.join("state-000000.vtu")).expect("it is there");
+    let said = said(&mut command(&["--json", "--resume"]));
+    assert!(said.err.contains("state-000000.vtu") && said.err.contains("it is computed again"), "{said:?}");
+    let summary = serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {said:?}"));
+    Left::of(&out, &summary).assert_same(undisturbed());
+}
+
+#[test]
+fn a_state_due_where_a_run_is_interrupted_is_kept() {
+    tests::faults::disks::interrupted(BOLIDE.as_ref(), small().as_ref(), 200);
+}
+
+#[test]
 fn a_killed_run_goes_on_from_its_newest_whole_snapshot_into_the_same_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");

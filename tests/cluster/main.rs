@@ -7,6 +7,7 @@ mod links;
 mod losses;
 mod peers;
 mod runs;
+mod slurm;
 mod trust;
 
 use std::{process::Command, sync::OnceLock};

@@ -99,12 +99,16 @@ fn jobs_run_one_after_another_and_one_waits_for_its_workers() {
     assert_eq!(cluster.json(&submit)["job"], 1);
     assert_eq!(cluster.json(&submit[..5])["job"], 2);
     assert_eq!(cluster.job(1)["waits_for"], "2 workers, 0 are idle");
+    assert_eq!(cluster.job(2)["waits_for"], "1 worker, 0 are idle");
     cluster.worker("a", "1");
-    assert_eq!(cluster.job(1)["state"], "queued");
+    assert_eq!(digest_of(&cluster.json(&["watch", "2"])), reference(), "it passes the one that wants two");
+    assert_eq!(cluster.job(1)["waits_for"], "2 workers, 1 are idle");
     cluster.worker("b", "1");
-    for job in ["1", "2"] {
-        assert_eq!(digest_of(&cluster.json(&["watch", job])), reference(), "job {job}");
-    }
+    assert_eq!(digest_of(&cluster.json(&["watch", "1"])), reference());
+    let removed = cluster.client(&["rm", "2"]);
+    assert_eq!((removed.code, removed.out.trim()), (Some(0), "job 2 is removed"), "{removed:?}");
+    assert!(cluster.find_job(2).is_none());
+    assert!(cluster.client(&["rm", "2"]).err.contains("no job 2"));
     let none = cluster.client(&["results", "1"]);
     assert_eq!(none.code, Some(1));
     assert!(none.err.contains("job 1 writes no results"), "{none:?}");

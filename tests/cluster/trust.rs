@@ -157,6 +157,25 @@ fn a_revoked_worker_is_cut_off_in_mid_run_and_the_others_finish_with_the_same_di
     assert_eq!(summary["losses"].as_array().map(Vec::len), Some(1), "{summary}");
 }
 
+#[test]
+fn another_user_of_the_pc_is_nobody_to_a_master_on_loopback() {
+    if tests::faults::stuck::another_user(BOLIDE.as_ref()).is_none() {
+        println!("skipped: only root may be another user");
+    }
+}
+
+#[test]
+fn a_token_may_come_from_a_file() {
+    let lab = Lab::start();
+    let mut line = lab.pasted();
+    let token = line.pop().expect("a token");
+    let path = lab.folder.path().join("token");
+    std::fs::write(&path, token + "\n").expect("room");
+    line.push(format!("@{}", path.display()));
+    let _first = lab.paste("pc-1", &line);
+    lab.master.wait_for("worker pc-1 joined");
+}
+
 /// Sends a greeting as it stands, gives the refusal.
 fn greet(address: &str, hello: &Hello) -> String {
     let mut frame = Frame::new(Header::new(Kind::Hello), codec::encode(hello).expect("plain"));

@@ -311,7 +311,7 @@ impl Cluster {
     /// # Panics
     /// If it does not join.
     pub fn worker_with(&mut self, name: &str, speed: &str, flags: &[&str]) {
-        self.worker_as("worker", name, speed, flags);
+        self.worker_as(name, name, speed, flags);
     }
 
     /// The same with the certificate of a host other than `worker`.
@@ -321,12 +321,28 @@ impl Cluster {
     pub fn worker_as(&mut self, host: &str, name: &str, speed: &str, flags: &[&str]) {
         let mut arguments = vec!["worker", "--name", name, "--speed", speed, "--threads", "1"];
         arguments.extend(flags);
+        self.certify(host);
         let mut command = self.command(host, &arguments);
         command.envs(self.variables.iter().cloned());
         let worker = Process::start(name, command.env("BOLIDE_LOG", "info"));
         worker.wait_for("joined");
         self.master.wait_for(&format!("worker {name} joined"));
         self.workers.push((name.to_owned(), worker));
+    }
+
+    /// Makes the certificate of a worker, where there are certificates and it has none.
+    ///
+    /// # Panics
+    /// If the binary does not make it.
+    pub fn certify(&self, host: &str) {
+        let certs = self.folder().join("certs");
+        if !self.tls || certs.join(host).is_dir() {
+            return;
+        }
+        let mut command = Command::new(&self.binary);
+        command.args(["certs", "host"]).arg(certs).args([host, "--role", "worker", "--address", "127.0.0.1"]);
+        let made = said(&mut command);
+        assert_eq!(made.code, Some(0), "{made:?}");
     }
 
     /// Starts a worker with faults ordered by `BOLIDE_FAIL`.

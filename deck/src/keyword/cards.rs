@@ -18,6 +18,10 @@ use crate::{
 const MAX_DEPTH: usize = 16;
 /// Most lines of all files together.
 const MAX_LINES: usize = 64_000_000;
+/// Most includes that are followed: a file may be named again and again, and so may those that it names.
+const MAX_INCLUDES: usize = 10_000;
+/// Lines that includes may repeat, beside those that the files have.
+const MAX_REPEATED: usize = 1_000_000;
 
 /// How wide the fields of a card are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +86,11 @@ struct Walk<'b, 'a> {
     blocks: Vec<Block<'a>>,
     parameters: BTreeMap<String, f64>,
     n_lines: usize,
+    /// Most of them, for files of this length.
+    most_lines: usize,
+    n_includes: usize,
+    /// A limit was met: nothing more is read.
+    full: bool,
     /// Cases of the deck: their number and the command identifiers they switch on.
     cases: BTreeMap<u32, Vec<u32>>,
     first_case: Option<Place>,
@@ -100,6 +109,10 @@ pub(super) fn read<'a>(bundle: &Bundle<'a>, log: &Log<'_>) -> Lines<'a> {
         blocks: Vec::new(),
         parameters: BTreeMap::new(),
         n_lines: 0,
+        most_lines: MAX_LINES
+            .min(MAX_REPEATED + bundle.files.iter().map(|(_, text)| text.len()).sum::<usize>()),
+        n_includes: 0,
+        full: false,
         cases: BTreeMap::new(),
         first_case: None,
         active: BTreeSet::new(),
@@ -119,12 +132,16 @@ impl<'a> Walk<'_, 'a> {
         for (line, words) in lines(text) {
             self.n_lines += 1;
             let at = Place::card(file as u16, line);
-            if self.n_lines > MAX_LINES {
+            if self.full {
+                return;
+            }
+            if self.n_lines > self.most_lines {
+                self.full = true;
                 self.log.fault(
                     at,
                     "more lines",
-                    format!("at most {MAX_LINES} in all files"),
-                    "shorten the deck",
+                    format!("at most {} in all files, as often as they are included", self.most_lines),
+                    "shorten the deck, or include a file once",
                 );
                 return;
             }
@@ -254,7 +271,17 @@ impl<'a> Walk<'_, 'a> {
         let name = self.bundle.files[usize::from(block.at.file())].0;
         let mut before = String::new();
         for card in &block.cards {
+            if self.full {
+                return;
+            }
             let Some(path) = path_of(&card.text, &mut before) else { continue };
+            self.n_includes += 1;
+            if self.n_includes > MAX_INCLUDES {
+                self.full = true;
+                let expected =
+                    format!("at most {MAX_INCLUDES} includes, those of included files counted each time");
+                return self.log.fault(card.at, self.log.quote(&path), expected, "include a file once");
+            }
             if depth == MAX_DEPTH {
                 let advice = "take out the file that includes itself";
                 self.log.fault(card.at, path, format!("at most {MAX_DEPTH} files one in another"), advice);

@@ -50,7 +50,7 @@ pub(super) fn make(
 ) -> Vec<PartDraft> {
     let mut drafts: Vec<PartDraft> = Vec::with_capacity(parts.len());
     let mut first: BTreeMap<&str, Place> = BTreeMap::new();
-    let mut budget = Budget { nodes: MAX_NODES, elements: MAX_ELEMENTS };
+    let mut budget = Budget { nodes: MAX_NODES, elements: log.most_elements() };
     for part in parts {
         let other = first.get(part.name.as_str()).copied();
         if let Some(named) = part.named {
@@ -198,8 +198,14 @@ impl Budget {
             log.fault(
                 mesh.at,
                 read,
-                format!("at most {MAX_NODES} nodes and {MAX_ELEMENTS} elements in all parts together"),
-                log.say("use fewer cells", "use fewer elements"),
+                format!(
+                    "at most {MAX_NODES} nodes and {} elements in all parts together",
+                    log.most_elements()
+                ),
+                match log.most_elements() {
+                    MAX_ELEMENTS => log.say("use fewer cells", "use fewer elements"),
+                    _ => "use fewer elements, or a master with more memory",
+                },
             );
             return None;
         }

@@ -32,7 +32,10 @@ use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::{api_state::ApiState, board};
-use crate::notice::Notice;
+use crate::{
+    desk::{self, Brought},
+    notice::Notice,
+};
 
 /// The shortest time between two events of the stream.
 const EVENT_EVERY: Duration = Duration::from_millis(500);
@@ -154,11 +157,9 @@ struct Place {
     advice: String,
 }
 
-/// Reads a deck on a thread that may block.
-async fn read(name: String, text: String) -> Result<(String, deck::model::Model), Fault> {
-    let read = tokio::task::spawn_blocking(move || deck::read(&text, &name).map(|model| (text, model))).await;
-    let read = read.map_err(|_| "a bug in the master; its log has the words".to_owned())?;
-    read.map_err(|faults| {
+impl From<desk::Error> for Fault {
+    fn from(error: desk::Error) -> Self {
+        let desk::Error::Faults(faults) = error else { return error.to_string().into() };
         let place = |fault: deck::Fault| Place {
             line: fault.line,
             column: fault.column,
@@ -167,8 +168,8 @@ async fn read(name: String, text: String) -> Result<(String, deck::model::Model)
             advice: fault.advice,
         };
         let faults: Vec<Place> = faults.into_iter().map(place).collect();
-        Fault(StatusCode::UNPROCESSABLE_ENTITY, json!({ "faults": faults }))
-    })
+        Self(StatusCode::UNPROCESSABLE_ENTITY, json!({ "faults": faults }))
+    }
 }
 
 fn name_of(asked: &Asked) -> String {
@@ -177,11 +178,8 @@ fn name_of(asked: &Asked) -> String {
 }
 
 async fn check(Query(asked): Query<Asked>, text: String) -> Result<Json<serde_json::Value>, Fault> {
-    let (_, model) = read(name_of(&asked), text).await?;
-    Ok(Json(json!({
-        "title": model.title, "parts": model.mesh.parts.len(),
-        "elements": model.mesh.n_elements(), "nodes": model.mesh.n_nodes(),
-    })))
+    let Brought { title, parts, elements, nodes, .. } = desk::read(name_of(&asked), text).await?;
+    Ok(Json(json!({ "title": title, "parts": parts, "elements": elements, "nodes": nodes })))
 }
 
 async fn submit(
@@ -190,16 +188,15 @@ async fn submit(
     text: String,
 ) -> Result<Json<serde_json::Value>, Fault> {
     let name = name_of(&asked);
-    let (text, model) = read(name.clone(), text).await?;
-    let title = model.title.clone();
-    drop(model);
+    let Brought { text, title, elements, .. } = desk::read(name.clone(), text).await?;
     let options = JobOptions {
         cycles: asked.cycles,
         min_workers: asked.min_workers.unwrap_or(1).clamp(1, 10_000),
         keep_every: Some(10.0),
         ..JobOptions::default()
     };
-    let job = ask(&api_state, |answer| Notice::Submit { name, title, text, options, answer }).await??;
+    let job =
+        ask(&api_state, |answer| Notice::Submit { name, title, text, elements, options, answer }).await??;
     Ok(Json(json!({ "job": job })))
 }
 

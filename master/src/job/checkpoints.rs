@@ -109,6 +109,7 @@ impl Checkpoint {
             run_totals: continuation.run_totals.clone(),
             rows: rows[..continuation.n_rows].to_vec(),
             states: Vec::new(),
+            sums: Vec::new(),
         }))
     }
 }

@@ -157,12 +157,12 @@ impl Job {
             return Ok(());
         }
         self.adopt(state, vote)?;
+        if due {
+            // The next session begins behind it, so the checkpoint counts on its file.
+            let state = GlobalState::clone(&self.checkpoints.newest().state);
+            actions.push(Action::State(Box::new(state)));
+        }
         if self.ending.leaves {
-            if due {
-                // The next session begins behind it.
-                let state = GlobalState::clone(&self.checkpoints.newest().state);
-                actions.push(Action::State(Box::new(state)));
-            }
             self.suspend_at_checkpoint(actions);
             return Ok(());
         }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::queue::Entry;
+use crate::{footprint, queue::Entry};
 
 /// Most jobs that run at a time. A job takes all idle workers, so a second one would find only those that come later.
 const JOBS_AT_ONCE: usize = 1;
@@ -10,9 +10,51 @@ const JOBS_AT_ONCE: usize = 1;
 /// in at plan boundaries.
 const RETURN_LIMIT: Duration = Duration::from_secs(2);
 
-/// What becomes of the first job of the queue.
+/// What becomes of the jobs that wait.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct Allotments {
+    /// The one that starts, on all idle workers.
+    pub(super) starts: Option<u32>,
+    /// What each of the others waits for.
+    pub(super) waits: Vec<(u32, String)>,
+}
+
+/// What becomes of the jobs that wait, in the order in which they are to start. One that wants more workers than there are lets those
+/// behind it pass; one that was interrupted does not, for its workers come back within moments.
+pub(super) fn among(
+    waiting: &[&Entry],
+    running: &[u32],
+    idle: &[&str],
+    since_start: Duration,
+    available: Option<u64>,
+) -> Allotments {
+    let mut allotments = Allotments::default();
+    let mut returns = None;
+    for (ahead, entry) in waiting.iter().enumerate() {
+        let what = match (of(entry, running, idle, since_start, available), allotments.starts, returns) {
+            (Allotment::Start, None, None) => {
+                allotments.starts = Some(entry.id);
+                continue;
+            }
+            (Allotment::Start, Some(job), _) | (Allotment::Start, None, Some(job)) => format!("job {job}"),
+            (Allotment::Wait(what), ..) if running.is_empty() => what,
+            (Allotment::Wait(what), ..) => match ahead {
+                0 => what,
+                1 => format!("{what}, then 1 job before it"),
+                ahead => format!("{what}, then {ahead} jobs before it"),
+            },
+        };
+        if entry.before.is_some() {
+            returns = returns.or(Some(entry.id));
+        }
+        allotments.waits.push((entry.id, what));
+    }
+    allotments
+}
+
+/// What becomes of one job.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Allotment {
+enum Allotment {
     /// It starts on all idle workers.
     Start,
     /// It waits, for this.
@@ -20,8 +62,14 @@ pub(super) enum Allotment {
 }
 
 /// What becomes of a job beside those that are `running`, with workers of these names `idle`, so long after the master's
-/// start.
-pub(super) fn of(entry: &Entry, running: &[u32], idle: &[&str], since_start: Duration) -> Allotment {
+/// start, with so much memory `available`.
+fn of(
+    entry: &Entry,
+    running: &[u32],
+    idle: &[&str],
+    since_start: Duration,
+    available: Option<u64>,
+) -> Allotment {
     if running.len() >= JOBS_AT_ONCE {
         let jobs: Vec<String> = running.iter().map(|job| format!("job {job}")).collect();
         return Allotment::Wait(jobs.join(", "));
@@ -37,11 +85,12 @@ pub(super) fn of(entry: &Entry, running: &[u32], idle: &[&str], since_start: Dur
             }
         }
         None if idle.len() < needed => {
-            return Allotment::Wait(format!("{needed} workers, {} are idle", idle.len()));
+            let workers = if needed == 1 { "worker" } else { "workers" };
+            return Allotment::Wait(format!("{needed} {workers}, {} are idle", idle.len()));
         }
         None => {}
     }
-    Allotment::Start
+    footprint::shortage(entry.elements, available).map_or(Allotment::Start, Allotment::Wait)
 }
 
 /// The job that is given a worker which has just come: of those that run the first; none without any.
@@ -69,6 +118,7 @@ mod tests {
             deck_sum: String::new(),
             starts: crate::queue::Starts::default(),
             cancelled: false,
+            elements: 0,
         }
     }
 
@@ -79,19 +129,47 @@ mod tests {
     #[test]
     fn a_job_starts_once_enough_workers_are_idle_and_no_other_runs() {
         let (entry, late) = (job(2, None), Duration::from_secs(60));
-        assert_eq!(of(&entry, &[], &["a"], late), waits_for("2 workers, 1 are idle"));
-        assert_eq!(of(&entry, &[], &["a", "b"], Duration::ZERO), Allotment::Start);
-        assert_eq!(of(&entry, &[3], &["a", "b"], late), waits_for("job 3"));
-        assert_eq!(of(&job(0, None), &[], &[], late), waits_for("1 workers, 0 are idle"));
+        assert_eq!(of(&entry, &[], &["a"], late, None), waits_for("2 workers, 1 are idle"));
+        assert_eq!(of(&entry, &[], &["a", "b"], Duration::ZERO, None), Allotment::Start);
+        assert_eq!(of(&entry, &[3], &["a", "b"], late, None), waits_for("job 3"));
+        assert_eq!(of(&job(0, None), &[], &[], late, None), waits_for("1 worker, 0 are idle"));
     }
 
     #[test]
     fn an_interrupted_job_waits_for_its_workers_a_while_and_then_takes_any() {
         let (entry, soon) = (job(5, Some(&["a", "b"])), Duration::from_secs(1));
-        assert_eq!(of(&entry, &[], &["a", "x"], soon), waits_for("its workers: 1 of 2 are back"));
-        assert_eq!(of(&entry, &[], &["b", "a"], soon), Allotment::Start);
-        assert_eq!(of(&entry, &[], &["x"], RETURN_LIMIT), Allotment::Start);
-        assert_eq!(of(&entry, &[], &[], RETURN_LIMIT), waits_for("its workers: 0 of 2 are back"));
+        assert_eq!(of(&entry, &[], &["a", "x"], soon, None), waits_for("its workers: 1 of 2 are back"));
+        assert_eq!(of(&entry, &[], &["b", "a"], soon, None), Allotment::Start);
+        assert_eq!(of(&entry, &[], &["x"], RETURN_LIMIT, None), Allotment::Start);
+        assert_eq!(of(&entry, &[], &[], RETURN_LIMIT, None), waits_for("its workers: 0 of 2 are back"));
+    }
+
+    #[test]
+    fn a_job_that_wants_more_workers_than_there_are_lets_the_next_one_pass() {
+        let late = Duration::from_secs(60);
+        let of = |id, min_workers, before| Entry { id, ..job(min_workers, before) };
+        let (large, small, smaller) = (of(1, 2, None), of(2, 1, None), of(3, 1, None));
+        let waiting = [&large, &small, &smaller];
+        let said = |pairs: &[(u32, &str)]| pairs.iter().map(|&(id, what)| (id, what.to_owned())).collect();
+        assert_eq!(
+            among(&waiting, &[], &["a"], late, None),
+            Allotments { starts: Some(2), waits: said(&[(1, "2 workers, 1 are idle"), (3, "job 2")]) }
+        );
+        assert_eq!(among(&waiting, &[], &["a", "b"], late, None).starts, Some(1), "it has its turn with two");
+        let huge = Entry { elements: 10_000_000, ..of(5, 1, None) };
+        let short = among(&[&huge, &small], &[], &["a"], late, Some(1_000_000_000));
+        assert_eq!(short.starts, Some(2));
+        assert!(short.waits[0].1.starts_with("memory: 11.1 GB on the master"), "{short:?}");
+        assert_eq!(
+            among(&waiting, &[7], &[], late, None).waits,
+            said(&[(1, "job 7"), (2, "job 7, then 1 job before it"), (3, "job 7, then 2 jobs before it")]),
+        );
+        let interrupted = of(4, 1, Some(&["a", "b"]));
+        assert_eq!(
+            among(&[&interrupted, &small], &[], &["a"], Duration::ZERO, None),
+            Allotments { starts: None, waits: said(&[(4, "its workers: 1 of 2 are back"), (2, "job 4")]) },
+        );
+        assert_eq!(among(&[&interrupted, &small], &[], &["a"], late, None).starts, Some(4));
     }
 
     #[test]

@@ -14,7 +14,7 @@ use tracing::trace;
 use super::Snapshot;
 
 /// First bytes of a snapshot file: the form of the file and of what is in it.
-const MAGIC: &[u8; 8] = b"BLDSNAPC";
+const MAGIC: &[u8; 8] = b"BLDSNAPD";
 /// Bytes that one checksum covers.
 pub const CHUNK: usize = 1 << 20;
 /// Magic, length, cycle.
@@ -57,7 +57,7 @@ pub(super) fn temporary_of(path: &Path) -> PathBuf {
 }
 
 /// Makes the names in the folder of `path` outlive a loss of power.
-pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
+pub(crate) fn sync_folder(path: &Path) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
 }

@@ -16,6 +16,7 @@ use super::{
     Snapshot,
     file::{self, sync_folder, temporary_of},
 };
+use crate::results;
 
 /// Name of a store in the folder of its run.
 pub const FOLDER: &str = "snapshots";
@@ -84,6 +85,17 @@ impl Store {
     /// # Errors
     /// If the folder cannot be read.
     pub fn open(folder: &Path) -> Result<(Self, Found), String> {
+        Self::open_for(folder, |_| Ok(()))
+    }
+
+    /// The same for a run that goes on where its results are: a snapshot is not used if `check` finds that they are not what it counts on.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn open_for(
+        folder: &Path,
+        check: impl Fn(&Snapshot) -> Result<(), results::Error>,
+    ) -> Result<(Self, Found), String> {
         let fault = |e: io::Error| format!("snapshots in {}: {e}", folder.display());
         let mut warnings = Vec::new();
         let mut numbers = Vec::new();
@@ -116,6 +128,11 @@ impl Store {
             let path = folder.join(name_of(number));
             match file::read_checked(&path) {
                 Ok((snapshot, written)) => {
+                    if let Err(why) = check(&snapshot) {
+                        let cycle = snapshot.state.cycle;
+                        warnings.push(format!("{why}; it is computed again from before cycle {cycle}"));
+                        continue;
+                    }
                     store.generations.push(Generation {
                         number,
                         cycle: snapshot.state.cycle,
@@ -278,6 +295,7 @@ mod tests {
             run_totals: RunTotals::new(&model, &vec![1.0; model.mesh.n_nodes()]),
             rows: Vec::new(),
             states: vec![(0, 0.0), (cycle, 0.5)],
+            sums: vec![[3; 32], [4; 32]],
         }
     }
 

@@ -8,7 +8,10 @@ use std::{
 };
 
 use super::{Case, GOES_ON, Seen, field, since};
-use crate::cluster::said;
+use crate::{
+    cluster::{Process, said, until},
+    left::Left,
+};
 
 /// The list.
 pub fn cases() -> Vec<Case> {
@@ -76,7 +79,41 @@ pub fn cases() -> Vec<Case> {
             );
             Seen { note, ..Seen::default() }
         }),
+        case("Ctrl-C of `bolide run` at a cycle at whose start a state is due", 2, |scene, _| {
+            interrupted(&scene.bolide, &scene.deck, 60);
+            Seen { note: "`--resume` leaves the files of the undisturbed run".into(), ..Seen::default() }
+        }),
     ]
+}
+
+/// Interrupts a run that writes a state in every cycle, goes on with it, and compares what it leaves.
+///
+/// # Panics
+/// If anything differs.
+pub fn interrupted(bolide: &Path, deck: &Path, cycles: u64) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let every = folder.path().join("deck.toml");
+    let text = fs::read_to_string(deck).expect("readable");
+    let period = text.lines().find(|line| line.starts_with("period")).expect("states are asked for");
+    fs::write(&every, text.replace(period, "period = 1e-6")).expect("room");
+    let command = |flag: &str, out: &str| {
+        let mut command = Command::new(bolide);
+        command.arg("run").arg(&every).args(["--cycles", &cycles.to_string(), "--threads", "1", "--json"]);
+        command.arg(flag).arg(folder.path().join(out));
+        command
+    };
+    let summary = |mut command: Command| {
+        let said = said(&mut command);
+        serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {said:?}"))
+    };
+    let undisturbed = Left::of(&folder.path().join("whole"), &summary(command("--out", "whole")));
+    let mut run = Process::start("run", &mut command("--out", "cut"));
+    let begun = folder.path().join("cut/state-000010.vtu");
+    until(|| format!("ten states; {}", run.text()), || begun.is_file().then_some(()));
+    run.signal("INT");
+    assert_eq!(run.wait().code(), Some(130), "{}", run.text());
+    let resumed = summary(command("--resume", "cut"));
+    Left::of(&folder.path().join("cut"), &resumed).assert_same(&undisturbed);
 }
 
 pub(super) fn skipped() -> Seen {

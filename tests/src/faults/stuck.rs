@@ -4,7 +4,7 @@ use std::{
     fs,
     io::{Read, Write},
     net::TcpStream,
-    os::unix::fs::PermissionsExt,
+    os::unix::{fs::PermissionsExt, process::CommandExt},
     path::Path,
     process::Command,
     time::{Duration, Instant},
@@ -84,6 +84,21 @@ pub fn cases() -> Vec<Case> {
             let note = "held with the reason; the next one done by another worker";
             Seen { note: note.into(), ..Seen::default() }
         }),
+        case("job that wants two workers of which there is one; another behind it", |scene, _| {
+            let mut cluster = scene.cluster(&[], None, &[]);
+            let deck = scene.deck.display().to_string();
+            cluster.json(&["submit", &deck, "--cycles", "60", "--min-workers", "2"]);
+            cluster.json(&["submit", &deck, "--cycles", "60"]);
+            cluster.worker("a", "1");
+            wait_for_state(&cluster, 2, "done");
+            until(
+                || format!("a reason: {}", cluster.job(1)),
+                || (cluster.job(1)["waits_for"] == "2 workers, 1 are idle").then_some(()),
+            );
+            cluster.worker("b", "1");
+            wait_for_state(&cluster, 1, "done");
+            Seen { note: "the other one passes it; `jobs` says why it waits".into(), ..Seen::default() }
+        }),
         case("cancel acknowledged, then the master killed", |scene, k| {
             let mut running = scene.begin(&[], None);
             running.wait_for_cycle(scene.instant(900 + k));
@@ -99,12 +114,37 @@ pub fn cases() -> Vec<Case> {
             running.cluster.master.kill();
             flip(&running, "toml");
             running.cluster.restart_master();
+            let line = running.cluster.master.wait_for("job-1.toml: damaged");
+            assert!(line.contains("its copy is used"), "{line}");
+            scene.end(&running);
+            Seen { note: "its copy is used, and said so".into(), ..Seen::default() }
+        }),
+        case("one bit of a deck in the spool and of its copy, the master killed", |scene, k| {
+            let mut running = scene.begin(&[], None);
+            running.wait_for_cycle(scene.instant(915 + k));
+            running.cluster.master.kill();
+            flip(&running, "toml");
+            flip(&running, "toml.copy");
+            running.cluster.restart_master();
             wait_for_state(&running.cluster, 1, "failed");
             running.cluster.master.wait_for("job-1.toml: damaged");
             Seen {
                 note: "fails with the name of the file; nothing wrong is computed".into(),
                 ..Seen::default()
             }
+        }),
+        case("one bit of a state file, the master killed", |scene, k| {
+            state_lost(scene, 930 + k, |path| {
+                let mut bytes = fs::read(path).expect("it is there");
+                let middle = bytes.len() / 2;
+                bytes[middle] ^= 1;
+                fs::write(path, bytes).expect("room");
+            })
+        }),
+        case("state file removed, the master killed", |scene, k| {
+            state_lost(scene, 940 + k, |path| {
+                fs::remove_file(path).expect("it is there");
+            })
         }),
         case("one bit of a record in the spool, the master killed", |scene, k| {
             let mut running = scene.begin(&[], None);
@@ -139,7 +179,29 @@ pub fn cases() -> Vec<Case> {
             asking.read_to_string(&mut answer).expect("an answer");
             assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
             drop(idle);
+            assert!(at.elapsed() < Duration::from_secs(3), "{:?}", at.elapsed());
             Seen { detected: since(at), note: "detected: until /healthz said ok".into(), ..Seen::default() }
+        }),
+        case("spool with a limit of 100 kB for jobs that are over", |scene, _| {
+            let mut cluster = scene.cluster(&["--keep-gb", "0.0001"], None, &[]);
+            cluster.worker("a", "1");
+            let deck = scene.deck.display().to_string();
+            for job in 1..=3 {
+                cluster.json(&["submit", &deck, "--cycles", "20"]);
+                wait_for_state(&cluster, job, "done");
+            }
+            until(
+                || format!("the oldest to go; {}", cluster.master.text()),
+                || cluster.find_job(1).is_none().then_some(()),
+            );
+            assert!(!cluster.results(1).exists(), "its results as well");
+            Seen { note: "the oldest are removed, with their results".into(), ..Seen::default() }
+        }),
+        case("another user of the PC asks a master on loopback", |scene, _| {
+            let Some(seen) = another_user(&scene.bolide) else {
+                return Seen { note: "skipped: only root may be another user".into(), ..Seen::default() };
+            };
+            seen
         }),
         case("another user of the PC looks into the spool", |scene, _| {
             let cluster = scene.cluster(&[], None, &[]);
@@ -227,6 +289,66 @@ fn stuck_alone(scene: &Scene) -> Running {
     running.wait_for_cycle(110);
     std::thread::sleep(Duration::from_secs(1));
     running
+}
+
+/// Another user submits, cancels and joins, and is refused; none if this process may not be another user.
+///
+/// # Panics
+/// If it is not refused, or is with `--share`.
+pub fn another_user(bolide: &Path) -> Option<Seen> {
+    const NOBODY: u32 = 65_534;
+    if !rustix::process::geteuid().is_root() {
+        return None;
+    }
+    // Where that user may read it.
+    let folder =
+        tempfile::Builder::new().permissions(fs::Permissions::from_mode(0o755)).tempdir().expect("room");
+    let binary = folder.path().join("bolide");
+    fs::copy(bolide, &binary).expect("room");
+    let master = |flags: &[&str]| {
+        let mut command = Command::new(&binary);
+        command.args(["master", "--listen", "127.0.0.1:0", "--spool"]).arg(folder.path().join("spool"));
+        // Not root, who may ask any master.
+        let spool = folder.path().join("spool");
+        let _ = fs::create_dir(&spool);
+        std::os::unix::fs::chown(&spool, Some(NOBODY - 1), Some(NOBODY - 1)).expect("root may");
+        let master = Process::start("master", command.args(flags).uid(NOBODY - 1).gid(NOBODY - 1));
+        let line = master.wait_for("listening on ");
+        (master, line.trim_start_matches("listening on ").to_owned())
+    };
+    let ask = |address: &str, user: u32, words: &[&str]| {
+        let mut command = Command::new(&binary);
+        said(command.args(words).args(["--master", address]).uid(user).gid(user).current_dir("/"))
+    };
+    let (mut first, address) = master(&[]);
+    for words in [&["jobs"][..], &["cancel", "1"], &["worker", "--patience", "0"]] {
+        let refused = ask(&address, NOBODY, words);
+        assert_eq!(refused.code, Some(1), "{refused:?}");
+        assert!(refused.err.contains("a caller of user 65534, this master serves user 65533"), "{refused:?}");
+    }
+    for user in [NOBODY - 1, 0] {
+        assert_eq!(ask(&address, user, &["jobs"]).code, Some(0), "user {user}");
+    }
+    first.kill();
+    let (_second, address) = master(&["--share"]);
+    assert_eq!(ask(&address, NOBODY, &["jobs"]).code, Some(0));
+    Some(Seen {
+        note: "refused as client and as worker; its own user and root are not".into(),
+        ..Seen::default()
+    })
+}
+
+/// The first state of a job is damaged while its master is away.
+fn state_lost(scene: &Scene, number: u64, damage: fn(&Path)) -> Seen {
+    let mut running = scene.begin(&[], None);
+    running.wait_for_snapshots(2);
+    running.wait_for_cycle(scene.instant(number));
+    running.cluster.master.kill();
+    damage(&running.cluster.results(1).join("state-000000.vtu"));
+    running.cluster.restart_master();
+    running.cluster.master.wait_for("it is computed again from before cycle");
+    scene.end(&running);
+    Seen { note: "named, and computed again".into(), ..Seen::default() }
 }
 
 fn wait_for_state(cluster: &Cluster, job: u64, state: &str) {

@@ -61,6 +61,20 @@ pub fn cases() -> Vec<Case> {
                 call(scene, cluster, &cluster.folder().join("certs/client"), "odd")
             })
         }),
+        case("certificate of one PC, the name of another", 1, |scene, k| {
+            refused(scene, k, |scene, cluster| {
+                call(scene, cluster, &cluster.folder().join("certs/worker"), "b2")
+            })
+        }),
+        case("newcomer that wants to be called master, or as a PC that is there", 1, |scene, k| {
+            refused(scene, k, |scene, cluster| {
+                let token = token(scene, &cluster.folder().join("certs"), None);
+                let reserved = join(scene, cluster, &token, "master");
+                assert_eq!(reserved.code, Some(1), "{reserved:?}");
+                assert!(reserved.err.contains("\"master\" must be"), "{reserved:?}");
+                join(scene, cluster, &token, "a")
+            })
+        }),
         case("expired certificate", 1, |scene, k| {
             let Some(clock) = clock_library() else { return no_compiler() };
             let running =
@@ -242,7 +256,7 @@ fn peak_memory(id: u32) -> u64 {
 }
 
 /// A cluster with certificates and a lab that takes newcomers, its job under way on a, b and c; `more` makes certificates
-/// in the CA's folder. Worker b shows that of the host `b`, if there is one.
+/// in the CA's folder. Each worker shows its own.
 fn begin(scene: &Scene, more: impl Fn(&Path)) -> Running {
     let folder = tempfile::tempdir().expect("a folder");
     let certs = folder.path().join("certs");
@@ -251,7 +265,7 @@ fn begin(scene: &Scene, more: impl Fn(&Path)) -> Running {
     let lab = certs.display().to_string();
     let mut cluster = Cluster::start_in(&scene.bolide, folder, true, &["--lab", &lab], None, &[]);
     cluster.worker("a", "1");
-    cluster.worker_as(if certs.join("b").is_dir() { "b" } else { "worker" }, "b", "1", &[]);
+    cluster.worker("b", "1");
     cluster.worker("c", "1");
     scene.submit(cluster)
 }

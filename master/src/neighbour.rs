@@ -1,0 +1,110 @@
+//! NEIGHBOUR: whose process is at the other end of a loopback connection, as Linux knows it.
+//!
+//! Without certificates a master listens on loopback, which every user of the PC reaches. Linux says which user each socket is of, so
+//! nobody needs a secret: callers of the master's own user, and of root, are taken in, all others refused.
+
+use std::{
+    fmt, fs,
+    net::{IpAddr, SocketAddr},
+};
+
+/// Why a caller is refused.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// It is of another user.
+    User { theirs: u32, ours: u32 },
+    /// The system does not list its socket.
+    Unlisted(SocketAddr),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::User { theirs, ours } => write!(
+                f,
+                "a caller of user {theirs}, this master serves user {ours}; start it with --share, or with --certs, to serve others"
+            ),
+            Self::Unlisted(address) => {
+                write!(f, "the system does not say of which user the caller at {address} is; try again")
+            }
+        }
+    }
+}
+
+/// Looks who calls from `theirs` at `ours`, both of loopback. A system without a list of sockets lets everybody in, as it did before.
+///
+/// # Errors
+/// Why the caller is refused.
+pub fn check(ours: SocketAddr, theirs: SocketAddr) -> Result<(), Refusal> {
+    let list = if ours.is_ipv4() { "/proc/net/tcp" } else { "/proc/net/tcp6" };
+    let Ok(list) = fs::read_to_string(list) else { return Ok(()) };
+    judge(&list, (ours, theirs), rustix::process::geteuid().as_raw())
+}
+
+fn judge(list: &str, (ours, theirs): (SocketAddr, SocketAddr), own: u32) -> Result<(), Refusal> {
+    match user_of(list, theirs, ours) {
+        None => Err(Refusal::Unlisted(theirs)),
+        Some(user) if user == own || user == 0 => Ok(()),
+        Some(user) => Err(Refusal::User { theirs: user, ours: own }),
+    }
+}
+
+/// The user of the socket at `local` that is connected with `remote`.
+fn user_of(list: &str, local: SocketAddr, remote: SocketAddr) -> Option<u32> {
+    let (local, remote) = (written(local), written(remote));
+    list.lines().find_map(|line| {
+        let mut words = line.split_whitespace().skip(1);
+        let found = words.next() == Some(&local) && words.next() == Some(&remote);
+        // State, queues, timer and retransmissions stand between.
+        if found { words.nth(4)?.parse().ok() } else { None }
+    })
+}
+
+/// An address as the list writes it: words of 32 bits as they lie in memory.
+fn written(address: SocketAddr) -> String {
+    let bytes = match address.ip() {
+        IpAddr::V4(ip) => ip.octets().to_vec(),
+        IpAddr::V6(ip) => ip.octets().to_vec(),
+    };
+    let words = bytes.chunks_exact(4).map(|word| u32::from_ne_bytes([word[0], word[1], word[2], word[3]]));
+    let digits: String = words.map(|word| format!("{word:08X}")).collect();
+    format!("{digits}:{:04X}", address.port())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::{TcpListener, TcpStream};
+
+    use super::*;
+
+    #[test]
+    fn a_caller_of_another_user_is_refused_and_one_of_this_user_or_root_is_not() {
+        let (ours, theirs) = ("127.0.0.1:7117", "127.0.0.1:50000");
+        let (ours, theirs) = (ours.parse().expect("an address"), theirs.parse().expect("an address"));
+        let list = |user: u32| {
+            format!(
+                "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n   \
+                 0: {1} {0} 01 00000000:00000000 00:00000000 00000000     7        0 1 1\n   \
+                 1: {0} {1} 01 00000000:00000000 02:00000A5C 00000000  {user}        0 2 1\n",
+                written(theirs),
+                written(ours)
+            )
+        };
+        assert_eq!(judge(&list(1000), (ours, theirs), 1000), Ok(()));
+        assert_eq!(judge(&list(0), (ours, theirs), 1000), Ok(()));
+        let refusal = Refusal::User { theirs: 1001, ours: 1000 };
+        assert_eq!(judge(&list(1001), (ours, theirs), 1000), Err(refusal));
+        assert_eq!(judge("", (ours, theirs), 1000), Err(Refusal::Unlisted(theirs)));
+    }
+
+    #[test]
+    fn linux_lists_the_sockets_of_this_process() {
+        for address in ["127.0.0.1:0", "[::1]:0"] {
+            // A machine may have no IPv6.
+            let Ok(listener) = TcpListener::bind(address) else { continue };
+            let near = TcpStream::connect(listener.local_addr().expect("bound")).expect("it listens");
+            let (far, theirs) = listener.accept().expect("one calls");
+            assert_eq!(check(far.local_addr().expect("connected"), theirs), Ok(()), "{near:?}");
+        }
+    }
+}
