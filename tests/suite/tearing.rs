@@ -1,5 +1,7 @@
 //! Shells erode: their layers break one by one, an element leaves with the last of them, and what it took to tear is booked.
 
+#![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
+
 use deck::Model;
 use mechanics::state::field;
 use tests::{
