@@ -142,6 +142,9 @@ impl CaFolder {
         };
         for entry in entries {
             let path = entry.map_err(fault)?.path();
+            if path.extension().is_none_or(|extension| extension != "pem") {
+                continue;
+            }
             let identity = tls::identity_of_file(&path).map_err(|e| Error::Rule(e.to_string()))?;
             let counts = !revoked.contains(&identity.fingerprint) && identity.expires > now() as i64;
             if identity.role == role && identity.name.eq_ignore_ascii_case(name) && counts {

@@ -4,7 +4,7 @@
 //! to the [`crate::client_requests`]. Every fault ends this connection with one line in the log, and nothing else.
 
 use std::{
-    net::{IpAddr, Ipv4Addr, SocketAddr},
+    net::SocketAddr,
     sync::{
         Arc, Mutex, OnceLock,
         atomic::{AtomicBool, AtomicU32, Ordering},
@@ -48,8 +48,6 @@ pub const CONNECTIONS: usize = 4096;
 pub const GREETINGS: usize = 256;
 /// The longest that a connection waits for a place among them.
 const PLACE_LIMIT: Duration = Duration::from_secs(30);
-/// Whoever has no address shares this one's places.
-const UNKNOWN: IpAddr = IpAddr::V4(Ipv4Addr::UNSPECIFIED);
 /// A worker is suspect after this part of the silence after which it is dead.
 const SUSPECT: f64 = 0.3;
 
@@ -162,7 +160,7 @@ impl Acceptor {
     /// Serves a TCP connection to its end; a fault is one line in the log, with the certificate that was shown.
     async fn attend(self: Arc<Self>, stream: TcpStream, address: SocketAddr) {
         let certificate = OnceLock::new();
-        if let Err(error) = Arc::clone(&self).take(stream, address.to_string(), &certificate).await
+        if let Err(error) = Arc::clone(&self).take(stream, address, &certificate).await
             && !self.is_ending()
         {
             warn!(certificate = certificate.get(), "connection from {address}: {error}");
@@ -173,15 +171,15 @@ impl Acceptor {
     async fn take(
         self: Arc<Self>,
         stream: TcpStream,
-        address: String,
+        theirs: SocketAddr,
         certificate: &OnceLock<String>,
     ) -> Result<()> {
-        let ends = stream.local_addr().ok().zip(stream.peer_addr().ok());
+        let address = theirs.to_string();
+        let ours = stream.local_addr().ok();
         let socket = link::Socket::new(stream)?;
         // A connection costs its socket until there is a place to greet it; strangers hold a place no longer than a
         // handshake and a greeting may take.
-        let from = address.parse().map_or(UNKNOWN, |address: SocketAddr| address.ip());
-        let place = tokio::time::timeout(PLACE_LIMIT, self.greetings.wait(from)).await;
+        let place = tokio::time::timeout(PLACE_LIMIT, self.greetings.wait(theirs.ip())).await;
         let full = || {
             let of_address = self.greetings.most_of_an_address();
             Error::Message(format!(
@@ -192,13 +190,14 @@ impl Acceptor {
         let stream = Shaped::new(socket, self.port.as_ref());
         match self.tls.clone() {
             None => {
-                let refusal = match ends.filter(|_| !self.shared) {
-                    Some((ours, theirs)) => {
+                let unlisted = Some(neighbour::Refusal::Unlisted(theirs));
+                let refusal = match ours {
+                    _ if self.shared => None,
+                    Some(ours) => {
                         let check = move || neighbour::check(ours, theirs).err();
-                        let refusal = tokio::task::spawn_blocking(check).await;
-                        refusal.unwrap_or(Some(neighbour::Refusal::Unlisted(theirs)))
+                        tokio::task::spawn_blocking(check).await.unwrap_or(unlisted)
                     }
-                    None => None,
+                    None => unlisted,
                 };
                 let refusal = refusal.map(|refusal| refusal.to_string());
                 let policy = Policy { roles: self.roles.clone(), refusal, ..Policy::default() };
@@ -245,7 +244,7 @@ impl Acceptor {
     /// Serves any stream to its end; `certificate` is the role that its certificate proved.
     ///
     /// # Errors
-    /// As for [`Acceptor::take`].
+    /// If the caller greets otherwise than it may, or the connection breaks; not if a client left.
     pub async fn serve<S>(
         self: Arc<Self>,
         stream: S,

@@ -250,6 +250,9 @@ impl Waiting {
         let (end, ended) = oneshot::channel();
         let caller = Caller { address, silent: AtomicBool::new(true), end: Mutex::new(Some(end)) };
         let caller = Arc::new(caller);
+        if self.0.len() > 2 * CONNECTIONS {
+            self.0.retain(|caller| caller.strong_count() > 0);
+        }
         self.0.push_back(Arc::downgrade(&caller));
         (caller, ended)
     }

@@ -4,7 +4,7 @@
 //! nobody needs a secret: callers of the master's own user, and of root, are taken in, all others refused.
 
 use std::{
-    fmt, fs,
+    fmt, fs, io,
     net::{IpAddr, SocketAddr},
 };
 
@@ -13,8 +13,10 @@ use std::{
 pub enum Refusal {
     /// It is of another user.
     User { theirs: u32, ours: u32 },
-    /// The system does not list its socket.
+    /// The system does not list its socket, or it is closed already.
     Unlisted(SocketAddr),
+    /// The list of sockets cannot be read, for this reason.
+    Unreadable(String),
 }
 
 impl fmt::Display for Refusal {
@@ -27,6 +29,9 @@ impl fmt::Display for Refusal {
             Self::Unlisted(address) => {
                 write!(f, "the system does not say of which user the caller at {address} is; try again")
             }
+            Self::Unreadable(why) => {
+                write!(f, "cannot see of which user a caller is: {why}; --share serves all users of the PC")
+            }
         }
     }
 }
@@ -37,8 +42,20 @@ impl fmt::Display for Refusal {
 /// Why the caller is refused.
 pub fn check(ours: SocketAddr, theirs: SocketAddr) -> Result<(), Refusal> {
     let list = if ours.is_ipv4() { "/proc/net/tcp" } else { "/proc/net/tcp6" };
-    let Ok(list) = fs::read_to_string(list) else { return Ok(()) };
-    judge(&list, (ours, theirs), rustix::process::geteuid().as_raw())
+    let own = rustix::process::geteuid().as_raw();
+    // The list may lack a line while other sockets come and go.
+    let mut answer = Err(Refusal::Unlisted(theirs));
+    for _ in 0..3 {
+        answer = match fs::read_to_string(list) {
+            Ok(list) => judge(&list, (ours, theirs), own),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            Err(error) => Err(Refusal::Unreadable(format!("{list}: {error}"))),
+        };
+        if !matches!(answer, Err(Refusal::Unlisted(_))) {
+            break;
+        }
+    }
+    answer
 }
 
 fn judge(list: &str, (ours, theirs): (SocketAddr, SocketAddr), own: u32) -> Result<(), Refusal> {
@@ -49,14 +66,16 @@ fn judge(list: &str, (ours, theirs): (SocketAddr, SocketAddr), own: u32) -> Resu
     }
 }
 
-/// The user of the socket at `local` that is connected with `remote`.
+/// The user of the socket at `local` that is connected with `remote`. A socket that its process has closed is listed as one of root, in
+/// another state than `01`, established.
 fn user_of(list: &str, local: SocketAddr, remote: SocketAddr) -> Option<u32> {
     let (local, remote) = (written(local), written(remote));
     list.lines().find_map(|line| {
         let mut words = line.split_whitespace().skip(1);
-        let found = words.next() == Some(&local) && words.next() == Some(&remote);
-        // State, queues, timer and retransmissions stand between.
-        if found { words.nth(4)?.parse().ok() } else { None }
+        let found =
+            words.next() == Some(&local) && words.next() == Some(&remote) && words.next() == Some("01");
+        // Queues, timer and retransmissions stand between.
+        if found { words.nth(3)?.parse().ok() } else { None }
     })
 }
 
@@ -81,20 +100,23 @@ mod tests {
     fn a_caller_of_another_user_is_refused_and_one_of_this_user_or_root_is_not() {
         let (ours, theirs) = ("127.0.0.1:7117", "127.0.0.1:50000");
         let (ours, theirs) = (ours.parse().expect("an address"), theirs.parse().expect("an address"));
-        let list = |user: u32| {
+        let list_of = |state: &str, user: u32| {
             format!(
                 "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n   \
                  0: {1} {0} 01 00000000:00000000 00:00000000 00000000     7        0 1 1\n   \
-                 1: {0} {1} 01 00000000:00000000 02:00000A5C 00000000  {user}        0 2 1\n",
+                 1: {0} {1} {state} 00000000:00000000 02:00000A5C 00000000  {user}        0 2 1\n",
                 written(theirs),
                 written(ours)
             )
         };
+        let list = |user| list_of("01", user);
         assert_eq!(judge(&list(1000), (ours, theirs), 1000), Ok(()));
         assert_eq!(judge(&list(0), (ours, theirs), 1000), Ok(()));
         let refusal = Refusal::User { theirs: 1001, ours: 1000 };
         assert_eq!(judge(&list(1001), (ours, theirs), 1000), Err(refusal));
         assert_eq!(judge("", (ours, theirs), 1000), Err(Refusal::Unlisted(theirs)));
+        // Closed by whoever opened it: the system names root.
+        assert_eq!(judge(&list_of("05", 0), (ours, theirs), 1000), Err(Refusal::Unlisted(theirs)));
     }
 
     #[test]

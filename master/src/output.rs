@@ -166,8 +166,12 @@ impl Output {
         let count = self.states.iter().take_while(|(written, _)| *written <= cycle).count();
         if let Some(folder) = &self.folder {
             for index in self.sums.len()..count {
-                // A file that was taken away is missed by whoever goes on.
-                self.sums.push(folder.sum_of_state(index as u32).unwrap_or_default());
+                let sum = match folder.sum_of_state(index as u32) {
+                    // A file that was taken away is missed by whoever goes on.
+                    Err(error) if error.is_loss() => Default::default(),
+                    sum => sum.map_err(|error| error.to_string())?,
+                };
+                self.sums.push(sum);
             }
             snapshot.sums = self.sums[..count].to_vec();
         }

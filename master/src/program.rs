@@ -7,6 +7,7 @@ use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 use clap::{CommandFactory, Parser};
 use deck::bundle::Options;
 use protocol::{
+    handshake,
     shape::{Shape, Wire},
     tls,
 };
@@ -82,7 +83,7 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
         && !tls::Paths::in_folder(folder).certificate.exists()
     {
         let name = args.name.clone().unwrap_or_else(machine::host_name);
-        newcomer::join(&args.master, &newcomer::token(token)?, &name, folder)?;
+        newcomer::join(&args.master, &newcomer::token(token)?, handshake::host_of(&name), folder)?;
     }
     if let Some(pin) = &args.pin {
         pin.apply()?;

@@ -257,8 +257,11 @@ impl Queue {
         if is_over(state) {
             job.text = Arc::default();
         }
-        let ended: Vec<u32> = self.jobs.values().filter(|j| is_over(j.state)).map(|j| j.id).collect();
-        let forgotten = ended[..ended.len().saturating_sub(ENDED_LIMIT)].to_vec();
+        // A held job waits for its user, and what has just ended is to be seen.
+        let ends = |job: &&Entry| is_over(job.state) && job.state != State::Held && job.id != id;
+        let ended: Vec<u32> = self.jobs.values().filter(ends).map(|job| job.id).collect();
+        let others = ENDED_LIMIT - usize::from(is_over(state));
+        let forgotten = ended[..ended.len().saturating_sub(others)].to_vec();
         for id in &forgotten {
             self.jobs.remove(id);
         }

@@ -71,6 +71,17 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Whether what was to be read is gone or damaged; else the system could not look, and it may be whole.
+    pub fn is_loss(&self) -> bool {
+        match self {
+            Self::Damaged { .. } => true,
+            Self::Io { source, .. } => source.kind() == io::ErrorKind::NotFound,
+            _ => false,
+        }
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

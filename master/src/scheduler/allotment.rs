@@ -20,7 +20,7 @@ pub(super) struct Allotments {
 }
 
 /// What becomes of the jobs that wait, in the order in which they are to start. One that wants more workers than there are lets those
-/// behind it pass; one that was interrupted does not, for its workers come back within moments.
+/// behind it pass; one that was interrupted does not at first, for its workers come back within moments.
 pub(super) fn among(
     waiting: &[&Entry],
     running: &[u32],
@@ -44,7 +44,7 @@ pub(super) fn among(
                 ahead => format!("{what}, then {ahead} jobs before it"),
             },
         };
-        if entry.before.is_some() {
+        if entry.before.is_some() && since_start < RETURN_LIMIT {
             returns = returns.or(Some(entry.id));
         }
         allotments.waits.push((entry.id, what));
@@ -170,6 +170,9 @@ mod tests {
             Allotments { starts: None, waits: said(&[(4, "its workers: 1 of 2 are back"), (2, "job 4")]) },
         );
         assert_eq!(among(&[&interrupted, &small], &[], &["a"], late, None).starts, Some(4));
+        let huge = Entry { elements: 10_000_000, ..of(4, 1, Some(&["a"])) };
+        let short = among(&[&huge, &small], &[], &["a"], late, Some(1_000_000_000));
+        assert_eq!(short.starts, Some(2), "one that waits for memory blocks none");
     }
 
     #[test]

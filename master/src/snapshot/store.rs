@@ -91,7 +91,7 @@ impl Store {
     /// The same for a run that goes on where its results are: a snapshot is not used if `check` finds that they are not what it counts on.
     ///
     /// # Errors
-    /// If the folder cannot be read.
+    /// If the folder cannot be read, or `check` could not look: what cannot be read now may be whole.
     pub fn open_for(
         folder: &Path,
         check: impl Fn(&Snapshot) -> Result<(), results::Error>,
@@ -129,6 +129,9 @@ impl Store {
             match file::read_checked(&path) {
                 Ok((snapshot, written)) => {
                     if let Err(why) = check(&snapshot) {
+                        if !why.is_loss() {
+                            return Err(why.to_string());
+                        }
                         let cycle = snapshot.state.cycle;
                         warnings.push(format!("{why}; it is computed again from before cycle {cycle}"));
                         continue;

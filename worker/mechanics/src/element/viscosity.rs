@@ -145,6 +145,7 @@ impl<L: Lane> Swing<L> {
         let square = (self.sound_square - two_shears).mul_add(self.trace, two_shears * largest);
         let damping = L::splat(least) * self.damping;
         let in_mesh = largest * (damping + damping + self.sound_square);
+        let square = square.max(L::splat(0.0));
         let alone = L::splat(FREE * FREE).mul_add(square, L::splat(FREE) * damping * self.trace);
         L::splat(least * least).less(in_mesh.max(alone))
     }
