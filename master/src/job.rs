@@ -269,6 +269,10 @@ impl Job {
                 if version != WORKER_STATE_VERSION {
                     return Err(Error::Worker(worker, Breach::ImageVersion(version)));
                 }
+                let n_parts = self.problem.model.mesh.parts.len();
+                if let Some(what) = not_a_number(last.as_deref(), &[], n_parts) {
+                    return self.blame(worker, cycle, &what, actions);
+                }
                 self.tally.note_work((index, self.workers.n()), work);
                 let before = Arc::clone(&self.checkpoints.newest().state);
                 match self.epoch.worker_states.add((worker, n), cycle, (pieces, last), &before)? {

@@ -66,16 +66,18 @@ fn judge(list: &str, (ours, theirs): (SocketAddr, SocketAddr), own: u32) -> Resu
     }
 }
 
-/// The user of the socket at `local` that is connected with `remote`. A socket that its process has closed is listed as one of root, in
-/// another state than `01`, established.
+/// The user of the socket at `local` that is connected with `remote`. A socket that its process has closed is listed as one of root,
+/// with the inode 0.
 fn user_of(list: &str, local: SocketAddr, remote: SocketAddr) -> Option<u32> {
     let (local, remote) = (written(local), written(remote));
     list.lines().find_map(|line| {
         let mut words = line.split_whitespace().skip(1);
-        let found =
-            words.next() == Some(&local) && words.next() == Some(&remote) && words.next() == Some("01");
-        // Queues, timer and retransmissions stand between.
-        if found { words.nth(3)?.parse().ok() } else { None }
+        if words.next() != Some(&local) || words.next() != Some(&remote) {
+            return None;
+        }
+        // State, queues, timer and retransmissions stand before the user, a timeout before the inode.
+        let (user, inode) = (words.nth(4)?, words.nth(1)?);
+        if inode == "0" { None } else { user.parse().ok() }
     })
 }
 
@@ -100,23 +102,23 @@ mod tests {
     fn a_caller_of_another_user_is_refused_and_one_of_this_user_or_root_is_not() {
         let (ours, theirs) = ("127.0.0.1:7117", "127.0.0.1:50000");
         let (ours, theirs) = (ours.parse().expect("an address"), theirs.parse().expect("an address"));
-        let list_of = |state: &str, user: u32| {
+        let list_of = |user: u32, inode: u32| {
             format!(
                 "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n   \
                  0: {1} {0} 01 00000000:00000000 00:00000000 00000000     7        0 1 1\n   \
-                 1: {0} {1} {state} 00000000:00000000 02:00000A5C 00000000  {user}        0 2 1\n",
+                 1: {0} {1} 01 00000000:00000000 02:00000A5C 00000000  {user}        0 {inode} 1\n",
                 written(theirs),
                 written(ours)
             )
         };
-        let list = |user| list_of("01", user);
+        let list = |user| list_of(user, 2);
         assert_eq!(judge(&list(1000), (ours, theirs), 1000), Ok(()));
         assert_eq!(judge(&list(0), (ours, theirs), 1000), Ok(()));
         let refusal = Refusal::User { theirs: 1001, ours: 1000 };
         assert_eq!(judge(&list(1001), (ours, theirs), 1000), Err(refusal));
         assert_eq!(judge("", (ours, theirs), 1000), Err(Refusal::Unlisted(theirs)));
         // Closed by whoever opened it: the system names root.
-        assert_eq!(judge(&list_of("05", 0), (ours, theirs), 1000), Err(Refusal::Unlisted(theirs)));
+        assert_eq!(judge(&list_of(0, 0), (ours, theirs), 1000), Err(Refusal::Unlisted(theirs)));
     }
 
     #[test]

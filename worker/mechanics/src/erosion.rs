@@ -9,7 +9,7 @@
 //! Mass stays at the nodes. A node without any element left is *freed*: it flies on and keeps colliding, or it leaves the
 //! run too, with its mass, momentum and kinetic energy booked, as [`Erosion::retain_inertia`] says.
 //!
-//! Strains are those of the middle of an element, and effective ones: `sqrt(2/3 e:e)`, which is 1 where a bar of constant
+//! Strains of solids are those of the middle of an element, and effective ones: `sqrt(2/3 e:e)`, which is 1 where a bar of constant
 //! volume is `e` = 2.718 times as long as at first.
 
 use std::ops::Range;

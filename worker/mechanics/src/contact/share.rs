@@ -67,7 +67,8 @@ impl Cut {
         self.units.len()
     }
 
-    /// By node of the batch the share that has it in a unit, which knows all faces that it may meet; the first for nodes of none.
+    /// By node of the batch the share that has it in a unit, which knows all faces that it may meet; 0 for nodes of none,
+    /// which that share need not have.
     pub(crate) fn owners(&self, batch: &Batch) -> Vec<u32> {
         let mut owners = vec![0; batch.nodes.len()];
         for (share, units) in (0..).zip(&self.units) {

@@ -139,7 +139,7 @@ impl Domain {
             let touching = contact.map_or(&[][..], |node| places.of(node));
             let n_blocks = self.held_blocks.len() as u32;
             let touching = touching.iter().map(|&(share, local)| (n_blocks + share, local));
-            let keeper = contact.map(|node| places.own(node));
+            let keeper = contact.and_then(|node| places.own(node));
             self.exchange.push(copies.iter().copied().chain(touching), keeper);
         }
         // Nodes of rigid bodies have histories too, though their forces are not added up here.
@@ -200,7 +200,10 @@ impl Domain {
         exchanged: &HashSet<u32>,
         meter: &dyn Meter,
     ) {
-        let of_contact = |node: u32| contact_nodes.binary_search_by_key(&node, |n| n.global).is_ok();
+        let of_contact = |node: u32| {
+            let contact = contact_nodes.binary_search_by_key(&node, |n| n.global);
+            contact.is_ok_and(|contact| places.own(contact).is_some())
+        };
         self.order.deal(&mut self.held_blocks, meter, |held_block| {
             for (local, &node) in held_block.block.nodes.iter().enumerate() {
                 let kept = held_block.contact_history.iter().any(|number| number[local] != 0.0);
@@ -212,7 +215,7 @@ impl Domain {
         for (i, node) in
             contact_nodes.iter().enumerate().filter(|(_, node)| !exchanged.contains(&node.global))
         {
-            let (share, in_share) = places.own(i);
+            let Some((share, in_share)) = places.own(i) else { continue };
             for &(held_block, local) in self.copy_index.get(node.global) {
                 self.held_blocks[held_block as usize].shared.kept.push([local, share, in_share]);
             }

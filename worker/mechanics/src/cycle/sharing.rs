@@ -128,7 +128,7 @@ impl Group {
     }
 }
 
-/// The nodes that several blocks have and no other worker.
+/// The nodes that several blocks have and no other worker and no rigid body.
 #[derive(Default)]
 pub(super) struct Groups {
     groups: Vec<Group>,

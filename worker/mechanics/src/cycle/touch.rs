@@ -38,8 +38,8 @@ pub(super) struct Places {
     starts: Vec<u32>,
     /// Share and node in it.
     entries: Vec<(u32, u32)>,
-    /// By node, the entry of the share that computes its pairs.
-    own: Vec<(u32, u32)>,
+    /// By node, the entry of the share that computes its pairs, else of the first that has it; none of a node in no share.
+    own: Vec<Option<(u32, u32)>>,
 }
 
 impl Places {
@@ -52,14 +52,14 @@ impl Places {
         }
         let mut next = starts.clone();
         let mut entries = vec![(0, 0); starts[owners.len()] as usize];
-        let mut own = vec![(0, 0); owners.len()];
+        let mut own = vec![None; owners.len()];
         for (share, nodes) in (0_u32..).zip(nodes) {
             for (local, &node) in (0_u32..).zip(nodes) {
                 let node = node as usize;
                 entries[next[node] as usize] = (share, local);
                 next[node] += 1;
-                if owners[node] == share {
-                    own[node] = (share, local);
+                if own[node].is_none() || owners[node] == share {
+                    own[node] = Some((share, local));
                 }
             }
         }
@@ -71,8 +71,8 @@ impl Places {
         &self.entries[self.starts[node] as usize..self.starts[node + 1] as usize]
     }
 
-    /// Likewise in the share that computes its pairs and so leaves its history.
-    pub fn own(&self, node: usize) -> (u32, u32) {
+    /// Likewise in the share that leaves its history: the one that computes its pairs, or any, where none does and it has none.
+    pub fn own(&self, node: usize) -> Option<(u32, u32)> {
         self.own[node]
     }
 }
@@ -230,5 +230,20 @@ fn pack<'a>(sources: &[(u32, u32)], from: impl Fn(u32) -> &'a [Vec<f64>; 3], to:
         for a in 0..3 {
             to[a][i] = from[a][local as usize];
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_node_in_no_unit_has_its_own_place_in_a_share_that_knows_it() {
+        let shares: [&[u32]; 2] = [&[0, 1, 2], &[2, 3]];
+        // Nodes 1 and 3 are corners of faces alone, node 4 is in no share.
+        let places = Places::new(shares.iter().copied(), &[0, 0, 1, 0, 0]);
+        let own = [0, 1, 2, 3, 4].map(|node| places.own(node));
+        assert_eq!(own, [Some((0, 0)), Some((0, 1)), Some((1, 0)), Some((1, 1)), None]);
+        assert_eq!((places.of(2), places.of(4)), (&[(0, 2), (1, 0)][..], &[][..]));
     }
 }

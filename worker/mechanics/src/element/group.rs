@@ -102,7 +102,8 @@ pub(crate) trait Group: Send + Sync {
     fn take_out(&mut self, slot: usize) -> (u32, f64);
 
     /// Energy that the element of a slot takes of its nodes in the second half of the step `dt` to the positions `x` of now, with the
-    /// velocities `v`, by the forces that it had before the step; for kinds that erode.
+    /// velocities `v`, by the forces that it had before the step. A shell gives none: all its layers have broken, and what its hourglass
+    /// control still holds is left out.
     fn half_work(&self, _slot: usize, _moved: [&[Vec<f64>; 3]; 2], _dt: f64, _material: &Material) -> f64 {
         0.0
     }

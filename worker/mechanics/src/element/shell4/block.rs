@@ -306,7 +306,10 @@ impl Group for Core {
     }
 
     fn met(&self, criteria: &Criteria, sets: &[Range<u32>]) -> Vec<u32> {
-        let Some(limit) = criteria.plastic_strain else { return Vec::new() };
+        // What the layers break by; without that none has.
+        let Some(limit) = self.breaks.filter(|_| criteria.plastic_strain.is_some()) else {
+            return Vec::new();
+        };
         let strains = || self.layers.iter().skip(PLASTIC_STRAIN).step_by(kernel::LAYER);
         let slots = sets.iter().flat_map(|range| range.start * SET as u32..range.end * SET as u32);
         slots
