@@ -19,19 +19,26 @@ pub struct Units {
     /// Names of the units of length, mass, time, velocity and stress, for readers of results.
     pub symbols: [&'static str; 5],
     /// Whether a deck in these units may name materials of the library.
-    pub library: bool,
+    pub takes_materials: bool,
 }
 
 /// Every set a deck may name.
 pub const SETS: [Units; 5] = [
-    Units { name: "SI", length: 0, mass: 0, time: 0, symbols: ["m", "kg", "s", "m/s", "Pa"], library: true },
+    Units {
+        name: "SI",
+        length: 0,
+        mass: 0,
+        time: 0,
+        symbols: ["m", "kg", "s", "m/s", "Pa"],
+        takes_materials: true,
+    },
     Units {
         name: "cm-g-us",
         length: -2,
         mass: -3,
         time: -6,
         symbols: ["cm", "g", "us", "cm/us", "Mbar"],
-        library: true,
+        takes_materials: true,
     },
     Units {
         name: "mm-ms-kg",
@@ -39,7 +46,7 @@ pub const SETS: [Units; 5] = [
         mass: 0,
         time: -3,
         symbols: ["mm", "kg", "ms", "m/s", "GPa"],
-        library: true,
+        takes_materials: true,
     },
     Units {
         name: "mm-s-t",
@@ -47,7 +54,7 @@ pub const SETS: [Units; 5] = [
         mass: 3,
         time: 0,
         symbols: ["mm", "t", "s", "mm/s", "MPa"],
-        library: true,
+        takes_materials: true,
     },
     Units {
         name: "in-s-lbf",
@@ -55,7 +62,7 @@ pub const SETS: [Units; 5] = [
         mass: 0,
         time: 0,
         symbols: ["in", "lbf*s2/in", "s", "in/s", "psi"],
-        library: false,
+        takes_materials: false,
     },
 ];
 

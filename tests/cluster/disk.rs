@@ -1,7 +1,12 @@
 //! Masters that die or are told to leave, disks that fill, snapshots that are torn: the run goes on where it was stored,
 //! with the digest, the history and the files of one that nothing happened to.
 
-use std::{fs, path::PathBuf, process::Command, sync::OnceLock};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::OnceLock,
+};
 
 use tests::{
     cluster::{Cluster, Process, said, until},
@@ -259,21 +264,28 @@ fn an_interrupted_run_says_the_command_that_goes_on_with_it() {
     Left::of(&folder.path().join("the results"), &summary).assert_same(undisturbed());
 }
 
+/// A run that keeps a snapshot every 100 cycles, with `more` flags, the last of which takes the folder `out`.
+fn run_in(out: &Path, more: &[&str]) -> Command {
+    let mut command = Command::new(BOLIDE);
+    command.arg("run").arg(small()).args(flags()).args(["--snapshot-cycles", "100"]).args(more).arg(out);
+    command
+}
+
+/// What such a run leaves in `out` when it is killed once it has three snapshots.
+fn killed_after_three_snapshots(out: &Path) {
+    let mut run = Process::start("run", &mut run_in(out, &["--out"]));
+    let third = out.join("snapshots/snapshot-000003.bolide");
+    until(|| format!("three snapshots; {}", run.text()), || third.is_file().then_some(()));
+    run.kill();
+}
+
 #[test]
 fn a_state_that_is_damaged_or_missing_is_computed_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
-    let command = |more: &[&str]| {
-        let mut command = Command::new(BOLIDE);
-        command.arg("run").arg(small()).args(flags()).args(["--snapshot-cycles", "100"]).args(more).arg(&out);
-        command
-    };
-    let mut run = Process::start("run", &mut command(&["--out"]));
-    let third = out.join("snapshots/snapshot-000003.bolide");
-    until(|| format!("three snapshots; {}", run.text()), || third.is_file().then_some(()));
-    run.kill();
+    killed_after_three_snapshots(&out);
     fs::remove_file(out.join("state-000000.vtu")).expect("it is there");
-    let said = said(&mut command(&["--json", "--resume"]));
+    let said = said(&mut run_in(&out, &["--json", "--resume"]));
     assert!(said.err.contains("state-000000.vtu") && said.err.contains("it is computed again"), "{said:?}");
     let summary = serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {said:?}"));
     Left::of(&out, &summary).assert_same(undisturbed());
@@ -288,16 +300,8 @@ fn a_state_due_where_a_run_is_interrupted_is_kept() {
 fn a_killed_run_goes_on_from_its_newest_whole_snapshot_into_the_same_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
-    let command = |more: &[&str]| {
-        let mut command = Command::new(BOLIDE);
-        command.arg("run").arg(small()).args(flags()).args(["--snapshot-cycles", "100"]).args(more).arg(&out);
-        command
-    };
-    let mut run = Process::start("run", &mut command(&["--out"]));
-    let third = out.join("snapshots/snapshot-000003.bolide");
-    until(|| format!("three snapshots; {}", run.text()), || third.is_file().then_some(()));
-    run.kill();
-    let said = said(&mut command(&["--json", "--resume"]));
+    killed_after_three_snapshots(&out);
+    let said = said(&mut run_in(&out, &["--json", "--resume"]));
     let summary = serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {said:?}"));
     Left::of(&out, &summary).assert_same(undisturbed());
 }

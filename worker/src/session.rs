@@ -5,146 +5,23 @@
 //! is then thrown away, and the new domain is built when it has come. The steps of a cycle, in order: states if ordered; at a plan boundary transfer, all elements, install;
 //! else contact and border; send; interior; a sample if ordered; totals; integrate.
 
+mod event;
+mod totals;
+
 use std::collections::{BTreeMap, VecDeque};
 
 use mechanics::{
-    block::Piece,
     cycle::{Neighbour, Plan},
     exact::Quantum,
     vote::Vote,
-    wall::Pose,
 };
 use protocol::{
     message::{Assign, Orders, ToMaster, ToPeer, ToWorker, WORKER_STATE_VERSION, Work},
     options::Route,
 };
 
-/// What happens to a session.
-#[derive(Debug)]
-pub enum Event {
-    /// A message from the master, in the order it was sent.
-    Message(ToWorker),
-    /// A message from another worker of the job, by its index.
-    Peer(u32, ToPeer),
-    /// A task is done.
-    Done(Outcome),
-}
-
-/// What a session wants done.
-#[derive(Debug)]
-pub enum Action {
-    Send(ToMaster),
-    /// Send to another worker of the job, over a link of our own or through the master.
-    SendPeer(u32, ToPeer),
-    /// Compute; exactly one [`Event::Done`] answers it.
-    Compute(Task),
-    /// The job is over: drop the domain.
-    Forget,
-}
-
-/// Work on the domain. `dt_previous` is `dt_{n-1}`, the step that led to `x_n` (time).
-#[derive(Debug)]
-pub enum Task {
-    /// Build the domain and install the first plan.
-    Load {
-        /// All that this worker holds.
-        assign: Box<Assign>,
-        /// Ask for the vote of a preparing pass.
-        prepare: bool,
-    },
-    /// State of nodes for other workers.
-    Transfer {
-        /// Global node indices.
-        nodes: Vec<u32>,
-    },
-    /// All element sets at `x_n`, before a new plan is in force.
-    Elements {
-        /// The step before.
-        dt_previous: f64,
-        /// Quantum of forces from now on.
-        quantum: Quantum,
-        /// When the cycle begins.
-        time: f64,
-    },
-    /// Install a plan; contact; partial forces.
-    Install {
-        plan: Box<Plan>,
-        /// Six numbers by ghost.
-        ghost_state: Vec<f64>,
-        /// The step before.
-        dt_previous: f64,
-        /// Gather positions then.
-        gather: bool,
-        /// This gathering replaces those whose plans have not acted.
-        blocking: bool,
-    },
-    /// Contact, border elements, partial forces.
-    Border {
-        /// The step before.
-        dt_previous: f64,
-        /// Quantum of forces from now on.
-        quantum: Quantum,
-        /// When the cycle begins.
-        time: f64,
-        /// Gather positions first.
-        gather: bool,
-        /// This gathering replaces those whose plans have not acted.
-        blocking: bool,
-    },
-    /// Interior elements.
-    Interior {
-        /// The step before.
-        dt_previous: f64,
-    },
-    /// Totals in place, integrate.
-    Integrate {
-        /// Three numbers by node of the exchange.
-        totals: Vec<f64>,
-        /// The step before.
-        dt_previous: f64,
-        /// The step to take.
-        dt: f64,
-        /// Poses of the walls of finite mass in this cycle.
-        walls: Vec<Pose>,
-    },
-    /// State of all sub-domains.
-    WorkerState {
-        /// Nothing is computed on them after that.
-        last: bool,
-    },
-    /// What elements came to in this cycle, in one block.
-    Sample { cycle: u64 },
-}
-
-/// What came of a task.
-#[derive(Debug)]
-pub enum Outcome {
-    Loaded {
-        /// Of the preparing pass, if one was asked for.
-        vote: Option<Box<Vote>>,
-        /// Lane width in use.
-        lanes: String,
-    },
-    /// Of `Transfer`: six numbers by node.
-    Transferred(Vec<f64>),
-    Computed,
-    Forces {
-        /// Three numbers by node of the exchange.
-        partials: Vec<f64>,
-        /// Three numbers by owned surface node, if asked for.
-        gathered: Vec<f64>,
-    },
-    Integrated(Box<Vote>),
-    WorkerState {
-        /// The state.
-        pieces: Vec<Piece>,
-        /// Compute time so far.
-        work: Work,
-    },
-    Sampled([u8; 16]),
-    /// The task failed: a sentence for the user.
-    Failed(String),
-}
+pub use event::{Action, Event, Outcome, Task};
+use totals::{all_finite, of_nodes};
 
 /// Where a session stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -679,65 +556,6 @@ impl Session {
         actions.push(Action::Compute(Task::Integrate { totals, dt_previous, dt, walls }));
         Ok(())
     }
-
-    /// The totals of this cycle from the master, if they are here.
-    fn totals_of_master(&mut self) -> Result<Option<Vec<f64>>, String> {
-        match self.totals.front() {
-            None => Ok(None),
-            Some((cycle, _)) if *cycle == self.cycle => Ok(self.totals.pop_front().map(|(_, totals)| totals)),
-            Some((cycle, _)) => {
-                Err(format!("totals of cycle {cycle}, expected those of cycle {}", self.cycle))
-            }
-        }
-    }
-
-    /// Own and all neighbours' partial forces of this cycle, added, if all are here. Exact, so the order is no matter.
-    fn totals_of_peers(&mut self) -> Result<Option<Vec<f64>>, String> {
-        if self.neighbours.iter().any(|n| !self.heard.contains_key(&(self.cycle, n.worker))) {
-            return Ok(None);
-        }
-        let mut totals = std::mem::take(&mut self.partials);
-        for neighbour in &self.neighbours {
-            let Some(partials) = self.heard.remove(&(self.cycle, neighbour.worker)) else { continue };
-            if partials.len() != self.stride * neighbour.shared.len() {
-                return Err(format!(
-                    "worker {} sends {} numbers in cycle {}, the plan has {}",
-                    neighbour.worker,
-                    partials.len(),
-                    self.cycle,
-                    self.stride * neighbour.shared.len()
-                ));
-            }
-            for (&at, partial) in neighbour.shared.iter().zip(partials.chunks_exact(self.stride)) {
-                for (total, term) in totals[self.stride * at as usize..].iter_mut().zip(partial) {
-                    *total += term;
-                }
-            }
-        }
-        Ok(Some(totals))
-    }
-}
-
-/// What leaves a worker is finite: numbers that are none stay with the worker that made them.
-fn all_finite(what: &str, values: &[f64]) -> Result<(), String> {
-    // Without a way out of the loop it takes a vector at a time.
-    if values.iter().fold(true, |all, value| all & value.is_finite()) {
-        return Ok(());
-    }
-    let bad = values.iter().position(|value| !value.is_finite()).unwrap_or_default();
-    Err(format!("{what} {} of {} is {}, must be finite", bad + 1, values.len(), values[bad]))
-}
-
-/// The numbers, `stride` each, of these nodes.
-fn of_nodes(values: &[f64], nodes: &[u32], stride: usize) -> Result<Vec<f64>, String> {
-    let mut out = Vec::with_capacity(stride * nodes.len());
-    for &node in nodes {
-        let at = stride * node as usize;
-        out.extend_from_slice(
-            values.get(at..at + stride).ok_or("a neighbour shares a node that is not in the exchange")?,
-        );
-    }
-    Ok(out)
 }
 
 #[cfg(test)]

@@ -64,7 +64,7 @@ impl<'d> Materials<'d> {
             return Some(material.clone());
         }
         if let Some(found) = library::find(&name.value) {
-            if self.deck.units.library {
+            if self.deck.units.takes_materials {
                 return Some(self.deck.units.from_si(found));
             }
             self.log.fault_of(

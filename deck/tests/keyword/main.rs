@@ -1,6 +1,8 @@
 //! Keyword decks: the examples are what they say, converted decks are the same problem, bad decks are refused at their
 //! lines, and no change of a deck makes the reader panic.
 
+#[path = "../damage/mod.rs"]
+mod damage;
 mod mutations;
 
 use std::{fs, path::Path};

@@ -312,9 +312,11 @@ impl Domain {
             order.deal(held_blocks, meter, of_block);
         } else {
             let of_ghosts = || {
+                let mark = meter.start();
                 ghosts.take_totals(totals, numbers);
                 ghosts.lead(bodies, &advance);
                 ghosts.integrate(&advance, unbooked, width);
+                meter.stop(mark, false);
             };
             rayon::join(|| order.deal(held_blocks, meter, of_block), of_ghosts);
         }

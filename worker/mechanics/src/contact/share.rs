@@ -114,29 +114,14 @@ impl Cut {
         };
         let came_out = exposed.nodes.iter().filter(|&&node| nodes.has(node as usize));
         let batch = Batch {
-            nodes: nodes.list.iter().map(|&node| batch.nodes[node as usize]).collect(),
-            faces: faces
-                .list
-                .iter()
-                .map(|&face| {
-                    let mut face = batch.faces[face as usize];
-                    face.nodes = face.nodes.map(|node| nodes.of(node));
-                    face
-                })
-                .collect(),
+            nodes: nodes.taken(&batch.nodes, |_| {}),
+            faces: faces.taken(&batch.faces, |face| face.nodes = face.nodes.map(|node| nodes.of(node))),
             units: units.iter().map(of_unit).collect(),
             excluded: excluded.collect(),
             listed: Listed {
                 edges: BatchEdges {
                     edges: edge_indices
-                        .list
-                        .iter()
-                        .map(|&edge| {
-                            let mut edge = edges.edges[edge as usize];
-                            edge.nodes = edge.nodes.map(|node| nodes.of(node));
-                            edge
-                        })
-                        .collect(),
+                        .taken(&edges.edges, |edge| edge.nodes = edge.nodes.map(|node| nodes.of(node))),
                     pairs: pairs.iter().map(|pair| pair.map(|edge| edge_indices.of(edge))).collect(),
                 },
                 ties: BatchTies { nodes: ties.iter().map(|tie| tie.map(|node| nodes.of(node))).collect() },
@@ -177,6 +162,13 @@ impl Indices {
 
     fn has(&self, index: usize) -> bool {
         self.number[index] != NONE
+    }
+
+    /// Copies of the marked entries of `all`, each as `change` makes it.
+    fn taken<T: Copy>(&self, all: &[T], change: impl Fn(&mut T)) -> Vec<T> {
+        let mut taken: Vec<T> = self.list.iter().map(|&index| all[index as usize]).collect();
+        taken.iter_mut().for_each(change);
+        taken
     }
 
     fn of(&self, index: u32) -> u32 {

@@ -391,6 +391,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         let damped = L::splat(step.dt / 8.0) * resist * modes_square;
         taken = L::splat(0.5 * step.dt).mul_add(power, damped);
         check = check + elastic.square();
+        // Which lanes are active is not known yet: an element with a fault ends the run before its state is used.
         if step.dt != 0.0 {
             view.set_hourglass(slot, elastic, alive);
         }

@@ -1,0 +1,131 @@
+//! What happens to a session, and what it wants done.
+
+use mechanics::{block::Piece, cycle::Plan, exact::Quantum, vote::Vote, wall::Pose};
+use protocol::message::{Assign, ToMaster, ToPeer, ToWorker, Work};
+
+/// What happens to a session.
+#[derive(Debug)]
+pub enum Event {
+    /// A message from the master, in the order it was sent.
+    Message(ToWorker),
+    /// A message from another worker of the job, by its index.
+    Peer(u32, ToPeer),
+    /// A task is done.
+    Done(Outcome),
+}
+
+/// What a session wants done.
+#[derive(Debug)]
+pub enum Action {
+    Send(ToMaster),
+    /// Send to another worker of the job, over a link of our own or through the master.
+    SendPeer(u32, ToPeer),
+    /// Compute; exactly one [`Event::Done`] answers it.
+    Compute(Task),
+    /// The job is over: drop the domain.
+    Forget,
+}
+
+/// Work on the domain. `dt_previous` is `dt_{n-1}`, the step that led to `x_n` (time).
+#[derive(Debug)]
+pub enum Task {
+    /// Build the domain and install the first plan.
+    Load {
+        /// All that this worker holds.
+        assign: Box<Assign>,
+        /// Ask for the vote of a preparing pass.
+        prepare: bool,
+    },
+    /// State of nodes for other workers.
+    Transfer {
+        /// Global node indices.
+        nodes: Vec<u32>,
+    },
+    /// All element sets at `x_n`, before a new plan is in force.
+    Elements {
+        /// The step before.
+        dt_previous: f64,
+        /// Quantum of forces from now on.
+        quantum: Quantum,
+        /// When the cycle begins.
+        time: f64,
+    },
+    /// Install a plan; contact; partial forces.
+    Install {
+        plan: Box<Plan>,
+        /// Six numbers by ghost.
+        ghost_state: Vec<f64>,
+        /// The step before.
+        dt_previous: f64,
+        /// Gather positions then.
+        gather: bool,
+        /// This gathering replaces those whose plans have not acted.
+        blocking: bool,
+    },
+    /// Contact, border elements, partial forces.
+    Border {
+        /// The step before.
+        dt_previous: f64,
+        /// Quantum of forces from now on.
+        quantum: Quantum,
+        /// When the cycle begins.
+        time: f64,
+        /// Gather positions first.
+        gather: bool,
+        /// This gathering replaces those whose plans have not acted.
+        blocking: bool,
+    },
+    /// Interior elements.
+    Interior {
+        /// The step before.
+        dt_previous: f64,
+    },
+    /// Totals in place, integrate.
+    Integrate {
+        /// Three numbers by node of the exchange.
+        totals: Vec<f64>,
+        /// The step before.
+        dt_previous: f64,
+        /// The step to take.
+        dt: f64,
+        /// Poses of the walls of finite mass in this cycle.
+        walls: Vec<Pose>,
+    },
+    /// State of all sub-domains.
+    WorkerState {
+        /// Nothing is computed on them after that.
+        last: bool,
+    },
+    /// What elements came to in this cycle, in one block.
+    Sample { cycle: u64 },
+}
+
+/// What came of a task.
+#[derive(Debug)]
+pub enum Outcome {
+    Loaded {
+        /// Of the preparing pass, if one was asked for.
+        vote: Option<Box<Vote>>,
+        /// Lane width in use.
+        lanes: String,
+    },
+    /// Of `Transfer`: six numbers by node.
+    Transferred(Vec<f64>),
+    Computed,
+    Forces {
+        /// Three numbers by node of the exchange.
+        partials: Vec<f64>,
+        /// Three numbers by owned surface node, if asked for.
+        gathered: Vec<f64>,
+    },
+    Integrated(Box<Vote>),
+    WorkerState {
+        /// The state.
+        pieces: Vec<Piece>,
+        /// Compute time so far.
+        work: Work,
+    },
+    Sampled([u8; 16]),
+    /// The task failed: a sentence for the user.
+    Failed(String),
+}
