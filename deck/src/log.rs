@@ -41,8 +41,8 @@ pub(crate) struct Log<'a> {
     warnings: RefCell<Vec<(Place, String)>>,
     /// Keywords that change nothing here, by name: the first line of each.
     ignored: RefCell<BTreeMap<String, Place>>,
-    /// Most elements that the deck may ask for, where that is fewer than any deck may.
-    most_elements: Option<u64>,
+    /// Most elements that the deck may ask for.
+    most_elements: u64,
 }
 
 impl<'a> Log<'a> {
@@ -63,7 +63,7 @@ impl<'a> Log<'a> {
             files: files.iter().map(|(name, _)| *name).collect(),
             warnings: RefCell::new(Vec::new()),
             ignored: RefCell::new(BTreeMap::new()),
-            most_elements: None,
+            most_elements: MAX_ELEMENTS,
         }
     }
 
@@ -144,12 +144,12 @@ impl<'a> Log<'a> {
 
     /// Most elements that the deck may ask for.
     pub(crate) fn most_elements(&self) -> u64 {
-        self.most_elements.unwrap_or(MAX_ELEMENTS)
+        self.most_elements
     }
 
-    /// Has the deck ask for no more elements.
+    /// Has the deck ask for no more elements, nor for more than any deck may.
     pub(crate) fn with_most_elements(mut self, most: u64) -> Self {
-        self.most_elements = Some(most.min(MAX_ELEMENTS));
+        self.most_elements = most.min(MAX_ELEMENTS);
         self
     }
 

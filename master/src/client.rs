@@ -300,7 +300,7 @@ pub fn resume(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
 /// `bolide rm`.
 ///
 /// # Errors
-/// If there is no such job or it has not failed, or whatever went wrong on the way.
+/// If there is no such job or it is not over, or whatever went wrong on the way.
 pub fn remove(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
     let Reply::Done(what) = Client::new(at)?.ask(&Request::Remove { job })? else { return Err(surprise()) };
     println!("{what}");

@@ -2,9 +2,9 @@
 //!
 //! [`Criteria`] say by part when an element is taken out. An element that meets one at the start of its pass of cycle `n` gives
 //! no force in that cycle nor in any after it, has no vote, and keeps its last state; its internal energy is booked as
-//! eroded in the vote of `n`, with the work that its last forces did in the second half of the step to `n`. Its faces stay on the contact surface until that vote has been answered: from cycle
-//! `n + `[`SURFACE_LAG`] on they are gone and the faces that they hid are outside. So neither cycle depends on how a run is cut,
-//! sorted or timed.
+//! eroded in the vote of `n`, with the work that its last forces did in the second half of the step to `n`. Its faces stay on the
+//! contact surface until that vote has been answered: from cycle `n + `[`SURFACE_LAG`] on they are gone and the faces that they hid
+//! are outside. So neither cycle depends on how a run is cut, sorted or timed.
 //!
 //! Mass stays at the nodes. A node without any element left is *freed*: it flies on and keeps colliding, or it leaves the
 //! run too, with its mass, momentum and kinetic energy booked, as [`Erosion::retain_inertia`] says.
