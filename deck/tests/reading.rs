@@ -3,11 +3,11 @@
 use deck::Model;
 use mechanics::{
     burn::Detonation,
+    constraint::Constraint,
     element::hourglass::Hourglass,
     load::{Drive, Gravity, NodalForce, Relaxation, SurfaceKind},
     material::{CowperSymonds, Eos, Failure, Strength},
     mesh::{FACES, Topology},
-    setup::Constraint,
     wall::{Motion, Shape},
 };
 

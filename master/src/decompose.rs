@@ -240,8 +240,8 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec
         pieces.retain(|(region, _): &(Region, usize)| region.n_elements() > 0);
         out.extend(pieces.into_iter().map(|(region, worker)| Subdomain { part, region, worker }));
     }
-    // The lowest sub-domain that has a node books it, and only shells know of its rotation.
-    out.sort_by_key(|subdomain| mesh.parts[subdomain.part].section().is_none());
+    // The lowest sub-domain that has a node books it, so it must know of its rotation.
+    out.sort_by_key(|subdomain| !mesh.parts[subdomain.part].turns_nodes());
     out
 }
 

@@ -9,9 +9,9 @@ use std::{collections::BTreeMap, fmt, sync::Arc};
 use deck::model::Model;
 use mechanics::{
     contact::Surface,
-    erosion::{ALIVE, SURFACE_LAG},
+    erosion::SURFACE_LAG,
     initial,
-    state::GlobalState,
+    state::{ALIVE, GlobalState},
 };
 
 /// A vote names an element that there is not.

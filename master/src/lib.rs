@@ -20,6 +20,7 @@ pub mod daemon;
 pub mod deck_file;
 pub mod decompose;
 pub mod desk;
+mod disk;
 pub mod drive;
 pub mod embedded;
 pub mod erosion;

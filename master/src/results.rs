@@ -20,6 +20,7 @@ pub mod report;
 pub mod summary;
 pub mod surface;
 pub mod trace;
+pub mod von_mises;
 pub mod vtu;
 pub mod writer;
 
@@ -39,7 +40,7 @@ pub const TRACE: &str = "trace.json";
 pub use deck::model::FIELD_NAMES;
 pub use summary::Summary;
 
-use crate::snapshot::{Snapshot, file::sync_folder};
+use crate::disk::sync_folder;
 
 /// Why results could not be written or read.
 #[derive(Debug)]
@@ -203,12 +204,12 @@ impl Folder {
     }
 }
 
-/// Looks whether the states in a folder are those that a snapshot counts on.
+/// Looks whether the states in a folder are those that a snapshot counts on, by their checksums.
 ///
 /// # Errors
 /// [`Error::Damaged`] or [`Error::Io`] of the first that is not.
-pub fn check_states(folder: &Path, snapshot: &Snapshot) -> Result<(), Error> {
-    for (index, stated) in snapshot.sums.iter().enumerate() {
+pub fn check_states(folder: &Path, sums: &[[u8; 32]]) -> Result<(), Error> {
+    for (index, stated) in sums.iter().enumerate() {
         let computed = sum_of_state(folder, index as u32)?;
         if computed != *stated {
             return Err(Error::Damaged { path: folder.join(state_name(index as u32)) });

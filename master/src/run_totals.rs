@@ -6,8 +6,9 @@ use mechanics::{
     mesh::Part,
     rigid,
     state::{GlobalState, field},
-    vote::{PartVote, Vote, Work},
+    vote::{PartVote, Vote},
     wall::WallVote,
+    work::Work,
 };
 use serde::{Deserialize, Serialize};
 

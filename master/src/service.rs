@@ -159,7 +159,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
         return Err(Failure::Job(reason));
     }
     let check = |snapshot: &Snapshot| match &order.folder {
-        Some(folder) => results::check_states(folder, snapshot),
+        Some(folder) => results::check_states(folder, &snapshot.sums),
         None => Ok(()),
     };
     let (store, found) = Store::open_for(&order.snapshots, check)?;

@@ -11,7 +11,7 @@
 
 use std::{fmt, sync::Arc};
 
-use mechanics::block::Piece;
+use mechanics::piece::Piece;
 use protocol::{
     frame::Kind,
     message::{ToMaster, ToPeer, ToWorker, Work},

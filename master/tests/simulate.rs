@@ -399,7 +399,7 @@ fn elements_lost_to_erosion_are_followed_within_two_boundaries() {
         embedded::run(job, first, 1, 1, &mut Nowhere, &AtomicBool::new(false)).expect("the deck runs");
     let state = outcome.state.expect("the worker gives it");
     let mut cycles: Vec<u64> =
-        state.eroded.iter().copied().filter(|&c| c != mechanics::erosion::ALIVE).collect();
+        state.eroded.iter().copied().filter(|&c| c != mechanics::state::ALIVE).collect();
     cycles.sort_unstable();
     let n = model.mesh.n_elements();
     let (from, to) = (cycles[cycles.len() / 20], cycles[cycles.len() * 19 / 20]);

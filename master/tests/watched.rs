@@ -60,7 +60,7 @@ fn plates(friction: f64, watched: bool) -> Model {
 
 /// Force on the projectile and contacts, by row.
 fn forces(solved: &Solved) -> Vec<([f64; 3], u64)> {
-    let of = |contacts: &[(u32, mechanics::vote::PairVote)]| {
+    let of = |contacts: &[(u32, mechanics::contact::PairVote)]| {
         contacts.first().map_or(([0.0; 3], 0), |(_, vote)| (vote.force, vote.hits))
     };
     solved.rows.iter().map(|row| of(&row.contacts)).collect()

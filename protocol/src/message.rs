@@ -12,12 +12,12 @@
 //! cycle `n + 1` and what happens at the start of cycle `n + 2`.
 
 use mechanics::{
-    block::Piece,
     cycle::{Plan, Subdomain},
-    exact::Quantum,
+    exact::{Quanta, Quantum},
+    piece::Piece,
     rigid,
     setup::Setup,
-    vote::{Quanta, Vote, Watched},
+    vote::{Vote, Watched},
     wall::Pose,
 };
 use serde::{Deserialize, Serialize};

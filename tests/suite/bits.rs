@@ -468,7 +468,7 @@ fn nodes_that_a_wall_names_have_the_same_bits_and_the_others_pass() {
     for node in touching {
         let free = model.setup.constraints[usize::from(model.constraint[node])];
         model.constraint[node] = model.setup.constraints.len() as u16;
-        model.setup.constraints.push(mechanics::setup::Constraint { walls: 1, ..free });
+        model.setup.constraints.push(mechanics::constraint::Constraint { walls: 1, ..free });
     }
     same_bits(&model);
     let solved = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));

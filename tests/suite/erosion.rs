@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 
 use deck::Model;
 use mechanics::{
-    erosion::{ALIVE, SURFACE_LAG},
+    erosion::SURFACE_LAG,
     mesh::{CORNERS, FACES},
-    state::{GlobalState, field},
+    state::{ALIVE, GlobalState, field},
 };
 use protocol::options::{JobOptions, Route};
 use tests::{

@@ -27,9 +27,10 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
 
 use crate::{
+    input::Input,
     notify,
     peers::{Peers, links::Links},
-    runner::{Compute, GOODBYE, Input, Runner},
+    runner::{Compute, GOODBYE, Runner},
 };
 
 /// Messages that may wait for the compute thread: a master sends at most a few ahead, a neighbour two.

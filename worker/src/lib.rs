@@ -9,6 +9,7 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 
 pub mod compute;
 pub mod daemon;
+pub mod input;
 pub mod notify;
 pub mod peers;
 pub mod processors;

@@ -25,7 +25,7 @@ use protocol::{
     Error, Result,
     frame::{Header, Kind},
     handshake,
-    link::{Receiver, Sender, Settings},
+    link::{Receiver, Settings},
     message::{Introduction, ToPeer},
     shape::Shape,
     tls::{self, ClientConfig, ServerConfig},
@@ -38,7 +38,7 @@ use tokio::{
     task::JoinHandle,
 };
 
-use crate::runner::Input;
+use crate::input::{Input, Key, News, What};
 
 /// The longest that a worker tries to reach another before the master relays for them.
 pub const DIAL_LIMIT: Duration = Duration::from_secs(5);
@@ -109,13 +109,6 @@ impl Drop for Peers {
     }
 }
 
-/// The job and its epoch that links belong to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Key {
-    pub job: u32,
-    pub epoch: u32,
-}
-
 /// The workers of one epoch of a job.
 struct Circle {
     key: Key,
@@ -179,27 +172,6 @@ impl Circle {
         receiver.recycle(frame.payload);
         Ok((header, message))
     }
-}
-
-/// What the compute thread hears about a peer.
-pub struct News {
-    /// Of which job and epoch.
-    pub key: Key,
-    /// The other worker's index.
-    pub from: u32,
-    pub what: What,
-}
-
-/// What happens to a pair.
-pub enum What {
-    /// A link stands.
-    Stands(Sender),
-    /// It could not be reached.
-    Failed(Error),
-    /// Partial forces came.
-    Frame(Header, ToPeer),
-    /// The link has ended.
-    Ended(Error),
 }
 
 #[cfg(test)]

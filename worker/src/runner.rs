@@ -21,23 +21,11 @@ use tokio::sync::mpsc;
 
 use crate::{
     compute::Machine,
-    peers::{
-        Key, News,
-        links::{Links, Step},
-    },
+    input::{Input, Key},
+    peers::links::{Links, Step},
     session::{Action, Event, Outcome, Session, Task},
     stopwatch::{Lap, Stopwatch},
 };
-
-/// What the compute thread hears.
-pub enum Input {
-    /// A message of the master, with the header of its frame.
-    Master(Header, ToWorker),
-    /// Of a link to another worker.
-    Peer(News),
-    /// This process is to end: the master is asked to release it.
-    Leave,
-}
 
 /// How often the master hears between cycles how the time goes.
 const REPORT_EVERY: Duration = Duration::from_secs(1);

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use mechanics::{
+    constraint::{Constraint, MAX_SUPPORTS, MAX_WALLS},
     load::{Drive, Loads, SurfaceKind, SurfaceLoad},
-    setup::{Constraint, MAX_SUPPORTS, MAX_WALLS},
     wall::RigidWall,
 };
 
@@ -248,7 +248,7 @@ fn held(
 /// Which nodes have shells and so turn, by global node.
 fn turning(assembly: &Assembly) -> Vec<bool> {
     let mut turns = vec![false; assembly.mesh.n_nodes()];
-    for part in assembly.mesh.parts.iter().filter(|part| part.section().is_some()) {
+    for part in assembly.mesh.parts.iter().filter(|part| part.turns_nodes()) {
         for &n in &part.nodes {
             turns[n as usize] = true;
         }

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
+    constraint::Constraint,
     contact::{Settings, WARNING},
     load::Drive,
     material::Material,
-    setup::Constraint,
     wall::Motion,
 };
 
@@ -168,8 +168,8 @@ pub(super) fn make(
 fn thinnest(assembly: &Assembly, interacts: &[bool]) -> Option<f64> {
     let parts = &assembly.mesh.parts;
     let meets = |p: usize| interacts[p * parts.len()..(p + 1) * parts.len()].contains(&true);
-    let of_shells = (0..parts.len()).filter(|&p| meets(p)).filter_map(|p| parts[p].section());
-    of_shells.map(|section| section.thickness).min_by(f64::total_cmp)
+    let of_shells = (0..parts.len()).filter(|&p| meets(p)).filter_map(|p| parts[p].thickness());
+    of_shells.min_by(f64::total_cmp)
 }
 
 /// Whether the two parts of each pair interact, and their friction.

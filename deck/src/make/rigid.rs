@@ -157,8 +157,8 @@ pub(super) fn make(
 
 /// Lets the nodes of a body turn at the start as it does; only those of shells ever use it.
 fn turn(assembly: &mut Assembly, body: &Body) {
-    let has_shells = assembly.mesh.parts.iter().any(|part| part.section().is_some());
-    if has_shells && (body.start.spin != [0.0; 3] || !assembly.spin.is_empty()) {
+    let turns = assembly.mesh.parts.iter().any(|part| part.turns_nodes());
+    if turns && (body.start.spin != [0.0; 3] || !assembly.spin.is_empty()) {
         assembly.spin.resize(assembly.velocity.len(), [0.0; 3]);
         body.nodes.iter().for_each(|&n| assembly.spin[n as usize] = body.start.spin);
     }

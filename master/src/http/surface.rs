@@ -10,7 +10,7 @@ use mechanics::state::{GlobalState, field};
 
 use crate::{
     picture::skin::{Cell, outside},
-    results::vtu::von_mises,
+    results::von_mises::von_mises,
 };
 
 /// Fields of faces, in their order.
@@ -152,7 +152,7 @@ fn range(column: &[f32]) -> [f32; 2] {
 
 #[cfg(test)]
 mod tests {
-    use mechanics::erosion::ALIVE;
+    use mechanics::state::ALIVE;
 
     use super::*;
     use crate::{

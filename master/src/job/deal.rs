@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use deck::model::Model;
 use mechanics::{
-    block::Piece,
     cycle::Subdomain,
-    piece::{self, Region},
+    exact::Quanta,
+    piece::{self, Piece, Region},
     state::GlobalState,
-    vote::{Quanta, Watched},
+    vote::Watched,
 };
 use protocol::message::{Assign, ToWorker};
 

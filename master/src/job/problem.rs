@@ -5,9 +5,9 @@ use std::sync::Arc;
 use deck::model::Model;
 use mechanics::{
     contact::{Exclusions, Surface, initial_edges, initial_pairs},
+    exact::Quanta,
     initial,
     state::GlobalState,
-    vote::Quanta,
 };
 
 use super::error::{Error, Overlap, TooNear};

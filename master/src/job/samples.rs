@@ -12,13 +12,12 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
-    block::Piece,
     cycle::{Domain, Sets, Subdomain},
-    exact::Quantum,
+    exact::{Quanta, Quantum},
     lanes::Width,
-    piece::{self, Region},
+    piece::{self, Piece, Region},
     state::GlobalState,
-    vote::{Quanta, Vote},
+    vote::Vote,
 };
 use protocol::{message::sampled_block, token::hex};
 use worker::compute::ThreadClock;

@@ -2,7 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::{block::Piece, piece, state::GlobalState, vote::Vote};
+use mechanics::{
+    piece::{self, Piece},
+    state::GlobalState,
+    vote::Vote,
+};
 
 use super::{
     error::{Breach, Error, Sent},

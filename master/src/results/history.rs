@@ -13,14 +13,14 @@ use std::{
 
 use deck::model::Model;
 use mechanics::{
+    contact::PairVote,
     law::Unit,
     material::Material,
     state::{N_FIELDS, field},
-    vote::PairVote,
 };
 use serde::{Deserialize, Serialize};
 
-use super::{Error, Folder, HISTORY, Units, vtu::von_mises, write_whole};
+use super::{Error, Folder, HISTORY, Units, von_mises::von_mises, write_whole};
 
 /// One row of the table. Energies and momentum of the whole problem, in the deck's units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -15,7 +15,12 @@ use mechanics::{
     state::{GlobalState, PartHistory, field},
 };
 
-use super::{Error, FIELD_NAMES, Folder, PVD, state_name, surface::Probe, write_whole};
+use super::{
+    Error, FIELD_NAMES, Folder, PVD, state_name,
+    surface::Probe,
+    von_mises::{plane_von_mises, von_mises},
+    write_whole,
+};
 use appended::Appended;
 
 /// Cell type of the eight-node hexahedron.
@@ -183,17 +188,6 @@ impl Elements<'_> {
     fn density(&self, element: usize) -> f64 {
         self.model.setup.materials[self.material(element) as usize].density
     }
-}
-
-/// Von Mises stress `sqrt(3/2 s:s)` of the deviator given by its components xx, yy, xy, yz, zx.
-pub fn von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
-    let zz = -(xx + yy);
-    (1.5 * (xx * xx + yy * yy + zz * zz) + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
-}
-
-/// Von Mises stress of a layer of a shell, given by xx, yy, xy, yz, zx; its normal stress is zero.
-fn plane_von_mises([xx, yy, xy, yz, zx]: [f64; 5]) -> f64 {
-    (xx * xx + yy * yy - xx * yy + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
 }
 
 /// Writes one state as a `.vtu` file, whole or not at all. Shells are quadrilaterals and trusses lines in it. With shells there are two

@@ -12,6 +12,7 @@ use std::{
 use tracing::trace;
 
 use super::Snapshot;
+use crate::disk::sync_folder;
 
 /// First bytes of a snapshot file: the form of the file and of what is in it.
 const MAGIC: &[u8; 8] = b"BLDSNAPD";
@@ -54,12 +55,6 @@ pub fn write(path: &Path, snapshot: &Snapshot) -> Result<Written, String> {
 /// The name under which a file is written before it has its own.
 pub(super) fn temporary_of(path: &Path) -> PathBuf {
     path.with_extension("tmp")
-}
-
-/// Makes the names in the folder of `path` outlive a loss of power.
-pub(crate) fn sync_folder(path: &Path) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
 }
 
 fn stream(path: &Path, body: &[u8], cycle: u64) -> io::Result<Written> {

@@ -14,9 +14,9 @@ use tracing::trace;
 
 use super::{
     Snapshot,
-    file::{self, sync_folder, temporary_of},
+    file::{self, temporary_of},
 };
-use crate::results;
+use crate::{disk::sync_folder, results};
 
 /// Name of a store in the folder of its run.
 pub const FOLDER: &str = "snapshots";

@@ -14,14 +14,16 @@ use master::results::{
     self, Folder,
     history::{GaugeRow, History, HistoryRow, PartEnergy, Table},
     summary::{Energies, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
-    vtu::{Fields, Series, von_mises, write_vtu},
+    von_mises::von_mises,
+    vtu::{Fields, Series, write_vtu},
 };
 use mechanics::{
+    constraint::Constraint,
+    contact::PairVote,
     material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Topology},
-    setup::{Constraint, Control, Setup},
+    setup::{Control, Setup},
     state::{GlobalState, field},
-    vote::PairVote,
 };
 
 /// An empty place for one test, kept after it for a look.

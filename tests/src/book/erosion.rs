@@ -1,6 +1,6 @@
 //! Erosion: a rod goes through a plate, and what left is in the totals.
 
-use mechanics::{contact::Surface, erosion::ALIVE};
+use mechanics::{contact::Surface, state::ALIVE};
 
 use crate::{
     case::Figures,

@@ -1,9 +1,10 @@
 //! Laws in single elements: the path of uniaxial strain, JWL products, detonation, Johnson-Cook.
 
 use mechanics::{
-    block::{Block, Piece},
+    block::Block,
     lanes::Width,
     material::{Eos, Failure, Material, Strength},
+    piece::Piece,
     state::field,
 };
 

@@ -1,12 +1,15 @@
 //! The 24 modes of a free one-point cube, with and without hourglass control, and the time step that they allow.
 
 use mechanics::{
-    block::{Block, Piece},
-    element::hourglass::Hourglass,
-    element::shell4::{Rule, ShellStep, Shells},
+    block::Block,
+    element::{
+        hourglass::Hourglass,
+        shell4::{Rule, ShellStep, Shells},
+    },
     exact::Quantum,
     lanes::Width,
     material::Material,
+    piece::Piece,
 };
 use nalgebra::{Rotation3, SMatrix, Vector3};
 

@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use deck::Model;
-use mechanics::{load::Drive, setup::Constraint};
+use mechanics::{constraint::Constraint, load::Drive};
 
 use crate::{
     case::Figures,

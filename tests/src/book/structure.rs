@@ -1,6 +1,6 @@
 //! Thin structures of solid elements under impulses, and the tones of a cantilever.
 
-use mechanics::{load::Drive, setup::Constraint};
+use mechanics::{constraint::Constraint, load::Drive};
 
 use crate::{
     case::Figures,

@@ -13,7 +13,8 @@
 
 use laws::{SHOCK, johnson_cook, steel, steels};
 use mechanics::{
-    block::{Block, Piece},
+    block::Block,
+    constraint::Constraint,
     cycle::{self, Domain, Interval, Meter, Plan, Subdomain},
     element::{
         ElementVote, Step, hex8,
@@ -24,8 +25,8 @@ use mechanics::{
     lanes::Width,
     material::{Eos, Failure, Heat, Material, Strength},
     mesh::{Mesh, Part, Section, Topology},
-    piece::{Region, cut},
-    setup::{Constraint, Control, Setup},
+    piece::{Piece, Region, cut},
+    setup::{Control, Setup},
     state::{N_FIELDS, field},
 };
 use rustix::time::{ClockId, clock_gettime};

@@ -20,11 +20,13 @@
 
 use serde::{Deserialize, Serialize};
 
+mod batch;
 mod boxes;
 pub mod cycle;
 pub mod edges;
 pub mod force;
 mod history;
+mod initial_pairs;
 pub mod joint;
 mod kinds;
 pub mod map;
@@ -40,25 +42,29 @@ pub mod sort;
 pub mod surface;
 mod tally;
 mod ties;
+mod tying;
 mod watch;
 pub mod work_unit;
 pub mod zone;
 
+pub use batch::{Batch, BatchFace, BatchNode, BatchUnit, Listed};
 pub use cycle::Contact;
 pub use edges::{BatchEdge, BatchEdges, Edge, initial_edges};
 pub use force::ContactVote;
 pub use history::History;
-pub use kinds::{Listed, sort};
+pub use initial_pairs::initial_pairs;
+pub use kinds::sort;
 pub use map::Map;
-pub use node_face::initial_pairs;
 pub use pair::Kind;
 pub use pair_energy::{PairEnergies, PairEnergy};
 pub use reach::Extent;
 pub use search::{Exclusions, cull};
 pub(crate) use share::{Cut, Share};
 pub use surface::{Exposed, Face, Surface};
-pub use ties::{BatchTies, OnFace, Tie, on_faces, tie};
-pub use work_unit::{Batch, BatchFace, BatchNode, BatchUnit, Census, WorkUnit};
+pub use tally::PairVote;
+pub use ties::{BatchTies, Tie};
+pub use tying::{OnFace, on_faces, tie};
+pub use work_unit::{Census, WorkUnit};
 
 /// Distance, in gaps, within which a pair votes on the time step although only those within one gap push.
 ///

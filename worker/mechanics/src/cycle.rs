@@ -24,20 +24,19 @@ use crate::{
     contact::Settings,
     copy_index::CopyIndex,
     element::{ElementVote, Step},
-    exact::Quantum,
+    exact::{Quanta, Quantum},
     lanes::Width,
     load::face,
     nodes::{Advance, share_before},
     setup::Setup,
-    vote::{Gone, Quanta, Vote},
+    vote::{Gone, Vote},
     wall::{self, Pose, WallVote},
 };
 
 pub use assembly::Subdomain;
 use bodies::{Bodies, Held};
-use deal::Order;
 use ghosts::Ghosts;
-use held_block::HeldBlock;
+use held_block::{HeldBlock, Order};
 pub use plan::{Ghost, Neighbour, Plan};
 use sharing::{Exchange, Groups, Holders, Numbers};
 use touch::HeldContact;

@@ -12,6 +12,7 @@ use crate::exact::Quantum;
 pub(crate) mod group;
 pub mod hex8;
 pub mod hourglass;
+pub(crate) mod kinds;
 pub(crate) mod layout;
 pub(crate) mod modes;
 pub(crate) mod place;

@@ -22,12 +22,14 @@ use crate::{
     lanes::{Width, scalar::Scalar},
     material::Material,
     rigid::{cross, dot},
-    state::field,
+    state::{ALIVE, field},
 };
 
+pub(crate) mod criteria;
 mod limits;
 mod scan;
 
+pub use criteria::{Criteria, PieceErosion};
 use limits::{Shape, Stress, Volume};
 use scan::Scan;
 
@@ -37,9 +39,6 @@ pub const GEOMETRIC_STRAIN: f64 = 1.5;
 /// Cycles from that in which an element erodes to the first on the new surface: its vote comes with the next frame, the orders
 /// that answer it act two cycles later, where positions travel, and the sort of those acts in the cycle after.
 pub const SURFACE_LAG: u64 = 4;
-
-/// Stands for the cycle of erosion of an element that is alive.
-pub const ALIVE: u64 = u64::MAX;
 
 /// What erodes in a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,65 +69,6 @@ impl Erosion {
     pub fn of_part(&self, part: usize) -> Option<&Criteria> {
         self.parts.get(part).and_then(Option::as_ref)
     }
-}
-
-/// When elements of a part erode: as soon as they meet one of these. At least one is given.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Criteria {
-    /// Instantaneous geometric strain: `sqrt(2/3 h:h)` with the logarithmic strain `h` from the initial shape to that of now.
-    /// An element that is turned inside out has met it.
-    pub geometric_strain: Option<f64>,
-    /// Incremental geometric strain: `sqrt(2/3 D:D)` over time, with the rate of deformation `D`. It never falls. An element
-    /// that is turned inside out has met it.
-    pub incremental_strain: Option<f64>,
-    /// Effective plastic strain; of shells, whose layers break at it one by one, that of the last of them. Shells erode by nothing else.
-    pub plastic_strain: Option<f64>,
-    /// The failure law of the material: damage has reached 1.
-    pub failure: bool,
-    /// Greatest logarithmic shear strain from the initial shape: half of what the greatest principal one is above the least.
-    /// An element that is turned inside out has met it, here and in the next two.
-    pub shear_strain: Option<f64>,
-    /// Greatest logarithmic principal strain from the initial shape, in tension.
-    pub principal_strain: Option<f64>,
-    /// Greatest logarithmic principal strain from the initial shape, in compression.
-    pub compressive_strain: Option<f64>,
-    /// Logarithm of the volume over the initial one.
-    pub expansion: Option<f64>,
-    /// Logarithm of the initial volume over the volume.
-    pub compaction: Option<f64>,
-    /// Pressure, without artificial viscosity (stress).
-    pub pressure: Option<f64>,
-    /// Mean stress in tension: the pressure with its sign turned (stress).
-    pub tension: Option<f64>,
-    /// Greatest principal stress, in tension (stress).
-    pub principal_stress: Option<f64>,
-    /// Von Mises stress (stress).
-    pub von_mises: Option<f64>,
-    /// The time step that the element allows, by the wave speed of its material at rest and with the safety factor, is below
-    /// this (time).
-    pub time_step: Option<f64>,
-}
-
-impl Criteria {
-    pub fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// Whether the shape of now is compared with the initial one.
-    fn measures_shape(&self) -> bool {
-        Shape::of(self).is_some()
-    }
-}
-
-/// What a piece carries of erosion, in runs where anything erodes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PieceErosion {
-    /// Cycle in which each local element eroded, or [`ALIVE`].
-    pub eroded: Vec<u64>,
-    /// Incremental geometric strain by local element; empty if no part of the run erodes by it.
-    pub strain: Vec<f64>,
-    /// Position at time zero by local node (length); empty in states, which it does not change.
-    pub initial: Vec<[f64; 3]>,
 }
 
 /// What the elements of a block answer to erosion in a cycle.
@@ -168,13 +108,15 @@ impl Eroding {
         safety_factor: f64,
     ) -> Self {
         let n_slots = block.n_slots();
+        // Whether the shape of now is compared with the initial one.
+        let measures_shape = Shape::of(criteria).is_some();
         let mut eroding = Self {
             criteria: *criteria,
             sound_square: (material.bulk() + 4.0 / 3.0 * material.shear()) / material.density,
             frequency: criteria.time_step.map_or(f64::INFINITY, |limit| safety_factor / limit),
             eroded: vec![ALIVE; n_slots],
             strain: vec![0.0; if criteria.incremental_strain.is_some() { n_slots } else { 0 }],
-            inverse: std::array::from_fn(|_| vec![0.0; if criteria.measures_shape() { n_slots } else { 0 }]),
+            inverse: std::array::from_fn(|_| vec![0.0; if measures_shape { n_slots } else { 0 }]),
             eroded_now: Casualties::default(),
             changed: false,
         };
@@ -188,7 +130,7 @@ impl Eroding {
             if let (Some(to), Some(from)) = (eroding.strain.get_mut(slot), state.strain.get(e)) {
                 *to = *from;
             }
-            if criteria.measures_shape() && state.initial.len() == block.nodes.len() {
+            if measures_shape && state.initial.len() == block.nodes.len() {
                 let corners = block.corners(e).map(|n| state.initial[n as usize]);
                 let axis = |a: usize| modes_of(corners.map(|x| Scalar(x[a]))).map(|mode| mode.0);
                 let [x, y, z] = [0, 1, 2].map(|a| {

@@ -70,6 +70,19 @@ impl Quantum {
     }
 }
 
+/// The quanta of a run's sums.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quanta {
+    /// Forces; may be made coarser by an order.
+    pub force: Quantum,
+    /// Energies.
+    pub energy: Quantum,
+    /// Momenta.
+    pub momentum: Quantum,
+    /// Quantum of moments over that of forces, a power of two (length).
+    pub arm: f64,
+}
+
 /// Whether sums are exact: always, but in builds that measure what that costs (feature `plain-sums`).
 pub(crate) const EXACT: bool = !cfg!(feature = "plain-sums");
 

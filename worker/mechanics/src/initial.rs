@@ -3,18 +3,16 @@
 
 use crate::{
     burn::lighting_time,
-    contact::Extent,
-    contact::Settings,
+    constraint::{Constraint, MAX_WALLS},
+    contact::{Extent, Settings},
     element::shell4,
-    erosion::ALIVE,
-    exact::Quantum,
+    exact::{Quanta, Quantum},
     load::{Drive, SurfaceKind},
     material::Material,
     mesh::{FACES, Mesh, Part, Topology},
     rigid::{Body, cross, dot},
-    setup::{Constraint, MAX_WALLS, Setup},
-    state::{GlobalState, N_FIELDS, PartHistory, ShellState, field},
-    vote::Quanta,
+    setup::Setup,
+    state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field},
     wall::{Motion, RigidWall},
 };
 

@@ -22,6 +22,7 @@
 
 pub mod block;
 pub mod burn;
+pub mod constraint;
 pub mod contact;
 mod copy_index;
 pub mod cycle;
@@ -47,3 +48,4 @@ pub mod state;
 pub mod strength;
 pub mod vote;
 pub mod wall;
+pub mod work;

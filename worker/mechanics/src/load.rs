@@ -109,7 +109,7 @@ pub struct Loads {
     pub relaxation: Option<Relaxation>,
 }
 
-/// Most nodal forces in a run: one bit each in [`crate::setup::Constraint::forces`].
+/// Most nodal forces in a run: one bit each in [`crate::constraint::Constraint::forces`].
 pub const MAX_FORCES: usize = 32;
 
 /// A force on each of some nodes.

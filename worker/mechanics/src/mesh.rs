@@ -82,7 +82,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// Number of arrays that such shells have of their own ([`crate::block::Piece::own`]).
+    /// Number of arrays that such shells have of their own ([`crate::piece::Piece::own`]).
     pub fn n_fields(&self) -> usize {
         shell4::ELEMENT + shell4::LAYER * self.rule.points().map_or(0, |points| points.len())
     }
@@ -135,6 +135,16 @@ impl Part {
         }
     }
 
+    /// Whether its elements turn the nodes that they have.
+    pub fn turns_nodes(&self) -> bool {
+        self.section().is_some()
+    }
+
+    /// Thickness of its elements, of a kind that has a thickness and no height (length).
+    pub fn thickness(&self) -> Option<f64> {
+        self.section().map(|section| section.thickness)
+    }
+
     /// Number of nodes of an element, the first of its [`Part::corners`].
     pub fn n_corners(&self) -> usize {
         match &self.topology {
@@ -153,7 +163,7 @@ impl Part {
         }
     }
 
-    /// Number of arrays that its elements have of their own ([`crate::block::Piece::own`]).
+    /// Number of arrays that its elements have of their own ([`crate::piece::Piece::own`]).
     pub fn n_own(&self) -> usize {
         match &self.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } if self.hourglass.is_elastic() => {

@@ -9,14 +9,14 @@ mod hold;
 mod tally;
 
 use crate::{
+    constraint::Constraint,
     contact::Extent,
     element::vector::Vector,
-    exact::rounded,
+    exact::{Quanta, rounded},
     lanes::{Lane, SET, Width, dispatch::Task},
     load::Loads,
-    setup::Constraint,
-    vote::{Quanta, Work},
     wall::{Pose, RigidWall, WallVote},
+    work::Work,
 };
 use tally::Tally;
 

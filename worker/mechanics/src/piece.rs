@@ -6,13 +6,55 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    block::Piece,
-    element::layout::n_runs,
-    erosion::PieceErosion,
+    element::{hourglass::Hourglass, layout::n_runs},
+    erosion::criteria::PieceErosion,
     lanes::SET,
     mesh::{Mesh, Topology},
     state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},
 };
+
+/// State of a sub-domain. Node arrays are by local node (structured: I fastest), element arrays by local
+/// element (structured: I fastest).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Piece {
+    /// Part index.
+    pub part: u32,
+    /// Index into [`crate::setup::Setup::materials`].
+    pub material: u32,
+    /// Index space or connectivity of the piece; explicit corners are local nodes.
+    pub topology: Topology,
+    /// Global node index of each local node.
+    pub nodes: Vec<u32>,
+    /// Global element index of each local element.
+    pub elements: Vec<u32>,
+    /// Position `x_n` (length).
+    pub x: Vec<[f64; 3]>,
+    /// Velocity `v_{n-1/2}` (length per time).
+    pub v: Vec<[f64; 3]>,
+    /// Nodal mass, that of all elements at the node.
+    pub mass: Vec<f64>,
+    /// Index into [`crate::setup::Setup::constraints`].
+    pub constraint: Vec<u16>,
+    /// Volume at time zero.
+    pub initial_volume: Vec<f64>,
+    /// One array per entry of [`crate::state::FIELDS`].
+    pub fields: [Vec<f64>; N_FIELDS],
+    /// In runs where anything erodes.
+    pub erosion: Option<PieceErosion>,
+    /// What contact keeps of each local node, by number; no array where it keeps nothing.
+    pub contact: Vec<Vec<f64>>,
+    /// What nodes of shells have beside that; empty of solids.
+    pub shells: ShellState,
+    /// What elements of this kind have beside [`Piece::fields`], one array per number: of shells six hourglass forces, thickness,
+    /// internal energy, energy of hourglass control, then for each point through the thickness, from below, stress xx, yy,
+    /// xy, yz, zx in the frame of the element, plastic strain, temperature; of solids with elastic hourglass control its
+    /// forces, x, y, z of each mode; of other solids nothing.
+    pub own: Vec<Vec<f64>>,
+    /// Hourglass control of solids.
+    pub hourglass: Hourglass,
+    /// One array per entry of [`Material::history`].
+    pub history: Vec<Vec<f64>>,
+}
 
 /// Which elements of a part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,19 +5,20 @@
 //! processor, a compiler or a build that rounds one operation otherwise has another hash.
 
 use crate::{
-    block::{Block, Piece},
+    block::Block,
+    constraint::Constraint,
     contact::{Batch, BatchFace, BatchNode, BatchUnit, Contact, Settings},
     cycle::{self, Domain, Interval, Meter, Subdomain},
     element::{ElementVote, hex8},
     erosion::Erosion,
-    exact::Quantum,
+    exact::{Quanta, Quantum},
     lanes::{Width, functions, scalar::Scalar},
     load::Loads,
     material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
     mesh::{Part, Topology},
-    setup::{Constraint, Control, Setup},
+    piece::Piece,
+    setup::{Control, Setup},
     state::{N_FIELDS, ShellState, field},
-    vote::Quanta,
 };
 
 /// What the fixed problem comes to on the lanes of one width: 32 hexadecimal digits, the same on every machine.

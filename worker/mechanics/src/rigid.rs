@@ -11,10 +11,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    exact::Quantum,
+    exact::{Quanta, Quantum},
     load::{Drive, Loads},
     nodes::share_before,
-    vote::{Quanta, Work},
+    work::Work,
 };
 
 pub mod shape;

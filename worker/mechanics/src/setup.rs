@@ -3,13 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    burn::Detonation,
-    contact,
-    erosion::Erosion,
-    load::{Drive, Loads},
-    material::Material,
-    rigid::Body,
-    wall::RigidWall,
+    burn::Detonation, constraint::Constraint, contact, erosion::Erosion, load::Loads, material::Material,
+    rigid::Body, wall::RigidWall,
 };
 
 /// The rules of a run. Equal on every worker.
@@ -34,26 +29,6 @@ pub struct Setup {
     pub erosion: Erosion,
 }
 
-/// What acts on a node alone: prescribed velocities, walls, forces. A node's constraint is the same on every holder.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Constraint {
-    /// Prescribed velocity by axis x, y, z (length per time); `None` is free, a constant 0 is fixed, and one
-    /// fixed axis is a symmetry plane.
-    pub velocity: [Option<Drive>; 3],
-    /// Walls that the node feels, one bit per entry of [`Setup::walls`]. Decks give it for walls that name nodes; the
-    /// start of a run adds the walls that name parts ([`crate::initial::bind_walls`]).
-    pub walls: u32,
-    /// Forces on the node, one bit per entry of [`Loads::forces`].
-    pub forces: u32,
-    /// Axes about which a node of shells does not turn: bit 0 is x.
-    pub clamped: u8,
-    /// By axis the number of the support that prescribes the velocity, from 1; 0 is none whose force is wanted.
-    pub supports: [u8; 3],
-}
-
-/// Highest number of a support whose force is booked.
-pub const MAX_SUPPORTS: u8 = 64;
-
 impl Setup {
     /// How many walls and supports book what nodes give them: supports stand behind the walls, by their number.
     pub fn n_holders(&self) -> usize {
@@ -61,9 +36,6 @@ impl Setup {
         self.walls.len() + usize::from(supports)
     }
 }
-
-/// Most walls in a run: one bit each in [`Constraint::walls`].
-pub const MAX_WALLS: usize = 32;
 
 /// Time step, damping and ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

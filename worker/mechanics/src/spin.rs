@@ -3,7 +3,11 @@
 //! As for the rest of a node, every block that has a copy does this with the same total moment and inertia and gets the
 //! same bits; the booked copy alone counts. Nodes are few beside the work of their elements, so this is plain code.
 
-use crate::{lanes::SET, nodes::Advance, nodes::NodeSet, vote::Work};
+use crate::{
+    lanes::SET,
+    nodes::{Advance, NodeSet},
+    work::Work,
+};
 
 /// Rotations of the nodes of a block, by local node and padded as its other arrays are.
 pub struct Turning {

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Stands for the cycle of erosion of an element that is alive.
+pub const ALIVE: u64 = u64::MAX;
+
 /// Element state fields in their order inside [`GlobalState::elements`] and inside a block.
 ///
 /// Deviatoric stress (zz is minus the sum of xx and yy), pressure, internal energy per initial volume,
@@ -94,7 +97,7 @@ pub struct GlobalState {
     pub initial_volume: Vec<f64>,
     /// One array per entry of [`FIELDS`], each by global element index.
     pub elements: [Vec<f64>; N_FIELDS],
-    /// Cycle in which each element eroded, or [`crate::erosion::ALIVE`]; empty where nothing can.
+    /// Cycle in which each element eroded, or [`ALIVE`]; empty where nothing can.
     pub eroded: Vec<u64>,
     /// Incremental geometric strain by element; empty where none erodes by it.
     pub strain: Vec<f64>,
@@ -102,7 +105,7 @@ pub struct GlobalState {
     pub contact: Vec<Vec<f64>>,
     /// What nodes of shells have beside that; empty arrays in a run without shells.
     pub shells: ShellState,
-    /// What elements have beside [`GlobalState::elements`], see [`crate::block::Piece::own`]: as many arrays as the kind that has most.
+    /// What elements have beside [`GlobalState::elements`], see [`crate::piece::Piece::own`]: as many arrays as the kind that has most.
     pub own: Vec<Vec<f64>>,
     /// History variables, for each part whose material has some, in the order of parts.
     pub history: Vec<PartHistory>,
@@ -144,7 +147,7 @@ impl GlobalState {
     }
 
     pub fn is_eroded(&self, element: usize) -> bool {
-        self.eroded.get(element).is_some_and(|&cycle| cycle != crate::erosion::ALIVE)
+        self.eroded.get(element).is_some_and(|&cycle| cycle != ALIVE)
     }
 
     /// Number of elements that have eroded.
@@ -161,7 +164,7 @@ impl GlobalState {
             constraint: self.constraint.clone(),
             initial_volume: self.initial_volume.clone(),
             // Kept in length alone: the states of parts that do not erode have nothing of this.
-            eroded: vec![crate::erosion::ALIVE; self.eroded.len()],
+            eroded: vec![ALIVE; self.eroded.len()],
             strain: vec![0.0; self.strain.len()],
             contact: vec![Vec::new(); self.contact.len()],
             shells: ShellState { spin: Vec::new(), inertia: self.shells.inertia.clone() },
@@ -184,7 +187,7 @@ impl GlobalState {
             x: vec![[0.0; 3]; n_nodes],
             v: vec![[0.0; 3]; n_nodes],
             elements: std::array::from_fn(|_| vec![0.0; n_elements]),
-            eroded: vec![crate::erosion::ALIVE; self.eroded.len()],
+            eroded: vec![ALIVE; self.eroded.len()],
             strain: vec![0.0; self.strain.len()],
             contact: vec![vec![0.0; n_nodes]; self.contact.len()],
             shells: ShellState {

@@ -6,10 +6,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    contact::{ContactVote, Extent, PairEnergies},
+    contact::{ContactVote, Extent, PairEnergies, PairVote},
     element::ElementVote,
     rigid,
     wall::WallVote,
+    work::Work,
 };
 
 /// The vote of one cycle.
@@ -100,56 +101,6 @@ pub struct Watched {
     pub elements: Vec<u32>,
     /// Pairs of parts.
     pub contacts: Vec<[u32; 2]>,
-}
-
-/// Contact of one pair of parts in one cycle: exact sums.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PairVote {
-    /// Force on the first part from the second.
-    pub force: [f64; 3],
-    /// Contacts in force: nodes of either in zones of the other.
-    pub hits: u64,
-}
-
-impl PairVote {
-    /// Adds what other contacts of the same pair give.
-    pub fn merge(&mut self, other: &Self) {
-        for axis in 0..3 {
-            self.force[axis] += other.force[axis];
-        }
-        self.hits += other.hits;
-    }
-}
-
-/// Work done from outside by the impulses of one cycle, which act at `t_n`; exact sums.
-///
-/// An impulse `J` takes a node from `v_{n-1/2}` to `v_{n+1/2}`, so its work is `J . (v_{n-1/2} + v_{n+1/2}) / 2`. Only the
-/// first half of it is done at `t_n`, where the kinetic energy `1/2 m v_{n-1/2} . v_{n+1/2}` and the internal energy stand;
-/// the second half follows with the motion from `x_n` to `x_{n+1}`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Work {
-    /// `J . v_{n-1/2} / 2`: part of the work up to `t_n`.
-    pub before: f64,
-    /// `J . v_{n+1/2} / 2`: part of the work up to `t_{n+1}`.
-    pub after: f64,
-}
-
-impl Work {
-    /// Adds the work of other impulses of the cycle.
-    pub fn merge(&mut self, other: Self) {
-        self.before += other.before;
-        self.after += other.after;
-    }
-
-    /// Puts off what the impulses at the start of a run do: no time has passed before them.
-    pub fn put_off(&mut self) {
-        *self = Self { before: 0.0, after: self.whole() };
-    }
-
-    /// Both halves.
-    pub fn whole(self) -> f64 {
-        self.before + self.after
-    }
 }
 
 /// Energies of one part in one cycle.
@@ -320,17 +271,4 @@ impl Vote {
             self.fault = Some(new);
         }
     }
-}
-
-/// The quanta of a run's sums.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Quanta {
-    /// Forces; may be made coarser by an order.
-    pub force: crate::exact::Quantum,
-    /// Energies.
-    pub energy: crate::exact::Quantum,
-    /// Momenta.
-    pub momentum: crate::exact::Quantum,
-    /// Quantum of moments over that of forces, a power of two (length).
-    pub arm: f64,
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     exact::Quantum,
     load::{Curve, Drive},
-    vote::Work,
+    work::Work,
 };
 
 /// A wall that no node of the named parts enters.

@@ -6,6 +6,7 @@ use std::{
 };
 
 use mechanics::{
+    constraint::Constraint,
     cycle::{Domain, Meter, Plan, Sets, Subdomain},
     initial,
     lanes::Width,
@@ -13,7 +14,7 @@ use mechanics::{
     material::{Eos, Failure, Heat, Material, Strength},
     mesh::{Mesh, Part, Topology},
     piece::{Region, cut},
-    setup::{Constraint, Control, Setup},
+    setup::{Control, Setup},
 };
 
 /// Counts the calls that take memory, on all threads.

@@ -15,8 +15,8 @@ use tokio::{
 };
 use tracing::warn;
 
-use super::{CONNECTIONS, Circle, DIAL_LIMIT, HEARTBEAT_MS, Key, News, Shared, What, settings};
-use crate::runner::Input;
+use super::{CONNECTIONS, Circle, DIAL_LIMIT, HEARTBEAT_MS, Shared, settings};
+use crate::input::{Input, Key, News, What};
 
 /// Takes connections for ever; each fault of one is one line in the log.
 pub(super) async fn listen(listener: TcpListener, shared: Arc<Shared>) {

@@ -18,8 +18,11 @@ use protocol::{
 use tokio::sync::mpsc;
 use tracing::{debug, info, warn};
 
-use super::{Circle, Key, News, Peers, Shared, What, connect, pairs::Heard, pairs::Pairs};
-use crate::{runner::Input, session::Session};
+use super::{Circle, Peers, Shared, connect, pairs::Heard, pairs::Pairs};
+use crate::{
+    input::{Input, Key, News, What},
+    session::Session,
+};
 
 /// What comes of news.
 #[derive(Debug, Default, PartialEq)]

@@ -1,6 +1,6 @@
 //! What happens to a session, and what it wants done.
 
-use mechanics::{block::Piece, cycle::Plan, exact::Quantum, vote::Vote, wall::Pose};
+use mechanics::{cycle::Plan, exact::Quantum, piece::Piece, vote::Vote, wall::Pose};
 use protocol::message::{Assign, ToMaster, ToPeer, ToWorker, Work};
 
 /// What happens to a session.

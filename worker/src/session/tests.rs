@@ -1,7 +1,11 @@
 //! A session without a master, sockets or clocks.
 
 use super::*;
-use mechanics::{cycle::Ghost, setup::Control, setup::Setup, vote::Quanta};
+use mechanics::{
+    cycle::Ghost,
+    exact::Quanta,
+    setup::{Control, Setup},
+};
 
 fn assign(cycle: u64) -> Box<Assign> {
     let quantum = Quantum::for_reference(1.0, 42);

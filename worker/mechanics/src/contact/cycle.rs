@@ -1,15 +1,16 @@
 //! One cycle of contact of a batch: the forces of all kinds of pairs, and what they book together.
 
 use super::{
-    ContactVote, Settings, force,
+    ContactVote, Settings,
+    batch::Batch,
+    force,
     history::History,
     kinds::Kinds,
     pair::{Books, Cycle},
     pair_energy::{ByPair, PairEnergies},
     tally::Tally,
-    work_unit::Batch,
 };
-use crate::{exact::Quantum, lanes::Width, vote::PairVote};
+use crate::{contact::PairVote, exact::Quantum, lanes::Width};
 
 /// The contact of one batch, from one sort to the next.
 #[derive(Clone, Debug)]

@@ -12,12 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Settings, WARNING,
-    pair::Kind,
-    surface::Surface,
-    work_unit::{Batch, WorkUnit},
-};
+use super::{Settings, WARNING, batch::Batch, pair::Kind, surface::Surface, work_unit::WorkUnit};
 
 /// Pairs that never interact because they were inside the zone at time zero.
 ///

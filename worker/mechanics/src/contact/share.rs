@@ -6,11 +6,10 @@
 use std::ops::Range;
 
 use super::{
+    batch::{Batch, BatchUnit, Listed},
     edges::BatchEdges,
-    kinds::Listed,
     surface::Exposed,
     ties::BatchTies,
-    work_unit::{Batch, BatchUnit},
 };
 
 /// Nodes of units for which another share is worth its own lists.

@@ -340,9 +340,9 @@ impl Surface {
 
 /// Penalty stiffness of a side of an element of a part.
 fn stiffness_of(part: &Part, bulk: f64, area: f64, volume: f64) -> f64 {
-    match part.section() {
+    match part.thickness() {
         // As the shell itself resists in its plane: across its thickness it would rule the time step.
-        Some(section) => bulk * section.thickness,
+        Some(thickness) => bulk * thickness,
         None if volume > 0.0 => bulk * area * area / volume,
         None => 0.0,
     }

@@ -1,6 +1,8 @@
 //! Forces between pairs of parts, for histories: sums over the contacts of a cycle.
 
-use crate::{exact::Quantum, vote::PairVote};
+use serde::{Deserialize, Serialize};
+
+use crate::exact::Quantum;
 
 /// A sum over all contacts of a pair has far more terms than one over those of a node, so it has a quantum that is
 /// `2^12` times as large: `2^21` terms at which a coarser quantum is asked for are added exactly. Of the 42 bits below the
@@ -9,6 +11,25 @@ const COARSER: u32 = 12;
 
 /// No pair.
 const NONE: u32 = u32::MAX;
+
+/// Contact of one pair of parts in one cycle: exact sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PairVote {
+    /// Force on the first part from the second.
+    pub force: [f64; 3],
+    /// Contacts in force: nodes of either in zones of the other.
+    pub hits: u64,
+}
+
+impl PairVote {
+    /// Adds what other contacts of the same pair give.
+    pub fn merge(&mut self, other: &Self) {
+        for axis in 0..3 {
+            self.force[axis] += other.force[axis];
+        }
+        self.hits += other.hits;
+    }
+}
 
 /// Sums by pair of parts. Whatever order contacts come in, the bits are the same.
 #[derive(Clone, Debug)]

@@ -8,21 +8,22 @@ use serde::{Deserialize, Serialize};
 use super::{
     Domain,
     bodies::Held,
-    deal::Order,
     ghosts::Ghosts,
-    held_block::HeldBlock,
-    sharing::{Exchange, Groups, Share},
+    held_block::{HeldBlock, Order, Share},
+    sharing::{Exchange, Groups},
 };
 use crate::{
-    block::{Block, Piece},
+    block::Block,
     copy_index::CopyIndex,
     element::ElementVote,
     erosion::Eroding,
+    exact::Quanta,
     lanes::{SET, Width},
     load::face::{self, FaceVote},
     nodes::{Booked, NodeSet},
+    piece::Piece,
     setup::Setup,
-    vote::{Gone, Quanta, Vote, Watched},
+    vote::{Gone, Vote, Watched},
     wall::WallVote,
 };
 

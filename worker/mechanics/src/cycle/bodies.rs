@@ -7,7 +7,12 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::{Domain, Ghosts, HeldBlock, Meter, NONE, deal::deal, touch::Places};
+use super::{
+    Domain, Ghosts, Meter, NONE,
+    deal::deal,
+    held_block::{HeldBlock, Led},
+    touch::Places,
+};
 use crate::{
     block::Block,
     copy_index::CopyIndex,
@@ -20,24 +25,7 @@ use crate::{
     vote::Vote,
 };
 
-/// Nodes of a body in a block or in a share of contact, and what pushes the body there.
-pub(super) struct Led {
-    body: u32,
-    /// Local node and place in the body.
-    nodes: Vec<[u32; 2]>,
-    push: Push,
-}
-
 impl Led {
-    /// Those of one body among `list`.
-    fn of(list: &mut Vec<Self>, body: u32) -> &mut Self {
-        let at = list.iter().position(|led| led.body == body).unwrap_or_else(|| {
-            list.push(Self { body, nodes: Vec::new(), push: Push::default() });
-            list.len() - 1
-        });
-        &mut list[at]
-    }
-
     /// Adds up what pushes the body here.
     fn add_up(&mut self, f: &[Vec<f64>; 3], turning: Option<&Turning>, bodies: Bodies<'_>, force: Quantum) {
         let (state, body) = (&bodies.held[self.body as usize].state, &bodies.of[self.body as usize]);

@@ -5,7 +5,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::{Meter, held_block::HeldBlock};
+use super::Meter;
 
 /// Does `work` on each item. Items are begun in their order; each is done by one thread.
 pub(super) fn deal<I>(items: I, meter: &dyn Meter, contact: bool, work: impl Fn(I::Item) + Sync)
@@ -53,35 +53,6 @@ fn together(n: usize, work: &(impl Fn() + Sync)) {
     } else {
         work();
     }
-}
-
-/// The order in which blocks are dealt: those that cost most first, because what is begun last is waited for.
-#[derive(Default)]
-pub(super) struct Order {
-    /// Memory for references, empty between two uses.
-    memory: Vec<&'static mut HeldBlock>,
-}
-
-impl Order {
-    /// Does `work` on each block.
-    pub(super) fn deal(
-        &mut self,
-        held_blocks: &mut [HeldBlock],
-        meter: &dyn Meter,
-        work: impl Fn(&mut HeldBlock) + Sync,
-    ) {
-        let mut list: Vec<&mut HeldBlock> = std::mem::take(&mut self.memory);
-        list.extend(held_blocks);
-        list.sort_unstable_by_key(|held_block| std::cmp::Reverse(held_block.cost()));
-        deal(list.drain(..), meter, false, work);
-        self.memory = emptied(list);
-    }
-}
-
-/// The memory of a list for references of another lifetime; collecting in place keeps it.
-fn emptied<'a>(mut list: Vec<&mut HeldBlock>) -> Vec<&'a mut HeldBlock> {
-    list.clear();
-    list.into_iter().map(|_| unreachable!("the list is empty")).collect()
 }
 
 #[cfg(test)]

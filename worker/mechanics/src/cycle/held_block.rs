@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, ops::Range};
 
-use super::{bodies::Led, sharing::Share};
+use super::{Meter, deal::deal};
 use crate::{
     block::Block,
     element::ElementVote,
@@ -10,6 +10,7 @@ use crate::{
     lanes::{SET, Width},
     load::face::{self, FaceVote, LoadedFace},
     nodes::{Advance, Booked, NodeSet, Nodes},
+    rigid::Push,
     setup::Setup,
     spin,
     wall::WallVote,
@@ -126,4 +127,76 @@ impl HeldBlock {
             }
         }
     }
+}
+
+/// Nodes of a block that have other holders.
+#[derive(Default)]
+pub(super) struct Share {
+    /// Local node and place, in the exchange.
+    pub exchanged: Vec<[u32; 2]>,
+    /// Likewise among the totals of groups.
+    pub local: Vec<[u32; 2]>,
+    /// By share of contact: local node and the node there, of those that no other block has.
+    pub touched: Vec<Vec<[u32; 2]>>,
+    /// Local node, share of contact and the node there that leaves its history, unless that travels.
+    pub kept: Vec<[u32; 3]>,
+}
+
+impl Share {
+    /// None yet; `n_shares` of contact.
+    pub fn clear(&mut self, n_shares: usize) {
+        self.exchanged.clear();
+        self.local.clear();
+        self.kept.clear();
+        self.touched.iter_mut().for_each(Vec::clear);
+        self.touched.resize(n_shares, Vec::new());
+    }
+}
+
+/// Nodes of a body in a block or in a share of contact, and what pushes the body there.
+pub(super) struct Led {
+    pub body: u32,
+    /// Local node and place in the body.
+    pub nodes: Vec<[u32; 2]>,
+    pub push: Push,
+}
+
+impl Led {
+    /// Those of one body among `list`.
+    pub fn of(list: &mut Vec<Self>, body: u32) -> &mut Self {
+        let at = list.iter().position(|led| led.body == body).unwrap_or_else(|| {
+            list.push(Self { body, nodes: Vec::new(), push: Push::default() });
+            list.len() - 1
+        });
+        &mut list[at]
+    }
+}
+
+/// The order in which blocks are dealt: those that cost most first, because what is begun last is waited for.
+#[derive(Default)]
+pub(super) struct Order {
+    /// Memory for references, empty between two uses.
+    memory: Vec<&'static mut HeldBlock>,
+}
+
+impl Order {
+    /// Does `work` on each block.
+    pub fn deal(
+        &mut self,
+        held_blocks: &mut [HeldBlock],
+        meter: &dyn Meter,
+        work: impl Fn(&mut HeldBlock) + Sync,
+    ) {
+        let mut list: Vec<&mut HeldBlock> = std::mem::take(&mut self.memory);
+        list.extend(held_blocks);
+        list.sort_unstable_by_key(|held_block| std::cmp::Reverse(held_block.cost()));
+        deal(list.drain(..), meter, false, work);
+        self.memory = emptied(list);
+    }
+}
+
+/// The memory of a list for references of another lifetime; collecting in place keeps it.
+fn emptied<'a>(mut list: Vec<&mut HeldBlock>) -> Vec<&'a mut HeldBlock> {
+    list.clear();
+    list.into_iter().map(|_| unreachable!("the list is empty")).collect()
 }

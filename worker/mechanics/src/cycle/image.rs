@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Domain, Meter, deal::deal, held_block::HeldBlock};
-use crate::block::Piece;
+use crate::piece::Piece;
 
 impl Domain {
     /// Position, velocity and contact history of `nodes` (global), for workers that will have them as ghosts.

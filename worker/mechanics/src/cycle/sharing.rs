@@ -1,7 +1,7 @@
 //! Total forces of nodes that several arrays hold: blocks, shares of contact, ghosts, other workers.
 //!
 //! What holds a node is one of its *holders*. They are added up in two steps, so that threads need no locks: totals are computed
-//! from what all holders have, which nobody changes meanwhile; then each block takes its own ([`Share`]). A node of the
+//! from what all holders have, which nobody changes meanwhile; then each block takes its own ([`Share`](super::held_block::Share)). A node of the
 //! [`Exchange`] has holders on other workers too, so what its holders here come to travels between the two steps. The
 //! other nodes that several blocks have stand in [`Groups`] by who their holders are, and are added up in plain loops. A
 //! node of one block that contact has too needs no total: its block adds what contact has. All terms are exact, so no
@@ -217,30 +217,6 @@ impl Group {
                 }
             }
         }
-    }
-}
-
-/// Nodes of a block that have other holders.
-#[derive(Default)]
-pub(super) struct Share {
-    /// Local node and place, in the exchange.
-    pub exchanged: Vec<[u32; 2]>,
-    /// Likewise among the totals of groups.
-    pub local: Vec<[u32; 2]>,
-    /// By share of contact: local node and the node there, of those that no other block has.
-    pub touched: Vec<Vec<[u32; 2]>>,
-    /// Local node, share of contact and the node there that leaves its history, unless that travels.
-    pub kept: Vec<[u32; 3]>,
-}
-
-impl Share {
-    /// None yet; `n_shares` of contact.
-    pub(super) fn clear(&mut self, n_shares: usize) {
-        self.exchanged.clear();
-        self.local.clear();
-        self.kept.clear();
-        self.touched.iter_mut().for_each(Vec::clear);
-        self.touched.resize(n_shares, Vec::new());
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::{
+    constraint::Constraint,
     contact::{Batch, Exclusions, Settings, Surface, WorkUnit, sort},
     element::shell4::Rule,
     erosion::Erosion,
@@ -10,7 +11,7 @@ use crate::{
     material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Section, Topology},
     piece::{Region, cut},
-    setup::{Constraint, Control},
+    setup::Control,
     state::field,
     vote::Watched,
 };

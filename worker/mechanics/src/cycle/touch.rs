@@ -3,12 +3,17 @@
 //! A share is one thread's work at a time and touches nothing but its own arrays; what several shares and blocks have of a node is
 //! added up afterwards ([`sharing`](super::sharing)).
 
-use super::{Domain, Meter, NONE, bodies::Led, deal::deal, ghosts::Ghosts, held_block::HeldBlock};
+use super::{
+    Domain, Meter, NONE,
+    deal::deal,
+    ghosts::Ghosts,
+    held_block::{HeldBlock, Led},
+};
 use crate::{
     contact::{Batch, Contact, ContactVote, Cut, PairEnergies, Settings, Share},
     copy_index::CopyIndex,
+    exact::Quanta,
     lanes::Width,
-    vote::Quanta,
 };
 
 /// Shares for each thread: so many that one which is slow holds up the others by little.

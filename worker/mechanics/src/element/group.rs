@@ -1,23 +1,13 @@
 //! The seam between a block and its elements: a block has nodes and one group of elements of one kind.
 //!
-//! An element kind is a module that implements [`Group`] and has an arm in [`Topology`] and in [`of`]; a block, a cycle, erosion,
+//! An element kind is a module that implements [`Group`] and has an arm in [`Topology`](crate::mesh::Topology) and in [`kinds`](super::kinds); a block, a cycle, erosion,
 //! loads and samples ask a group by this trait and by nothing else. Elements sit in *slots*, eight to a *lane set*, the same on every
 //! lane width; a slot may be empty.
 
 use std::ops::Range;
 
-use super::{
-    ElementVote, Step, hex8::group::Solids, layout::Layout, place::Nodal, shell4::Core, truss2::Trusses,
-};
-use crate::{
-    block::Piece,
-    erosion::Criteria,
-    lanes::Width,
-    material::Material,
-    mesh::Topology,
-    spin::Turning,
-    state::{N_FIELDS, ShellState},
-};
+use super::{ElementVote, Step, layout::Layout, place::Nodal};
+use crate::{erosion::criteria::Criteria, lanes::Width, material::Material, spin::Turning, state::N_FIELDS};
 
 /// Stands for the global element index in a slot without an element.
 pub(crate) const PHANTOM: u32 = u32::MAX;
@@ -121,29 +111,4 @@ pub(crate) trait Group: Send + Sync {
 
     /// A number of the stress of the first element, for tests that change it; none without elements.
     fn first_stress(&mut self) -> Option<&mut f64>;
-}
-
-/// The elements of a piece, whose element arrays they take, and the rotations of its nodes where its kind turns them.
-///
-/// # Panics
-/// If the arrays of the piece do not fit its topology, or elements of this kind cannot be of its material.
-pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, Option<Turning>) {
-    let n_nodes = piece.nodes.len();
-    match &piece.topology {
-        Topology::Structured { .. } | Topology::Explicit { .. } => (Box::new(Solids::of(piece)), None),
-        Topology::Shells { quads, section } => {
-            let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);
-            let fields = std::mem::take(&mut piece.own);
-            let material = materials.get(piece.material as usize).expect("shells need their material");
-            let volume = &piece.initial_volume;
-            let core = Core::new(quads, n_nodes, &piece.elements, volume, &fields, section, material);
-            let core = core.expect("the deck has checked section and material");
-            (Box::new(core), Some(Turning::new(&spin, inertia)))
-        }
-        Topology::Trusses { bars, .. } => {
-            let material = materials.get(piece.material as usize).expect("trusses need their material");
-            let bars = bars.clone();
-            (Box::new(Trusses::of(piece, bars, material)), None)
-        }
-    }
 }

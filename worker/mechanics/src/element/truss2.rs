@@ -12,10 +12,10 @@ use super::{
     place::Nodal,
 };
 use crate::{
-    block::Piece,
     lanes::{SET, scalar::Scalar},
     material::Material,
     mesh::spread,
+    piece::Piece,
     spin::Turning,
     state::{N_FIELDS, field},
     strength::{

@@ -4,7 +4,7 @@
 
 use std::f64::consts::SQRT_2;
 
-use super::Criteria;
+use super::criteria::Criteria;
 use crate::{
     element::{vector::Tensor, viscosity::Spread},
     failure::principal_stress,

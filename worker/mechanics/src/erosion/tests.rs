@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::{
-    block::Piece,
     element::{
         ElementVote,
         hourglass::{Hourglass, Kind, N_FORCES},
@@ -10,6 +9,7 @@ use crate::{
     exact::Quantum,
     material::{Eos, Failure, Strength},
     mesh::Topology,
+    piece::Piece,
     state::{N_FIELDS, ShellState},
 };
 

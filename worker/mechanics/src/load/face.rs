@@ -12,7 +12,7 @@ use crate::{
     mesh::FACES,
     rigid::{cross, dot},
     setup::Control,
-    vote::Work,
+    work::Work,
 };
 
 /// A loaded face and what acted on it in this cycle.

@@ -3,8 +3,8 @@
 use super::{Advance, NodeSet, Nodes};
 use crate::{
     lanes::SET,
-    vote::Work,
     wall::{Motion, Pose, WallVote, touched_quantum},
+    work::Work,
 };
 
 impl Advance<'_> {

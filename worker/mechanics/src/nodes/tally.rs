@@ -1,7 +1,7 @@
 //! What the nodes of a step say, lane by lane.
 
 use super::{Booked, arrays, splat};
-use crate::{element::vector::Vector, lanes::Lane, vote::Work};
+use crate::{element::vector::Vector, lanes::Lane, work::Work};
 
 /// [`Booked`] by lane; lanes join in any way.
 pub(super) struct Tally<L> {

@@ -7,13 +7,13 @@
 
 use super::{Body, State, cross, dot, full};
 use crate::{
+    constraint::Constraint,
     element::hex8,
     exact::Quantum,
     initial::largest_face,
     load::{Curve, Drive},
     material::Material,
     mesh::{CORNERS, Mesh, Part, Topology, quad_area},
-    setup::Constraint,
 };
 
 /// What a deck says of a body.

@@ -1,10 +1,10 @@
 use super::*;
 use crate::{
+    constraint::Constraint,
     element::shell4::Rule,
     load::{Curve, Gravity},
     material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Section, Topology},
-    setup::Constraint,
 };
 
 fn steel() -> Material {

@@ -173,12 +173,13 @@ impl StrengthLaw for Ceramic {
 mod tests {
     use super::*;
     use crate::{
-        block::{Block, Piece},
+        block::Block,
         element::{ElementVote, Step},
         exact::Quantum,
         lanes::Width,
         material::{Eos, Failure, Material, Strength},
         mesh::Topology,
+        piece::Piece,
         state::{ShellState, field},
     };
 

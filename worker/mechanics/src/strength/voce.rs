@@ -77,12 +77,13 @@ impl StrengthLaw for Voce {
 mod tests {
     use super::*;
     use crate::{
-        block::{Block, Piece},
+        block::Block,
         element::{ElementVote, Step},
         exact::Quantum,
         lanes::{Width, scalar::Scalar},
         material::{Eos, Failure, Material, Strength},
         mesh::Topology,
+        piece::Piece,
         state::{ShellState, field},
         strength::plane_stress::{Layer, Plane, PlaneLaw},
     };

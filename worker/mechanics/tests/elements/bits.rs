@@ -1,7 +1,7 @@
 //! Equality to the bit: lane widths, topologies, cuts, the order of sets, states.
 
 use mechanics::{
-    block::{Block, Piece},
+    block::Block,
     element::{
         ElementVote, Fault,
         hourglass::{Hourglass, Kind},
@@ -9,6 +9,7 @@ use mechanics::{
     lanes::Width,
     material::{Failure, Material},
     mesh::{Part, Topology},
+    piece::Piece,
     state::{N_FIELDS, field},
 };
 

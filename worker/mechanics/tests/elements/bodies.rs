@@ -1,7 +1,7 @@
 //! Bodies that the tests compute: pieces from corners or index spaces, and materials.
 
 use mechanics::{
-    block::{Block, Piece},
+    block::Block,
     element::{
         ElementVote, Step, hex8,
         hourglass::{Hourglass, N_FORCES},
@@ -10,6 +10,7 @@ use mechanics::{
     lanes::Width,
     material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
     mesh::{Part, Topology},
+    piece::Piece,
     state::{N_FIELDS, field},
 };
 

@@ -1,10 +1,11 @@
 //! Elastic hourglass control of one element: what its forces are, that they keep energy and turn with the element, and when they yield.
 
 use mechanics::{
-    block::{Block, Piece},
+    block::Block,
     element::hourglass::{Hourglass, Kind},
     lanes::Width,
     material::{Failure, Material},
+    piece::Piece,
     state::field,
 };
 use nalgebra::{Rotation3, Vector3};

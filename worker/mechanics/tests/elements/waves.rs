@@ -1,11 +1,12 @@
 //! Shock tubes, implosions and detonations in columns of elements.
 
 use mechanics::{
-    block::{Block, Piece},
+    block::Block,
     element::Step,
     exact::Quantum,
     lanes::Width,
     material::{Eos, Material, Strength},
+    piece::Piece,
     state::field,
 };
 

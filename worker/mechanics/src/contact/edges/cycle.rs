@@ -2,9 +2,10 @@
 
 use super::{
     super::{
-        BatchEdge, Settings, WARNING, force,
+        BatchEdge, Settings, WARNING,
+        batch::Batch,
+        force,
         pair::{Books, Cycle, Pairs},
-        work_unit::Batch,
         zone::Vector,
     },
     EDGE,

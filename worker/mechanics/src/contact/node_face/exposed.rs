@@ -10,7 +10,7 @@
 //! more than two nodes can travel. The history of a node is its offset and the depth of the last cycle, of the deepest of its hits.
 
 use super::{NodeFace, Work};
-use crate::contact::{history::History, surface::Exposed, work_unit::Batch};
+use crate::contact::{batch::Batch, history::History, surface::Exposed};
 
 /// How much a depth may grow in a cycle (gaps): twice what a node may travel, and a little for the turn of the face.
 const GROWTH: f64 = 0.45;

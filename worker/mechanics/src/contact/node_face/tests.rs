@@ -88,7 +88,7 @@ fn slowly(contact: &NodeFace, cycle: Cycle<'_>) -> ContactVote {
         let range = contact.candidates.starts[i] as usize..contact.candidates.starts[i + 1] as usize;
         for &face in &contact.candidates.faces[range] {
             let nearest = frame(face).nearest(p);
-            let bounds = Bounds::of(&contact.faces[face as usize].map(at), warning);
+            let bounds = search::Bounds::of(&contact.faces[face as usize].map(at), warning);
             if bounds.holds(p) && nearest.distance2 < warning * warning {
                 let (id, corners) = (contact.ids[face as usize], contact.faces[face as usize]);
                 near.push(Near { face, id, corners, nearest });

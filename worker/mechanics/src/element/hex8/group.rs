@@ -7,7 +7,6 @@ use std::mem::take;
 
 use super::{BySlot, View, leaving::Leaving, pass};
 use crate::{
-    block::Piece,
     element::{
         ElementVote,
         group::{Call, ElementArrays, Group, PHANTOM, Scanned},
@@ -18,6 +17,7 @@ use crate::{
     lanes::{SET, scalar::Scalar},
     material::Material,
     mesh::Topology,
+    piece::Piece,
     spin::Turning,
     state::{
         N_FIELDS,

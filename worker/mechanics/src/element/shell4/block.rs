@@ -12,7 +12,7 @@ use crate::{
         group::{Call, ElementArrays, Group},
         place::Nodal,
     },
-    erosion::Criteria,
+    erosion::criteria::Criteria,
     exact::Quantum,
     lanes::{SET, Width},
     material::Material,
@@ -123,7 +123,7 @@ impl Section {
 
 impl Core {
     /// Lays out the state of `quads.len()` elements in slots, eight to a set. `elements` are their global indices,
-    /// `volume` their area times thickness at the start, `fields` their state, see [`crate::block::Piece::own`].
+    /// `volume` their area times thickness at the start, `fields` their state, see [`crate::piece::Piece::own`].
     ///
     /// # Errors
     /// [`SectionError`].

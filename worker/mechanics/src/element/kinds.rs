@@ -1,0 +1,29 @@
+//! The kinds of elements that there are ([`group`](super::group)). A new one is an arm here.
+
+use super::{group::Group, hex8::group::Solids, shell4::Core, truss2::Trusses};
+use crate::{material::Material, mesh::Topology, piece::Piece, spin::Turning, state::ShellState};
+
+/// The elements of a piece, whose element arrays they take, and the rotations of its nodes where its kind turns them.
+///
+/// # Panics
+/// If the arrays of the piece do not fit its topology, or elements of this kind cannot be of its material.
+pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, Option<Turning>) {
+    let n_nodes = piece.nodes.len();
+    match &piece.topology {
+        Topology::Structured { .. } | Topology::Explicit { .. } => (Box::new(Solids::of(piece)), None),
+        Topology::Shells { quads, section } => {
+            let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);
+            let fields = std::mem::take(&mut piece.own);
+            let material = materials.get(piece.material as usize).expect("shells need their material");
+            let volume = &piece.initial_volume;
+            let core = Core::new(quads, n_nodes, &piece.elements, volume, &fields, section, material);
+            let core = core.expect("the deck has checked section and material");
+            (Box::new(core), Some(Turning::new(&spin, inertia)))
+        }
+        Topology::Trusses { bars, .. } => {
+            let material = materials.get(piece.material as usize).expect("trusses need their material");
+            let bars = bars.clone();
+            (Box::new(Trusses::of(piece, bars, material)), None)
+        }
+    }
+}
