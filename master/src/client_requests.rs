@@ -24,7 +24,7 @@ use tracing::info;
 
 use crate::{
     desk::{self, Brought},
-    notice::Notice,
+    notice::{self, Notice},
 };
 
 /// Bytes of a request around a deck.
@@ -129,7 +129,7 @@ impl ClientRequests<'_> {
             tokio::pin!(answer);
             loop {
                 tokio::select! {
-                    reply = &mut answer => break reply.unwrap_or_else(Reply::No),
+                    reply = &mut answer => break reply.unwrap_or_else(|why| Reply::No(why.to_string())),
                     frame = receiver.receive(), if early.len() < EARLY_FRAMES => early.push(frame?),
                 }
             }
@@ -146,15 +146,12 @@ impl ClientRequests<'_> {
     /// Asks the scheduler.
     async fn ask<T>(
         &self,
-        event: impl FnOnce(oneshot::Sender<T>) -> Notice,
-    ) -> std::result::Result<T, String> {
-        let (answer, answered) = oneshot::channel();
-        let ending = "the master is ending".to_owned();
-        self.notices.send(event(answer)).await.map_err(|_| ending.clone())?;
-        answered.await.map_err(|_| ending)
+        question: impl FnOnce(oneshot::Sender<T>) -> Notice,
+    ) -> std::result::Result<T, notice::Error> {
+        notice::ask(&self.notices, question).await
     }
 
-    async fn answer(&self, request: Request) -> std::result::Result<Reply, String> {
+    async fn answer(&self, request: Request) -> std::result::Result<Reply, Refusal> {
         Ok(match request {
             Request::Submit { name, text, options } => self.submit(name, text, options).await?,
             Request::Jobs => Reply::Jobs(self.ask(Notice::Jobs).await?),
@@ -176,15 +173,15 @@ impl ClientRequests<'_> {
                 Reply::Files(blocking(move || list(&folder)).await?)
             }
             Request::File { job, name, offset } => {
-                check_file_name(&name)?;
+                check_file_name(&name).map_err(Refusal::Name)?;
                 let folder = self.folder(job).await?;
                 Reply::Piece(blocking(move || piece(&folder.join(name), offset)).await?)
             }
-            Request::Watch { .. } => return Err("a watch is not answered here".to_owned()),
+            Request::Watch { .. } => return Err(Refusal::Watch),
         })
     }
 
-    async fn folder(&self, job: u32) -> std::result::Result<PathBuf, String> {
+    async fn folder(&self, job: u32) -> std::result::Result<PathBuf, notice::Error> {
         self.ask(|answer| Notice::Folder(job, answer)).await?
     }
 
@@ -193,14 +190,14 @@ impl ClientRequests<'_> {
         name: String,
         text: String,
         options: JobOptions,
-    ) -> std::result::Result<Reply, String> {
-        options.check().map_err(|error| error.to_string())?;
+    ) -> std::result::Result<Reply, Refusal> {
+        options.check().map_err(desk::Error::Options)?;
         let Brought { text, title, elements, .. } = match desk::read(name.clone(), text).await {
             Ok(brought) => brought,
             Err(desk::Error::Faults(faults)) => {
                 return Ok(Reply::Faults(faults.iter().map(ToString::to_string).collect()));
             }
-            Err(error) => return Err(error.to_string()),
+            Err(error) => return Err(error.into()),
         };
         let submit = |answer| Notice::Submit { name, title, text, elements, options, answer };
         let job = self.ask(submit).await??;
@@ -212,7 +209,7 @@ impl ClientRequests<'_> {
     async fn watch(&mut self, job: Option<u32>, receiver: &mut Receiver) -> Result<()> {
         let mut status = match self.ask(|answer| Notice::Watch(job, answer)).await.and_then(|s| s) {
             Ok(status) => status,
-            Err(why) => return self.reply(&Reply::No(why)),
+            Err(why) => return self.reply(&Reply::No(why.to_string())),
         };
         loop {
             let now = status.borrow_and_update().clone();
@@ -238,16 +235,57 @@ impl ClientRequests<'_> {
     }
 }
 
+/// Why a request is not answered as it asks.
+#[derive(Debug)]
+enum Refusal {
+    Scheduler(notice::Error),
+    Deck(desk::Error),
+    /// The name stands for no file of results.
+    Name(String),
+    File(PathBuf, std::io::Error),
+    /// Of results, something that is a folder or a link.
+    NoFile(PathBuf),
+    /// A watch is no single answer.
+    Watch,
+    /// Reading files had a bug.
+    Bug,
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Scheduler(error) => error.fmt(f),
+            Self::Deck(error) => error.fmt(f),
+            Self::Name(why) => f.write_str(why),
+            Self::File(path, error) => write!(f, "{}: {error}", path.display()),
+            Self::NoFile(path) => write!(f, "{} is no file", path.display()),
+            Self::Watch => f.write_str("a watch is not answered here"),
+            Self::Bug => f.write_str("a bug in the master; its log has the words"),
+        }
+    }
+}
+
+impl From<notice::Error> for Refusal {
+    fn from(error: notice::Error) -> Self {
+        Self::Scheduler(error)
+    }
+}
+
+impl From<desk::Error> for Refusal {
+    fn from(error: desk::Error) -> Self {
+        Self::Deck(error)
+    }
+}
+
 async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> std::result::Result<T, String> + Send + 'static,
-) -> std::result::Result<T, String> {
-    let done = tokio::task::spawn_blocking(work).await;
-    done.unwrap_or_else(|_| Err("a bug in the master; its log has the words".to_owned()))
+    work: impl FnOnce() -> std::result::Result<T, Refusal> + Send + 'static,
+) -> std::result::Result<T, Refusal> {
+    tokio::task::spawn_blocking(work).await.unwrap_or(Err(Refusal::Bug))
 }
 
 /// The results files of a folder with their lengths, by name.
-fn list(folder: &Path) -> std::result::Result<Vec<(String, u64)>, String> {
-    let fault = |e: std::io::Error| format!("{}: {e}", folder.display());
+fn list(folder: &Path) -> std::result::Result<Vec<(String, u64)>, Refusal> {
+    let fault = |e: std::io::Error| Refusal::File(folder.to_owned(), e);
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(fault)? {
         let entry = entry.map_err(fault)?;
@@ -264,10 +302,10 @@ fn list(folder: &Path) -> std::result::Result<Vec<(String, u64)>, String> {
 }
 
 /// At most [`PIECE_LIMIT`] bytes of a file.
-fn piece(path: &Path, offset: u64) -> std::result::Result<Vec<u8>, String> {
-    let fault = |e: std::io::Error| format!("{}: {e}", path.display());
+fn piece(path: &Path, offset: u64) -> std::result::Result<Vec<u8>, Refusal> {
+    let fault = |e: std::io::Error| Refusal::File(path.to_owned(), e);
     if !path.symlink_metadata().map_err(fault)?.is_file() {
-        return Err(format!("{} is no file", path.display()));
+        return Err(Refusal::NoFile(path.to_owned()));
     }
     let mut file = File::open(path).map_err(fault)?;
     file.seek(SeekFrom::Start(offset)).map_err(fault)?;

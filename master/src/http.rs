@@ -45,7 +45,7 @@ use api_state::ApiState;
 use guard::Refusal;
 
 use crate::{
-    notice::Notice,
+    notice::{self, Notice},
     places::{self, Places},
 };
 
@@ -153,7 +153,7 @@ async fn health(api_state: &ApiState) -> (StatusCode, &'static str) {
     if api_state.notices.is_closed() {
         return (StatusCode::SERVICE_UNAVAILABLE, "ending\n");
     }
-    match tokio::time::timeout(HEALTH_LIMIT, api::ask(api_state, Notice::Alive)).await {
+    match tokio::time::timeout(HEALTH_LIMIT, notice::ask(&api_state.notices, Notice::Alive)).await {
         Ok(Ok(())) => (StatusCode::OK, "ok\n"),
         Ok(Err(_)) => (StatusCode::SERVICE_UNAVAILABLE, "ending\n"),
         Err(_) => (StatusCode::SERVICE_UNAVAILABLE, "the owner of the queue does not answer\n"),

@@ -12,14 +12,20 @@ pub const QUEUED_LIMIT: usize = 1000;
 /// Most jobs that are remembered after their end.
 pub const ENDED_LIMIT: usize = 1000;
 
-/// Why a job is not removed.
+/// Why the queue does not do what is asked of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// There is none of this number.
+    /// There is no job of this number.
     Unknown(u32),
-    /// It waits or runs.
+    /// A job that is to be removed waits or runs.
     NotOver(u32, State),
+    /// A job in this state cannot change so.
+    Illegal(State, Change),
+    /// So many jobs wait, and no more may.
+    Full(usize),
 }
+
+impl std::error::Error for Error {}
 
 impl std::fmt::Display for Error {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -28,6 +34,10 @@ impl std::fmt::Display for Error {
             Self::NotOver(job, state) => {
                 write!(f, "job {job} is {}; `bolide cancel {job}` it first", state.name())
             }
+            Self::Illegal(state, change) => {
+                write!(f, "a job that is {} cannot {}", state.name(), format!("{change:?}").to_lowercase())
+            }
+            Self::Full(waiting) => write!(f, "{waiting} jobs wait, at most {QUEUED_LIMIT}; cancel some"),
         }
     }
 }
@@ -78,8 +88,8 @@ impl Starts {
 /// The state after a change.
 ///
 /// # Errors
-/// A sentence that names both, where the change cannot happen.
-pub fn after(state: State, change: Change) -> Result<State, String> {
+/// [`Error::Illegal`], where the change cannot happen.
+pub fn after(state: State, change: Change) -> Result<State, Error> {
     match (state, change) {
         (State::Queued, Change::Start) => Ok(State::Running),
         (State::Queued | State::Running | State::Held, Change::Cancel) => Ok(State::Cancelled),
@@ -92,7 +102,7 @@ pub fn after(state: State, change: Change) -> Result<State, String> {
         (State::Queued, Change::Finish | Change::Fail | Change::Suspend | Change::Resume)
         | (State::Running, Change::Start | Change::Resume)
         | (State::Done | State::Failed | State::Held | State::Cancelled, _) => {
-            Err(format!("a job that is {} cannot {change:?}", state.name()).to_lowercase())
+            Err(Error::Illegal(state, change))
         }
     }
 }
@@ -151,7 +161,7 @@ impl Queue {
     ///
     /// # Errors
     /// As for [`Queue::apply`].
-    pub fn resume(&mut self, id: u32, text: String) -> Result<State, String> {
+    pub fn resume(&mut self, id: u32, text: String) -> Result<State, Error> {
         let (state, _) = self.apply(id, Change::Resume)?;
         if let Some(job) = self.jobs.get_mut(&id) {
             job.text = Arc::new(text);
@@ -211,10 +221,10 @@ impl Queue {
         (text, elements): (String, u64),
         options: JobOptions,
         spool: &std::path::Path,
-    ) -> Result<u32, String> {
+    ) -> Result<u32, Error> {
         let waiting = self.jobs.values().filter(|job| job.state == State::Queued).count();
         if waiting >= QUEUED_LIMIT {
-            return Err(format!("{waiting} jobs wait, at most {QUEUED_LIMIT}; cancel some"));
+            return Err(Error::Full(waiting));
         }
         let id = self.next;
         self.next += 1;
@@ -250,8 +260,8 @@ impl Queue {
     ///
     /// # Errors
     /// As for [`after`], or if there is no such job.
-    pub fn apply(&mut self, id: u32, change: Change) -> Result<(State, Vec<u32>), String> {
-        let job = self.jobs.get_mut(&id).ok_or_else(|| format!("no job {id}"))?;
+    pub fn apply(&mut self, id: u32, change: Change) -> Result<(State, Vec<u32>), Error> {
+        let job = self.jobs.get_mut(&id).ok_or(Error::Unknown(id))?;
         job.state = after(job.state, change)?;
         let state = job.state;
         if is_over(state) {
@@ -302,7 +312,7 @@ mod tests {
             for change in CHANGES {
                 match after(state, change) {
                     Ok(next) => legal.push((state, next)),
-                    Err(why) => assert!(why.contains(state.name()), "{why}"),
+                    Err(why) => assert_eq!(why, Error::Illegal(state, change)),
                 }
             }
         }
@@ -334,7 +344,7 @@ mod tests {
         assert!(starts.are_too_many(4) && !starts.are_too_many(5));
     }
 
-    fn add(queue: &mut Queue) -> Result<u32, String> {
+    fn add(queue: &mut Queue) -> Result<u32, Error> {
         queue.add("d".into(), ("text".into(), 1), JobOptions::default(), "spool".as_ref())
     }
 
@@ -348,7 +358,7 @@ mod tests {
         assert_eq!(queue.waiting().first().map(|job| job.id), Some(7));
         assert_eq!(queue.apply(5, Change::Fail), Ok((State::Failed, vec![])));
         assert_eq!(queue.get(5).map(|job| job.text.as_str()), Some(""), "the deck is not kept");
-        assert_eq!(queue.apply(9, Change::Start), Err("no job 9".to_owned()));
+        assert_eq!(queue.apply(9, Change::Start), Err(Error::Unknown(9)));
     }
 
     #[test]
@@ -376,8 +386,7 @@ mod tests {
         for _ in 0..QUEUED_LIMIT {
             add(&mut queue).expect("room");
         }
-        let full = add(&mut queue).expect_err("full");
-        assert!(full.contains("1000 jobs wait"), "{full}");
+        assert_eq!(add(&mut queue), Err(Error::Full(1000)));
         for id in 1..=ENDED_LIMIT as u32 {
             assert_eq!(queue.apply(id, Change::Cancel), Ok((State::Cancelled, vec![])));
         }

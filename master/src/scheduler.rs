@@ -28,12 +28,12 @@ use crate::{
     footprint,
     hosts::Hosts,
     http::board::Board,
-    notice::Notice,
+    notice::{Error, Notice},
     queue::{self, Change, Entry, Queue, Starts, is_over},
     scheduler::retention::Limits,
     service::{self, Order},
     snapshot::store,
-    spool::{Left, Record, Spool},
+    spool::{self, Left, Record, Spool},
 };
 
 mod allotment;
@@ -188,7 +188,7 @@ impl Scheduler {
     }
 
     /// Puts on disk how a job stands, before anybody is told. One that was begun is called running until it is over.
-    fn record(&self, job: u32, ended: Option<Ended>) -> Result<(), String> {
+    fn record(&self, job: u32, ended: Option<Ended>) -> Result<(), spool::Fault> {
         let (Some(entry), Some(status)) = (self.queue.get(job), self.status.get(&job)) else { return Ok(()) };
         let begun = entry.before.is_some() && !is_over(entry.state);
         let record = {
@@ -339,8 +339,7 @@ impl Scheduler {
                 let _ = answer.send(self.resume(job));
             }
             Notice::Remove(job, answer) => {
-                let removed = self.remove(job).map(|()| format!("job {job} is removed"));
-                let _ = answer.send(removed.map_err(|error| error.to_string()));
+                let _ = answer.send(self.remove(job).map(|()| format!("job {job} is removed")));
             }
             Notice::Folder(job, answer) => {
                 let _ = answer.send(self.folder(job));
@@ -391,7 +390,7 @@ impl Scheduler {
         title: String,
         (text, elements): (String, u64),
         options: JobOptions,
-    ) -> Result<u32, String> {
+    ) -> Result<u32, Error> {
         let job = self.queue.add(name.clone(), (text, elements), options.clone(), &self.folder)?;
         let record = Record {
             job,
@@ -412,25 +411,26 @@ impl Scheduler {
         // Who is told that the job is queued finds it in the queue of the next master as well.
         if let Err(why) = tokio::task::block_in_place(|| self.spool.add(&record, &text)) {
             self.queue.take_back(job);
-            return Err(format!("the job is not queued: {why}"));
+            return Err(Error::Disk { asked: "the job is not queued".to_owned(), why });
         }
         info!(job, title, "job queued");
         self.status.insert(job, watch::Sender::new(Status::queued(job, title)));
         Ok(job)
     }
 
-    fn watch(&self, job: Option<u32>) -> Result<watch::Receiver<Status>, String> {
-        let job = job.or_else(|| self.queue.last()).ok_or("no job yet")?;
-        self.status.get(&job).map(watch::Sender::subscribe).ok_or_else(|| format!("no job {job}"))
+    fn watch(&self, job: Option<u32>) -> Result<watch::Receiver<Status>, Error> {
+        let job = job.or_else(|| self.queue.last()).ok_or(Error::NoJob)?;
+        let status = self.status.get(&job).ok_or(queue::Error::Unknown(job))?;
+        Ok(status.subscribe())
     }
 
-    fn cancel(&mut self, job: u32) -> Result<String, String> {
+    fn cancel(&mut self, job: u32) -> Result<String, Error> {
         if let Some(stop) = self.running.get(&job).map(Running::stopper) {
             // Who is told so finds it cancelled after a death of this master as well.
             self.queue.set_cancelled(job, true);
             if let Err(why) = self.record(job, None) {
                 self.queue.set_cancelled(job, false);
-                return Err(format!("job {job} is not cancelled: {why}"));
+                return Err(Error::Disk { asked: format!("job {job} is not cancelled"), why });
             }
             stop();
             return Ok(format!("job {job} ends after its present cycle"));
@@ -439,29 +439,30 @@ impl Scheduler {
         Ok(format!("job {job} is cancelled"))
     }
 
-    fn resume(&mut self, job: u32) -> Result<String, String> {
-        let state = self.queue.get(job).ok_or_else(|| format!("no job {job}"))?.state;
+    fn resume(&mut self, job: u32) -> Result<String, Error> {
+        let state = self.queue.get(job).ok_or(queue::Error::Unknown(job))?.state;
         queue::after(state, Change::Resume)?;
         let sum = self.queue.get(job).map(|entry| entry.deck_sum.clone()).unwrap_or_default();
-        let text = tokio::task::block_in_place(|| self.spool.text(job, &sum)).map_err(|e| e.to_string())?;
+        let text = tokio::task::block_in_place(|| self.spool.text(job, &sum)).map_err(Error::Deck)?;
         let state = self.queue.resume(job, text)?;
-        self.record(job, None)?;
+        self.record(job, None)
+            .map_err(|why| Error::Disk { asked: format!("that job {job} goes on is not on disk"), why })?;
         if let Some(status) = self.status.get(&job) {
             status.send_modify(|status| (status.state, status.ended) = (state, None));
         }
         Ok(format!("job {job} goes on where it was stored"))
     }
 
-    fn folder(&self, job: u32) -> Result<PathBuf, String> {
-        let entry = self.queue.get(job).ok_or_else(|| format!("no job {job}"))?;
-        let folder = entry.folder.clone().ok_or_else(|| format!("job {job} writes no results"))?;
+    fn folder(&self, job: u32) -> Result<PathBuf, Error> {
+        let entry = self.queue.get(job).ok_or(queue::Error::Unknown(job))?;
+        let folder = entry.folder.clone().ok_or(Error::WritesNone(job))?;
         if folder.is_dir() {
             return Ok(folder);
         }
-        Err(format!("job {job} is {} and has no results", entry.state.name()))
+        Err(Error::NoResults(job, entry.state))
     }
 
-    fn change(&mut self, job: u32, change: Change, ended: Option<Ended>) -> Result<(), String> {
+    fn change(&mut self, job: u32, change: Change, ended: Option<Ended>) -> Result<(), queue::Error> {
         let (state, forgotten) = self.queue.apply(job, change)?;
         let ended = ended.filter(|_| is_over(state));
         if let Err(why) = self.record(job, ended.clone()) {

@@ -261,10 +261,10 @@ impl Spool {
     ///
     /// # Errors
     /// What the disk refused; the job is then not there.
-    pub fn add(&self, record: &Record, text: &str) -> Result<(), String> {
+    pub fn add(&self, record: &Record, text: &str) -> Result<(), Fault> {
         let path = self.deck(record.job);
         let written = [&path, &self.deck_copy(record.job)].into_iter().try_for_each(|path| {
-            write_durably(path, text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))
+            write_durably(path, text.as_bytes()).map_err(|e| Fault::Io(path.clone(), e))
         });
         written.and_then(|()| self.change(record)).inspect_err(|_| self.forget(record.job))
     }
@@ -273,12 +273,13 @@ impl Spool {
     ///
     /// # Errors
     /// What the disk refused; the former record then stays.
-    pub fn change(&self, record: &Record) -> Result<(), String> {
-        let sum = sum_of(&serde_json::to_string(record).map_err(|e| e.to_string())?);
+    pub fn change(&self, record: &Record) -> Result<(), Fault> {
+        let form = |e| Fault::Form(self.record(record.job), e);
+        let sum = sum_of(&serde_json::to_string(record).map_err(form)?);
         let sealed = Sealed { sum, record: record.clone() };
-        let text = serde_json::to_string_pretty(&sealed).map_err(|e| e.to_string())?;
+        let text = serde_json::to_string_pretty(&sealed).map_err(form)?;
         for path in [self.record(record.job), self.copy(record.job)] {
-            write_durably(&path, text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
+            write_durably(&path, text.as_bytes()).map_err(|e| Fault::Io(path.clone(), e))?;
         }
         if matches!(record.state, State::Done | State::Cancelled) {
             // What cannot be removed takes room and harms nobody.

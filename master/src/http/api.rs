@@ -11,7 +11,8 @@
 //! | `GET /api/jobs/N/sheet` | energies, imbalance, phases of workers, list of states |
 //! | `GET /api/jobs/N/surface/K` | the surface of state K, binary, as [`surface`](super::surface) says |
 //!
-//! What cannot be done is 4xx with `{error}`.
+//! What cannot be done is `{error}` with 404 where there is no such thing, 409 where the state of the job forbids it, 422 where what was sent
+//! is wrong, 503 where the queue is full or the master ends, and 507 where the disk refused.
 
 use std::{convert::Infallible, time::Duration};
 
@@ -28,13 +29,14 @@ use protocol::{
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::{api_state::ApiState, board};
 use crate::{
     desk::{self, Brought},
-    notice::Notice,
+    notice::{self, Notice, ask},
+    queue,
 };
 
 /// The shortest time between two events of the stream.
@@ -65,28 +67,23 @@ impl IntoResponse for Fault {
     }
 }
 
-impl From<String> for Fault {
-    fn from(why: String) -> Self {
-        Self(StatusCode::CONFLICT, json!({ "error": why }))
+impl From<notice::Error> for Fault {
+    fn from(error: notice::Error) -> Self {
+        use notice::Error::{Deck, Disk, Ending, NoJob, NoResults, Queue, Results, WritesNone};
+        use queue::Error::{Full, Illegal, NotOver, Unknown};
+        let status = match &error {
+            NoJob | Queue(Unknown(_)) | WritesNone(_) | NoResults(..) => StatusCode::NOT_FOUND,
+            Queue(NotOver(..) | Illegal(..)) => StatusCode::CONFLICT,
+            Queue(Full(_)) | Ending => StatusCode::SERVICE_UNAVAILABLE,
+            Disk { .. } => StatusCode::INSUFFICIENT_STORAGE,
+            Deck(_) | Results(_) => StatusCode::INTERNAL_SERVER_ERROR,
+        };
+        Self(status, json!({ "error": error.to_string() }))
     }
 }
 
 fn missing(what: String) -> Fault {
     Fault(StatusCode::NOT_FOUND, json!({ "error": what }))
-}
-
-/// Asks the scheduler.
-///
-/// # Errors
-/// If the master is ending.
-pub async fn ask<T>(
-    api_state: &ApiState,
-    event: impl FnOnce(oneshot::Sender<T>) -> Notice,
-) -> Result<T, String> {
-    let (answer, answered) = oneshot::channel();
-    let ending = "the master is ending".to_owned();
-    api_state.notices.send(event(answer)).await.map_err(|_| ending.clone())?;
-    answered.await.map_err(|_| ending)
 }
 
 /// A job as the page lists it: a finished one without the text of its summary.
@@ -100,9 +97,9 @@ fn listed(api_state: &ApiState, mut status: Status) -> serde_json::Value {
     value
 }
 
-async fn all(api_state: &ApiState) -> Result<serde_json::Value, String> {
-    let jobs = ask(api_state, Notice::Jobs).await?;
-    let hosts = ask(api_state, Notice::Hosts).await?;
+async fn all(api_state: &ApiState) -> Result<serde_json::Value, notice::Error> {
+    let jobs = ask(&api_state.notices, Notice::Jobs).await?;
+    let hosts = ask(&api_state.notices, Notice::Hosts).await?;
     let jobs: Vec<_> = jobs.into_iter().map(|status| listed(api_state, status)).collect();
     let host = |row: protocol::request::HostRow| {
         let load = if row.state == "busy" { api_state.board.load(&row.name) } else { None };
@@ -159,7 +156,9 @@ struct Place {
 
 impl From<desk::Error> for Fault {
     fn from(error: desk::Error) -> Self {
-        let desk::Error::Faults(faults) = error else { return error.to_string().into() };
+        let desk::Error::Faults(faults) = error else {
+            return Self(StatusCode::UNPROCESSABLE_ENTITY, json!({ "error": error.to_string() }));
+        };
         let place = |fault: deck::Fault| Place {
             line: fault.line,
             column: fault.column,
@@ -196,8 +195,8 @@ async fn submit(
         ..JobOptions::default()
     };
     options.check().map_err(desk::Error::Options)?;
-    let job =
-        ask(&api_state, |answer| Notice::Submit { name, title, text, elements, options, answer }).await??;
+    let submit = |answer| Notice::Submit { name, title, text, elements, options, answer };
+    let job = ask(&api_state.notices, submit).await??;
     Ok(Json(json!({ "job": job })))
 }
 
@@ -205,7 +204,7 @@ async fn job(
     State(api_state): State<ApiState>,
     Path(job): Path<u32>,
 ) -> Result<Json<serde_json::Value>, Fault> {
-    let watch = ask(&api_state, |answer| Notice::Watch(Some(job), answer)).await?.map_err(missing)?;
+    let watch = ask(&api_state.notices, |answer| Notice::Watch(Some(job), answer)).await??;
     let status = watch.borrow().clone();
     Ok(Json(json!(status)))
 }
@@ -214,7 +213,7 @@ async fn cancel(
     State(api_state): State<ApiState>,
     Path(job): Path<u32>,
 ) -> Result<Json<serde_json::Value>, Fault> {
-    let done = ask(&api_state, |answer| Notice::Cancel(job, answer)).await??;
+    let done = ask(&api_state.notices, |answer| Notice::Cancel(job, answer)).await??;
     Ok(Json(json!({ "done": done })))
 }
 

@@ -5,13 +5,13 @@ use std::fmt::Write;
 use axum::{extract::State, http::header, response::IntoResponse};
 use protocol::request::{HostRow, State as JobState, Status};
 
-use super::{api::ask, api_state::ApiState, board};
-use crate::notice::Notice;
+use super::{api_state::ApiState, board};
+use crate::notice::{Notice, ask};
 
 /// The table.
 pub async fn text(State(api_state): State<ApiState>) -> impl IntoResponse {
-    let jobs = ask(&api_state, Notice::Jobs).await.unwrap_or_default();
-    let hosts = ask(&api_state, Notice::Hosts).await.unwrap_or_default();
+    let jobs = ask(&api_state.notices, Notice::Jobs).await.unwrap_or_default();
+    let hosts = ask(&api_state.notices, Notice::Hosts).await.unwrap_or_default();
     let content = [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")];
     (content, render(&api_state, &jobs, &hosts))
 }

@@ -10,10 +10,7 @@ use protocol::request::State;
 use tracing::{info, warn};
 
 use super::Scheduler;
-use crate::{
-    queue::{self, Entry},
-    results,
-};
+use crate::{notice::Error, queue::Entry, results};
 
 /// Between two looks at what jobs that are over take.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
@@ -92,33 +89,17 @@ fn remove_results(folder: &Path) -> Result<(), results::Error> {
     }
 }
 
-/// Why a job is not removed.
-#[derive(Debug)]
-pub(super) enum RemoveError {
-    Queue(queue::Error),
-    Results(results::Error),
-}
-
-impl std::fmt::Display for RemoveError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Queue(error) => error.fmt(f),
-            Self::Results(error) => error.fmt(f),
-        }
-    }
-}
-
 impl Scheduler {
     /// Removes a job that is over with all that it left.
-    pub(super) fn remove(&mut self, job: u32) -> Result<(), RemoveError> {
-        let entry = self.queue.remove(job).map_err(RemoveError::Queue)?;
+    pub(super) fn remove(&mut self, job: u32) -> Result<(), Error> {
+        let entry = self.queue.remove(job)?;
         let removed = tokio::task::block_in_place(|| match &entry.folder {
             Some(folder) => remove_results(folder),
             None => Ok(()),
         });
         if let Err(error) = removed {
             self.queue.restore(entry);
-            return Err(RemoveError::Results(error));
+            return Err(Error::Results(error));
         }
         tokio::task::block_in_place(|| self.spool.forget(job));
         self.status.remove(&job);
