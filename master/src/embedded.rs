@@ -71,6 +71,8 @@ pub enum Fate {
     Join(WorkerSpec),
     /// From here on this is done to what a worker holds whenever it has computed elements.
     Touch(usize, fn(&mut Machine)),
+    /// One bit of what a worker holds flips when it has next computed elements: place and bit, see [`Machine::flip`].
+    Flip(usize, u64, u32),
 }
 
 /// Something that has arrived, or a task's end.
@@ -89,6 +91,7 @@ struct LocalWorker {
     machine: Option<Box<Machine>>,
     lost: bool,
     touch: Option<fn(&mut Machine)>,
+    flip: Option<(u64, u32)>,
     stopwatch: Stopwatch,
     /// Of this epoch: bytes sent to each neighbour.
     peers: (u32, BTreeMap<u32, u64>),
@@ -101,6 +104,7 @@ impl LocalWorker {
             stopwatch: Stopwatch::new(),
             lost: false,
             touch: None,
+            flip: None,
             peers: (0, BTreeMap::new()),
         }
     }
@@ -207,6 +211,9 @@ fn drive(
                     world.apply(Event::Lost(member, "it was to be lost".to_owned()))?;
                 }
             }
+            Some(Fate::Flip(host, place, bit)) => {
+                world.surroundings.places[host].flip = Some((place, bit));
+            }
             Some(Fate::Touch(host, touch)) => world.surroundings.places[host].touch = Some(touch),
             Some(Fate::Join(spec)) => {
                 world.surroundings.places.push(LocalWorker::new());
@@ -233,6 +240,12 @@ fn drive(
                 machine.take_laps().for_each(|lap| place.stopwatch.book(cycle, lap));
                 if let (Some(touch), session::Outcome::Computed) = (place.touch, &outcome) {
                     touch(&mut machine);
+                }
+                if let (session::Outcome::Computed, Some((place, bit))) = (&outcome, place.flip) {
+                    machine.flip(place, bit);
+                }
+                if matches!(outcome, session::Outcome::Computed) {
+                    place.flip = None;
                 }
                 place.machine = Some(machine);
                 world.step(host, session::Event::Done(outcome))?;

@@ -9,7 +9,7 @@ use protocol::{
 };
 
 use crate::{
-    incident::{Loss, Rebalance},
+    incident::{Difference, Loss, Rebalance},
     results::history::HistoryRow,
     run_totals::RunTotals,
     snapshot::Snapshot,
@@ -160,4 +160,6 @@ pub struct Outcome {
     pub rebalances: Vec<Rebalance>,
     /// Workers that were lost at work.
     pub losses: Vec<Loss>,
+    /// Computations that were found wrong, since another one came to something else.
+    pub differences: Vec<Difference>,
 }

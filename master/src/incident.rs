@@ -1,5 +1,7 @@
 //! What a run tells of its workers when it is over: losses, and times at which work was dealt out anew.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 /// Work was dealt out anew because speeds turned out to be others.
@@ -28,4 +30,31 @@ pub struct Loss {
     /// The cycle that the run went back to.
     pub back_to: u64,
     pub why: String,
+}
+
+/// A computation of an interval came to something else than two others that agree; it left no trace in the results.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Difference {
+    /// The cycle at whose start the interval begins.
+    pub begins: u64,
+    /// The cycle at whose start it ends.
+    pub ends: u64,
+    /// The first cycle whose votes show it; none if the state at the end alone does.
+    pub cycle: Option<u64>,
+    /// Workers of the sub-domains that show it first.
+    pub workers: Vec<String>,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { begins, ends, cycle, workers } = self;
+        write!(f, "one computation of cycles {begins} to {ends} was wrong and is not in the results; ")?;
+        match cycle {
+            Some(cycle) => {
+                let workers = workers.join(", ");
+                write!(f, "it differs first in cycle {cycle}, on {workers}: test the memory of that host")
+            }
+            None => f.write_str("no vote shows on which worker: test the memory of all hosts"),
+        }
+    }
 }

@@ -25,6 +25,7 @@ mod tally;
 #[cfg(test)]
 mod tests;
 mod turnover;
+mod twice;
 mod verdict;
 mod worker_states;
 mod workers;
@@ -54,6 +55,7 @@ use numbers::not_a_number;
 use problem::Problem;
 use schedule::{Step, allowed, first_share, step_after};
 use tally::Tally;
+use twice::Twice;
 use verdict::{Account, element_fault};
 use workers::Workers;
 
@@ -79,6 +81,7 @@ pub struct Job {
     account: Account,
     balancing: Balancing,
     tally: Tally,
+    twice: Twice,
     first_cycle: u64,
     ending: Ending,
 }
@@ -165,6 +168,10 @@ impl Job {
             Event::Sorted(sorted) => return self.sorted(*sorted, actions),
             Event::Lost(index, why) => return self.lost(index, why, actions),
             Event::Joined(spec) => return self.joined(spec, actions),
+            // An interval that is taken again ends where it did before.
+            Event::Timer if self.twice.until().is_some() => {
+                actions.extend(self.options.keep.seconds().map(Action::Timer));
+            }
             Event::Timer => self.checkpoints.time_has_come(),
             Event::Stop => {
                 self.ending.stop_asked = true;
@@ -207,6 +214,7 @@ impl Job {
             workers: self.workers.names(at_work),
             rebalances: std::mem::take(&mut tally.rebalances),
             losses: std::mem::take(&mut tally.losses),
+            differences: std::mem::take(&mut tally.differences),
         })));
     }
 
@@ -352,14 +360,23 @@ impl Job {
                 || self.account.failure.is_some()
                 || time_after >= control.end_time
                 || after >= control.end_cycle;
-            let pauses = !ends && self.is_boundary(after) && self.wants_next_epoch(after);
+            let pauses = !ends
+                && match self.twice.until() {
+                    Some(until) => after >= until,
+                    None => {
+                        (self.is_boundary(after) && self.wants_next_epoch(after))
+                            || (self.twice.is_chosen() && self.checkpoint_due(after, actions))
+                    }
+                };
             if ends || pauses {
                 self.epoch.schedule.stop_at(after, pauses);
             }
         }
         let stop = self.epoch.schedule.stops_at(after);
         let due = !self.options.asked.no_output && self.epoch.schedule.state_due(time_after);
-        let keep = !self.epoch.schedule.is_stopping() && self.checkpoint_due(after, actions);
+        let keep = !self.epoch.schedule.is_stopping()
+            && !self.twice.is_chosen()
+            && self.checkpoint_due(after, actions);
         if keep {
             self.checkpoints.expect(after);
         }
@@ -443,6 +460,7 @@ impl Job {
         if let Some(what) = not_a_number(frame.vote.as_deref(), looked_at, n_parts) {
             return self.blame(worker, cycle, &what, actions);
         }
+        self.twice.note((worker, self.epoch.n()), cycle, frame.vote.as_deref());
         match self.epoch.inflow.add(worker, cycle, frame, &exchange)? {
             Some(frames) => self.complete(cycle, frames, actions),
             None => Ok(()),

@@ -73,8 +73,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     if !interval.is_never() && folder.is_none() {
         return Err("snapshots need a results folder; leave out --no-output".to_owned());
     }
-    // Nobody is lost who shares this process.
-    let memory = asked.keep_every.filter(|_| args.processes);
+    // Nobody is lost who shares this process; a part that is computed twice goes back all the same.
+    let memory = asked.keep_every.filter(|_| args.processes || asked.verify > 0.0);
     let options = SessionOptions {
         keep: CheckpointEvery::for_both(memory, interval),
         store: folder.is_some(),
@@ -97,7 +97,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     }
     output.go_on(&job, states)?;
-    if !args.processes && output.keeper.is_none() {
+    if !args.processes && output.keeper.is_none() && asked.verify == 0.0 {
         job.keep_no_state();
     }
     let stop = stop_on_interrupt("stopping after this cycle");

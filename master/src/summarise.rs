@@ -122,7 +122,10 @@ pub fn summarise(
         worst_penetration: run_totals.worst_penetration,
         rebalances: outcome.rebalances.clone(),
         losses: outcome.losses.clone(),
-        warnings: hourglass_warnings(&model.mesh.parts, &parts, run_totals.eroded, run_totals.scale()),
+        warnings: hourglass_warnings(&model.mesh.parts, &parts, run_totals.eroded, run_totals.scale())
+            .into_iter()
+            .chain(outcome.differences.iter().map(ToString::to_string))
+            .collect(),
         digest: outcome.digest.clone(),
     }
 }

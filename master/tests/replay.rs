@@ -97,3 +97,48 @@ fn when_all_workers_differ_the_master_is_suspected() {
     let why = run(at_work(2, true, Route::Master), &mut fate).err().expect("nobody agrees");
     assert!(why.contains("all 2 workers differ") && why.contains("look at its host"), "{why}");
 }
+
+/// A run of which a part is computed twice, with one bit that flips at a step.
+fn with_flip(verify: f64, (at, host, place, bit): (u64, usize, u64, u32)) -> Result<Solved, String> {
+    let mut workers = at_work(3, false, Route::Direct);
+    workers.options.asked.verify = verify;
+    run(workers, &mut |number| (number == at).then_some(Fate::Flip(host, place, bit)))
+}
+
+#[test]
+fn intervals_that_are_computed_twice_change_no_bit_on_any_workers() {
+    let plain = Fingerprint::of(&solve(model(PLATES), at_work(1, false, Route::Master)).expect("a good run"));
+    for verify in [0.3, 1.0] {
+        for workers in [1, 2, 3, 5] {
+            for route in [Route::Master, Route::Direct] {
+                let mut at_work = at_work(workers, true, route);
+                at_work.options.asked.verify = verify;
+                let solved = solve(model(PLATES), at_work).unwrap_or_else(|e| panic!("{workers}: {e}"));
+                plain.assert_equal(&Fingerprint::of(&solved), &format!("{workers} workers, {verify}"));
+                assert_eq!(solved.outcome.differences, []);
+            }
+        }
+    }
+}
+
+#[test]
+fn no_single_flip_is_silent_where_all_is_computed_twice() {
+    let plain = Fingerprint::of(&solve(model(PLATES), at_work(1, false, Route::Master)).expect("a good run"));
+    let mut silent = [0; 2];
+    let (mut found, mut named) = (0, 0);
+    for k in 0..24_u64 {
+        let flip = (150 + 67 * k % 800, (k % 3) as usize, k.wrapping_mul(0x9e37_79b9), (k * 5 % 52) as u32);
+        for (verify, silent) in [0.0, 1.0].into_iter().zip(&mut silent) {
+            let Ok(solved) = with_flip(verify, flip) else { continue };
+            *silent += usize::from(Fingerprint::of(&solved) != plain);
+            for difference in &solved.outcome.differences {
+                found += 1;
+                named += usize::from(difference.workers.contains(&format!("worker-{}", flip.1)));
+            }
+        }
+    }
+    println!("24 flips: silent {} without, {} with; {found} found, {named} by name", silent[0], silent[1]);
+    assert!(silent[0] > 0, "the flips change something");
+    assert_eq!(silent[1], 0);
+    assert!(found > 0 && named > 0, "{found} found, {named} named");
+}

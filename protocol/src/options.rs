@@ -84,6 +84,14 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A part of a whole.
+fn fraction(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(fraction) if (0.0..=1.0).contains(&fraction) => Ok(fraction),
+        _ => Err("expected a number from 0 to 1".to_owned()),
+    }
+}
+
 /// [`seconds`] between two states; none for 0.
 fn period(text: &str) -> Result<Option<f64>, String> {
     seconds(text).map(|seconds| Some(seconds).filter(|seconds| *seconds > 0.0))
@@ -157,6 +165,10 @@ pub struct JobOptions {
     /// Keep a checkpoint in memory every this many seconds, to return to when a worker is lost; 0 for none beside those on disk
     #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = period, allow_negative_numbers = true)]
     pub keep_every: std::option::Option<f64>,
+    /// Compute this part of the work twice, by other workers the second time, from 0 to 1; where both differ a third time decides
+    #[arg(long, value_name = "FRACTION", default_value = "0", value_parser = fraction, allow_negative_numbers = true)]
+    #[serde(default)]
+    pub verify: f64,
     /// Write a checkpoint to disk every this many seconds, for --resume; 0 for never [default: the deck's; else a
     /// master's jobs every 10, `run` only when it is interrupted]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
@@ -185,6 +197,7 @@ impl JobOptions {
         let seconds = "a number of seconds above 0, at most 1e9";
         number("end time", self.end_time, |t| t.is_finite() && t > 0.0, "a positive number")?;
         number("keep-every", self.keep_every, |s| s > 0.0 && s <= 1e9, seconds)?;
+        number("verify", Some(self.verify), |f| (0.0..=1.0).contains(&f), "from 0 to 1")?;
         number("snapshot-every", self.snapshot_every, |s| (0.0..=1e9).contains(&s), "seconds from 0 to 1e9")?;
         let whole = |n: Option<u64>| n.map(|n| n as f64);
         number("snapshot-cycles", whole(self.snapshot_cycles), |n| n >= 1.0, "1 or more")?;
@@ -239,9 +252,13 @@ mod tests {
         assert_eq!(flags(&["--keep-every", "0"]), Ok(JobOptions::default()));
         let lanes = JobOptions { lanes: Some("avx2".to_owned()), balance: Balance::Measured, ..plain };
         assert_eq!(flags(&["--lanes", "avx2", "--balance", "measured"]), Ok(lanes));
-        for bad in
-            [["--route", "sideways"], ["--lanes", "avx"], ["--keep-every", "-1"], ["--keep-every", "x"]]
-        {
+        for bad in [
+            ["--verify", "1.5"],
+            ["--route", "sideways"],
+            ["--lanes", "avx"],
+            ["--keep-every", "-1"],
+            ["--keep-every", "x"],
+        ] {
             let fault = flags(&bad).expect_err(bad[1]);
             assert!(fault.contains(bad[0]) && fault.contains(bad[1]), "{fault}");
         }
@@ -259,6 +276,8 @@ mod tests {
             (JobOptions { keep_every: Some(1e300), ..good.clone() }, "keep-every 1"),
             (JobOptions { snapshot_every: Some(f64::NAN), ..good.clone() }, "snapshot-every NaN"),
             (JobOptions { snapshot_every: Some(f64::INFINITY), ..good.clone() }, "snapshot-every inf"),
+            (JobOptions { verify: 1.5, ..good.clone() }, "verify 1.5: must be from 0 to 1"),
+            (JobOptions { verify: f64::NAN, ..good.clone() }, "verify NaN"),
             (JobOptions { end_time: Some(0.0), ..good.clone() }, "end time 0: must be a positive number"),
             (JobOptions { snapshot_cycles: Some(0), ..good.clone() }, "snapshot-cycles 0"),
             (JobOptions { min_workers: u32::MAX, ..good.clone() }, "min-workers 4294967295"),

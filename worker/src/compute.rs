@@ -174,6 +174,12 @@ impl Machine {
         self.domain.iter_mut().for_each(Domain::plant_fault);
     }
 
+    /// See [`Domain::flip`].
+    #[doc(hidden)]
+    pub fn flip(&mut self, place: u64, bit: u32) {
+        self.domain.iter_mut().for_each(|domain| domain.flip(place, bit));
+    }
+
     /// Does one task. Failures are outcomes.
     pub fn run(&mut self, task: Task) -> Outcome {
         self.try_run(task).unwrap_or_else(Outcome::Failed)

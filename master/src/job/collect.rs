@@ -82,6 +82,7 @@ impl Job {
             return Ok(());
         }
         self.checkpoints.adopt(checkpoint);
+        self.twice.begin_interval();
         self.store(cycle, actions);
         Ok(())
     }

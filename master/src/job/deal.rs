@@ -22,6 +22,7 @@ use super::{
     problem::{Problem, Touching},
     samples::Samples,
     tally::Tally,
+    twice::Twice,
     verdict::Account,
     workers::Workers,
 };
@@ -56,7 +57,9 @@ impl Job {
             Some(snapshot) => Checkpoint::restored(snapshot, &problem, &start)?,
         };
         let keep = options.keep;
+        let twice = Twice::new(options.asked.verify, &problem.sum);
         let mut job = Self {
+            twice,
             epoch: Epoch::without_workers(0, &first, &problem.model),
             account: Account::new(&first, rows),
             first_cycle: first.cycle(),
@@ -110,7 +113,8 @@ impl Job {
         }
         let state = &checkpoint.state;
         let specs: Vec<&WorkerSpec> = at_work.iter().map(|&index| self.workers.spec(index)).collect();
-        let speeds: Vec<f64> = specs.iter().map(|spec| spec.speed).collect();
+        let speeds = self.twice.speeds(&at_work);
+        let speeds: Vec<f64> = speeds.unwrap_or_else(|| specs.iter().map(|spec| spec.speed).collect());
         let costs = self.options.costs;
         let alive = alive_in(state);
         let layout = decompose(&model.mesh, &speeds, costs.node, alive.as_deref());

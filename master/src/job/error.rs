@@ -67,6 +67,14 @@ pub enum Error {
         /// How the first one differs.
         first: String,
     },
+    /// Computations of an interval came to different ends each time.
+    NoTwoAgree {
+        /// The cycle at whose start it begins.
+        begins: u64,
+        /// The cycle at whose start the last one ended.
+        ends: u64,
+        computations: usize,
+    },
     /// A worker is lost whose work nobody can take up, because no state is kept.
     NotKept {
         /// The cycle to go back to.
@@ -215,6 +223,10 @@ impl fmt::Display for Error {
             Self::AllDiffer { workers, first } => write!(
                 f,
                 "the samples of all {workers} workers differ from this master's: look at its host. {first}"
+            ),
+            Self::NoTwoAgree { begins, ends, computations } => write!(
+                f,
+                "cycles {begins} to {ends}: no two of {computations} computations by different workers agree; a host computes wrongly each time, run `bolide bench` and a memory test on each"
             ),
             Self::NotKept { cycle } => write!(f, "no state of cycle {cycle} is kept to go back to"),
             Self::Epochs => f.write_str("2^32 epochs of one job"),

@@ -3,7 +3,7 @@
 use mechanics::contact::Census;
 use protocol::{message::Work, phase::Report};
 
-use crate::incident::{Loss, Rebalance};
+use crate::incident::{Difference, Loss, Rebalance};
 
 /// What a job counts for its summary.
 #[derive(Default)]
@@ -22,6 +22,7 @@ pub(super) struct Tally {
     lanes: String,
     pub(super) rebalances: Vec<Rebalance>,
     pub(super) losses: Vec<Loss>,
+    pub(super) differences: Vec<Difference>,
 }
 
 impl Tally {

@@ -80,7 +80,7 @@ impl Job {
     }
 
     /// Everything that was booked after the checkpoint is forgotten, here and in the results.
-    fn go_back(&mut self, actions: &mut Vec<Action>) {
+    pub(super) fn go_back(&mut self, actions: &mut Vec<Action>) {
         let checkpoint = self.checkpoints.newest();
         self.account.go_back(checkpoint);
         self.balancing.go_back();
@@ -88,9 +88,10 @@ impl Job {
     }
 
     /// Deals the checkpoint out to all that are alive; with nobody, the job waits.
-    fn next_epoch(&mut self, actions: &mut Vec<Action>) -> Result<(), Error> {
+    pub(super) fn next_epoch(&mut self, actions: &mut Vec<Action>) -> Result<(), Error> {
         let number = self.epoch.number.checked_add(1).ok_or(Error::Epochs)?;
-        let at_work = self.workers.alive();
+        let at_work = self.twice.exchange(self.workers.alive());
+        self.twice.begin_epoch();
         let nobody = at_work.is_empty();
         self.epoch = self.deal(number, at_work, actions)?;
         self.checkpoints.begin_epoch();
@@ -111,6 +112,15 @@ impl Job {
         if cycle > self.epoch.schedule.first_cycle() {
             self.book(cycle - 1, &stopped.vote, actions);
         }
+        // Who asks for the end does not wait for a second computation: nothing is stored of the first.
+        let is_hurried = self.ending.leaves || self.ending.stop_asked;
+        if self.twice.is_chosen()
+            && cycle > self.epoch.schedule.first_cycle()
+            && !is_hurried
+            && !self.interval_stands(&stopped, actions)?
+        {
+            return Ok(());
+        }
         if !self.epoch.schedule.pauses() {
             return self.stopped(stopped, actions);
         }
@@ -129,6 +139,7 @@ impl Job {
         let Stopped { state, vote, .. } = stopped;
         let cycle = state.cycle;
         self.adopt(state, vote)?;
+        self.twice.begin_interval();
         self.store(cycle, actions);
         let (at_work, shares) = (&self.epoch.at_work, &self.epoch.shares);
         if let Some(rebalance) = self.balancing.adopt(cycle, self.workers.names(at_work), shares) {
@@ -156,6 +167,12 @@ impl Job {
             }
             return Ok(());
         }
+        let is_proved = !self.twice.is_chosen();
+        if self.ending.leaves && !is_proved {
+            self.go_back(actions);
+            self.suspend_at_checkpoint(actions);
+            return Ok(());
+        }
         self.adopt(state, vote)?;
         if due {
             // The next session begins behind it, so the checkpoint counts on its file.
@@ -166,7 +183,9 @@ impl Job {
             self.suspend_at_checkpoint(actions);
             return Ok(());
         }
-        self.give_last_checkpoint(actions);
+        if is_proved {
+            self.give_last_checkpoint(actions);
+        }
         self.finish_at_checkpoint(actions);
         Ok(())
     }

@@ -80,6 +80,18 @@ impl Domain {
         self.held_blocks.iter_mut().for_each(|held_block| held_block.block.plant_fault());
     }
 
+    /// Flips one bit of a velocity of a node: what a particle does to memory. For tests of who finds it.
+    #[doc(hidden)]
+    pub fn flip(&mut self, place: u64, bit: u32) {
+        let blocks = self.held_blocks.len().max(1) as u64;
+        let Some(held_block) = self.held_blocks.get_mut((place % blocks) as usize) else { return };
+        let block = &mut held_block.block;
+        let (place, n) = (place / blocks, block.nodes.len().max(1) as u64);
+        let numbers = if place.is_multiple_of(2) { &mut block.v } else { &mut block.x };
+        let number = &mut numbers[(place / 2 % 3) as usize][(place / 6 % n) as usize];
+        *number = f64::from_bits(number.to_bits() ^ 1 << (bit % 64));
+    }
+
     /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.
     pub fn into_pieces(self) -> Vec<Piece> {
         let image = |held_block: HeldBlock| Piece {
