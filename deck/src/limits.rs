@@ -15,6 +15,8 @@ pub const MAX_PARTS: usize = 10_000;
 pub const MAX_ENTRIES: usize = 10_000;
 /// Most pairs of parts whose contact force is written: each has four columns.
 pub(crate) const MAX_CONTACT_FORCES: usize = 64;
+/// Most cross-sections: each has nine columns.
+pub(crate) const MAX_SECTIONS: usize = 64;
 /// Greatest node or element number a deck may give; generated numbers go on above.
 pub(crate) const MAX_ID: u32 = 2_000_000_000;
 pub(crate) const MAX_CURVE_POINTS: usize = 100_000;

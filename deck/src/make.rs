@@ -19,6 +19,7 @@ mod output;
 mod part;
 mod region;
 mod rigid;
+mod section;
 mod spans;
 mod surface;
 mod tie;
@@ -61,7 +62,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         Control { sort_lag: control::sort_lag(given, control.sort_lag, settings, log), ..control }
     });
     let erosion = erosion::make(deck, &parts, &rigid, log);
-    let output = output::make(deck, &names, &assembly, log);
+    let output = output::make(deck, &names, &assembly, &bodies, log);
     let detonations = burn::make(deck, &materials, &parts, log);
     let faces = contact.as_ref().map(|contact| (&contact.settings, contact.faces.as_slice()));
     spans::check(&parts, &assembly, faces, &materials, log);

@@ -1,6 +1,6 @@
 //! Model: what a run needs, free of any file format.
 
-use mechanics::{mesh::Mesh, setup::Setup};
+use mechanics::{cross_section::CrossSection, mesh::Mesh, setup::Setup};
 use serde::{Deserialize, Serialize};
 
 /// Names that [`Output::fields`] may hold: fields of nodes and elements in the results.
@@ -73,6 +73,8 @@ pub struct Output {
     pub contact_surface: bool,
     /// Pairs of different parts, by index, whose contact force the history holds: that on the first from the second.
     pub contact_forces: Vec<[u32; 2]>,
+    /// Cross-sections whose force the history holds.
+    pub sections: Vec<Section>,
     /// Gauges: histories at nodes.
     pub gauges: Vec<Gauge>,
     /// Histories of elements.
@@ -92,10 +94,19 @@ impl Default for Output {
             workers: false,
             contact_surface: false,
             contact_forces: Vec::new(),
+            sections: Vec::new(),
             gauges: Vec::new(),
             element_gauges: Vec::new(),
         }
     }
+}
+
+/// A history of what passes through a cut.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Section {
+    /// Name: its columns begin with `section NAME`.
+    pub name: String,
+    pub cut: CrossSection,
 }
 
 /// A history at one node.

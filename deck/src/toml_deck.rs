@@ -72,6 +72,7 @@ fn read_document(document: &DeTable<'_>, log: &Log<'_>) -> Deck {
     deck.contact = contact::read(&table);
     deck.erosion = read_erosion(&table);
     deck.output = output::read(&table);
+    deck.sections = output::read_sections(&table);
     deck.gauges = output::read_gauges(&table);
     deck.detonations = condition::read_detonations(&table);
     table.finish();

@@ -17,7 +17,7 @@ use crate::{
     place::{Place, Placed},
     units::Units,
 };
-use condition::{Boundary, Curve, Gravity, Load, Relaxation, Rigid, Wall};
+use condition::{Boundary, Curve, Gravity, Load, Parts, Relaxation, Rigid, Wall};
 use contact::{Contact, Join};
 use part::{Own, Part};
 
@@ -42,6 +42,7 @@ pub(crate) struct Deck {
     pub(crate) has_contact: bool,
     pub(crate) erosion: Option<FreedNodes>,
     pub(crate) output: Output,
+    pub(crate) sections: Vec<Section>,
     pub(crate) gauges: Vec<Gauge>,
     pub(crate) detonations: Vec<(Place, Option<Detonation>)>,
 }
@@ -67,6 +68,7 @@ impl Deck {
             has_contact: false,
             erosion: None,
             output: Output::default(),
+            sections: Vec::new(),
             gauges: Vec::new(),
             detonations: Vec::new(),
         }
@@ -152,6 +154,20 @@ impl Default for Output {
             contact_forces: None,
         }
     }
+}
+
+/// A plane through bodies, whose force is wanted.
+#[derive(Clone, Debug)]
+pub(crate) struct Section {
+    pub(crate) at: Place,
+    /// What it is called in messages.
+    pub(crate) title: String,
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) parts: Parts,
+    /// Point and normal, of any length above 0; none where they could not be read.
+    pub(crate) plane: Option<[[f64; 3]; 2]>,
+    /// Elements whose centre is farther from the point are not cut.
+    pub(crate) radius: Option<f64>,
 }
 
 /// A history of a node or of an element.

@@ -7,7 +7,8 @@ mod part;
 mod value;
 
 use crate::typed::{
-    Control, Deck, Gauge, Kind, Output, Spot,
+    Control, Deck, Gauge, Kind, Output, Section, Spot,
+    condition::Parts,
     contact::{Contact, Gap, Slack},
 };
 use value::{Text, list, names, quoted, vector};
@@ -34,6 +35,9 @@ pub(crate) fn text(deck: &Deck) -> String {
         write_contact(&mut text, contact);
     }
     write_output(&mut text, &deck.output);
+    for section in &deck.sections {
+        write_section(&mut text, section);
+    }
     for gauge in &deck.gauges {
         write_gauge(&mut text, gauge);
     }
@@ -122,6 +126,20 @@ fn write_output(text: &mut Text, output: &Output) {
         text.key("contact_forces", list(pairs.value.iter().map(|both| pair(&both.value))));
     }
     text.drop_heading();
+}
+
+fn write_section(text: &mut Text, section: &Section) {
+    text.heading("[[section]]");
+    if let Some(name) = &section.name {
+        text.key("name", quoted(&name.value));
+    }
+    if !matches!(section.parts, Parts::All) {
+        text.key("parts", names(&section.parts));
+    }
+    if let Some([point, normal]) = section.plane {
+        text.key("plane", format!("{{ point = {}, normal = {} }}", vector(point), vector(normal)));
+    }
+    text.some("radius", section.radius);
 }
 
 fn write_gauge(text: &mut Text, gauge: &Gauge) {

@@ -275,3 +275,15 @@ fn force_transducers_ask_for_the_contact_of_their_parts() {
         assert!(reading.warnings.iter().any(|w| w.words.contains(expected)), "{:?}", reading.warnings);
     }
 }
+
+#[test]
+fn a_plane_is_a_cross_section_by_its_heading() {
+    let plane = |x: f64| format!("*DATABASE_CROSS_SECTION_PLANE_ID\n7,middle\n0,{x},0,0,{},0,0\n\n", x + 1.0);
+    let sections = good(ELASTIC, &plane(15.0)).output.sections;
+    assert_eq!((sections.len(), sections[0].name.as_str()), (1, "middle"));
+    // The second shell, whose second and third corner are ahead.
+    assert_eq!(sections[0].cut.elements, [(1, 0b0110)]);
+    // The first is of a rigid body.
+    let found = faults(ELASTIC, &plane(5.0));
+    assert!(found.len() == 1 && found[0].contains("cross-section middle that cuts nothing"), "{found:?}");
+}

@@ -255,6 +255,7 @@ impl RunTotals {
                 .collect(),
             element_gauges: vote.element_gauges.iter().map(|(_, state)| state.clone()).collect(),
             contacts: vote.contacts.clone(),
+            sections: vote.sections.clone(),
             holders: self.holders.iter().map(|(row, _)| *row).collect(),
         };
     }

@@ -22,7 +22,8 @@ use std::fmt;
 /// 9: trusses, numbers of supports and hourglass control of pieces in assignments; nodes tied to faces in assignments and plans; in
 /// votes the work of each wall and support, and what nodes lost at walls,
 /// and readings of element gauges with history variables behind them; requests to remove a job;
-/// the strain at which layers of shells break in assignments; the part of a job that is computed twice.
+/// the strain at which layers of shells break in assignments; the part of a job that is computed twice; cross-sections in assignments
+/// and votes.
 pub const VERSION: u16 = 9;
 
 /// Most characters of a host's name.

@@ -65,6 +65,7 @@ fn numbers(row: &HistoryRow) -> Vec<u64> {
         .chain(row.parts.iter().flat_map(|part| [part.kinetic, part.internal]))
         .chain(row.gauges.iter().flat_map(|gauge| gauge.x.into_iter().chain(gauge.v)))
         .chain(row.element_gauges.iter().flatten().copied())
+        .chain(row.sections.iter().flat_map(|(_, s)| s.force.into_iter().chain(s.moment).chain(s.places)))
         .chain(row.contacts.iter().flat_map(|(_, vote)| vote.force.into_iter().chain([vote.hits as f64])))
         .map(f64::to_bits)
         .collect()

@@ -12,6 +12,7 @@ mod holders;
 mod hourglass;
 mod late;
 mod pairs;
+mod sections;
 mod seeds;
 mod sums;
 mod tearing;

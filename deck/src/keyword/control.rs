@@ -4,7 +4,7 @@ use super::{
     cards::Block,
     fields::{Context, TENS},
 };
-use crate::place::Place;
+use crate::{geometry, place::Place};
 
 /// Keywords that say how a computation is carried out or written, not what is computed here.
 const HARMLESS: [&str; 15] = [
@@ -25,6 +25,54 @@ const HARMLESS: [&str; 15] = [
     "CONTROL_SUBCYCLE",
 ];
 
+/// `*DATABASE_CROSS_SECTION_PLANE`.
+pub(super) struct SectionCard {
+    pub(super) at: Place,
+    /// Number and heading of `_ID`.
+    pub(super) id: u32,
+    pub(super) heading: String,
+    /// Set of parts; 0 is all.
+    pub(super) parts: u32,
+    /// Tail and head of the normal.
+    pub(super) tail: [f64; 3],
+    pub(super) head: [f64; 3],
+    /// 0 is none.
+    pub(super) radius: f64,
+}
+
+impl SectionCard {
+    fn read(block: &Block<'_>, context: &Context<'_>) -> Option<Self> {
+        let named = usize::from(block.keyword.ends_with("_ID"));
+        let name = block.card(0);
+        let title = context.fields(&name, block.width, &[10, 70]);
+        let (id, heading) =
+            if named == 1 { (title.id(0), title.words(1).to_string()) } else { (0, String::new()) };
+        let cards = [block.card(named), block.card(named + 1)];
+        let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+        let (tail, head) = (f.vector(1), f.vector(4));
+        if geometry::unit(geometry::sub(head, tail)).is_none() {
+            f.fault(4, "a head of the normal apart from its tail", "give XCH, YCH, ZCH");
+            return None;
+        }
+        if g.real(3, 0.0) != 0.0 || g.real(4, 0.0) != 0.0 {
+            g.fault(
+                3,
+                "no LENL and LENM: a plane without end",
+                "leave them blank, or bound it by RADIUS and PSID",
+            );
+        }
+        if g.integer(6) != 0 {
+            g.fault(6, "ITYPE 0, the global system", "leave ID and ITYPE blank");
+        }
+        let radius = f.real(7, 0.0);
+        if radius < 0.0 {
+            f.fault(7, "a RADIUS of 0 or above", "give one, or leave it blank");
+            return None;
+        }
+        Some(Self { at: f.at, id, heading, parts: f.id(0), tail, head, radius })
+    }
+}
+
 /// What the control cards say; none is what no card said.
 #[derive(Default)]
 pub(super) struct ControlCards {
@@ -41,6 +89,7 @@ pub(super) struct ControlCards {
     /// The card of `*CONTROL_SHELL` by which shells keep their thickness.
     pub(super) rigid_thickness: Option<Place>,
     pub(super) period: Option<(Place, f64)>,
+    pub(super) sections: Vec<SectionCard>,
     /// Nodes and sets of nodes whose motion is to be written.
     pub(super) gauges: Vec<(Place, u32)>,
     pub(super) gauge_sets: Vec<(Place, u32)>,
@@ -175,6 +224,15 @@ impl ControlCards {
                     list.extend((0..8).map(|i| (card.at, f.id(i))).filter(|(_, id)| *id != 0));
                 }
             }
+            "DATABASE_CROSS_SECTION_PLANE" | "DATABASE_CROSS_SECTION_PLANE_ID" => {
+                self.sections.extend(SectionCard::read(block, context));
+            }
+            word if word.starts_with("DATABASE_CROSS_SECTION") => context.log.warn(
+                block.at,
+                format!(
+                    "*{word}: the force of this section is not written; *DATABASE_CROSS_SECTION_PLANE is"
+                ),
+            ),
             word => context.log.ignore(block.at, word),
         }
     }

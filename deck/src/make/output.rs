@@ -1,6 +1,8 @@
 //! What is written: results, contact forces, gauges.
 
-use super::{assembly::Assembly, names::Names};
+use mechanics::rigid::Body;
+
+use super::{assembly::Assembly, names::Names, section};
 use crate::{
     fault::short,
     geometry::{norm, sub},
@@ -11,7 +13,13 @@ use crate::{
     typed::{self, Deck, Kind, Spot},
 };
 
-pub(super) fn make(deck: &Deck, names: &Names<'_>, assembly: &Assembly, log: &Log<'_>) -> Output {
+pub(super) fn make(
+    deck: &Deck,
+    names: &Names<'_>,
+    assembly: &Assembly,
+    bodies: &[Body],
+    log: &Log<'_>,
+) -> Output {
     let given = &deck.output;
     let surface = given.contact_surface.as_ref().filter(|on| on.value);
     if let Some(on) = surface {
@@ -27,6 +35,7 @@ pub(super) fn make(deck: &Deck, names: &Names<'_>, assembly: &Assembly, log: &Lo
         workers: given.workers,
         contact_surface: surface.is_some(),
         contact_forces: contact_forces(deck, names, log),
+        sections: section::make(deck, names, assembly, bodies, log),
         gauges: Vec::new(),
         element_gauges: Vec::new(),
     };

@@ -1,13 +1,13 @@
-//! `[output]` and `[[gauge]]`.
+//! `[output]`, `[[section]]` and `[[gauge]]`.
 
-use super::entry::text;
+use super::entry::{direction, parts_of, text};
 use crate::{
     fault::nearest,
-    limits::MAX_ENTRIES,
+    limits::{MAX_ENTRIES, MAX_SECTIONS},
     model::FIELD_NAMES,
     place::Placed,
     table::{Range, Table},
-    typed::{Gauge, Kind, Output, PartPairs, Spot},
+    typed::{Gauge, Kind, Output, PartPairs, Section, Spot},
 };
 
 /// Reads `[output]`.
@@ -59,6 +59,26 @@ fn read_fields(table: &Table<'_>) -> Vec<String> {
         item.fault(&format!("one of {}", words.join(", ")), &advice);
     }
     fields
+}
+
+/// Reads every `[[section]]`: a plane through parts.
+pub(super) fn read_sections(deck: &Table<'_>) -> Vec<Section> {
+    let section = |table: Table<'_>| {
+        let name = table.require("name", "a name in quotes");
+        let name = name.and_then(|v| v.name().map(|name| v.placed(name)));
+        let parts = parts_of(&table);
+        let plane = table.require("plane", "{ point = [x, y, z], normal = [x, y, z] }");
+        let plane = plane.and_then(|v| v.table(format!("plane of {}", table.title))).and_then(|plane| {
+            let (point, normal) = (plane.vector("point"), direction(&plane, "normal"));
+            plane.finish();
+            Some([point?, normal?])
+        });
+        let radius = table.get("radius").and_then(|v| v.number(Range::Positive));
+        let (at, title) = (table.place(), table.title.clone());
+        table.finish();
+        Section { at, title, name, parts, plane, radius }
+    };
+    deck.tables("section", MAX_SECTIONS).into_iter().map(section).collect()
 }
 
 /// Reads every `[[gauge]]`: at a node or element number, or at the node or element nearest to a point.

@@ -173,6 +173,7 @@ impl Job {
         let watched = Watched {
             elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
             contacts: model.output.contact_forces.clone(),
+            sections: model.output.sections.iter().map(|section| section.cut.clone()).collect(),
         };
         for (position, subdomains) in division.by_worker.into_iter().enumerate() {
             let assign = Assign {

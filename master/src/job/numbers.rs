@@ -28,7 +28,10 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64], n_parts: usize
         let held = vote.walls.iter().flat_map(|wall| [wall.work.whole(), wall.loss.whole()]);
         let numbers = numbers.chain(released).chain(held);
         let seen = vote.contacts.iter().flat_map(|(_, contact)| contact.force);
+        let passed =
+            vote.sections.iter().flat_map(|(_, s)| s.force.into_iter().chain(s.moment).chain(s.places));
         let mut numbers = numbers
+            .chain(passed)
             .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| state.iter().copied())))
             .chain([vote.force_bound, vote.contact_speed_squared]);
         let bad = numbers.find(|v| !v.is_finite());

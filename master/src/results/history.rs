@@ -14,6 +14,7 @@ use std::{
 use deck::model::Model;
 use mechanics::{
     contact::PairVote,
+    cross_section::SectionVote,
     law::Unit,
     material::Material,
     state::{N_FIELDS, field},
@@ -63,6 +64,8 @@ pub struct HistoryRow {
     pub element_gauges: Vec<Vec<f64>>,
     /// The pairs of parts that are watched and in contact: index of the pair in the deck, force and hits.
     pub contacts: Vec<(u32, PairVote)>,
+    /// Cross-sections with elements: index of the section in the deck, and what passes through it.
+    pub sections: Vec<(u32, SectionVote)>,
     /// Walls and supports, see [`mechanics::setup::Setup::n_holders`].
     pub holders: Vec<HolderRow>,
 }
@@ -140,6 +143,8 @@ pub struct History {
     densities: Vec<f64>,
     /// Pairs of parts that are watched.
     n_contacts: u32,
+    /// Origins of the cross-sections.
+    sections: Vec<[f64; 3]>,
     /// The walls and supports that rows speak of.
     holders: Vec<Holder>,
     has_walls: bool,
@@ -187,6 +192,7 @@ impl History {
                 .map(|g| material(model, g.element).density)
                 .collect(),
             n_contacts: model.output.contact_forces.len() as u32,
+            sections: model.output.sections.iter().map(|section| section.cut.origin).collect(),
             holders: holders(model),
             has_walls: !model.setup.walls.is_empty(),
             erodes: model.setup.erosion.is_on(),
@@ -258,6 +264,14 @@ impl History {
                 contacts.next_if(|(index, _)| *index == pair).map(|(_, vote)| *vote).unwrap_or_default();
             let [x, y, z] = vote.force;
             let _ = write!(self.row, ",{x:?},{y:?},{z:?},{}", vote.hits);
+        }
+        let mut sections = row.sections.iter().peekable();
+        for (index, &origin) in (0..).zip(&self.sections) {
+            let vote = sections.next_if(|(at, _)| *at == index).map(|(_, vote)| *vote).unwrap_or_default();
+            let (centre, moment) = vote.about_centre(origin);
+            for number in vote.force.into_iter().chain(moment).chain(centre) {
+                let _ = write!(self.row, ",{number:?}");
+            }
         }
         for Holder { index, is_wall, .. } in &self.holders {
             let HolderRow { force: [x, y, z], work, loss } =
@@ -403,6 +417,12 @@ fn header(model: &Model) -> String {
         let [a, b] = pair.map(|part| &model.mesh.parts[part as usize].name);
         columns.extend(["fx", "fy", "fz"].iter().map(|axis| format!("{a} from {b}:{axis} [{force}]")));
         columns.push(format!("{a} from {b}:contacts"));
+    }
+    for section in &model.output.sections {
+        let name = format!("section {}", section.name);
+        columns.extend(["fx", "fy", "fz"].iter().map(|axis| format!("{name}:{axis} [{force}]")));
+        columns.extend(["mx", "my", "mz"].iter().map(|axis| format!("{name}:{axis} [{force}*{length}]")));
+        columns.extend(["x", "y", "z"].iter().map(|axis| format!("{name}:{axis} [{length}]")));
     }
     for Holder { name, is_wall, .. } in holders(model) {
         columns.extend(["fx", "fy", "fz"].iter().map(|axis| format!("{name}:{axis} [{force}]")));

@@ -275,6 +275,7 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
             .then_some((1, PairVote { force: [x, -0.5, 1e-300], hits: 10 + cycle }))
             .into_iter()
             .collect(),
+        sections: Vec::new(),
         holders: Vec::new(),
     }
 }

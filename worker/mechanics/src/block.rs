@@ -168,6 +168,11 @@ impl Block {
         self.group.alive()
     }
 
+    /// The same, to mask elements while others of their sets are computed.
+    pub(crate) fn alive_mut(&mut self) -> &mut [u8] {
+        self.group.alive_mut()
+    }
+
     /// Whether a local element takes part.
     pub(crate) fn is_alive(&self, element: usize) -> bool {
         let slot = self.slot(element);

@@ -222,10 +222,10 @@ impl Domain {
             }
             if sets != Sets::Interior {
                 held_block.vote = ElementVote::default();
-                held_block.block.compute(material, &held_block.border, &step, width, &mut held_block.vote);
+                held_block.compute(true, material, (&step, width));
             }
             if sets != Sets::Border {
-                held_block.block.compute(material, &held_block.interior, &step, width, &mut held_block.vote);
+                held_block.compute(false, material, (&step, width));
             }
         };
         self.order.deal(&mut self.held_blocks, meter, work);

@@ -25,6 +25,7 @@ pub mod burn;
 pub mod constraint;
 pub mod contact;
 mod copy_index;
+pub mod cross_section;
 pub mod cycle;
 pub mod digest;
 pub mod element;

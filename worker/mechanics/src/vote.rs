@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     contact::{ContactVote, Extent, PairEnergies, PairVote},
+    cross_section::{CrossSection, SectionVote},
     element::ElementVote,
     rigid,
     wall::WallVote,
@@ -62,6 +63,8 @@ pub struct Vote {
     pub element_gauges: Vec<(u32, Vec<f64>)>,
     /// Contact between the pairs of parts that are watched: index of the pair, ascending; pairs without force are left out.
     pub contacts: Vec<(u32, PairVote)>,
+    /// What passes through cross-sections: index of the section, ascending; those of which no element is here are left out.
+    pub sections: Vec<(u32, SectionVote)>,
     /// The first element that went wrong, if any: global index and its volume.
     pub fault: Option<(u32, f64)>,
     /// Global indices of the elements that eroded in this cycle, ascending.
@@ -95,12 +98,13 @@ impl Gone {
 }
 
 /// What of a run is watched beside its energies, because a deck asks for it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Watched {
     /// Global element of each element gauge.
     pub elements: Vec<u32>,
     /// Pairs of parts.
     pub contacts: Vec<[u32; 2]>,
+    pub sections: Vec<CrossSection>,
 }
 
 /// Energies of one part in one cycle.
@@ -148,6 +152,7 @@ impl Vote {
             gauges: Vec::new(),
             element_gauges: Vec::new(),
             contacts: Vec::new(),
+            sections: Vec::new(),
             fault: None,
             eroded: Vec::new(),
             gone: Gone::default(),
@@ -195,6 +200,7 @@ impl Vote {
         self.element_gauges.extend_from_slice(&other.element_gauges);
         self.element_gauges.sort_by_key(|g| g.0);
         self.add_contacts(&other.contacts);
+        self.add_sections(other.sections.iter().copied());
         self.note_fault(other.fault);
         self.add_eroded(&other.eroded);
         self.gone.merge(&other.gone);
@@ -241,6 +247,16 @@ impl Vote {
             match self.contacts.binary_search_by_key(pair, |(pair, _)| *pair) {
                 Ok(at) => self.contacts[at].1.merge(vote),
                 Err(at) => self.contacts.insert(at, (*pair, *vote)),
+            }
+        }
+    }
+
+    /// Joins what passes through cross-sections elsewhere.
+    pub fn add_sections(&mut self, others: impl Iterator<Item = (u32, SectionVote)>) {
+        for (section, vote) in others {
+            match self.sections.binary_search_by_key(&section, |(section, _)| *section) {
+                Ok(at) => self.sections[at].1.merge(&vote),
+                Err(at) => self.sections.insert(at, (section, vote)),
             }
         }
     }

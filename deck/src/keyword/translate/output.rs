@@ -4,8 +4,13 @@ use std::collections::BTreeMap;
 
 use super::{contact, state::Translation};
 use crate::{
+    geometry::sub,
+    keyword::control::SectionCard,
     place::{Origin, Place, Placed},
-    typed::{Gauge, Kind, Spot, condition::made},
+    typed::{
+        Gauge, Kind, Section, Spot,
+        condition::{Parts, made},
+    },
 };
 
 const MAX_GAUGES: usize = 100;
@@ -20,6 +25,10 @@ pub(super) fn write(t: &mut Translation<'_>) {
             |pair: [u32; 2]| Placed::new(pair.map(|id| made(t.names[&id].clone(), at)), Origin::card(at));
         let pairs = pairs.into_iter().map(named).collect();
         t.deck.output.contact_forces = Some(Placed::new(pairs, Origin::card(at)));
+    }
+    for (number, card) in (1..).zip(&control.sections) {
+        let section = section(t, number, card);
+        t.deck.sections.push(section);
     }
     let mut gauges: BTreeMap<u32, Place> = control.gauges.iter().map(|(at, id)| (*id, *at)).collect();
     for (at, set) in &control.gauge_sets {
@@ -37,5 +46,31 @@ pub(super) fn write(t: &mut Translation<'_>) {
             spot: Some(Spot::Number(Placed::new(id, Origin::card(at)))),
             part: None,
         });
+    }
+}
+
+/// A cross-section by its heading, or by its number.
+fn section(t: &Translation<'_>, number: u32, card: &SectionCard) -> Section {
+    let at = card.at;
+    let name = match (card.heading.as_str(), card.id) {
+        ("", 0) => number.to_string(),
+        ("", id) => id.to_string(),
+        (heading, _) => heading.to_string(),
+    };
+    let parts = match card.parts {
+        0 => Parts::All,
+        set => {
+            let members = t.problem.part_set(set, at, t.log);
+            let named = members.iter().filter_map(|id| t.names.get(id));
+            Parts::Named(named.map(|name| made(name.clone(), at)).collect())
+        }
+    };
+    Section {
+        at,
+        title: format!("cross-section {name}"),
+        name: Some(made(name, at)),
+        parts,
+        plane: Some([card.tail, sub(card.head, card.tail)]),
+        radius: Some(card.radius).filter(|radius| *radius > 0.0),
     }
 }

@@ -15,6 +15,7 @@ use super::{
 use crate::{
     block::Block,
     copy_index::CopyIndex,
+    cross_section::Cuts,
     element::ElementVote,
     erosion::Eroding,
     exact::Quanta,
@@ -69,6 +70,7 @@ impl HeldBlock {
             face_vote: NO_FACES,
             walls: vec![WallVote::default(); setup.n_holders()],
             eroding,
+            cuts: Cuts::default(),
             contact_history,
             shared: Share::default(),
             led: Vec::new(),
@@ -171,6 +173,9 @@ impl Domain {
     /// From now on votes say how these elements and contacts are; before the first plan is installed.
     pub fn watch(&mut self, watched: &Watched) {
         self.watched_pairs.clone_from(&watched.contacts);
+        for held_block in self.held_blocks.iter_mut().filter(|held_block| !held_block.is_rigid) {
+            held_block.cuts = Cuts::of(&watched.sections, &held_block.block);
+        }
         let place = |element: &u32| {
             let found = |held_block: &HeldBlock| held_block.block.elements.iter().position(|e| e == element);
             let mut held_blocks = (0..).zip(&self.held_blocks);

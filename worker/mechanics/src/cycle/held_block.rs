@@ -5,10 +5,12 @@ use std::{collections::VecDeque, ops::Range};
 use super::{Meter, deal::deal};
 use crate::{
     block::Block,
-    element::ElementVote,
+    cross_section::Cuts,
+    element::{ElementVote, Step},
     erosion::{Eroding, PieceErosion},
     lanes::{SET, Width},
     load::face::{self, FaceVote, LoadedFace},
+    material::Material,
     nodes::{Advance, Booked, NodeSet, Nodes},
     rigid::Push,
     setup::Setup,
@@ -38,6 +40,8 @@ pub(super) struct HeldBlock {
     pub walls: Vec<WallVote>,
     /// Where the part erodes.
     pub eroding: Option<Eroding>,
+    /// What cross-sections cut of it.
+    pub cuts: Cuts,
     /// What contact keeps of each node, by number; no array where it keeps nothing.
     pub contact_history: Vec<Vec<f64>>,
     /// Its nodes with other holders.
@@ -89,6 +93,12 @@ impl HeldBlock {
 
     pub fn is_booked(&self, local: u32) -> bool {
         self.sets[local as usize / SET].booked >> (local as usize % SET) & 1 == 1
+    }
+
+    /// Forces of its border or interior elements, and what passes through cross-sections.
+    pub fn compute(&mut self, is_border: bool, material: &Material, how: (&Step, Width)) {
+        let sets = if is_border { &self.border } else { &self.interior };
+        self.cuts.compute(&mut self.block, material, sets, how, &mut self.vote);
     }
 
     /// Integrates its nodes and books what they say; elements that have eroded leave.

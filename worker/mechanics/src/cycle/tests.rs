@@ -196,7 +196,7 @@ fn folding_plate() -> Domain {
     let pieces = vec![cut(&mesh, &state, 0, &all)];
     let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: Vec::new() };
     let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], Width::best());
-    domain.watch(&Watched { elements: vec![7, 0], contacts: Vec::new() });
+    domain.watch(&Watched { elements: vec![7, 0], ..Watched::default() });
     domain.install(&Plan { moments: true, ..Plan::default() }, &[], &Silent).expect("all nodes are held");
     domain
 }

@@ -52,6 +52,9 @@ pub(crate) trait Group: Send + Sync {
     /// Bits of the slots of each set whose elements take part.
     fn alive(&self) -> &[u8];
 
+    /// The same, to mask elements while others of their sets are computed.
+    fn alive_mut(&mut self) -> &mut [u8];
+
     fn slot(&self, element: usize) -> usize;
 
     /// Nodes of the corners of an element. A kind with fewer corners than a hexahedron names some of them twice.

@@ -216,6 +216,10 @@ impl Group for Trusses {
         &self.alive
     }
 
+    fn alive_mut(&mut self) -> &mut [u8] {
+        &mut self.alive
+    }
+
     fn slot(&self, element: usize) -> usize {
         element
     }

@@ -138,6 +138,10 @@ impl Group for Solids {
         &self.alive
     }
 
+    fn alive_mut(&mut self) -> &mut [u8] {
+        &mut self.alive
+    }
+
     fn slot(&self, element: usize) -> usize {
         self.slots[element] as usize
     }

@@ -255,6 +255,10 @@ impl Group for Core {
         &self.alive
     }
 
+    fn alive_mut(&mut self) -> &mut [u8] {
+        &mut self.alive
+    }
+
     fn slot(&self, element: usize) -> usize {
         element
     }
