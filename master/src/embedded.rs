@@ -71,8 +71,8 @@ pub enum Fate {
     Join(WorkerSpec),
     /// From here on this is done to what a worker holds whenever it has computed elements.
     Touch(usize, fn(&mut Machine)),
-    /// One bit of what a worker holds flips when it has next computed elements: place and bit, see [`Machine::flip`].
-    Flip(usize, u64, u32),
+    /// This is done, with this number, to what a worker holds when it has next computed elements.
+    TouchOnce(usize, fn(&mut Machine, u64), u64),
 }
 
 /// Something that has arrived, or a task's end.
@@ -91,7 +91,7 @@ struct LocalWorker {
     machine: Option<Box<Machine>>,
     lost: bool,
     touch: Option<fn(&mut Machine)>,
-    flip: Option<(u64, u32)>,
+    touch_once: Option<(fn(&mut Machine, u64), u64)>,
     stopwatch: Stopwatch,
     /// Of this epoch: bytes sent to each neighbour.
     peers: (u32, BTreeMap<u32, u64>),
@@ -104,7 +104,7 @@ impl LocalWorker {
             stopwatch: Stopwatch::new(),
             lost: false,
             touch: None,
-            flip: None,
+            touch_once: None,
             peers: (0, BTreeMap::new()),
         }
     }
@@ -211,8 +211,8 @@ fn drive(
                     world.apply(Event::Lost(member, "it was to be lost".to_owned()))?;
                 }
             }
-            Some(Fate::Flip(host, place, bit)) => {
-                world.surroundings.places[host].flip = Some((place, bit));
+            Some(Fate::TouchOnce(host, touch, number)) => {
+                world.surroundings.places[host].touch_once = Some((touch, number));
             }
             Some(Fate::Touch(host, touch)) => world.surroundings.places[host].touch = Some(touch),
             Some(Fate::Join(spec)) => {
@@ -238,14 +238,13 @@ fn drive(
                 let place = &mut world.surroundings.places[host];
                 let cycle = world.sessions.hosts[host].session.cycle();
                 machine.take_laps().for_each(|lap| place.stopwatch.book(cycle, lap));
-                if let (Some(touch), session::Outcome::Computed) = (place.touch, &outcome) {
-                    touch(&mut machine);
-                }
-                if let (session::Outcome::Computed, Some((place, bit))) = (&outcome, place.flip) {
-                    machine.flip(place, bit);
-                }
                 if matches!(outcome, session::Outcome::Computed) {
-                    place.flip = None;
+                    if let Some(touch) = place.touch {
+                        touch(&mut machine);
+                    }
+                    if let Some((touch, number)) = place.touch_once.take() {
+                        touch(&mut machine, number);
+                    }
                 }
                 place.machine = Some(machine);
                 world.step(host, session::Event::Done(outcome))?;

@@ -102,7 +102,9 @@ fn when_all_workers_differ_the_master_is_suspected() {
 fn with_flip(verify: f64, (at, host, place, bit): (u64, usize, u64, u32)) -> Result<Solved, String> {
     let mut workers = at_work(3, false, Route::Direct);
     workers.options.asked.verify = verify;
-    run(workers, &mut |number| (number == at).then_some(Fate::Flip(host, place, bit)))
+    let flip = |machine: &mut Machine, number: u64| machine.flip(number / 64, (number % 64) as u32);
+    let number = 64 * (place % (1 << 58)) + u64::from(bit);
+    run(workers, &mut |step| (step == at).then_some(Fate::TouchOnce(host, flip, number)))
 }
 
 #[test]
