@@ -148,7 +148,7 @@ impl ClientRequests<'_> {
         &self,
         question: impl FnOnce(oneshot::Sender<T>) -> Notice,
     ) -> std::result::Result<T, notice::Error> {
-        notice::ask(&self.notices, question).await
+        notice::ask(self.notices, question).await
     }
 
     async fn answer(&self, request: Request) -> std::result::Result<Reply, Refusal> {

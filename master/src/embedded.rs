@@ -62,6 +62,9 @@ pub struct Traffic {
     pub serial_ns: Option<u64>,
 }
 
+/// What is done to what a worker holds, with a number that says where.
+pub type Numbered = fn(&mut Machine, u64);
+
 /// What befalls the workers of a run.
 #[derive(Clone, Debug)]
 pub enum Fate {
@@ -72,7 +75,7 @@ pub enum Fate {
     /// From here on this is done to what a worker holds whenever it has computed elements.
     Touch(usize, fn(&mut Machine)),
     /// This is done, with this number, to what a worker holds when it has next computed elements.
-    TouchOnce(usize, fn(&mut Machine, u64), u64),
+    TouchOnce(usize, Numbered, u64),
 }
 
 /// Something that has arrived, or a task's end.
@@ -91,7 +94,7 @@ struct LocalWorker {
     machine: Option<Box<Machine>>,
     lost: bool,
     touch: Option<fn(&mut Machine)>,
-    touch_once: Option<(fn(&mut Machine, u64), u64)>,
+    touch_once: Option<(Numbered, u64)>,
     stopwatch: Stopwatch,
     /// Of this epoch: bytes sent to each neighbour.
     peers: (u32, BTreeMap<u32, u64>),
