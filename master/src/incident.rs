@@ -52,7 +52,7 @@ impl fmt::Display for Difference {
         match cycle {
             Some(cycle) => {
                 let workers = workers.join(", ");
-                write!(f, "it differs first in cycle {cycle}, on {workers}: test the memory of that host")
+                write!(f, "it differs first in cycle {cycle}, on {workers}: test the memory there")
             }
             None => f.write_str("no vote shows on which worker: test the memory of all hosts"),
         }

@@ -33,7 +33,9 @@ pub(super) fn make(
         let (Some(name), Some(mut selected)) = (&given.name, selected) else { continue };
         selected.retain(|&p| !bodies.iter().any(|body| body.parts.contains(&(p as u32))));
         let Some(cut) = cut(given, &selected, assembly) else { continue };
-        if cut.elements.is_empty() && log.count() == 0 {
+        // A part without elements has a fault of its own.
+        let is_whole = selected.iter().all(|&p| assembly.mesh.parts[p].n_elements() > 0);
+        if cut.elements.is_empty() && is_whole {
             log.fault(
                 given.at,
                 format!("{} that cuts nothing", given.title),

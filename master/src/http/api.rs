@@ -12,7 +12,7 @@
 //! | `GET /api/jobs/N/surface/K` | the surface of state K, binary, as [`surface`](super::surface) says |
 //!
 //! What cannot be done is `{error}` with 404 where there is no such thing, 409 where the state of the job forbids it, 422 where what was sent
-//! is wrong, 503 where the queue is full or the master ends, and 507 where the disk refused.
+//! is wrong, 500 after a bug or damage here, 503 where the queue is full or the master ends, and 507 where the disk refused.
 
 use std::{convert::Infallible, time::Duration};
 
@@ -156,8 +156,15 @@ struct Place {
 
 impl From<desk::Error> for Fault {
     fn from(error: desk::Error) -> Self {
+        let status = match &error {
+            desk::Error::Options(_) | desk::Error::Name(_) | desk::Error::Faults(_) => {
+                StatusCode::UNPROCESSABLE_ENTITY
+            }
+            desk::Error::Ending => StatusCode::SERVICE_UNAVAILABLE,
+            desk::Error::Bug => StatusCode::INTERNAL_SERVER_ERROR,
+        };
         let desk::Error::Faults(faults) = error else {
-            return Self(StatusCode::UNPROCESSABLE_ENTITY, json!({ "error": error.to_string() }));
+            return Self(status, json!({ "error": error.to_string() }));
         };
         let place = |fault: deck::Fault| Place {
             line: fault.line,
@@ -167,7 +174,7 @@ impl From<desk::Error> for Fault {
             advice: fault.advice,
         };
         let faults: Vec<Place> = faults.into_iter().map(place).collect();
-        Self(StatusCode::UNPROCESSABLE_ENTITY, json!({ "faults": faults }))
+        Self(status, json!({ "faults": faults }))
     }
 }
 
@@ -238,4 +245,38 @@ async fn surface(
     let bytes = board::lock(&job_view).surface(index);
     let bytes = bytes.ok_or_else(|| missing(format!("job {job} has no state {index}")))?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], bytes.as_ref().clone()))
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::request::State as JobState;
+
+    use super::*;
+    use crate::{queue::Change, spool};
+
+    #[test]
+    fn a_refusal_has_the_status_of_its_kind() {
+        let disk = || spool::Fault::Io("job-1.json".into(), std::io::ErrorKind::StorageFull.into());
+        for (error, status) in [
+            (notice::Error::NoJob, 404),
+            (notice::Error::Queue(queue::Error::Unknown(7)), 404),
+            (notice::Error::WritesNone(7), 404),
+            (notice::Error::NoResults(7, JobState::Queued), 404),
+            (notice::Error::Queue(queue::Error::NotOver(7, JobState::Running)), 409),
+            (notice::Error::Queue(queue::Error::Illegal(JobState::Done, Change::Cancel)), 409),
+            (notice::Error::Queue(queue::Error::Full(1000)), 503),
+            (notice::Error::Ending, 503),
+            (notice::Error::Disk { asked: "the job is not queued".to_owned(), why: disk() }, 507),
+            (notice::Error::Deck(disk()), 500),
+        ] {
+            let words = error.to_string();
+            let Fault(found, body) = error.into();
+            assert_eq!((found.as_u16(), &body["error"]), (status, &json!(words)));
+        }
+        for (error, status) in
+            [(desk::Error::Name(300), 422), (desk::Error::Ending, 503), (desk::Error::Bug, 500)]
+        {
+            assert_eq!(Fault::from(error).0.as_u16(), status);
+        }
+    }
 }

@@ -28,7 +28,7 @@ struct Trial {
     /// Hash of all that it came to.
     sum: [u8; 32],
     /// By cycle and position: hash of the sub-domain's vote.
-    votes: BTreeMap<u64, Vec<u64>>,
+    votes: BTreeMap<u64, Vec<[u8; 32]>>,
 }
 
 /// What follows from a computation of an interval.
@@ -47,7 +47,7 @@ pub(super) struct Twice {
     owed: f64,
     chosen: bool,
     trials: Vec<Trial>,
-    votes: BTreeMap<u64, Vec<u64>>,
+    votes: BTreeMap<u64, Vec<[u8; 32]>>,
 }
 
 impl Twice {
@@ -84,7 +84,7 @@ impl Twice {
     /// A worker's vote of the cycle before this one has come; `n` are at work.
     pub(super) fn note(&mut self, (position, n): (usize, usize), cycle: u64, vote: Option<&Vote>) {
         if let (true, Some(vote)) = (self.chosen, vote) {
-            self.votes.entry(cycle).or_insert_with(|| vec![0; n])[position] = hash_of(vote);
+            self.votes.entry(cycle).or_insert_with(|| vec![[0; 32]; n])[position] = hash_of(vote);
         }
     }
 
@@ -144,15 +144,18 @@ fn partner(rank: usize, n: usize, computation: usize) -> usize {
 }
 
 /// Of what depends on the elements and nodes of a sub-domain alone, not on how contact was dealt.
-fn hash_of(vote: &Vote) -> u64 {
+fn hash_of(vote: &Vote) -> [u8; 32] {
     let parts = vote
         .parts
         .iter()
         .flat_map(|part| [part.kinetic, part.internal, part.hourglass, part.viscosity, part.gone]);
     let numbers = parts.chain(vote.momentum).chain([vote.courant, f64::from(vote.courant_element)]);
-    numbers.fold(0xcbf2_9ce4_8422_2325, |hash, number| {
-        ((hash ^ (number + 0.0).to_bits()).wrapping_mul(0x0100_0000_01b3)).rotate_left(29)
-    })
+    let mut hasher = blake3::Hasher::new();
+    for number in numbers {
+        // Zeros of both signs are one number.
+        hasher.update(&(number + 0.0).to_le_bytes());
+    }
+    *hasher.finalize().as_bytes()
 }
 
 /// The first cycle in which votes differ, and the positions whose do.

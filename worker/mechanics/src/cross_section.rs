@@ -15,6 +15,7 @@ use crate::{
     exact::Quantum,
     lanes::{SET, Width},
     material::Material,
+    rigid::cross,
 };
 
 /// Elements that are cut, and which of their corners are ahead of the cut.
@@ -187,23 +188,17 @@ impl Cuts {
         let of_set = self.sets.last_mut().expect("one was just pushed");
         let bit = 1 << cut.lane;
         of_set.lanes |= bit;
-        let fits = |pass: &&mut Pass| {
-            pass.lanes & bit != 0 || !corners.iter().any(|node| pass.touched.contains(node))
-        };
         // One element that two sections cut stays in one pass.
         let known = of_set.passes.iter().position(|pass| pass.lanes & bit != 0);
-        let pass = match known {
-            Some(known) => Some(&mut of_set.passes[known]),
-            None => of_set.passes.iter_mut().find(fits),
-        };
-        match pass {
-            Some(pass) => {
-                pass.lanes |= bit;
-                pass.touched.extend(corners);
-                pass.cuts.push(cut);
-            }
-            None => of_set.passes.push(Pass { lanes: bit, touched: corners.to_vec(), cuts: vec![cut] }),
-        }
+        let is_apart = |pass: &Pass| !corners.iter().any(|node| pass.touched.contains(node));
+        let at = known.or_else(|| of_set.passes.iter().position(is_apart)).unwrap_or_else(|| {
+            of_set.passes.push(Pass { lanes: 0, touched: Vec::new(), cuts: Vec::new() });
+            of_set.passes.len() - 1
+        });
+        let pass = &mut of_set.passes[at];
+        pass.lanes |= bit;
+        pass.touched.extend(corners);
+        pass.cuts.push(cut);
     }
 
     /// As [`Block::compute`], to the same bits; adds what passes through the sections.
@@ -262,8 +257,4 @@ fn pull(block: &Block, node: u32) -> [f64; 6] {
     let [fx, fy, fz] = [0, 1, 2].map(|a| block.f[a][n]);
     let [mx, my, mz] = block.turning.as_ref().map_or([0.0; 3], |turning| [0, 1, 2].map(|a| turning.m[a][n]));
     [fx, fy, fz, mx, my, mz]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -1,8 +1,8 @@
 //! The seam between a block and its elements: a block has nodes and one group of elements of one kind.
 //!
-//! An element kind is a module that implements [`Group`] and has an arm in [`Topology`](crate::mesh::Topology) and in [`kinds`](super::kinds); a block, a cycle, erosion,
-//! loads and samples ask a group by this trait and by nothing else. Elements sit in *slots*, eight to a *lane set*, the same on every
-//! lane width; a slot may be empty.
+//! An element kind is a module that implements [`Group`] and has an arm in [`Topology`](crate::mesh::Topology) and in
+//! [`kinds`](super::kinds); a block, a cycle, erosion, loads and samples ask a group by this trait and by nothing else. Elements sit in
+//! *slots*, eight to a *lane set*, the same on every lane width; a slot may be empty.
 
 use std::ops::Range;
 
