@@ -121,6 +121,16 @@ pub trait Lane:
     }
 }
 
+/// Each of the numbers in all lanes. A loop, because the standard library's `map` is a call where the compiler does not inline it.
+#[inline(always)]
+pub fn splat_each<L: Lane, const K: usize>(numbers: &[f64; K]) -> [L; K] {
+    let mut lanes = [L::splat(0.0); K];
+    for i in 0..K {
+        lanes[i] = L::splat(numbers[i]);
+    }
+    lanes
+}
+
 /// How many elements an instruction works on. The result does not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Width {

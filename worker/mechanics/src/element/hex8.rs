@@ -138,28 +138,32 @@ unsafe fn compute<L: Lane, E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
         match layout {
             Layout::Structured { row, plane, base } => {
                 let place = Rows { row: *row, plane: *plane, base };
-                for set in sets.iter().cloned().flatten() {
-                    of_set::<L, _, E, S, F>(place, nodes, slots, laws, step, set, &mut tally, vote);
+                for range in sets {
+                    for set in range.start..range.end {
+                        of_set::<L, _, E, S, F>(place, nodes, slots, laws, step, set, &mut tally, vote);
+                    }
                 }
             }
             Layout::Explicit { sets: places, lists } => {
                 let mut packed = Packed::new();
-                for set in sets.iter().cloned().flatten() {
-                    // One kernel for both, which knows only whence it loads: a choice at each load would cost it its registers.
-                    let place = *places.get_unchecked(set as usize);
-                    let (place, mut arrays, list) = match place {
-                        Corners::Run(along, first) => {
-                            (Bases { first, along: Some(along) }, nodes.reborrow(), None)
+                for range in sets {
+                    for set in range.start..range.end {
+                        // One kernel for both, which knows only whence it loads: a choice at each load would cost it its registers.
+                        let place = *places.get_unchecked(set as usize);
+                        let (place, mut arrays, list) = match place {
+                            Corners::Run(along, first) => {
+                                (Bases { first, along: Some(along) }, nodes.reborrow(), None)
+                            }
+                            Corners::List(list) => {
+                                let list = lists.get_unchecked(list as usize);
+                                packed.gather::<L>(nodes, list);
+                                (PACKED, packed.nodal(), Some(list))
+                            }
+                        };
+                        of_set::<L, _, E, S, F>(place, &mut arrays, slots, laws, step, set, &mut tally, vote);
+                        if let Some(list) = list {
+                            packed.scatter(nodes, list);
                         }
-                        Corners::List(list) => {
-                            let list = lists.get_unchecked(list as usize);
-                            packed.gather::<L>(nodes, list);
-                            (PACKED, packed.nodal(), Some(list))
-                        }
-                    };
-                    of_set::<L, _, E, S, F>(place, &mut arrays, slots, laws, step, set, &mut tally, vote);
-                    if let Some(list) = list {
-                        packed.scatter(nodes, list);
                     }
                 }
             }
@@ -405,10 +409,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let active = L::both(alive, L::both(upright, finite));
     if L::bits(active) != L::bits(alive) {
         let volumes = at_mid.volume().min(volume).to_array();
-        let bad = L::bits(alive) & !L::bits(active);
-        for (lane, &volume) in volumes.iter().enumerate().filter(|(lane, _)| bad >> lane & 1 == 1) {
-            vote.offer_fault(Fault { element: view.elements[slot + lane], volume });
-        }
+        offer_faults(&volumes, L::bits(alive) & !L::bits(active), &view.elements[slot..], vote);
     }
 
     // 9. Votes and energies.
@@ -490,6 +491,17 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         // SAFETY: corners are inside the node arrays.
         unsafe { place.scatter(nodes.f[axis], slot, forces) };
         axis += 1;
+    }
+}
+
+/// Votes against the lanes of `bad`, whose elements are turned inside out or hold numbers that are none.
+#[cold]
+#[inline(never)]
+fn offer_faults(volumes: &[f64; SET], bad: u32, elements: &[u32], vote: &mut ElementVote) {
+    for (lane, (&volume, &element)) in volumes.iter().zip(elements).enumerate() {
+        if bad >> lane & 1 == 1 {
+            vote.offer_fault(Fault { element, volume });
+        }
     }
 }
 

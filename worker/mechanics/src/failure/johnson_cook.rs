@@ -9,6 +9,7 @@ use super::{FailureLaw, Loading};
 use crate::lanes::{
     Lane,
     functions::{exp, ln},
+    splat_each,
 };
 
 /// Least strain at fracture.
@@ -34,7 +35,7 @@ impl JohnsonCookDamage {
     #[inline(always)]
     fn fracture_strain<L: Lane>(&self, triaxiality: L, rate: L, temperature: L) -> L {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let [d1, d2, d3, d4, d5] = self.d.map(L::splat);
+        let [d1, d2, d3, d4, d5] = splat_each::<L, _>(&self.d);
         let eta = triaxiality.min(L::splat(HIGHEST_TRIAXIALITY));
         let mut strain = d2.mul_add(exp(d3 * eta), d1);
         // The same for all elements of the material.

@@ -4,7 +4,7 @@
 
 use super::{Deviator, History, RateFactor, Strain, StrengthLaw};
 use crate::{
-    lanes::Lane,
+    lanes::{Lane, splat_each},
     material::{Hardening, MAX_HARDENING},
 };
 
@@ -47,7 +47,7 @@ impl StrengthLaw for Tabulated {
         let (mut stress, mut slope) = (L::splat(self.points[0][1]), L::splat(0.0));
         let mut point = 0;
         while point < self.n_points {
-            let [at, here, next] = self.points[point].map(L::splat);
+            let [at, here, next] = splat_each::<L, _>(&self.points[point]);
             let beyond = at.less_equal(strain);
             stress = L::select(beyond, next.mul_add(strain - at, here), stress);
             slope = L::select(beyond, next, slope);
@@ -83,11 +83,11 @@ impl StrengthLaw for Tabulated {
         let factor = self.rate.at(strain.rate);
         let three_g = L::splat(3.0 * self.shear);
         let before = history.plastic_strain;
-        let [at, stress, slope] = self.points[0].map(L::splat);
+        let [at, stress, slope] = splat_each::<L, _>(&self.points[0]);
         let (mut at, mut stress, mut slope) = (at, stress * factor, slope * factor);
         let mut point = 1;
         while point < self.n_points {
-            let [next_at, next_stress, next_slope] = self.points[point].map(L::splat);
+            let [next_at, next_stress, next_slope] = splat_each::<L, _>(&self.points[point]);
             let next_stress = next_stress * factor;
             let left = three_g.neg_mul_add(next_at - before, sigma);
             let beyond = next_stress.less(left);

@@ -56,9 +56,9 @@ impl BySlot<'_> {
     #[inline(always)]
     pub fn hourglass<L: Lane>(&self, slot: usize) -> Amplitudes<L> {
         let mut forces = [L::splat(0.0); N_FORCES];
-        for (force, array) in forces.iter_mut().zip(&self.hourglass) {
+        for i in 0..N_FORCES {
             // SAFETY: the kernel keeps slots inside the state arrays, which these are with elastic control.
-            *force = unsafe { L::load(array, slot) };
+            forces[i] = unsafe { L::load(self.hourglass[i], slot) };
         }
         Amplitudes::from_array(forces)
     }
@@ -66,11 +66,12 @@ impl BySlot<'_> {
     /// Writes them for the active lanes; the others keep theirs.
     #[inline(always)]
     pub fn set_hourglass<L: Lane>(&mut self, slot: usize, forces: Amplitudes<L>, active: L::Mask) {
-        for (value, array) in forces.to_array().into_iter().zip(&mut self.hourglass) {
+        let forces = forces.to_array();
+        for i in 0..N_FORCES {
             // SAFETY: as in `hourglass`.
             unsafe {
-                let kept = L::load(array, slot);
-                L::select(active, value, kept).store(array, slot);
+                let kept = L::load(self.hourglass[i], slot);
+                L::select(active, forces[i], kept).store(self.hourglass[i], slot);
             }
         }
     }
