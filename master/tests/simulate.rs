@@ -18,7 +18,7 @@ use master::{
         machines::{Change, Costs, Machines, Scheme, What},
         network::{Network, Wires},
         paper::{self, Verdict},
-        table,
+        sweep, table,
         timeline::Timeline,
         virtual_clock,
     },
@@ -166,6 +166,24 @@ fn the_same_run_twice_is_equal_to_the_bit_and_a_tape_tells_the_same() {
         assert_eq!(bits(&first), bits(&other));
         assert_eq!(first.digest, other.digest);
     }
+}
+
+/// What a host of the end sends is as large as its sub-domain in a run that computes, and empty in one that plays a tape.
+#[test]
+fn a_row_does_not_depend_on_the_rates_that_stand_before_it() {
+    let small = model("plates-joined.toml", 12);
+    let models = [Arc::clone(&small), small];
+    let mut cluster = cluster("modern-1000.toml");
+    let mut tables = cluster.tables.take().expect("the file has tables");
+    tables.hosts = vec![1, 20];
+    let mut rows = |rates: &[f64]| {
+        tables.rates = rates.to_vec();
+        let rows = sweep::run(&cluster, &tables, &models, &mut |_| ()).expect("the decks run");
+        rows.into_iter().filter(|row| row.rate_bits_per_second == 10e9 && row.hosts == 20).collect::<Vec<_>>()
+    };
+    let alone = rows(&[10e9]);
+    assert_eq!(alone.len(), 4);
+    assert_eq!(rows(&[1e9, 10e9]), alone);
 }
 
 #[test]

@@ -185,13 +185,16 @@ impl Timeline {
     }
 
     /// The cycles that averages are taken over: from the first plan boundary to the last if there are several, so that
-    /// sorts weigh at their real rate; else without the first two.
+    /// sorts weigh at their real rate; else without the first two. The last two are never among them: the first workers to end
+    /// send their final states while others are up to two cycles behind, and the master's host handles those instead of frames.
     pub fn window(&self) -> std::ops::Range<u64> {
         let n = self.counts.len() as u64;
-        let within: Vec<u64> = self.boundaries.iter().copied().filter(|&b| b >= 2 && b <= n).collect();
+        let first = 2.min(n.saturating_sub(1));
+        let last = n.saturating_sub(2).max(n.min(first + 1));
+        let within: Vec<u64> = self.boundaries.iter().copied().filter(|b| (2..=last).contains(b)).collect();
         match (within.first(), within.last()) {
             (Some(&first), Some(&last)) if last > first => first..last,
-            _ => 2.min(n.saturating_sub(1))..n,
+            _ => first..last,
         }
     }
 
