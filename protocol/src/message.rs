@@ -121,7 +121,7 @@ pub struct Assign {
     pub gauges: Vec<u32>,
     /// Elements and contacts that votes are to speak of.
     pub watched: Watched,
-    /// Lane width to use: `scalar`, `avx2`, `avx512`; none for the best of the machine.
+    /// Lane width to use: `scalar`, `neon`, `avx2`, `avx512`; none for the best of the machine.
     pub lanes: Option<String>,
     /// The cycle to start at.
     pub cycle: u64,

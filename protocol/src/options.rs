@@ -9,6 +9,7 @@ use clap::{
     Args, ValueEnum,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
+use mechanics::lanes::Width;
 use serde::{Deserialize, Serialize};
 
 /// How partial forces travel.
@@ -71,6 +72,7 @@ pub fn routes() -> impl TypedValueParser<Value = Option<Route>> {
 pub fn lanes() -> PossibleValuesParser {
     PossibleValuesParser::new([
         PossibleValue::new("scalar").help("One element at a time"),
+        PossibleValue::new("neon").help("Four, on 64-bit ARM"),
         PossibleValue::new("avx2").help("Four"),
         PossibleValue::new("avx512").help("Eight"),
     ])
@@ -117,7 +119,7 @@ impl std::fmt::Display for Error {
             Self::Number { name, value, expected } => write!(f, "{name} {value}: must be {expected}"),
             Self::Lanes(name) => {
                 let shown: String = name.chars().take(32).collect();
-                write!(f, "lanes {shown:?}: must be scalar, avx2 or avx512")
+                write!(f, "lanes {shown:?}: must be scalar, neon, avx2 or avx512")
             }
         }
     }
@@ -203,9 +205,7 @@ impl JobOptions {
         number("snapshot-cycles", whole(self.snapshot_cycles), |n| n >= 1.0, "1 or more")?;
         number("min-workers", Some(f64::from(self.min_workers)), |n| n <= 10_000.0, "at most 10000")?;
         match &self.lanes {
-            Some(name) if !["scalar", "avx2", "avx512"].contains(&name.as_str()) => {
-                Err(Error::Lanes(name.clone()))
-            }
+            Some(name) if name.parse::<Width>().is_err() => Err(Error::Lanes(name.clone())),
             _ => Ok(()),
         }
     }

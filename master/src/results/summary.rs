@@ -39,7 +39,7 @@ pub struct Summary {
     pub linked_pairs: u64,
     /// Pairs of workers that the master relayed for, because they could not reach each other or their link broke.
     pub relayed_pairs: u64,
-    /// Lane width of the workers: `scalar`, `avx2` or `avx512`; joined by `+` where they differ.
+    /// Lane width of the workers: `scalar`, `neon`, `avx2` or `avx512`; joined by `+` where they differ.
     pub lanes: String,
     /// Cycles completed.
     pub cycles: u64,

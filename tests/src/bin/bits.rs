@@ -83,7 +83,7 @@ fn row(name: &str, flags: &str) -> Row {
 }
 
 /// All rows; `processes` where this binary can start its workers as processes, `lanes` those of this machine.
-fn rows(asked: &Asked, processes: bool, lanes: &[&str], snapshot: &Path) -> Vec<Row> {
+fn rows(asked: &Asked, processes: bool, lanes: &[String], snapshot: &Path) -> Vec<Row> {
     let half = asked.cycles / 2;
     let mut rows = vec![row("1 worker, 1 thread", "--workers 1 --threads 1")];
     for workers in [1, 2, 3, 4, 7].into_iter().filter(|w| *w <= asked.most_workers) {
@@ -170,13 +170,9 @@ fn run(asked: &Asked, deck: &Path, row: &Row, out: &Path) -> Result<(Outcome, f6
 }
 
 /// The lanes of this machine.
-fn lanes() -> Vec<&'static str> {
+fn lanes() -> Vec<String> {
     use mechanics::lanes::Width;
-    [("scalar", Width::Scalar), ("avx2", Width::Avx2), ("avx512", Width::Avx512)]
-        .into_iter()
-        .filter(|(_, width)| width.available())
-        .map(|(name, _)| name)
-        .collect()
+    Width::ALL.into_iter().filter(|width| width.available()).map(|width| width.to_string()).collect()
 }
 
 fn main() -> ExitCode {

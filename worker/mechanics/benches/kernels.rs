@@ -387,7 +387,13 @@ fn cycle_times(
 /// The table of whole cycles; `only` chooses a number of elements.
 fn cycles(only: Option<usize>) {
     println!("whole cycle of benchmark 1, ns per element and cycle, median and (least)");
-    println!("{:>9}  {:<22}{:>16}{:>16}", "elements", "elements are", "avx2", "avx512");
+    let widths: Vec<Width> =
+        Width::ALL.into_iter().filter(|&width| width != Width::Scalar && width.available()).collect();
+    let row = |first: &str, name: &str, of: &[String]| {
+        let columns: String = of.iter().map(|column| format!("{column:>16}")).collect();
+        println!("{first:>9}  {name:<22}{columns}");
+    };
+    row("elements", "elements are", &widths.iter().map(Width::to_string).collect::<Vec<_>>());
     let shapes = [
         (30, (20, 10), Kind::Structured, 200),
         (40, (30, 10), Kind::Structured, 120),
@@ -407,21 +413,18 @@ fn cycles(only: Option<usize>) {
         if !only.map_or(n_elements < LARGE, about) {
             continue;
         }
-        let columns = [Width::Avx2, Width::Avx512].map(|width| {
-            if width.available() {
-                let [median, least] = whole_cycle(plates(side, layers, kind, width, 1), n_cycles, &now);
-                format!("{median:.1} ({least:.1})")
-            } else {
-                "-".to_owned()
-            }
-        });
+        let column = |&width: &Width| {
+            let [median, least] = whole_cycle(plates(side, layers, kind, width, 1), n_cycles, &now);
+            format!("{median:.1} ({least:.1})")
+        };
+        let columns: Vec<String> = widths.iter().map(column).collect();
         let name = match kind {
             Kind::Structured => "structured",
             Kind::Explicit => "explicit, in rows",
             Kind::Scattered => "explicit, in no rows",
             Kind::Shells => "shells, five points",
         };
-        println!("{n_elements:>9}  {name:<22}{:>16}{:>16}", columns[0], columns[1]);
+        row(&n_elements.to_string(), name, &columns);
     }
 }
 
@@ -493,22 +496,23 @@ fn tables(words: &[String]) {
 /// The table of the quietest chunks; words that name lane widths choose columns.
 fn quiet_table(words: &[String]) {
     println!("kernel alone, ns per element, quietest: structured, and written out");
-    println!("{:<34}{:>20}{:>20}{:>20}", "laws", "scalar", "avx2", "avx512");
     let named = |width: Width| words.contains(&width.to_string());
     let all = !Width::ALL.into_iter().any(named);
-    let widths = Width::ALL.map(|width| width.require().ok().filter(|&width| all || named(width)));
+    let widths: Vec<Width> =
+        Width::ALL.into_iter().filter(|&width| width.available() && (all || named(width))).collect();
+    let row = |name: &str, of: &dyn Fn(Width) -> String| {
+        let columns: String = widths.iter().map(|&width| format!("{:>20}", of(width))).collect();
+        println!("{name:<34}{columns}");
+    };
+    row("laws", &|width| width.to_string());
     for material in steels() {
-        let of = |width| {
+        row(&material.name, &|width| {
             let [rows, lists] = [false, true].map(|explicit| quiet(&material, explicit, width));
             format!("{rows:.1} {lists:.1}")
-        };
-        let [scalar, avx2, avx512] = widths.map(|width| width.map_or("-".to_owned(), of));
-        println!("{:<34}{scalar:>20}{avx2:>20}{avx512:>20}", material.name);
+        });
     }
     let material = steel("shells, five points", SHOCK, johnson_cook(1.0));
-    let of = |width| format!("{:.1}", quiet_shells(&material, width));
-    let [scalar, avx2, avx512] = widths.map(|width| width.map_or("-".to_owned(), of));
-    println!("{:<34}{scalar:>20}{avx2:>20}{avx512:>20}", material.name);
+    row(&material.name, &|width| format!("{:.1}", quiet_shells(&material, width)));
 }
 
 /// Nanoseconds per element of the kernel of shells alone, wall clock: a sheet of 256 that is bent until it yields, the least of 400

@@ -18,8 +18,9 @@ pub(crate) mod avx2;
 pub(crate) mod avx512;
 pub(crate) mod dispatch;
 pub mod functions;
+#[cfg(target_arch = "aarch64")]
+pub(crate) mod neon;
 pub mod scalar;
-#[cfg(target_arch = "x86_64")]
 pub(crate) mod twice;
 
 /// Slots in a lane set: the grouping of elements is the same on every width, and the widest holds 8.
@@ -136,6 +137,8 @@ pub fn splat_each<L: Lane, const K: usize>(numbers: &[f64; K]) -> [L; K] {
 pub enum Width {
     /// One element at a time.
     Scalar,
+    /// Four in two registers, with NEON.
+    Neon,
     /// Four, with AVX2 and FMA.
     Avx2,
     /// Eight, with AVX-512 F and DQ.
@@ -144,23 +147,18 @@ pub enum Width {
 
 impl Width {
     /// All widths, narrowest first.
-    pub const ALL: [Width; 3] = [Width::Scalar, Width::Avx2, Width::Avx512];
+    pub const ALL: [Width; 4] = [Width::Scalar, Width::Neon, Width::Avx2, Width::Avx512];
 
     /// The widest that this machine has.
     pub fn best() -> Width {
-        if Width::Avx512.available() {
-            Width::Avx512
-        } else if Width::Avx2.available() {
-            Width::Avx2
-        } else {
-            Width::Scalar
-        }
+        Width::ALL.into_iter().rev().find(|width| width.available()).unwrap_or(Width::Scalar)
     }
 
     /// Whether this machine has the instructions.
     pub fn available(self) -> bool {
         match self {
             Width::Scalar => true,
+            Width::Neon => cfg!(target_arch = "aarch64"),
             #[cfg(target_arch = "x86_64")]
             Width::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
@@ -187,6 +185,7 @@ impl fmt::Display for Width {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Width::Scalar => "scalar",
+            Width::Neon => "neon",
             Width::Avx2 => "avx2",
             Width::Avx512 => "avx512",
         })
@@ -221,7 +220,7 @@ impl fmt::Display for WidthError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             WidthError::Unknown { text } => {
-                write!(f, "lane width {text:?}, expected scalar, avx2 or avx512; name one of them")
+                write!(f, "lane width {text:?}, expected scalar, neon, avx2 or avx512; name one of them")
             }
             WidthError::Unavailable { width } => {
                 let best = Width::best();
@@ -248,7 +247,7 @@ mod tests {
         let error = "sse".parse::<Width>().expect_err("no such width");
         assert_eq!(
             error.to_string(),
-            "lane width \"sse\", expected scalar, avx2 or avx512; name one of them"
+            "lane width \"sse\", expected scalar, neon, avx2 or avx512; name one of them"
         );
         let missing = WidthError::Unavailable { width: Width::Avx512 }.to_string();
         assert!(missing.starts_with("lane width avx512 is not on this machine"), "{missing}");
@@ -291,6 +290,11 @@ mod tests {
     fn rows_and_masks_are_the_same_on_every_width() {
         rows_and_masks::<scalar::Scalar>();
         rows_and_masks::<twice::Twice<scalar::Scalar>>();
+        #[cfg(target_arch = "aarch64")]
+        {
+            rows_and_masks::<neon::Neon>();
+            rows_and_masks::<twice::Twice<neon::Neon>>();
+        }
         #[cfg(target_arch = "x86_64")]
         if Width::Avx2.available() {
             rows_and_masks::<avx2::Avx2>();

@@ -5,9 +5,7 @@
 //! [`Bounds::holds`](super::search::Bounds::holds) because changing a sign is exact.
 
 use super::{search::Candidates, watch::Listed};
-use crate::lanes::{Lane, SET, Width, scalar::Scalar};
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
+use crate::lanes::{Lane, SET, Width, dispatch::Task};
 
 /// Points of nodes and boxes of faces in one cycle, those that are watched.
 #[derive(Clone, Debug, Default)]
@@ -40,24 +38,11 @@ impl Boxes {
         }
         self.faces.resize(SET * faces.len(), 0.0);
         let grown = [grow, grow, grow, grow, grow, grow, 0.0, 0.0];
-        match width {
-            // SAFETY: the width is available.
-            Width::Scalar => unsafe { self.boxes::<Scalar>(faces, &watched.faces, &grown) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above.
-            Width::Avx2 => unsafe { self.boxes_on_avx2(faces, &watched.faces, &grown) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above.
-            Width::Avx512 => unsafe { self.boxes_on_avx512(faces, &watched.faces, &grown) },
-            #[cfg(not(target_arch = "x86_64"))]
-            Width::Avx2 | Width::Avx512 => unreachable!("not available"),
-        }
+        width.run(Measure { boxes: self, faces, watched: &watched.faces, grown: &grown });
     }
 
-    /// # Safety
-    /// On a machine that has the lanes.
     #[inline(always)]
-    unsafe fn boxes<L: Lane>(&mut self, faces: &[[u32; 4]], watched: &[u32], grown: &[f64; SET]) {
+    fn boxes<L: Lane>(&mut self, faces: &[[u32; 4]], watched: &[u32], grown: &[f64; SET]) {
         let (n_points, n_boxes) = (self.points.len() / SET, self.faces.len() / SET);
         for &f in watched {
             let (f, nodes) = (f as usize, &faces[f as usize]);
@@ -65,7 +50,7 @@ impl Boxes {
             assert!(f < n_boxes && highest < n_points, "face {f} of {n_boxes}, node {highest} of {n_points}");
             let mut at = 0;
             while at < SET {
-                // SAFETY: the caller's; a set lies behind each point and box that has just been checked.
+                // SAFETY: a set lies behind each point and box that has just been checked.
                 unsafe {
                     let a = L::load(&self.points, SET * nodes[0] as usize + at);
                     let b = L::load(&self.points, SET * nodes[1] as usize + at);
@@ -77,20 +62,6 @@ impl Boxes {
                 at += L::N;
             }
         }
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    unsafe fn boxes_on_avx2(&mut self, faces: &[[u32; 4]], watched: &[u32], grown: &[f64; SET]) {
-        // SAFETY: the caller's.
-        unsafe { self.boxes::<Avx2>(faces, watched, grown) }
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-    unsafe fn boxes_on_avx512(&mut self, faces: &[[u32; 4]], watched: &[u32], grown: &[f64; SET]) {
-        // SAFETY: the caller's.
-        unsafe { self.boxes::<Avx512>(faces, watched, grown) }
     }
 
     /// The candidates of nodes `first..end` of the list whose boxes hold them: faces in `held`, and the end of
@@ -107,17 +78,7 @@ impl Boxes {
         ends: &mut Vec<u32>,
     ) {
         assert!(width.available(), "lane width {width} on a machine that lacks it");
-        match width {
-            Width::Scalar => self.held::<Scalar>(candidates, (first, end), held, ends),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the width is available.
-            Width::Avx2 => unsafe { self.held_on_avx2(candidates, (first, end), held, ends) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the width is available.
-            Width::Avx512 => unsafe { self.held_on_avx512(candidates, (first, end), held, ends) },
-            #[cfg(not(target_arch = "x86_64"))]
-            Width::Avx2 | Width::Avx512 => unreachable!("not available"),
-        }
+        width.run(Hold { boxes: self, candidates, range: (first, end), held, ends });
     }
 
     #[inline(always)]
@@ -144,29 +105,40 @@ impl Boxes {
         }
         held.truncate(n);
     }
+}
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    unsafe fn held_on_avx2(
-        &self,
-        candidates: &Candidates,
-        range: (usize, usize),
-        held: &mut Vec<u32>,
-        ends: &mut Vec<u32>,
-    ) {
-        self.held::<Avx2>(candidates, range, held, ends);
+/// The boxes of watched faces.
+struct Measure<'a> {
+    boxes: &'a mut Boxes,
+    faces: &'a [[u32; 4]],
+    watched: &'a [u32],
+    grown: &'a [f64; SET],
+}
+
+impl Task for Measure<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane>(self) {
+        self.boxes.boxes::<L>(self.faces, self.watched, self.grown);
     }
+}
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-    unsafe fn held_on_avx512(
-        &self,
-        candidates: &Candidates,
-        range: (usize, usize),
-        held: &mut Vec<u32>,
-        ends: &mut Vec<u32>,
-    ) {
-        self.held::<Avx512>(candidates, range, held, ends);
+/// The candidates of a range of nodes whose boxes hold them.
+struct Hold<'a> {
+    boxes: &'a Boxes,
+    candidates: &'a Candidates,
+    range: (usize, usize),
+    held: &'a mut Vec<u32>,
+    ends: &'a mut Vec<u32>,
+}
+
+impl Task for Hold<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane>(self) {
+        self.boxes.held::<L>(self.candidates, self.range, self.held, self.ends);
     }
 }
 

@@ -7,13 +7,16 @@
 use super::{Lane, Width, scalar::Scalar};
 #[cfg(target_arch = "x86_64")]
 use super::{avx2::Avx2, avx512::Avx512, twice::Twice};
+#[cfg(target_arch = "aarch64")]
+use super::{neon::Neon, twice::Twice};
 
 /// A calculation on lanes. [`Task::run`] is to be `#[inline(always)]`, and so is every function that it calls with lanes.
 pub(crate) trait Task {
     /// The answer.
     type Output;
 
-    /// Whether a set of eight is done in two registers at once where one holds four, see [`Twice`].
+    /// Whether a set of eight is done in two registers at once where one holds four, see [`super::twice`].
+    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "no register of four"))]
     const PAIRED: bool = false;
 
     /// Does the work.
@@ -37,6 +40,8 @@ impl Width {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the machine has FMA.
             Width::Scalar if is_x86_feature_detected!("fma") => unsafe { on_scalar_with_fma(task) },
+            #[cfg(target_arch = "aarch64")]
+            Width::Neon => task.run::<Twice<Neon>>(),
             _ => task.run::<Scalar>(),
         }
     }
@@ -51,6 +56,8 @@ impl Width {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the machine has the width.
             Width::Avx512 => unsafe { on_avx512(task) },
+            #[cfg(target_arch = "aarch64")]
+            Width::Neon => task.run::<Twice<Neon>>(),
             _ => self.run_avx2(task),
         }
     }

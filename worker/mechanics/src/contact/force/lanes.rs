@@ -1,12 +1,10 @@
 //! Forces of many hits at a time without friction, to the bits of [`react`](super::react).
 
 use super::BOTH_SIDES;
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     contact::near_pairs::NearPairs,
     exact::{Quantum, rounded},
-    lanes::{Lane, SET, Width, scalar::Scalar},
+    lanes::{Lane, SET, Width, dispatch::Task},
 };
 
 /// Static data of nodes and faces.
@@ -92,44 +90,27 @@ pub(in crate::contact) fn push(
     pairs.check(width, n_nodes);
     terms.iter_mut().for_each(|values| values.resize(n, 0.0));
     let magic = [force_quantum.magic(), energy_quantum.magic()];
-    match width {
-        // SAFETY: indices, lengths and width have been checked.
-        Width::Scalar => unsafe { kernel::<Scalar>(statics, pairs, pushes, magic, terms) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Width::Avx2 => unsafe { on_avx2(statics, pairs, pushes, magic, terms) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Width::Avx512 => unsafe { on_avx512(statics, pairs, pushes, magic, terms) },
-        #[cfg(not(target_arch = "x86_64"))]
-        Width::Avx2 | Width::Avx512 => unreachable!("not available"),
+    width.run(Push { statics, pairs, pushes, magic, terms })
+}
+
+/// The forces of pairs, indices, lengths and width of which [`push`] has checked.
+struct Push<'a> {
+    statics: &'a Statics,
+    pairs: &'a NearPairs,
+    pushes: Pushes<'a>,
+    magic: [f64; 2],
+    terms: &'a mut Terms,
+}
+
+impl Task for Push<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn run<L: Lane>(self) -> Sums {
+        let Self { statics, pairs, pushes, magic, terms } = self;
+        // SAFETY: `push`, which alone makes one, has checked.
+        unsafe { kernel::<L>(statics, pairs, pushes, magic, terms) }
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2(
-    statics: &Statics,
-    pairs: &NearPairs,
-    pushes: Pushes,
-    magic: [f64; 2],
-    terms: &mut Terms,
-) -> Sums {
-    // SAFETY: the caller's.
-    unsafe { kernel::<Avx2>(statics, pairs, pushes, magic, terms) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512(
-    statics: &Statics,
-    pairs: &NearPairs,
-    pushes: Pushes,
-    magic: [f64; 2],
-    terms: &mut Terms,
-) -> Sums {
-    // SAFETY: the caller's.
-    unsafe { kernel::<Avx512>(statics, pairs, pushes, magic, terms) }
 }
 
 /// # Safety

@@ -7,9 +7,7 @@ use super::super::{
     slots::Slots,
     zone::lanes::{CORNER, Closest, EDGE},
 };
-use crate::lanes::{Lane, SET, Width, scalar::Scalar};
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
+use crate::lanes::{Lane, SET, Width, dispatch::Task};
 
 /// Square of the distance, in gaps, up to which the long way has to find out whether a node touches its feature: somewhat
 /// more than [`is_on_feature`](super::is_on_feature) squared.
@@ -65,44 +63,27 @@ pub(in crate::contact) fn firsts(
     }
     found.resize(sets.len());
     let limits = [warning * warning, TOUCHING * gap * gap];
-    match width {
-        // SAFETY: sets, lengths and width have been checked; `found` has room for the sets.
-        Width::Scalar => unsafe { kernel::<Scalar>(limits, slots, sets, closest, found) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Width::Avx2 => unsafe { on_avx2(limits, slots, sets, closest, found) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Width::Avx512 => unsafe { on_avx512(limits, slots, sets, closest, found) },
-        #[cfg(not(target_arch = "x86_64"))]
-        Width::Avx2 | Width::Avx512 => unreachable!("not available"),
+    width.run(FirstFaces { limits, slots, sets, closest, found });
+}
+
+/// The first faces of the nodes of sets, with lengths, width and room that have been checked.
+struct FirstFaces<'a> {
+    limits: [f64; 2],
+    slots: &'a Slots,
+    sets: Range<usize>,
+    closest: &'a Closest,
+    found: &'a mut Firsts,
+}
+
+impl Task for FirstFaces<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane>(self) {
+        let Self { limits, slots, sets, closest, found } = self;
+        // SAFETY: the function above, which alone makes one, has checked.
+        unsafe { kernel::<L>(limits, slots, sets, closest, found) }
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2(
-    limits: [f64; 2],
-    slots: &Slots,
-    sets: Range<usize>,
-    closest: &Closest,
-    found: &mut Firsts,
-) {
-    // SAFETY: the caller's.
-    unsafe { kernel::<Avx2>(limits, slots, sets, closest, found) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512(
-    limits: [f64; 2],
-    slots: &Slots,
-    sets: Range<usize>,
-    closest: &Closest,
-    found: &mut Firsts,
-) {
-    // SAFETY: the caller's.
-    unsafe { kernel::<Avx512>(limits, slots, sets, closest, found) }
 }
 
 /// # Safety

@@ -5,11 +5,9 @@ use super::{
     lanes::Closest,
     vectors::{V, along, corners, cross, dot, inverse, points, sub},
 };
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     contact::near_pairs::NearPairs,
-    lanes::{Lane, SET, Width, scalar::Scalar},
+    lanes::{Lane, SET, Width, dispatch::Task},
 };
 
 /// How nodes approach closest points, by near feature.
@@ -67,44 +65,27 @@ pub(in crate::contact) fn approach(
     let lists = closest.vector.iter().chain(&closest.shares).chain([&closest.triangle, &closest.distance2]);
     lists.for_each(|list| assert!(n == 0 || (highest as usize) < list.len(), "point {highest}"));
     found.resize(n);
-    match width {
-        // SAFETY: pairs, width, indices and lengths have been checked.
-        Width::Scalar => unsafe { near::<Scalar>(rows, gap, pairs, closest, found) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Width::Avx2 => unsafe { near_on_avx2(rows, gap, pairs, closest, found) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Width::Avx512 => unsafe { near_on_avx512(rows, gap, pairs, closest, found) },
-        #[cfg(not(target_arch = "x86_64"))]
-        Width::Avx2 | Width::Avx512 => unreachable!("not available"),
+    width.run(Near { rows, gap, pairs, closest, found });
+}
+
+/// How pairs approach, with indices, lengths and width that [`approach`] has checked.
+struct Near<'a> {
+    rows: &'a [[f64; 4]],
+    gap: f64,
+    pairs: &'a NearPairs,
+    closest: &'a Closest,
+    found: &'a mut Approach,
+}
+
+impl Task for Near<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane>(self) {
+        let Self { rows, gap, pairs, closest, found } = self;
+        // SAFETY: `approach`, which alone makes one, has checked.
+        unsafe { near::<L>(rows, gap, pairs, closest, found) }
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn near_on_avx2(
-    rows: &[[f64; 4]],
-    gap: f64,
-    pairs: &NearPairs,
-    closest: &Closest,
-    found: &mut Approach,
-) {
-    // SAFETY: the caller's.
-    unsafe { near::<Avx2>(rows, gap, pairs, closest, found) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn near_on_avx512(
-    rows: &[[f64; 4]],
-    gap: f64,
-    pairs: &NearPairs,
-    closest: &Closest,
-    found: &mut Approach,
-) {
-    // SAFETY: the caller's.
-    unsafe { near::<Avx512>(rows, gap, pairs, closest, found) }
 }
 
 /// # Safety

@@ -11,11 +11,9 @@ use super::{
     point::{Point, inside, on_rim},
     vectors::{V, corners, from_each, points},
 };
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{avx2::Avx2, avx512::Avx512};
 use crate::{
     contact::{near_pairs::NearPairs, slots::Slots},
-    lanes::{Lane, SET, Width, scalar::Scalar},
+    lanes::{Lane, SET, Width, dispatch::Task},
 };
 
 /// Closest points, by lane of each slot of some sets.
@@ -146,46 +144,28 @@ pub(in crate::contact) fn nearest(
     let n = SET * slots.of_sets(&sets).len();
     found.resize(n);
     rest.reserve(n);
-    match width {
-        // SAFETY: sets, indices and width have been checked; `found` has room for the slots of the sets.
-        Width::Scalar => unsafe { kernel::<Scalar>(rows, grow, slots, sets, found, rest) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Width::Avx2 => unsafe { on_avx2(rows, grow, slots, sets, found, rest) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Width::Avx512 => unsafe { on_avx512(rows, grow, slots, sets, found, rest) },
-        #[cfg(not(target_arch = "x86_64"))]
-        Width::Avx2 | Width::Avx512 => unreachable!("not available"),
+    width.run(ClosestPoints { rows, grow, slots, sets, found, rest });
+}
+
+/// The closest points of sets, with indices, width and room that [`nearest`] has checked.
+struct ClosestPoints<'a> {
+    rows: &'a [[f64; 4]],
+    grow: f64,
+    slots: &'a Slots,
+    sets: Range<usize>,
+    found: &'a mut Closest,
+    rest: &'a mut Rest,
+}
+
+impl Task for ClosestPoints<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane>(self) {
+        let Self { rows, grow, slots, sets, found, rest } = self;
+        // SAFETY: `nearest`, which alone makes one, has checked.
+        unsafe { kernel::<L>(rows, grow, slots, sets, found, rest) }
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2(
-    rows: &[[f64; 4]],
-    grow: f64,
-    slots: &Slots,
-    sets: Range<usize>,
-    found: &mut Closest,
-    rest: &mut Rest,
-) {
-    // SAFETY: the caller's.
-    unsafe { kernel::<Avx2>(rows, grow, slots, sets, found, rest) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512(
-    rows: &[[f64; 4]],
-    grow: f64,
-    slots: &Slots,
-    sets: Range<usize>,
-    found: &mut Closest,
-    rest: &mut Rest,
-) {
-    // SAFETY: the caller's.
-    unsafe { kernel::<Avx512>(rows, grow, slots, sets, found, rest) }
 }
 
 /// # Safety
