@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use deck::Model;
 use mechanics::{
+    element::hourglass::{Hourglass, Kind},
     erosion::SURFACE_LAG,
     mesh::{CORNERS, FACES},
     state::{ALIVE, GlobalState, field},
@@ -453,6 +454,22 @@ fn contact_of_parts_that_erode_gives_and_takes_no_energy() {
         assert!(solved.rows.last().is_some_and(|row| row.eroded_elements > 20), "{case}");
         assert!(worst < 0.01, "{case}: energy error {worst}");
         assert!(back < 1e-3 * initial, "{case}: {back} of {initial} came back from what had eroded");
+    }
+}
+
+#[test]
+fn a_sphere_that_breaks_gives_hourglass_control_less_than_a_tenth_of_its_heat() {
+    for (speed, gap) in [(3000.0, 0.1), (5000.0, 0.25), (7000.0, 0.5)] {
+        let mut model = ball_on_plate(speed, gap, true);
+        for part in &mut model.mesh.parts {
+            part.hourglass = Hourglass { kind: Kind::AssumedStrain, coefficient: 1.0 };
+        }
+        let totals = solved(&model, Workers::default()).outcome.run_totals;
+        let last = &totals.last;
+        let share = totals.hourglass / (last.internal + totals.eroded);
+        println!("{speed} m/s, gap {gap}: hourglass over heat {share:.3}, energy error {:.1e}", last.error);
+        assert!(share < 0.1, "{speed} m/s, gap {gap}: {share}");
+        assert!(last.error.abs() < 0.01, "{speed} m/s, gap {gap}: energy error {}", last.error);
     }
 }
 

@@ -118,3 +118,30 @@ fn sections_have_the_same_bits_on_any_workers_and_change_none() {
     without.output.sections.clear();
     assert_eq!(fingerprint(&without, Default::default()).digest, one.digest);
 }
+
+/// The rows of cycles that `full` shares with `few` hold the same readings.
+fn rows_agree(full: &Solved, few: &Solved) {
+    for row in &few.rows {
+        let same = full.rows.iter().find(|of_all| of_all.cycle == row.cycle).expect("a row of each cycle");
+        assert_eq!(row.sections.len(), 1, "cycle {}", row.cycle);
+        assert_eq!(row.sections, same.sections, "cycle {}", row.cycle);
+    }
+}
+
+#[test]
+fn sections_are_read_for_rows_alone_and_for_the_last_cycle_in_any_case() {
+    // One run ends by its cycles, the other by its time; neither ends where a row is due.
+    for end_time in [1.0, 1e-4] {
+        let mut model = bar("");
+        model.setup.control.end_time = end_time;
+        let full = run(model.clone());
+        model.output.history_cycles = 1000;
+        let few = run(model);
+        let cycles: Vec<u64> = few.rows.iter().map(|row| row.cycle).collect();
+        println!("ends at {end_time}: rows of cycles {cycles:?}");
+        assert_eq!(cycles, [0, full.rows.last().expect("rows").cycle]);
+        assert!(few.rows[1].sections[0].1.corners == 8 * 2, "{:?}", few.rows[1].sections);
+        rows_agree(&full, &few);
+        assert_eq!(full.outcome.digest, few.outcome.digest);
+    }
+}

@@ -174,6 +174,7 @@ impl Job {
             elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
             contacts: model.output.contact_forces.clone(),
             sections: model.output.sections.iter().map(|section| section.cut.clone()).collect(),
+            row_cycles: model.output.history_cycles,
         };
         for (position, subdomains) in division.by_worker.into_iter().enumerate() {
             let assign = Assign {

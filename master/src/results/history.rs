@@ -64,7 +64,8 @@ pub struct HistoryRow {
     pub element_gauges: Vec<Vec<f64>>,
     /// The pairs of parts that are watched and in contact: index of the pair in the deck, force and hits.
     pub contacts: Vec<(u32, PairVote)>,
-    /// Cross-sections with elements: index of the section in the deck, and what passes through it.
+    /// Cross-sections with elements: index of the section in the deck, and what passes through it. None of them in a row that was not
+    /// due, of a run that failed or was interrupted.
     pub sections: Vec<(u32, SectionVote)>,
     /// Walls and supports, see [`mechanics::setup::Setup::n_holders`].
     pub holders: Vec<HolderRow>,
@@ -267,7 +268,11 @@ impl History {
         }
         let mut sections = row.sections.iter().peekable();
         for (index, &origin) in (0..).zip(&self.sections) {
-            let vote = sections.next_if(|(at, _)| *at == index).map(|(_, vote)| *vote).unwrap_or_default();
+            let Some((_, vote)) = sections.next_if(|(at, _)| *at == index) else {
+                // Nobody knew that this cycle would have a row.
+                self.row.push_str(&",NaN".repeat(9));
+                continue;
+            };
             let (centre, moment) = vote.about_centre(origin);
             for number in vote.force.into_iter().chain(moment).chain(centre) {
                 let _ = write!(self.row, ",{number:?}");

@@ -16,6 +16,7 @@ use crate::{
     lanes::{SET, Width},
     material::Material,
     rigid::cross,
+    setup::Control,
 };
 
 /// Elements that are cut, and which of their corners are ahead of the cut.
@@ -62,6 +63,16 @@ impl SectionVote {
         let moved = cross(centre, self.force);
         (std::array::from_fn(|a| origin[a] + centre[a]), std::array::from_fn(|a| self.moment[a] - moved[a]))
     }
+}
+
+/// Whether the vote of a cycle must say what passes through cross-sections: its row of the history is due, or it may be the last of the
+/// run, which has a row in any case. `dt` is the step before; the step of this cycle is at most [`Control::growth`] times that, so the
+/// run may end with any of the last few.
+pub(crate) fn are_due(row_cycles: u32, control: &Control, (cycle, time, dt): (u64, f64, f64)) -> bool {
+    let longest = 1.000_001 * control.growth.max(1.0) * dt;
+    cycle.is_multiple_of(u64::from(row_cycles.max(1)))
+        || cycle.saturating_add(1) >= control.end_cycle
+        || control.end_time - time <= longest
 }
 
 /// The part of a cross-section that a block holds.

@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     contact::Settings,
     copy_index::CopyIndex,
+    cross_section,
     element::{ElementVote, Step},
     exact::{Quanta, Quantum},
     lanes::Width,
@@ -150,6 +151,10 @@ pub struct Domain {
     element_gauges: Vec<(u32, u32, u32)>,
     /// Pairs of parts whose contact force is wanted.
     watched_pairs: Vec<[u32; 2]>,
+    /// Cycles between two with a row of the history.
+    row_cycles: u32,
+    /// They are read in this cycle.
+    reads_sections: bool,
     vote: Vote,
     /// `n`.
     cycle: u64,
@@ -187,6 +192,8 @@ impl Domain {
 
     /// Forces of element sets at `x_n`, added to forces that integration has cleared; `dt` is `dt_{n-1}`.
     pub fn elements(&mut self, sets: Sets, dt: f64, meter: &dyn Meter) {
+        self.reads_sections =
+            cross_section::are_due(self.row_cycles, &self.setup.control, (self.cycle, self.time, dt));
         if sets == Sets::Border && !self.has_border {
             self.held_blocks.iter_mut().for_each(|held_block| held_block.vote = ElementVote::default());
             return;
@@ -201,6 +208,7 @@ impl Domain {
             arm: self.quanta.arm,
         };
         let (materials, width, cycle) = (&self.setup.materials, self.width, self.cycle);
+        let reads_sections = self.reads_sections;
         let work = |held_block: &mut HeldBlock| {
             if held_block.is_rigid {
                 return;
@@ -222,10 +230,10 @@ impl Domain {
             }
             if sets != Sets::Interior {
                 held_block.vote = ElementVote::default();
-                held_block.compute(true, material, (&step, width));
+                held_block.compute(true, material, (&step, width), reads_sections);
             }
             if sets != Sets::Border {
-                held_block.compute(false, material, (&step, width));
+                held_block.compute(false, material, (&step, width), reads_sections);
             }
         };
         self.order.deal(&mut self.held_blocks, meter, work);

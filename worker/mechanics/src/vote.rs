@@ -63,7 +63,8 @@ pub struct Vote {
     pub element_gauges: Vec<(u32, Vec<f64>)>,
     /// Contact between the pairs of parts that are watched: index of the pair, ascending; pairs without force are left out.
     pub contacts: Vec<(u32, PairVote)>,
-    /// What passes through cross-sections: index of the section, ascending; those of which no element is here are left out.
+    /// What passes through cross-sections: index of the section, ascending; those of which no element is here are left out, and all of
+    /// them in cycles that need no row.
     pub sections: Vec<(u32, SectionVote)>,
     /// The first element that went wrong, if any: global index and its volume.
     pub fault: Option<(u32, f64)>,
@@ -105,6 +106,8 @@ pub struct Watched {
     /// Pairs of parts.
     pub contacts: Vec<[u32; 2]>,
     pub sections: Vec<CrossSection>,
+    /// Cycles between two that have a row of the history.
+    pub row_cycles: u32,
 }
 
 /// Energies of one part in one cycle.

@@ -167,12 +167,15 @@ impl Domain {
             gauges_before: Vec::new(),
             element_gauges: Vec::new(),
             watched_pairs: Vec::new(),
+            row_cycles: 1,
+            reads_sections: false,
         }
     }
 
     /// From now on votes say how these elements and contacts are; before the first plan is installed.
     pub fn watch(&mut self, watched: &Watched) {
         self.watched_pairs.clone_from(&watched.contacts);
+        self.row_cycles = watched.row_cycles;
         for held_block in self.held_blocks.iter_mut().filter(|held_block| !held_block.is_rigid) {
             held_block.cuts = Cuts::of(&watched.sections, &held_block.block);
         }

@@ -95,10 +95,20 @@ impl HeldBlock {
         self.sets[local as usize / SET].booked >> (local as usize % SET) & 1 == 1
     }
 
-    /// Forces of its border or interior elements, and what passes through cross-sections.
-    pub fn compute(&mut self, is_border: bool, material: &Material, how: (&Step, Width)) {
+    /// Forces of its border or interior elements, and, if `reads_sections`, what passes through cross-sections.
+    pub fn compute(
+        &mut self,
+        is_border: bool,
+        material: &Material,
+        (step, width): (&Step, Width),
+        reads_sections: bool,
+    ) {
         let sets = if is_border { &self.border } else { &self.interior };
-        self.cuts.compute(&mut self.block, material, sets, how, &mut self.vote);
+        if reads_sections {
+            self.cuts.compute(&mut self.block, material, sets, (step, width), &mut self.vote);
+        } else {
+            self.block.compute(material, sets, step, width, &mut self.vote);
+        }
     }
 
     /// Integrates its nodes and books what they say; elements that have eroded leave.

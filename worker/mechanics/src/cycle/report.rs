@@ -69,7 +69,9 @@ impl Domain {
             for a in 0..3 {
                 vote.momentum[a] += held_block.booked.momentum[a];
             }
-            vote.add_sections(held_block.cuts.take());
+            if self.reads_sections {
+                vote.add_sections(held_block.cuts.take());
+            }
             vote.extents[part].merge(&held_block.booked.extent);
             vote.contact_speed_squared = vote.contact_speed_squared.max(held_block.booked.speed_squared);
             vote.contact_speed_ahead = vote.contact_speed_ahead.max(held_block.booked.speed_ahead);

@@ -365,7 +365,12 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     //    stays in registers.
     let modes_square = hourglass.square();
     let mut check = energy + pressure + viscosity + modes_square + stress.sum();
-    let mut resist = L::splat(2.0 * laws.hourglass.viscous) * density * sound * area;
+    let mut coefficient = L::splat(2.0 * laws.hourglass.viscous);
+    if laws.failure.fails() || S::REMEMBERS {
+        let failed = one.less_equal(damage_after);
+        coefficient = L::select(failed, L::splat(2.0 * laws.hourglass.failed), coefficient);
+    }
+    let mut resist = coefficient * density * sound * area;
     let mut taken = L::splat(step.dt / 8.0) * resist * modes_square;
     let mut resisted = hourglass;
     if elastic_control {
@@ -386,10 +391,6 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
             let most = L::splat(PLASTIC) * yield_stress;
             let share = L::select((most * most).less(bent), most / bent.sqrt(), one);
             elastic = elastic.scaled(share);
-        }
-        if laws.failure.fails() {
-            resist = L::splat(2.0 * laws.hourglass.failed) * density * sound * area;
-            resist = L::select(failed, resist, zero);
         }
         let power = elastic.mul_add(one, &turned).dot(&hourglass);
         let damped = L::splat(step.dt / 8.0) * resist * modes_square;

@@ -198,3 +198,30 @@ fn forces_yield_with_the_stress_and_vanish_with_it() {
         assert!(vote.hourglass > 0.0 && force(&block, 0)[0] < 0.0, "it is resisted viscously");
     }
 }
+
+/// The force on a corner of a cube of a material, whole or failed, that moves in a pattern.
+fn resisted(control: Hourglass, material: &Material, damage: f64) -> f64 {
+    let mut body = moved(&controlled(one(material, &UNIT_CUBE), control), 0, 0, 10.0);
+    body.fields[field::DAMAGE][0] = damage;
+    let mut block = Block::new(&body);
+    compute(&mut block, material, &bare_step(1e-9, 1e9, 1e-6), Width::best());
+    -force(&block, 0)[0]
+}
+
+#[test]
+fn a_failed_element_is_resisted_as_a_fluid_and_broken_ceramic_as_a_solid() {
+    let laws = all_laws();
+    let find =
+        |is: &dyn Fn(&Material) -> bool| laws.iter().find(|m| m.shear() > 0.0 && is(m)).expect("a law");
+    let failing = find(&|m| m.failure != Failure::None);
+    let ceramic = find(&|m| !m.history().is_empty());
+    let viscous = Hourglass::viscous(0.1);
+    for (material, share) in [(failing, 1e-3), (ceramic, 1.0)] {
+        let whole = resisted(viscous, material, 0.0);
+        assert!(whole > 0.0, "{}", material.name);
+        for control in [viscous, ELASTIC[0], ELASTIC[1]] {
+            let failed = resisted(control, material, 1.0);
+            assert!((failed / whole / share - 1.0).abs() < 1e-6, "{control:?}: {failed} of {whole}");
+        }
+    }
+}

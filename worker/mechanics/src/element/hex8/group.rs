@@ -157,13 +157,13 @@ impl Group for Solids {
         let is_elastic = self.control.is_elastic();
         let hourglass = is_elastic
             .then(|| Amplitudes::from_array(self.hourglass.each_ref().map(|array| Scalar(array[slot]))));
-        let viscous = if !is_elastic {
-            self.control.coefficient
-        // One that failed in its last step still had forces of elastic control then.
-        } else if state(DAMAGE) >= 1.0 && hourglass.is_some_and(|forces| forces.square().0 == 0.0) {
-            self.control.damping()
-        } else {
+        // The damage that the last step left chose the coefficient of that step.
+        let viscous = if state(DAMAGE) >= 1.0 {
+            self.control.of_failed(material)
+        } else if is_elastic {
             0.0
+        } else {
+            self.control.coefficient
         };
         let stiffness = material.bulk() + 4.0 / 3.0 * material.shear();
         let sound = (stiffness / material.density).sqrt();
