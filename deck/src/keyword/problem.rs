@@ -128,6 +128,8 @@ pub(super) struct Problem {
     pub(super) boxes: BTreeMap<u32, [[f64; 3]; 2]>,
     /// Directions of x, y, z of each coordinate system.
     pub(super) systems: BTreeMap<u32, [[f64; 3]; 3]>,
+    /// Direction of each vector.
+    pub(super) vectors: BTreeMap<u32, [f64; 3]>,
     pub(super) conditions: Conditions,
     pub(super) rigid: RigidCards,
     pub(super) contacts: Vec<ContactCard>,

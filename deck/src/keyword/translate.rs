@@ -39,6 +39,8 @@ pub(super) fn translate(
     condition::write_forces(&mut t);
     condition::write_pressures(&mut t);
     condition::write_gravity(&mut t);
+    condition::write_part_gravities(&mut t);
+    condition::write_masses(&mut t);
     condition::write_walls(&mut t);
     contact::write(&mut t);
     output::write(&mut t);

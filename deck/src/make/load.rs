@@ -48,7 +48,7 @@ pub(super) fn make(
                     draft.list.surfaces.push(SurfaceLoad { kind: SurfaceKind::Pressure(pressure), faces });
                 }
             }
-            LoadKind::Force { force, drive, nodes } => {
+            LoadKind::Force { force, by_mass, drive, nodes } => {
                 let drive = curves.of_entry(drive);
                 let nodes = nodes.as_ref().and_then(|nodes| region::nodes(nodes, &selected, assembly, log));
                 let (Some(force), Some(nodes)) = (force, nodes) else { continue };
@@ -60,7 +60,7 @@ pub(super) fn make(
                         "check parts, face, box, plane or nodes against the mesh",
                     );
                 }
-                push(&mut draft, load, NodalForce { force: *force, drive }, nodes, log);
+                push(&mut draft, load, NodalForce { force: *force, by_mass: *by_mass, drive }, nodes, log);
             }
         }
     }
@@ -78,7 +78,7 @@ fn push(draft: &mut LoadDraft, load: &Load, force: NodalForce, nodes: Vec<u32>, 
     if index == MAX_FORCES {
         log.fault(
             load.at,
-            format!("more than {MAX_FORCES} loads of type force"),
+            format!("more than {MAX_FORCES} loads of types force and acceleration"),
             format!("at most {MAX_FORCES}"),
             "give more nodes the same force",
         );
@@ -90,4 +90,30 @@ fn push(draft: &mut LoadDraft, load: &Load, force: NodalForce, nodes: Vec<u32>, 
     for node in nodes {
         *draft.forces.entry(node).or_default() |= 1 << index;
     }
+}
+
+/// The masses that the deck puts at nodes, by node and ascending; those at one node are added up.
+pub(super) fn lumped(
+    deck: &Deck,
+    names: &Names<'_>,
+    parts: &[PartDraft],
+    assembly: &Assembly,
+    log: &Log<'_>,
+) -> Vec<(u32, f64)> {
+    let mut masses: BTreeMap<u32, f64> = BTreeMap::new();
+    for given in &deck.masses {
+        let selected = names.several(&given.parts).unwrap_or_default();
+        let nodes = given.nodes.as_ref().and_then(|nodes| region::nodes(nodes, &selected, assembly, log));
+        let (Some(mass), Some(nodes)) = (given.mass, nodes) else { continue };
+        if nodes.is_empty() && !broken(&selected, parts) {
+            log.fault(
+                given.at,
+                format!("{} that holds no node", given.title),
+                "at least one node",
+                "check parts, face, box, plane or nodes against the mesh",
+            );
+        }
+        nodes.into_iter().for_each(|node| *masses.entry(node).or_default() += mass);
+    }
+    masses.into_iter().collect()
 }
