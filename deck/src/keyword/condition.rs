@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use mechanics::load::Span;
 
 use super::{
+    blast::Blasted,
     cards::{Block, Card},
     fields::{Context, Fields, TENS},
 };
@@ -179,6 +180,8 @@ pub(super) struct Conditions {
     pub(super) motions: Vec<Motion>,
     pub(super) forces: Vec<Force>,
     pub(super) pressures: Vec<Pressure>,
+    /// Segments of `*LOAD_SEGMENT` that feel the charge of `*LOAD_BLAST`.
+    pub(super) blasted: Vec<Blasted>,
     pub(super) bodies: Vec<Body>,
     pub(super) gravities: Vec<PartGravity>,
     pub(super) masses: Vec<Mass>,
@@ -260,7 +263,7 @@ fn way_of(
 }
 
 /// The span of a birth and a death time; a faulty one is reported.
-fn span_of(f: &Fields<'_>, birth: usize, death: usize) -> Span {
+pub(super) fn span_of(f: &Fields<'_>, birth: usize, death: usize) -> Span {
     let from = f.within(birth, 0.0, Range::NotNegative);
     let until = match f.within(death, 0.0, Range::NotNegative) {
         0.0 => Span::ALWAYS.until,
@@ -407,7 +410,10 @@ impl Conditions {
                 self.forces.push(Force { at, target, axis, curve: f.id(2), factor: scale(f, 3) });
             }
             "LOAD_SEGMENT" | "LOAD_SEGMENT_SET" => {
-                let (set, curve, i) = if of_set { (f.id(0), f.id(1), 2) } else { (0, f.id(0), 1) };
+                let (set, i) = if of_set { (f.id(0), 2) } else { (0, 1) };
+                // -2 is the pressure of *LOAD_BLAST.
+                let blasted = f.integer(i - 1) == -2;
+                let curve = if blasted { 0 } else { f.id(i - 1) };
                 if f.real(i + 1, 0.0) != 0.0 {
                     f.fault(i + 1, "an arrival time of 0", "put it into the curve");
                 }
@@ -419,7 +425,11 @@ impl Conditions {
                     }
                     faces.push(face);
                 }
-                self.pressures.push(Pressure { at, faces, set, curve, factor: scale(f, i) });
+                if blasted {
+                    self.blasted.push(Blasted { at, charge: 0, faces, set });
+                } else {
+                    self.pressures.push(Pressure { at, faces, set, curve, factor: scale(f, i) });
+                }
             }
             "LOAD_BODY_X" | "LOAD_BODY_Y" | "LOAD_BODY_Z" => {
                 let axis = usize::from(word.as_bytes()[word.len() - 1] - b'X');

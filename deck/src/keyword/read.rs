@@ -2,6 +2,7 @@
 //! what changes nothing here goes into one warning.
 
 use super::{
+    blast::Blasts,
     cards::{Block, Lines},
     condition::Conditions,
     contact::ContactCard,
@@ -123,6 +124,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         word if word.starts_with("CONTACT_") => problem.contacts.extend(ContactCard::read(block, context)),
         word if word.starts_with("CONTROL_") => problem.control.read(block, context),
         word if word.starts_with("DATABASE_") => problem.control.read_database(block, context),
+        word if Blasts::knows(word) => problem.blasts.read(block, context),
         word if Conditions::knows(word) => problem.conditions.read(block, &problem.vectors, context),
         word if word.starts_with("DEFINE_") => define::read_other(problem, block, context),
         _ => {

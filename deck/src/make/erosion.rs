@@ -48,9 +48,9 @@ pub(super) fn make(
         let holds = |p: &usize| assembly.mesh.parts[*p].nodes.contains(node);
         (0..parts.len()).filter(|&p| parts[p].erosion.is_some()).any(|p| holds(&p))
     };
-    let of_nodes = bodies.iter().filter(|body| body.parts.is_empty()).flat_map(|body| &body.nodes);
+    let mut of_nodes = bodies.iter().filter(|body| body.parts.is_empty()).flat_map(|body| &body.nodes);
     if !erosion.retain_inertia
-        && let Some(node) = of_nodes.filter(|&node| erodes(node)).next()
+        && let Some(node) = of_nodes.find(|&node| erodes(node))
     {
         log.fault(
             freed.at,

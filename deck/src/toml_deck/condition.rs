@@ -1,6 +1,9 @@
 //! `[[curve]]`, `[[boundary]]`, `[[wall]]`, `[[rigid]]`, `[[load]]`, `[gravity]`, `[relaxation]`, `[[detonation]]`.
 
-use mechanics::{burn::Detonation, load::Span};
+use mechanics::{
+    burn::Detonation,
+    load::{Span, blast::Burst},
+};
 
 use super::entry::{AXES, circle, components, direction, drive, faces, parts, parts_of, region, span, text};
 use crate::{
@@ -8,8 +11,8 @@ use crate::{
     place::Place,
     table::{Range, Table, Value},
     typed::condition::{
-        Boundary, BoundaryKind, Components, Curve, Drive, Gravity, Load, LoadKind, Lumped, Parts, Relaxation,
-        Rigid, Wall, WallMotion, WallShape,
+        Boundary, BoundaryKind, Charge, Components, Curve, Drive, Gravity, Load, LoadKind, Lumped, Parts,
+        Relaxation, Rigid, Wall, WallMotion, WallShape,
     },
 };
 
@@ -182,7 +185,7 @@ fn read_motion(table: &Table<'_>) -> Option<WallMotion> {
     };
     let velocity = velocity?;
     let Some(mass) = mass else {
-        return Some(if given { WallMotion::Driven(velocity) } else { WallMotion::Fixed });
+        return Some(if given { WallMotion::Driven(Box::new(velocity)) } else { WallMotion::Fixed });
     };
     if velocity.iter().flatten().any(|v| v.curve.is_some()) {
         table.faults.add(
@@ -267,11 +270,12 @@ pub(super) fn read_masses(deck: &Table<'_>) -> Vec<Lumped> {
 
 /// Reads every `[[load]]`.
 pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
-    const TYPES: [&str; 3] = ["pressure", "force", "acceleration"];
+    const TYPES: [&str; 4] = ["pressure", "force", "acceleration", "blast"];
     let mut loads = Vec::new();
     for table in deck.tables("load", MAX_ENTRIES) {
-        let kind =
-            table.require("type", "one of pressure, force, acceleration").and_then(|v| v.one_of(&TYPES));
+        let kind = table
+            .require("type", "one of pressure, force, acceleration, blast")
+            .and_then(|v| v.one_of(&TYPES));
         // Which keys belong depends on the type, so without one none is called unknown.
         let Some(kind) = kind else { continue };
         let (at, title, parts) = (table.place(), table.title.clone(), parts_of(&table));
@@ -281,6 +285,7 @@ pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
                 put(span(&table), pressure.iter_mut());
                 LoadKind::Pressure { pressure, faces: faces(&table) }
             }
+            "blast" => LoadKind::Blast { charge: read_charge(&table), faces: faces(&table) },
             kind => {
                 let force = table.vector(kind);
                 let drive = Drive { span: span(&table), ..drive_of(&table) };
@@ -291,6 +296,18 @@ pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
         loads.push(Load { at, title, parts, kind });
     }
     loads
+}
+
+/// A charge: mass, point, burst, span and whether its negative phase acts.
+fn read_charge(table: &Table<'_>) -> Option<Charge> {
+    const BURSTS: [&str; 2] = ["air", "surface"];
+    let mass = table.number("mass", Range::Positive);
+    let point = table.vector("point");
+    let burst = table.require("burst", "one of air, surface").and_then(|v| v.one_of(&BURSTS));
+    let negative = table.get("negative_phase").map_or(Some(true), |v| v.boolean());
+    let span = span(table);
+    let burst = if burst? == 0 { Burst::Air } else { Burst::Surface };
+    Some(Charge { mass: mass?, point: point?, span, burst, negative: negative? })
 }
 
 /// The curve under `curve` of a table, if it has one.

@@ -1,6 +1,6 @@
 //! What holds, moves, stops and pushes bodies, and what makes them rigid.
 
-use mechanics::load::Span;
+use mechanics::load::{Span, blast::Burst};
 
 use crate::place::{Origin, Place, Placed};
 
@@ -143,7 +143,7 @@ pub(crate) enum WallShape {
 #[derive(Clone, Debug)]
 pub(crate) enum WallMotion {
     Fixed,
-    Driven(Components),
+    Driven(Box<Components>),
     /// By what strikes it, from this velocity on.
     Free {
         mass: f64,
@@ -184,6 +184,11 @@ pub(crate) enum LoadKind {
         pressure: Option<Drive>,
         faces: Option<Faces>,
     },
+    /// A charge that explodes in air.
+    Blast {
+        charge: Option<Charge>,
+        faces: Option<Faces>,
+    },
     /// On each node; by its mass it is an acceleration.
     Force {
         force: Option<[f64; 3]>,
@@ -191,6 +196,17 @@ pub(crate) enum LoadKind {
         drive: Drive,
         nodes: Option<Region>,
     },
+}
+
+/// A charge of TNT that explodes in air.
+#[derive(Clone, Debug)]
+pub(crate) struct Charge {
+    pub(crate) mass: f64,
+    pub(crate) point: [f64; 3],
+    /// From when it explodes until its pressure ends.
+    pub(crate) span: Span,
+    pub(crate) burst: Burst,
+    pub(crate) negative: bool,
 }
 
 /// An acceleration of everything.

@@ -1,6 +1,6 @@
 //! Curves, boundaries, walls, rigid bodies and loads.
 
-use mechanics::load::Span;
+use mechanics::load::{Span, blast::Burst};
 
 use super::value::{Text, circle, components, drive, list, names, numbers, quoted, span, table, vector};
 use crate::typed::{
@@ -162,6 +162,19 @@ fn write_load(text: &mut Text, load: &Load) {
             write_faces(text, faces.as_ref());
             if let Some(pressure) = pressure {
                 text.key("pressure", drive(pressure));
+            }
+        }
+        LoadKind::Blast { charge, faces } => {
+            text.key("type", quoted("blast"));
+            write_faces(text, faces.as_ref());
+            if let Some(charge) = charge {
+                text.key("mass", format!("{:?}", charge.mass));
+                text.key("point", vector(charge.point));
+                text.key("burst", quoted(if charge.burst == Burst::Air { "air" } else { "surface" }));
+                text.some("negative_phase", Some(charge.negative).filter(|acts| !acts));
+                for (key, time) in span(&charge.span) {
+                    text.key(key, time);
+                }
             }
         }
         LoadKind::Force { force, by_mass, drive, nodes } => {

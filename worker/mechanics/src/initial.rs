@@ -203,6 +203,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         .iter()
         .map(|surface| match surface.kind {
             SurfaceKind::Pressure(drive) => drive.greatest(curves),
+            SurfaceKind::Blast(charge) => setup.loads.charges[charge as usize].greatest,
             SurfaceKind::Transmit => 0.0,
         })
         .fold(0.0, f64::max);

@@ -4,6 +4,7 @@
 //! on nodes, gravity and relaxation are put in where nodes are integrated (`nodes.rs`), alike on every holder of a node;
 //! loads on faces are nodal forces of the block that has the element (`load/face.rs`), rounded like its corner forces.
 
+pub mod blast;
 pub(crate) mod face;
 
 use serde::{Deserialize, Serialize};
@@ -155,6 +156,8 @@ pub struct Loads {
     pub gravity: Option<Gravity>,
     /// Loads on faces.
     pub surfaces: Vec<SurfaceLoad>,
+    /// Charges that explode in air, which loads on faces name.
+    pub charges: Vec<blast::Charge>,
     /// Dynamic relaxation.
     pub relaxation: Option<Relaxation>,
 }
@@ -196,6 +199,8 @@ pub struct SurfaceLoad {
 pub enum SurfaceKind {
     /// A pressure against the face as it is turned now (stress, positive pushes).
     Pressure(Drive),
+    /// The pressure of a charge that explodes in air, by its index in [`Loads::charges`].
+    Blast(u32),
     /// Dampers that take up plane waves which leave through the face (Lysmer and Kuhlemeyer 1969): traction
     /// `-rho (c_l v_n n + c_s v_t)` with the wave speeds of the material at rest.
     Transmit,

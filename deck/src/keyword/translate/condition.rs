@@ -22,7 +22,8 @@ const FREE: Components = [const { None }; 3];
 pub(super) fn write_held(t: &mut Translation<'_>) {
     let (problem, log) = (t.problem, t.log);
     // By node and span: translations, then rotations.
-    let mut of_node: BTreeMap<(u32, [u64; 2]), ([[bool; 3]; 2], Place)> = BTreeMap::new();
+    type Holding = ([[bool; 3]; 2], Place);
+    let mut of_node: BTreeMap<(u32, [u64; 2]), Holding> = BTreeMap::new();
     let mut hold = |node: u32, axes: [[bool; 3]; 2], span: Span, at: Place| {
         let key = (node, [span.from.to_bits(), span.until.to_bits()]);
         let entry = of_node.entry(key).or_insert(([[false; 3]; 2], at));

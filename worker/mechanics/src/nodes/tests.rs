@@ -108,6 +108,7 @@ fn gravity_relaxation_and_nodal_force_change_the_velocity_and_book_their_work() 
         forces: vec![force],
         gravity: Some(Gravity { acceleration: [0.0, 0.0, -10.0], drive }),
         surfaces: Vec::new(),
+        charges: Vec::new(),
         relaxation: Some(Relaxation { factor: 0.9, until: 0.6 }),
     };
     let pushed = Constraint { forces: 1, ..Constraint::default() };
