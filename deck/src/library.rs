@@ -99,7 +99,10 @@ pub(crate) fn read_material(table: Table<'_>, name: String) -> Option<Material> 
         let (value, expected) = match clash {
             Clash::Strength => (strength_value, "no strength in a gas or an explosive"),
             Clash::Failure => (failure_value, "no failure in a gas or an explosive"),
-            Clash::Damage => (failure_value, "no failure beside a strength that has damage of its own"),
+            Clash::Damage if material.strength.damages() => {
+                (failure_value, "no failure beside a strength that has damage of its own")
+            }
+            Clash::Damage => (failure_value, "no failure beside a strength with history variables"),
         };
         if let Some(value) = value {
             value.fault(expected, "remove it");
@@ -113,7 +116,7 @@ pub(crate) fn read_material(table: Table<'_>, name: String) -> Option<Material> 
 pub(crate) enum Clash {
     Strength,
     Failure,
-    /// A failure law beside a strength law with its own damage.
+    /// A failure law beside a strength law with history variables, its own damage mostly.
     Damage,
 }
 
@@ -189,8 +192,12 @@ fn read_strength(table: Table<'_>) -> Option<Strength> {
     let kind = table.require("type", &format!("one of {words}"))?.one_of(&all)?;
     if let Some(law) = kind.checked_sub(STRENGTHS.len()).map(|declared| &Strength::DECLARED[declared]) {
         let strength = read_declared(&table, law);
+        let fault = strength.as_ref().and_then(Strength::fault);
+        if let Some(expected) = fault {
+            table.faults.add(table.at, table.title.clone(), expected, "correct the constants");
+        }
         table.finish();
-        return strength;
+        return strength.filter(|_| fault.is_none());
     }
     let strength = match STRENGTHS[kind] {
         "hydro" => Some(Strength::Hydro),
@@ -231,8 +238,12 @@ fn read_declared<T>(table: &Table<'_>, law: &Declaration<T>) -> Option<T> {
             Bound::Positive => Range::Positive,
             Bound::NotNegative => Range::NotNegative,
             Bound::Fraction => Range::Within(-f64::MIN_POSITIVE, 1.0, "a number from 0 to 1"),
+            Bound::Any => Range::Any,
         };
-        table.number(constant.key, range)
+        match constant.default {
+            Some(default) => Some(table.number_or(constant.key, default, range)),
+            None => table.number(constant.key, range),
+        }
     };
     // All are read before the first that is missing ends it, so that every fault is reported.
     let values: Vec<Option<f64>> = law.constants.iter().map(number).collect();
@@ -369,8 +380,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_library_holds_thirty_sets_each_with_a_source() {
-        assert_eq!(names().len(), 30);
+    fn the_library_holds_thirty_one_sets_each_with_a_source() {
+        assert_eq!(names().len(), 31);
         for name in names() {
             assert!(source(name).is_some_and(|s| s.len() > 20), "{name}");
         }
@@ -379,7 +390,7 @@ mod tests {
     #[test]
     fn shear_and_bulk_of_every_solid_give_a_poisson_ratio_between_0_15_and_0_5() {
         let solids = names().into_iter().filter(|n| find(n).is_some_and(|m| m.shear() > 0.0));
-        assert_eq!(solids.clone().count(), 22);
+        assert_eq!(solids.clone().count(), 23);
         for name in solids {
             let material = find(name).expect("a name of the list");
             let (k, g) = (material.bulk(), material.shear());

@@ -50,8 +50,9 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let joins = assembly::joins(&deck.joins, &names, log);
     let mut assembly = assembly::assemble(&parts, &joins, &materials, meshes, log);
     let curves = Curves::of(&deck.curves, log);
-    let rigid = rigid::drafts(&deck.rigid, &names, &curves, log);
+    let rigid = rigid::drafts(&deck.rigid, &names, &curves, &assembly, log);
     let mut conditions = boundary::make(deck, &names, curves, &parts, &assembly, log);
+    assembly.mesh.lumped = load::lumped(deck, &names, &parts, &assembly, log);
     let bodies = rigid::make(&rigid, &materials, &mut assembly, &mut conditions, log);
     let contact = deck.contact.as_ref().and_then(|contact| {
         contact::make(contact, &names, &mut assembly, &materials, &conditions, &rigid, log)
@@ -61,7 +62,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         let control = control::make(given, log);
         Control { sort_lag: control::sort_lag(given, control.sort_lag, settings, log), ..control }
     });
-    let erosion = erosion::make(deck, &parts, &rigid, log);
+    let erosion = erosion::make(deck, (&parts, &assembly), (&rigid, &bodies), log);
     let output = output::make(deck, &names, &assembly, &bodies, log);
     let detonations = burn::make(deck, &materials, &parts, log);
     let faces = contact.as_ref().map(|contact| (&contact.settings, contact.faces.as_slice()));
@@ -69,11 +70,11 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
 
     let mut velocity = assembly.velocity;
     for (node, index) in conditions.constraint.iter().enumerate() {
-        let prescribed = conditions.constraints[*index as usize].velocity;
-        for (axis, value) in prescribed.iter().enumerate() {
-            if let Some(value) = value {
-                velocity[node][axis] = value.at(&conditions.loads.curves, 0.0);
-            }
+        let held = &conditions.constraints[*index as usize];
+        let x = assembly.mesh.positions[node];
+        let prescribed = held.prescribed(&conditions.loads.curves, x, 0.0, 0.0);
+        for (component, prescribed) in velocity[node].iter_mut().zip(prescribed) {
+            *component = prescribed.unwrap_or(*component);
         }
     }
     let control = control?;

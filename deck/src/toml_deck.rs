@@ -68,6 +68,7 @@ fn read_document(document: &DeTable<'_>, log: &Log<'_>) -> Deck {
     deck.boundaries = condition::read_boundaries(&table);
     deck.walls = condition::read_walls(&table);
     deck.rigid = condition::read_rigid(&table);
+    deck.masses = condition::read_masses(&table);
     deck.has_contact = table.has("contact");
     deck.contact = contact::read(&table);
     deck.erosion = read_erosion(&table);

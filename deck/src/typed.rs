@@ -17,7 +17,7 @@ use crate::{
     place::{Place, Placed},
     units::Units,
 };
-use condition::{Boundary, Curve, Gravity, Load, Parts, Relaxation, Rigid, Wall};
+use condition::{Boundary, Curve, Gravity, Load, Lumped, Parts, Relaxation, Rigid, Wall};
 use contact::{Contact, Join};
 use part::{Own, Part};
 
@@ -34,6 +34,7 @@ pub(crate) struct Deck {
     pub(crate) boundaries: Vec<Boundary>,
     pub(crate) walls: Vec<Wall>,
     pub(crate) rigid: Vec<Rigid>,
+    pub(crate) masses: Vec<Lumped>,
     pub(crate) loads: Vec<Load>,
     pub(crate) gravity: Option<Gravity>,
     pub(crate) relaxation: Option<Relaxation>,
@@ -61,6 +62,7 @@ impl Deck {
             boundaries: Vec::new(),
             walls: Vec::new(),
             rigid: Vec::new(),
+            masses: Vec::new(),
             loads: Vec::new(),
             gravity: None,
             relaxation: None,

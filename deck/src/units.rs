@@ -84,6 +84,17 @@ impl Units {
         unit.length * self.length + unit.mass * self.mass + unit.time * self.time
     }
 
+    /// Metres, milliseconds and kPa in a unit of length, time and stress, and kilograms in one of mass.
+    pub(crate) fn in_air(&self) -> ([f64; 3], f64) {
+        if !self.takes_materials {
+            // Inches, pounds of force and seconds.
+            let (inch, pound) = (0.0254, 4.448_221_615_260_5);
+            return ([inch, 1e3, pound / (inch * inch) * 1e-3], pound / inch);
+        }
+        let factor = |power: i32| 1.0 / scale(1.0, power);
+        ([factor(self.length), factor(self.time) * 1e3, factor(self.stress()) * 1e-3], factor(self.mass))
+    }
+
     fn specific_energy(&self) -> i32 {
         2 * self.velocity()
     }

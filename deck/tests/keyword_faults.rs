@@ -170,7 +170,7 @@ fn what_is_missing_is_told_once_and_as_what_it_is() {
 fn the_second_card_of_a_motion_is_none_of_its_own() {
     let curve = "*DEFINE_CURVE\n3\n0,1\n";
     for motion in [
-        "*BOUNDARY_PRESCRIBED_MOTION_NODE\n1,9,0,3\n0.5,0.5\n",
+        "*BOUNDARY_PRESCRIBED_MOTION_NODE\n1,-9,0,3\n0.5,0.5\n",
         "*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,-10,0,3\n0.5,0.5\n",
     ] {
         let found = faults(&cube(&format!("{curve}{motion}")));

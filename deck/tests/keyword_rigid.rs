@@ -198,14 +198,19 @@ fn what_cannot_be_honoured_of_rigid_bodies_is_refused_at_its_line() {
         (
             "*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,4,0,3\n",
             1,
-            "read 4; expected DOF 1 to 3 along, or 5 to 7 about",
+            "read a blank field; expected the number of a *DEFINE_VECTOR",
         ),
         ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,1,4,3\n", 1, "read 4; expected VAD 0, 1 or 2"),
         ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,1,0,3\n", 1, "read curve 3; expected a *DEFINE_CURVE"),
-        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,1,0,3,1.0,0,0.5\n", 1, "read 0.5; expected no death time"),
+        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,12,0,3\n", 1, "read 12; expected DOF 1 to 3 along x, y or z"),
+        (
+            "*BOUNDARY_PRESCRIBED_MOTION_RIGID\n1,1,0,3,1.0,0,0.5,0.7\n",
+            1,
+            "read 0.5; expected a death after the birth",
+        ),
         (second.as_str(), 6, "read a second motion of the body of part 4; expected one by axis, which line"),
         (held.as_str(), 5, "read a motion of part 4 along or about y; expected an axis that CON1 or CON2"),
-        ("*CONSTRAINED_EXTRA_NODES_SET\n1,2\n", 0, "read *CONSTRAINED_EXTRA_NODES_SET; expected a keyword"),
+        ("*CONSTRAINED_JOINT_REVOLUTE\n1,2\n", 0, "read *CONSTRAINED_JOINT_REVOLUTE; expected a keyword"),
     ];
     for (more, line, expected) in refused {
         let found = faults(ELASTIC, more);

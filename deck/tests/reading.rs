@@ -185,10 +185,10 @@ fn boundaries_merge_by_node_and_set_the_initial_velocity() {
 fn loads_curves_and_walls_are_as_the_deck_says() {
     let model = good("loads");
     let loads = &model.setup.loads;
-    let ramp = |factor| Drive { factor, curve: Some(1) };
+    let ramp = |factor| Drive::along(1, factor);
     assert_eq!(loads.curves[0].points, [[0.0, 0.0]]);
     assert_eq!(loads.curves[1].points, [[0.0, 3.0], [1e-3, 1.0]]);
-    assert_eq!(loads.forces, [NodalForce { force: [1.0, 2.0, 3.0], drive: ramp(1.0) }]);
+    assert_eq!(loads.forces, [NodalForce { force: [1.0, 2.0, 3.0], by_mass: false, drive: ramp(1.0) }]);
     assert_eq!(loads.gravity, Some(Gravity { acceleration: [0.0, 0.0, -9.81], drive: Drive::constant(1.0) }));
     assert_eq!(loads.relaxation, Some(Relaxation { factor: 0.99, until: 5e-4 }));
     // Faces of a grid of 4 x 4 x 4: sides are those of the mechanics, so that 1 is k-max and 3 is i-max.
@@ -205,10 +205,9 @@ fn loads_curves_and_walls_are_as_the_deck_says() {
         of(0),
         Constraint {
             velocity: [Some(ramp(2.0)), None, None],
-            walls: 0,
             forces: 1,
-            clamped: 0,
-            supports: [2, 0, 0]
+            supports: [2, 0, 0],
+            ..Constraint::default()
         }
     );
     assert_eq!(of(124), Constraint { forces: 1, ..Constraint::default() });

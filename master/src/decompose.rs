@@ -449,7 +449,7 @@ mod tests {
             element_ids: Vec::new(),
             hourglass: Default::default(),
         };
-        Mesh { positions: Vec::new(), node_ids: Vec::new(), parts: vec![part] }
+        Mesh { positions: Vec::new(), node_ids: Vec::new(), parts: vec![part], lumped: Vec::new() }
     }
 
     fn shares(subdomains: &[Subdomain], n: usize) -> Vec<usize> {

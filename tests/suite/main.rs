@@ -14,6 +14,7 @@ mod late;
 mod pairs;
 mod sections;
 mod seeds;
+mod spans;
 mod sums;
 mod tearing;
 mod trusses;

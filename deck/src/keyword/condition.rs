@@ -1,10 +1,16 @@
-//! `*INITIAL_`, `*BOUNDARY_`, `*LOAD_`, `*RIGIDWALL_`: what nodes start with, what holds, moves, pushes and stops them.
+//! `*INITIAL_`, `*BOUNDARY_`, `*LOAD_`, `*RIGIDWALL_`, `*ELEMENT_MASS`: what nodes start with, what holds, moves, pushes, loads and
+//! stops them.
+
+use std::collections::BTreeMap;
+
+use mechanics::load::Span;
 
 use super::{
-    cards::Block,
+    blast::Blasted,
+    cards::{Block, Card},
     fields::{Context, Fields, TENS},
 };
-use crate::{geometry, place::Place};
+use crate::{geometry, place::Place, table::Range};
 
 /// Which nodes something speaks of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +58,7 @@ pub(super) struct Held {
     pub(super) system: u32,
     /// x, y, z, then the rotations about them.
     pub(super) axes: [bool; 6],
+    pub(super) span: Span,
 }
 
 /// How a curve is meant.
@@ -77,14 +84,49 @@ impl Meaning {
     }
 }
 
-/// A motion by curve along one axis.
+/// What a motion goes along or about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Way {
+    Along(usize),
+    /// Of a body, about its centre; of a node of shells, about itself.
+    Turn(usize),
+    /// A circle about an axis through a point.
+    About(usize, [f64; 3]),
+}
+
+/// A motion by curve.
 pub(super) struct Motion {
     pub(super) at: Place,
     pub(super) target: Target,
-    pub(super) axis: usize,
+    pub(super) way: Way,
+    pub(super) how: Driven,
+}
+
+/// How a motion follows its curve, and when.
+#[derive(Clone, Copy)]
+pub(super) struct Driven {
     pub(super) meaning: Meaning,
     pub(super) curve: u32,
     pub(super) factor: f64,
+    pub(super) span: Span,
+}
+
+/// Gravity of parts along one axis.
+pub(super) struct PartGravity {
+    pub(super) at: Place,
+    pub(super) target: Target,
+    pub(super) axis: usize,
+    /// 0 is constant.
+    pub(super) curve: u32,
+    pub(super) acceleration: f64,
+}
+
+/// Mass at each of some nodes.
+pub(super) struct Mass {
+    pub(super) at: Place,
+    pub(super) target: Target,
+    /// Of a set it is that of all its nodes together.
+    pub(super) mass: f64,
 }
 
 /// A force by curve along one axis, on each node.
@@ -138,7 +180,11 @@ pub(super) struct Conditions {
     pub(super) motions: Vec<Motion>,
     pub(super) forces: Vec<Force>,
     pub(super) pressures: Vec<Pressure>,
+    /// Segments of `*LOAD_SEGMENT` that feel the charge of `*LOAD_BLAST`.
+    pub(super) blasted: Vec<Blasted>,
     pub(super) bodies: Vec<Body>,
+    pub(super) gravities: Vec<PartGravity>,
+    pub(super) masses: Vec<Mass>,
     pub(super) walls: Vec<Wall>,
 }
 
@@ -146,8 +192,89 @@ pub(super) struct Conditions {
 const NEVER: f64 = 1e15;
 
 /// Whether a second card belongs to a motion, with offsets or nodes.
-pub(super) fn goes_on(f: &Fields<'_>) -> bool {
+fn goes_on(f: &Fields<'_>) -> bool {
     matches!(f.words(1).parse::<i64>(), Ok(dof) if (9..=11).contains(&dof.abs())) || f.words(2) == "4"
+}
+
+/// The motions of a `*BOUNDARY_PRESCRIBED_MOTION_`: the first card of each, and what it says.
+pub(super) fn motions<'c>(
+    block: &'c Block<'_>,
+    named: bool,
+    vectors: &BTreeMap<u32, [f64; 3]>,
+    context: &'c Context<'_>,
+    mut take: impl FnMut(&Fields<'_>, Way, Driven),
+) {
+    let mut cards = block.cards.iter();
+    while let Some(card) = next_card(&mut cards, named) {
+        let f = context.fields(card, block.width, &TENS);
+        let second = if goes_on(&f) { cards.next() } else { None };
+        let offsets = second.map_or([0.0; 2], |card| {
+            let g = context.fields(card, block.width, &TENS);
+            [g.real(0, 0.0), g.real(1, 0.0)]
+        });
+        let way = way_of(&f, offsets, vectors);
+        let meaning = Meaning::read(&f, 2);
+        let span = span_of(&f, 7, 6);
+        if span.from > 0.0 {
+            context.log.warn(f.at, "BIRTH: the curve is read at the time of the run, not from BIRTH on");
+        }
+        let (Some((way, sign)), Some(meaning)) = (way, meaning) else { continue };
+        take(&f, way, Driven { meaning, curve: f.id(3), factor: sign * scale(&f, 4), span });
+    }
+}
+
+/// The next card that is not blank; where each has a card with a number and a heading before it, the one behind that.
+fn next_card<'c, 'd>(cards: &mut std::slice::Iter<'c, Card<'d>>, named: bool) -> Option<&'c Card<'d>> {
+    if named {
+        cards.next()?;
+    }
+    cards.find(|card| !card.text.trim().is_empty())
+}
+
+/// What DOF says, and the sign of the motion; none after a fault.
+fn way_of(
+    f: &Fields<'_>,
+    [first, second]: [f64; 2],
+    vectors: &BTreeMap<u32, [f64; 3]>,
+) -> Option<(Way, f64)> {
+    match f.integer(1) {
+        dof @ 1..=3 => Some((Way::Along(dof as usize - 1), 1.0)),
+        dof @ 5..=7 => Some((Way::Turn(dof as usize - 5), 1.0)),
+        dof @ (4 | 8) => {
+            let Some(vector) = vectors.get(&f.id(5)).copied() else {
+                f.fault(5, "the number of a *DEFINE_VECTOR", "define it, or give DOF 1 to 3 or 5 to 7");
+                return None;
+            };
+            let Some(axis) = (0..3).find(|a| vector[*a].abs() > 1.0 - 1e-9) else {
+                f.fault(5, "a vector along x, y or z", "turn the mesh so that motions are along the axes");
+                return None;
+            };
+            Some((if dof == 4 { Way::Along(axis) } else { Way::Turn(axis) }, vector[axis].signum()))
+        }
+        9 => Some((Way::About(0, [0.0, first, second]), 1.0)),
+        10 => Some((Way::About(1, [second, 0.0, first]), 1.0)),
+        11 => Some((Way::About(2, [first, second, 0.0]), 1.0)),
+        _ => {
+            let expected = "DOF 1 to 3 along x, y or z, 5 to 7 about them, 4 or 8 along or about a vector, 9 to 11 on circles";
+            f.fault(1, expected, "give components along or about the global axes");
+            None
+        }
+    }
+}
+
+/// The span of a birth and a death time; a faulty one is reported.
+pub(super) fn span_of(f: &Fields<'_>, birth: usize, death: usize) -> Span {
+    let from = f.within(birth, 0.0, Range::NotNegative);
+    let until = match f.within(death, 0.0, Range::NotNegative) {
+        0.0 => Span::ALWAYS.until,
+        end if end >= NEVER => Span::ALWAYS.until,
+        end => end,
+    };
+    if until <= from {
+        f.fault(death, format!("a death after the birth at {from}"), "correct one of the two");
+        return Span::ALWAYS;
+    }
+    Span { from, until }
 }
 
 /// Reports a birth or death time that is not from the start to the end.
@@ -172,6 +299,8 @@ impl Conditions {
                 | "INITIAL_VELOCITY_GENERATION"
                 | "BOUNDARY_SPC_NODE"
                 | "BOUNDARY_SPC_SET"
+                | "BOUNDARY_SPC_NODE_BIRTH_DEATH"
+                | "BOUNDARY_SPC_SET_BIRTH_DEATH"
                 | "BOUNDARY_PRESCRIBED_MOTION_NODE"
                 | "BOUNDARY_PRESCRIBED_MOTION_SET"
                 | "LOAD_NODE_POINT"
@@ -181,6 +310,10 @@ impl Conditions {
                 | "LOAD_BODY_X"
                 | "LOAD_BODY_Y"
                 | "LOAD_BODY_Z"
+                | "LOAD_GRAVITY_PART"
+                | "LOAD_GRAVITY_PART_SET"
+                | "ELEMENT_MASS"
+                | "ELEMENT_MASS_NODE_SET"
         ) || matches!(
             plain,
             "RIGIDWALL_PLANAR"
@@ -190,17 +323,16 @@ impl Conditions {
         )
     }
 
-    pub(super) fn read(&mut self, block: &mut Block<'_>, context: &Context<'_>) {
+    pub(super) fn read(
+        &mut self,
+        block: &mut Block<'_>,
+        vectors: &BTreeMap<u32, [f64; 3]>,
+        context: &Context<'_>,
+    ) {
         let named = block.take("_ID");
+        let dated = block.take("_BIRTH_DEATH");
         let per_card = block.keyword.starts_with("BOUNDARY") || block.keyword.starts_with("LOAD");
-        if named && per_card {
-            // A card with a number and a heading stands before each.
-            let mut n = 0;
-            block.cards.retain(|_| {
-                n += 1;
-                n % 2 == 0
-            });
-        } else if named && !block.cards.is_empty() {
+        if named && !per_card && !block.cards.is_empty() {
             block.cards.remove(0);
         }
         let word = block.keyword.clone();
@@ -208,14 +340,36 @@ impl Conditions {
             "INITIAL_VELOCITY" => self.velocity(block, context),
             "INITIAL_VELOCITY_GENERATION" => self.generation(block, context),
             word if word.starts_with("RIGIDWALL") => self.wall(block, context),
+            word if word.starts_with("BOUNDARY_PRESCRIBED") => {
+                let of_set = word.ends_with("_SET");
+                motions(block, named, vectors, context, |f, way, how| {
+                    let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
+                    if let Way::Turn(_) = way {
+                        f.fault(
+                            1,
+                            "DOF 1 to 4 or 9 to 11 of nodes",
+                            "hold rotations by *BOUNDARY_SPC, or move a rigid body",
+                        );
+                        return;
+                    }
+                    self.motions.push(Motion { at: f.at, target, way, how });
+                });
+            }
             word => {
-                let widths: &[usize] = if word == "LOAD_SEGMENT" { &[10; 10] } else { &TENS };
-                let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
-                while let Some(card) = cards.next() {
+                let widths: &[usize] = match word {
+                    "LOAD_SEGMENT" => &[10; 10],
+                    "ELEMENT_MASS" | "ELEMENT_MASS_NODE_SET" => &[8, 8, 16, 8],
+                    _ => &TENS,
+                };
+                let mut cards = block.cards.iter();
+                while let Some(card) = next_card(&mut cards, named && per_card) {
                     let f = context.fields(card, block.width, widths);
                     self.line(word, &f);
-                    if word.starts_with("BOUNDARY_PRESCRIBED") && goes_on(&f) {
-                        cards.next();
+                    if dated {
+                        let times = cards.next().map_or(Span::ALWAYS, |card| {
+                            span_of(&context.fields(card, block.width, &TENS), 0, 1)
+                        });
+                        self.held.iter_mut().rev().take(1).for_each(|held| held.span = times);
                     }
                 }
             }
@@ -245,7 +399,7 @@ impl Conditions {
             "BOUNDARY_SPC_NODE" | "BOUNDARY_SPC_SET" => {
                 let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
                 let axes = [2, 3, 4, 5, 6, 7].map(|i| f.integer(i) != 0);
-                self.held.push(Held { at, target, system: f.id(1), axes });
+                self.held.push(Held { at, target, system: f.id(1), axes, span: Span::ALWAYS });
             }
             "LOAD_NODE_POINT" | "LOAD_NODE_SET" => {
                 let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
@@ -256,7 +410,10 @@ impl Conditions {
                 self.forces.push(Force { at, target, axis, curve: f.id(2), factor: scale(f, 3) });
             }
             "LOAD_SEGMENT" | "LOAD_SEGMENT_SET" => {
-                let (set, curve, i) = if of_set { (f.id(0), f.id(1), 2) } else { (0, f.id(0), 1) };
+                let (set, i) = if of_set { (f.id(0), 2) } else { (0, 1) };
+                // -2 is the pressure of *LOAD_BLAST.
+                let blasted = f.integer(i - 1) == -2;
+                let curve = if blasted { 0 } else { f.id(i - 1) };
                 if f.real(i + 1, 0.0) != 0.0 {
                     f.fault(i + 1, "an arrival time of 0", "put it into the curve");
                 }
@@ -268,7 +425,11 @@ impl Conditions {
                     }
                     faces.push(face);
                 }
-                self.pressures.push(Pressure { at, faces, set, curve, factor: scale(f, i) });
+                if blasted {
+                    self.blasted.push(Blasted { at, charge: 0, faces, set });
+                } else {
+                    self.pressures.push(Pressure { at, faces, set, curve, factor: scale(f, i) });
+                }
             }
             "LOAD_BODY_X" | "LOAD_BODY_Y" | "LOAD_BODY_Z" => {
                 let axis = usize::from(word.as_bytes()[word.len() - 1] - b'X');
@@ -280,12 +441,20 @@ impl Conditions {
                 }
                 self.bodies.push(Body { at, axis, curve: f.id(0), factor: scale(f, 1) });
             }
-            _ => {
-                let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
+            "LOAD_GRAVITY_PART" | "LOAD_GRAVITY_PART_SET" => {
+                let target = if of_set { Target::PartSet(f.id(0)) } else { Target::Part(f.id(0)) };
                 let Some(axis) = axis_of(f, 1) else { return };
-                let Some(meaning) = Meaning::read(f, 2) else { return };
-                all_along(f, 7, 6);
-                self.motions.push(Motion { at, target, axis, meaning, curve: f.id(3), factor: scale(f, 4) });
+                for i in [5, 6].into_iter().filter(|i| f.integer(*i) != 0) {
+                    f.fault(i, "parts that are there from the start", "leave STGA and STGR blank");
+                }
+                let (curve, acceleration) = (f.id(2), f.real(3, 0.0));
+                self.gravities.push(PartGravity { at, target, axis, curve, acceleration });
+            }
+            _ => {
+                let target = if of_set { Target::NodeSet(f.id(1)) } else { Target::Node(f.id(1)) };
+                if let Some(mass) = f.positive(2, "a mass") {
+                    self.masses.push(Mass { at, target, mass });
+                }
             }
         }
     }

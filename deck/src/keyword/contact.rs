@@ -60,15 +60,29 @@ impl ContactCard {
     pub(super) fn read(block: &mut Block<'_>, context: &Context<'_>) -> Option<Self> {
         let log = context.log;
         let whole = block.keyword.clone();
+        if whole == "CONTACT_INTERIOR" || whole.starts_with("CONTACT_INTERIOR_") {
+            log.warn(
+                block.at,
+                "*CONTACT_INTERIOR: nothing keeps the elements of these parts from being crushed flat; a run in which one turns \
+                 inside out stops with an error that names it",
+            );
+            return None;
+        }
         let mut extra = usize::from(block.take("_ID") || block.take("_TITLE"));
         extra += usize::from(block.take("_MPP"));
         extra += usize::from(extra == 0 && (block.take("_ID") || block.take("_TITLE")));
         let word = block.keyword["CONTACT_".len()..].to_string();
         let single = match word.as_str() {
-            "AUTOMATIC_SINGLE_SURFACE" | "AUTOMATIC_GENERAL" | "ERODING_SINGLE_SURFACE" => true,
+            "AUTOMATIC_SINGLE_SURFACE"
+            | "AUTOMATIC_GENERAL"
+            | "ERODING_SINGLE_SURFACE"
+            | "SINGLE_SURFACE" => true,
             "AUTOMATIC_SURFACE_TO_SURFACE"
             | "AUTOMATIC_NODES_TO_SURFACE"
             | "AUTOMATIC_ONE_WAY_SURFACE_TO_SURFACE"
+            | "SURFACE_TO_SURFACE"
+            | "NODES_TO_SURFACE"
+            | "ONE_WAY_SURFACE_TO_SURFACE"
             | "ERODING_SURFACE_TO_SURFACE"
             | "ERODING_NODES_TO_SURFACE"
             | "TIED_NODES_TO_SURFACE"
@@ -78,11 +92,15 @@ impl ContactCard {
                     block.at,
                     format!("*{}", log.quote(&whole)),
                     "a contact of the table in deck/README.md",
-                    "use an AUTOMATIC, ERODING or TIED one",
+                    "use one without other words, or an AUTOMATIC, ERODING or TIED one",
                 );
                 return None;
             }
         };
+        if !["AUTOMATIC", "ERODING", "TIED"].iter().any(|kind| word.starts_with(kind)) {
+            let words = format!("*CONTACT_{word} as *CONTACT_AUTOMATIC_{word}: faces meet from both sides");
+            log.warn(block.at, words);
+        }
         let mut erodes = word.starts_with("ERODING");
         if erodes {
             // The card of an eroding contact is its fourth.

@@ -72,6 +72,24 @@ pub(super) fn read_system(problem: &mut Problem, block: &Block<'_>, context: &Co
     }
 }
 
+/// `*DEFINE_VECTOR`, with headings or without.
+pub(super) fn read_vectors(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
+    let titled = block.keyword.ends_with("_TITLE");
+    let cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
+    for card in cards.skip(usize::from(titled)).step_by(1 + usize::from(titled)) {
+        let f = context.fields(card, block.width, &TENS);
+        if f.integer(7) != 0 {
+            f.fault(7, "a vector of the global axes", "leave CID blank");
+        }
+        match unit(minus(f.vector(4), f.vector(1))) {
+            Some(direction) => {
+                problem.vectors.insert(f.id(0), direction);
+            }
+            None => f.fault(4, "a head apart from the tail", "give XH, YH, ZH"),
+        }
+    }
+}
+
 /// `*DEFINE_BOX`.
 pub(super) fn read_box(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     for card in &block.cards {
@@ -82,7 +100,7 @@ pub(super) fn read_box(problem: &mut Problem, block: &Block<'_>, context: &Conte
 }
 
 /// Definitions that do nothing unless another keyword names them; those that name them are refused or do without.
-const NAMED: [&str; 13] = [
+const NAMED: [&str; 12] = [
     "DEFINE_BOX_",
     "DEFINE_COORDINATE_",
     "DEFINE_CURVE_",
@@ -95,7 +113,6 @@ const NAMED: [&str; 13] = [
     "DEFINE_TABLE",
     "DEFINE_TRACER_PARTICLES",
     "DEFINE_TRANSFORMATION",
-    "DEFINE_VECTOR",
 ];
 
 /// Every other `*DEFINE_`.

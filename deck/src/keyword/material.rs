@@ -1,6 +1,11 @@
 //! `*MAT_` and `*EOS_`: constants of a deck.
 
-use mechanics::strength::JohnsonHolmquist;
+mod rubber;
+
+use mechanics::{
+    material::{Eos, Strength},
+    strength::JohnsonHolmquist,
+};
 
 use super::{
     cards::Block,
@@ -48,10 +53,12 @@ pub(super) enum Law {
         specific_heat: f64,
         damage: Option<[f64; 5]>,
     },
-    JohnsonHolmquist {
-        constants: JohnsonHolmquist,
-        /// K1, K2, K3.
-        bulk: [f64; 3],
+    /// A strength that our declared laws have, and the equation of state that the card gives with it.
+    Whole {
+        strength: Strength,
+        eos: Eos,
+        /// What of the card is that equation.
+        given: &'static str,
     },
     /// A fluid, with the pressure below which it does not go (negative), if any.
     Null {
@@ -79,13 +86,17 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 8] = [
+const NUMBERS: [(&str, &str); 12] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
+    ("MAT_006", "MAT_VISCOELASTIC"),
     ("MAT_009", "MAT_NULL"),
     ("MAT_015", "MAT_JOHNSON_COOK"),
     ("MAT_020", "MAT_RIGID"),
     ("MAT_024", "MAT_PIECEWISE_LINEAR_PLASTICITY"),
+    ("MAT_027", "MAT_MOONEY-RIVLIN_RUBBER"),
+    ("MAT_077_O", "MAT_OGDEN_RUBBER"),
+    ("MAT_077", "MAT_OGDEN_RUBBER"),
     ("MAT_098", "MAT_SIMPLIFIED_JOHNSON_COOK"),
     ("MAT_110", "MAT_JOHNSON_HOLMQUIST_CERAMICS"),
 ];
@@ -214,6 +225,18 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
         "MAT_JOHNSON_HOLMQUIST_CERAMICS" => {
             needs_moduli = false;
             (None, johnson_holmquist(&f, &mut limits))
+        }
+        "MAT_VISCOELASTIC" => {
+            needs_moduli = false;
+            (None, rubber::viscoelastic(&f))
+        }
+        "MAT_MOONEY-RIVLIN_RUBBER" => {
+            needs_moduli = false;
+            (None, rubber::mooney_rivlin(&f))
+        }
+        "MAT_OGDEN_RUBBER" => {
+            needs_moduli = false;
+            (None, rubber::ogden(&f))
         }
         "MAT_NULL" => {
             needs_moduli = false;
@@ -345,7 +368,9 @@ fn johnson_holmquist(f: &[Fields<'_>; 8], limits: &mut Limits) -> Option<Law> {
         d1,
         d2: d2?,
     };
-    Some(Law::JohnsonHolmquist { constants, bulk: [k1?, k2, k3] })
+    let a1 = k1?;
+    let eos = Eos::Polynomial { a1, a2: k2, a3: k3, b0: 0.0, b1: 0.0, t1: a1, t2: 0.0 };
+    Some(Law::Whole { strength: Strength::JohnsonHolmquist(constants), eos, given: "K1, K2 and K3" })
 }
 
 /// Reads an `*EOS_` keyword; none after a fault.

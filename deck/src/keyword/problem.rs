@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::{
+    blast::Blasts,
     condition::Conditions,
     contact::ContactCard,
     control::ControlCards,
@@ -128,6 +129,9 @@ pub(super) struct Problem {
     pub(super) boxes: BTreeMap<u32, [[f64; 3]; 2]>,
     /// Directions of x, y, z of each coordinate system.
     pub(super) systems: BTreeMap<u32, [[f64; 3]; 3]>,
+    /// Direction of each vector.
+    pub(super) vectors: BTreeMap<u32, [f64; 3]>,
+    pub(super) blasts: Blasts,
     pub(super) conditions: Conditions,
     pub(super) rigid: RigidCards,
     pub(super) contacts: Vec<ContactCard>,

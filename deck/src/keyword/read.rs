@@ -2,6 +2,7 @@
 //! what changes nothing here goes into one warning.
 
 use super::{
+    blast::Blasts,
     cards::{Block, Lines},
     condition::Conditions,
     contact::ContactCard,
@@ -16,8 +17,16 @@ use crate::log::Log;
 
 /// Keywords of several sections, each with a heading of its own where the keyword ends in `_TITLE`; and the cards of a
 /// section.
-const HEADED: [(&str, usize); 5] =
-    [("SECTION_SOLID", 1), ("SECTION_SHELL", 2), ("SECTION_BEAM", 2), ("HOURGLASS", 1), ("DEFINE_BOX", 1)];
+const HEADED: [(&str, usize); 8] = [
+    ("SECTION_SOLID", 1),
+    ("SECTION_SHELL", 2),
+    ("SECTION_BEAM", 2),
+    ("HOURGLASS", 1),
+    ("DEFINE_BOX", 1),
+    ("DEFINE_VECTOR", 1),
+    ("CONSTRAINED_NODAL_RIGID_BODY", 1),
+    ("CONSTRAINED_NODAL_RIGID_BODY_SPC", 2),
+];
 
 /// Reads all blocks.
 pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
@@ -26,6 +35,9 @@ pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
     let context = Context { log, parameters: &lines.parameters };
     // Coordinate systems may name nodes, whatever stands first.
     let mut later = Vec::new();
+    blocks.iter().filter(|block| block.keyword.starts_with("DEFINE_VECTOR")).for_each(|block| {
+        define::read_vectors(&mut problem, block, &context);
+    });
     for block in &mut blocks {
         while block.cards.last().is_some_and(|card| card.text.trim().is_empty()) {
             block.cards.pop();
@@ -87,6 +99,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "SECTION_BEAM" => property::read_beam_sections(problem, block, context),
         "HOURGLASS" => property::read_hourglass(problem, block, context),
         "DEFINE_CURVE" => define::read_curve(problem, block, context),
+        "DEFINE_VECTOR" => {}
         "DEFINE_BOX" => define::read_box(problem, block, context),
         "DEFINE_COORDINATE_SYSTEM" | "DEFINE_COORDINATE_NODES" | "DEFINE_COORDINATE_VECTOR" => {
             define::read_system(problem, block, context);
@@ -101,7 +114,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
             let (id, limits) = erosion::read(block, context);
             problem.erosions.entry(id).or_default().merge(limits);
         }
-        word if RigidCards::knows(word) => problem.rigid.read(block, context),
+        word if RigidCards::knows(word) => problem.rigid.read(block, &problem.vectors, context),
         word if word.starts_with("SET_") => problem.sets.read(block, context),
         word if word.starts_with("MAT_") => read_material(problem, block, context),
         word if word.starts_with("EOS_") => read_eos(problem, block, context),
@@ -111,7 +124,8 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         word if word.starts_with("CONTACT_") => problem.contacts.extend(ContactCard::read(block, context)),
         word if word.starts_with("CONTROL_") => problem.control.read(block, context),
         word if word.starts_with("DATABASE_") => problem.control.read_database(block, context),
-        word if Conditions::knows(word) => problem.conditions.read(block, context),
+        word if Blasts::knows(word) => problem.blasts.read(block, context),
+        word if Conditions::knows(word) => problem.conditions.read(block, &problem.vectors, context),
         word if word.starts_with("DEFINE_") => define::read_other(problem, block, context),
         _ => {
             log.fault(

@@ -1,8 +1,10 @@
 //! Rigid bodies by keyword: which parts become rigid or belong together, how bodies begin and how they are moved.
 
+use std::collections::BTreeMap;
+
 use super::{
     cards::Block,
-    condition::{Meaning, all_along, goes_on, scale},
+    condition::{AXES_OF_CODE, Driven, Target, Way, motions},
     fields::{Context, Fields, TENS},
 };
 use crate::place::Place;
@@ -24,15 +26,28 @@ pub(super) struct Joined {
     pub(super) switched: bool,
 }
 
-/// A motion of a body by curve: along an axis, or about it.
+/// A motion of a body by curve.
 pub(super) struct BodyMotion {
     pub(super) at: Place,
     pub(super) part: u32,
-    pub(super) axis: usize,
-    pub(super) turns: bool,
-    pub(super) meaning: Meaning,
-    pub(super) curve: u32,
-    pub(super) factor: f64,
+    pub(super) way: Way,
+    pub(super) how: Driven,
+}
+
+/// A rigid body of the nodes of a set.
+pub(super) struct NodalBody {
+    pub(super) at: Place,
+    pub(super) id: u32,
+    pub(super) set: u32,
+    /// Translations, then rotations that are held, by axis.
+    pub(super) held: [[bool; 3]; 2],
+}
+
+/// Nodes that go with a rigid part.
+pub(super) struct ExtraNodes {
+    pub(super) at: Place,
+    pub(super) part: u32,
+    pub(super) target: Target,
 }
 
 /// How a body begins.
@@ -51,6 +66,8 @@ pub(super) struct RigidCards {
     pub(super) joined: Vec<Joined>,
     pub(super) motions: Vec<BodyMotion>,
     pub(super) starts: Vec<BodyStart>,
+    pub(super) of_nodes: Vec<NodalBody>,
+    pub(super) extra: Vec<ExtraNodes>,
 }
 
 impl RigidCards {
@@ -66,18 +83,21 @@ impl RigidCards {
                 | "BOUNDARY_PRESCRIBED_MOTION_RIGID"
                 | "BOUNDARY_PRESCRIBED_MOTION_RIGID_ID"
                 | "INITIAL_VELOCITY_RIGID_BODY"
+                | "CONSTRAINED_NODAL_RIGID_BODY"
+                | "CONSTRAINED_NODAL_RIGID_BODY_SPC"
+                | "CONSTRAINED_NODAL_RIGID_BODY_INERTIA"
+                | "CONSTRAINED_EXTRA_NODES_NODE"
+                | "CONSTRAINED_EXTRA_NODES_SET"
         )
     }
 
-    pub(super) fn read(&mut self, block: &mut Block<'_>, context: &Context<'_>) {
-        if block.take("_ID") {
-            // A card with a number and a heading stands before each.
-            let mut n = 0;
-            block.cards.retain(|_| {
-                n += 1;
-                n % 2 == 0
-            });
-        }
+    pub(super) fn read(
+        &mut self,
+        block: &mut Block<'_>,
+        vectors: &BTreeMap<u32, [f64; 3]>,
+        context: &Context<'_>,
+    ) {
+        let named = block.take("_ID");
         match block.keyword.as_str() {
             "DEFORMABLE_TO_RIGID_AUTOMATIC" => context.log.fault(
                 block.at,
@@ -91,13 +111,33 @@ impl RigidCards {
                 "mass and inertia of the elements",
                 "take it out, or convert the deck and give mass, centre and inertia in [[rigid]]",
             ),
+            "CONSTRAINED_NODAL_RIGID_BODY_INERTIA" => context.log.fault(
+                block.at,
+                "*CONSTRAINED_NODAL_RIGID_BODY_INERTIA",
+                "mass and inertia of the nodes",
+                "take _INERTIA and its cards out, and put mass at the nodes by *ELEMENT_MASS",
+            ),
+            "BOUNDARY_PRESCRIBED_MOTION_RIGID" => motions(block, named, vectors, context, |f, way, how| {
+                self.motions.push(BodyMotion { at: f.at, part: f.id(0), way, how });
+            }),
             word => {
                 let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
                 while let Some(card) = cards.next() {
                     let f = context.fields(card, block.width, &TENS);
                     self.line(word, &f);
-                    if word.starts_with("BOUNDARY_PRESCRIBED") && goes_on(&f) {
-                        cards.next();
+                    if word.ends_with("_BODY_SPC") {
+                        let held = cards.next().map(|card| {
+                            let g = context.fields(card, block.width, &TENS);
+                            if g.real(0, 0.0) != 1.0 && g.real(0, 0.0) != 0.0 {
+                                g.fault(0, "CMO 1: directions of the axes", "give CON1 and CON2 along them");
+                            }
+                            [1, 2].map(|i| code_of(&g, i))
+                        });
+                        self.of_nodes
+                            .iter_mut()
+                            .rev()
+                            .take(1)
+                            .for_each(|body| body.held = held.unwrap_or_default());
                     }
                 }
             }
@@ -130,20 +170,30 @@ impl RigidCards {
                 spin: f.vector(4),
                 system: f.id(7),
             }),
+            "CONSTRAINED_EXTRA_NODES_NODE" | "CONSTRAINED_EXTRA_NODES_SET" => {
+                let target =
+                    if word.ends_with("_SET") { Target::NodeSet(f.id(1)) } else { Target::Node(f.id(1)) };
+                self.extra.push(ExtraNodes { at, part: f.id(0), target });
+            }
             _ => {
-                let (axis, turns) = match f.integer(1) {
-                    dof @ 1..=3 => (dof as usize - 1, false),
-                    dof @ 5..=7 => (dof as usize - 5, true),
-                    _ => {
-                        let advice = "give components along or about the global axes";
-                        return f.fault(1, "DOF 1 to 3 along, or 5 to 7 about x, y or z", advice);
-                    }
-                };
-                let Some(meaning) = Meaning::read(f, 2) else { return };
-                all_along(f, 7, 6);
-                let (part, curve, factor) = (f.id(0), f.id(3), scale(f, 4));
-                self.motions.push(BodyMotion { at, part, axis, turns, meaning, curve, factor });
+                for i in [5, 6].into_iter().filter(|i| f.integer(*i) != 0) {
+                    f.fault(
+                        i,
+                        "a body that holds all of its nodes in every direction",
+                        "leave DRFLAG and RRFLAG blank",
+                    );
+                }
+                self.of_nodes.push(NodalBody { at, id: f.id(0), set: f.id(2), held: Default::default() });
             }
         }
     }
+}
+
+/// Axes that a code from 0 to 7 holds.
+fn code_of(f: &Fields<'_>, i: usize) -> [bool; 3] {
+    let code = usize::try_from(f.integer(i)).ok().and_then(|code| AXES_OF_CODE.get(code).copied());
+    code.unwrap_or_else(|| {
+        f.fault(i, "a code from 0 to 7 of what is held", "correct it");
+        [false; 3]
+    })
 }

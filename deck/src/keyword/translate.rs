@@ -1,5 +1,6 @@
 //! A problem by the numbers of a keyword deck becomes a typed deck and its mesh.
 
+mod blast;
 mod condition;
 mod contact;
 mod control;
@@ -38,7 +39,10 @@ pub(super) fn translate(
     condition::write_motions(&mut t);
     condition::write_forces(&mut t);
     condition::write_pressures(&mut t);
+    blast::write(&mut t);
     condition::write_gravity(&mut t);
+    condition::write_part_gravities(&mut t);
+    condition::write_masses(&mut t);
     condition::write_walls(&mut t);
     contact::write(&mut t);
     output::write(&mut t);

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use mechanics::{
-    constraint::{Constraint, MAX_SUPPORTS, MAX_WALLS},
-    load::{Drive, Loads, SurfaceKind, SurfaceLoad},
+    constraint::{Circle, Constraint, MAX_SUPPORTS, MAX_WALLS},
+    load::{Drive, Loads, Span, SurfaceKind, SurfaceLoad},
     wall::RigidWall,
 };
 
@@ -43,14 +43,56 @@ struct Prescribing {
     velocity: Prescribed,
 }
 
-/// A drive as a key: bits of the factor, and the curve.
-type DriveBits = Option<(u64, Option<u32>)>;
+/// A drive as a key: bits of the factor and of its span, and the curve.
+type DriveBits = ([u64; 3], Option<u32>);
 
-/// What tells constraints apart: velocities and supports by axis, forces, walls, clamped axes.
-type Key = ([DriveBits; 3], [u8; 3], u32, u32, u8);
+/// What tells constraints apart: velocities and supports by axis, a circle, forces, walls, clamped axes and when.
+type Key = ([Option<DriveBits>; 3], [u8; 3], Option<(DriveBits, u8, [u64; 3])>, u32, u32, (u8, [u64; 2]));
 
-/// Velocities by axis.
-type Prescribed = [Option<Drive>; 3];
+/// What a node does along an axis.
+#[derive(Clone, Copy, PartialEq)]
+enum Moved {
+    By(Drive),
+    Along(Circle),
+}
+
+/// That by axis.
+type Prescribed = [Option<Moved>; 3];
+
+impl Moved {
+    fn by(self) -> Option<Drive> {
+        match self {
+            Moved::By(drive) => Some(drive),
+            Moved::Along(_) => None,
+        }
+    }
+
+    fn along(self) -> Option<Circle> {
+        match self {
+            Moved::Along(circle) => Some(circle),
+            Moved::By(_) => None,
+        }
+    }
+
+    /// How a message writes it.
+    fn words(self, curves: &Curves<'_>) -> String {
+        match self {
+            Moved::By(drive) => curves.words(drive),
+            Moved::Along(circle) => {
+                format!("of a rotation by {} about {:?}", curves.words(circle.rate), circle.point)
+            }
+        }
+    }
+}
+
+fn span_bits(span: Span) -> [u64; 2] {
+    [span.from, span.until].map(f64::to_bits)
+}
+
+fn drive_bits(drive: Drive) -> DriveBits {
+    let [from, until] = span_bits(drive.span);
+    ([drive.factor.to_bits(), from, until], drive.curve)
+}
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -68,8 +110,8 @@ pub(super) fn make(
     let mut boundaries: Vec<Prescribing> = Vec::new();
     // By node and axis: the boundary that prescribes it.
     let mut prescribed: BTreeMap<u32, [Option<usize>; 3]> = BTreeMap::new();
-    // By node: axes about which it does not turn.
-    let mut clamps: BTreeMap<u32, u8> = BTreeMap::new();
+    // By node: axes about which it does not turn, and when.
+    let mut clamps: BTreeMap<u32, (u8, Span)> = BTreeMap::new();
     // By pair of boundaries and axis: the first node both prescribe differently, and how many.
     let mut conflicts: BTreeMap<(usize, usize, usize), (u32, usize)> = BTreeMap::new();
     for (number, boundary) in (1..).zip(&deck.boundaries) {
@@ -87,15 +129,31 @@ pub(super) fn make(
             loads.list.surfaces.push(SurfaceLoad { kind: SurfaceKind::Transmit, faces });
             continue;
         }
-        let Some((velocity, clamped, nodes)) = held(boundary, names, parts, assembly, &curves, log) else {
+        let Some((velocity, (clamped, span), nodes)) = held(boundary, names, parts, assembly, &curves, log)
+        else {
             continue;
         };
         let this = boundaries.len();
         let number = u8::try_from(number).ok().filter(|number: &u8| *number <= MAX_SUPPORTS).unwrap_or(0);
         boundaries.push(Prescribing { at: boundary.at, number, velocity });
+        let mut told = false;
         for node in nodes {
             if clamped != 0 && turns[node as usize] {
-                *clamps.entry(node).or_default() |= clamped;
+                let clamp = clamps.entry(node).or_insert((0, span));
+                clamp.0 |= clamped;
+                if clamp.1 != span && !told {
+                    told = true;
+                    let id = assembly.mesh.node_ids[node as usize];
+                    log.fault(
+                        boundary.at,
+                        format!("rotations of node {id} held from {} until {}", span.from, span.until),
+                        format!(
+                            "from {} until {}, as another boundary holds them",
+                            clamp.1.from, clamp.1.until
+                        ),
+                        "let both act at the same times",
+                    );
+                }
             }
             let held = prescribed.entry(node).or_default();
             for axis in 0..3 {
@@ -112,7 +170,7 @@ pub(super) fn make(
         }
     }
     for ((first, second, axis), (node, count)) in conflicts {
-        let value = |b: usize| boundaries[b].velocity[axis].map(|v| curves.words(v)).unwrap_or_default();
+        let value = |b: usize| boundaries[b].velocity[axis].map(|v| v.words(&curves)).unwrap_or_default();
         let line = log.line(boundaries[first].at, boundaries[second].at);
         let other = log.say("the boundary at ", "");
         log.fault(
@@ -165,7 +223,7 @@ fn make_walls(
 fn number(
     boundaries: &[Prescribing],
     prescribed: &BTreeMap<u32, [Option<usize>; 3]>,
-    clamps: &BTreeMap<u32, u8>,
+    clamps: &BTreeMap<u32, (u8, Span)>,
     loads: &LoadDraft,
     touched: &BTreeMap<u32, u32>,
     n_nodes: usize,
@@ -181,11 +239,14 @@ fn number(
         let held = prescribed.get(&node).copied().unwrap_or_default();
         let forces = forces.get(&node).copied().unwrap_or_default();
         let walls = touched.get(&node).copied().unwrap_or_default();
-        let clamped = clamps.get(&node).copied().unwrap_or_default();
-        let velocity = [0, 1, 2].map(|axis| held[axis].and_then(|b| boundaries[b].velocity[axis]));
+        let (clamped, clamp_span) = clamps.get(&node).copied().unwrap_or((0, Span::ALWAYS));
+        let moved = [0, 1, 2].map(|axis| held[axis].and_then(|b| boundaries[b].velocity[axis]));
+        let velocity = moved.map(|moved| moved.and_then(Moved::by));
+        let circle = moved.into_iter().flatten().find_map(Moved::along);
         let supports = held.map(|held| held.map_or(0, |b| boundaries[b].number));
-        let bits = velocity.map(|v| v.map(|v| (v.factor.to_bits(), v.curve)));
-        let key = (bits, supports, forces, walls, clamped);
+        let around = circle.map(|c| (drive_bits(c.rate), c.axis, c.point.map(f64::to_bits)));
+        let bits = velocity.map(|v| v.map(drive_bits));
+        let key = (bits, supports, around, forces, walls, (clamped, span_bits(clamp_span)));
         let next = list.len();
         let index = match known.get(&key) {
             Some(index) => *index,
@@ -199,7 +260,7 @@ fn number(
                     );
                     return (list, of_node);
                 };
-                list.push(Constraint { velocity, walls, forces, clamped, supports });
+                list.push(Constraint { velocity, walls, forces, clamped, clamp_span, circle, supports });
                 known.insert(key, index);
                 index
             }
@@ -209,7 +270,7 @@ fn number(
     (list, of_node)
 }
 
-/// What a boundary prescribes, the axes about which its nodes do not turn, and its nodes; none after a fault.
+/// What a boundary prescribes, the axes about which its nodes do not turn and when, and its nodes; none after a fault.
 fn held(
     boundary: &Boundary,
     names: &Names<'_>,
@@ -217,21 +278,29 @@ fn held(
     assembly: &Assembly,
     curves: &Curves<'_>,
     log: &Log<'_>,
-) -> Option<(Prescribed, u8, Vec<u32>)> {
+) -> Option<(Prescribed, (u8, Span), Vec<u32>)> {
     let selected = names.several(&boundary.parts).unwrap_or_default();
     let (velocity, clamped, nodes) = match &boundary.kind {
         BoundaryKind::Transmit(_) => return None,
         BoundaryKind::Symmetry { axis, place } => {
             let mut velocity = [None; 3];
-            velocity[*axis] = Some(Drive::constant(0.0));
+            velocity[*axis] = Some(Moved::By(Drive::constant(0.0)));
             let nodes = choose(assembly, &selected, |x, near| (x[*axis] - place).abs() <= near);
             // The plane turns only with itself.
-            (velocity, 0b111 & !(1 << axis), nodes)
+            (velocity, (0b111 & !(1 << axis), Span::ALWAYS), nodes)
         }
-        BoundaryKind::Held { velocity, clamped, nodes } => {
+        BoundaryKind::Held { velocity, clamped, clamp_span, nodes } => {
             let velocity = curves.components(velocity);
             let nodes = region::nodes(nodes.as_ref()?, &selected, assembly, log);
-            (velocity?, *clamped, nodes?)
+            (velocity?.map(|drive| drive.map(Moved::By)), (*clamped, *clamp_span), nodes?)
+        }
+        BoundaryKind::Circle { circle, nodes } => {
+            let circle = curves.circle(circle.as_ref()?);
+            let nodes = region::nodes(nodes.as_ref()?, &selected, assembly, log);
+            let circle = circle?;
+            let mut moved = [Some(Moved::Along(circle)); 3];
+            moved[usize::from(circle.axis)] = None;
+            (moved, (0, Span::ALWAYS), nodes?)
         }
     };
     if nodes.is_empty() && !broken(&selected, parts) {

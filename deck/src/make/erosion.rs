@@ -1,15 +1,21 @@
 //! What erodes, and what becomes of nodes without elements.
 
-use mechanics::erosion::Erosion;
+use mechanics::{erosion::Erosion, rigid::Body};
 
 use super::{
+    assembly::Assembly,
     part::PartDraft,
     rigid::{self, RigidDraft},
 };
 use crate::{log::Log, typed::Deck};
 
 /// Gathers the criteria of all parts. Of rigid bodies no part erodes.
-pub(super) fn make(deck: &Deck, parts: &[PartDraft], rigid: &[RigidDraft<'_>], log: &Log<'_>) -> Erosion {
+pub(super) fn make(
+    deck: &Deck,
+    (parts, assembly): (&[PartDraft], &Assembly),
+    (rigid, bodies): (&[RigidDraft<'_>], &[Body]),
+    log: &Log<'_>,
+) -> Erosion {
     let mut erosion = Erosion::default();
     for part in rigid::parts_of(rigid).flatten().map(|&p| &parts[p as usize]) {
         if part.erosion.is_some() {
@@ -37,6 +43,24 @@ pub(super) fn make(deck: &Deck, parts: &[PartDraft], rigid: &[RigidDraft<'_>], l
                 "add [contact], or leave the inertia of freed nodes in the run",
             );
         }
+    }
+    let erodes = |node: &u32| {
+        let holds = |p: &usize| assembly.mesh.parts[*p].nodes.contains(node);
+        (0..parts.len()).filter(|&p| parts[p].erosion.is_some()).any(|p| holds(&p))
+    };
+    let mut of_nodes = bodies.iter().filter(|body| body.parts.is_empty()).flat_map(|body| &body.nodes);
+    if !erosion.retain_inertia
+        && let Some(node) = of_nodes.find(|&node| erodes(node))
+    {
+        log.fault(
+            freed.at,
+            format!(
+                "freed nodes that leave the run, node {} of a rigid body among them",
+                assembly.mesh.node_ids[*node as usize]
+            ),
+            "rigid bodies whose nodes stay",
+            log.say("write retain_inertia = true", "give ENMASS 2 in *CONTROL_CONTACT"),
+        );
     }
     if erosion.parts.is_empty() {
         log.fault(

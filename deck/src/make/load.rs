@@ -2,7 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::load::{Gravity, Loads, MAX_FORCES, NodalForce, Relaxation, SurfaceKind, SurfaceLoad};
+use mechanics::{
+    load::{
+        Gravity, Loads, MAX_FORCES, NodalForce, Relaxation, SurfaceKind, SurfaceLoad,
+        blast::{Burst, Charge},
+    },
+    mesh::FACES,
+};
 
 use super::{
     assembly::Assembly,
@@ -11,6 +17,7 @@ use super::{
     region::{self, Asking, broken},
 };
 use crate::{
+    fault::short,
     log::Log,
     typed::{
         Deck,
@@ -48,7 +55,21 @@ pub(super) fn make(
                     draft.list.surfaces.push(SurfaceLoad { kind: SurfaceKind::Pressure(pressure), faces });
                 }
             }
-            LoadKind::Force { force, drive, nodes } => {
+            LoadKind::Blast { charge, faces } => {
+                let asking = Asking { at: load.at, title: &load.title, selected: &selected };
+                let faces = match faces {
+                    Some(faces) => region::faces(faces, &asking, parts, assembly, log),
+                    None => Vec::new(),
+                };
+                if let Some(charge) =
+                    charge.as_ref().and_then(|c| exploding(c, load, &faces, deck, assembly, log))
+                {
+                    let kind = SurfaceKind::Blast(draft.list.charges.len() as u32);
+                    draft.list.charges.push(charge);
+                    draft.list.surfaces.push(SurfaceLoad { kind, faces });
+                }
+            }
+            LoadKind::Force { force, by_mass, drive, nodes } => {
                 let drive = curves.of_entry(drive);
                 let nodes = nodes.as_ref().and_then(|nodes| region::nodes(nodes, &selected, assembly, log));
                 let (Some(force), Some(nodes)) = (force, nodes) else { continue };
@@ -60,7 +81,7 @@ pub(super) fn make(
                         "check parts, face, box, plane or nodes against the mesh",
                     );
                 }
-                push(&mut draft, load, NodalForce { force: *force, drive }, nodes, log);
+                push(&mut draft, load, NodalForce { force: *force, by_mass: *by_mass, drive }, nodes, log);
             }
         }
     }
@@ -72,13 +93,51 @@ pub(super) fn make(
     draft
 }
 
+/// A charge in the units of the deck; none where a face is nearer than its pressure is known.
+fn exploding(
+    given: &condition::Charge,
+    load: &Load,
+    faces: &[(u32, u8)],
+    deck: &Deck,
+    assembly: &Assembly,
+    log: &Log<'_>,
+) -> Option<Charge> {
+    let (units, kilograms) = deck.units.in_air();
+    let condition::Charge { mass, point, span, burst, negative } = *given;
+    let root = Charge::root(mass * kilograms);
+    let mut charge = Charge { point, root, span, burst, negative, units, greatest: 0.0 };
+    let mesh = &assembly.mesh;
+    let offsets = mesh.element_offsets();
+    let mut nearest = f64::MAX;
+    for &(element, side) in faces {
+        let p = offsets.partition_point(|&first| first <= element as usize) - 1;
+        let corners = mesh.parts[p].corners(element as usize - offsets[p]);
+        let places = FACES[usize::from(side)].map(|c| mesh.positions[corners[c] as usize]);
+        let centre = std::array::from_fn(|a| 0.25 * places.iter().map(|x| x[a]).sum::<f64>());
+        nearest = nearest.min(charge.scaled_distance(centre));
+    }
+    if nearest < burst.nearest() {
+        let kind = if burst == Burst::Air { "an air burst" } else { "a surface burst" };
+        log.fault(
+            load.at,
+            format!("{} {} m/kg^(1/3) from a face", load.title, short(nearest)),
+            format!("a scaled distance of at least {} for {kind}", burst.nearest()),
+            "move the charge away, or model it as a part of an explosive",
+        );
+        return None;
+    }
+    // Faces that fly towards it may come twice as near.
+    charge.greatest = charge.reflected_peak(0.5 * nearest);
+    Some(charge)
+}
+
 /// Adds a force on some nodes.
 fn push(draft: &mut LoadDraft, load: &Load, force: NodalForce, nodes: Vec<u32>, log: &Log<'_>) {
     let index = draft.list.forces.len();
     if index == MAX_FORCES {
         log.fault(
             load.at,
-            format!("more than {MAX_FORCES} loads of type force"),
+            format!("more than {MAX_FORCES} loads of types force and acceleration"),
             format!("at most {MAX_FORCES}"),
             "give more nodes the same force",
         );
@@ -90,4 +149,30 @@ fn push(draft: &mut LoadDraft, load: &Load, force: NodalForce, nodes: Vec<u32>, 
     for node in nodes {
         *draft.forces.entry(node).or_default() |= 1 << index;
     }
+}
+
+/// The masses that the deck puts at nodes, by node and ascending; those at one node are added up.
+pub(super) fn lumped(
+    deck: &Deck,
+    names: &Names<'_>,
+    parts: &[PartDraft],
+    assembly: &Assembly,
+    log: &Log<'_>,
+) -> Vec<(u32, f64)> {
+    let mut masses: BTreeMap<u32, f64> = BTreeMap::new();
+    for given in &deck.masses {
+        let selected = names.several(&given.parts).unwrap_or_default();
+        let nodes = given.nodes.as_ref().and_then(|nodes| region::nodes(nodes, &selected, assembly, log));
+        let (Some(mass), Some(nodes)) = (given.mass, nodes) else { continue };
+        if nodes.is_empty() && !broken(&selected, parts) {
+            log.fault(
+                given.at,
+                format!("{} that holds no node", given.title),
+                "at least one node",
+                "check parts, face, box, plane or nodes against the mesh",
+            );
+        }
+        nodes.into_iter().for_each(|node| *masses.entry(node).or_default() += mass);
+    }
+    masses.into_iter().collect()
 }

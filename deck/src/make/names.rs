@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::load::{self, Curve};
+use mechanics::{
+    constraint::Circle,
+    load::{self, Curve, Span},
+};
 
 use crate::{
     fault::nearest,
@@ -94,12 +97,13 @@ impl<'d> Curves<'d> {
             Some(name) => Some(self.find(name)?),
             None => None,
         };
-        Some(load::Drive { factor: drive.factor, curve })
+        Some(load::Drive { factor: drive.factor, curve, span: drive.span })
     }
 
     /// The same of an entry that does without its curve after a fault.
     pub(super) fn of_entry(&self, drive: &condition::Drive) -> load::Drive {
-        load::Drive { factor: drive.factor, curve: drive.curve.as_ref().and_then(|name| self.find(name)) }
+        let curve = drive.curve.as_ref().and_then(|name| self.find(name));
+        load::Drive { factor: drive.factor, curve, span: drive.span }
     }
 
     /// Drives by axis; none after a fault.
@@ -129,12 +133,24 @@ impl<'d> Curves<'d> {
 
     /// How a message writes a drive.
     pub(super) fn words(&self, drive: load::Drive) -> String {
-        match self.index.iter().find(|(_, index)| Some(**index) == drive.curve) {
+        let words = match self.index.iter().find(|(_, index)| Some(**index) == drive.curve) {
             Some((name, _)) => {
                 let [before, after] = [self.log.say("curve \"", ""), self.log.say("\"", "")];
                 format!("{} x {before}{name}{after}", drive.factor)
             }
             None => drive.factor.to_string(),
+        };
+        let Span { from, until } = drive.span;
+        match drive.span == Span::ALWAYS {
+            true => words,
+            false if until == Span::ALWAYS.until => format!("{words} from {from} on"),
+            false => format!("{words} from {from} until {until}"),
         }
+    }
+
+    /// A turn; none after a fault.
+    pub(super) fn circle(&self, circle: &condition::Circle) -> Option<Circle> {
+        let rate = self.drive(&circle.rate)?;
+        Some(Circle { axis: circle.axis as u8, point: circle.point, rate })
     }
 }

@@ -148,7 +148,7 @@ fn criteria(given: &Erosion, kind: Kind, material: Option<&Material>, log: &Log<
         }
         if let Some(failure) = given.failure.as_ref().filter(|on| on.value)
             && material.failure == Failure::None
-            && material.history().is_empty()
+            && !material.strength.damages()
         {
             log.fault_of(
                 failure.origin,

@@ -9,6 +9,7 @@ use super::{
     assembly::Assembly,
     boundary::Conditions,
     names::{Curves, Names},
+    region,
 };
 use crate::{log::Log, typed::condition::Rigid};
 
@@ -23,6 +24,7 @@ pub(super) fn drafts<'d>(
     list: &'d [Rigid],
     names: &Names<'_>,
     curves: &Curves<'_>,
+    assembly: &Assembly,
     log: &Log<'_>,
 ) -> Vec<RigidDraft<'d>> {
     let mut drafts: Vec<RigidDraft<'d>> = Vec::new();
@@ -42,8 +44,12 @@ pub(super) fn drafts<'d>(
         }
         let [velocity, spin] =
             [&rigid.velocity, &rigid.spin].map(|c| curves.components(c).unwrap_or_default());
+        let nodes = rigid.nodes.as_ref().and_then(|nodes| region::nodes(nodes, &[], assembly, log));
+        let circle = rigid.circle.as_ref().and_then(|circle| curves.circle(circle));
         let given = shape::Given {
             parts,
+            nodes: nodes.unwrap_or_default(),
+            circle,
             mass: rigid.mass,
             inertia: rigid.inertia,
             start_spin: rigid.start_spin,
@@ -91,10 +97,11 @@ pub(super) fn make(
                 ),
             );
         }
-        for &n in given.parts.iter().flat_map(|&p| &assembly.mesh.parts[p as usize].nodes) {
+        for &n in &given.all_nodes(&assembly.mesh) {
             let id = assembly.mesh.node_ids[n as usize];
             let held = conditions.constraints[conditions.constraint[n as usize] as usize];
-            if held.velocity.iter().any(Option::is_some) || held.clamped != 0 || held.walls != 0 {
+            let prescribed = held.velocity.iter().any(Option::is_some) || held.circle.is_some();
+            if prescribed || held.clamped != 0 || held.walls != 0 {
                 log.fault(
                     at,
                     format!("{title} with node {id}, which a boundary or a wall holds"),
@@ -113,7 +120,10 @@ pub(super) fn make(
                     at,
                     format!("{title} with node {id}, which {} has too", drafts[other].rigid.title),
                     "bodies that share no nodes",
-                    "make them one [[rigid]] of all their parts, or do not join them",
+                    log.say(
+                        "make them one [[rigid]], or do not join them",
+                        "make them one body, or take the node out of one",
+                    ),
                 );
                 break;
             }
@@ -125,7 +135,7 @@ pub(super) fn make(
             &assembly.mesh,
             materials,
             (&conditions.constraints, &conditions.constraint),
-            &conditions.loads.curves,
+            &conditions.loads,
             given.clone(),
             &mut assembly.velocity,
         );

@@ -1,15 +1,18 @@
 //! `[[curve]]`, `[[boundary]]`, `[[wall]]`, `[[rigid]]`, `[[load]]`, `[gravity]`, `[relaxation]`, `[[detonation]]`.
 
-use mechanics::burn::Detonation;
+use mechanics::{
+    burn::Detonation,
+    load::{Span, blast::Burst},
+};
 
-use super::entry::{AXES, components, direction, drive, faces, parts, parts_of, region, text};
+use super::entry::{AXES, circle, components, direction, drive, faces, parts, parts_of, region, span, text};
 use crate::{
     limits::{MAX_CURVE_POINTS, MAX_ENTRIES},
     place::Place,
     table::{Range, Table, Value},
     typed::condition::{
-        Boundary, BoundaryKind, Components, Curve, Drive, Gravity, Load, LoadKind, Parts, Relaxation, Rigid,
-        Wall, WallMotion, WallShape,
+        Boundary, BoundaryKind, Charge, Components, Curve, Drive, Gravity, Load, LoadKind, Lumped, Parts,
+        Relaxation, Rigid, Wall, WallMotion, WallShape,
     },
 };
 
@@ -50,11 +53,11 @@ fn read_points(table: &Table<'_>) -> Option<Vec<[f64; 2]>> {
 
 /// Reads every `[[boundary]]`.
 pub(super) fn read_boundaries(deck: &Table<'_>) -> Vec<Boundary> {
-    const TYPES: [&str; 4] = ["fixed", "velocity", "symmetry", "transmit"];
+    const TYPES: [&str; 5] = ["fixed", "velocity", "rotation", "symmetry", "transmit"];
     let mut boundaries = Vec::new();
     for table in deck.tables("boundary", MAX_ENTRIES) {
         let kind = table
-            .require("type", "one of fixed, velocity, symmetry, transmit")
+            .require("type", "one of fixed, velocity, rotation, symmetry, transmit")
             .and_then(|v| v.one_of(&TYPES));
         // Which keys belong depends on the type, so without one none is called unknown.
         let Some(kind) = kind else { continue };
@@ -65,6 +68,14 @@ pub(super) fn read_boundaries(deck: &Table<'_>) -> Vec<Boundary> {
                 let axis = table.require("axis", "one of x, y, z").and_then(|v| v.one_of(&AXES));
                 let place = table.number_or("at", 0.0, Range::Any);
                 axis.map(|axis| BoundaryKind::Symmetry { axis, place })
+            }
+            "rotation" => {
+                let span = span(&table);
+                let circle = circle(&table).map(|mut circle| {
+                    put(span, [&mut circle.rate].into_iter());
+                    circle
+                });
+                Some(BoundaryKind::Circle { circle, nodes: region(&table) })
             }
             kind => read_held(&table, kind),
         };
@@ -83,7 +94,17 @@ fn read_held(table: &Table<'_>, kind: &str) -> Option<BoundaryKind> {
         components(table, "velocity")
     };
     let nodes = region(table);
-    Some(BoundaryKind::Held { velocity: velocity?, clamped: clamped?, nodes })
+    let clamp_span = span(table);
+    let mut velocity = velocity?;
+    put(clamp_span, velocity.iter_mut().flatten());
+    Some(BoundaryKind::Held { velocity, clamped: clamped?, clamp_span, nodes })
+}
+
+/// Gives drives the span of their entry, where they have none of their own.
+fn put<'d>(span: Span, drives: impl Iterator<Item = &'d mut Drive>) {
+    for drive in drives.filter(|drive| drive.span == Span::ALWAYS) {
+        drive.span = span;
+    }
 }
 
 /// Bits of the axes that a text of the letters x, y, z names.
@@ -164,7 +185,7 @@ fn read_motion(table: &Table<'_>) -> Option<WallMotion> {
     };
     let velocity = velocity?;
     let Some(mass) = mass else {
-        return Some(if given { WallMotion::Driven(velocity) } else { WallMotion::Fixed });
+        return Some(if given { WallMotion::Driven(Box::new(velocity)) } else { WallMotion::Fixed });
     };
     if velocity.iter().flatten().any(|v| v.curve.is_some()) {
         table.faults.add(
@@ -182,7 +203,16 @@ fn read_motion(table: &Table<'_>) -> Option<WallMotion> {
 pub(super) fn read_rigid(deck: &Table<'_>) -> Vec<Rigid> {
     let rigid = |table: Table<'_>| {
         let (at, title) = (table.place(), table.title.clone());
-        let members = table.require("parts", "\"all\" or a list of part names").map_or(Parts::Broken, parts);
+        // A body may be one of nodes alone.
+        let nodes = if table.has("nodes") { region(&table) } else { None };
+        let members = match table.get("parts") {
+            Some(value) => parts(value),
+            None if nodes.is_some() => Parts::Named(Vec::new()),
+            None => {
+                table.require("parts", "\"all\" or a list of part names, or nodes");
+                Parts::Broken
+            }
+        };
         let mass = table.get("mass").and_then(|v| v.number(Range::Positive));
         let centre = table.get("centre").map(|v| v.vector());
         let inertia = table.get("inertia").map(|v| {
@@ -203,38 +233,63 @@ pub(super) fn read_rigid(deck: &Table<'_>) -> Vec<Rigid> {
         let start_spin = table.get("start_spin").and_then(|v| v.vector());
         let given = |key| if table.has(key) { components(&table, key) } else { Some(NO_COMPONENTS) };
         let (velocity, spin) = (given("velocity"), given("spin"));
+        let circle = table.get("rotation").and_then(|v| {
+            let table = v.table(format!("rotation of {title}"))?;
+            let circle = circle(&table);
+            table.finish();
+            circle
+        });
         table.finish();
         Rigid {
             at,
             title,
             parts: members,
+            nodes,
             mass,
             inertia: centre.flatten().zip(inertia.flatten()),
             start_spin,
             velocity: velocity.unwrap_or(NO_COMPONENTS),
             spin: spin.unwrap_or(NO_COMPONENTS),
+            circle,
         }
     };
     deck.tables("rigid", MAX_ENTRIES).into_iter().map(rigid).collect()
 }
 
+/// Reads every `[[mass]]`.
+pub(super) fn read_masses(deck: &Table<'_>) -> Vec<Lumped> {
+    let lumped = |table: Table<'_>| {
+        let (at, title, parts) = (table.place(), table.title.clone(), parts_of(&table));
+        let mass = table.number("mass", Range::Positive);
+        let nodes = region(&table);
+        table.finish();
+        Lumped { at, title, mass, parts, nodes }
+    };
+    deck.tables("mass", MAX_ENTRIES).into_iter().map(lumped).collect()
+}
+
 /// Reads every `[[load]]`.
 pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
-    const TYPES: [&str; 2] = ["pressure", "force"];
+    const TYPES: [&str; 4] = ["pressure", "force", "acceleration", "blast"];
     let mut loads = Vec::new();
     for table in deck.tables("load", MAX_ENTRIES) {
-        let kind = table.require("type", "one of pressure, force").and_then(|v| v.one_of(&TYPES));
+        let kind = table
+            .require("type", "one of pressure, force, acceleration, blast")
+            .and_then(|v| v.one_of(&TYPES));
         // Which keys belong depends on the type, so without one none is called unknown.
         let Some(kind) = kind else { continue };
         let (at, title, parts) = (table.place(), table.title.clone(), parts_of(&table));
         let kind = match TYPES[kind] {
             "pressure" => {
-                let pressure = table.require("pressure", "a number or a curve").and_then(drive);
+                let mut pressure = table.require("pressure", "a number or a curve").and_then(drive);
+                put(span(&table), pressure.iter_mut());
                 LoadKind::Pressure { pressure, faces: faces(&table) }
             }
-            _ => {
-                let force = table.vector("force");
-                LoadKind::Force { force, drive: drive_of(&table), nodes: region(&table) }
+            "blast" => LoadKind::Blast { charge: read_charge(&table), faces: faces(&table) },
+            kind => {
+                let force = table.vector(kind);
+                let drive = Drive { span: span(&table), ..drive_of(&table) };
+                LoadKind::Force { force, by_mass: kind == "acceleration", drive, nodes: region(&table) }
             }
         };
         table.finish();
@@ -243,9 +298,21 @@ pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
     loads
 }
 
+/// A charge: mass, point, burst, span and whether its negative phase acts.
+fn read_charge(table: &Table<'_>) -> Option<Charge> {
+    const BURSTS: [&str; 2] = ["air", "surface"];
+    let mass = table.number("mass", Range::Positive);
+    let point = table.vector("point");
+    let burst = table.require("burst", "one of air, surface").and_then(|v| v.one_of(&BURSTS));
+    let negative = table.get("negative_phase").map_or(Some(true), |v| v.boolean());
+    let span = span(table);
+    let burst = if burst? == 0 { Burst::Air } else { Burst::Surface };
+    Some(Charge { mass: mass?, point: point?, span, burst, negative: negative? })
+}
+
 /// The curve under `curve` of a table, if it has one.
 fn drive_of(table: &Table<'_>) -> Drive {
-    Drive { factor: 1.0, curve: table.get("curve").and_then(text) }
+    Drive { curve: table.get("curve").and_then(text), ..Drive::constant(1.0) }
 }
 
 /// Reads `[gravity]`.

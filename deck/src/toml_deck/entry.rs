@@ -1,10 +1,12 @@
 //! What several tables have: parts by name, numbers that may follow a curve, nodes and faces.
 
+use mechanics::load::Span;
+
 use crate::{
     geometry::norm,
     place::Placed,
     table::{Range, Table, Value},
-    typed::condition::{Components, Drive, Faces, Parts, Region},
+    typed::condition::{Circle, Components, Drive, Faces, Parts, Region},
 };
 
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
@@ -36,16 +38,39 @@ pub(super) fn parts_of(table: &Table<'_>) -> Parts {
     table.get("parts").map_or(Parts::All, parts)
 }
 
-/// A number, or `{ curve = "name", factor = 2.0 }`.
+/// When something acts: `from` and `until` of its table.
+pub(super) fn span(table: &Table<'_>) -> Span {
+    let from = table.number_or("from", 0.0, Range::NotNegative);
+    let Some(value) = table.get("until") else { return Span { from, ..Span::ALWAYS } };
+    let until = value.number(Range::Positive).unwrap_or(Span::ALWAYS.until);
+    if until <= from {
+        value.fault(&format!("a time after {from}, from which it acts"), "end it later, or remove the entry");
+        return Span::ALWAYS;
+    }
+    Span { from, until }
+}
+
+/// A number, `{ curve = "name", factor = 2.0 }` or `{ value = 3.0 }`; of the last two `from` and `until` say when they act.
 pub(super) fn drive(value: Value<'_>) -> Option<Drive> {
     if !value.is_table() {
         return value.number(Range::Any).map(Drive::constant);
     }
     let table = value.table("a value by curve".to_string())?;
-    let curve = table.require("curve", "the name of a [[curve]]").and_then(text);
-    let factor = table.number_or("factor", 1.0, Range::Any);
+    let constant = table.get("value").map(|v| v.number(Range::Any));
+    let (factor, curve) = match constant {
+        Some(value) => (value, None),
+        None => {
+            let curve = table.require("curve", "the name of a [[curve]]").and_then(text);
+            (Some(table.number_or("factor", 1.0, Range::Any)), Some(curve))
+        }
+    };
+    let span = span(&table);
     table.finish();
-    Some(Drive { factor, curve: Some(curve?) })
+    let curve = match curve {
+        Some(name) => Some(name?),
+        None => None,
+    };
+    Some(Drive { factor: factor?, curve, span })
 }
 
 /// `velocity = { x = 1.0, z = { curve = "name" } }` or the like of another key: the axes not named stay free.
@@ -66,6 +91,14 @@ pub(super) fn components(table: &Table<'_>, key: &'static str) -> Option<Compone
         return None;
     }
     (!faulty).then_some(list)
+}
+
+/// `axis`, `point` and `rate` of a turn.
+pub(super) fn circle(table: &Table<'_>) -> Option<Circle> {
+    let axis = table.require("axis", "one of x, y, z").and_then(|v| v.one_of(&AXES));
+    let point = table.vector("point");
+    let rate = table.require("rate", "radians per time, a number or by curve").and_then(drive);
+    Some(Circle { axis: axis?, point: point?, rate: rate? })
 }
 
 /// A direction of any length above 0.

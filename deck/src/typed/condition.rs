@@ -1,5 +1,7 @@
 //! What holds, moves, stops and pushes bodies, and what makes them rigid.
 
+use mechanics::load::{Span, blast::Burst};
+
 use crate::place::{Origin, Place, Placed};
 
 /// A tabulated function of time.
@@ -16,11 +18,18 @@ pub(crate) struct Drive {
     pub(crate) factor: f64,
     /// Name of the curve.
     pub(crate) curve: Option<Placed<String>>,
+    /// When it acts.
+    pub(crate) span: Span,
 }
 
 impl Drive {
     pub(crate) fn constant(factor: f64) -> Self {
-        Self { factor, curve: None }
+        Self { factor, curve: None, span: Span::ALWAYS }
+    }
+
+    /// A curve times a factor, all along.
+    pub(crate) fn along(curve: Placed<String>, factor: f64) -> Self {
+        Self { factor, curve: Some(curve), span: Span::ALWAYS }
     }
 }
 
@@ -31,7 +40,7 @@ pub(crate) type Components = [Option<Drive>; 3];
 #[derive(Clone, Debug)]
 pub(crate) enum Parts {
     All,
-    /// By name; at least one.
+    /// By name; at least one, but for a rigid body of nodes.
     Named(Vec<Placed<String>>),
     /// What could not be read.
     Broken,
@@ -84,8 +93,29 @@ pub(crate) enum BoundaryKind {
     Transmit(Option<Faces>),
     /// A plane of symmetry: `x[axis] = place`.
     Symmetry { axis: usize, place: f64 },
-    /// Velocities of nodes, and axes about which those of shells do not turn (bit 0 is x).
-    Held { velocity: Components, clamped: u8, nodes: Option<Region> },
+    /// Velocities of nodes, and axes about which those of shells do not turn (bit 0 is x) in a span.
+    Held { velocity: Components, clamped: u8, clamp_span: Span, nodes: Option<Region> },
+    /// Nodes that turn about an axis; none is what could not be read.
+    Circle { circle: Option<Circle>, nodes: Option<Region> },
+}
+
+/// A turn about an axis of the deck, 0 to 2, through a point.
+#[derive(Clone, Debug)]
+pub(crate) struct Circle {
+    pub(crate) axis: usize,
+    pub(crate) point: [f64; 3],
+    /// Radians per time.
+    pub(crate) rate: Drive,
+}
+
+/// Mass at each of some nodes, beside that of the elements.
+#[derive(Clone, Debug)]
+pub(crate) struct Lumped {
+    pub(crate) at: Place,
+    pub(crate) title: String,
+    pub(crate) mass: Option<f64>,
+    pub(crate) parts: Parts,
+    pub(crate) nodes: Option<Region>,
 }
 
 /// A rigid wall.
@@ -113,7 +143,7 @@ pub(crate) enum WallShape {
 #[derive(Clone, Debug)]
 pub(crate) enum WallMotion {
     Fixed,
-    Driven(Components),
+    Driven(Box<Components>),
     /// By what strikes it, from this velocity on.
     Free {
         mass: f64,
@@ -121,18 +151,21 @@ pub(crate) enum WallMotion {
     },
 }
 
-/// Parts whose nodes move as one.
+/// Parts whose nodes move as one, nodes beside them, or nodes alone.
 #[derive(Clone, Debug)]
 pub(crate) struct Rigid {
     pub(crate) at: Place,
     pub(crate) title: String,
+    /// None of a body of nodes alone.
     pub(crate) parts: Parts,
+    pub(crate) nodes: Option<Region>,
     pub(crate) mass: Option<f64>,
     /// Centre of mass and inertia about it, xx, yy, zz, xy, yz, zx.
     pub(crate) inertia: Option<([f64; 3], [f64; 6])>,
     pub(crate) start_spin: Option<[f64; 3]>,
     pub(crate) velocity: Components,
     pub(crate) spin: Components,
+    pub(crate) circle: Option<Circle>,
 }
 
 /// What pushes faces or nodes.
@@ -147,8 +180,33 @@ pub(crate) struct Load {
 /// Kinds of loads; none is what could not be read.
 #[derive(Clone, Debug)]
 pub(crate) enum LoadKind {
-    Pressure { pressure: Option<Drive>, faces: Option<Faces> },
-    Force { force: Option<[f64; 3]>, drive: Drive, nodes: Option<Region> },
+    Pressure {
+        pressure: Option<Drive>,
+        faces: Option<Faces>,
+    },
+    /// A charge that explodes in air.
+    Blast {
+        charge: Option<Charge>,
+        faces: Option<Faces>,
+    },
+    /// On each node; by its mass it is an acceleration.
+    Force {
+        force: Option<[f64; 3]>,
+        by_mass: bool,
+        drive: Drive,
+        nodes: Option<Region>,
+    },
+}
+
+/// A charge of TNT that explodes in air.
+#[derive(Clone, Debug)]
+pub(crate) struct Charge {
+    pub(crate) mass: f64,
+    pub(crate) point: [f64; 3],
+    /// From when it explodes until its pressure ends.
+    pub(crate) span: Span,
+    pub(crate) burst: Burst,
+    pub(crate) negative: bool,
 }
 
 /// An acceleration of everything.

@@ -1,6 +1,8 @@
 //! Curves, boundaries, walls, rigid bodies and loads.
 
-use super::value::{Text, components, drive, list, names, numbers, quoted, table, vector};
+use mechanics::load::{Span, blast::Burst};
+
+use super::value::{Text, circle, components, drive, list, names, numbers, quoted, span, table, vector};
 use crate::typed::{
     Deck,
     condition::{
@@ -20,6 +22,12 @@ pub(super) fn write(text: &mut Text, deck: &Deck) {
         text.key("points", list(curve.points.iter().map(|point| numbers(point))));
     }
     deck.rigid.iter().for_each(|rigid| write_rigid(text, rigid));
+    for lumped in &deck.masses {
+        text.heading("[[mass]]");
+        text.some("mass", lumped.mass);
+        write_region(text, lumped.nodes.as_ref());
+        write_parts(text, &lumped.parts);
+    }
     deck.boundaries.iter().for_each(|boundary| write_boundary(text, boundary));
     deck.loads.iter().for_each(|load| write_load(text, load));
     if let Some(gravity) = &deck.gravity {
@@ -37,7 +45,10 @@ pub(super) fn write(text: &mut Text, deck: &Deck) {
 
 fn write_rigid(text: &mut Text, rigid: &Rigid) {
     text.heading("[[rigid]]");
-    text.key("parts", names(&rigid.parts));
+    if !matches!(&rigid.parts, Parts::Named(names) if names.is_empty()) {
+        text.key("parts", names(&rigid.parts));
+    }
+    write_region(text, rigid.nodes.as_ref());
     text.some("mass", rigid.mass);
     if let Some((centre, [xx, yy, zz, xy, yz, zx])) = rigid.inertia {
         text.key("centre", vector(centre));
@@ -51,6 +62,9 @@ fn write_rigid(text: &mut Text, rigid: &Rigid) {
         if given.iter().any(Option::is_some) {
             text.key(key, components(given));
         }
+    }
+    if let Some(given) = &rigid.circle {
+        text.key("rotation", table(&circle(given)));
     }
 }
 
@@ -66,16 +80,24 @@ fn write_boundary(text: &mut Text, boundary: &Boundary) {
             text.key("axis", quoted(AXES[*axis]));
             text.key("at", format!("{place:?}"));
         }
-        BoundaryKind::Held { velocity, clamped, nodes } => {
-            write_held(text, velocity, *clamped);
+        BoundaryKind::Held { velocity, clamped, clamp_span, nodes } => {
+            write_held(text, velocity, *clamped, clamp_span);
+            write_region(text, nodes.as_ref());
+        }
+        BoundaryKind::Circle { circle: given, nodes } => {
+            text.key("type", quoted("rotation"));
+            for (key, value) in given.iter().flat_map(circle) {
+                text.key(key, value);
+            }
             write_region(text, nodes.as_ref());
         }
     }
     write_parts(text, &boundary.parts);
 }
 
-fn write_held(text: &mut Text, velocity: &Components, clamped: u8) {
-    let still = |drive: &Drive| drive.curve.is_none() && drive.factor.to_bits() == 0;
+fn write_held(text: &mut Text, velocity: &Components, clamped: u8, clamp_span: &Span) {
+    let still =
+        |drive: &Drive| drive.curve.is_none() && drive.factor.to_bits() == 0 && drive.span == *clamp_span;
     let letters = |holds: &dyn Fn(usize) -> bool| -> String {
         (0..3).filter(|axis| holds(*axis)).map(|axis| AXES[axis]).collect()
     };
@@ -85,6 +107,9 @@ fn write_held(text: &mut Text, velocity: &Components, clamped: u8) {
     } else {
         text.key("type", quoted("velocity"));
         text.key("velocity", components(velocity));
+    }
+    for (key, time) in span(clamp_span) {
+        text.key(key, time);
     }
     if clamped != 0 {
         text.key("rotations", quoted(&letters(&|axis| clamped >> axis & 1 == 1)));
@@ -139,13 +164,30 @@ fn write_load(text: &mut Text, load: &Load) {
                 text.key("pressure", drive(pressure));
             }
         }
-        LoadKind::Force { force, drive, nodes } => {
-            text.key("type", quoted("force"));
+        LoadKind::Blast { charge, faces } => {
+            text.key("type", quoted("blast"));
+            write_faces(text, faces.as_ref());
+            if let Some(charge) = charge {
+                text.key("mass", format!("{:?}", charge.mass));
+                text.key("point", vector(charge.point));
+                text.key("burst", quoted(if charge.burst == Burst::Air { "air" } else { "surface" }));
+                text.some("negative_phase", Some(charge.negative).filter(|acts| !acts));
+                for (key, time) in span(&charge.span) {
+                    text.key(key, time);
+                }
+            }
+        }
+        LoadKind::Force { force, by_mass, drive, nodes } => {
+            let kind = if *by_mass { "acceleration" } else { "force" };
+            text.key("type", quoted(kind));
             write_region(text, nodes.as_ref());
             if let Some(force) = force {
-                text.key("force", vector(*force));
+                text.key(kind, vector(*force));
             }
             write_curve(text, drive);
+            for (key, time) in span(&drive.span) {
+                text.key(key, time);
+            }
         }
     }
     write_parts(text, &load.parts);

@@ -2,7 +2,9 @@
 
 use std::fmt::Debug;
 
-use crate::typed::condition::{Components, Drive, Parts};
+use mechanics::load::Span;
+
+use crate::typed::condition::{Circle, Components, Drive, Parts};
 
 /// A text on the way.
 #[derive(Default)]
@@ -91,10 +93,26 @@ pub(super) fn names(parts: &Parts) -> String {
 
 /// A number that may follow a curve.
 pub(super) fn drive(drive: &Drive) -> String {
-    match &drive.curve {
-        None => format!("{:?}", drive.factor),
-        Some(curve) => table(&[("curve", quoted(&curve.value)), ("factor", format!("{:?}", drive.factor))]),
-    }
+    let mut keys = match &drive.curve {
+        None if drive.span == Span::ALWAYS => return format!("{:?}", drive.factor),
+        None => vec![("value", format!("{:?}", drive.factor))],
+        Some(curve) => vec![("curve", quoted(&curve.value)), ("factor", format!("{:?}", drive.factor))],
+    };
+    keys.extend(span(&drive.span));
+    table(&keys)
+}
+
+/// `from` and `until`, where they are not those of a whole run.
+pub(super) fn span(span: &Span) -> impl Iterator<Item = (&'static str, String)> {
+    let from = (span.from != 0.0).then(|| ("from", format!("{:?}", span.from)));
+    let until = (span.until != Span::ALWAYS.until).then(|| ("until", format!("{:?}", span.until)));
+    from.into_iter().chain(until)
+}
+
+/// Axis, point and rate of a turn.
+pub(super) fn circle(circle: &Circle) -> [(&'static str, String); 3] {
+    let axis = quoted(["x", "y", "z"][circle.axis]);
+    [("axis", axis), ("point", vector(circle.point)), ("rate", drive(&circle.rate))]
 }
 
 /// Numbers by axis.

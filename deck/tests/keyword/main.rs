@@ -475,7 +475,7 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
             "a.k:24:3: read -0.8; expected a failure strain of 0 or above",
         ),
         ("*CONTROL_CONTACT\n,,,,,,,3\n", "a.k:23:8: read 3; expected ENMASS 0, 1 or 2"),
-        ("*MAT_VISCOELASTIC\n2,1.0\n", "a.k:22:1: read *MAT_VISCOELASTIC; expected a material of the table"),
+        ("*MAT_SEATBELT\n2,1.0\n", "a.k:22:1: read *MAT_SEATBELT; expected a material of the table"),
         (
             "*ELEMENT_DISCRETE\n1,1,1,2,3\n",
             "a.k:22:1: read *ELEMENT_DISCRETE; expected a keyword of the table",

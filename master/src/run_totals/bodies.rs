@@ -60,7 +60,7 @@ pub(super) fn joined(model: &Model) -> Vec<usize> {
         body.parts.windows(2).for_each(|pair| join(&mut roots, pair[0] as usize, pair[1] as usize));
         // What shares nodes with a rigid body is moved by it.
         for part in body.nodes.iter().map(|&node| part_of[node as usize]).filter(|&part| part != usize::MAX) {
-            body.parts.first().into_iter().for_each(|&first| join(&mut roots, first as usize, part));
+            join(&mut roots, body.account as usize, part);
         }
     }
     (0..roots.len()).map(|p| root(&roots, p)).collect()

@@ -60,7 +60,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         element_ids: (0..n_elements as u32).collect(),
         hourglass: Default::default(),
     };
-    let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part] };
+    let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part], lumped: Vec::new() };
     let hexahedra: Vec<[u32; 8]> = (0..n_elements).map(|e| mesh.parts[0].corners(e)).collect();
     let initial_volume: Vec<f64> = hexahedra
         .iter()
@@ -247,7 +247,7 @@ fn plates(
         Kind::Shells => vec![sheet()],
         _ => vec![part("target", 0, below, 0), part("projectile", 1, above, below)],
     };
-    let mesh = Mesh { node_ids: (0..n_nodes).collect(), positions, parts };
+    let mesh = Mesh { node_ids: (0..n_nodes).collect(), positions, parts, lumped: Vec::new() };
     let steel = [7896.0, 4569.0, 1.49, 2.17, 81.8e9, 350e6, 275e6, 0.36, 0.022, 1811.0, 452.0];
     let aluminium = [2785.0, 5328.0, 1.338, 2.0, 27.6e9, 265e6, 426e6, 0.34, 0.015, 775.0, 875.0];
     let materials = [("aluminium", aluminium), ("steel", steel)].map(|(name, constants)| {

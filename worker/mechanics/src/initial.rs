@@ -1,9 +1,9 @@
-//! The state a run starts from: masses by eighths of element masses, elements at rest volume without deviatoric stress,
+//! The state a run starts from: masses by eighths of element masses and those that a deck puts at nodes, elements at rest volume without deviatoric stress,
 //! gases at their pressure, explosives with the time until they are lit.
 
 use crate::{
     burn::lighting_time,
-    constraint::{Constraint, MAX_WALLS},
+    constraint::{Circle, Constraint, MAX_WALLS},
     contact::{Extent, Settings},
     element::shell4,
     exact::{Quanta, Quantum},
@@ -80,7 +80,8 @@ pub fn state(
         }
     }
     debug_assert_eq!(state.elements.len(), N_FIELDS);
-    let heaviest = mass_of.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let masses = mass_of.iter().copied().chain(mesh.lumped.iter().map(|(_, mass)| *mass));
+    let heaviest = masses.fold(f64::MIN_POSITIVE, f64::max);
     // 64 eighths at a node stay below 2^53 quanta.
     let quantum = Quantum::for_reference(heaviest, 50);
     let mut index = 0;
@@ -93,6 +94,9 @@ pub fn state(
             index += 1;
         }
     }
+    for &(n, mass) in &mesh.lumped {
+        state.mass[n as usize] += quantum.round(mass);
+    }
     shells(mesh, setup, &mut state);
     Ok(state)
 }
@@ -101,7 +105,7 @@ pub fn state(
 /// or empty.
 pub fn spin(state: &mut GlobalState, constraints: &[Constraint], given: &[[f64; 3]]) {
     for (n, (spin, given)) in state.shells.spin.iter_mut().zip(given).enumerate() {
-        let clamped = constraints[state.constraint[n] as usize].clamped;
+        let clamped = constraints[state.constraint[n] as usize].clamped_at(0.0);
         if state.shells.inertia[n] > 0.0 {
             *spin = std::array::from_fn(|axis| if clamped >> axis & 1 == 1 { 0.0 } else { given[axis] });
         }
@@ -164,6 +168,17 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         .iter()
         .map(|c| c.velocity.iter().map(|v| v.map_or(0.0, |v| v.greatest(curves).powi(2))).sum::<f64>())
         .fold(0.0, f64::max);
+    let fastest = |circle: &Circle, x: &[f64; 3]| {
+        let across = (0..3).filter(|&a| a != usize::from(circle.axis));
+        let arm2: f64 = across.map(|a| (x[a] - circle.point[a]).powi(2)).sum();
+        circle.rate.greatest(curves).powi(2) * arm2
+    };
+    let turned2 = state
+        .constraint
+        .iter()
+        .zip(&state.x)
+        .filter_map(|(&c, x)| Some(fastest(setup.constraints[c as usize].circle.as_ref()?, x)))
+        .fold(0.0, f64::max);
     let of_wall = |wall: &RigidWall| match wall.motion {
         Motion::Fixed => 0.0,
         Motion::Driven(velocity) => velocity.iter().map(|v| v.greatest(curves).powi(2)).sum(),
@@ -175,16 +190,20 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
             drives.iter().flatten().map(|v| v.greatest(curves).powi(2)).sum::<f64>().sqrt()
         };
         let reach = body.places.iter().map(|x| dot(*x, *x)).fold(0.0, f64::max).sqrt();
-        size(&body.spin).mul_add(reach, size(&body.velocity)).powi(2)
+        let about = body.circle.map_or(0.0, |circle| {
+            circle.rate.greatest(curves).mul_add(reach, fastest(&circle, &body.start.centre).sqrt())
+        });
+        (size(&body.spin).mul_add(reach, size(&body.velocity)) + about).powi(2)
     };
     let bodies2 = setup.bodies.iter().map(of_body).fold(0.0, f64::max);
-    let top_speed2 = speed2.max(prescribed2).max(walls2).max(bodies2);
+    let top_speed2 = speed2.max(prescribed2).max(turned2).max(walls2).max(bodies2);
     let pressure = setup
         .loads
         .surfaces
         .iter()
         .map(|surface| match surface.kind {
             SurfaceKind::Pressure(drive) => drive.greatest(curves),
+            SurfaceKind::Blast(charge) => setup.loads.charges[charge as usize].greatest,
             SurfaceKind::Transmit => 0.0,
         })
         .fold(0.0, f64::max);

@@ -46,15 +46,19 @@ pub enum Bound {
     NotNegative,
     /// From 0 to 1.
     Fraction,
+    /// Whatever.
+    Any,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constant {
     /// The key that a deck writes.
     pub key: &'static str,
     /// Its unit.
     pub unit: Unit,
     pub bound: Bound,
+    /// Its value where a deck gives none; none of a constant that a deck has to give.
+    pub default: Option<f64>,
 }
 
 /// A law as a deck names it, and how its constants make one.
@@ -67,13 +71,19 @@ pub struct Declaration<T> {
     pub of: fn(&[f64]) -> T,
 }
 
-/// A law whose constants are plain numbers, each declared with its key, unit and bounds: the struct, its declaration, and the way
-/// from and to values in the order of the declaration.
+/// A law whose constants are plain numbers, each declared with its key, unit and bounds, and perhaps a default: the struct, its
+/// declaration, and the way from and to values in the order of the declaration.
 macro_rules! declared {
+    (@default) => {
+        None
+    };
+    (@default $default:literal) => {
+        Some($default)
+    };
     (
         $(#[$of_law:meta])*
         pub struct $law:ident = $name:literal {
-            $($(#[$of_constant:meta])* $constant:ident: $unit:ident, $bound:ident;)*
+            $($(#[$of_constant:meta])* $constant:ident: $unit:ident, $bound:ident $(= $default:literal)?;)*
         }
     ) => {
         $(#[$of_law])*
@@ -91,6 +101,7 @@ macro_rules! declared {
                 key: stringify!($constant),
                 unit: $crate::law::Unit::$unit,
                 bound: $crate::law::Bound::$bound,
+                default: $crate::law::declared!(@default $($default)?),
             }),*];
 
             /// The law with these constants, in the order of their declaration.

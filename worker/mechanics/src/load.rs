@@ -4,6 +4,7 @@
 //! on nodes, gravity and relaxation are put in where nodes are integrated (`nodes.rs`), alike on every holder of a node;
 //! loads on faces are nodal forces of the block that has the element (`load/face.rs`), rounded like its corner forces.
 
+pub mod blast;
 pub(crate) mod face;
 
 use serde::{Deserialize, Serialize};
@@ -55,34 +56,84 @@ impl Curve {
     }
 }
 
-/// A number that may follow a curve.
+/// A stretch of time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Span {
+    /// It begins at this time, 0 or later (time).
+    pub from: f64,
+    /// It is over at this time (time).
+    pub until: f64,
+}
+
+impl Span {
+    /// From the start of a run to its end.
+    pub const ALWAYS: Self = Self { from: 0.0, until: f64::MAX };
+
+    /// Whether a time is in it.
+    pub fn holds(&self, time: f64) -> bool {
+        self.from <= time && time < self.until
+    }
+
+    /// Whether no time is in both.
+    pub fn is_apart_from(&self, other: &Self) -> bool {
+        self.until <= other.from || other.until <= self.from
+    }
+}
+
+/// A number that may follow a curve, and when it acts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drive {
     /// The number, or what the curve is multiplied by.
     pub factor: f64,
     /// Index into [`Loads::curves`]; none for a constant.
     pub curve: Option<u32>,
+    /// When it acts: a load is zero at other times, and a prescribed velocity then leaves its node free.
+    pub span: Span,
 }
 
 impl Drive {
+    /// The same number all along.
     pub const fn constant(factor: f64) -> Self {
-        Self { factor, curve: None }
+        Self { factor, curve: None, span: Span::ALWAYS }
     }
 
-    /// The value at a time.
+    /// A curve times a factor, all along.
+    pub const fn along(curve: u32, factor: f64) -> Self {
+        Self { factor, curve: Some(curve), span: Span::ALWAYS }
+    }
+
+    /// Whether it acts at a time.
+    pub fn acts(&self, time: f64) -> bool {
+        self.span.holds(time)
+    }
+
+    /// The value at a time; zero where it does not act.
     ///
     /// # Panics
     /// If there is no such curve.
     pub fn at(&self, curves: &[Curve], time: f64) -> f64 {
+        if !self.acts(time) {
+            return 0.0;
+        }
         self.curve.map_or(self.factor, |c| self.factor * curves[c as usize].at(time))
     }
 
-    /// The integral from zero to a time.
+    /// The value at a time at which it acts; none at others.
+    ///
+    /// # Panics
+    /// If there is no such curve.
+    pub fn prescribed(&self, curves: &[Curve], time: f64) -> Option<f64> {
+        self.acts(time).then(|| self.at(curves, time))
+    }
+
+    /// The integral from zero to a time, over the times at which it acts.
     ///
     /// # Panics
     /// If there is no such curve.
     pub fn integral(&self, curves: &[Curve], time: f64) -> f64 {
-        self.factor * self.curve.map_or(time, |c| curves[c as usize].integral(time))
+        let to = |time: f64| self.curve.map_or(time, |c| curves[c as usize].integral(time));
+        let within = |time: f64| time.min(self.span.until).max(self.span.from);
+        self.factor * (to(within(time)) - to(within(0.0)))
     }
 
     /// The greatest magnitude.
@@ -105,6 +156,8 @@ pub struct Loads {
     pub gravity: Option<Gravity>,
     /// Loads on faces.
     pub surfaces: Vec<SurfaceLoad>,
+    /// Charges that explode in air, which loads on faces name.
+    pub charges: Vec<blast::Charge>,
     /// Dynamic relaxation.
     pub relaxation: Option<Relaxation>,
 }
@@ -115,8 +168,10 @@ pub const MAX_FORCES: usize = 32;
 /// A force on each of some nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NodalForce {
-    /// Force on one node (force).
+    /// Force on one node (force); of a force by mass, the acceleration (length per time squared).
     pub force: [f64; 3],
+    /// Whether it is multiplied by the mass of the node.
+    pub by_mass: bool,
     /// What it is multiplied by.
     pub drive: Drive,
 }
@@ -144,6 +199,8 @@ pub struct SurfaceLoad {
 pub enum SurfaceKind {
     /// A pressure against the face as it is turned now (stress, positive pushes).
     Pressure(Drive),
+    /// The pressure of a charge that explodes in air, by its index in [`Loads::charges`].
+    Blast(u32),
     /// Dampers that take up plane waves which leave through the face (Lysmer and Kuhlemeyer 1969): traction
     /// `-rho (c_l v_n n + c_s v_t)` with the wave speeds of the material at rest.
     Transmit,
@@ -189,7 +246,7 @@ mod tests {
             assert!((curve.integral(time) - expected).abs() < 1e-14, "{time}: {}", curve.integral(time));
         }
         let curves = [curve];
-        let drive = Drive { factor: -2.0, curve: Some(0) };
+        let drive = Drive::along(0, -2.0);
         assert_eq!(
             (drive.at(&curves, 2.0), drive.integral(&curves, 3.0), drive.greatest(&curves)),
             (-8.0, -20.0, 12.0)
@@ -199,5 +256,21 @@ mod tests {
             (constant.at(&[], 9.0), constant.integral(&[], 2.0), constant.greatest(&[])),
             (3.0, 6.0, 3.0)
         );
+    }
+
+    #[test]
+    fn a_drive_acts_from_the_start_of_its_span_until_the_end_of_it() {
+        let curves = [Curve { points: vec![[1.0, 2.0], [3.0, 6.0], [4.0, -1.0]] }];
+        let drive = Drive { span: Span { from: 1.0, until: 3.0 }, ..Drive::along(0, 2.0) };
+        assert_eq!([0.5, 1.0, 2.0, 3.0].map(|t| drive.at(&curves, t)), [0.0, 4.0, 8.0, 0.0]);
+        assert_eq!([0.5, 2.0, 3.0].map(|t| drive.prescribed(&curves, t)), [None, Some(8.0), None]);
+        // Twice the area from 1 on, and none after 3.
+        assert_eq!(
+            [0.0, 1.0, 2.0, 3.0, 9.0].map(|t| drive.integral(&curves, t)),
+            [0.0, 0.0, 6.0, 16.0, 16.0]
+        );
+        let other = Span { from: 3.0, until: 4.0 };
+        assert!(drive.span.is_apart_from(&other) && other.is_apart_from(&drive.span));
+        assert!(!drive.span.is_apart_from(&Span::ALWAYS));
     }
 }

@@ -20,6 +20,8 @@ pub struct Mesh {
     pub node_ids: Vec<u32>,
     /// Parts in deck order.
     pub parts: Vec<Part>,
+    /// Masses at nodes beside those of elements: global node index and mass, each node once, ascending.
+    pub lumped: Vec<(u32, f64)>,
 }
 
 /// One part: a body or a piece of one, of one material.

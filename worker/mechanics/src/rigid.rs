@@ -1,4 +1,4 @@
-//! Rigid bodies: parts whose nodes move as one.
+//! Rigid bodies: parts whose nodes move as one, or nodes alone.
 //!
 //! A body is a mass, an inertia and a [`State`]: centre, velocity, attitude, angular momentum. Its nodes sit at fixed
 //! places in its frame, which at the start of a run is that of the deck moved to the centre. What pushes nodes - contact,
@@ -11,6 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    constraint::{Circle, Constraint},
     exact::{Quanta, Quantum},
     load::{Drive, Loads},
     nodes::share_before,
@@ -21,8 +22,10 @@ pub mod shape;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Body {
-    /// Its parts, by index, ascending.
+    /// Its parts, by index, ascending; none of a body of nodes alone.
     pub parts: Vec<u32>,
+    /// The part whose energies hold those of the body.
+    pub account: u32,
     /// Mass, that of elements which share nodes with it included as far as they hang on these.
     pub mass: f64,
     /// Inertia about the centre in the frame of the body: xx, yy, zz, xy, yz, zx.
@@ -31,6 +34,8 @@ pub struct Body {
     pub velocity: [Option<Drive>; 3],
     /// Prescribed angular velocity about axes through the centre that do not turn (radians per time).
     pub spin: [Option<Drive>; 3],
+    /// A circle that the centre follows while the body turns as fast about its axis.
+    pub circle: Option<Circle>,
     /// As it begins.
     pub start: State,
     /// Global node indices of its nodes, ascending.
@@ -46,6 +51,19 @@ pub struct Body {
     pub courant: Option<(f64, u32)>,
     /// Nodal forces: index into `places` and into [`Loads::forces`].
     pub forces: Vec<(u32, u32)>,
+    /// Forces by mass, each of all the nodes that feel it.
+    pub pulls: Vec<Pull>,
+}
+
+/// A force by mass on some of the nodes of a body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pull {
+    /// Index into [`Loads::forces`].
+    pub load: u32,
+    /// Mass that feels it.
+    pub mass: f64,
+    /// Centre of that mass in the frame of the body.
+    pub place: [f64; 3],
 }
 
 /// Where a body is and how it moves, at the start of cycle `n`.
@@ -205,6 +223,16 @@ impl Advance<'_> {
                 momentum[a] += moment[a];
             }
         }
+        for pull in &body.pulls {
+            let load = &self.loads.forces[pull.load as usize];
+            let scale = half_steps * load.drive.at(curves, self.time) * pull.mass;
+            let impulse = load.force.map(|f| f * scale);
+            let moment = cross(turned(&state.attitude, pull.place), impulse);
+            for a in 0..3 {
+                velocity[a] += impulse[a] / body.mass;
+                momentum[a] += moment[a];
+            }
+        }
         if let Some(gravity) = self.loads.gravity {
             let scale = half_steps * gravity.drive.at(curves, self.time);
             (0..3).for_each(|a| velocity[a] += gravity.acceleration[a] * scale);
@@ -216,12 +244,16 @@ impl Advance<'_> {
                 momentum[a] -= loss * state.momentum[a];
             }
         }
-        for (component, prescribed) in velocity.iter_mut().zip(body.velocity) {
-            if let Some(drive) = prescribed {
-                *component = drive.at(curves, middle);
-            }
+        let mut prescribed = body.spin.map(|drive| drive?.prescribed(curves, middle));
+        let motion = Constraint { velocity: body.velocity, circle: body.circle, ..Constraint::default() };
+        let led = motion.prescribed(curves, state.centre, middle, self.dt);
+        for (component, led) in velocity.iter_mut().zip(led) {
+            *component = led.unwrap_or(*component);
         }
-        let prescribed = body.spin.map(|drive| drive.map(|drive| drive.at(curves, middle)));
+        if let Some(Circle { axis, rate, .. }) = body.circle {
+            let axis = usize::from(axis);
+            prescribed[axis] = rate.prescribed(curves, middle).or(prescribed[axis]);
+        }
         let (spin, momentum) = body.spin_of(&state.attitude, momentum, prescribed, state.spin, self.dt);
         let old = *state;
         state.velocity = velocity;
@@ -373,7 +405,7 @@ const SMALL: f64 = 1e-3;
 
 /// An attitude after a turn by `spin` for `dt`; any other is made of doubled smaller ones. Library functions of angles
 /// would differ between machines.
-fn turn(attitude: &[f64; 4], spin: [f64; 3], dt: f64) -> [f64; 4] {
+pub(crate) fn turn(attitude: &[f64; 4], spin: [f64; 3], dt: f64) -> [f64; 4] {
     if spin == [0.0; 3] {
         return *attitude;
     }

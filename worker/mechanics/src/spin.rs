@@ -51,12 +51,13 @@ pub(crate) fn advance(
     sets: &[NodeSet],
 ) -> (f64, Work) {
     let half_steps = 0.5 * (advance.dt_previous + advance.dt);
+    let middle = 0.5f64.mul_add(advance.dt, advance.time);
     let relaxation = advance.loads.relaxation.filter(|r| advance.time < r.until);
     let loss = relaxation.map_or(0.0, |r| 1.0 - r.factor);
     let energy = advance.quanta.energy;
     let (mut kinetic, mut external) = (0.0, Work::default());
     for (i, &held) in constraint.iter().enumerate() {
-        let clamped = advance.constraints[held as usize].clamped;
+        let clamped = advance.constraints[held as usize].clamped_at(middle);
         let inertia = turning.inertia[i];
         let scale = half_steps / inertia;
         let (mut product, mut work) = (0.0, Work::default());

@@ -8,6 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    element::vector::{Tensor, Vector},
     lanes::Lane,
     law::{Declaration, MAX_HISTORY, Unit, Variable},
     material::Material,
@@ -15,18 +16,26 @@ use crate::{
 
 pub(crate) mod cowper_symonds;
 pub(crate) mod elastic;
+pub(crate) mod finite_strain;
 pub(crate) mod johnson_cook;
 pub(crate) mod johnson_holmquist;
+pub(crate) mod mooney_rivlin;
+pub(crate) mod ogden;
 pub(crate) mod plane_stress;
+pub(crate) mod remembering;
 pub(crate) mod tabulated;
+pub(crate) mod viscoelastic;
 pub(crate) mod voce;
 pub(crate) mod von_mises;
 
 pub use johnson_holmquist::JohnsonHolmquist;
+pub use mooney_rivlin::MooneyRivlin;
+pub use ogden::Ogden;
+pub use viscoelastic::Viscoelastic;
 pub use voce::Voce;
 pub(crate) use {
     cowper_symonds::RateFactor, elastic::Elastic, elastic::Hydro, johnson_cook::JohnsonCook,
-    tabulated::Tabulated, von_mises::VonMises,
+    remembering::AnyRemembering, tabulated::Tabulated, von_mises::VonMises,
 };
 
 /// Deviatoric stress, or the deviator of the rate of deformation.
@@ -93,6 +102,19 @@ impl<L: Lane> Deviator<L> {
         }
     }
 
+    /// `self` in the lanes of a mask, `other` in the rest.
+    #[inline(always)]
+    pub fn or(&self, mask: L::Mask, other: &Self) -> Self {
+        Self {
+            xx: L::select(mask, self.xx, other.xx),
+            yy: L::select(mask, self.yy, other.yy),
+            zz: L::select(mask, self.zz, other.zz),
+            xy: L::select(mask, self.xy, other.xy),
+            yz: L::select(mask, self.yz, other.yz),
+            zx: L::select(mask, self.zx, other.zx),
+        }
+    }
+
     /// `self * factor + other`.
     #[inline(always)]
     pub fn mul_add(&self, factor: L, other: &Self) -> Self {
@@ -134,6 +156,10 @@ pub(crate) struct Around<L> {
     pub density: L,
     /// Volume over initial volume.
     pub relative_volume: L,
+    /// Velocity gradient in the middle of the step, by rows of the velocity.
+    pub gradient: Tensor<L>,
+    /// Axial vector of the spin of the step, by which the trial was turned.
+    pub spin: Vector<L>,
     /// Deviator of the rate of deformation in the middle of the step.
     pub rate: Deviator<L>,
     /// Rate of the volume by volume, there.
@@ -156,6 +182,8 @@ pub(crate) struct Memory<L> {
     pub added_pressure: L,
     /// The pressure goes no lower (stress).
     pub least_pressure: L,
+    /// Added to the stiffness of waves that the equation of state and [`StrengthLaw::shear`] make (stress).
+    pub added_stiffness: L,
 }
 
 impl<L: Lane> Memory<L> {
@@ -163,7 +191,13 @@ impl<L: Lane> Memory<L> {
     #[inline(always)]
     pub fn none() -> Self {
         let zero = L::splat(0.0);
-        Self { variables: [zero; MAX_HISTORY], damage: zero, added_pressure: zero, least_pressure: zero }
+        Self {
+            variables: [zero; MAX_HISTORY],
+            damage: zero,
+            added_pressure: zero,
+            least_pressure: zero,
+            added_stiffness: zero,
+        }
     }
 }
 
@@ -267,60 +301,6 @@ pub(crate) enum AnyStrength {
     Voce(Voce),
 }
 
-/// The laws with history variables. They have a kernel of their own, so that the other one does not become slower.
-#[derive(Clone, Copy)]
-pub(crate) enum AnyRemembering {
-    JohnsonHolmquist(johnson_holmquist::Ceramic),
-}
-
-impl AnyRemembering {
-    /// That of a material, made ready; none if its law has no history variables.
-    pub fn of(material: &Material) -> Option<Self> {
-        match material.strength {
-            _ if material.is_gas() => None,
-            Strength::JohnsonHolmquist(law) => {
-                Some(Self::JohnsonHolmquist(johnson_holmquist::Ceramic::new(&law, material.bulk())))
-            }
-            _ => None,
-        }
-    }
-}
-
-impl StrengthLaw for AnyRemembering {
-    const REMEMBERS: bool = true;
-
-    #[inline(always)]
-    fn shear(&self) -> f64 {
-        let Self::JohnsonHolmquist(law) = self;
-        law.shear()
-    }
-
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        strain: Strain<L>,
-        history: &mut History<L>,
-        active: L::Mask,
-    ) -> Deviator<L> {
-        let Self::JohnsonHolmquist(law) = self;
-        law.update(trial, strain, history, active)
-    }
-
-    #[inline(always)]
-    fn remember<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        around: &Around<L>,
-        history: &mut History<L>,
-        memory: &mut Memory<L>,
-        active: L::Mask,
-    ) -> Deviator<L> {
-        let Self::JohnsonHolmquist(law) = self;
-        law.remember(trial, around, history, memory, active)
-    }
-}
-
 /// Strength law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Strength {
@@ -381,6 +361,12 @@ pub enum Strength {
     Voce(Voce),
     /// Ceramics and glass, with damage and bulking.
     JohnsonHolmquist(JohnsonHolmquist),
+    /// Rubber by the invariants of its stretch.
+    MooneyRivlin(MooneyRivlin),
+    /// Rubber by its principal stretches.
+    Ogden(Ogden),
+    /// A shear modulus that relaxes.
+    Viscoelastic(Viscoelastic),
 }
 
 /// What the temperature of a Johnson-Cook material follows.
@@ -393,44 +379,61 @@ pub enum Heat {
     InternalEnergy,
 }
 
-impl Strength {
-    /// The laws that declare their constants.
-    pub const DECLARED: &'static [Declaration<Strength>] = &[
-        Declaration {
-            name: Voce::NAME,
-            constants: Voce::CONSTANTS,
-            of: |values| Strength::Voce(Voce::of(values)),
-        },
-        Declaration {
-            name: JohnsonHolmquist::NAME,
-            constants: JohnsonHolmquist::CONSTANTS,
-            of: |values| Strength::JohnsonHolmquist(JohnsonHolmquist::of(values)),
-        },
-    ];
+/// The laws that declare their constants, by their names in [`Strength`]: the one list that declarations go by.
+macro_rules! declared_laws {
+    ($($law:ident),* $(,)?) => {
+        impl Strength {
+            /// The laws that declare their constants.
+            pub const DECLARED: &'static [Declaration<Strength>] = &[$(Declaration {
+                name: $law::NAME,
+                constants: $law::CONSTANTS,
+                of: |values| Strength::$law($law::of(values)),
+            }),*];
 
+            /// The name and the constants by key of a law that declares them.
+            pub fn declared(&self) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
+                match self {
+                    $(Strength::$law(law) => Some(($law::NAME, law.constants())),)*
+                    _ => None,
+                }
+            }
+
+            /// A law that declares its constants with each as `convert` makes it of its unit and value; any other law as it is.
+            pub fn converted(self, convert: &dyn Fn(Unit, f64) -> f64) -> Self {
+                match self {
+                    $(Strength::$law(law) => Strength::$law(law.converted(convert)),)*
+                    other => other,
+                }
+            }
+        }
+    };
+}
+
+declared_laws!(Voce, JohnsonHolmquist, MooneyRivlin, Ogden, Viscoelastic);
+
+impl Strength {
     /// The history variables of the law.
     pub fn history(&self) -> &'static [Variable] {
         match self {
             Strength::JohnsonHolmquist(_) => JohnsonHolmquist::HISTORY,
+            Strength::MooneyRivlin(_) => MooneyRivlin::HISTORY,
+            Strength::Ogden(_) => Ogden::HISTORY,
+            Strength::Viscoelastic(_) => Viscoelastic::HISTORY,
             _ => &[],
         }
     }
 
-    /// The name and the constants by key of a law that declares them.
-    pub fn declared(&self) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
-        match self {
-            Strength::Voce(law) => Some((Voce::NAME, law.constants())),
-            Strength::JohnsonHolmquist(law) => Some((JohnsonHolmquist::NAME, law.constants())),
-            _ => None,
-        }
+    /// Whether the law damages its elements itself.
+    pub fn damages(&self) -> bool {
+        matches!(self, Strength::JohnsonHolmquist(_))
     }
 
-    /// A law that declares its constants with each as `convert` makes it of its unit and value; any other law as it is.
-    pub fn converted(self, convert: &dyn Fn(Unit, f64) -> f64) -> Self {
+    /// What the constants would have to be, where each is within its bounds and together they make no law.
+    pub fn fault(&self) -> Option<&'static str> {
         match self {
-            Strength::Voce(law) => Strength::Voce(law.converted(convert)),
-            Strength::JohnsonHolmquist(law) => Strength::JohnsonHolmquist(law.converted(convert)),
-            other => other,
+            Strength::Ogden(law) => law.fault(),
+            Strength::Viscoelastic(law) => law.fault(),
+            _ => None,
         }
     }
 }
@@ -493,8 +496,11 @@ impl AnyStrength {
                 })
             }
             Strength::Voce(law) => Self::Voce(law),
-            // Its elements have a kernel of their own, see [`AnyRemembering`]; others ask for its stiffness.
+            // Their elements have a kernel of their own, see [`AnyRemembering`]; others ask for the stiffness.
             Strength::JohnsonHolmquist(law) => Self::Elastic(Elastic { shear: law.shear }),
+            Strength::MooneyRivlin(law) => Self::Elastic(Elastic { shear: law.shear() }),
+            Strength::Ogden(law) => Self::Elastic(Elastic { shear: law.shear() }),
+            Strength::Viscoelastic(law) => Self::Elastic(Elastic { shear: law.shear }),
         }
     }
 }

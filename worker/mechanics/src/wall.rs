@@ -285,7 +285,7 @@ mod tests {
     #[test]
     fn a_driven_wall_is_where_the_integral_of_its_velocity_says() {
         let curves = [Curve { points: vec![[0.0, 0.0], [2.0, 4.0]] }];
-        let drive = Drive { factor: 1.0, curve: Some(0) };
+        let drive = Drive::along(0, 1.0);
         let motion = Motion::Driven([drive, Drive::constant(3.0), Drive::constant(0.0)]);
         let walls = [wall(Shape::Sphere { centre: [0.0; 3], radius: 1.0 }, motion, 0.0)];
         let mut found = Vec::new();

@@ -74,7 +74,7 @@ fn domain() -> Domain {
         element_ids: (0..cells.iter().product()).collect(),
         hourglass: Default::default(),
     };
-    let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part] };
+    let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part], lumped: Vec::new() };
     let strength = Strength::JohnsonCook {
         shear: 0.8,
         a: 3.5e-3,

@@ -2,16 +2,16 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use mechanics::load::MAX_FORCES;
+use mechanics::load::{MAX_FORCES, Span};
 
 use super::state::Translation;
 use crate::{
     geometry::{dot, sub, unit},
-    keyword::condition::{AXES_OF_CODE, Meaning, Target},
+    keyword::condition::{AXES_OF_CODE, Driven, Meaning, Target, Way},
     place::Place,
     typed::condition::{
-        Boundary, BoundaryKind, Components, Drive, Faces, Gravity, Load, LoadKind, Parts, Region, Wall,
-        WallMotion, WallShape, made,
+        Boundary, BoundaryKind, Circle, Components, Drive, Faces, Gravity, Load, LoadKind, Lumped, Parts,
+        Region, Wall, WallMotion, WallShape, made,
     },
 };
 
@@ -21,16 +21,18 @@ const FREE: Components = [const { None }; 3];
 /// What is held at rest, by the axes that are.
 pub(super) fn write_held(t: &mut Translation<'_>) {
     let (problem, log) = (t.problem, t.log);
-    // By node: translations, then rotations.
-    let mut of_node: BTreeMap<u32, ([[bool; 3]; 2], Place)> = BTreeMap::new();
-    let mut hold = |node: u32, axes: [[bool; 3]; 2], at: Place| {
-        let entry = of_node.entry(node).or_insert(([[false; 3]; 2], at));
+    // By node and span: translations, then rotations.
+    type Holding = ([[bool; 3]; 2], Place);
+    let mut of_node: BTreeMap<(u32, [u64; 2]), Holding> = BTreeMap::new();
+    let mut hold = |node: u32, axes: [[bool; 3]; 2], span: Span, at: Place| {
+        let key = (node, [span.from.to_bits(), span.until.to_bits()]);
+        let entry = of_node.entry(key).or_insert(([[false; 3]; 2], at));
         for (all, new) in entry.0.iter_mut().flatten().zip(axes.iter().flatten()) {
             *all |= new;
         }
     };
     for node in problem.nodes.iter().filter(|node| node.held != [0; 2] && t.used.contains(&node.id)) {
-        hold(node.id, node.held.map(|code| AXES_OF_CODE[usize::from(code)]), node.at);
+        hold(node.id, node.held.map(|code| AXES_OF_CODE[usize::from(code)]), Span::ALWAYS, node.at);
     }
     for given in &problem.conditions.held {
         let [x, y, z, turn_x, turn_y, turn_z] = given.axes;
@@ -52,31 +54,44 @@ pub(super) fn write_held(t: &mut Translation<'_>) {
             axes
         });
         for node in t.nodes(given.target, given.at) {
-            hold(node, axes, given.at);
+            hold(node, axes, given.span, given.at);
         }
     }
-    let mut groups: BTreeMap<[[bool; 3]; 2], (Place, Vec<u32>)> = BTreeMap::new();
-    for (node, (axes, at)) in of_node {
+    type Group = (Place, Vec<u32>);
+    let mut groups: BTreeMap<([u64; 2], [[bool; 3]; 2]), Group> = BTreeMap::new();
+    for ((node, span), (axes, at)) in of_node {
         // Only nodes of shells turn.
         let axes = [axes[0], if t.turns.contains(&node) { axes[1] } else { [false; 3] }];
         if axes == [[false; 3]; 2] {
             continue;
         }
-        let group = groups.entry(axes).or_insert((at, Vec::new()));
+        let group = groups.entry((span, axes)).or_insert((at, Vec::new()));
         group.0 = group.0.min(at);
         group.1.push(node);
     }
-    for (axes, (at, nodes)) in groups {
+    for ((span, axes), (at, nodes)) in groups {
+        let [from, until] = span.map(f64::from_bits);
+        let clamp_span = Span { from, until };
         let [letters, turns] =
             axes.map(|axes| (0..3).filter(|a| axes[*a]).map(|a| AXES[a]).collect::<String>());
         let name = match (letters.as_str(), turns.as_str()) {
             (letters, "") => format!("held {letters}"),
             (letters, turns) => format!("held {letters} turned {turns}"),
         };
-        let velocity = axes[0].map(|held| held.then(|| Drive::constant(0.0)));
+        let name = match clamp_span == Span::ALWAYS {
+            true => name,
+            false => format!("{name} from {from} until {until}"),
+        };
+        let still = Drive { span: clamp_span, ..Drive::constant(0.0) };
+        let velocity = axes[0].map(|held| held.then(|| still.clone()));
         let clamped = (0..3).filter(|a| axes[1][*a]).fold(0, |bits, a| bits | 1 << a);
         let nodes = Some(Region::Set(t.set(&name, nodes, at)));
-        push_boundary(t, at, "nodes that are held", BoundaryKind::Held { velocity, clamped, nodes });
+        push_boundary(
+            t,
+            at,
+            "nodes that are held",
+            BoundaryKind::Held { velocity, clamped, clamp_span, nodes },
+        );
     }
 }
 
@@ -89,16 +104,146 @@ pub(super) fn write_motions(t: &mut Translation<'_>) {
     let problem = t.problem;
     for (n, given) in problem.conditions.motions.iter().enumerate() {
         let nodes = t.nodes(given.target, given.at);
-        let Some(curve) = t.curve(given.curve, given.meaning, given.at) else { continue };
+        let Some(drive) = driven(t, &given.how, given.at) else { continue };
         if nodes.is_empty() {
             t.log.warn(given.at, "a motion of no node that has an element");
             continue;
         }
         let nodes = Some(Region::Set(t.set(&format!("motion {}", n + 1), nodes, given.at)));
-        let mut velocity = FREE;
-        velocity[given.axis] = Some(Drive { factor: given.factor + 0.0, curve: Some(curve) });
-        let kind = BoundaryKind::Held { velocity, clamped: 0, nodes };
+        let kind = match given.way {
+            Way::About(axis, point) => {
+                let point = t.vector(given.at, "an axis through", point);
+                BoundaryKind::Circle { circle: Some(Circle { axis, point, rate: drive }), nodes }
+            }
+            Way::Along(axis) | Way::Turn(axis) => {
+                let mut velocity = FREE;
+                velocity[axis] = Some(drive);
+                BoundaryKind::Held { velocity, clamped: 0, clamp_span: Span::ALWAYS, nodes }
+            }
+        };
         push_boundary(t, given.at, "a motion", kind);
+    }
+}
+
+/// The drive of a motion; none after a fault.
+pub(super) fn driven(t: &mut Translation<'_>, how: &Driven, at: Place) -> Option<Drive> {
+    let curve = t.curve(how.curve, how.meaning, at)?;
+    Some(Drive { span: how.span, ..Drive::along(curve, how.factor + 0.0) })
+}
+
+/// Masses at nodes, those of equal mass together.
+pub(super) fn write_masses(t: &mut Translation<'_>) {
+    let problem = t.problem;
+    // By node the masses of all cards, then the nodes by mass.
+    let mut of_node: BTreeMap<u32, (f64, Place)> = BTreeMap::new();
+    for given in &problem.conditions.masses {
+        let nodes = t.nodes(given.target, given.at);
+        let named = match given.target {
+            Target::NodeSet(id) => problem.node_set(id, given.at, t.log).len(),
+            _ => 1,
+        };
+        if nodes.len() < named || nodes.is_empty() {
+            t.log.fault(
+                given.at,
+                "mass at a node that no element has",
+                "nodes of elements",
+                "put it at nodes of the body that carries it",
+            );
+            continue;
+        }
+        let each = given.mass / nodes.len() as f64;
+        for node in nodes {
+            of_node.entry(node).or_insert((0.0, given.at)).0 += each;
+        }
+    }
+    let mut groups: BTreeMap<u64, (Place, Vec<u32>)> = BTreeMap::new();
+    for (node, (mass, at)) in of_node {
+        groups.entry(mass.to_bits()).or_insert((at, Vec::new())).1.push(node);
+    }
+    for (n, (mass, (at, nodes))) in groups.into_iter().enumerate() {
+        let mass = Some(t.number(at, "a mass of", f64::from_bits(mass)));
+        let nodes = Some(Region::Set(t.set(&format!("mass {}", n + 1), nodes, at)));
+        t.deck.masses.push(Lumped {
+            at,
+            title: "a *ELEMENT_MASS".to_string(),
+            mass,
+            parts: Parts::All,
+            nodes,
+        });
+    }
+}
+
+/// Gravity of parts: that of all parts together where they have the same, else by part.
+pub(super) fn write_part_gravities(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    let Some(first) = problem.conditions.gravities.first() else { return };
+    let mut groups: BTreeMap<(usize, u32, u64), (Place, Vec<u32>)> = BTreeMap::new();
+    for given in &problem.conditions.gravities {
+        let parts = match given.target {
+            Target::PartSet(id) => problem.part_set(id, given.at, log),
+            Target::Part(id) => vec![id],
+            _ => Vec::new(),
+        };
+        if let Some(id) = parts.iter().find(|id| !problem.parts.contains_key(id)) {
+            log.fault(given.at, format!("part {id}"), "a part of the deck", "correct the number");
+        }
+        let key = (given.axis, given.curve, given.acceleration.to_bits());
+        let parts = parts.into_iter().filter(|id| t.names.contains_key(id));
+        groups.entry(key).or_insert((given.at, Vec::new())).1.extend(parts);
+    }
+    let mut shared: BTreeMap<u32, u32> = BTreeMap::new();
+    let all = t.names.len();
+    let mut gravity: Option<Gravity> = None;
+    for ((axis, curve, bits), (at, mut parts)) in groups {
+        parts.sort_unstable();
+        parts.dedup();
+        let drive = match curve {
+            0 => Drive::constant(1.0),
+            id => match t.curve(id, Meaning::Velocity, at) {
+                Some(curve) => Drive::along(curve, 1.0),
+                None => continue,
+            },
+        };
+        // As *LOAD_BODY, against the axis.
+        let mut acceleration = [0.0; 3];
+        acceleration[axis] = -f64::from_bits(bits);
+        let acceleration = t.vector(at, "an acceleration of", acceleration);
+        if parts.len() == all && gravity.is_none() && problem.conditions.bodies.is_empty() {
+            gravity = Some(Gravity { acceleration, drive });
+            continue;
+        }
+        for &part in &parts {
+            for node in problem.nodes_of_part(part) {
+                let other = *shared.entry(node).or_insert(part);
+                if other != part {
+                    log.warn(
+                        at,
+                        format!("parts {other} and {part} share nodes: those feel the gravity of both"),
+                    );
+                    break;
+                }
+            }
+        }
+        let named = parts.iter().map(|id| made(t.names[id].clone(), at)).collect();
+        let force = Some(acceleration);
+        let kind = LoadKind::Force { force, by_mass: true, drive, nodes: Some(Region::All) };
+        t.deck.loads.push(Load {
+            at,
+            title: "a *LOAD_GRAVITY_PART".to_string(),
+            parts: Parts::Named(named),
+            kind,
+        });
+    }
+    if gravity.is_some() {
+        t.deck.gravity = gravity;
+    }
+    if t.deck.loads.iter().filter(|load| matches!(load.kind, LoadKind::Force { .. })).count() > MAX_FORCES {
+        log.fault(
+            first.at,
+            "more forces",
+            format!("at most {MAX_FORCES}"),
+            "give more parts the same gravity",
+        );
     }
 }
 
@@ -139,8 +284,8 @@ pub(super) fn write_forces(t: &mut Translation<'_>) {
             let mut force = [0.0; 3];
             force[axis] = f64::from_bits(bits) * f64::from(times);
             let force = Some(t.vector(at, "a force of", force));
-            let drive = Drive { factor: 1.0, curve: Some(curve.clone()) };
-            push_load(t, at, "a force", LoadKind::Force { force, drive, nodes });
+            let drive = Drive::along(curve.clone(), 1.0);
+            push_load(t, at, "a force", LoadKind::Force { force, by_mass: false, drive, nodes });
         }
     }
 }
@@ -195,7 +340,7 @@ pub(super) fn write_pressures(t: &mut Translation<'_>) {
         let Some(curve) = t.curve(curve, Meaning::Velocity, at) else { continue };
         let name = format!("pressure {}", n + 1);
         t.mesh.segments.insert(name.clone(), faces);
-        let pressure = Some(Drive { factor: f64::from_bits(bits) + 0.0, curve: Some(curve) });
+        let pressure = Some(Drive::along(curve, f64::from_bits(bits) + 0.0));
         let faces = Some(Faces::Segments(made(name, at)));
         push_load(t, at, "a pressure", LoadKind::Pressure { pressure, faces });
     }
@@ -221,7 +366,7 @@ pub(super) fn write_gravity(t: &mut Translation<'_>) {
     }
     let Some(curve) = t.curve(first.curve, Meaning::Velocity, first.at) else { return };
     let acceleration = t.vector(first.at, "an acceleration of", acceleration);
-    t.deck.gravity = Some(Gravity { acceleration, drive: Drive { factor: 1.0, curve: Some(curve) } });
+    t.deck.gravity = Some(Gravity { acceleration, drive: Drive::along(curve, 1.0) });
 }
 
 /// Rigid walls.

@@ -92,15 +92,15 @@ fn eos_of(
     part: &PartCard,
 ) -> Option<Eos> {
     let log = t.log;
-    if let Law::JohnsonHolmquist { bulk: [a1, a2, a3], .. } = material.law {
+    if let Law::Whole { eos: own, given, .. } = &material.law {
         if eos.is_some() {
-            log.fault_of(
-                part.eos.origin,
-                "no *EOS: K1, K2 and K3 of the material are one",
-                "leave EOSID blank",
+            let expected = format!(
+                "no *EOS: {given} of the material {} one",
+                if given.contains(' ') { "are" } else { "is" }
             );
+            log.fault_of(part.eos.origin, expected, "leave EOSID blank");
         }
-        return Some(Eos::Polynomial { a1, a2, a3, b0: 0.0, b1: 0.0, t1: a1, t2: 0.0 });
+        return Some(*own);
     }
     match (eos, material.elastic) {
         (Some(EosCard::Grueneisen { c, s, gamma }), _) => {
@@ -162,7 +162,7 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
     let rate_of =
         |rate: &Option<[f64; 2]>| rate.map(|[reference, exponent]| CowperSymonds { reference, exponent });
     Some(match &material.law {
-        Law::JohnsonHolmquist { constants, .. } => Strength::JohnsonHolmquist(*constants),
+        Law::Whole { strength, .. } => *strength,
         Law::Elastic | Law::Rigid { .. } => Strength::Elastic { shear: shear() },
         Law::Null { .. } => Strength::Hydro,
         Law::Bilinear { yield_stress, tangent, rate } => {

@@ -2,11 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::state::{Bodies, Translation};
+use super::{
+    condition::driven,
+    state::{Bodies, Translation},
+};
 use crate::{
-    keyword::{material::Law, rigid::Members},
+    keyword::{condition::Way, material::Law, rigid::Members},
     place::Place,
-    typed::condition::{Components, Drive, Parts, Rigid, made},
+    typed::condition::{Circle, Components, Drive, Parts, Region, Rigid, made},
 };
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -130,7 +133,8 @@ pub(super) fn write(t: &mut Translation<'_>) {
     for (part, lead) in &t.bodies.lead {
         members.entry(*lead).or_default().push(*part);
     }
-    let mut drives = drives(t);
+    let mut motions = motions(t);
+    let mut extra = extra_nodes(t);
     for (lead, parts) in members {
         // What holds a body is said by the part that leads, or else by the first that says anything.
         let law = |id: &u32| match problem.materials.get(&problem.parts[id].material.value).map(|m| &m.law) {
@@ -148,48 +152,136 @@ pub(super) fn write(t: &mut Translation<'_>) {
             );
         }
         let at = problem.parts[&lead].at;
-        let mut components = [FREE; 2];
-        for (turns, list) in components.iter_mut().enumerate() {
-            for (axis, name) in AXES.into_iter().enumerate() {
-                match drives.remove(&(lead, turns == 1, axis)) {
-                    Some((place, _)) if held[turns][axis] => log.fault(
-                        place,
-                        format!("a motion of part {ruler} along or about {name}"),
-                        "an axis that CON1 or CON2 of its *MAT_RIGID leaves free",
-                        "take one of the two out",
-                    ),
-                    Some((_, drive)) => list[axis] = Some(drive),
-                    None if held[turns][axis] => list[axis] = Some(Drive::constant(0.0)),
-                    None => {}
-                }
-            }
-        }
-        let [velocity, spin] = components;
+        let ([velocity, spin], circle) = led(t, (&mut motions, lead), held, &format!("part {ruler}"));
+        let nodes = extra
+            .remove(&lead)
+            .map(|(place, nodes)| Region::Set(t.set(&format!("extra nodes of part {lead}"), nodes, place)));
         let spun = t.bodies.starts.get(&lead).map(|[_, spin]| *spin);
         let start_spin = spun.map(|spin| t.vector(at, "an angular velocity of", spin));
         t.deck.rigid.push(Rigid {
             at,
             title: format!("the rigid body of part {lead}"),
             parts: Parts::Named(parts.iter().map(|id| made(t.names[id].clone(), at)).collect()),
+            nodes,
             mass: None,
             inertia: None,
             start_spin,
             velocity,
             spin,
+            circle,
+        });
+    }
+    for given in &problem.rigid.of_nodes {
+        let set = problem.node_set(given.set, given.at, log);
+        let nodes: Vec<u32> = set.iter().copied().filter(|node| t.used.contains(node)).collect();
+        if nodes.len() < 2 {
+            log.fault(
+                given.at,
+                format!("a nodal rigid body of {} nodes that elements have", nodes.len()),
+                "two nodes at least",
+                "correct the set, or take the body out",
+            );
+            continue;
+        }
+        if nodes.len() < set.len() {
+            let words =
+                format!("{} nodes of the body have no element: they are left out", set.len() - nodes.len());
+            log.warn(given.at, words);
+        }
+        let title = format!("the nodal rigid body {}", given.id);
+        let ([velocity, spin], circle) = led(t, (&mut motions, given.id), given.held, &title);
+        let nodes = Some(Region::Set(t.set(&title, nodes, given.at)));
+        t.deck.rigid.push(Rigid {
+            at: given.at,
+            title,
+            parts: Parts::Named(Vec::new()),
+            nodes,
+            mass: None,
+            inertia: None,
+            start_spin: None,
+            velocity,
+            spin,
+            circle,
         });
     }
 }
 
-/// Motions by curve: by the part that leads, whether it turns, and axis, the place and drive of each.
-fn drives(t: &mut Translation<'_>) -> BTreeMap<(u32, bool, usize), (Place, Drive)> {
+/// By the part that leads: nodes that go with a rigid part, and where the first of its cards stands.
+fn extra_nodes(t: &Translation<'_>) -> BTreeMap<u32, (Place, Vec<u32>)> {
+    let mut extra: BTreeMap<u32, (Place, Vec<u32>)> = BTreeMap::new();
+    for given in &t.problem.rigid.extra {
+        let nodes = t.nodes(given.target, given.at);
+        let Some(lead) = body_at(t, given.part, given.at) else { continue };
+        extra.entry(lead).or_insert((given.at, Vec::new())).1.extend(nodes);
+    }
+    extra.retain(|_, (_, nodes)| !nodes.is_empty());
+    for (_, nodes) in extra.values_mut() {
+        nodes.sort_unstable();
+        nodes.dedup();
+    }
+    extra
+}
+
+/// Motions by body and way.
+type Motions = BTreeMap<(u32, u8, usize), (Place, Drive, [f64; 3])>;
+
+/// What leads a body that is held along and about some axes: velocity and spin by axis, and a circle.
+fn led(
+    t: &Translation<'_>,
+    (motions, lead): (&mut Motions, u32),
+    held: [[bool; 3]; 2],
+    title: &str,
+) -> ([Components; 2], Option<Circle>) {
+    let log = t.log;
+    let mut components = [FREE; 2];
+    for (turns, list) in components.iter_mut().enumerate() {
+        for (axis, name) in AXES.into_iter().enumerate() {
+            match motions.remove(&(lead, turns as u8, axis)) {
+                Some((place, ..)) if held[turns][axis] => log.fault(
+                    place,
+                    format!("a motion of {title} along or about {name}"),
+                    "an axis that CON1 or CON2 leaves free",
+                    "take one of the two out",
+                ),
+                Some((_, drive, _)) => list[axis] = Some(drive),
+                None if held[turns][axis] => list[axis] = Some(Drive::constant(0.0)),
+                None => {}
+            }
+        }
+    }
+    let mut circle = None;
+    for (axis, name) in AXES.into_iter().enumerate() {
+        let Some((place, rate, point)) = motions.remove(&(lead, 2, axis)) else { continue };
+        let taken = (0..3).any(|a| a != axis && components[0][a].is_some()) || components[1][axis].is_some();
+        if taken || circle.is_some() {
+            let read = format!("a rotation of {title} about {name}");
+            let expected = "an axis about which and across which nothing else moves or holds the body";
+            log.fault(place, read, expected, "take one of the two out");
+        }
+        circle = Some(Circle { axis, point: t.vector(place, "an axis through", point), rate });
+    }
+    (components, circle)
+}
+
+/// Motions by curve: by the part that leads or the nodal body, whether it is along, about the centre or on a circle, and axis, the
+/// place, drive and point of each.
+fn motions(t: &mut Translation<'_>) -> Motions {
     let (problem, log) = (t.problem, t.log);
-    let mut drives: BTreeMap<(u32, bool, usize), (Place, Drive)> = BTreeMap::new();
+    let mut motions = Motions::new();
     for motion in &problem.rigid.motions {
-        let Some(lead) = body_at(t, motion.part, motion.at) else { continue };
-        let Some(curve) = t.curve(motion.curve, motion.meaning, motion.at) else { continue };
-        let drive = Drive { factor: motion.factor + 0.0, curve: Some(curve) };
-        let key = (lead, motion.turns, motion.axis);
-        if let Some((first, _)) = drives.insert(key, (motion.at, drive)) {
+        let nodal = problem.rigid.of_nodes.iter().find(|body| body.id == motion.part);
+        let lead = match nodal {
+            Some(body) => Some(body.id),
+            None => body_at(t, motion.part, motion.at),
+        };
+        let Some(lead) = lead else { continue };
+        let Some(drive) = driven(t, &motion.how, motion.at) else { continue };
+        let (key, point) = match motion.way {
+            Way::Along(axis) => ((lead, 0, axis), [0.0; 3]),
+            Way::Turn(axis) => ((lead, 1, axis), [0.0; 3]),
+            Way::About(axis, point) => ((lead, 2, axis), point),
+        };
+        if let Some((first, ..)) = motions.insert(key, (motion.at, drive, point)) {
             log.fault(
                 motion.at,
                 format!("a second motion of the body of part {lead}"),
@@ -198,5 +290,5 @@ fn drives(t: &mut Translation<'_>) -> BTreeMap<(u32, bool, usize), (Place, Drive
             );
         }
     }
-    drives
+    motions
 }

@@ -199,7 +199,7 @@ impl Domain {
             if !held.is_booked {
                 continue;
             }
-            let part = body.parts.first().map_or(0, |&part| part as usize);
+            let part = body.account as usize;
             vote.parts[part].kinetic += held.booked.kinetic;
             vote.parts[part].external.merge(held.booked.external);
             vote.external.merge(held.booked.external);

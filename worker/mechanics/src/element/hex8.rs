@@ -311,7 +311,10 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let energy = pressure_before.neg_mul_add(volume_change, energy_before);
     let bulk =
         line.stiffness(relative_volume, line.pressure(energy), energy).max(laws.eos.least_stiffness(burnt));
-    let stiffness = bulk + L::splat(4.0 / 3.0 * laws.strength.shear());
+    let mut stiffness = bulk + L::splat(4.0 / 3.0 * laws.strength.shear());
+    if S::REMEMBERS {
+        stiffness = stiffness + memory.added_stiffness;
+    }
     let sound_square = stiffness * relative_volume * L::splat(1.0 / laws.density);
     let sound = sound_square.sqrt();
 

@@ -114,6 +114,19 @@ pub(crate) fn apply(
         let velocities = nodes.map(|n| at(&block.v, n));
         let kind = loads.surfaces[face.load as usize].kind;
         face.power = 0.0;
+        let blast = match kind {
+            SurfaceKind::Blast(charge) => {
+                let places = nodes.map(|n| at(&block.x, n));
+                let centre: [f64; 3] = std::array::from_fn(|a| {
+                    0.25 * ((places[0][a] + places[1][a]) + (places[2][a] + places[3][a]))
+                });
+                let across = cross(minus(places[2], places[0]), minus(places[3], places[1]));
+                let size = norm(across);
+                let normal = if size > 0.0 { across.map(|c| c / size) } else { across };
+                loads.charges[charge as usize].pressure(centre, normal, time)
+            }
+            SurfaceKind::Pressure(_) | SurfaceKind::Transmit => 0.0,
+        };
         for (corner, &n) in nodes.iter().enumerate() {
             let (area, v) = (areas[corner], velocities[corner]);
             let force = match kind {
@@ -121,6 +134,7 @@ pub(crate) fn apply(
                     let tension = -drive.at(&loads.curves, time);
                     area.map(|c| c * tension)
                 }
+                SurfaceKind::Blast(_) => area.map(|c| c * -blast),
                 SurfaceKind::Transmit => {
                     let size = norm(area);
                     let normal = if size > 0.0 { area.map(|c| c / size) } else { area };

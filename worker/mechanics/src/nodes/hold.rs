@@ -30,16 +30,19 @@ impl Advance<'_> {
             let mut forces = held.forces;
             while forces != 0 {
                 let load = &self.loads.forces[forces.trailing_zeros() as usize];
-                let scale = half_steps * load.drive.at(curves, self.time) / mass;
+                let inertia = if load.by_mass { 1.0 } else { mass };
+                let scale = half_steps * load.drive.at(curves, self.time) / inertia;
                 for a in 0..3 {
                     new[a] += load.force[a] * scale;
                 }
                 forces &= forces - 1;
             }
+            let x = [nodes.x[0][i], nodes.x[1][i], nodes.x[2][i]];
+            let prescribed = held.prescribed(curves, x, 0.5f64.mul_add(self.dt, self.time), self.dt);
             for axis in 0..3 {
-                let Some(velocity) = held.velocity[axis] else { continue };
+                let Some(velocity) = prescribed[axis] else { continue };
                 let before = new[axis];
-                new[axis] = velocity.at(curves, 0.5f64.mul_add(self.dt, self.time));
+                new[axis] = velocity;
                 if let Some(support) = held.supports[axis].checked_sub(1).filter(|_| booked) {
                     let vote = &mut nodes.walls[self.walls.len() + usize::from(support)];
                     let impulse = mass * (new[axis] - before);
@@ -50,7 +53,6 @@ impl Advance<'_> {
             let mut walls = held.walls;
             while walls != 0 {
                 let w = walls.trailing_zeros() as usize;
-                let x = [nodes.x[0][i], nodes.x[1][i], nodes.x[2][i]];
                 let before = new;
                 if self.walls[w].stop(&self.poses[w], x, &mut new, self.dt) && booked {
                     self.struck(&mut nodes.walls[w], &self.poses[w], mass, [old, before, new]);

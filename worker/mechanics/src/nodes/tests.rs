@@ -101,13 +101,14 @@ fn what_a_node_loses_the_wall_gets_and_a_light_wall_counts_the_mass_on_it() {
 #[test]
 fn gravity_relaxation_and_nodal_force_change_the_velocity_and_book_their_work() {
     let curves = vec![Curve { points: vec![[0.0, 0.0], [1.0, 2.0]] }];
-    let drive = Drive { factor: 3.0, curve: Some(0) };
-    let force = NodalForce { force: [8.0, 0.0, 0.0], drive: Drive { factor: 1.0, curve: Some(0) } };
+    let drive = Drive::along(0, 3.0);
+    let force = NodalForce { force: [8.0, 0.0, 0.0], by_mass: false, drive: Drive::along(0, 1.0) };
     let loads = Loads {
         curves,
         forces: vec![force],
         gravity: Some(Gravity { acceleration: [0.0, 0.0, -10.0], drive }),
         surfaces: Vec::new(),
+        charges: Vec::new(),
         relaxation: Some(Relaxation { factor: 0.9, until: 0.6 }),
     };
     let pushed = Constraint { forces: 1, ..Constraint::default() };
@@ -161,7 +162,7 @@ fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
     let motion = Motion::Free { mass: 50.0, velocity: [0.0; 3] };
     let wall = RigidWall { shape: FLOOR, motion, friction: 0.2, parts: vec![true] };
     let loads = Loads {
-        forces: vec![NodalForce { force: [1e3, 0.0, 5e2], drive: Drive::constant(1.0) }],
+        forces: vec![NodalForce { force: [1e3, 0.0, 5e2], by_mass: false, drive: Drive::constant(1.0) }],
         gravity: Some(Gravity { acceleration: [0.0, 3.0, -10.0], drive: Drive::constant(1.0) }),
         relaxation: Some(Relaxation { factor: 0.95, until: 1.0 }),
         ..Loads::default()

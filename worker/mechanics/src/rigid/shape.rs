@@ -5,13 +5,15 @@
 //! three points along each axis, and of their thickness: `h^2 / 12` along the normal. A warped shell has the mass that its
 //! nodes have, half the cross product of its diagonals.
 
-use super::{Body, State, cross, dot, full};
+use std::collections::BTreeMap;
+
+use super::{Body, Pull, State, cross, dot, full};
 use crate::{
-    constraint::Constraint,
+    constraint::{Circle, Constraint},
     element::hex8,
     exact::Quantum,
     initial::largest_face,
-    load::{Curve, Drive},
+    load::{Drive, Loads},
     material::Material,
     mesh::{CORNERS, Mesh, Part, Topology, quad_area},
 };
@@ -21,6 +23,8 @@ use crate::{
 pub struct Given {
     /// Its parts, by index, ascending.
     pub parts: Vec<u32>,
+    /// Nodes beside those of its parts; alone they are a body of the masses that hang on them.
+    pub nodes: Vec<u32>,
     /// Mass of the parts; none for that of the elements.
     pub mass: Option<f64>,
     /// Their centre of mass and inertia about it, xx, yy, zz, xy, yz, zx; none for those of the elements.
@@ -31,7 +35,24 @@ pub struct Given {
     pub velocity: [Option<Drive>; 3],
     /// Prescribed angular velocity by axis.
     pub spin: [Option<Drive>; 3],
+    /// A circle that the centre follows as the body turns.
+    pub circle: Option<Circle>,
 }
+
+impl Given {
+    /// All nodes of the body, ascending.
+    pub fn all_nodes(&self, mesh: &Mesh) -> Vec<u32> {
+        let of_parts = self.parts.iter().flat_map(|&p| &mesh.parts[p as usize].nodes);
+        let mut nodes: Vec<u32> = of_parts.chain(&self.nodes).copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+}
+
+/// Inertia that nodes on one line or in one point are given about the axes that they have none about, over the largest that they have:
+/// what pushes them has no moment about these.
+const LINE_INERTIA: f64 = 1e-6;
 
 /// Least share of the inertia of its nodes that a body may have: contact finds its time step by the masses of nodes.
 const LEAST_INERTIA: f64 = 0.1;
@@ -42,19 +63,19 @@ const LEAST_INERTIA: f64 = 0.1;
 /// of the nodes: the same for all of them, or the rigid motion of the same momentum and angular momentum.
 ///
 /// # Errors
-/// If a part has no mass, or the inertia is none that a body can have.
+/// If it has no mass, or the inertia is none that a body can have: of nodes alone, if they are in one point.
 pub fn body(
     mesh: &Mesh,
     materials: &[Material],
     constraints: (&[Constraint], &[u16]),
-    curves: &[Curve],
+    loads: &Loads,
     given: Given,
     velocity: &mut [[f64; 3]],
 ) -> Result<Body, String> {
-    let mut nodes: Vec<u32> =
-        given.parts.iter().flat_map(|&p| mesh.parts[p as usize].nodes.iter().copied()).collect();
-    nodes.sort_unstable();
-    nodes.dedup();
+    let curves = &loads.curves;
+    let nodes = given.all_nodes(mesh);
+    let is_of_nodes = given.parts.is_empty();
+    let mut account = given.parts.first().copied();
     let first = nodes.first().map_or([0.0; 3], |&n| mesh.positions[n as usize]);
     let mut own = Moments::default();
     // Mass of each node: that of the body's elements, and what hangs on it.
@@ -69,6 +90,7 @@ pub fn body(
                 continue;
             }
             let x = corners.map(|n| mesh.positions[n as usize]);
+            account.get_or_insert(p);
             if inside {
                 own.add_element(part, &x.map(|x| minus(x, first)), density);
             }
@@ -79,10 +101,16 @@ pub fn body(
             }
         }
     }
-    if !(own.mass > 0.0 && own.mass.is_finite()) {
+    for &(n, mass) in &mesh.lumped {
+        if let Ok(place) = nodes.binary_search(&n) {
+            nodal[place][1] += mass;
+        }
+    }
+    let heavy = own.mass > 0.0 || is_of_nodes && nodal.iter().any(|[_, hung]| *hung > 0.0);
+    if !(heavy && own.mass.is_finite()) {
         return Err(format!("mass {:e} of its elements, must be positive", own.mass));
     }
-    let scale = given.mass.map_or(1.0, |mass| mass / own.mass);
+    let scale = given.mass.filter(|_| !is_of_nodes).map_or(1.0, |mass| mass / own.mass);
     let mut all = own.scaled(scale);
     if let Some((centre, inertia)) = &given.inertia {
         all = Moments::about(all.mass, minus(*centre, first), inertia);
@@ -90,13 +118,17 @@ pub fn body(
     for (&n, [_, hung]) in nodes.iter().zip(&nodal) {
         all.add(*hung, minus(mesh.positions[n as usize], first));
     }
-    let (centre, inertia) = all.central();
+    let (centre, mut inertia) = all.central();
     let centre: [f64; 3] = std::array::from_fn(|a| first[a] + centre[a]);
     let places: Vec<[f64; 3]> = nodes.iter().map(|&n| minus(mesh.positions[n as usize], centre)).collect();
     let mass_of = |i: usize| scale * nodal[i][0] + nodal[i][1];
     let mut lumped = Moments::default();
     (0..nodes.len()).for_each(|i| lumped.add(mass_of(i), places[i]));
     let lumped_inertia = lumped.inertia();
+    if is_of_nodes {
+        let largest = inertia[0].max(inertia[1]).max(inertia[2]);
+        (0..3).for_each(|a| inertia[a] += LINE_INERTIA * largest);
+    }
     let spare: [f64; 6] = std::array::from_fn(|i| inertia[i] - LEAST_INERTIA * lumped_inertia[i]);
     if !is_positive(&inertia) || !is_positive(&spare) {
         return Err(format!(
@@ -106,8 +138,19 @@ pub fn body(
     let (mut speed, mut spin) = motion(&nodes, &places, &mass_of, &lumped, velocity);
     spin = given.start_spin.unwrap_or(spin);
     for axis in 0..3 {
-        speed[axis] = given.velocity[axis].map_or(speed[axis], |drive| drive.at(curves, 0.0));
-        spin[axis] = given.spin[axis].map_or(spin[axis], |drive| drive.at(curves, 0.0));
+        let now = |drive: Option<Drive>| drive?.prescribed(curves, 0.0);
+        speed[axis] = now(given.velocity[axis]).unwrap_or(speed[axis]);
+        spin[axis] = now(given.spin[axis]).unwrap_or(spin[axis]);
+    }
+    if let Some((circle, rate)) = given.circle.and_then(|c| Some((c, c.rate.prescribed(curves, 0.0)?))) {
+        let along = circle.velocity(rate, centre, 0.0);
+        for axis in 0..3 {
+            if axis == usize::from(circle.axis) {
+                spin[axis] = rate;
+            } else {
+                speed[axis] = along[axis];
+            }
+        }
     }
     for (&n, &place) in nodes.iter().zip(&places) {
         let turning = cross(spin, place);
@@ -116,26 +159,41 @@ pub fn body(
     let radius = places.iter().flatten().fold(0.0_f64, |r, c| r.max(c.abs()));
     let (constraints, of_node) = constraints;
     let mut forces = Vec::new();
+    let mut pulled: BTreeMap<u32, Moments> = BTreeMap::new();
     for (i, &n) in (0..).zip(&nodes) {
         let mut bits = constraints[of_node[n as usize] as usize].forces;
         while bits != 0 {
-            forces.push((i, bits.trailing_zeros()));
+            let load = bits.trailing_zeros();
+            if loads.forces[load as usize].by_mass {
+                pulled.entry(load).or_default().add(mass_of(i as usize), places[i as usize]);
+            } else {
+                forces.push((i, load));
+            }
             bits &= bits - 1;
         }
     }
+    // What all nodes feel pulls at the centre of the body, which that of the nodes' masses is not quite for distorted elements.
+    let pull = |(load, felt): (u32, Moments)| match felt.mass >= lumped.mass * (1.0 - 1e-12) {
+        true => Pull { load, mass: all.mass, place: [0.0; 3] },
+        false => Pull { load, mass: felt.mass, place: felt.first.map(|c| c / felt.mass) },
+    };
+    let pulls = pulled.into_iter().map(pull).collect();
     Ok(Body {
         parts: given.parts,
+        account: account.unwrap_or(0),
         mass: all.mass,
         start: starting(&inertia, centre, speed, spin),
         inertia,
         velocity: given.velocity,
         spin: given.spin,
+        circle: given.circle,
         nodes,
         places,
         nodal_scale: scale,
         length: Quantum::for_reference(2.0 * radius, 50),
         courant: None,
         forces,
+        pulls,
     })
 }
 

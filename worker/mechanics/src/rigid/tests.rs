@@ -31,12 +31,17 @@ fn brick(low: [f64; 3], size: [f64; 3], shape: impl Fn([f64; 3]) -> [f64; 3]) ->
         element_ids: vec![1],
         hourglass: Default::default(),
     };
-    Mesh { positions: (0..8).map(corner).collect(), node_ids: (1..9).collect(), parts: vec![part] }
+    Mesh {
+        positions: (0..8).map(corner).collect(),
+        node_ids: (1..9).collect(),
+        parts: vec![part],
+        lumped: Vec::new(),
+    }
 }
 
 fn made(mesh: &Mesh, given: shape::Given, velocity: &mut [[f64; 3]]) -> Result<Body, String> {
     let of_node = vec![0; mesh.n_nodes()];
-    shape::body(mesh, &[steel()], (&[Constraint::default()], &of_node), &[], given, velocity)
+    shape::body(mesh, &[steel()], (&[Constraint::default()], &of_node), &Loads::default(), given, velocity)
 }
 
 fn spinning(size: [f64; 3], spin: [f64; 3]) -> Body {
@@ -107,7 +112,12 @@ fn tube(radius: f64, length: f64, thickness: f64, n: u32) -> Mesh {
         hourglass: Default::default(),
     };
     let positions: Vec<[f64; 3]> = (0..n * (n + 1)).map(place).collect();
-    Mesh { node_ids: (1..=positions.len() as u32).collect(), positions, parts: vec![part] }
+    Mesh {
+        node_ids: (1..=positions.len() as u32).collect(),
+        positions,
+        parts: vec![part],
+        lumped: Vec::new(),
+    }
 }
 
 #[test]
@@ -282,7 +292,7 @@ fn a_book_that_turns_over_does_not_gain_energy() {
 fn a_prescribed_turn_has_its_angle_and_its_support_does_the_work() {
     let mut body = spinning([0.2, 0.3, 0.5], [0.0; 3]);
     let zero = Some(Drive::constant(0.0));
-    body.spin = [zero, zero, Some(Drive { factor: 1.0, curve: Some(0) })];
+    body.spin = [zero, zero, Some(Drive::along(0, 1.0))];
     body.velocity[0] = Some(Drive::constant(5.0));
     let loads = Loads {
         curves: vec![Curve { points: vec![[0.0, 0.0], [1.0, 2.0]] }],

@@ -342,7 +342,10 @@ mod tests {
 
     #[test]
     fn the_strength_is_that_of_the_damage_between_the_intact_and_the_fractured_curve() {
-        use crate::lanes::scalar::Scalar;
+        use crate::{
+            element::vector::{Tensor, Vector},
+            lanes::scalar::Scalar,
+        };
         let law = Ceramic::new(&LAW, K[0]);
         // Quasi-static at the elastic limit: A (1 + T*)^N of the equivalent stress there.
         let [intact, fractured, strain] = law.curves(Scalar(8.71e9), Scalar(0.5)).map(|x| x.0);
@@ -354,12 +357,15 @@ mod tests {
             let mut trial = Deviator::<Scalar>::zero();
             trial.xy = Scalar(1e11);
             let zero = Scalar(0.0);
+            let still = Vector { x: zero, y: zero, z: zero };
             let strain = Strain { rate: Scalar(0.5), increment: zero };
             let around = Around {
                 pressure: Scalar(8.71e9),
                 energy: zero,
                 density: Scalar(2610.0),
                 relative_volume: Scalar(0.96),
+                gradient: Tensor { x: still, y: still, z: still },
+                spin: still,
                 rate: Deviator::zero(),
                 volume_rate: zero,
                 strain,

@@ -7,10 +7,7 @@
 //! difference is then convex. Each lane stops where its own step was small, whatever its neighbours do.
 
 use super::{AnyStrength, StrengthLaw};
-use crate::{
-    lanes::Lane,
-    material::{Material, Strength},
-};
+use crate::{lanes::Lane, material::Material};
 
 /// Most Newton steps of the return. From a trial far outside each step halves the distance until the last few: a trial of 1e4 times the yield
 /// stress takes 19.
@@ -54,8 +51,11 @@ impl PlaneLaw {
         if material.is_gas() {
             return Err("a gas");
         }
-        if let Strength::JohnsonHolmquist(_) = material.strength {
-            return Err("johnson-holmquist");
+        if !material.history().is_empty() {
+            return Err(material
+                .strength
+                .declared()
+                .map_or("a law with history variables", |(name, _)| name));
         }
         let strength = AnyStrength::of(material);
         if !strength.deviatoric() {

@@ -129,7 +129,7 @@ fn two_sheets() -> Mesh {
         element_ids: (1..=4).collect(),
         hourglass: Default::default(),
     };
-    Mesh { positions, node_ids: (1..=12).collect(), parts: vec![part] }
+    Mesh { positions, node_ids: (1..=12).collect(), parts: vec![part], lumped: Vec::new() }
 }
 
 #[test]

@@ -142,7 +142,7 @@ fn stiffness_is_bulk_times_area_squared_over_volume() {
 
 #[test]
 fn a_wedge_has_five_faces() {
-    let mut mesh = Mesh { positions: vec![], node_ids: vec![], parts: vec![] };
+    let mut mesh = Mesh { positions: vec![], node_ids: vec![], parts: vec![], lumped: Vec::new() };
     add_block(&mut mesh, [1, 1, 1], [0.0; 3], 1.0);
     mesh.parts[0] = Part {
         topology: Topology::Explicit { hexahedra: vec![[0, 1, 2, 2, 4, 5, 6, 6]] },

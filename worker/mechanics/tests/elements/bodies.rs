@@ -117,6 +117,19 @@ pub fn all_laws() -> Vec<Material> {
         d2: 0.8,
     };
     add(polynomial, Strength::JohnsonHolmquist(ceramic), Failure::None);
+    let rubber = mechanics::strength::MooneyRivlin { a: 25e9, b: 15e9 };
+    add(linear, Strength::MooneyRivlin(rubber), Failure::None);
+    let stretches = mechanics::strength::Ogden {
+        mu1: 100e9,
+        alpha1: 1.3,
+        mu2: 0.2e9,
+        alpha2: 5.0,
+        mu3: -1.6e9,
+        alpha3: -2.0,
+    };
+    add(linear, Strength::Ogden(stretches), Failure::None);
+    let creeping = mechanics::strength::Viscoelastic { shear, long_shear: 20e9, decay: 1e4 };
+    add(shock, Strength::Viscoelastic(creeping), Failure::None);
     materials
 }
 
@@ -266,8 +279,11 @@ pub fn stirred(material: &Material, cells: [u32; 3], seed: u64) -> Piece {
             }
         }
     }
-    for column in &mut piece.history {
-        column.iter_mut().for_each(|value| *value = 1e8 * draws.next().max(0.0));
+    for (column, variable) in piece.history.iter_mut().zip(material.history()) {
+        // Plain numbers are near those of the start, as stretches are.
+        let plain = variable.unit == mechanics::law::Unit::NONE;
+        let mut draw = || if plain { 0.05 * draws.next() } else { 1e8 * draws.next().max(0.0) };
+        column.iter_mut().for_each(|value| *value = variable.initial + draw());
     }
     piece
 }

@@ -129,6 +129,8 @@ impl<L: Lane> Stressed<L> {
                     energy,
                     density: L::splat(laws.density) / relative_volume,
                     relative_volume,
+                    gradient: *gradient,
+                    spin,
                     rate,
                     volume_rate: third * L::splat(3.0),
                     strain,

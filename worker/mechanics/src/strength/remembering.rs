@@ -1,0 +1,81 @@
+//! The laws with history variables. They have a kernel of their own, so that the other one does not become slower.
+
+use super::{
+    Around, Deviator, History, Memory, MooneyRivlin, Ogden, Strain, Strength, StrengthLaw, Viscoelastic,
+    johnson_holmquist::Ceramic,
+};
+use crate::{lanes::Lane, material::Material};
+
+/// Any of them, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
+#[derive(Clone, Copy)]
+pub(crate) enum AnyRemembering {
+    JohnsonHolmquist(Ceramic),
+    MooneyRivlin(MooneyRivlin),
+    Ogden(Ogden),
+    Viscoelastic(Viscoelastic),
+}
+
+/// The laws by their names: the one list that calls go by.
+macro_rules! of_any {
+    ($any:expr, $law:ident => $call:expr) => {
+        match $any {
+            AnyRemembering::JohnsonHolmquist($law) => $call,
+            AnyRemembering::MooneyRivlin($law) => $call,
+            AnyRemembering::Ogden($law) => $call,
+            AnyRemembering::Viscoelastic($law) => $call,
+        }
+    };
+}
+
+impl AnyRemembering {
+    /// That of a material, made ready; none if its law has no history variables.
+    pub fn of(material: &Material) -> Option<Self> {
+        match material.strength {
+            _ if material.is_gas() => None,
+            Strength::JohnsonHolmquist(law) => {
+                Some(Self::JohnsonHolmquist(Ceramic::new(&law, material.bulk())))
+            }
+            Strength::MooneyRivlin(law) => Some(Self::MooneyRivlin(law)),
+            Strength::Ogden(law) => Some(Self::Ogden(law)),
+            Strength::Viscoelastic(law) => Some(Self::Viscoelastic(law)),
+            _ => None,
+        }
+    }
+}
+
+impl StrengthLaw for AnyRemembering {
+    const REMEMBERS: bool = true;
+
+    #[inline(always)]
+    fn plastic(&self) -> bool {
+        of_any!(self, law => law.plastic())
+    }
+
+    #[inline(always)]
+    fn shear(&self) -> f64 {
+        of_any!(self, law => law.shear())
+    }
+
+    #[inline(always)]
+    fn update<L: Lane>(
+        &self,
+        trial: Deviator<L>,
+        strain: Strain<L>,
+        history: &mut History<L>,
+        active: L::Mask,
+    ) -> Deviator<L> {
+        of_any!(self, law => law.update(trial, strain, history, active))
+    }
+
+    #[inline(always)]
+    fn remember<L: Lane>(
+        &self,
+        trial: Deviator<L>,
+        around: &Around<L>,
+        history: &mut History<L>,
+        memory: &mut Memory<L>,
+        active: L::Mask,
+    ) -> Deviator<L> {
+        of_any!(self, law => law.remember(trial, around, history, memory, active))
+    }
+}
