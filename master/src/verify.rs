@@ -98,7 +98,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, String> {
     bring_end_forward(&mut model, &asked)?;
     let mut differences = Vec::new();
     let snapshots = snapshots_of(results, &mut differences)?;
-    let mut comparison = Comparison::of(results, &model)?;
+    let mut comparison = Comparison::of(results, &model, summary.is_some())?;
     let last_row = comparison.last_row().map(|cycle| cycle + 1);
     let last_snapshot = snapshots.last().map(|snapshot| snapshot.state.cycle);
     let end = summary.as_ref().map(|summary| summary.cycles).or(last_row.max(last_snapshot)).or(args.to);

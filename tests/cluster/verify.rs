@@ -91,3 +91,37 @@ fn a_folder_is_equal_until_a_bit_of_a_row_a_state_or_a_snapshot_flips() {
     assert_eq!(found.code, Some(1), "{found:?}");
     assert!(found.out.contains("checksum"), "{found:?}");
 }
+
+#[test]
+fn a_folder_of_a_run_with_another_end_or_without_its_last_files_is_told_from_a_damaged_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let mut command = Command::new(BOLIDE);
+    command.args(["run", &small(), "--threads", "1", "--end-time", "50", "--out"]).arg(&out);
+    let ran = said(&mut command);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let equal = verify(&out, &["--end-time", "50"]);
+    assert_eq!(equal.code, Some(0), "{equal:?}");
+    // Another end shows in the last step, not before.
+    let found = verify(&out, &[]);
+    assert_eq!(found.code, Some(1), "{found:?}");
+    let (first, _) = found.out.split_once(": history.csv, row of cycle ").expect("the last row differs");
+    let cycle = first.rsplit(' ').next().and_then(|word| word.parse::<u64>().ok());
+    assert!(cycle > Some(100), "{found:?}");
+
+    // A killed run has no summary, and its last state may not have come to the disk.
+    let index = fs::read_to_string(out.join("results.pvd")).expect("an index");
+    let lines: Vec<&str> = index
+        .lines()
+        .filter(|line| !["state-000002", "state-000003"].iter().any(|name| line.contains(name)))
+        .collect();
+    fs::write(out.join("results.pvd"), lines.join("\n")).expect("room");
+    fs::remove_file(out.join("summary.json")).expect("a summary");
+    let killed = verify(&out, &["--end-time", "50"]);
+    assert_eq!(killed.code, Some(0), "{killed:?}");
+    // One that is missing between two others was there.
+    let lines: Vec<&str> = index.lines().filter(|line| !line.contains("state-000001")).collect();
+    fs::write(out.join("results.pvd"), lines.join("\n")).expect("room");
+    let found = verify(&out, &["--end-time", "50"]);
+    assert_eq!(found.code, Some(1), "{found:?}");
+}

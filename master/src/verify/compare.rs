@@ -55,6 +55,8 @@ pub(super) struct Comparison {
     lines: BTreeMap<u64, String>,
     /// Bits of the time, and index, of each state that the folder lists.
     states: Vec<(f64, u32)>,
+    /// The run has a summary, so nothing of it is missing.
+    is_over: bool,
     span: [u64; 2],
     /// Cycle at which the interval ends: a state and a row there may be its own.
     ends: u64,
@@ -66,7 +68,7 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    pub(super) fn of(results: &Path, model: &Model) -> Result<Self, String> {
+    pub(super) fn of(results: &Path, model: &Model, is_over: bool) -> Result<Self, String> {
         let path = std::env::temp_dir().join(format!("bolide-verify-{}", std::process::id()));
         let scratch = Scratch(Folder::create(&path, true).map_err(|e| e.to_string())?);
         let mut comparison = Self {
@@ -78,6 +80,7 @@ impl Comparison {
             probe: None,
             lines: BTreeMap::new(),
             states: Vec::new(),
+            is_over,
             span: [0, 0],
             ends: 0,
             times: [f64::INFINITY, f64::NEG_INFINITY],
@@ -139,7 +142,9 @@ impl Comparison {
         self.times = [self.times[0].min(state.time), self.times[1].max(state.time)];
         let listed = self.states.iter().find(|(time, _)| time.to_bits() == state.time.to_bits());
         let Some(&(_, index)) = listed else {
-            if due {
+            // States are written beside the run: a killed one lacks its last.
+            let later = self.states.last().is_some_and(|(time, _)| *time > state.time);
+            if due && (later || self.is_over) {
                 self.add(cycle, format!("no state of time {:?} is in the index", state.time));
             }
             return Ok(());
@@ -270,10 +275,9 @@ impl Comparison {
         let [low, high] = self.times;
         for (time, index) in self.states.clone() {
             if time > low && time < high && !self.states_seen.contains(&index) {
-                self.add(
-                    self.span[0],
-                    format!("{}: a state of time {time:?}, where none is due", state_name(index)),
-                );
+                let name = state_name(index);
+                let cycle = Piece::open(&self.results.join(&name)).map_or(self.span[0], |piece| piece.cycle);
+                self.add(cycle, format!("{name}: a state of time {time:?}, where none is due"));
             }
         }
     }
