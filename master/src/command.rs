@@ -16,7 +16,7 @@ use protocol::{
 };
 use worker::processors::Processors;
 
-use crate::{bench::grind::Speed, picture::arguments::PictureArgs};
+use crate::{bench::grind::Speed, picture::arguments::PictureArgs, verify::arguments::VerifyArgs};
 
 /// What the process ends with, as `--help` says it.
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 a fault, which is printed (deck, disk, physics, peer); 2 wrong flags; 130 \
@@ -128,6 +128,8 @@ pub enum Command {
         #[command(flatten)]
         reading: ReadingArgs,
     },
+    /// Compute a results folder again and name the first cycle and place that differ
+    Verify(VerifyArgs),
     /// Draw a state of a results folder as a PNG, coloured by a field
     Picture(PictureArgs),
     /// Write an LS-DYNA keyword deck as a TOML deck, with its mesh in a file beside it

@@ -59,4 +59,5 @@ pub mod snapshot;
 pub mod sort;
 pub mod spool;
 pub mod summarise;
+pub mod verify;
 pub mod world;

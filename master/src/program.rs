@@ -21,7 +21,7 @@ use crate::{
     ca_folder::CaFolder,
     certs, client,
     command::{Bench, Certs, Cli, Command, WorkerArgs},
-    convert, daemon, deck_file, machine, memory, newcomer, picture, processes, run, simulate,
+    convert, daemon, deck_file, machine, memory, newcomer, picture, processes, run, simulate, verify,
 };
 
 /// The log: to standard error, of the levels that `BOLIDE_LOG` says (`debug`, or by module `info,worker=debug`), else from
@@ -63,6 +63,7 @@ pub fn main(compute: Compute) -> ExitCode {
         Command::Man { out } => manual(out.as_deref()),
         Command::Check { deck, reading } => check(&deck, &reading.options()),
         Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
+        Command::Verify(args) => verify::run(&args),
         Command::Picture(args) => picture::run(&args),
         Command::Materials => {
             for name in deck::materials() {

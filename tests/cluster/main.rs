@@ -9,6 +9,7 @@ mod peers;
 mod runs;
 mod slurm;
 mod trust;
+mod verify;
 
 use std::{process::Command, sync::OnceLock};
 

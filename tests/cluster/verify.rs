@@ -1,0 +1,127 @@
+//! A results folder that is computed again: equal, or one flipped bit is named with its place.
+
+use std::{fs, path::Path, process::Command};
+
+use tests::cluster::{Said, said};
+
+use crate::{BOLIDE, small};
+
+fn verify(results: &Path, arguments: &[&str]) -> Said {
+    let mut command = Command::new(BOLIDE);
+    said(command.arg("verify").arg(results).args(["--deck", &small(), "--threads", "1"]).args(arguments))
+}
+
+/// Flips the lowest bit of a byte.
+fn flip(path: &Path, at: usize) {
+    let mut bytes = fs::read(path).expect("a file of the run");
+    bytes[at] ^= 1;
+    fs::write(path, bytes).expect("room");
+}
+
+#[test]
+fn a_folder_is_equal_until_a_bit_of_a_row_a_state_or_a_snapshot_flips() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let mut command = Command::new(BOLIDE);
+    command.args(["run", &small(), "--workers", "2", "--threads", "1", "--cycles", "300"]);
+    command.args(["--snapshot-cycles", "60", "--out"]).arg(&out);
+    let ran = said(&mut command);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+
+    let equal = verify(&out, &[]);
+    assert_eq!(equal.code, Some(0), "{equal:?}");
+    assert!(equal.out.contains("cycles 0 to 300: all is equal"), "{equal:?}");
+    let beyond = verify(&out, &["--interval", "9"]);
+    assert!(beyond.err.contains("--interval 9: there are 3 (1: cycles 0 to "), "{beyond:?}");
+    let backward = verify(&out, &["--from", "200", "--to", "100"]);
+    assert!(backward.err.contains("the run has cycles 0 to 300"), "{backward:?}");
+
+    // The last digit of the last row.
+    let history = out.join("history.csv");
+    let text = fs::read_to_string(&history).expect("a history");
+    let digit = text.trim_end().rfind(|c: char| c.is_ascii_digit()).expect("a number");
+    flip(&history, digit);
+    let found = verify(&out, &["--interval", "3"]);
+    assert_eq!(found.code, Some(1), "{found:?}");
+    let cycle = text.lines().last().expect("a row").split(',').next().expect("a cell");
+    assert!(found.out.contains(&format!("history.csv, row of cycle {cycle}: ")), "{found:?}");
+    assert!(found.out.contains("computed again to"), "{found:?}");
+    // It is not in the first interval.
+    assert_eq!(verify(&out, &["--interval", "1"]).code, Some(0));
+    fs::write(&history, text).expect("room");
+
+    // In the size of a block, where compressed numbers stay the same, and within the numbers.
+    let state = out.join("state-000000.vtu");
+    let bytes = fs::read(&state).expect("a state");
+    let marker = b"<AppendedData encoding=\"raw\">\n_";
+    let start = bytes.windows(marker.len()).position(|window| window == marker).expect("numbers");
+    let words =
+        [(11, "its numbers are equal, its byte"), (100, "its numbers are equal"), (140, "array velocity")];
+    for (offset, words) in words {
+        flip(&state, start + marker.len() + offset);
+        let found = verify(&out, &["--interval", "1"]);
+        assert_eq!(found.code, Some(1), "byte {offset}: {found:?}");
+        assert!(found.out.contains("the first difference is in cycle 0: state-000000.vtu: "), "{found:?}");
+        assert!(found.out.contains(words), "{found:?}");
+        fs::write(&state, &bytes).expect("room");
+    }
+
+    // A state whose numbers are others: that of another run.
+    let other = folder.path().join("other");
+    let text = fs::read_to_string(small()).expect("the deck");
+    let deck = folder.path().join("other.toml");
+    fs::write(&deck, text.replace("[0, 0, -0.05]", "[0, 0, -0.0500001]")).expect("room");
+    let ran = said(Command::new(BOLIDE).arg("run").arg(&deck).args(["--cycles", "1", "--out"]).arg(&other));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    fs::copy(other.join("state-000000.vtu"), &state).expect("room");
+    let found = verify(&out, &["--interval", "1"]);
+    assert!(
+        found.out.contains("velocity of node ")
+            && found.out.contains("is -0.0500001, computed again to -0.05"),
+        "{found:?}"
+    );
+    fs::write(&state, &bytes).expect("room");
+
+    let snapshots =
+        fs::read_dir(out.join("snapshots")).expect("snapshots").map(|f| f.expect("a file").path());
+    let snapshot =
+        snapshots.filter(|path| path.extension().is_some_and(|e| e == "bolide")).min().expect("one");
+    flip(&snapshot, 4000);
+    let found = verify(&out, &[]);
+    assert_eq!(found.code, Some(1), "{found:?}");
+    assert!(found.out.contains("checksum"), "{found:?}");
+}
+
+#[test]
+fn a_folder_of_a_run_with_another_end_or_without_its_last_files_is_told_from_a_damaged_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let mut command = Command::new(BOLIDE);
+    command.args(["run", &small(), "--threads", "1", "--end-time", "50", "--out"]).arg(&out);
+    let ran = said(&mut command);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let equal = verify(&out, &["--end-time", "50"]);
+    assert_eq!(equal.code, Some(0), "{equal:?}");
+    // Another end shows in the last step, not before.
+    let found = verify(&out, &[]);
+    assert_eq!(found.code, Some(1), "{found:?}");
+    let (first, _) = found.out.split_once(": history.csv, row of cycle ").expect("the last row differs");
+    let cycle = first.rsplit(' ').next().and_then(|word| word.parse::<u64>().ok());
+    assert!(cycle > Some(100), "{found:?}");
+
+    // A killed run has no summary, and its last state may not have come to the disk.
+    let index = fs::read_to_string(out.join("results.pvd")).expect("an index");
+    let lines: Vec<&str> = index
+        .lines()
+        .filter(|line| !["state-000002", "state-000003"].iter().any(|name| line.contains(name)))
+        .collect();
+    fs::write(out.join("results.pvd"), lines.join("\n")).expect("room");
+    fs::remove_file(out.join("summary.json")).expect("a summary");
+    let killed = verify(&out, &["--end-time", "50"]);
+    assert_eq!(killed.code, Some(0), "{killed:?}");
+    // One that is missing between two others was there.
+    let lines: Vec<&str> = index.lines().filter(|line| !line.contains("state-000001")).collect();
+    fs::write(out.join("results.pvd"), lines.join("\n")).expect("room");
+    let found = verify(&out, &["--end-time", "50"]);
+    assert_eq!(found.code, Some(1), "{found:?}");
+}
