@@ -23,6 +23,7 @@ mod log;
 mod make;
 pub mod mesh_file;
 pub mod model;
+pub mod physics;
 mod place;
 pub mod table;
 mod toml_deck;

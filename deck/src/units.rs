@@ -22,6 +22,9 @@ pub struct Units {
     pub takes_materials: bool,
 }
 
+/// The set that the library is not converted to.
+const INCHES: &str = "in-s-lbf";
+
 /// Every set a deck may name.
 pub const SETS: [Units; 5] = [
     Units {
@@ -57,7 +60,7 @@ pub const SETS: [Units; 5] = [
         takes_materials: true,
     },
     Units {
-        name: "in-s-lbf",
+        name: INCHES,
         length: 0,
         mass: 0,
         time: 0,
@@ -67,6 +70,21 @@ pub const SETS: [Units; 5] = [
 ];
 
 impl Units {
+    /// The set of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        SETS.into_iter().find(|set| set.name == name)
+    }
+
+    /// Units of length, mass and time in m, kg and s.
+    pub fn in_si(&self) -> [f64; 3] {
+        if self.name == INCHES {
+            // An inch, and the mass that a pound-force accelerates by an inch per square second.
+            return [0.0254, 175.126_835_246_476_7, 1.0];
+        }
+        // The powers of `scale` are those of a unit in SI, the other way round.
+        [self.length, self.mass, self.time].map(|power| scale(1.0, -power))
+    }
+
     fn velocity(&self) -> i32 {
         self.length - self.time
     }
@@ -225,6 +243,21 @@ mod tests {
         assert_eq!(scale(1e9, set("mm-ms-kg").stress()).to_bits(), 1.0f64.to_bits());
         assert_eq!(scale(1e6, set("mm-s-t").stress()).to_bits(), 1.0f64.to_bits());
         assert_eq!(scale(8000.0, set("mm-s-t").density()).to_bits(), 8e-9f64.to_bits());
+    }
+
+    #[test]
+    fn steel_weighs_the_same_in_every_set() {
+        for (name, density) in [
+            ("SI", 7850.0),
+            ("cm-g-us", 7.85),
+            ("mm-ms-kg", 7.85e-6),
+            ("mm-s-t", 7.85e-9),
+            ("in-s-lbf", 7.3454e-4),
+        ] {
+            let [length, mass, _] = set(name).in_si();
+            let si = density * mass / (length * length * length);
+            assert!((si / 7850.0 - 1.0).abs() < 1e-4, "{name}: {si}");
+        }
     }
 
     #[test]

@@ -21,7 +21,7 @@ use protocol::{
 
 use crate::{
     command::{ClientArgs, SubmitArgs},
-    deck_file::{self, gather_deck, warn},
+    deck_file::{self, doubt, gather_deck, warn},
     machine::host_name,
     results::{Folder, create_anew},
 };
@@ -149,6 +149,7 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     // The master answers with faults; what a run does otherwise than the deck says is told here.
     if let Ok(reading) = deck::read_whole(&text, &name) {
         warn(&reading.warnings);
+        doubt(&reading.model);
     }
     let options = JobOptions {
         min_workers: args.min_workers,

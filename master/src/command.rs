@@ -120,10 +120,13 @@ pub enum Command {
         #[command(subcommand)]
         what: Certs,
     },
-    /// List every error of a deck without running it
+    /// List every error of a deck, or what a run of it would take and what in it is hardly meant, without running it
     Check {
         /// The deck
         deck: PathBuf,
+        /// Print JSON on standard output, faults too
+        #[arg(long)]
+        json: bool,
         /// What a keyword deck does not say
         #[command(flatten)]
         reading: ReadingArgs,

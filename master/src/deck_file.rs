@@ -5,6 +5,7 @@ use std::{fmt, path::Path};
 use deck::{
     bundle::{self, Options as Reading},
     model::Model,
+    physics,
 };
 
 /// Reads and checks a deck.
@@ -24,12 +25,20 @@ pub fn read_deck_with(path: &Path, options: &Reading) -> Result<Model, Error> {
     let reading = deck::read_whole(&text, &path.display().to_string())
         .map_err(|faults| Error::of_faults(faults.iter().map(ToString::to_string)))?;
     warn(&reading.warnings);
+    doubt(&reading.model);
     Ok(reading.model)
 }
 
 /// Tells what is done otherwise than a deck says, on standard error.
 pub fn warn(warnings: &[deck::Warning]) {
     for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}
+
+/// Tells what is hardly meant by a deck that runs, on standard error.
+pub fn doubt(model: &Model) {
+    for warning in physics::forecast(model).warnings {
         eprintln!("warning: {warning}");
     }
 }

@@ -11,6 +11,7 @@ pub mod balance;
 pub mod bench;
 pub mod ca_folder;
 pub mod certs;
+pub mod check;
 pub mod client;
 pub mod client_requests;
 pub mod command;

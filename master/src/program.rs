@@ -5,7 +5,6 @@
 use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 
 use clap::{CommandFactory, Parser};
-use deck::bundle::Options;
 use protocol::{
     handshake,
     shape::{Shape, Wire},
@@ -19,9 +18,9 @@ use crate::{
     add, bench,
     bench::grind::Speed,
     ca_folder::CaFolder,
-    certs, client,
+    certs, check, client,
     command::{Bench, Certs, Cli, Command, WorkerArgs},
-    convert, daemon, deck_file, machine, memory, newcomer, picture, processes, run, simulate, verify,
+    convert, daemon, machine, memory, newcomer, picture, processes, run, simulate, verify,
 };
 
 /// The log: to standard error, of the levels that `BOLIDE_LOG` says (`debug`, or by module `info,worker=debug`), else from
@@ -61,7 +60,7 @@ pub fn main(compute: Compute) -> ExitCode {
             Ok(ExitCode::SUCCESS)
         }
         Command::Man { out } => manual(out.as_deref()),
-        Command::Check { deck, reading } => check(&deck, &reading.options()),
+        Command::Check { deck, json, reading } => check::run(&deck, json, &reading.options()),
         Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
         Command::Verify(args) => verify::run(&args),
         Command::Picture(args) => picture::run(&args),
@@ -176,17 +175,5 @@ fn manual(folder: Option<&Path>) -> Result<ExitCode, String> {
             clap_mangen::generate_to(command, folder).map_err(fault)?;
         }
     }
-    Ok(ExitCode::SUCCESS)
-}
-
-fn check(path: &Path, options: &Options) -> Result<ExitCode, String> {
-    let model = deck_file::read_deck_with(path, options)?;
-    println!(
-        "{}: no fault; {} parts, {} elements, {} nodes",
-        path.display(),
-        model.mesh.parts.len(),
-        model.mesh.n_elements(),
-        model.mesh.n_nodes()
-    );
     Ok(ExitCode::SUCCESS)
 }

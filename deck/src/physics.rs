@@ -1,0 +1,253 @@
+//! PHYSICS: what a checked deck describes, in SI: mass, speed and cells of each part, the cycles and the memory that a run takes,
+//! and doubts about what no form of a deck forbids but hardly anybody means.
+//!
+//! A [`Forecast`] comes from the model alone, so that decks of either format are doubted alike. It looks at boxes and mean velocities
+//! and not at single faces: a doubt is a hint and never keeps a deck from running.
+
+mod bodies;
+mod doubts;
+
+use mechanics::{
+    initial::closing_speeds,
+    mesh::{CORNERS, Part, Topology},
+};
+use serde::Serialize;
+
+use crate::{
+    geometry::{EDGES, dot, norm, scaled, sub},
+    model::Model,
+    units::Units,
+};
+
+/// Thread time for an element and cycle that the wall time is reckoned with (ns): hexahedra with contact on a PC of 2023.
+pub const GRIND_NS: f64 = 60.0;
+/// Share of the gap that a node travels in a cycle at most, as the votes of contact have it.
+const TRAVEL: f64 = 0.16;
+/// Memory of master and worker for an element, measured with contact and states, and for any run (bytes).
+const OF_ELEMENT: u64 = 1_600;
+const OF_RUN: u64 = 64 << 20;
+
+/// What to expect of a run. Lengths, masses and times in m, kg and s.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Forecast {
+    pub title: String,
+    /// Name of the deck's units.
+    pub units: String,
+    pub parts: Vec<PartForecast>,
+    pub elements: u64,
+    pub nodes: u64,
+    /// The step that the undeformed mesh and the speed of contact allow (s); none where nothing limits it. Springs of contact may ask
+    /// for less.
+    pub first_step_s: Option<f64>,
+    /// When the run ends (s).
+    pub end_time_s: f64,
+    /// Cycles to the end at the first step; a run takes more as elements become flatter, and fewer as bodies are slowed down.
+    pub cycles: Option<u64>,
+    /// Of master and worker together, on one PC.
+    pub memory_bytes: u64,
+    /// Seconds on one thread at [`GRIND_NS`] for an element and cycle.
+    pub thread_s: Option<f64>,
+    /// What is hardly meant, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// What stands in a deck about one part.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartForecast {
+    pub name: String,
+    pub material: String,
+    pub elements: u64,
+    pub mass_kg: f64,
+    pub centre_m: [f64; 3],
+    /// Mean velocity by mass.
+    pub velocity_m_s: [f64; 3],
+    pub speed_m_s: f64,
+    /// The thinnest way through an element.
+    pub least_cell_m: f64,
+    /// The step that its elements allow; none of rigid bodies and trusses, which allow any.
+    pub step_s: Option<f64>,
+}
+
+/// A part as the doubts look at it, in the units of the deck.
+struct Measured {
+    mass: f64,
+    centre: [f64; 3],
+    velocity: [f64; 3],
+    /// Whether every node starts at that velocity.
+    translates: bool,
+    /// Greatest speed of a node.
+    fastest: f64,
+    low: [f64; 3],
+    high: [f64; 3],
+    /// Thinnest way through an element; of a shell, across its plane.
+    least_cell: f64,
+    /// Typical side of an element.
+    cell: f64,
+    /// Longest edge over that way, of the flattest element, and its index in the part.
+    flattest: (f64, usize),
+    /// Infinite where its elements allow any step.
+    step: f64,
+}
+
+/// Looks at a checked model.
+pub fn forecast(model: &Model) -> Forecast {
+    let units = Units::named(&model.units);
+    let [length, mass, time] = units.map_or([1.0; 3], |units| units.in_si());
+    let measured: Vec<Measured> = (0..model.mesh.parts.len()).map(|p| measure(model, p)).collect();
+    let of_contact = model.setup.contact.as_ref().map_or(f64::INFINITY, |contact| {
+        let speeds = closing_speeds(&model.mesh, contact, &model.velocity);
+        TRAVEL * contact.gap / speeds.into_iter().fold(0.0, f64::max)
+    });
+    let step = measured.iter().map(|part| part.step).fold(of_contact, f64::min);
+    let end = model.setup.control.end_time;
+    let elements = model.mesh.n_elements() as u64;
+    let cycles =
+        step.is_finite().then(|| ((end / step).ceil() as u64).clamp(1, model.setup.control.end_cycle));
+    let part = |(part, of): (&Part, &Measured)| PartForecast {
+        name: part.name.clone(),
+        material: model.setup.materials[part.material as usize].name.clone(),
+        elements: part.n_elements() as u64,
+        mass_kg: of.mass * mass,
+        centre_m: of.centre.map(|x| x * length),
+        velocity_m_s: of.velocity.map(|v| v * length / time),
+        speed_m_s: norm(of.velocity) * length / time,
+        least_cell_m: of.least_cell * length,
+        step_s: of.step.is_finite().then_some(of.step * time),
+    };
+    Forecast {
+        title: model.title.clone(),
+        units: model.units.clone(),
+        parts: model.mesh.parts.iter().zip(&measured).map(part).collect(),
+        elements,
+        nodes: model.mesh.n_nodes() as u64,
+        first_step_s: step.is_finite().then_some(step * time),
+        end_time_s: end * time,
+        cycles,
+        memory_bytes: OF_RUN.saturating_add(elements.saturating_mul(OF_ELEMENT)),
+        thread_s: cycles.map(|cycles| cycles as f64 * elements as f64 * GRIND_NS * 1e-9),
+        warnings: doubts::of(model, &measured, units, cycles),
+    }
+}
+
+fn measure(model: &Model, index: usize) -> Measured {
+    let (mesh, setup) = (&model.mesh, &model.setup);
+    let part = &mesh.parts[index];
+    let material = &setup.materials[part.material as usize];
+    let is_rigid = setup.bodies.iter().any(|body| body.parts.binary_search(&(index as u32)).is_ok());
+    let sound = ((material.bulk() + 4.0 / 3.0 * material.shear()) / material.density).sqrt();
+    let mut this = Measured {
+        mass: 0.0,
+        centre: [0.0; 3],
+        velocity: [0.0; 3],
+        translates: true,
+        fastest: 0.0,
+        low: [f64::INFINITY; 3],
+        high: [f64::NEG_INFINITY; 3],
+        least_cell: f64::INFINITY,
+        cell: 0.0,
+        flattest: (0.0, 0),
+        step: f64::INFINITY,
+    };
+    let (mut volume, mut area) = (0.0, 0.0);
+    for e in 0..part.n_elements() {
+        let corners = part.corners(e);
+        let x = corners.map(|n| mesh.positions[n as usize]);
+        let (v, longest) = (part.volume(&x), longest_edge(&x));
+        let thinnest = match &part.topology {
+            Topology::Shells { section, .. } => v / (section.thickness * longest),
+            Topology::Trusses { .. } => longest,
+            Topology::Structured { .. } | Topology::Explicit { .. } => thinnest_way(&x),
+        };
+        volume += v;
+        area += part.thickness().map_or(0.0, |thickness| v / thickness);
+        this.least_cell = this.least_cell.min(thinnest);
+        if longest / thinnest > this.flattest.0 {
+            this.flattest = (longest / thinnest, e);
+        }
+        for (x, n) in x.iter().zip(corners) {
+            for axis in 0..3 {
+                this.centre[axis] += 0.125 * v * x[axis];
+                this.velocity[axis] += 0.125 * v * model.velocity[n as usize][axis];
+            }
+        }
+    }
+    this.centre = scaled(this.centre, 1.0 / volume);
+    this.velocity = scaled(this.velocity, 1.0 / volume);
+    this.mass = material.density * volume;
+    for &n in &part.nodes {
+        let (x, v) = (mesh.positions[n as usize], model.velocity[n as usize]);
+        this.fastest = this.fastest.max(norm(v));
+        for axis in 0..3 {
+            this.low[axis] = this.low[axis].min(x[axis]);
+            this.high[axis] = this.high[axis].max(x[axis]);
+        }
+    }
+    let even = 1e-6 * this.fastest;
+    this.translates =
+        part.nodes.iter().all(|&n| norm(sub(model.velocity[n as usize], this.velocity)) <= even);
+    if let (true, Some(&node)) = (this.translates, part.nodes.first()) {
+        // Without the rounding of a mean.
+        this.velocity = model.velocity[node as usize];
+    }
+    let n = part.n_elements().max(1) as f64;
+    this.cell = match &part.topology {
+        Topology::Shells { .. } => (area / n).sqrt(),
+        Topology::Trusses { .. } => this.least_cell,
+        Topology::Structured { .. } | Topology::Explicit { .. } => libm::cbrt(volume / n),
+    };
+    if !is_rigid && part.n_corners() > 2 {
+        // Linear viscosity damps the fastest wave of an element, and its step with it.
+        let q = setup.control.linear_viscosity;
+        let damped = (1.0 + q * q).sqrt() - q;
+        this.step = setup.control.safety_factor * damped * this.least_cell / sound;
+    }
+    this
+}
+
+fn longest_edge(x: &[[f64; 3]; 8]) -> f64 {
+    EDGES.iter().map(|&[a, b]| norm(sub(x[b], x[a]))).fold(0.0, f64::max)
+}
+
+/// The thinnest way through a hexahedron, as the time step sees it: twice the least singular value of the Jacobian in its middle.
+fn thinnest_way(x: &[[f64; 3]; 8]) -> f64 {
+    // Columns of the Jacobian: half the vectors that join the middles of opposite faces.
+    let columns: [[f64; 3]; 3] = std::array::from_fn(|i| {
+        std::array::from_fn(|a| 0.125 * x.iter().zip(CORNERS).map(|(x, sign)| sign[i] * x[a]).sum::<f64>())
+    });
+    let [u, v, w] = columns;
+    let m = [dot(u, u), dot(v, v), dot(w, w), dot(u, v), dot(v, w), dot(w, u)];
+    2.0 * least_eigenvalue(m).max(0.0).sqrt()
+}
+
+/// The least eigenvalue of a symmetric matrix xx, yy, zz, xy, yz, zx: the trigonometric solution of its cubic.
+fn least_eigenvalue([xx, yy, zz, xy, yz, zx]: [f64; 6]) -> f64 {
+    let mean = (xx + yy + zz) / 3.0;
+    let (a, b, c) = (xx - mean, yy - mean, zz - mean);
+    let square = (a * a + b * b + c * c + 2.0 * (xy * xy + yz * yz + zx * zx)) / 6.0;
+    let p = square.sqrt();
+    if p <= f64::EPSILON * mean {
+        return mean;
+    }
+    let determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
+    let angle = libm::acos((0.5 * determinant / (square * p)).clamp(-1.0, 1.0)) / 3.0;
+    mean + 2.0 * p * libm::cos(angle + 2.0 * std::f64::consts::FRAC_PI_3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_thinnest_way_through_a_cell_does_not_depend_on_how_it_is_turned() {
+        let (cos, sin) = (0.6, 0.8);
+        let corner = |sign: [f64; 3]| {
+            let [x, y, z] = [0.5 * sign[0], sign[1], 1.5 * sign[2]];
+            [cos * x - sin * y, sin * x + cos * y, z]
+        };
+        assert!((thinnest_way(&CORNERS.map(corner)) - 1.0).abs() < 1e-12);
+        // A cube of side 2 that is sheared by one side: the least singular value of [[1, 1], [0, 1]] is (sqrt 5 - 1) / 2.
+        let sheared = CORNERS.map(|[x, y, z]| [x + y, y, 2.0 * z]);
+        assert!((thinnest_way(&sheared) - (5.0_f64.sqrt() - 1.0)).abs() < 1e-12);
+        assert!((thinnest_way(&CORNERS) - 2.0).abs() < 1e-12);
+    }
+}

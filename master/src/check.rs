@@ -1,0 +1,131 @@
+//! CHECK: `bolide check`, the faults of a deck, or what a run of it would take and what in it is hardly meant.
+
+use std::{path::Path, process::ExitCode};
+
+use deck::{
+    Fault, Warning,
+    bundle::Options,
+    fault::short,
+    physics::{self, Forecast, GRIND_NS},
+};
+use serde::Serialize;
+
+use crate::deck_file::{Error, gather_deck, warn};
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Checked {
+    deck: String,
+    /// A line each; a deck with faults has no forecast.
+    faults: Vec<String>,
+    /// Of the reader and of the physics, a line each.
+    warnings: Vec<String>,
+    forecast: Option<Forecast>,
+}
+
+/// Checks a deck.
+///
+/// # Errors
+/// Its faults, one per line.
+pub fn run(path: &Path, json: bool, options: &Options) -> Result<ExitCode, String> {
+    let name = path.display().to_string();
+    let text = gather_deck(path, options)?;
+    let lines = |faults: &[Fault]| faults.iter().map(Fault::to_string).collect::<Vec<_>>();
+    let read = deck::read_whole(&text, &name);
+    let forecast = read.as_ref().ok().map(|reading| physics::forecast(&reading.model));
+    if !json {
+        let reading = read.map_err(|faults| Error::of_faults(lines(&faults)))?;
+        warn(&reading.warnings);
+        if let Some(forecast) = &forecast {
+            forecast.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+            print!("{name}: no fault{}", words(forecast));
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let code = if read.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+    let of_reader = read.as_ref().map_or(&[][..], |reading| &reading.warnings);
+    let of_physics = forecast.iter().flat_map(|forecast| forecast.warnings.clone());
+    let checked = Checked {
+        deck: name,
+        warnings: of_reader.iter().map(Warning::to_string).chain(of_physics).collect(),
+        faults: read.as_ref().err().map_or_else(Vec::new, |faults| lines(faults)),
+        forecast,
+    };
+    println!("{}", serde_json::to_string_pretty(&checked).map_err(|e| e.to_string())?);
+    Ok(code)
+}
+
+/// The forecast of a deck without a fault, from the end of its first line on.
+fn words(forecast: &Forecast) -> String {
+    let Forecast { parts, elements, nodes, .. } = forecast;
+    let count = forecast.warnings.len();
+    let doubts = match count {
+        0 => String::new(),
+        1 => ", 1 warning".to_owned(),
+        _ => format!(", {count} warnings"),
+    };
+    let mut text = format!("{doubts}; {} parts, {elements} elements, {nodes} nodes\n", parts.len());
+    let width = parts.iter().map(|part| part.name.chars().count()).max().unwrap_or(0).max(4);
+    text += &format!(
+        "  {:width$}  {:>10}  {:>10}  {:>10}  {:>12}  {:>10}\n",
+        "part", "elements", "mass kg", "speed m/s", "least cell m", "step s"
+    );
+    for part in parts {
+        let step = part.step_s.map_or_else(|| "any".to_owned(), digits);
+        text += &format!(
+            "  {:width$}  {:>10}  {:>10}  {:>10}  {:>12}  {:>10}\n",
+            part.name,
+            part.elements,
+            digits(part.mass_kg),
+            digits(part.speed_m_s),
+            digits(part.least_cell_m),
+            step
+        );
+    }
+    let run = match (forecast.first_step_s, forecast.cycles, forecast.thread_s) {
+        (Some(step), Some(cycles), Some(seconds)) => format!(
+            "first step {} s, {cycles} cycles to {} s, {} of thread time at {GRIND_NS} ns per element and cycle",
+            digits(step),
+            digits(forecast.end_time_s),
+            span(seconds)
+        ),
+        _ => format!("to {} s; the mesh limits no step", digits(forecast.end_time_s)),
+    };
+    text + &format!("  {run}\n  memory {} of master and worker\n", size(forecast.memory_bytes))
+}
+
+/// Four digits of a number.
+fn digits(x: f64) -> String {
+    short(format!("{x:.3e}").parse().unwrap_or(x))
+}
+
+/// A time that a person waits for.
+fn span(seconds: f64) -> String {
+    match seconds {
+        s if s < 1.0 => "less than 1 s".to_owned(),
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.1} days", s / 86_400.0),
+    }
+}
+
+fn size(bytes: u64) -> String {
+    match bytes as f64 {
+        b if b < 1e9 => format!("{:.0} MB", b / 1e6),
+        b => format!("{:.1} GB", b / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_and_sizes_are_told_in_units_that_fit() {
+        let spans = [0.2, 5.0, 600.0, 36_000.0, 864_000.0].map(span);
+        assert_eq!(spans, ["less than 1 s", "5 s", "10 min", "10.0 h", "10.0 days"]);
+        assert_eq!([300_000_000, 3_400_000_000].map(size), ["300 MB", "3.4 GB"]);
+        assert_eq!([1.234_56e-9, 7.850_04].map(digits), ["1.235e-9", "7.85"]);
+    }
+}
