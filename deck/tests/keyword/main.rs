@@ -555,7 +555,7 @@ fn beams_of_elform_3_are_trusses_with_the_area_of_their_section() {
 
 #[test]
 fn a_parameter_from_outside_replaces_that_of_the_deck_and_expressions_follow() {
-    let text = "*KEYWORD\n*PARAMETER\nRv,5.0,Rhalf,1.0\n*PARAMETER_EXPRESSION\nRend,&v*2e-6\n*CONTROL_TERMINATION\n&end\n*PART\ncube\n1,1,1\n\
+    let text = "*KEYWORD\n*PARAMETER\nRv,5.0,Rhalf,1.0\n*PARAMETER_EXPRESSION\nRend,&v*2\n*CONTROL_TERMINATION\n&end\n*PART\ncube\n1,1,1\n\
                 *SECTION_SOLID\n1,1\n*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n\
                 8,0,1,1\n*ELEMENT_SOLID\n1,1,1,2,3,4,5,6,7,8\n*END\n";
     let read = |name: &str, value: f64| {
@@ -564,7 +564,7 @@ fn a_parameter_from_outside_replaces_that_of_the_deck_and_expressions_follow() {
         deck::read(&text, "a.k")
     };
     let end = read("v", 50.0).expect("a good deck").setup.control.end_time;
-    assert_eq!(end.to_bits(), 1e-4_f64.to_bits(), "{end}");
+    assert_eq!(end.to_bits(), 100.0_f64.to_bits(), "{end}");
     let faults = read("w", 1.0).expect_err("no such parameter");
     assert_eq!(
         lines(&faults),

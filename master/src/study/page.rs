@@ -57,7 +57,7 @@ pub fn page(study: &Study, outcomes: &Outcomes) -> String {
     body.push_str(&runs(study, outcomes));
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
-         content=\"width=device-width\"><title>{}</title>\n<style>{STYLE}\ntd code{{white-space:nowrap;font-size:11px}}</style></head>\n<body>\n{body}</body></html>\n",
+         content=\"width=device-width\"><title>{}</title>\n<style>{STYLE}\ntd code{{white-space:nowrap;font-size:11px;display:block;text-align:left}}</style></head>\n<body>\n{body}</body></html>\n",
         escaped(&study.title)
     )
 }
