@@ -22,7 +22,9 @@ pub const MAX_PARAMETER: usize = 32;
 /// Whether a name may be that of a parameter: small letters, digits and underscores, a letter first.
 pub fn is_parameter(name: &str) -> bool {
     let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-    name.starts_with(|c: char| c.is_ascii_lowercase())
+    // Expressions know `pi` by themselves.
+    name != "pi"
+        && name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.len() <= MAX_PARAMETER
         && name.chars().all(fits)
 }
@@ -196,7 +198,7 @@ mod tests {
     #[test]
     fn names_are_small_letters_digits_and_underscores() {
         assert!(is_parameter("thickness_2"));
-        for bad in ["", "2t", "Thick", "a b", "a-b", "_a", &"a".repeat(33)] {
+        for bad in ["", "pi", "2t", "Thick", "a b", "a-b", "_a", &"a".repeat(33)] {
             assert!(!is_parameter(bad), "{bad}");
         }
         assert_eq!(names_in("2e3 * max(t, v_0) + pi + 1.5e-3").collect::<Vec<_>>(), ["t", "v_0"]);

@@ -214,7 +214,8 @@ impl Cache {
         Ok(entry)
     }
 
-    /// Removes the entries that were not used for the longest time until the rest is small enough. Those of this process go last.
+    /// Removes the entries that were not used for the longest time until the rest is small enough; runs that nobody computes any more count as
+    /// such. Those that this process has used go last.
     fn shrink(&self) {
         let Ok(entries) = fs::read_dir(&self.folder) else { return };
         let used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
@@ -222,8 +223,14 @@ impl Cache {
             .flatten()
             .filter_map(|entry| {
                 let path = entry.path();
-                let name = entry.file_name().into_string().ok().filter(|name| is_identity(name))?;
-                let time = fs::metadata(path.join(SUMS)).and_then(|m| m.modified()).ok()?;
+                let name = entry.file_name().into_string().ok()?;
+                let (name, dated) = match name.strip_suffix(PART) {
+                    Some(identity) if self.is_left(identity) => (identity.to_owned(), path.clone()),
+                    Some(_) => return None,
+                    None => (name, path.join(SUMS)),
+                };
+                let time =
+                    fs::metadata(dated).and_then(|m| m.modified()).ok().filter(|_| is_identity(&name))?;
                 Some((used.contains(&name), time, bytes_in(&path), path))
             })
             .collect();
@@ -235,12 +242,14 @@ impl Cache {
             }
             // One that cannot be removed is tried again next time.
             if fs::remove_dir_all(&path).is_ok() {
-                if let Some(name) = path.file_name() {
-                    let _ = fs::remove_file(self.folder.join("locks").join(name));
-                }
                 all -= bytes;
             }
         }
+    }
+
+    /// Whether nobody computes the run of an identity.
+    fn is_left(&self, identity: &str) -> bool {
+        File::open(self.folder.join("locks").join(identity)).is_ok_and(|lock| lock.try_lock().is_ok())
     }
 }
 
@@ -250,7 +259,11 @@ fn is_identity(name: &str) -> bool {
 
 fn bytes_in(folder: &Path) -> u64 {
     let files = fs::read_dir(folder).into_iter().flatten().flatten();
-    files.filter_map(|file| file.metadata().ok()).map(|metadata| metadata.len()).sum()
+    let bytes = |file: fs::DirEntry| match file.metadata() {
+        Ok(metadata) if metadata.is_dir() => bytes_in(&file.path()),
+        metadata => metadata.map_or(0, |metadata| metadata.len()),
+    };
+    files.map(bytes).sum()
 }
 
 fn sum_of(path: &Path) -> io::Result<String> {
@@ -323,11 +336,20 @@ mod tests {
             let age = std::time::Duration::from_secs(1000 - u64::from(digit as u32));
             File::open(sums).and_then(|file| file.set_modified(SystemTime::now() - age)).expect("ours");
         }
+        // A run was left by a study that was killed, before all others.
+        let cut = folder.path().join(name('5') + PART);
+        drop(fill_all.begin(&name('5')).expect("a disk"));
+        fs::write(cut.join(HISTORY), "x".repeat(5_000)).expect("room");
+        File::open(&cut)
+            .and_then(|file| file.set_modified(SystemTime::now() - std::time::Duration::from_secs(5_000)))
+            .expect("ours");
         // A later process uses the oldest.
         let cache = Cache::open(folder.path(), 3_500).expect("a folder");
+        let under_way = cache.begin(&name('6')).expect("a disk").expect("not there");
         assert!(cache.look(&name('1')).is_some());
         fill(&cache, &name('4'), 1000);
         let left = ['1', '2', '3', '4'].map(|digit| folder.path().join(name(digit)).is_dir());
         assert_eq!(left, [true, false, false, true]);
+        assert!(!cut.is_dir() && under_way.folder().is_dir());
     }
 }

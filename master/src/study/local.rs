@@ -104,9 +104,15 @@ impl Place for Local {
 fn run(task: &Task, cache: &Cache, threads: usize, stop: &AtomicBool) -> Result<u64, RunError> {
     let Some(work) = cache.begin(&task.prepared.identity).map_err(RunError::Cache)? else { return Ok(0) };
     let model = task.prepared.model().map_err(|why| RunError::Compute(compute::Error::Physics(why)))?;
-    match compute(model, work.folder(), threads, stop).map_err(RunError::Compute)? {
-        End::Stopped => Err(RunError::Stopped),
-        End::Done { element_cycles } => {
+    match compute(model, work.folder(), threads, stop) {
+        Err(why @ compute::Error::Physics(_)) => {
+            // Begun again it would end in the same way. What cannot be removed is bounded with the rest.
+            let _ = std::fs::remove_dir_all(work.folder());
+            Err(RunError::Compute(why))
+        }
+        Err(why) => Err(RunError::Compute(why)),
+        Ok(End::Stopped) => Err(RunError::Stopped),
+        Ok(End::Done { element_cycles }) => {
             cache.commit(work).map_err(RunError::Cache)?;
             Ok(element_cycles)
         }

@@ -510,6 +510,28 @@ mod tests {
     }
 
     #[test]
+    fn no_damage_of_a_study_is_more_than_a_fault() {
+        let text = "title = \"t\"\ndeck = \"d.toml\"\npoints = [[1, 2]]\nwhere = [\"a * (b - 1) < 12\"]\nperturb = { nodes = 1e-9, samples = 2 }\n\
+                    [[parameter]]\nname = \"a\"\nfrom = 1\nto = 3\n[[parameter]]\nname = \"b\"\nvalues = [2]\n[[measure]]\nname = \"m\"\n\
+                    of = \"max(rear:uz) > min(a, b) and perforated by x through y\"\n[goal]\nkind = \"ballistic-limit\"\nparameter = \"a\"\n\
+                    measure = \"m\"\ntolerance = 1\n";
+        let path = Path::new("s.toml");
+        let mut random = 1;
+        assert!(read(text, path).is_ok());
+        for at in 0..text.len() {
+            let mut bytes = text.as_bytes().to_vec();
+            random = deck::perturb::mixed(random);
+            bytes[at] = b"()[]{}<>=\"#.,e-0 \n$~"[random as usize % 20];
+            for piece in [&bytes[..], &bytes[..at]] {
+                let text = std::str::from_utf8(piece).expect("letters of ASCII");
+                if let Ok(study) = read(text, path) {
+                    assert!(study.sites().len() <= MAX_POINTS);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn parameters_without_a_value_and_goals_without_a_range_are_faults() {
         let head = "title = \"t\"\ndeck = \"d.toml\"\n";
         for (text, words) in [

@@ -26,6 +26,8 @@ use crate::{client::Client, command::ClientArgs, deck_file, results::Summary};
 /// How long a master that has gone is dialled.
 const PATIENCE: Duration = Duration::from_secs(300);
 const DIAL_EVERY: Duration = Duration::from_millis(500);
+/// Seconds between states that a master keeps in memory of a run.
+const KEEP_EVERY: f64 = 10.0;
 /// How often jobs are looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(300);
 /// How often a run is put into the queue, or resumed, before it counts as failed.
@@ -40,6 +42,10 @@ pub struct Submitted<'a> {
     /// Jobs at once.
     most: usize,
     jobs: BTreeMap<u32, Tracked>,
+    /// What the master said last of all its jobs, and those that were put there since.
+    listed: Option<Vec<Status>>,
+    /// Runs that it did not take.
+    refused: Vec<Finished>,
     looked: Instant,
 }
 
@@ -55,18 +61,16 @@ impl<'a> Submitted<'a> {
     /// # Errors
     /// If it does not answer.
     pub fn new(study: &'a Study, at: &ClientArgs, cache: Arc<Cache>, most: usize) -> Result<Self, String> {
-        let client = Client::new(at)?;
-        Ok(Self { study, at: at.clone(), client, cache, most, jobs: BTreeMap::new(), looked: Instant::now() })
+        let (client, at) = (Client::new(at)?, at.clone());
+        let (jobs, refused) = (BTreeMap::new(), Vec::new());
+        Ok(Self { study, at, client, cache, most, jobs, listed: None, refused, looked: Instant::now() })
     }
 
     /// Asks the master, and once more when it is back if it went meanwhile. What is asked twice must do no harm.
     fn ask<T>(&mut self, mut what: impl FnMut(&mut Client) -> Result<T, String>) -> Result<T, String> {
         loop {
             match what(&mut self.client) {
-                Err(why) if self.client.gone => {
-                    warn!("{why}; dialling again for {} s", PATIENCE.as_secs());
-                    self.client = dial_again(&self.at, &why)?;
-                }
+                Err(why) if self.client.gone => self.dial_again(&why)?,
                 other => return other,
             }
         }
@@ -74,18 +78,50 @@ impl<'a> Submitted<'a> {
 
     /// Puts a run into the queue, unless a job there already is that run.
     fn submit(&mut self, task: &Task) -> Result<u32, String> {
-        let identity = task.prepared.identity.clone();
-        let title = title_of(&task.prepared.title, &identity);
-        let options = bundle::Options { title: Some(title), ..self.study.options_at(&task.point) };
+        let identity = &task.prepared.identity;
+        let title = title_of(&task.prepared.title, identity);
+        let options = bundle::Options { title: Some(title.clone()), ..self.study.options_at(&task.point) };
         let text = deck_file::gather_deck(&self.study.deck, &options)?;
-        let name = task.prepared.name.clone();
-        self.ask(|client| {
-            let known = client.jobs()?.into_iter().rev().find(|status| is_usable(status, &identity));
-            match known {
-                Some(status) => Ok(status.job),
-                None => client.submit(name.clone(), text.clone(), JobOptions::default()),
+        let asked = JobOptions { keep_every: Some(KEEP_EVERY), ..JobOptions::default() };
+        loop {
+            let jobs = match self.listed.take() {
+                Some(jobs) => jobs,
+                None => self.ask(Client::jobs)?,
+            };
+            let jobs = self.listed.insert(jobs);
+            if let Some(status) = jobs.iter().rev().find(|status| is_usable(status, identity)) {
+                return Ok(status.job);
             }
-        })
+            match self.client.submit(task.prepared.name.clone(), text.clone(), asked.clone()) {
+                Ok(job) => {
+                    jobs.push(Status::queued(job, title));
+                    return Ok(job);
+                }
+                // It may have taken the run before it went: that shows when it is back.
+                Err(why) if self.client.gone => self.dial_again(&why)?,
+                Err(why) => return Err(why),
+            }
+        }
+    }
+
+    /// Waits for a master that has gone.
+    fn dial_again(&mut self, why: &str) -> Result<(), String> {
+        warn!("{why}; dialling again for {} s", PATIENCE.as_secs());
+        let since = Instant::now();
+        self.listed = None;
+        loop {
+            std::thread::sleep(DIAL_EVERY);
+            match Client::new(&self.at) {
+                Ok(client) => {
+                    self.client = client;
+                    return Ok(());
+                }
+                Err(_) if since.elapsed() < PATIENCE => {}
+                Err(last) => {
+                    return Err(format!("{why}; then {last}; the same command goes on once it is back"));
+                }
+            }
+        }
     }
 
     /// Takes the results of a job into the cache; gives the element-cycles of the run.
@@ -148,8 +184,15 @@ impl Place for Submitted<'_> {
     }
 
     fn take(&mut self, task: Task, _: usize) -> Result<(), String> {
-        let job = self.submit(&task)?;
-        self.jobs.insert(job, Tracked { task, tries: 1 });
+        match self.submit(&task) {
+            Ok(job) => {
+                self.jobs.insert(job, Tracked { task, tries: 1 });
+            }
+            Err(why) if self.client.gone => return Err(why),
+            Err(why) => {
+                self.refused.push(Finished { point: task.point, result: Err(RunError::Elsewhere(why)) });
+            }
+        }
         Ok(())
     }
 
@@ -162,9 +205,10 @@ impl Place for Submitted<'_> {
         }
         std::thread::sleep(LOOK_EVERY.saturating_sub(self.looked.elapsed()));
         self.looked = Instant::now();
-        let statuses: BTreeMap<u32, Status> =
-            self.ask(Client::jobs)?.into_iter().map(|status| (status.job, status)).collect();
-        let mut finished = Vec::new();
+        let listed = self.ask(Client::jobs)?;
+        let statuses: BTreeMap<u32, Status> = listed.iter().map(|s| (s.job, s.clone())).collect();
+        self.listed = Some(listed);
+        let mut finished = std::mem::take(&mut self.refused);
         for job in self.jobs.keys().copied().collect::<Vec<_>>() {
             if let Some(result) = self.look(job, statuses.get(&job))?
                 && let Some(tracked) = self.jobs.remove(&job)
@@ -187,18 +231,6 @@ fn title_of(title: &str, identity: &str) -> String {
 fn is_usable(status: &Status, identity: &str) -> bool {
     let is_run = status.title.strip_suffix(']').is_some_and(|title| title.ends_with(&format!("[{identity}")));
     is_run && matches!(status.state, State::Queued | State::Running | State::Done | State::Held)
-}
-
-fn dial_again(at: &ClientArgs, why: &str) -> Result<Client, String> {
-    let since = Instant::now();
-    loop {
-        std::thread::sleep(DIAL_EVERY);
-        match Client::new(at) {
-            Ok(client) => return Ok(client),
-            Err(_) if since.elapsed() < PATIENCE => {}
-            Err(last) => return Err(format!("{why}; then {last}; the same command goes on once it is back")),
-        }
-    }
 }
 
 #[cfg(test)]
