@@ -1,7 +1,7 @@
 //! A deck and the files that it refers to, as one text: what is sent to a master, and what [`crate::read`] takes.
 //!
 //! A deck of one file and no options is its own text. Any other starts with the line `#bolide-bundle 1`; then come
-//! lines `units NAME`, `case NUMBER`, and for each file, the deck first, `file BYTES NAME` with its text below.
+//! lines `units NAME`, `case NUMBER`, `parameter NAME VALUE`, `title WORDS`, `perturb AMPLITUDE SEED`, and for each file, the deck first, `file BYTES NAME` with its text below.
 
 use std::collections::BTreeSet;
 
@@ -10,6 +10,9 @@ use toml::de::DeTable;
 use crate::{
     fault::{Fault, Faults},
     include::{beside, includes},
+    limits::MAX_TITLE,
+    parameters::{MAX_PARAMETERS, Parameters, is_parameter, substituted_if_possible},
+    perturb::Perturbation,
 };
 
 const FIRST: &str = "#bolide-bundle 1";
@@ -19,13 +22,19 @@ pub const MAX_FILES: usize = 1_000;
 /// Most bytes of a deck with its files.
 pub const MAX_BYTES: usize = 256 << 20;
 
-/// What a deck does not say itself. Only keyword decks need it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// What a deck does not say itself.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// Consistent units of a keyword deck; guessed from its densities where absent.
     pub units: Option<String>,
     /// The case of a keyword deck with several.
     pub case: Option<u32>,
+    /// Values of the parameters that the deck leaves open.
+    pub parameters: Parameters,
+    /// A title in place of the deck's, by which others tell its runs apart.
+    pub title: Option<String>,
+    /// How the nodes are moved once the mesh is made.
+    pub perturbation: Option<Perturbation>,
 }
 
 /// The kinds of text that are a deck.
@@ -84,6 +93,19 @@ impl<'a> Bundle<'a> {
                 "" => {}
                 "units" => bundle.options.units = Some(rest.to_string()),
                 "case" => bundle.options.case = Some(rest.parse().map_err(|_| broken(start))?),
+                "parameter" => {
+                    let (name, value) = parameter(rest).ok_or_else(|| broken(start))?;
+                    if bundle.options.parameters.len() == MAX_PARAMETERS {
+                        return Err(broken(start));
+                    }
+                    bundle.options.parameters.insert(name, value);
+                }
+                "title" if rest.chars().count() <= MAX_TITLE && !rest.chars().any(char::is_control) => {
+                    bundle.options.title = Some(rest.to_string());
+                }
+                "perturb" => {
+                    bundle.options.perturbation = Some(perturbation(rest).ok_or_else(|| broken(start))?);
+                }
                 "file" => {
                     let (bytes, name) = rest.split_once(' ').ok_or_else(|| broken(start))?;
                     let bytes: usize = bytes.parse().map_err(|_| broken(start))?;
@@ -130,6 +152,9 @@ pub fn gather(
         let (name, text) = &files[next];
         let wanted = match Kind::of(text) {
             Kind::Keyword => includes(name, text, &mut folders),
+            Kind::Toml if next == 0 && !options.parameters.is_empty() => {
+                mesh_files(name, &substituted_if_possible(text, &options.parameters))
+            }
             Kind::Toml if next == 0 => mesh_files(name, text),
             _ => Vec::new(),
         };
@@ -164,10 +189,33 @@ pub fn gather(
     if let Some(case) = options.case {
         packed += &format!("case {case}\n");
     }
+    for (name, value) in &options.parameters {
+        packed += &format!("parameter {name} {value:?}\n");
+    }
+    if let Some(title) = &options.title {
+        packed += &format!("title {}\n", title.replace(char::is_control, " ").trim());
+    }
+    if let Some(Perturbation { nodes, seed }) = options.perturbation {
+        packed += &format!("perturb {nodes:?} {seed}\n");
+    }
     for (name, text) in &files {
         packed += &format!("file {} {}\n{text}\n", text.len(), name.replace('\n', " "));
     }
     Ok(packed)
+}
+
+/// `NAME VALUE` of a parameter.
+fn parameter(words: &str) -> Option<(String, f64)> {
+    let (name, value) = words.split_once(' ')?;
+    let value = value.parse::<f64>().ok().filter(|value| value.is_finite())?;
+    is_parameter(name).then(|| (name.to_string(), value))
+}
+
+/// `AMPLITUDE SEED` of a perturbation.
+fn perturbation(words: &str) -> Option<Perturbation> {
+    let (nodes, seed) = words.split_once(' ')?;
+    let read = Perturbation { nodes: nodes.parse().ok()?, seed: seed.parse().ok()? };
+    read.is_fit().then_some(read)
 }
 
 /// The mesh files that a TOML deck names; what cannot be read is a fault later.
@@ -199,7 +247,13 @@ mod tests {
             ("a/mesh/two.k", "$ nothing\u{e9}\n"),
         ];
         let mut asked = Vec::new();
-        let options = Options { units: Some("mm-s-t".to_string()), case: Some(7) };
+        let options = Options {
+            units: Some("mm-s-t".to_string()),
+            case: Some(7),
+            parameters: Parameters::from([("t".to_string(), 0.1), ("v".to_string(), -3e300)]),
+            title: Some("one of many".to_string()),
+            perturbation: Some(Perturbation { nodes: 1e-9, seed: u64::MAX }),
+        };
         let packed = gather(texts[0].0, texts[0].1.to_string(), &options, &mut |path| {
             asked.push(path.to_string());
             texts.iter().find(|(name, _)| *name == path).map(|(_, text)| (*text).to_string())

@@ -27,6 +27,7 @@ mod set;
 mod translate;
 mod unit;
 
+pub(crate) use parameter::evaluate;
 pub use unit::NAMES as UNIT_NAMES;
 
 use crate::{

@@ -23,6 +23,8 @@ mod log;
 mod make;
 pub mod mesh_file;
 pub mod model;
+pub mod parameters;
+pub mod perturb;
 pub mod physics;
 mod place;
 pub mod table;
@@ -32,6 +34,7 @@ pub mod units;
 mod write;
 
 use bundle::{Bundle, Kind};
+use fault::Faults;
 use log::Log;
 use mesh_file::MeshFile;
 use typed::{
@@ -96,6 +99,16 @@ const MESH: &str = "keyword.mesh";
 /// Reads and checks a TOML deck with its mesh files.
 fn read_toml(bundle: &Bundle<'_>, most_elements: u64) -> Result<Reading, Vec<Fault>> {
     let (name, text) = bundle.files[0];
+    let given = &bundle.options.parameters;
+    let substituted;
+    let text = if given.is_empty() && !lacks_parameters(text) {
+        text
+    } else {
+        let faults = Faults::new(name, text);
+        let Some(text) = parameters::substitute(text, given, &faults) else { return Err(faults.into_list()) };
+        substituted = text;
+        &substituted
+    };
     let log = Log::toml(name, text).with_most_elements(most_elements);
     let mut of_meshes = Vec::new();
     let mut meshes = Meshes::new();
@@ -107,7 +120,7 @@ fn read_toml(bundle: &Bundle<'_>, most_elements: u64) -> Result<Reading, Vec<Fau
         meshes.insert(seen.to_string(), mesh.ok().map(Mesh::from));
     }
     let model = toml_deck::read(text, &log).and_then(|deck| make::model(&deck, &meshes, &log));
-    let mut reading = conclude(model, log);
+    let mut reading = conclude(model, log, bundle);
     if !of_meshes.is_empty() {
         of_meshes.extend(reading.err().unwrap_or_default());
         reading = Err(of_meshes);
@@ -133,13 +146,26 @@ fn read_keyword(
     let meshes = Meshes::from([(mesh_name.to_string(), Some(mesh))]);
     let model = make::model(&deck, &meshes, &log);
     let mesh = meshes.into_values().flatten().next().map(|mesh| mesh.file).unwrap_or_default();
-    Ok(WholeKeyword { reading: conclude(model, log)?, deck, mesh })
+    Ok(WholeKeyword { reading: conclude(model, log, bundle)?, deck, mesh })
 }
 
-/// The model of a deck without a fault.
-fn conclude(model: Option<Model>, log: Log<'_>) -> Result<Reading, Vec<Fault>> {
+/// Whether a deck that was given no parameters cannot be read without them.
+fn lacks_parameters(text: &str) -> bool {
+    text.len() <= MAX_TEXT && parameters::has_any(text) && toml::de::DeTable::parse(text).is_err()
+}
+
+/// The model of a deck without a fault, perturbed and named as asked.
+fn conclude(model: Option<Model>, log: Log<'_>, bundle: &Bundle<'_>) -> Result<Reading, Vec<Fault>> {
     match model {
-        Some(model) if log.count() == 0 => Ok(Reading { model, warnings: log.into_lists().1 }),
+        Some(mut model) if log.count() == 0 => {
+            if let Some(perturbation) = bundle.options.perturbation {
+                perturb::perturb(&mut model, perturbation);
+            }
+            if let Some(title) = &bundle.options.title {
+                model.title.clone_from(title);
+            }
+            Ok(Reading { model, warnings: log.into_lists().1 })
+        }
         _ => {
             assert!(log.count() > 0, "a deck was refused without a fault");
             Err(log.into_lists().0)
@@ -165,8 +191,18 @@ pub fn convert(text: &str, file_name: &str, mesh_name: &str) -> Result<Converted
     let bundle = Bundle::of(text, file_name)?;
     let (name, deck) = bundle.files[0];
     if Kind::of(deck) != Kind::Keyword {
-        let faults = fault::Faults::new(name, deck);
+        let faults = Faults::new(name, deck);
         faults.add(0, faults.quote(0, 60), "an LS-DYNA keyword deck", "run a TOML deck as it is");
+        return Err(faults.into_list());
+    }
+    if bundle.options.perturbation.is_some() {
+        let faults = Faults::new(name, deck);
+        faults.add(
+            0,
+            "a perturbation of the nodes",
+            "a deck as it is",
+            "perturb the nodes where it runs, with --perturb",
+        );
         return Err(faults.into_list());
     }
     let WholeKeyword { reading, deck, mesh } = read_keyword(&bundle, mesh_name, MAX_ELEMENTS)?;

@@ -16,7 +16,7 @@ fn of_file(path: &PathBuf) -> Forecast {
     let name = path.display().to_string();
     let text = fs::read_to_string(path).expect("a deck is text");
     // The cases of a deck say how fast.
-    let options = Options { case: text.contains("*CASE").then_some(101), units: None };
+    let options = Options { case: text.contains("*CASE").then_some(101), ..Options::default() };
     let text = bundle::gather(&name, text, &options, &mut |path| fs::read_to_string(path).ok());
     let model = deck::read(&text.expect("few files"), &name).unwrap_or_else(|faults| {
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();

@@ -7,6 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use clap::ValueEnum;
 use protocol::{
     codec::{self, MESSAGE_LIMIT},
     dial::{self, Call},
@@ -23,6 +24,7 @@ use crate::{
     command::{ClientArgs, SubmitArgs},
     deck_file::{self, doubt, gather_deck, warn},
     machine::host_name,
+    notify::notify,
     results::{Folder, create_anew},
 };
 
@@ -33,20 +35,43 @@ const RETURN_LIMIT: Duration = Duration::from_secs(60);
 /// How often.
 const DIAL_EVERY: Duration = Duration::from_millis(500);
 
+/// How far a job is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Until {
+    /// Until it runs, or is over
+    Running,
+    /// Until it is done; ends with 1 if it ends otherwise or is held
+    Done,
+}
+
+impl Until {
+    /// Whether a job in this state is followed no further.
+    const fn is_met_by(self, state: State) -> bool {
+        match self {
+            Self::Running => matches!(state, State::Running),
+            Self::Done => matches!(state, State::Held),
+        }
+    }
+}
+
 /// A connection to a master.
-struct Client {
+pub struct Client {
     runtime: tokio::runtime::Runtime,
     outbox: Outbox,
     inbox: Inbox,
     receiver: Receiver,
     /// The connection has ended.
-    gone: bool,
+    pub gone: bool,
     /// The job that is followed.
     following: Option<u32>,
 }
 
 impl Client {
-    fn new(at: &ClientArgs) -> Result<Self, String> {
+    /// Connects.
+    ///
+    /// # Errors
+    /// If there is no master, or it does not take this client.
+    pub fn new(at: &ClientArgs) -> Result<Self, String> {
         let certificates = dial::certificates(at.certs.as_deref()).map_err(|e| e.to_string())?;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
@@ -67,7 +92,10 @@ impl Client {
     }
 
     /// Asks for something and waits for the answer; a refusal is an error.
-    fn ask(&mut self, request: &Request) -> Result<Reply, String> {
+    ///
+    /// # Errors
+    /// The refusal, or the end of the connection.
+    pub fn ask(&mut self, request: &Request) -> Result<Reply, String> {
         let bytes = codec::encode(request).map_err(|e| e.to_string())?;
         let packed = Packed { kind: Kind::Control, cycle: 0, bytes };
         // Outside of the runtime: the link's own task writes.
@@ -95,8 +123,51 @@ impl Client {
         }
     }
 
+    /// Puts a deck into the queue.
+    ///
+    /// # Errors
+    /// Faults of the deck, or whatever went wrong on the way.
+    pub fn submit(&mut self, name: String, text: String, options: JobOptions) -> Result<u32, String> {
+        if text.len() > DECK_LIMIT {
+            return Err(format!("{name}: {} bytes, at most {DECK_LIMIT} can be sent", text.len()));
+        }
+        match self.ask(&Request::Submit { name, text, options })? {
+            Reply::Submitted { job } => Ok(job),
+            Reply::Faults(lines) => Err(deck_file::Error::Faults(lines).into()),
+            _ => Err(surprise()),
+        }
+    }
+
+    /// Every job that the master knows, oldest first.
+    ///
+    /// # Errors
+    /// Whatever went wrong on the way.
+    pub fn jobs(&mut self) -> Result<Vec<Status>, String> {
+        let Reply::Jobs(jobs) = self.ask(&Request::Jobs)? else { return Err(surprise()) };
+        Ok(jobs)
+    }
+
+    /// Fetches a file of a job's results to a path; gives its length (bytes).
+    ///
+    /// # Errors
+    /// If there is none, it cannot be written, or whatever went wrong on the way.
+    pub fn fetch(&mut self, job: u32, name: &str, path: &Path) -> Result<u64, String> {
+        let fault = |e: std::io::Error| format!("{}: {e}", path.display());
+        let mut file = create_anew(path).map_err(fault)?;
+        let mut offset = 0;
+        loop {
+            let request = Request::File { job, name: name.to_owned(), offset };
+            let Reply::Piece(bytes) = self.ask(&request)? else { return Err(surprise()) };
+            if bytes.is_empty() {
+                return Ok(offset);
+            }
+            file.write_all(&bytes).map_err(fault)?;
+            offset += bytes.len() as u64;
+        }
+    }
+
     /// Follows a job to its end; reports go to standard error.
-    fn follow(&mut self, job: Option<u32>, quiet: bool) -> Result<Status, String> {
+    fn follow(&mut self, job: Option<u32>, until: Option<Until>, quiet: bool) -> Result<Status, String> {
         let mut reply = self.ask(&Request::Watch { job })?;
         let mut last = String::new();
         loop {
@@ -107,7 +178,7 @@ impl Client {
                 eprintln!("{line}");
             }
             last = line;
-            if status.ended.is_some() {
+            if status.ended.is_some() || until.is_some_and(|until| until.is_met_by(status.state)) {
                 return Ok(*status);
             }
             reply = self.hear()?;
@@ -143,9 +214,6 @@ fn line_of(status: &Status) -> String {
 pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     let name = args.deck.display().to_string();
     let text = gather_deck(&args.deck, &args.reading.options())?;
-    if text.len() > DECK_LIMIT {
-        return Err(format!("{name}: {} bytes, at most {DECK_LIMIT} can be sent", text.len()));
-    }
     // The master answers with faults; what a run does otherwise than the deck says is told here.
     if let Ok(reading) = deck::read_whole(&text, &name) {
         warn(&reading.warnings);
@@ -158,39 +226,41 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
         ..args.job.clone()
     };
     let mut client = Client::new(&args.at)?;
-    match client.ask(&Request::Submit { name, text, options })? {
-        Reply::Submitted { job } if args.wait => {
-            if !args.at.json {
-                eprintln!("job {job} submitted");
-            }
-            finish(client, &args.at, Some(job))
+    let job = client.submit(name, text, options)?;
+    if args.wait {
+        if !args.at.json {
+            eprintln!("job {job} submitted");
         }
-        Reply::Submitted { job } => {
-            if args.at.json {
-                println!("{{\"job\":{job}}}");
-            } else {
-                println!("job {job} submitted");
-            }
-            Ok(ExitCode::SUCCESS)
-        }
-        Reply::Faults(lines) => Err(deck_file::Error::Faults(lines).into()),
-        _ => Err(surprise()),
+        let result = finish(client, &args.at, Some(job), None);
+        notify(args.notify.as_deref(), &job.to_string(), None, &result);
+        return result;
     }
+    if args.at.json {
+        println!("{{\"job\":{job}}}");
+    } else {
+        println!("job {job} submitted");
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// `bolide watch`: ends as `run` would.
 ///
 /// # Errors
 /// The job's failure, or whatever went wrong on the way.
-pub fn watch(job: Option<u32>, at: &ClientArgs) -> Result<ExitCode, String> {
-    finish(Client::new(at)?, at, job)
+pub fn watch(job: Option<u32>, until: Option<Until>, at: &ClientArgs) -> Result<ExitCode, String> {
+    finish(Client::new(at)?, at, job, until)
 }
 
 /// Follows a job to its end, over a restart of its master as well.
-fn finish(mut client: Client, at: &ClientArgs, mut job: Option<u32>) -> Result<ExitCode, String> {
+fn finish(
+    mut client: Client,
+    at: &ClientArgs,
+    mut job: Option<u32>,
+    until: Option<Until>,
+) -> Result<ExitCode, String> {
     let json = at.json;
     let status = loop {
-        match client.follow(job, json) {
+        match client.follow(job, until, json) {
             Ok(status) => break status,
             Err(why) if client.gone && client.following.is_some() => {
                 job = client.following;
@@ -207,6 +277,9 @@ fn finish(mut client: Client, at: &ClientArgs, mut job: Option<u32>) -> Result<E
     }
     match (ended.failure, status.state) {
         (Some(why), _) => Err(format!("job {}: {why}", status.job)),
+        (None, State::Cancelled | State::Held) if until == Some(Until::Done) => {
+            Err(format!("job {} is {}", status.job, status.state.name()))
+        }
         (None, State::Cancelled) => Ok(ExitCode::from(130)),
         (None, _) => Ok(ExitCode::SUCCESS),
     }
@@ -230,7 +303,7 @@ fn dial_again(at: &ClientArgs, why: &str) -> Result<Client, String> {
 /// # Errors
 /// Whatever went wrong on the way.
 pub fn jobs(at: &ClientArgs) -> Result<ExitCode, String> {
-    let Reply::Jobs(jobs) = Client::new(at)?.ask(&Request::Jobs)? else { return Err(surprise()) };
+    let jobs = Client::new(at)?.jobs()?;
     if at.json {
         println!("{}", serde_json::to_string(&jobs).map_err(|e| e.to_string())?);
         return Ok(ExitCode::SUCCESS);
@@ -317,24 +390,11 @@ pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> 
     let mut client = Client::new(at)?;
     let Reply::Files(files) = client.ask(&Request::Files { job })? else { return Err(surprise()) };
     Folder::create(&folder, force).map_err(|e| e.to_string())?;
-    let fault = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
     let mut total = 0;
     for (name, _) in &files {
         // The master is believed no more than any other peer.
         check_file_name(name)?;
-        let path = folder.join(name);
-        let mut file = create_anew(&path).map_err(|e| fault(&path, e))?;
-        let mut offset = 0;
-        loop {
-            let request = Request::File { job, name: name.clone(), offset };
-            let Reply::Piece(bytes) = client.ask(&request)? else { return Err(surprise()) };
-            if bytes.is_empty() {
-                break;
-            }
-            file.write_all(&bytes).map_err(|e| fault(&path, e))?;
-            offset += bytes.len() as u64;
-        }
-        total += offset;
+        total += client.fetch(job, name, &folder.join(name))?;
     }
     if at.json {
         let names: Vec<&String> = files.iter().map(|(name, _)| name).collect();

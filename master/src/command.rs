@@ -16,11 +16,15 @@ use protocol::{
 };
 use worker::processors::Processors;
 
-use crate::{bench::grind::Speed, picture::arguments::PictureArgs, verify::arguments::VerifyArgs};
+use crate::{
+    bench::grind::Speed, picture::arguments::PictureArgs, study::arguments::StudyArgs,
+    verify::arguments::VerifyArgs,
+};
+pub use crate::{client::Until, reading::ReadingArgs};
 
 /// What the process ends with, as `--help` says it.
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 a fault, which is printed (deck, disk, physics, peer); 2 wrong flags; 130 \
-stopped by Ctrl-C, or the followed job was cancelled. The log goes to standard error, BOLIDE_LOG=debug for more.";
+stopped by Ctrl-C, or the followed job was cancelled (1 with --until done). The log goes to standard error, BOLIDE_LOG=debug for more.";
 
 /// Explicit Lagrangian impact simulation on whatever PCs a lab has.
 #[derive(Debug, Parser)]
@@ -36,6 +40,8 @@ pub struct Cli {
 pub enum Command {
     /// Run a deck here: master and workers in one process
     Run(RunArgs),
+    /// Run a deck with many values of its parameters: a table, a ballistic limit, a threshold, a minimum
+    Study(StudyArgs),
     /// Predict how long a deck or the benchmark tables take on an emulated cluster
     Simulate(SimulateArgs),
     /// Listen for workers and clients, and run the jobs of the queue
@@ -50,6 +56,9 @@ pub enum Command {
     Watch {
         /// The job [default: the newest]
         job: Option<u32>,
+        /// Follow it only until it runs, or until it is done: then any other end is a failure, and so is a job that is held
+        #[arg(long, value_enum, value_name = "STATE")]
+        until: Option<Until>,
         /// The master
         #[command(flatten)]
         at: ClientArgs,
@@ -127,7 +136,7 @@ pub enum Command {
         /// Print JSON on standard output, faults too
         #[arg(long)]
         json: bool,
-        /// What a keyword deck does not say
+        /// What the deck leaves open
         #[command(flatten)]
         reading: ReadingArgs,
     },
@@ -144,7 +153,7 @@ pub enum Command {
         /// Replace files that are there
         #[arg(long)]
         force: bool,
-        /// What a keyword deck does not say
+        /// What the deck leaves open
         #[command(flatten)]
         reading: ReadingArgs,
     },
@@ -169,31 +178,12 @@ pub enum Command {
     },
 }
 
-/// What an LS-DYNA keyword deck does not say itself.
-#[derive(Args, Clone, Debug)]
-pub struct ReadingArgs {
-    /// Keyword decks: their units, one of mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), in-s-lbf,
-    /// SI (m-s-kg) [default: told by the densities]
-    #[arg(long)]
-    pub units: Option<String>,
-    /// Keyword decks: the case to run, of those that *CASE defines
-    #[arg(long)]
-    pub case: Option<u32>,
-}
-
-impl ReadingArgs {
-    /// As the reader takes them.
-    pub fn options(&self) -> deck::bundle::Options {
-        deck::bundle::Options { units: self.units.clone(), case: self.case }
-    }
-}
-
 /// Flags of `run`.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
     /// The deck (TOML, or LS-DYNA keywords)
     pub deck: PathBuf,
-    /// What a keyword deck does not say
+    /// What the deck leaves open
     #[command(flatten)]
     pub reading: ReadingArgs,
     /// Number of workers
@@ -223,6 +213,9 @@ pub struct RunArgs {
     /// Write a trace of the last cycles of every worker for Perfetto
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
+    /// When it is over run this in a shell, with BOLIDE_JOB, BOLIDE_STATE (done, failed or stopped), BOLIDE_FOLDER and BOLIDE_REASON set
+    #[arg(long, value_name = "COMMAND")]
+    pub notify: Option<String>,
     /// Print the summary alone, as JSON, on standard output
     #[arg(long)]
     pub json: bool,
@@ -322,7 +315,7 @@ pub struct MasterArgs {
 }
 
 /// A number of days or gigabytes.
-fn amount(text: &str) -> Result<f64, String> {
+pub fn amount(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(amount) if (0.0..=1e6).contains(&amount) => Ok(amount),
         _ => Err("expected a number from 0 to 1e6".to_owned()),
@@ -420,7 +413,7 @@ pub struct ClientArgs {
 pub struct SubmitArgs {
     /// The deck (TOML, or LS-DYNA keywords); files that it refers to are sent along
     pub deck: PathBuf,
-    /// What a keyword deck does not say
+    /// What the deck leaves open
     #[command(flatten)]
     pub reading: ReadingArgs,
     /// Wait for at least this many workers
@@ -432,6 +425,9 @@ pub struct SubmitArgs {
     /// Follow the job until it ends, then print its summary
     #[arg(long)]
     pub wait: bool,
+    /// When it is over run this in a shell, with BOLIDE_JOB, BOLIDE_STATE (done, failed or stopped), BOLIDE_FOLDER and BOLIDE_REASON set
+    #[arg(long, value_name = "COMMAND", requires = "wait")]
+    pub notify: Option<String>,
     /// Write trace.json into the results: what every worker did in its last cycles, for Perfetto
     #[arg(long, conflicts_with = "no_output")]
     pub trace: bool,

@@ -4,7 +4,7 @@
 //! [`embedded`] runs them, and [`drive`] has workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`], asks [`footprint`] for the memory of a job, and hears [`notice`]s: each
 //! [`connection`] is one task that carries messages, which waits for one of the [`places`], the [`client_requests`] answers clients, the [`desk`] reads their decks, [`service`] runs one job of the queue. [`client`] is the other end of the client requests;
 //! [`ca_folder`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`neighbour`] whose process calls on loopback; [`processes`] starts workers as
-//! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster. [`program`] is the command line.
+//! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster. [`mod@study`] runs a deck with many values of its parameters. [`program`] is the command line.
 
 pub mod add;
 pub mod balance;
@@ -40,6 +40,7 @@ pub mod neighbour;
 pub mod newcomer;
 pub mod node_owners;
 pub mod notice;
+pub mod notify;
 pub mod options;
 pub mod output;
 pub mod pace;
@@ -49,6 +50,7 @@ pub mod places;
 pub mod processes;
 pub mod program;
 pub mod queue;
+pub mod reading;
 pub mod results;
 pub mod run;
 pub mod run_totals;
@@ -59,6 +61,7 @@ pub mod simulate;
 pub mod snapshot;
 pub mod sort;
 pub mod spool;
+pub mod study;
 pub mod summarise;
 pub mod verify;
 pub mod world;

@@ -20,7 +20,7 @@ use crate::{
     ca_folder::CaFolder,
     certs, check, client,
     command::{Bench, Certs, Cli, Command, WorkerArgs},
-    convert, daemon, machine, memory, newcomer, picture, processes, run, simulate, verify,
+    convert, daemon, machine, memory, newcomer, picture, processes, run, simulate, study, verify,
 };
 
 /// The log: to standard error, of the levels that `BOLIDE_LOG` says (`debug`, or by module `info,worker=debug`), else from
@@ -38,13 +38,14 @@ pub fn log<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
 pub fn main(compute: Compute) -> ExitCode {
     memory::return_large_arrays();
     let result = match Cli::parse().command {
-        Command::Run(args) => run::run(&args),
+        Command::Run(args) => run::run_and_tell(&args),
+        Command::Study(args) => study::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Master(args) => daemon::run(&args),
         Command::Worker(args) => work(args, compute),
         Command::Add(args) => add::run(&args),
         Command::Submit(args) => client::submit(&args),
-        Command::Watch { job, at } => client::watch(job, &at),
+        Command::Watch { job, until, at } => client::watch(job, until, &at),
         Command::Jobs { at } => client::jobs(&at),
         Command::Hosts { at } => client::hosts(&at),
         Command::Cancel { job, at } => client::cancel(job, &at),

@@ -18,6 +18,7 @@ use crate::{
     event::{Outcome, WorkerSpec},
     interrupt::stop_on_interrupt,
     job::Job,
+    notify::notify,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     processes::Processes,
@@ -37,6 +38,17 @@ pub fn folder_for(args: &RunArgs) -> PathBuf {
     args.out.clone().or(resumed).unwrap_or_else(|| {
         Path::new("results").join(args.deck.file_stem().unwrap_or(std::ffi::OsStr::new("run")))
     })
+}
+
+/// [`run`], and then the command that the user wants to be told by.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_and_tell(args: &RunArgs) -> Result<ExitCode, String> {
+    let result = run(args);
+    let folder = (!args.job.no_output).then(|| folder_for(args));
+    notify(args.notify.as_deref(), &args.deck.display().to_string(), folder.as_deref(), &result);
+    result
 }
 
 /// Runs a deck here: in this process, or with a process for each worker.

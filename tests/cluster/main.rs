@@ -8,6 +8,7 @@ mod losses;
 mod peers;
 mod runs;
 mod slurm;
+mod study;
 mod trust;
 mod verify;
 

@@ -85,6 +85,8 @@ struct Walk<'b, 'a> {
     folders: Vec<String>,
     blocks: Vec<Block<'a>>,
     parameters: BTreeMap<String, f64>,
+    /// Parameters from outside that the deck has not defined yet.
+    given: BTreeSet<&'b str>,
     n_lines: usize,
     /// Most of them, for files of this length.
     most_lines: usize,
@@ -108,6 +110,7 @@ pub(super) fn read<'a>(bundle: &Bundle<'a>, log: &Log<'_>) -> Lines<'a> {
         folders: Vec::new(),
         blocks: Vec::new(),
         parameters: BTreeMap::new(),
+        given: bundle.options.parameters.keys().map(String::as_str).collect(),
         n_lines: 0,
         most_lines: MAX_LINES
             .min(MAX_REPEATED + bundle.files.iter().map(|(_, text)| text.len()).sum::<usize>()),
@@ -120,6 +123,14 @@ pub(super) fn read<'a>(bundle: &Bundle<'a>, log: &Log<'_>) -> Lines<'a> {
         left_out: 0,
     };
     walk.file(0, 0);
+    for name in std::mem::take(&mut walk.given) {
+        log.fault(
+            Place::card(0, 1),
+            format!("a deck without a *PARAMETER {name}"),
+            format!("{name}, which is given, as a parameter of the deck"),
+            "define it in the deck, or do not give it",
+        );
+    }
     walk.conclude();
     Lines { blocks: walk.blocks, parameters: walk.parameters }
 }
@@ -239,7 +250,8 @@ impl<'a> Walk<'_, 'a> {
                 }
             }
             "PARAMETER" | "PARAMETER_LOCAL" | "PARAMETER_EXPRESSION" | "PARAMETER_EXPRESSION_LOCAL" => {
-                parameter::read(&block, &mut self.parameters, self.log);
+                parameter::read(&block, &mut self.parameters, &self.bundle.options.parameters, self.log);
+                self.given.retain(|name| !self.parameters.contains_key(*name));
             }
             _ => self.blocks.push(block),
         }
@@ -350,7 +362,7 @@ mod tests {
     use crate::bundle::Options;
 
     fn blocks(files: &[(&'static str, &'static str)], case: Option<u32>) -> (Vec<String>, Vec<String>) {
-        let bundle = Bundle { options: Options { units: None, case }, files: files.to_vec() };
+        let bundle = Bundle { options: Options { case, ..Options::default() }, files: files.to_vec() };
         let log = Log::keyword(&bundle.files);
         let lines = read(&bundle, &log);
         let words = lines

@@ -10,7 +10,7 @@ const MAX_DEPTH: usize = 50;
 
 /// What is wrong with an expression. Displayed as what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Error {
+pub(crate) enum Error {
     /// Something stands behind its end.
     Rest(char),
     TooDeep,
@@ -37,8 +37,14 @@ impl fmt::Display for Error {
     }
 }
 
-/// Reads the parameters of a block into `known`; a later value of a name replaces an earlier one.
-pub(super) fn read(block: &Block<'_>, known: &mut BTreeMap<String, f64>, log: &Log<'_>) {
+/// Reads the parameters of a block into `known`; a later value of a name replaces an earlier one, and one that is given from outside
+/// replaces all.
+pub(super) fn read(
+    block: &Block<'_>,
+    known: &mut BTreeMap<String, f64>,
+    given: &BTreeMap<String, f64>,
+    log: &Log<'_>,
+) {
     let expressions = block.keyword.contains("EXPRESSION");
     let width = if block.width == Width::Long { 20 } else { 10 };
     for card in &block.cards {
@@ -81,6 +87,10 @@ pub(super) fn read(block: &Block<'_>, known: &mut BTreeMap<String, f64>, log: &L
                 log.warn(card.at, format!("parameter {name}: characters are not put in for parameters"));
                 continue;
             }
+            if let Some(&value) = given.get(&name) {
+                known.insert(name, value);
+                continue;
+            }
             match evaluate(value, known) {
                 Ok(number) if number.is_finite() => {
                     known.insert(name, if kind == 'I' { number.trunc() } else { number });
@@ -108,7 +118,7 @@ fn cut(text: &str, column: usize) -> (&str, &str) {
 ///
 /// # Errors
 /// What is wrong with it.
-pub(super) fn evaluate(text: &str, known: &BTreeMap<String, f64>) -> Result<f64, Error> {
+pub(crate) fn evaluate(text: &str, known: &BTreeMap<String, f64>) -> Result<f64, Error> {
     let mut reader = Reader { rest: text, known, depth: 0 };
     let value = reader.sum()?;
     reader.skip();

@@ -33,7 +33,7 @@ fn gathered(folder: &str, name: &str, options: &Options) -> String {
 }
 
 fn example(name: &str, case: Option<u32>) -> Reading {
-    let options = Options { units: None, case };
+    let options = Options { case, ..Options::default() };
     deck::read_whole(&gathered(&folder("examples"), name, &options), name)
         .unwrap_or_else(|f| panic!("{}", lines(&f)))
 }
@@ -328,7 +328,7 @@ fn every_converted_keyword_deck_is_the_same_problem_to_the_bit() {
         let cases = if name == "bar-on-wall.k" { vec![None, Some(101), Some(102)] } else { vec![None] };
         for case in cases {
             seen += 1;
-            let text = gathered(&folder("examples"), &name, &Options { units: None, case });
+            let text = gathered(&folder("examples"), &name, &Options { case, ..Options::default() });
             let model = example(&name, case).model;
             let again = converted(&text, &name);
             assert_eq!(again, model, "{name}");
@@ -551,4 +551,24 @@ fn beams_of_elform_3_are_trusses_with_the_area_of_their_section() {
     assert!(lines(&faults).contains("ELFORM 3"), "{}", lines(&faults));
     let faults = read(&cube(&more.replace("2,2,1", "2,1,1"))).expect_err("a section of solids");
     assert!(lines(&faults).contains("*SECTION_BEAM"), "{}", lines(&faults));
+}
+
+#[test]
+fn a_parameter_from_outside_replaces_that_of_the_deck_and_expressions_follow() {
+    let text = "*KEYWORD\n*PARAMETER\nRv,5.0,Rhalf,1.0\n*PARAMETER_EXPRESSION\nRend,&v*2\n*CONTROL_TERMINATION\n&end\n*PART\ncube\n1,1,1\n\
+                *SECTION_SOLID\n1,1\n*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n\
+                8,0,1,1\n*ELEMENT_SOLID\n1,1,1,2,3,4,5,6,7,8\n*END\n";
+    let read = |name: &str, value: f64| {
+        let options = Options { parameters: [(name.to_string(), value)].into(), ..Options::default() };
+        let text = bundle::gather("a.k", text.to_string(), &options, &mut |_| None).expect("one file");
+        deck::read(&text, "a.k")
+    };
+    let end = read("v", 50.0).expect("a good deck").setup.control.end_time;
+    assert_eq!(end.to_bits(), 100.0_f64.to_bits(), "{end}");
+    let faults = read("w", 1.0).expect_err("no such parameter");
+    assert_eq!(
+        lines(&faults),
+        "a.k:1:1: read a deck without a *PARAMETER w; expected w, which is given, as a parameter of the deck; define it in the deck, or do not \
+         give it"
+    );
 }

@@ -380,6 +380,13 @@ fn material(model: &Model, element: u32) -> &Material {
 
 /// The header row, with its line end.
 fn header(model: &Model) -> String {
+    let mut header = columns(model).iter().map(|column| cell(column)).collect::<Vec<_>>().join(",");
+    header.push('\n');
+    header
+}
+
+/// The columns of the history of a model: names with units.
+pub fn columns(model: &Model) -> Vec<String> {
     let Units { length, mass, time, energy, stress, force, specific } = Units::named(&model.units);
     let mut columns = vec!["cycle".to_owned(), format!("time [{time}]"), format!("dt [{time}]")];
     let energies = ["kinetic", "internal", "hourglass", "contact", "friction", "external", "total"];
@@ -439,9 +446,7 @@ fn header(model: &Model) -> String {
     if model.setup.erosion.is_on() {
         columns.push("eroded elements".to_owned());
     }
-    let mut header = columns.iter().map(|column| cell(column)).collect::<Vec<_>>().join(",");
-    header.push('\n');
-    header
+    columns
 }
 
 /// A unit by the names of length, mass and time.

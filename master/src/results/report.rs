@@ -94,7 +94,7 @@ fn lines(table: &str) -> String {
     table.lines().map(|line| format!("<span>{}</span>", escaped(line))).collect()
 }
 
-const STYLE: &str = "
+pub(crate) const STYLE: &str = "
 :root{color-scheme:light dark;--ink:#1b1f24;--paper:#fff;--line:#d5d9de;--c0:#0b62c4;--c1:#b8450f;--c2:#0a7a4b;--c3:#8a3fb0;--c4:#8c6d00;--c5:#b0214f;--c6:#4b5563}
 @media(prefers-color-scheme:dark){:root{--ink:#e6e8eb;--paper:#14171a;--line:#3a4047;--c0:#6cb0ff;--c1:#ff9d66;--c2:#5fd3a0;--c3:#d09bf0;--c4:#e2c04c;--c5:#ff86a8;--c6:#aab3bd}}
 body{font:15px/1.45 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:760px;margin:2rem auto;padding:0 1rem}
@@ -117,7 +117,7 @@ fn thinned(all: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 }
 
 /// Round numbers that lie between two, about five of them.
-fn ticks(low: f64, high: f64) -> Vec<f64> {
+pub(crate) fn ticks(low: f64, high: f64) -> Vec<f64> {
     let raw = (high - low) / 5.0;
     if !raw.is_finite() || raw <= 0.0 {
         return vec![low];
@@ -133,7 +133,7 @@ fn ticks(low: f64, high: f64) -> Vec<f64> {
 }
 
 /// A tick's number without the zeros that say nothing.
-fn label(tick: f64) -> String {
+pub(crate) fn label(tick: f64) -> String {
     let text = significant(tick);
     let (number, exponent) = text.split_once('e').map_or((text.as_str(), None), |(n, e)| (n, Some(e)));
     let number =
@@ -243,7 +243,7 @@ fn balance(summary: &Summary) -> String {
     html
 }
 
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

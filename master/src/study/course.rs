@@ -1,0 +1,307 @@
+//! The course of a study: which points are known, wait, or are under way. One thread owns all of it.
+
+use std::{
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use deck::fault::{Faults, short};
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+
+use super::{
+    cache::{Cache, FILES},
+    goal,
+    measure::{self, Facts},
+    place::{Finished, Place, RunError, Task},
+    plan::{Point, Study},
+    prepare::{self, Prepared, prepare},
+    table::{self, Outcome, Outcomes, Row},
+};
+use crate::results::{Summary, history::Table};
+
+/// Faults of a deck that are printed at most.
+const MOST_FAULTS: usize = 100;
+
+/// What a study has cost so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Runs that were computed.
+    pub computed: usize,
+    pub element_cycles: u64,
+    /// Runs that the cache answered.
+    pub answered: usize,
+}
+
+/// A study under way.
+pub struct Course<'a> {
+    study: &'a Study,
+    cache: Arc<Cache>,
+    outcomes: Outcomes,
+    /// In the order in which they begin.
+    waiting: VecDeque<Task>,
+    under_way: BTreeMap<Point, Arc<Prepared>>,
+    /// Points that were made ready before the first run.
+    ready: BTreeMap<Point, Arc<Prepared>>,
+    pub tally: Tally,
+}
+
+impl<'a> Course<'a> {
+    /// A study of which nothing is known.
+    pub fn new(study: &'a Study, cache: Arc<Cache>) -> Self {
+        Self {
+            study,
+            cache,
+            outcomes: Outcomes::new(),
+            waiting: VecDeque::new(),
+            under_way: BTreeMap::new(),
+            ready: BTreeMap::new(),
+            tally: Tally::default(),
+        }
+    }
+
+    /// Reads the decks of the points that are wanted first, and checks the measures against them.
+    ///
+    /// # Errors
+    /// Every fault of every deck, each once, with a point that has it; those of measures.
+    pub fn begin(&mut self) -> Result<(), String> {
+        let wanted = self.wanted();
+        if wanted.is_empty() {
+            return Err("the conditions of the study exclude every point".to_owned());
+        }
+        let mut faults: BTreeMap<String, (usize, &Point)> = BTreeMap::new();
+        let mut n_faulty = 0;
+        let all = prepare_all(self.study, &wanted);
+        for (point, prepared) in wanted.iter().zip(all) {
+            match prepared {
+                Ok(prepared) => {
+                    self.ready.insert(point.clone(), Arc::new(prepared));
+                }
+                Err(prepare::Error::Faults(list)) => {
+                    n_faulty += 1;
+                    for fault in list {
+                        faults.entry(fault.to_string()).or_insert((0, point)).0 += 1;
+                    }
+                }
+                Err(why) => return Err(why.to_string()),
+            }
+        }
+        if !faults.is_empty() {
+            let lines = faults.iter().take(MOST_FAULTS).map(|(fault, (count, point))| {
+                let at = words(self.study, &point.values, None);
+                if *count == 1 {
+                    format!("{fault} (at {at})")
+                } else {
+                    format!("{fault} (at {at} and {} more)", count - 1)
+                }
+            });
+            let lines: Vec<String> = lines.collect();
+            let n = wanted.len();
+            return Err(format!(
+                "{} faults in the deck at {n_faulty} of {n} points\n{}",
+                faults.len(),
+                lines.join("\n")
+            ));
+        }
+        let facts = self.ready.values().next().map(|prepared| prepared.facts.clone());
+        facts.map_or(Ok(()), |facts| check_measures(self.study, &facts))
+    }
+
+    /// Prints the points that are known so far with their identities.
+    pub fn list(&self) {
+        for (point, prepared) in &self.ready {
+            let known = if self.cache.look(&prepared.identity).is_some() { "  in the cache" } else { "" };
+            let sample =
+                self.study.scatter.map_or_else(String::new, |_| format!(", sample {}", point.sample));
+            println!("{}  {}{sample}{known}", prepared.identity, words(self.study, &point.values, None));
+        }
+    }
+
+    /// Computes all that the goal wants, until it wants no more or `stop` is set.
+    ///
+    /// # Errors
+    /// If the place can compute no more, or results cannot be read.
+    pub fn run(&mut self, place: &mut dyn Place, stop: &AtomicBool) -> Result<(), String> {
+        loop {
+            let stopping = stop.load(Ordering::Relaxed);
+            if !stopping {
+                self.look_for_more()?;
+            }
+            while !stopping
+                && let Some(next) = self.waiting.front()
+                && place.has_room(next)
+                && let Some(task) = self.waiting.pop_front()
+            {
+                self.under_way.insert(task.point.clone(), Arc::clone(&task.prepared));
+                place.take(task, self.waiting.len())?;
+            }
+            if self.under_way.is_empty() && (stopping || self.is_over()) {
+                return Ok(());
+            }
+            for finished in place.wait(stopping)? {
+                self.finish(finished)?;
+            }
+        }
+    }
+
+    /// Whether nothing is wanted any more.
+    pub fn is_over(&self) -> bool {
+        self.under_way.is_empty() && self.waiting.is_empty() && self.wanted().is_empty()
+    }
+
+    /// What is known in the end.
+    pub fn into_outcomes(self) -> Outcomes {
+        self.outcomes
+    }
+
+    fn wanted(&self) -> Vec<Point> {
+        goal::wanted(self.study, &table::known(self.study, &self.outcomes))
+    }
+
+    /// Takes what the goal wants next from the cache, or puts it into the queue; the largest first.
+    fn look_for_more(&mut self) -> Result<(), String> {
+        loop {
+            let waiting: BTreeSet<&Point> = self.waiting.iter().map(|task| &task.point).collect();
+            let is_new = |point: &Point| !self.under_way.contains_key(point) && !waiting.contains(point);
+            let new: Vec<Point> = self.wanted().into_iter().filter(is_new).collect();
+            if new.is_empty() {
+                return Ok(());
+            }
+            let unread: Vec<Point> =
+                new.iter().filter(|point| !self.ready.contains_key(point)).cloned().collect();
+            for (point, prepared) in unread.iter().zip(prepare_all(self.study, &unread)) {
+                match prepared {
+                    Ok(prepared) => {
+                        self.ready.insert(point.clone(), Arc::new(prepared));
+                    }
+                    Err(why) => {
+                        self.put(point.clone(), Outcome::Failed(why.to_string()), "its deck is faulty")
+                    }
+                }
+            }
+            let mut answered = false;
+            for point in new {
+                let Some(prepared) = self.ready.remove(&point) else { continue };
+                if self.is_computed(&prepared.identity) {
+                    // Another point is the same run: it is answered when that is over.
+                    self.ready.insert(point, prepared);
+                    continue;
+                }
+                match self.cache.look(&prepared.identity) {
+                    Some(entry) => {
+                        let outcome = outcome_of(self.study, &point, &prepared.facts, &entry)?;
+                        self.tally.answered += 1;
+                        answered = true;
+                        self.put(point, outcome, "from the cache");
+                    }
+                    None => self.waiting.push_back(Task { point, prepared }),
+                }
+            }
+            self.waiting.make_contiguous().sort_by_key(|task| std::cmp::Reverse(task.prepared.elements));
+            if !answered {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Whether a run of this identity waits or is under way.
+    fn is_computed(&self, identity: &str) -> bool {
+        let waiting = self.waiting.iter().map(|task| &task.prepared);
+        waiting.chain(self.under_way.values()).any(|prepared| prepared.identity == identity)
+    }
+
+    /// A run is over.
+    fn finish(&mut self, Finished { point, result }: Finished) -> Result<(), String> {
+        let Some(prepared) = self.under_way.remove(&point) else { return Ok(()) };
+        match result {
+            Ok(element_cycles) => {
+                let Some(entry) = self.cache.look(&prepared.identity) else {
+                    return Err("results of a run are gone from the cache as soon as they were there; raise --keep-gb".to_owned());
+                };
+                let outcome = outcome_of(self.study, &point, &prepared.facts, &entry)?;
+                if element_cycles > 0 {
+                    self.tally.computed += 1;
+                    self.tally.element_cycles += element_cycles;
+                } else {
+                    self.tally.answered += 1;
+                }
+                self.put(point, outcome, "computed");
+            }
+            Err(RunError::Stopped) => {}
+            Err(why @ RunError::Cache(_)) => return Err(why.to_string()),
+            Err(why) => self.put(point, Outcome::Failed(why.to_string()), "failed"),
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, point: Point, outcome: Outcome, how: &str) {
+        let at = words(self.study, &point.values, None);
+        let sample = if point.sample > 0 { format!(", sample {}", point.sample) } else { String::new() };
+        let told = match &outcome {
+            Outcome::Done(row) => {
+                let values = self.study.measures.iter().zip(&row.values);
+                values
+                    .map(|(measure, value)| format!("{} {}", measure.name, short(*value)))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            }
+            Outcome::Failed(why) => why.clone(),
+        };
+        eprintln!("{at}{sample}: {told} ({how})");
+        self.outcomes.insert(point, outcome);
+    }
+}
+
+fn prepare_all(study: &Study, points: &[Point]) -> Vec<Result<Prepared, prepare::Error>> {
+    points.par_iter().map(|point| prepare(study, point)).collect()
+}
+
+/// `velocity = 200, thickness = 5`.
+pub fn words(study: &Study, values: &[f64], without: Option<usize>) -> String {
+    let all = study.parameters.iter().zip(values).enumerate().filter(|(index, _)| Some(*index) != without);
+    all.map(|(_, (parameter, value))| format!("{} = {value}", parameter.name)).collect::<Vec<_>>().join(", ")
+}
+
+/// Whether the deck has what the measures speak of, as faults of the study file.
+fn check_measures(study: &Study, facts: &Facts) -> Result<(), String> {
+    let text = &study.text;
+    let faults = Faults::new(&study.file, text);
+    for measure in &study.measures {
+        if let Err(why) = measure.formula.check(facts) {
+            let expected = "what the history of the deck has";
+            faults.add(measure.at, format!("of = \"{}\"", measure.words), expected, why.to_string());
+        }
+    }
+    let lines: Vec<String> = faults.into_list().iter().map(ToString::to_string).collect();
+    let ending = if lines.len() == 1 { "" } else { "s" };
+    if lines.is_empty() {
+        Ok(())
+    } else {
+        Err(format!("{} fault{ending} in the study\n{}", lines.len(), lines.join("\n")))
+    }
+}
+
+/// The measures of a run whose results lie in a folder. A measure without a value is a failed run.
+fn outcome_of(study: &Study, point: &Point, facts: &Facts, entry: &Path) -> Result<Outcome, String> {
+    let [history, summary] = FILES.map(|name| entry.join(name));
+    let history = Table::read(&history).map_err(|e| e.to_string())?;
+    let fault = |e: &dyn std::fmt::Display| format!("{}: {e}", summary.display());
+    let text = std::fs::read_to_string(&summary).map_err(|e| fault(&e))?;
+    let summary: Summary = serde_json::from_str(&text).map_err(|e| fault(&e))?;
+    let mut known = study.named(&point.values);
+    known.extend(measure::of_summary(&summary));
+    let mut values = Vec::new();
+    for measure in &study.measures {
+        match measure.formula.of_run(&history, facts, &known) {
+            Ok(value) => {
+                known.insert(measure.name.clone(), value);
+                values.push(value);
+            }
+            Err(why) => return Ok(Outcome::Failed(format!("measure {}: {why}", measure.name))),
+        }
+    }
+    Ok(Outcome::Done(Row { values, cycles: summary.cycles, digest: summary.digest }))
+}

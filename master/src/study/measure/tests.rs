@@ -1,0 +1,90 @@
+//! Formulas against a small history.
+
+use super::*;
+
+fn history() -> Table {
+    let columns =
+        ["time [ms]", "rear:x [mm]", "rear:y [mm]", "rear:z [mm]", "rear:vx [m/s]", "rear:vy [m/s]"];
+    let more = ["rear:vz [m/s]", "rear:ux [mm]", "rear:uy [mm]", "rear:uz [mm]", "rod:kinetic [J]"];
+    let rows = vec![
+        vec![0.0, 0.0, 0.0, 20.0, 0.0, 0.0, -300.0, 0.0, 0.0, 0.0, 8.0],
+        vec![0.1, 0.0, 0.0, 1.0, 0.0, 0.0, -100.0, 3.0, 4.0, -19.0, 4.0],
+        vec![0.2, 0.0, 0.0, -8.0, 0.0, 4.0, -75.0, 0.0, 0.0, -28.0, 2.0],
+    ];
+    Table { columns: columns.iter().chain(&more).map(|c| (*c).to_owned()).collect(), rows }
+}
+
+fn facts() -> Facts {
+    let part = |name: &str, low, high, velocity| PartFacts { name: name.to_owned(), low, high, velocity };
+    Facts {
+        gauges: vec![("rear".to_owned(), [0.0, 0.0, -300.0]), ("edge".to_owned(), [0.0; 3])],
+        parts: vec![
+            part("rod", [-2.0, -2.0, 0.0], [2.0, 2.0, 20.0], Some([0.0, 0.0, -300.0])),
+            part("plate", [-9.0, -9.0, -5.0], [9.0, 9.0, 0.0], Some([0.0; 3])),
+        ],
+        columns: history()
+            .columns
+            .iter()
+            .map(|c| c.split(" [").next().unwrap_or_default().to_owned())
+            .collect(),
+    }
+}
+
+fn value(text: &str) -> Result<f64, Error> {
+    let known = Parameters::from([("thickness".to_owned(), 5.0), ("cycles".to_owned(), 70.0)]);
+    let names: Vec<&str> = known.keys().map(String::as_str).collect();
+    let formula = Formula::parse(text, &names)?;
+    formula.check(&facts())?;
+    formula.of_run(&history(), &facts(), &known)
+}
+
+#[test]
+fn formulas_have_the_values_of_their_history() {
+    for (text, expected) in [
+        ("max(rear:uy)", 4.0),
+        ("maxabs(rear:uz) / thickness", 5.6),
+        ("max(min(rear:uz), -20) + first(rear:z)", 0.0),
+        ("last( rear:vz )**2 + sqrt(mean(rear:x))", 5625.0),
+        ("cycles / 2", 35.0),
+        ("residual velocity of rear", 75.0),
+        ("residual velocity of rod", 150.0),
+        ("max displacement of rear", 28.0),
+        ("max displacement of rear along x", 3.0),
+        ("perforated", 1.0),
+        ("perforated by rear through plate", 1.0),
+        ("perforated by rear through rod", 1.0),
+        ("residual velocity of rear > 75", 0.0),
+        ("residual velocity of rear >= 75 and last(rear:z) < -thickness", 1.0),
+        ("perforated and cycles < 70", 0.0),
+    ] {
+        assert_eq!(value(text), Ok(expected), "{text}");
+    }
+}
+
+#[test]
+fn faults_of_formulas_name_what_is_there() {
+    for (text, words) in [
+        ("max(rear:uw)", "the history has no column rear:uw; write rear:u"),
+        (
+            "thicknes * 2",
+            "there is no parameter, measure before this or number of the summary thicknes; write thickness",
+        ),
+        ("max(rear:ux", "close the bracket"),
+        ("residual velocity of front", "the deck has no [[gauge]] at a node front; it has rear, edge"),
+        ("residual velocity of plate", "plate is at rest at the start"),
+        ("perforated by rear through wall", "the deck has no part wall; it has rod, plate"),
+        ("thickness *", "complete the expression"),
+        ("1 / (thickness - 5)", "it comes to inf"),
+        ("grind_ns", "there is no parameter"),
+    ] {
+        let fault = value(text).expect_err(text).to_string();
+        assert!(fault.contains(words), "{fault}");
+    }
+}
+
+#[test]
+fn comparisons_say_yes_or_no() {
+    for (text, is) in [("perforated", true), ("a > 1", true), ("a", false), ("perforated and a > 1", true)] {
+        assert_eq!(Formula::parse(text, &["a"]).map(|formula| formula.is_comparison()), Ok(is), "{text}");
+    }
+}
