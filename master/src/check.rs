@@ -64,7 +64,8 @@ fn words(forecast: &Forecast) -> String {
         1 => ", 1 warning".to_owned(),
         _ => format!(", {count} warnings"),
     };
-    let mut text = format!("{doubts}; {} parts, {elements} elements, {nodes} nodes\n", parts.len());
+    let n_parts = if parts.len() == 1 { "1 part".to_owned() } else { format!("{} parts", parts.len()) };
+    let mut text = format!("{doubts}; {n_parts}, {elements} elements, {nodes} nodes\n");
     let width = parts.iter().map(|part| part.name.chars().count()).max().unwrap_or(0).max(4);
     text += &format!(
         "  {:width$}  {:>10}  {:>10}  {:>10}  {:>12}  {:>10}\n",
