@@ -16,7 +16,7 @@
 //! The forces of the last two are a state of the element, vectors that turn with it. They yield with it, too: what a radial return
 //! leaves of its stress, it leaves of them, and they do not pass the moment at which a bar of the yield stress is plastic throughout. A failed element keeps
 //! nothing of them. Nothing but its pressure is left, so its modes move as those of a fluid do: what resists them is viscous, with
-//! [`FAILED`] of the coefficient of an element that is whole.
+//! [`FAILED`] of the coefficient of a fluid. With viscous control it keeps what a whole element has.
 
 use serde::{Deserialize, Serialize};
 
@@ -33,8 +33,9 @@ pub const N_FORCES: usize = 12;
 /// Viscous coefficient of elements that have no shear stiffness or have lost it.
 const FLUID: f64 = 0.1;
 
-/// Share of the viscous coefficient that an element keeps which has failed. With all of it a sphere that breaks at 3 or 6 km/s gave more
-/// energy to hourglass control than to heat; a ten-thousandth of the wave impedance is what other codes give fluids.
+/// Share of the viscous coefficient of a fluid that resists an element which has failed, with elastic control. With all of it a sphere that
+/// breaks at 3 or 6 km/s gave more energy to hourglass control than to heat; a ten-thousandth of the wave impedance is what other codes give
+/// fluids.
 const FAILED: f64 = 1e-3;
 
 /// What resists the hourglass modes.
@@ -111,7 +112,8 @@ impl Hourglass {
     /// The viscous coefficient of an element of this material that has failed. A law that keeps strength at full damage keeps its
     /// elements' resistance, too.
     pub(crate) fn of_failed(&self, material: &Material) -> f64 {
-        if material.failure == Failure::None { self.damping() } else { FAILED * self.damping() }
+        let share = if self.is_elastic() && material.failure != Failure::None { FAILED } else { 1.0 };
+        share * self.damping()
     }
 }
 

@@ -219,7 +219,7 @@ fn a_failed_element_is_resisted_as_a_fluid_and_broken_ceramic_as_a_solid() {
     for (material, share) in [(failing, 1e-3), (ceramic, 1.0)] {
         let whole = resisted(viscous, material, 0.0);
         assert!(whole > 0.0, "{}", material.name);
-        for control in [viscous, ELASTIC[0], ELASTIC[1]] {
+        for (control, share) in [(viscous, 1.0), (ELASTIC[0], share), (ELASTIC[1], share)] {
             let failed = resisted(control, material, 1.0);
             assert!((failed / whole / share - 1.0).abs() < 1e-6, "{control:?}: {failed} of {whole}");
         }
