@@ -58,7 +58,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         topology: Topology::Structured { cells: CELLS },
         nodes: (0..positions.len() as u32).collect(),
         element_ids: (0..n_elements as u32).collect(),
-        hourglass: Default::default(),
+        hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
     };
     let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part], lumped: Vec::new() };
     let hexahedra: Vec<[u32; 8]> = (0..n_elements).map(|e| mesh.parts[0].corners(e)).collect();
@@ -96,7 +96,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         contact: Vec::new(),
         shells: mechanics::state::ShellState::default(),
         own: Vec::new(),
-        hourglass: Default::default(),
+        hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
     }
 }
 
@@ -215,7 +215,7 @@ fn plates(
             topology: Topology::Structured { cells },
             nodes: (0..plane * (layers + 1)).collect(),
             element_ids: (0..n_elements).collect(),
-            hourglass: Default::default(),
+            hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
         };
         if kind != Kind::Structured {
             let mut order: Vec<u32> = (0..n_elements).collect();
@@ -240,7 +240,7 @@ fn plates(
             },
             nodes: (0..plane).collect(),
             element_ids: (0..side * side).collect(),
-            hourglass: Default::default(),
+            hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
         }
     };
     let parts = match kind {

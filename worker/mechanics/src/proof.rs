@@ -191,7 +191,7 @@ fn stirred(material: &Material, seed: u64) -> Piece {
         topology: topology.clone(),
         nodes: nodes.clone(),
         element_ids: Vec::new(),
-        hourglass: Default::default(),
+        hourglass: crate::element::hourglass::Hourglass::VISCOUS,
     };
     let n = part.n_elements();
     let mut mass = vec![0.0; x.len()];
@@ -245,7 +245,7 @@ fn stirred(material: &Material, seed: u64) -> Piece {
         contact: Vec::new(),
         shells: ShellState::default(),
         own: Vec::new(),
-        hourglass: Default::default(),
+        hourglass: crate::element::hourglass::Hourglass::VISCOUS,
     }
 }
 

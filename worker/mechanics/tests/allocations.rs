@@ -72,7 +72,7 @@ fn domain() -> Domain {
         topology: Topology::Structured { cells },
         nodes: (0..n_nodes).collect(),
         element_ids: (0..cells.iter().product()).collect(),
-        hourglass: Default::default(),
+        hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
     };
     let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part], lumped: Vec::new() };
     let strength = Strength::JohnsonCook {

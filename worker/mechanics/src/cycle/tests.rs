@@ -51,7 +51,7 @@ fn two_blocks() -> Mesh {
             topology: Topology::Structured { cells: CELLS },
             nodes,
             element_ids: (0..CELLS.iter().product()).collect(),
-            hourglass: Default::default(),
+            hourglass: crate::element::hourglass::Hourglass::VISCOUS,
         });
     }
     mesh
@@ -183,7 +183,7 @@ fn folding_plate() -> Domain {
         topology,
         nodes,
         element_ids,
-        hourglass: Default::default(),
+        hourglass: crate::element::hourglass::Hourglass::VISCOUS,
     });
     let mut setup = Setup { contact: None, ..setup(0.0) };
     setup.materials[0].strength =

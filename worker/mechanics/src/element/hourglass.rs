@@ -88,6 +88,8 @@ impl Default for Hourglass {
 impl Hourglass {
     /// No control.
     pub const NONE: Self = Self::viscous(0.0);
+    /// Viscous control with its usual coefficient.
+    pub const VISCOUS: Self = Self::viscous(Kind::Viscous.usual());
 
     pub const fn viscous(coefficient: f64) -> Self {
         Self { kind: Kind::Viscous, coefficient }

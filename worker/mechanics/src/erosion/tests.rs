@@ -53,7 +53,7 @@ fn bent(structured: bool) -> (Piece, PieceErosion) {
         topology: topology.clone(),
         nodes: (0..initial.len() as u32).collect(),
         element_ids: Vec::new(),
-        hourglass: Default::default(),
+        hourglass: Hourglass::VISCOUS,
     };
     let hexahedra = (0..n).map(|e| part.corners(e)).collect();
     let topology = if structured { topology } else { Topology::Explicit { hexahedra } };
@@ -86,7 +86,7 @@ fn bent(structured: bool) -> (Piece, PieceErosion) {
         contact: Vec::new(),
         shells: ShellState::default(),
         own: Vec::new(),
-        hourglass: Default::default(),
+        hourglass: Hourglass::VISCOUS,
     };
     // One has gone before.
     let mut eroded = vec![ALIVE; n];

@@ -29,7 +29,7 @@ fn brick(low: [f64; 3], size: [f64; 3], shape: impl Fn([f64; 3]) -> [f64; 3]) ->
         topology: Topology::Structured { cells: [1; 3] },
         nodes: (0..8).collect(),
         element_ids: vec![1],
-        hourglass: Default::default(),
+        hourglass: crate::element::hourglass::Hourglass::VISCOUS,
     };
     Mesh {
         positions: (0..8).map(corner).collect(),
@@ -109,7 +109,7 @@ fn tube(radius: f64, length: f64, thickness: f64, n: u32) -> Mesh {
         },
         nodes: (0..n * (n + 1)).collect(),
         element_ids: (1..=n * n).collect(),
-        hourglass: Default::default(),
+        hourglass: crate::element::hourglass::Hourglass::VISCOUS,
     };
     let positions: Vec<[f64; 3]> = (0..n * (n + 1)).map(place).collect();
     Mesh {

@@ -180,7 +180,7 @@ pub(super) mod tests {
                 contact: Vec::new(),
                 shells: ShellState::default(),
                 own: Vec::new(),
-                hourglass: Default::default(),
+                hourglass: crate::element::hourglass::Hourglass::VISCOUS,
             });
             Self { block, material, corners }
         }

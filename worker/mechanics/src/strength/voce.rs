@@ -168,7 +168,7 @@ mod tests {
             contact: Vec::new(),
             shells: ShellState::default(),
             own: Vec::new(),
-            hourglass: Default::default(),
+            hourglass: crate::element::hourglass::Hourglass::VISCOUS,
         });
         let step = Step {
             dt: 1e-4,

@@ -127,7 +127,7 @@ fn two_sheets() -> Mesh {
         topology: Topology::Shells { quads, section },
         nodes: (0..12).collect(),
         element_ids: (1..=4).collect(),
-        hourglass: Default::default(),
+        hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
     };
     Mesh { positions, node_ids: (1..=12).collect(), parts: vec![part], lumped: Vec::new() }
 }

@@ -64,7 +64,7 @@ pub fn add_block(mesh: &mut Mesh, cells: [u32; 3], origin: [f64; 3], h: f64) {
         topology: Topology::Structured { cells },
         nodes: (first..last).collect(),
         element_ids: (1..=n_elements).collect(),
-        hourglass: Default::default(),
+        hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
     });
 }
 

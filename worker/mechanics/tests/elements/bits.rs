@@ -59,7 +59,7 @@ fn written_out(piece: &Piece) -> Piece {
         topology: piece.topology.clone(),
         nodes: (0..piece.nodes.len() as u32).collect(),
         element_ids: Vec::new(),
-        hourglass: Default::default(),
+        hourglass: Hourglass::VISCOUS,
     };
     let hexahedra = (0..part.n_elements()).map(|element| part.corners(element)).collect();
     Piece { topology: Topology::Explicit { hexahedra }, ..piece.clone() }

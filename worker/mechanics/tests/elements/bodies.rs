@@ -174,7 +174,7 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
         topology: topology.clone(),
         nodes: nodes.clone(),
         element_ids: Vec::new(),
-        hourglass: Default::default(),
+        hourglass: Hourglass::VISCOUS,
     };
     let n_elements = part.n_elements();
     let mut mass = vec![0.0; x.len()];
