@@ -4,7 +4,7 @@
 use std::sync::OnceLock;
 
 use mechanics::{
-    law::{Bound, Constant, Declaration},
+    law::{Bound, Constant},
     material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
 };
 use toml::de::DeTable;
@@ -77,10 +77,8 @@ fn entries() -> &'static [Entry] {
 /// Reads the constants of a material; `None` after reporting what is wrong.
 pub(crate) fn read_material(table: Table<'_>, name: String) -> Option<Material> {
     let density = table.number("density", Range::Positive);
-    let eos = table
-        .require("eos", "an equation of state { type = ..., ... }")
-        .and_then(|v| v.table(format!("eos of \"{name}\"")))
-        .and_then(read_eos);
+    let eos_value = table.require("eos", "an equation of state { type = ..., ... }");
+    let eos = eos_value.and_then(|v| v.table(format!("eos of \"{name}\""))).and_then(read_eos);
     let strength_value = table.get("strength");
     let strength = match strength_value {
         None => Some(Strength::Hydro),
@@ -95,6 +93,13 @@ pub(crate) fn read_material(table: Table<'_>, name: String) -> Option<Material> 
     };
     table.finish();
     let material = Material { name, density: density?, eos: eos?, strength: strength?, failure: failure? };
+    if let Some(bulk) = material.strength.bulk().filter(|_| !material.is_gas())
+        && !matches!(material.eos, Eos::Linear { bulk: given } if (given / bulk - 1.0).abs() < 1e-3)
+    {
+        let expected =
+            format!("{{ type = \"linear\", bulk = {bulk} }}: this strength makes the pressure itself");
+        eos_value.into_iter().for_each(|eos| eos.fault(&expected, "give it, it says how fast waves are"));
+    }
     for clash in clashes(&material) {
         let (value, expected) = match clash {
             Clash::Strength => (strength_value, "no strength in a gas or an explosive"),
@@ -186,12 +191,26 @@ fn read_jwl(table: &Table<'_>) -> Option<Eos> {
 const STRENGTHS: [&str; 5] = ["hydro", "elastic", "von-mises", "tabulated", "johnson-cook"];
 
 fn read_strength(table: Table<'_>) -> Option<Strength> {
-    let all: Vec<&str> =
-        STRENGTHS.iter().copied().chain(Strength::DECLARED.iter().map(|law| law.name)).collect();
+    let declared = Strength::DECLARED.iter().map(|law| law.name);
+    let curved = Strength::CURVED.iter().map(|law| law.name);
+    let all: Vec<&str> = STRENGTHS.iter().copied().chain(declared).chain(curved).collect();
     let words = all.join(", ");
     let kind = table.require("type", &format!("one of {words}"))?.one_of(&all)?;
-    if let Some(law) = kind.checked_sub(STRENGTHS.len()).map(|declared| &Strength::DECLARED[declared]) {
-        let strength = read_declared(&table, law);
+    if let Some(declared) = kind.checked_sub(STRENGTHS.len()) {
+        let strength = match declared.checked_sub(Strength::DECLARED.len()) {
+            None => {
+                let law = &Strength::DECLARED[declared];
+                read_constants(&table, law.constants).map(|values| (law.of)(&values))
+            }
+            Some(curved) => {
+                let law = &Strength::CURVED[curved];
+                let points = table.require("points", &format!("[{}, ...]", law.points));
+                let curve = points.and_then(|points| read_curve(points, law.points, true));
+                read_constants(&table, law.constants)
+                    .zip(curve)
+                    .map(|(values, curve)| (law.of)(&values, curve))
+            }
+        };
         let fault = strength.as_ref().and_then(Strength::fault);
         if let Some(expected) = fault {
             table.faults.add(table.at, table.title.clone(), expected, "correct the constants");
@@ -216,8 +235,9 @@ fn read_strength(table: Table<'_>) -> Option<Strength> {
         }
         "tabulated" => {
             let shear = table.number("shear", Range::Positive);
+            let hardening = table.require("points", "[[plastic strain, yield stress], ...]");
             let hardening =
-                table.require("points", "[[plastic strain, yield stress], ...]").and_then(read_hardening);
+                hardening.and_then(|points| read_curve(points, "[plastic strain, yield stress]", false));
             let rate = read_cowper_symonds(&table);
             shear.zip(hardening).zip(rate).map(|((shear, hardening), rate)| Strength::Tabulated {
                 shear,
@@ -231,8 +251,8 @@ fn read_strength(table: Table<'_>) -> Option<Strength> {
     strength
 }
 
-/// A law that says itself which constants it has; `None` after reporting what is wrong.
-fn read_declared<T>(table: &Table<'_>, law: &Declaration<T>) -> Option<T> {
+/// The constants of a law that says itself which it has; `None` after reporting what is wrong.
+fn read_constants(table: &Table<'_>, constants: &[Constant]) -> Option<Vec<f64>> {
     let number = |constant: &Constant| {
         let range = match constant.bound {
             Bound::Positive => Range::Positive,
@@ -246,9 +266,8 @@ fn read_declared<T>(table: &Table<'_>, law: &Declaration<T>) -> Option<T> {
         }
     };
     // All are read before the first that is missing ends it, so that every fault is reported.
-    let values: Vec<Option<f64>> = law.constants.iter().map(number).collect();
-    let values: Option<Vec<f64>> = values.into_iter().collect();
-    values.map(|values| (law.of)(&values))
+    let values: Vec<Option<f64>> = constants.iter().map(number).collect();
+    values.into_iter().collect()
 }
 
 /// The rate factor of a yield stress, if it has one; `None` after reporting what is wrong.
@@ -261,8 +280,8 @@ fn read_cowper_symonds(table: &Table<'_>) -> Option<Option<CowperSymonds>> {
     Some(Some(CowperSymonds { reference: reference?, exponent: exponent? }))
 }
 
-/// Points of a hardening curve.
-fn read_hardening(value: Value<'_>) -> Option<Hardening> {
+/// Points of a curve, which may begin without stress.
+fn read_curve(value: Value<'_>, what: &str, from_zero: bool) -> Option<Hardening> {
     let items = value.items()?;
     if items.is_empty() || items.len() > MAX_HARDENING {
         value.fault(&format!("1 to {MAX_HARDENING} points"), "leave out those that lie on a line");
@@ -274,14 +293,20 @@ fn read_hardening(value: Value<'_>) -> Option<Hardening> {
         stress: [0.0; MAX_HARDENING],
     };
     for (i, item) in items.iter().enumerate() {
-        let [strain, stress] = item.numbers::<2>("[plastic strain, yield stress]", Range::NotNegative)?;
+        let [strain, stress] = item.numbers::<2>(what, Range::NotNegative)?;
         let fits = match i.checked_sub(1) {
-            None => strain == 0.0 && stress > 0.0,
-            Some(last) => strain > hardening.strain[last] && stress >= hardening.stress[last],
+            None => strain == 0.0 && (stress > 0.0 || (from_zero && items.len() > 1)),
+            Some(last) => {
+                let zero = i + 1 == items.len() && stress == 0.0;
+                strain > hardening.strain[last] && stress >= hardening.stress[last] && !zero
+            }
         };
         if !fits {
             let expected =
                 "plastic strains from 0 upwards, each with a yield stress above 0 not below the one before";
+            let from_nothing =
+                "strains from 0 upwards, each with a stress not below the one before, the last above 0";
+            let expected = if from_zero { from_nothing } else { expected };
             item.fault(expected, "order the points, or flatten what softens");
             return None;
         }

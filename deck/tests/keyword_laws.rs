@@ -3,7 +3,7 @@
 use deck::{Model, bundle};
 use mechanics::{
     material::{Eos, Material, Strength},
-    strength::{MooneyRivlin, Ogden, Viscoelastic},
+    strength::{CrushableFoam, LowDensityFoam, MooneyRivlin, Ogden, SoilFoam, Viscoelastic},
 };
 
 /// One cube of a material.
@@ -59,6 +59,55 @@ fn ogden_has_its_pairs() {
     assert!(fault(&card("\n1,1,1,1\n1,1,1,1")).contains("at most 3 pairs"));
     assert!(fault(&card("\n1.0\n-1.3")).contains("above 0, and no exponent of 0"));
     assert!(fault(&card("\n1.0\n1.3\n0.1,5.0")).contains("no relaxation"));
+}
+
+#[test]
+fn foam_has_its_crush_curve() {
+    let card = |rest: &str| {
+        format!(
+            "*DEFINE_CURVE\n9\n0.0,0.2\n0.5,0.3\n0.8,3.0\n*MAT_CRUSHABLE_FOAM\n1,6.0e-11,10.,0.0,9,0.05{rest}\n"
+        )
+    };
+    let foam = material(&card(""));
+    let Strength::CrushableFoam(law, crush) = foam.strength else { panic!("{foam:?}") };
+    assert_eq!(law, CrushableFoam { young: 10.0, tension: 0.05 });
+    assert_eq!(foam.eos, Eos::Linear { bulk: 10.0 / 3.0 });
+    // Beyond its last point the curve goes on with its last slope.
+    assert_eq!((crush.n_points, crush.strain[2], crush.stress[2], crush.strain[3]), (4, 0.8, 3.0, 10.0));
+    assert!(fault(&card(",0.1,1")).contains("a crush curve by the volume alone"));
+    assert!(fault(&card("").replace(",9,", ",8,")).contains("curve 8"));
+}
+
+#[test]
+fn low_density_foam_unloads_by_hu_and_shape() {
+    let card = |rest: &str| {
+        format!("*DEFINE_CURVE\n9\n0.0,0.0\n0.5,0.1\n0.9,3.0\n*MAT_057\n1,6.0e-11,10.,9,0.05,0.3{rest}\n")
+    };
+    let foam = material(&card("\n5.0"));
+    let Strength::LowDensityFoam(law, curve) = foam.strength else { panic!("{foam:?}") };
+    assert_eq!(law, LowDensityFoam { young: 10.0, tension: 0.05, hysteresis: 0.3, shape: 5.0 });
+    assert_eq!((curve.n_points, curve.stress[0], curve.stress[1]), (4, 0.0, 0.1));
+    assert!(fault(&card(",0.1")).contains("no decay"));
+    assert!(fault(&card("\n5.0,1")).contains("tension that stays at its cut-off"));
+}
+
+#[test]
+fn soil_has_its_points_by_the_logarithm_of_the_volume() {
+    let card =
+        "*MAT_SOIL_AND_FOAM\n1,1.8e-9,20.,300.,0.01,0.2,0.3,-0.1\n0,0,0\n0.,-0.1,-0.2\n\n0.,1.0,11.\n\n";
+    let soil = material(card);
+    let Strength::SoilFoam(law, curve) = soil.strength else { panic!("{soil:?}") };
+    assert_eq!(law, SoilFoam { shear: 20.0, unloading: 300.0, a0: 0.01, a1: 0.2, a2: 0.3, tension: 0.1 });
+    assert_eq!(soil.eos, Eos::Linear { bulk: 300.0 });
+    assert_eq!(
+        (curve.n_points, &curve.strain[..3], &curve.stress[..3]),
+        (4, &[0.0, 0.1, 0.2][..], &[0.0, 1.0, 11.0][..])
+    );
+    let by_curve =
+        "*DEFINE_CURVE\n9\n-0.2,11.\n-0.1,1.0\n0.,0.\n*MAT_005\n1,1.8e-9,20.,300.,0.01,0.2,0.3,-0.1\n0,0,9\n";
+    assert_eq!(material(by_curve).strength, soil.strength);
+    assert!(fault(&card.replace("300.", "90.")).contains("no less than the steepest line"));
+    assert!(fault(&card.replace("\n0,0,0", "\n1,0,0")).contains("crushing that stays"));
 }
 
 #[test]

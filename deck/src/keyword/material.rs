@@ -1,5 +1,6 @@
 //! `*MAT_` and `*EOS_`: constants of a deck.
 
+mod foam;
 mod rubber;
 
 use mechanics::{
@@ -60,6 +61,12 @@ pub(super) enum Law {
         /// What of the card is that equation.
         given: &'static str,
     },
+    /// A strength that has a curve: one of the deck, or these points where its number is 0. It makes the pressure itself.
+    Curved {
+        strength: Strength,
+        curve: Placed<u32>,
+        points: Vec<[f64; 2]>,
+    },
     /// A fluid, with the pressure below which it does not go (negative), if any.
     Null {
         cut_off: Placed<f64>,
@@ -86,15 +93,18 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 12] = [
+const NUMBERS: [(&str, &str); 15] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
+    ("MAT_005", "MAT_SOIL_AND_FOAM"),
     ("MAT_006", "MAT_VISCOELASTIC"),
     ("MAT_009", "MAT_NULL"),
     ("MAT_015", "MAT_JOHNSON_COOK"),
     ("MAT_020", "MAT_RIGID"),
     ("MAT_024", "MAT_PIECEWISE_LINEAR_PLASTICITY"),
     ("MAT_027", "MAT_MOONEY-RIVLIN_RUBBER"),
+    ("MAT_057", "MAT_LOW_DENSITY_FOAM"),
+    ("MAT_063", "MAT_CRUSHABLE_FOAM"),
     ("MAT_077_O", "MAT_OGDEN_RUBBER"),
     ("MAT_077", "MAT_OGDEN_RUBBER"),
     ("MAT_098", "MAT_SIMPLIFIED_JOHNSON_COOK"),
@@ -237,6 +247,10 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
         "MAT_OGDEN_RUBBER" => {
             needs_moduli = false;
             (None, rubber::ogden(&f))
+        }
+        "MAT_CRUSHABLE_FOAM" | "MAT_LOW_DENSITY_FOAM" | "MAT_SOIL_AND_FOAM" => {
+            needs_moduli = false;
+            (None, foam::read(word, &f, log))
         }
         "MAT_NULL" => {
             needs_moduli = false;

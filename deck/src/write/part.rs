@@ -117,7 +117,11 @@ fn strength(strength: &Strength) -> String {
         other => {
             let (name, constants) =
                 other.declared().expect("a law that is not written by hand declares its constants");
-            law(name, plain(&constants))
+            let mut keys = plain(&constants);
+            keys.extend(
+                other.curve().map(|curve| ("points", list(curve.points().map(|point| numbers(&point))))),
+            );
+            law(name, keys)
         }
     }
 }

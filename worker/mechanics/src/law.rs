@@ -3,6 +3,8 @@
 //! The deck reads a declared law, checks it and converts it between sets of units without knowing it. History variables are declared
 //! by name and unit: their columns in blocks, in states that travel and are stored, in digests and in results follow from that.
 
+use crate::strength::Hardening;
+
 /// Powers of length, mass and time; temperatures stay in K in every set of units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unit {
@@ -19,6 +21,8 @@ impl Unit {
     pub const NONE: Self = Self { length: 0, mass: 0, time: 0 };
     /// Force per area, energy per volume.
     pub const STRESS: Self = Self { length: -1, mass: 1, time: -2 };
+    /// Square of a stress.
+    pub const STRESS_SQUARED: Self = Self { length: -2, mass: 2, time: -4 };
     /// Strain per time.
     pub const RATE: Self = Self { length: 0, mass: 0, time: -1 };
 }
@@ -69,6 +73,18 @@ pub struct Declaration<T> {
     pub constants: &'static [Constant],
     /// The law with these constants, each within its bounds.
     pub of: fn(&[f64]) -> T,
+}
+
+/// A law as a deck names it that has a curve beside its constants, by the key `points`.
+pub struct Curved<T> {
+    /// The word after `type`.
+    pub name: &'static str,
+    /// Its constants, in the order that `of` takes.
+    pub constants: &'static [Constant],
+    /// What the two numbers of a point are.
+    pub points: &'static str,
+    /// The law with these constants, each within its bounds, and this curve.
+    pub of: fn(&[f64], Hardening) -> T,
 }
 
 /// A law whose constants are plain numbers, each declared with its key, unit and bounds, and perhaps a default: the struct, its

@@ -10,27 +10,38 @@ use serde::{Deserialize, Serialize};
 use crate::{
     element::vector::{Tensor, Vector},
     lanes::Lane,
-    law::{Declaration, MAX_HISTORY, Unit, Variable},
+    law::{Curved, Declaration, MAX_HISTORY, Unit, Variable},
     material::Material,
 };
 
 pub(crate) mod cowper_symonds;
+pub(crate) mod crushable_foam;
+pub(crate) mod curve;
 pub(crate) mod elastic;
 pub(crate) mod finite_strain;
 pub(crate) mod johnson_cook;
 pub(crate) mod johnson_holmquist;
+pub(crate) mod low_density_foam;
 pub(crate) mod mooney_rivlin;
 pub(crate) mod ogden;
 pub(crate) mod plane_stress;
+pub(crate) mod principal;
 pub(crate) mod remembering;
+pub(crate) mod soil_foam;
 pub(crate) mod tabulated;
 pub(crate) mod viscoelastic;
 pub(crate) mod voce;
 pub(crate) mod von_mises;
 
+pub use cowper_symonds::CowperSymonds;
+pub use crushable_foam::CrushableFoam;
+pub use curve::{Hardening, MAX_HARDENING};
+pub use johnson_cook::Heat;
 pub use johnson_holmquist::JohnsonHolmquist;
+pub use low_density_foam::LowDensityFoam;
 pub use mooney_rivlin::MooneyRivlin;
 pub use ogden::Ogden;
+pub use soil_foam::SoilFoam;
 pub use viscoelastic::Viscoelastic;
 pub use voce::Voce;
 pub(crate) use {
@@ -151,6 +162,8 @@ pub(crate) struct Strain<L> {
 pub(crate) struct Around<L> {
     /// That of the equation of state at the energy of the start; [`Memory::added_pressure`] is not in it, nor is viscosity.
     pub pressure: L,
+    /// The whole pressure before the step, without viscosity.
+    pub pressure_before: L,
     /// Internal energy at the start of the step, per initial volume.
     pub energy: L,
     pub density: L,
@@ -367,21 +380,17 @@ pub enum Strength {
     Ogden(Ogden),
     /// A shear modulus that relaxes.
     Viscoelastic(Viscoelastic),
-}
-
-/// What the temperature of a Johnson-Cook material follows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Heat {
-    /// Plastic work over `density * specific_heat`.
-    PlasticWork,
-    /// `(E - E_cold(v)) / (density * specific_heat)`: the internal energy, that of shocks too, less that of the material at the same volume
-    /// without heat. The cold curve is the isentrope at 0 K, `dE_cold = -p(v, E_cold) dv`.
-    InternalEnergy,
+    /// Foam that is crushed, with its crush stress by loss of volume.
+    CrushableFoam(CrushableFoam, Hardening),
+    /// Foam that comes back, with its nominal stress by nominal strain in compression.
+    LowDensityFoam(LowDensityFoam, Hardening),
+    /// Soil and concrete-like foam, with its pressure by logarithmic compression.
+    SoilFoam(SoilFoam, Hardening),
 }
 
 /// The laws that declare their constants, by their names in [`Strength`]: the one list that declarations go by.
 macro_rules! declared_laws {
-    ($($law:ident),* $(,)?) => {
+    ($($law:ident),*; $($curved:ident),* $(,)?) => {
         impl Strength {
             /// The laws that declare their constants.
             pub const DECLARED: &'static [Declaration<Strength>] = &[$(Declaration {
@@ -390,11 +399,36 @@ macro_rules! declared_laws {
                 of: |values| Strength::$law($law::of(values)),
             }),*];
 
+            /// The laws that declare their constants and have a curve beside them.
+            pub const CURVED: &'static [Curved<Strength>] = &[$(Curved {
+                name: $curved::NAME,
+                constants: $curved::CONSTANTS,
+                points: $curved::POINTS,
+                of: |values, curve| Strength::$curved($curved::of(values), curve),
+            }),*];
+
             /// The name and the constants by key of a law that declares them.
             pub fn declared(&self) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
                 match self {
                     $(Strength::$law(law) => Some(($law::NAME, law.constants())),)*
+                    $(Strength::$curved(law, _) => Some(($curved::NAME, law.constants())),)*
                     _ => None,
+                }
+            }
+
+            /// The curve of a law that declares one beside its constants.
+            pub fn curve(&self) -> Option<&Hardening> {
+                match self {
+                    $(Strength::$curved(_, curve) => Some(curve),)*
+                    _ => None,
+                }
+            }
+
+            /// A law that declares a curve with this one; any other law as it is.
+            pub fn with_curve(self, curve: Hardening) -> Self {
+                match self {
+                    $(Strength::$curved(law, _) => Strength::$curved(law, curve),)*
+                    other => other,
                 }
             }
 
@@ -402,6 +436,10 @@ macro_rules! declared_laws {
             pub fn converted(self, convert: &dyn Fn(Unit, f64) -> f64) -> Self {
                 match self {
                     $(Strength::$law(law) => Strength::$law(law.converted(convert)),)*
+                    $(Strength::$curved(law, mut curve) => {
+                        curve.stress = curve.stress.map(|stress| convert(Unit::STRESS, stress));
+                        Strength::$curved(law.converted(convert), curve)
+                    })*
                     other => other,
                 }
             }
@@ -409,7 +447,10 @@ macro_rules! declared_laws {
     };
 }
 
-declared_laws!(Voce, JohnsonHolmquist, MooneyRivlin, Ogden, Viscoelastic);
+declared_laws!(
+    Voce, JohnsonHolmquist, MooneyRivlin, Ogden, Viscoelastic;
+    CrushableFoam, LowDensityFoam, SoilFoam,
+);
 
 impl Strength {
     /// The history variables of the law.
@@ -419,6 +460,9 @@ impl Strength {
             Strength::MooneyRivlin(_) => MooneyRivlin::HISTORY,
             Strength::Ogden(_) => Ogden::HISTORY,
             Strength::Viscoelastic(_) => Viscoelastic::HISTORY,
+            Strength::CrushableFoam(..) => CrushableFoam::HISTORY,
+            Strength::LowDensityFoam(..) => LowDensityFoam::HISTORY,
+            Strength::SoilFoam(..) => SoilFoam::HISTORY,
             _ => &[],
         }
     }
@@ -433,32 +477,20 @@ impl Strength {
         match self {
             Strength::Ogden(law) => law.fault(),
             Strength::Viscoelastic(law) => law.fault(),
+            Strength::SoilFoam(law, curve) => law.fault(curve),
             _ => None,
         }
     }
-}
 
-/// Most points of a [`Hardening`].
-pub const MAX_HARDENING: usize = 10;
-
-/// Yield stress at growing plastic strains.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Hardening {
-    /// Points in use, 1 to [`MAX_HARDENING`].
-    pub n_points: u32,
-    /// Effective plastic strain: the first is 0, the others ascend.
-    pub strain: [f64; MAX_HARDENING],
-    /// Yield stress there (stress), positive and not descending.
-    pub stress: [f64; MAX_HARDENING],
-}
-
-/// `1 + (rate / reference)^(1/exponent)`, a factor on the yield stress (Cowper and Symonds 1957).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CowperSymonds {
-    /// D, the rate that doubles the yield stress (1/time).
-    pub reference: f64,
-    /// q.
-    pub exponent: f64,
+    /// The bulk modulus of a law that makes the pressure itself: the equation of state beside it has this one.
+    pub fn bulk(&self) -> Option<f64> {
+        match self {
+            Strength::CrushableFoam(law, _) => Some(law.bulk()),
+            Strength::LowDensityFoam(law, _) => Some(law.bulk()),
+            Strength::SoilFoam(law, _) => Some(law.unloading),
+            _ => None,
+        }
+    }
 }
 
 impl AnyStrength {
@@ -501,6 +533,9 @@ impl AnyStrength {
             Strength::MooneyRivlin(law) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::Ogden(law) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::Viscoelastic(law) => Self::Elastic(Elastic { shear: law.shear }),
+            Strength::CrushableFoam(law, _) => Self::Elastic(Elastic { shear: law.shear() }),
+            Strength::LowDensityFoam(law, _) => Self::Elastic(Elastic { shear: law.shear() }),
+            Strength::SoilFoam(law, _) => Self::Elastic(Elastic { shear: law.shear }),
         }
     }
 }

@@ -92,6 +92,14 @@ fn eos_of(
     part: &PartCard,
 ) -> Option<Eos> {
     let log = t.log;
+    if let Law::Curved { strength, .. } = &material.law {
+        if eos.is_some() {
+            log.fault_of(part.eos.origin, "no *EOS: the curve of the material is one", "leave EOSID blank");
+        }
+        return strength
+            .bulk()
+            .map(|bulk| Eos::Linear { bulk: t.number(material.at, "a bulk modulus of", bulk) });
+    }
     if let Law::Whole { eos: own, given, .. } = &material.law {
         if eos.is_some() {
             let expected = format!(
@@ -163,6 +171,26 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
         |rate: &Option<[f64; 2]>| rate.map(|[reference, exponent]| CowperSymonds { reference, exponent });
     Some(match &material.law {
         Law::Whole { strength, .. } => *strength,
+        Law::Curved { strength, curve, points } => {
+            let mut points = match curve.value {
+                0 => points.clone(),
+                id => t.points(id, curve.origin.at)?.to_vec(),
+            };
+            if let Strength::SoilFoam(..) = strength {
+                // The card has the logarithm of the relative volume, which compression makes negative.
+                points.iter_mut().for_each(|point| point[0] = -point[0] + 0.0);
+                points.push([0.0; 2]);
+                points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+                points.dedup();
+            }
+            let at = curve.origin.at;
+            let strength = strength.with_curve(held(t, hardening(points, true, at, log)?, at));
+            if let Some(expected) = strength.fault() {
+                log.fault_of(curve.origin, expected, "correct the curve or the constants");
+                return None;
+            }
+            strength
+        }
         Law::Elastic | Law::Rigid { .. } => Strength::Elastic { shear: shear() },
         Law::Null { .. } => Strength::Hydro,
         Law::Bilinear { yield_stress, tangent, rate } => {
@@ -185,16 +213,8 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
                 0 => points.clone(),
                 id => t.points(id, curve.origin.at)?.to_vec(),
             };
-            let points = hardening(points, material.at, log)?;
-            let mut hardening = Hardening {
-                n_points: points.len() as u32,
-                strain: [0.0; MAX_HARDENING],
-                stress: [0.0; MAX_HARDENING],
-            };
-            for (i, [strain, stress]) in points.into_iter().enumerate() {
-                hardening.strain[i] = t.number(material.at, "a plastic strain of", strain);
-                hardening.stress[i] = t.number(material.at, "a yield stress of", stress);
-            }
+            let points = hardening(points, false, material.at, log)?;
+            let hardening = held(t, points, material.at);
             Strength::Tabulated { shear: shear(), hardening, rate: rate_of(rate) }
         }
         Law::JohnsonCook {
@@ -218,14 +238,23 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
     })
 }
 
-/// Points of a yield curve as our law takes them: from strain 0, not descending, few; beyond the last the last slope
+/// The points of a curve as a law holds them.
+fn held(t: &Translation<'_>, mut points: Vec<[f64; 2]>, at: Place) -> Hardening {
+    for point in &mut points {
+        *point = [t.number(at, "a strain of", point[0]), t.number(at, "a stress of", point[1])];
+    }
+    Hardening::through(&points)
+}
+
+/// Points of a yield curve, or of one that may begin without stress, as our law takes them: from strain 0, not descending, few; beyond the last the last slope
 /// goes on, as LS-DYNA continues curves.
-fn hardening(mut points: Vec<[f64; 2]>, at: Place, log: &Log<'_>) -> Option<Vec<[f64; 2]>> {
+fn hardening(mut points: Vec<[f64; 2]>, from_zero: bool, at: Place, log: &Log<'_>) -> Option<Vec<[f64; 2]>> {
     points.retain(|p| p[0] >= 0.0);
     let bad = points.windows(2).find(|w| w[1][0] <= w[0][0] || w[1][1] < w[0][1]);
-    if points.is_empty() || points[0][1] <= 0.0 || bad.is_some() {
-        let read = bad.map_or("a yield curve without a positive stress".to_string(), |w| {
-            format!("a yield curve from {:?} to {:?}", w[0], w[1])
+    let stress = if from_zero { points.last() } else { points.first() }.map_or(0.0, |p| p[1]);
+    if stress <= 0.0 || points[0][1] < 0.0 || bad.is_some() {
+        let read = bad.map_or("a curve without a positive stress".to_string(), |w| {
+            format!("a curve from {:?} to {:?}", w[0], w[1])
         });
         log.fault(at, read, "strains that ascend, stresses that do not descend", "flatten what softens");
         return None;
@@ -271,14 +300,16 @@ mod tests {
         let log = Log::keyword(&[("a.k", "")]);
         let at = Place::card(0, 1);
         assert_eq!(
-            hardening(vec![[0.0, 1.0], [1.0, 2.0]], at, &log),
+            hardening(vec![[0.0, 1.0], [1.0, 2.0]], false, at, &log),
             Some(vec![[0.0, 1.0], [1.0, 2.0], [10.0, 11.0]])
         );
         let many: Vec<[f64; 2]> = (0..50).map(|i| f64::from(i) * 0.01).map(|e| [e, 1.0 + e.sqrt()]).collect();
-        let few = hardening(many, at, &log).expect("ascends");
+        let few = hardening(many, false, at, &log).expect("ascends");
         assert_eq!(few.len(), MAX_HARDENING);
         assert_eq!(few[0], [0.0, 1.0]);
-        assert!(hardening(vec![[0.0, 1.0], [1.0, 0.5]], at, &log).is_none());
-        assert!(hardening(vec![], at, &log).is_none());
+        assert!(hardening(vec![[0.0, 1.0], [1.0, 0.5]], false, at, &log).is_none());
+        assert!(hardening(vec![], false, at, &log).is_none());
+        assert!(hardening(vec![[0.0, 0.0], [1.0, 0.5]], false, at, &log).is_none());
+        assert!(hardening(vec![[0.0, 0.0], [1.0, 0.5]], true, at, &log).is_some());
     }
 }

@@ -2,10 +2,18 @@
 //!
 //! The rate is the total effective deviatoric strain rate.
 
-use crate::{
-    lanes::{Lane, functions::pow},
-    material::CowperSymonds,
-};
+use serde::{Deserialize, Serialize};
+
+use crate::lanes::{Lane, functions::pow};
+
+/// `1 + (rate / reference)^(1/exponent)`, a factor on the yield stress (Cowper and Symonds 1957).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CowperSymonds {
+    /// D, the rate that doubles the yield stress (1/time).
+    pub reference: f64,
+    /// q.
+    pub exponent: f64,
+}
 
 /// Constants made ready; the factor is 1 where there is none.
 #[derive(Clone, Copy)]

@@ -4,11 +4,23 @@
 //! `(T - t_room) / (t_melt - t_room)` clamped to 0..1. All plastic work becomes heat, or the element says what heat it has
 //! (`StrengthLaw::heating_by_energy`).
 
+use serde::{Deserialize, Serialize};
+
 use super::{Deviator, History, Strain, StrengthLaw};
 use crate::lanes::{
     Lane,
     functions::{ln, pow},
 };
+
+/// What the temperature of a Johnson-Cook material follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Heat {
+    /// Plastic work over `density * specific_heat`.
+    PlasticWork,
+    /// `(E - E_cold(v)) / (density * specific_heat)`: the internal energy, that of shocks too, less that of the material at the same volume
+    /// without heat. The cold curve is the isentrope at 0 K, `dE_cold = -p(v, E_cold) dv`.
+    InternalEnergy,
+}
 
 /// Constants of the law, those of [`crate::material::Strength::JohnsonCook`] made ready.
 #[derive(Clone, Copy)]

@@ -361,6 +361,7 @@ mod tests {
             let strain = Strain { rate: Scalar(0.5), increment: zero };
             let around = Around {
                 pressure: Scalar(8.71e9),
+                pressure_before: zero,
                 energy: zero,
                 density: Scalar(2610.0),
                 relative_volume: Scalar(0.96),

@@ -2,7 +2,7 @@
 
 use super::{
     Around, Deviator, History, Memory, MooneyRivlin, Ogden, Strain, Strength, StrengthLaw, Viscoelastic,
-    johnson_holmquist::Ceramic,
+    crushable_foam::Crushable, johnson_holmquist::Ceramic, low_density_foam::LowDensity, soil_foam::Soil,
 };
 use crate::{lanes::Lane, material::Material};
 
@@ -13,6 +13,9 @@ pub(crate) enum AnyRemembering {
     MooneyRivlin(MooneyRivlin),
     Ogden(Ogden),
     Viscoelastic(Viscoelastic),
+    CrushableFoam(Crushable),
+    LowDensityFoam(LowDensity),
+    SoilFoam(Soil),
 }
 
 /// The laws by their names: the one list that calls go by.
@@ -23,6 +26,9 @@ macro_rules! of_any {
             AnyRemembering::MooneyRivlin($law) => $call,
             AnyRemembering::Ogden($law) => $call,
             AnyRemembering::Viscoelastic($law) => $call,
+            AnyRemembering::CrushableFoam($law) => $call,
+            AnyRemembering::LowDensityFoam($law) => $call,
+            AnyRemembering::SoilFoam($law) => $call,
         }
     };
 }
@@ -38,6 +44,9 @@ impl AnyRemembering {
             Strength::MooneyRivlin(law) => Some(Self::MooneyRivlin(law)),
             Strength::Ogden(law) => Some(Self::Ogden(law)),
             Strength::Viscoelastic(law) => Some(Self::Viscoelastic(law)),
+            Strength::CrushableFoam(law, curve) => Some(Self::CrushableFoam(Crushable::new(&law, &curve))),
+            Strength::LowDensityFoam(law, curve) => Some(Self::LowDensityFoam(LowDensity::new(&law, &curve))),
+            Strength::SoilFoam(law, curve) => Some(Self::SoilFoam(Soil::new(&law, &curve))),
             _ => None,
         }
     }

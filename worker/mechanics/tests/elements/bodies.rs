@@ -128,6 +128,17 @@ pub fn all_laws() -> Vec<Material> {
         alpha3: -2.0,
     };
     add(linear, Strength::Ogden(stretches), Failure::None);
+    let bulk = |young: f64| Eos::Linear { bulk: young / 3.0 };
+    let crush = Hardening::through(&[[0.0, 1e8], [0.01, 3e8]]);
+    let foam = mechanics::strength::CrushableFoam { young: 100e9, tension: 1e8 };
+    add(bulk(100e9), Strength::CrushableFoam(foam, crush), Failure::None);
+    let curve = Hardening::through(&[[0.0, 0.0], [0.01, 3e8], [0.2, 6e8]]);
+    let soft =
+        mechanics::strength::LowDensityFoam { young: 100e9, tension: 1e8, hysteresis: 0.4, shape: 3.0 };
+    add(bulk(100e9), Strength::LowDensityFoam(soft, curve), Failure::None);
+    let soil =
+        mechanics::strength::SoilFoam { shear, unloading: 164e9, a0: 1e16, a1: 1e8, a2: 0.2, tension: 1e8 };
+    add(linear, Strength::SoilFoam(soil, curve), Failure::None);
     let creeping = mechanics::strength::Viscoelastic { shear, long_shear: 20e9, decay: 1e4 };
     add(shock, Strength::Viscoelastic(creeping), Failure::None);
     materials

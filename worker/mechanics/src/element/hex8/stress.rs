@@ -126,6 +126,7 @@ impl<L: Lane> Stressed<L> {
                 let line = laws.eos.line(relative_volume, one);
                 let around = Around {
                     pressure: line.pressure(energy),
+                    pressure_before: view.state(slot, field::PRESSURE),
                     energy,
                     density: L::splat(laws.density) / relative_volume,
                     relative_volume,
