@@ -98,7 +98,9 @@ pub(crate) fn read_material(table: Table<'_>, name: String) -> Option<Material> 
     {
         let expected =
             format!("{{ type = \"linear\", bulk = {bulk} }}: this strength makes the pressure itself");
-        eos_value.into_iter().for_each(|eos| eos.fault(&expected, "give it, it says how fast waves are"));
+        eos_value
+            .into_iter()
+            .for_each(|eos| eos.fault(&expected, "write it so: the time step follows from it"));
     }
     for clash in clashes(&material) {
         let (value, expected) = match clash {

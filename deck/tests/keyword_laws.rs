@@ -87,6 +87,8 @@ fn low_density_foam_unloads_by_hu_and_shape() {
     let Strength::LowDensityFoam(law, curve) = foam.strength else { panic!("{foam:?}") };
     assert_eq!(law, LowDensityFoam { young: 10.0, tension: 0.05, hysteresis: 0.3, shape: 5.0 });
     assert_eq!((curve.n_points, curve.stress[0], curve.stress[1]), (4, 0.0, 0.1));
+    let reading = deck::read_whole(&cube(&card("\n5.0,,,,,2.0"), ""), "a.k").expect("a warning");
+    assert!(reading.warnings.iter().any(|warning| warning.words.contains("KCON")), "{:?}", reading.warnings);
     assert!(fault(&card(",0.1")).contains("no decay"));
     assert!(fault(&card("\n5.0,1")).contains("tension that stays at its cut-off"));
 }

@@ -278,15 +278,18 @@ pub(crate) trait StrengthLaw: Copy {
         self.update(trial, around.strain, history, active)
     }
 
-    /// Returns the trial deviator to the yield surface. Only lanes in `active` need be right; what the others
-    /// hold is arbitrary.
+    /// Returns the trial deviator to the yield surface: of a law that never yields, or that does all in [`StrengthLaw::remember`],
+    /// the trial. Only lanes in `active` need be right; what the others hold is arbitrary.
+    #[inline(always)]
     fn update<L: Lane>(
         &self,
         trial: Deviator<L>,
-        strain: Strain<L>,
-        history: &mut History<L>,
-        active: L::Mask,
-    ) -> Deviator<L>;
+        _strain: Strain<L>,
+        _history: &mut History<L>,
+        _active: L::Mask,
+    ) -> Deviator<L> {
+        trial
+    }
 }
 
 /// The laws of this module by their names in [`AnyStrength`]: the one list that calls go by.

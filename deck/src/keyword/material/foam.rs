@@ -49,6 +49,9 @@ fn low_density(f: &[Fields<'_>; 8], log: &Log<'_>) -> Option<Law> {
     refuse(&f[1], 1, "tension that stays at its cut-off", "leave FAIL blank");
     refuse(&f[1], 3, "no relaxation", "leave ED and BETA1 blank");
     refuse(&f[1], 6, "a geometry at the start without stress", "leave REF blank");
+    if f[1].real(5, 0.0) != 0.0 {
+        log.warn(f[1].origin(5, "KCON").at, "KCON: the stiffness of contact follows from the material here");
+    }
     let or = |value: f64, default: f64| if value > 0.0 { value } else { default };
     let young = f[0].positive(2, "Young's modulus");
     let law = LowDensityFoam {

@@ -81,7 +81,7 @@ pub struct Hourglass {
 
 impl Default for Hourglass {
     fn default() -> Self {
-        Self::viscous(0.1)
+        Self::VISCOUS
     }
 }
 

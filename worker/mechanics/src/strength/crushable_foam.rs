@@ -7,7 +7,7 @@
 //! J. O. Hallquist, LS-DYNA theoretical manual (1998), material model 63.
 
 use super::{
-    Around, Deviator, Hardening, History, Memory, Strain, StrengthLaw,
+    Around, Deviator, Hardening, History, Memory, StrengthLaw,
     curve::Curve,
     finite_strain::Symmetric,
     principal::{along, principal},
@@ -70,18 +70,6 @@ impl StrengthLaw for Crushable {
     #[inline(always)]
     fn shear(&self) -> f64 {
         self.law.shear()
-    }
-
-    /// The trial: what crushes is in [`StrengthLaw::remember`].
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        _: Strain<L>,
-        _: &mut History<L>,
-        _: L::Mask,
-    ) -> Deviator<L> {
-        trial
     }
 
     #[inline(always)]

@@ -52,15 +52,4 @@ impl StrengthLaw for Elastic {
     fn shear(&self) -> f64 {
         self.shear
     }
-
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        _strain: Strain<L>,
-        _history: &mut History<L>,
-        _active: L::Mask,
-    ) -> Deviator<L> {
-        trial
-    }
 }

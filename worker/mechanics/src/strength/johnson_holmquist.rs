@@ -12,7 +12,7 @@
 //!   into swelling: `q' = -K mu + sqrt((K mu + q)^2 + 2 beta K U)`, with K the bulk modulus. Where `K mu + q` is negative nothing
 //!   presses against the swelling, and q stays.
 
-use super::{Around, Deviator, History, Memory, Strain, StrengthLaw};
+use super::{Around, Deviator, History, Memory, StrengthLaw};
 use crate::{
     lanes::{
         Lane,
@@ -116,18 +116,6 @@ impl StrengthLaw for Ceramic {
         self.law.shear
     }
 
-    /// The trial: what yields is in [`StrengthLaw::remember`].
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        _strain: Strain<L>,
-        _history: &mut History<L>,
-        _active: L::Mask,
-    ) -> Deviator<L> {
-        trial
-    }
-
     #[inline(always)]
     fn remember<L: Lane>(
         &self,
@@ -171,7 +159,7 @@ impl StrengthLaw for Ceramic {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::Strain, *};
     use crate::{
         block::Block,
         element::{ElementVote, Step},

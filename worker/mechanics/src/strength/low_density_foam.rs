@@ -9,7 +9,7 @@
 //! same code's hysteretic unloading of foams by rate.
 
 use super::{
-    Around, Deviator, Hardening, History, Memory, Strain, StrengthLaw,
+    Around, Deviator, Hardening, History, Memory, StrengthLaw,
     curve::Curve,
     finite_strain::{COLUMNS, Symmetric},
     principal::{along, principal},
@@ -104,18 +104,6 @@ impl StrengthLaw for LowDensity {
     #[inline(always)]
     fn shear(&self) -> f64 {
         self.law.shear()
-    }
-
-    /// The trial: the stress is found by [`StrengthLaw::remember`].
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        _: Strain<L>,
-        _: &mut History<L>,
-        _: L::Mask,
-    ) -> Deviator<L> {
-        trial
     }
 
     #[inline(always)]

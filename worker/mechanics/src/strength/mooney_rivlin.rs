@@ -6,7 +6,7 @@
 //! R. S. Rivlin, Large elastic deformations of isotropic materials IV, Phil. Trans. R. Soc. A 241 (1948) 379.
 
 use super::{
-    Around, Deviator, History, Memory, Strain, StrengthLaw,
+    Around, Deviator, History, Memory, StrengthLaw,
     finite_strain::{COLUMNS, Symmetric},
 };
 use crate::{
@@ -40,18 +40,6 @@ impl StrengthLaw for MooneyRivlin {
     #[inline(always)]
     fn shear(&self) -> f64 {
         2.0 * (self.a + self.b)
-    }
-
-    /// The trial: the stress is found by [`StrengthLaw::remember`].
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        _: Strain<L>,
-        _: &mut History<L>,
-        _: L::Mask,
-    ) -> Deviator<L> {
-        trial
     }
 
     #[inline(always)]

@@ -8,7 +8,7 @@
 //! solids, Proc. R. Soc. Lond. A 326 (1972) 565.
 
 use super::{
-    Around, Deviator, History, Memory, Strain, StrengthLaw,
+    Around, Deviator, History, Memory, StrengthLaw,
     finite_strain::{COLUMNS, Symmetric},
     principal::{along, principal},
 };
@@ -58,18 +58,6 @@ impl StrengthLaw for Ogden {
     #[inline(always)]
     fn shear(&self) -> f64 {
         0.5 * (self.mu1 * self.alpha1 + self.mu2 * self.alpha2 + self.mu3 * self.alpha3)
-    }
-
-    /// The trial: the stress is found by [`StrengthLaw::remember`].
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        _: Strain<L>,
-        _: &mut History<L>,
-        _: L::Mask,
-    ) -> Deviator<L> {
-        trial
     }
 
     #[inline(always)]

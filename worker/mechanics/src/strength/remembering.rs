@@ -1,7 +1,7 @@
 //! The laws with history variables. They have a kernel of their own, so that the other one does not become slower.
 
 use super::{
-    Around, Deviator, History, Memory, MooneyRivlin, Ogden, Strain, Strength, StrengthLaw, Viscoelastic,
+    Around, Deviator, History, Memory, MooneyRivlin, Ogden, Strength, StrengthLaw, Viscoelastic,
     crushable_foam::Crushable, johnson_holmquist::Ceramic, low_density_foam::LowDensity, soil_foam::Soil,
 };
 use crate::{lanes::Lane, material::Material};
@@ -63,17 +63,6 @@ impl StrengthLaw for AnyRemembering {
     #[inline(always)]
     fn shear(&self) -> f64 {
         of_any!(self, law => law.shear())
-    }
-
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        strain: Strain<L>,
-        history: &mut History<L>,
-        active: L::Mask,
-    ) -> Deviator<L> {
-        of_any!(self, law => law.update(trial, strain, history, active))
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@
 //!
 //! R. D. Krieg, A simple constitutive description for cellular concrete, Sandia SC-DR-72-0883 (1972).
 
-use super::{Around, Deviator, Hardening, History, Memory, Strain, StrengthLaw, curve::Curve};
+use super::{Around, Deviator, Hardening, History, Memory, StrengthLaw, curve::Curve};
 use crate::{
     lanes::{Lane, functions::ln},
     law::{Unit, Variable, declared},
@@ -67,18 +67,6 @@ impl StrengthLaw for Soil {
     #[inline(always)]
     fn shear(&self) -> f64 {
         self.law.shear
-    }
-
-    /// The trial: what yields is in [`StrengthLaw::remember`].
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        _: Strain<L>,
-        _: &mut History<L>,
-        _: L::Mask,
-    ) -> Deviator<L> {
-        trial
     }
 
     #[inline(always)]

@@ -7,7 +7,7 @@
 //! L. R. Herrmann, F. E. Peterson, A numerical procedure for viscoelastic stress analysis, Proc. 7th ICRPG Mechanical Behavior
 //! Working Group (1968).
 
-use super::{Around, Deviator, History, Memory, Strain, StrengthLaw};
+use super::{Around, Deviator, History, Memory, StrengthLaw};
 use crate::{
     element::rotation::rotated,
     lanes::{Lane, functions::exp},
@@ -60,18 +60,6 @@ impl StrengthLaw for Viscoelastic {
     #[inline(always)]
     fn shear(&self) -> f64 {
         self.shear
-    }
-
-    /// The trial: what relaxes is in [`StrengthLaw::remember`].
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        _: Strain<L>,
-        _: &mut History<L>,
-        _: L::Mask,
-    ) -> Deviator<L> {
-        trial
     }
 
     #[inline(always)]
