@@ -1,6 +1,9 @@
 //! The material library, and how a material is read: `[[material]]` of a deck and an entry of the library
 //! have the same keys.
 
+pub mod card;
+pub(crate) mod constants;
+
 use std::sync::OnceLock;
 
 use mechanics::{

@@ -8,6 +8,8 @@ use mechanics::{
     material::{CowperSymonds, Eos, Failure, Material, Strength},
 };
 
+use crate::library::card::Measure;
+
 /// A consistent set: one deck unit is ten to this power of the SI unit, where the library is converted to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Units {
@@ -83,6 +85,32 @@ impl Units {
         }
         // The powers of `scale` are those of a unit in SI, the other way round.
         [self.length, self.mass, self.time].map(|power| scale(1.0, -power))
+    }
+
+    /// What a constant is counted in; empty for a plain number.
+    pub(crate) fn word(&self, measure: Measure) -> String {
+        let [length, mass, time, velocity, stress] = self.symbols;
+        let power = |unit: &str, n: i32| if n == 1 { unit.to_string() } else { format!("{unit}{n}") };
+        let Measure { unit: Unit { length: l, mass: m, time: t }, kelvin } = measure;
+        // Joules per kilogram where they are what the powers come to.
+        let joules = ["SI", "mm-ms-kg"].contains(&self.name);
+        let word = match [l, m, t] {
+            [0, 0, 0] if kelvin > 0 => return power("K", kelvin),
+            [0, 0, 0] => String::new(),
+            [1, 0, -1] => velocity.to_string(),
+            [-1, 1, -2] => stress.to_string(),
+            [2, 0, -2] if joules => "J/kg".to_string(),
+            [2, 0, -2] => format!("({velocity})2"),
+            _ => {
+                let powers = [(mass, m), (length, l), (time, t)];
+                let above: Vec<String> =
+                    powers.iter().filter(|(_, n)| *n > 0).map(|(unit, n)| power(unit, *n)).collect();
+                let below = powers.iter().filter(|(_, n)| *n < 0).map(|(unit, n)| power(unit, -n));
+                let above = if above.is_empty() { "1".to_string() } else { above.join("*") };
+                below.fold(above, |word, unit| format!("{word}/{unit}"))
+            }
+        };
+        if kelvin < 0 { format!("{word}/{}", power("K", -kelvin)) } else { word }
     }
 
     fn velocity(&self) -> i32 {

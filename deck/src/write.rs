@@ -6,6 +6,8 @@ mod condition;
 mod part;
 mod value;
 
+use mechanics::material::Material;
+
 use crate::typed::{
     Control, Deck, Gauge, Kind, Output, Section, Spot,
     condition::Parts,
@@ -47,6 +49,13 @@ pub(crate) fn text(deck: &Deck) -> String {
         text.key("point", vector(detonation.point));
         text.key("time", format!("{:?}", detonation.time));
     }
+    text.into_string()
+}
+
+/// A `[[material]]` alone.
+pub(crate) fn material(material: &Material) -> String {
+    let mut text = Text::default();
+    part::write_material(&mut text, material);
     text.into_string()
 }
 

@@ -157,8 +157,8 @@ pub enum Command {
         #[command(flatten)]
         reading: ReadingArgs,
     },
-    /// List the material library
-    Materials,
+    /// List the material library, or print the constants of one material, its source and a block to paste into a deck
+    Materials(MaterialsArgs),
     /// Show hosts and jobs of a master, updated once a second
     Top {
         /// The master
@@ -176,6 +176,19 @@ pub enum Command {
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
+}
+
+/// Flags of `materials`.
+#[derive(Args, Clone, Debug)]
+pub struct MaterialsArgs {
+    /// The material; without it all are listed
+    pub name: Option<String>,
+    /// Units of the values
+    #[arg(long, default_value = "SI", value_parser = ["SI", "cm-g-us", "mm-ms-kg", "mm-s-t"])]
+    pub units: String,
+    /// Print JSON on standard output
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Flags of `run`.

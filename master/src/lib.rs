@@ -35,6 +35,7 @@ pub mod incident;
 pub mod interrupt;
 pub mod job;
 pub mod machine;
+pub mod materials;
 pub mod memory;
 pub mod neighbour;
 pub mod newcomer;

@@ -20,7 +20,7 @@ use crate::{
     ca_folder::CaFolder,
     certs, check, client,
     command::{Bench, Certs, Cli, Command, WorkerArgs},
-    convert, daemon, machine, memory, newcomer, picture, processes, run, simulate, study, verify,
+    convert, daemon, machine, materials, memory, newcomer, picture, processes, run, simulate, study, verify,
 };
 
 /// The log: to standard error, of the levels that `BOLIDE_LOG` says (`debug`, or by module `info,worker=debug`), else from
@@ -65,12 +65,7 @@ pub fn main(compute: Compute) -> ExitCode {
         Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
         Command::Verify(args) => verify::run(&args),
         Command::Picture(args) => picture::run(&args),
-        Command::Materials => {
-            for name in deck::materials() {
-                println!("{name}");
-            }
-            Ok(ExitCode::SUCCESS)
-        }
+        Command::Materials(args) => materials::run(&args),
     };
     result.unwrap_or_else(|reason| {
         eprintln!("bolide: {reason}");

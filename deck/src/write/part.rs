@@ -2,14 +2,14 @@
 
 use mechanics::{
     element::{hourglass::Hourglass, shell4::Rule},
-    material::{CowperSymonds, Eos, Failure, Heat, Material, Strength},
+    material::Material,
     mesh::{Section, Topology},
 };
 
 use super::value::{Text, list, numbers, quoted, table, vector};
 use crate::{
     blocks::{Sector, Shape},
-    library::HEATS,
+    library::constants::{Written, of_eos, of_failure, of_strength},
     typed::{
         Deck,
         mesh::{Explicit, PartMesh, Source},
@@ -20,10 +20,15 @@ use crate::{
 /// Writes the deck's own materials, and its parts.
 pub(super) fn write(text: &mut Text, deck: &Deck) {
     for material in deck.materials.iter().filter_map(|own| own.material.as_ref()) {
-        text.heading("[[material]]");
-        material_keys(material).into_iter().for_each(|(key, value)| text.key(key, value));
+        write_material(text, material);
     }
     deck.parts.iter().for_each(|part| write_part(text, part));
+}
+
+/// A `[[material]]`.
+pub(super) fn write_material(text: &mut Text, material: &Material) {
+    text.heading("[[material]]");
+    material_keys(material).into_iter().for_each(|(key, value)| text.key(key, value));
 }
 
 type Keys = Vec<(&'static str, String)>;
@@ -33,113 +38,31 @@ fn plain(keys: &[(&'static str, f64)]) -> Keys {
     keys.iter().map(|(key, value)| (*key, format!("{value:?}"))).collect()
 }
 
-/// A law by its name and constants.
-fn law(kind: &str, constants: Keys) -> String {
-    let mut keys = vec![("type", quoted(kind))];
-    keys.extend(constants);
-    table(&keys)
-}
-
 fn material_keys(material: &Material) -> Keys {
     let mut keys = vec![
         ("name", quoted(&material.name)),
         ("density", format!("{:?}", material.density)),
-        ("eos", eos(material.eos)),
-        ("strength", strength(&material.strength)),
+        ("eos", law(of_eos(material.eos))),
+        ("strength", law(of_strength(&material.strength))),
     ];
-    keys.extend(failure(material.failure).map(|failure| ("failure", failure)));
+    keys.extend(of_failure(material.failure).map(|failure| ("failure", law(failure))));
     keys
 }
 
-fn eos(eos: Eos) -> String {
-    match eos {
-        Eos::Linear { bulk } => law("linear", plain(&[("bulk", bulk)])),
-        Eos::Shock { c0, s, gamma } => law("shock", plain(&[("c0", c0), ("s", s), ("gamma", gamma)])),
-        Eos::Polynomial { a1, a2, a3, b0, b1, t1, t2 } => law(
-            "polynomial",
-            plain(&[("a1", a1), ("a2", a2), ("a3", a3), ("b0", b0), ("b1", b1), ("t1", t1), ("t2", t2)]),
-        ),
-        Eos::IdealGas { gamma, energy } => law("ideal-gas", plain(&[("gamma", gamma), ("energy", energy)])),
-        Eos::Jwl { a, b, r1, r2, omega, energy, detonation, cj_pressure } => law(
-            "jwl",
-            plain(&[
-                ("a", a),
-                ("b", b),
-                ("r1", r1),
-                ("r2", r2),
-                ("omega", omega),
-                ("energy", energy),
-                ("detonation", detonation),
-                ("cj_pressure", cj_pressure),
-            ]),
-        ),
+/// A law as a deck has it.
+fn law(written: Written) -> String {
+    let mut keys = vec![("type", quoted(written.kind))];
+    keys.extend(plain(&written.constants));
+    if !written.points.is_empty() {
+        keys.push(("points", list(written.points.iter().map(|point| numbers(point)))));
     }
-}
-
-fn strength(strength: &Strength) -> String {
-    let with_rate = |mut keys: Keys, rate: &Option<CowperSymonds>| {
-        let words = |rate: &CowperSymonds| {
-            table(&plain(&[("reference", rate.reference), ("exponent", rate.exponent)]))
-        };
-        keys.extend(rate.as_ref().map(|rate| ("cowper_symonds", words(rate))));
-        keys
-    };
-    match strength {
-        Strength::Hydro => law("hydro", Vec::new()),
-        Strength::Elastic { shear } => law("elastic", plain(&[("shear", *shear)])),
-        Strength::VonMises { shear, yield_stress, hardening, rate } => {
-            let keys = [("shear", *shear), ("yield_stress", *yield_stress), ("hardening", *hardening)];
-            law("von-mises", with_rate(plain(&keys), rate))
-        }
-        Strength::Tabulated { shear, hardening, rate } => {
-            let points = (0..hardening.n_points as usize).map(|i| [hardening.strain[i], hardening.stress[i]]);
-            let mut keys = plain(&[("shear", *shear)]);
-            keys.push(("points", list(points.map(|point| numbers(&point)))));
-            law("tabulated", with_rate(keys, rate))
-        }
-        Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0, heat } => {
-            let mut keys = plain(&[
-                ("shear", *shear),
-                ("a", *a),
-                ("b", *b),
-                ("n", *n),
-                ("c", *c),
-                ("m", *m),
-                ("t_melt", *t_melt),
-                ("t_room", *t_room),
-                ("specific_heat", *specific_heat),
-                ("rate0", *rate0),
-            ]);
-            let words = HEATS.iter().find(|(_, one)| one == heat && *heat != Heat::PlasticWork);
-            keys.extend(words.map(|(word, _)| ("temperature", quoted(word))));
-            law("johnson-cook", keys)
-        }
-        other => {
-            let (name, constants) =
-                other.declared().expect("a law that is not written by hand declares its constants");
-            let mut keys = plain(&constants);
-            keys.extend(
-                other.curve().map(|curve| ("points", list(curve.points().map(|point| numbers(&point))))),
-            );
-            law(name, keys)
-        }
-    }
-}
-
-fn failure(failure: Failure) -> Option<String> {
-    match failure {
-        Failure::None => None,
-        Failure::PlasticStrain { limit } => Some(law("plastic-strain", plain(&[("limit", limit)]))),
-        Failure::PrincipalStress { tension } => Some(law("principal-stress", plain(&[("tension", tension)]))),
-        Failure::Hydrostatic { tension, heals } => {
-            let mut keys = plain(&[("tension", tension)]);
-            keys.push(("heals", heals.to_string()));
-            Some(law("hydrostatic", keys))
-        }
-        Failure::JohnsonCook { d: [d1, d2, d3, d4, d5] } => {
-            Some(law("johnson-cook", plain(&[("d1", d1), ("d2", d2), ("d3", d3), ("d4", d4), ("d5", d5)])))
-        }
-    }
+    keys.extend(written.rate.map(|rate| {
+        let words = table(&plain(&[("reference", rate.reference), ("exponent", rate.exponent)]));
+        ("cowper_symonds", words)
+    }));
+    keys.extend(written.word.map(|(key, word)| (key, quoted(word))));
+    keys.extend(written.flag.map(|(key, on)| (key, on.to_string())));
+    table(&keys)
 }
 
 pub(super) fn hourglass(control: &Hourglass) -> String {

@@ -1,0 +1,390 @@
+//! What a person wants to know of a material of the library: its laws with formulas, each constant with its unit and meaning, the
+//! source, and a `[[material]]` to paste into a deck.
+
+use mechanics::{
+    law::Unit,
+    material::{Failure, Material},
+};
+use serde::Serialize;
+
+use super::{
+    constants::{Written, of_eos, of_failure, of_strength},
+    entries, find,
+};
+use crate::{fault::nearest, units::Units, write};
+
+/// A material of the library in a set of units.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Card {
+    pub name: String,
+    /// Name of the set of units of every value.
+    pub units: String,
+    pub density: Constant,
+    pub eos: Law,
+    pub strength: Law,
+    /// None of a material whose elements do not fail by themselves.
+    pub failure: Option<Law>,
+    /// The failure law of the parts that say `fracture = true`, where the library has one.
+    pub fracture: Option<Law>,
+    /// Where the constants come from.
+    pub source: String,
+    /// The material as a `[[material]]` of a deck in these units, under a name of its own.
+    pub toml: String,
+}
+
+/// An equation of state, a strength or a failure law.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Law {
+    /// The word after `type` in a deck.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// What follows from the constants.
+    pub formula: &'static str,
+    pub constants: Vec<Constant>,
+}
+
+/// A constant of a material.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Constant {
+    /// The key that a deck writes.
+    pub key: String,
+    pub value: f64,
+    /// Empty for a plain number.
+    pub unit: String,
+    pub meaning: &'static str,
+}
+
+/// The material of that name in this set of units; none where the library has none of that name.
+pub fn card(name: &str, units: &Units) -> Option<Card> {
+    let entry = entries().iter().find(|entry| entry.material.name == name)?;
+    let material = units.from_si(&entry.material);
+    let law = |role: Role, written: Written| law(role, written, units);
+    let fracture = entry.fracture.map(|failure| units.failure_from_si(failure));
+    Some(Card {
+        name: material.name.clone(),
+        units: units.name.to_string(),
+        density: Constant {
+            key: "density".to_string(),
+            value: material.density,
+            unit: units.word(Measure::of(DENSITY)),
+            meaning: "density at the start",
+        },
+        eos: law(Role::Eos, of_eos(material.eos)),
+        strength: law(Role::Strength, of_strength(&material.strength)),
+        failure: of_failure(material.failure).map(|written| law(Role::Failure, written)),
+        fracture: fracture.and_then(of_failure).map(|written| law(Role::Failure, written)),
+        source: entry.source.clone(),
+        toml: block(&material, fracture, units, &entry.source),
+    })
+}
+
+/// Names of the library that somebody who wrote `name` may have meant: those that hold each piece of it, else the one that is spelt
+/// most alike, else none.
+pub fn near(name: &str) -> Vec<&'static str> {
+    let lower = name.to_lowercase();
+    let pieces: Vec<&str> =
+        lower.split(|c: char| !c.is_alphanumeric()).filter(|piece| !piece.is_empty()).collect();
+    let names = || entries().iter().map(|entry| entry.material.name.as_str());
+    let holds = |known: &&str| pieces.iter().all(|piece| known.to_lowercase().contains(piece));
+    let found: Vec<&str> = names().filter(|known| !pieces.is_empty() && holds(known)).collect();
+    if found.is_empty() { nearest(name, names()).into_iter().collect() } else { found }
+}
+
+/// A `[[material]]`, with a comment that says where it is from.
+fn block(material: &Material, fracture: Option<Failure>, units: &Units, source: &str) -> String {
+    debug_assert!(find(&material.name).is_some(), "{} is not of the library", material.name);
+    let own = Material { name: format!("my {}", material.name), ..material.clone() };
+    let mut text = format!("# {} of the library, in {}. {source}\n", material.name, units.name);
+    text += write::material(&own).trim_start();
+    if let Some(fracture) = fracture {
+        let broken = write::material(&Material { failure: fracture, ..own });
+        let line = broken.lines().find(|line| line.starts_with("failure"));
+        text += &line.map_or_else(String::new, |line| format!("# {line}   # as fracture = true has it\n"));
+    }
+    text
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Role {
+    Eos,
+    Strength,
+    Failure,
+}
+
+/// What a constant measures: powers of length, mass and time, and whether it is per kelvin or in kelvin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Measure {
+    pub(crate) unit: Unit,
+    pub(crate) kelvin: i32,
+}
+
+impl Measure {
+    pub(crate) const fn of(unit: Unit) -> Self {
+        Self { unit, kelvin: 0 }
+    }
+}
+
+const DENSITY: Unit = Unit { length: -3, mass: 1, time: 0 };
+const VELOCITY: Unit = Unit { length: 1, mass: 0, time: -1 };
+const SPECIFIC: Unit = Unit { length: 2, mass: 0, time: -2 };
+const NONE: Measure = Measure::of(Unit::NONE);
+const STRESS: Measure = Measure::of(Unit::STRESS);
+const RATE: Measure = Measure::of(Unit::RATE);
+const SPEED: Measure = Measure::of(VELOCITY);
+const KELVIN: Measure = Measure { unit: Unit::NONE, kelvin: 1 };
+const HEAT: Measure = Measure { unit: SPECIFIC, kelvin: -1 };
+
+/// The law with what it says of itself.
+fn law(role: Role, written: Written, units: &Units) -> Law {
+    let about = LAWS.iter().find(|law| law.role == role && law.kind == written.kind);
+    let about = about.expect("every law is described, as a test makes sure");
+    let described = |key: &str, value: f64| {
+        let (_, measure, meaning) = about.constants.iter().find(|(known, ..)| *known == key).copied()?;
+        Some(Constant { key: key.to_string(), value, unit: units.word(measure), meaning })
+    };
+    let mut constants: Vec<Constant> =
+        written.constants.iter().filter_map(|(key, value)| described(key, *value)).collect();
+    if let Some(rate) = written.rate {
+        let of = |key: &str, value, measure, meaning| Constant {
+            key: format!("cowper_symonds.{key}"),
+            value,
+            unit: units.word(measure),
+            meaning,
+        };
+        constants.push(of("reference", rate.reference, RATE, "strain rate that doubles the yield stress"));
+        constants.push(of("exponent", rate.exponent, NONE, "exponent of the rate"));
+    }
+    Law { kind: written.kind.to_string(), formula: about.formula, constants }
+}
+
+/// What a law is, and what its constants are.
+struct About {
+    role: Role,
+    kind: &'static str,
+    formula: &'static str,
+    constants: &'static [(&'static str, Measure, &'static str)],
+}
+
+const SHEAR: (&str, Measure, &str) = ("shear", STRESS, "shear modulus");
+
+/// The laws that materials of the library have.
+const LAWS: [About; 12] = [
+    About {
+        role: Role::Eos,
+        kind: "linear",
+        formula: "p = bulk ln(rho/rho0)",
+        constants: &[("bulk", STRESS, "bulk modulus")],
+    },
+    About {
+        role: Role::Eos,
+        kind: "polynomial",
+        formula: "p = a1 mu + a2 mu^2 + a3 mu^3 + (b0 + b1 mu) E in compression, t1 mu + t2 mu^2 + b0 E in tension; mu = rho/rho0 - 1",
+        constants: &[
+            ("a1", STRESS, "bulk modulus"),
+            ("a2", STRESS, "factor of mu^2"),
+            ("a3", STRESS, "factor of mu^3"),
+            ("b0", NONE, "pressure for each unit of energy per volume"),
+            ("b1", NONE, "the same, times mu"),
+            ("t1", STRESS, "bulk modulus in tension"),
+            ("t2", STRESS, "factor of mu^2 in tension"),
+        ],
+    },
+    About {
+        role: Role::Eos,
+        kind: "shock",
+        formula: "Mie-Grueneisen about the shock line Us = c0 + s up, rho gamma constant",
+        constants: &[
+            ("c0", SPEED, "bulk speed of sound"),
+            ("s", NONE, "slope of shock speed over particle speed"),
+            ("gamma", NONE, "Grueneisen's coefficient"),
+        ],
+    },
+    About {
+        role: Role::Eos,
+        kind: "ideal-gas",
+        formula: "p = (gamma - 1) rho e",
+        constants: &[
+            ("gamma", NONE, "ratio of the specific heats"),
+            ("energy", Measure::of(SPECIFIC), "internal energy per mass at the start"),
+        ],
+    },
+    About {
+        role: Role::Eos,
+        kind: "jwl",
+        formula: "p = a (1 - omega/(r1 v)) exp(-r1 v) + b (1 - omega/(r2 v)) exp(-r2 v) + omega E/v, v = rho0/rho",
+        constants: &[
+            ("a", STRESS, "factor of the first exponential"),
+            ("b", STRESS, "factor of the second exponential"),
+            ("r1", NONE, "decay of the first exponential"),
+            ("r2", NONE, "decay of the second exponential"),
+            ("omega", NONE, "Grueneisen's coefficient of the products"),
+            ("energy", STRESS, "energy per volume that detonation releases"),
+            ("detonation", SPEED, "speed of the detonation"),
+            ("cj_pressure", STRESS, "pressure of the detonation (Chapman-Jouguet)"),
+        ],
+    },
+    About { role: Role::Strength, kind: "hydro", formula: "no strength", constants: &[] },
+    About {
+        role: Role::Strength,
+        kind: "von-mises",
+        formula: "yield stress = yield_stress + hardening e, e the plastic strain",
+        constants: &[
+            SHEAR,
+            ("yield_stress", STRESS, "yield stress at the start"),
+            ("hardening", STRESS, "slope of the yield stress over the plastic strain"),
+        ],
+    },
+    About {
+        role: Role::Strength,
+        kind: "johnson-cook",
+        formula: "yield stress = (a + b e^n)(1 + c ln(rate/rate0))(1 - T*^m), T* = (T - t_room)/(t_melt - t_room)",
+        constants: &[
+            SHEAR,
+            ("a", STRESS, "yield stress at the start, at rate0 and t_room"),
+            ("b", STRESS, "factor of hardening"),
+            ("n", NONE, "exponent of hardening"),
+            ("c", NONE, "factor of the logarithm of the rate"),
+            ("m", NONE, "exponent of thermal softening"),
+            ("t_melt", KELVIN, "melting temperature: no strength above"),
+            ("t_room", KELVIN, "temperature at the start"),
+            ("specific_heat", HEAT, "energy that warms a unit of mass by 1 K"),
+            ("rate0", RATE, "strain rate at which a, b and n were measured"),
+        ],
+    },
+    About {
+        role: Role::Strength,
+        kind: "johnson-holmquist",
+        formula: "strength = hel_stress (s_i - D (s_i - s_f)), s_i = a (P* + T*)^n (1 + c ln(rate/rate0)), s_f = b P*^m (1 + c ln(rate/rate0))",
+        constants: &[
+            SHEAR,
+            ("a", NONE, "strength of the intact material, over hel_stress"),
+            ("b", NONE, "strength of the fractured material, over hel_stress"),
+            ("c", NONE, "factor of the logarithm of the rate"),
+            ("m", NONE, "exponent of pressure, fractured"),
+            ("n", NONE, "exponent of pressure, intact"),
+            ("rate0", RATE, "strain rate up to which the strength stays"),
+            ("tension", STRESS, "mean tension that the intact material bears"),
+            ("fractured_limit", NONE, "greatest strength fractured, over hel_stress"),
+            ("hel_stress", STRESS, "equivalent stress at the Hugoniot elastic limit"),
+            ("hel_pressure", STRESS, "pressure at the Hugoniot elastic limit"),
+            ("beta", NONE, "share of released elastic energy that swells it"),
+            ("d1", NONE, "plastic strain to fracture where P* + T* is 1"),
+            ("d2", NONE, "exponent of that strain"),
+        ],
+    },
+    About {
+        role: Role::Strength,
+        kind: "ogden",
+        formula: "Cauchy stress = 1/J sum of mu_i (l^alpha_i - mean) along the principal stretches l at unit volume",
+        constants: &[
+            ("mu1", STRESS, "factor of the first term"),
+            ("alpha1", NONE, "exponent of the first term"),
+            ("mu2", STRESS, "factor of the second term"),
+            ("alpha2", NONE, "exponent of the second term"),
+            ("mu3", STRESS, "factor of the third term"),
+            ("alpha3", NONE, "exponent of the third term"),
+        ],
+    },
+    About {
+        role: Role::Failure,
+        kind: "hydrostatic",
+        formula: "fails where the pressure falls to -tension",
+        constants: &[("tension", STRESS, "mean tension that it bears")],
+    },
+    About {
+        role: Role::Failure,
+        kind: "johnson-cook",
+        formula: "fails where the sum of de/e_f comes to 1, e_f = (d1 + d2 exp(d3 eta))(1 + d4 ln(rate/rate0))(1 + d5 T*), eta the triaxiality",
+        constants: &[
+            ("d1", NONE, "strain to fracture under great tension"),
+            ("d2", NONE, "factor of triaxiality"),
+            ("d3", NONE, "exponent of triaxiality"),
+            ("d4", NONE, "factor of the logarithm of the rate"),
+            ("d5", NONE, "factor of the temperature"),
+        ],
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{library::names, units::SETS};
+
+    #[test]
+    fn every_constant_of_the_library_has_a_meaning_and_a_unit_that_converts_it() {
+        let si = Units::named("SI").expect("a set of units");
+        let own = Units::named("mm-ms-kg").expect("a set of units");
+        let mut seen = 0;
+        for name in names() {
+            let material = find(name).expect("a name of the list");
+            let [in_si, here] = [si, own].map(|units| card(name, &units).expect("a name of the list"));
+            let written = [
+                of_eos(material.eos).constants.len(),
+                of_strength(&material.strength).constants.len(),
+                of_failure(material.failure).map_or(0, |law| law.constants.len()),
+            ];
+            let laws = |card: &Card| {
+                let fracture = card.fracture.iter().flat_map(|law| law.constants.clone());
+                let failure = card.failure.iter().flat_map(|law| law.constants.clone());
+                let all = [&card.eos, &card.strength].into_iter().flat_map(|law| law.constants.clone());
+                all.chain(failure).chain(fracture).chain([card.density.clone()]).collect::<Vec<_>>()
+            };
+            let of_fracture = in_si.fracture.as_ref().map_or(0, |law| law.constants.len());
+            let (in_si, here) = (laws(&in_si), laws(&here));
+            assert_eq!(in_si.len(), written.iter().sum::<usize>() + of_fracture + 1, "{name}");
+            for (si, own) in in_si.iter().zip(&here) {
+                // The unit that is printed is the one that the value was converted to.
+                let factor = match (si.unit.as_str(), own.unit.as_str()) {
+                    ("Pa", "GPa") => 1e-9,
+                    ("kg/m3", "kg/mm3") => 1e-9,
+                    ("1/s", "1/ms") => 1e-3,
+                    ("m/s", "m/s") | ("K", "K") | ("J/kg/K", "J/kg/K") | ("J/kg", "J/kg") | ("", "") => 1.0,
+                    other => panic!("{name}: {} in {other:?}", si.key),
+                };
+                assert!(
+                    (own.value - si.value * factor).abs() <= 1e-12 * own.value.abs(),
+                    "{name}: {}",
+                    si.key
+                );
+                seen += 1;
+            }
+        }
+        assert!(seen > 400, "{seen} constants");
+    }
+
+    #[test]
+    fn a_block_that_is_pasted_into_a_deck_makes_the_same_material() {
+        for units in SETS.iter().filter(|set| set.takes_materials) {
+            for name in names() {
+                let card = card(name, units).expect("a name of the list");
+                let (part, detonation) = (
+                    "[[part]]\nname = \"a\"\nbox = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }",
+                    "[[detonation]]\npoint = [0, 0, 0]",
+                );
+                let detonation = if card.eos.kind == "jwl" { detonation } else { "" };
+                let deck = |blocks: &str, name: &str| {
+                    let text = format!(
+                        "title = \"a\"\nunits = \"{}\"\n[control]\nend_cycle = 1\n{blocks}\n{part}\nmaterial = \"{name}\"\n{detonation}\n",
+                        units.name
+                    );
+                    crate::read(&text, "pasted.toml").unwrap_or_else(|faults| panic!("{faults:?}\n{text}"))
+                };
+                let own = format!("my {name}");
+                let (pasted, of_library) = (deck(&card.toml, &own), deck("", name));
+                let [pasted, of_library] = [pasted, of_library].map(|model| model.setup.materials);
+                let renamed = Material { name: own, ..of_library[0].clone() };
+                assert_eq!(pasted, [renamed], "{} in {}", name, units.name);
+            }
+        }
+    }
+
+    #[test]
+    fn near_names_hold_the_pieces_or_are_spelt_alike() {
+        assert_eq!(near("4340"), ["STEEL_4340"]);
+        assert_eq!(near("steel"), ["MILD_STEEL", "STEEL_1006", "STEEL_4340", "STEEL_S7_TOOL"]);
+        assert_eq!(near("6061-t6"), ["AL_6061_T6"]);
+        assert_eq!(near("TUNGSTEN_ALLOI"), ["TUNGSTEN_ALLOY"]);
+        assert!(near("banana").is_empty());
+        assert!(near("--").is_empty());
+    }
+}
