@@ -129,6 +129,13 @@ pub enum Command {
         #[command(subcommand)]
         what: Certs,
     },
+    /// Write a commented deck of a usual problem to start from; without a name list them
+    Init {
+        /// Which
+        name: Option<String>,
+        /// The file to write, - for standard output; a file that is there stays [default: <NAME>.toml]
+        file: Option<PathBuf>,
+    },
     /// List every error of a deck, or what a run of it would take and what in it is hardly meant, without running it
     Check {
         /// The deck

@@ -32,6 +32,7 @@ pub mod footprint;
 pub mod hosts;
 pub mod http;
 pub mod incident;
+pub mod init;
 pub mod interrupt;
 pub mod job;
 pub mod machine;
