@@ -5,6 +5,7 @@
 //! whole-mesh check confirms again.
 
 mod block;
+mod cut;
 mod o_grid;
 mod sheet;
 mod structured;
@@ -12,6 +13,7 @@ mod structured;
 mod tests;
 
 pub(crate) use block::{Block, Sector};
+pub(crate) use cut::Straddles;
 pub(crate) use structured::graded;
 
 use mechanics::mesh::Section;
@@ -129,6 +131,17 @@ impl Shape {
             Self::Plate { cells: [ni, nj], .. } | Self::Prism { cells: [ni, nj], .. } => {
                 let nodes = (wide(*ni) + 1).checked_mul(wide(*nj) + 1)?;
                 Some((nodes, wide(*ni).checked_mul(wide(*nj))?))
+            }
+        }
+    }
+
+    /// Its counts of cells, in the order that a deck gives them.
+    pub(crate) fn cells(&self) -> Vec<u32> {
+        match self {
+            Self::Brick { coordinates } => coordinates.iter().map(|planes| planes.len() as u32 - 1).collect(),
+            Self::Cylinder { cells, .. } | Self::Tube { cells, .. } => cells.to_vec(),
+            Self::Sphere { cells, .. } | Self::Plate { cells, .. } | Self::Prism { cells, .. } => {
+                cells.to_vec()
             }
         }
     }

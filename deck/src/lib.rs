@@ -40,7 +40,8 @@ use log::Log;
 use mesh_file::MeshFile;
 use typed::{
     Deck,
-    mesh::{Mesh, Meshes},
+    mesh::{Mesh, Meshes, Source},
+    part::Part,
 };
 
 pub use fault::{Fault, MAX_FAULTS};
@@ -57,6 +58,8 @@ pub struct Reading {
     pub model: Model,
     /// What is done otherwise than the deck says; TOML decks have none.
     pub warnings: Vec<Warning>,
+    /// Of each part the counts of cells of its block, in the order of `cells` in a TOML deck; empty of a part with another mesh.
+    pub cells: Vec<Vec<u32>>,
 }
 
 /// Reads and checks a deck, or a bundle of files that [`bundle::gather`] made. `file_name` stands in the faults of a
@@ -120,8 +123,9 @@ fn read_toml(bundle: &Bundle<'_>, most_elements: u64) -> Result<Reading, Vec<Fau
         let mesh = mesh_file::parse(text, path).map_err(|faults| of_meshes.extend(faults));
         meshes.insert(seen.to_string(), mesh.ok().map(Mesh::from));
     }
-    let model = toml_deck::read(text, &log).and_then(|deck| make::model(&deck, &meshes, &log));
-    let mut reading = conclude(model, log, bundle);
+    let deck = toml_deck::read(text, &log);
+    let model = deck.as_ref().and_then(|deck| make::model(deck, &meshes, &log));
+    let mut reading = conclude(model, deck.as_ref(), log, bundle);
     if !of_meshes.is_empty() {
         of_meshes.extend(reading.err().unwrap_or_default());
         reading = Err(of_meshes);
@@ -147,7 +151,7 @@ fn read_keyword(
     let meshes = Meshes::from([(mesh_name.to_string(), Some(mesh))]);
     let model = make::model(&deck, &meshes, &log);
     let mesh = meshes.into_values().flatten().next().map(|mesh| mesh.file).unwrap_or_default();
-    Ok(WholeKeyword { reading: conclude(model, log, bundle)?, deck, mesh })
+    Ok(WholeKeyword { reading: conclude(model, Some(&deck), log, bundle)?, deck, mesh })
 }
 
 /// Whether a deck that was given no parameters cannot be read without them.
@@ -156,7 +160,12 @@ fn lacks_parameters(text: &str) -> bool {
 }
 
 /// The model of a deck without a fault, perturbed and named as asked.
-fn conclude(model: Option<Model>, log: Log<'_>, bundle: &Bundle<'_>) -> Result<Reading, Vec<Fault>> {
+fn conclude(
+    model: Option<Model>,
+    deck: Option<&Deck>,
+    log: Log<'_>,
+    bundle: &Bundle<'_>,
+) -> Result<Reading, Vec<Fault>> {
     match model {
         Some(mut model) if log.count() == 0 => {
             if let Some(perturbation) = bundle.options.perturbation {
@@ -165,7 +174,12 @@ fn conclude(model: Option<Model>, log: Log<'_>, bundle: &Bundle<'_>) -> Result<R
             if let Some(title) = &bundle.options.title {
                 model.title.clone_from(title);
             }
-            Ok(Reading { model, warnings: log.into_lists().1 })
+            let cells = |part: &Part| match part.mesh.as_ref().map(|mesh| &mesh.source) {
+                Some(Source::Shape(shape)) => shape.cells(),
+                _ => Vec::new(),
+            };
+            let cells = deck.map_or_else(Vec::new, |deck| deck.parts.iter().map(cells).collect());
+            Ok(Reading { model, warnings: log.into_lists().1, cells })
         }
         _ => {
             assert!(log.count() > 0, "a deck was refused without a fault");

@@ -67,6 +67,11 @@ impl<'a> Log<'a> {
         }
     }
 
+    /// A log in the same words for checks that are made again: nobody reads it.
+    pub(crate) fn quiet(&self) -> Log<'static> {
+        Log { most_elements: self.most_elements, ..Log::of(self.dialect, &[]) }
+    }
+
     /// A fault at a place. Of a card of a keyword deck its keyword is told too.
     pub(crate) fn fault(
         &self,

@@ -1,7 +1,7 @@
 //! A typed deck becomes a model: the one set of checks on what spans entries, whichever format the deck was written in.
 //!
 //! The stages, each of which goes on past the faults of the one before as far as it can:
-//! 1. names, materials, parts with their blocks;
+//! 1. names, materials, parts with their blocks, where these stand and what planes of symmetry leave of them;
 //! 2. one mesh with one numbering, joins, volumes, masses, velocities;
 //! 3. boundaries, walls, loads, rigid bodies, contact, output, which refer to parts and nodes;
 //! 4. elements that are turned inside out, sections, contact zones that overlap.
@@ -9,6 +9,7 @@
 mod assembly;
 mod boundary;
 mod burn;
+mod clamp;
 mod contact;
 mod control;
 mod erosion;
@@ -17,11 +18,13 @@ mod material;
 mod names;
 mod output;
 mod part;
+mod placement;
 mod region;
 mod rigid;
 mod section;
 mod spans;
 mod surface;
+mod symmetry;
 mod tie;
 mod wall;
 mod zones;
@@ -44,14 +47,20 @@ use names::{Curves, Names};
 pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model> {
     let mut materials = Materials::of(deck, log);
     let hourglass = deck.control.as_ref().and_then(|control| control.hourglass).unwrap_or_default();
-    let parts = part::make((&deck.parts, hourglass), &mut materials, meshes, log);
+    let mut parts = part::make((&deck.parts, hourglass), &mut materials, meshes, log);
     let materials = materials.list;
     let names = Names::of(&deck.parts, log);
+    placement::resolve(deck, &mut parts, &names, &materials, meshes, log);
+    symmetry::cut(deck, &mut parts, log);
+    let parts = parts;
     let joins = assembly::joins(&deck.joins, &names, log);
     let mut assembly = assembly::assemble(&parts, &joins, &materials, meshes, log);
     let curves = Curves::of(&deck.curves, log);
     let rigid = rigid::drafts(&deck.rigid, &names, &curves, &assembly, log);
-    let mut conditions = boundary::make(deck, &names, curves, &parts, &assembly, log);
+    let clamps = clamp::boundaries(&deck.parts, &parts, log);
+    let intended: Vec<_> = symmetry::boundaries(deck).chain(clamps).collect();
+    let supports: Vec<_> = deck.boundaries.iter().chain(&intended).collect();
+    let mut conditions = boundary::make((deck, &supports), &names, curves, &parts, &assembly, log);
     assembly.mesh.lumped = load::lumped(deck, &names, &parts, &assembly, log);
     let bodies = rigid::make(&rigid, &materials, &mut assembly, &mut conditions, log);
     let contact = deck.contact.as_ref().and_then(|contact| {

@@ -13,12 +13,13 @@ mod shape;
 
 use toml::de::DeTable;
 
+use self::entry::AXES;
 use crate::{
     limits::{MAX_TEXT, MAX_TITLE},
     log::Log,
     place::Place,
     table::{Range, Table},
-    typed::{Control, Deck, FreedNodes},
+    typed::{Control, Deck, FreedNodes, Symmetry},
     units::SETS,
 };
 
@@ -56,16 +57,19 @@ fn read_document(document: &DeTable<'_>, log: &Log<'_>) -> Deck {
         .require("units", "one of SI, cm-g-us, mm-ms-kg, mm-s-t, in-s-lbf")
         .and_then(|v| v.one_of(&names));
     let control = read_control(&table);
+    let symmetry = read_symmetry(&table);
+    let planes = symmetry.as_ref().map_or([false; 3], |symmetry| symmetry.planes);
     let mut deck = Deck::new(text.to_string(), SETS[units.unwrap_or(0)]);
     deck.control = control;
     deck.materials = part::read_materials(&table);
-    deck.parts = part::read_parts(&table);
+    deck.parts = part::read_parts(&table, planes);
     deck.joins = contact::read_joins(&table);
     deck.curves = condition::read_curves(&table);
     deck.loads = condition::read_loads(&table);
     deck.gravity = condition::read_gravity(&table);
     deck.relaxation = condition::read_relaxation(&table);
     deck.boundaries = condition::read_boundaries(&table);
+    deck.symmetry = symmetry;
     deck.walls = condition::read_walls(&table);
     deck.rigid = condition::read_rigid(&table);
     deck.masses = condition::read_masses(&table);
@@ -115,6 +119,29 @@ fn read_control(deck: &Table<'_>) -> Option<Control> {
     };
     table.finish();
     Some(read)
+}
+
+/// Reads `[symmetry]`.
+fn read_symmetry(deck: &Table<'_>) -> Option<Symmetry> {
+    let table = deck.get("symmetry").and_then(|v| v.table("[symmetry]".to_string()))?;
+    let value = table.require("planes", "a list of some of \"x\", \"y\", \"z\"");
+    let at = table.place();
+    table.finish();
+    let value = value?;
+    let mut planes = [false; 3];
+    let items = value.items()?;
+    for item in &items {
+        let axis = item.one_of(&AXES)?;
+        if planes[axis] {
+            item.fault("each plane once", "remove it");
+        }
+        planes[axis] = true;
+    }
+    if items.is_empty() {
+        value.fault("at least one plane", "name a plane, or remove [symmetry]");
+        return None;
+    }
+    Some(Symmetry { at, planes })
 }
 
 /// Reads `[erosion]`.

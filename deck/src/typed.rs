@@ -32,6 +32,7 @@ pub(crate) struct Deck {
     pub(crate) joins: Vec<Join>,
     pub(crate) curves: Vec<Curve>,
     pub(crate) boundaries: Vec<Boundary>,
+    pub(crate) symmetry: Option<Symmetry>,
     pub(crate) walls: Vec<Wall>,
     pub(crate) rigid: Vec<Rigid>,
     pub(crate) masses: Vec<Lumped>,
@@ -60,6 +61,7 @@ impl Deck {
             joins: Vec::new(),
             curves: Vec::new(),
             boundaries: Vec::new(),
+            symmetry: None,
             walls: Vec::new(),
             rigid: Vec::new(),
             masses: Vec::new(),
@@ -113,6 +115,14 @@ impl Control {
             plan_interval: None,
         }
     }
+}
+
+/// Planes at which the whole problem is mirrored, all through the origin: what lies below them is left out.
+#[derive(Clone, Debug)]
+pub(crate) struct Symmetry {
+    pub(crate) at: Place,
+    /// Whether there is a plane across each axis.
+    pub(crate) planes: [bool; 3],
 }
 
 /// What becomes of nodes that have lost all their elements.

@@ -29,6 +29,11 @@ pub(crate) fn text(deck: &Deck) -> String {
         text.key("tolerance", format!("{:?}", join.tolerance));
     }
     condition::write(&mut text, deck);
+    if let Some(symmetry) = &deck.symmetry {
+        text.heading("[symmetry]");
+        let planes = ["x", "y", "z"].into_iter().zip(symmetry.planes).filter(|(_, has)| *has);
+        text.key("planes", list(planes.map(|(axis, _)| quoted(axis))));
+    }
     if let Some(freed) = &deck.erosion {
         text.heading("[erosion]");
         text.some("retain_inertia", freed.retain_inertia.as_ref().map(|on| on.value));

@@ -229,7 +229,7 @@ fn a_converted_pipe_whip_is_the_same_problem() {
     let text = fs::read_to_string(format!("{folder}/{name}")).expect("the deck is in the repository");
     let mut open = |path: &str| fs::read_to_string(format!("{folder}/{path}")).ok();
     let gathered = bundle::gather(name, text, &Options::default(), &mut open).expect("few files");
-    let Reading { model, warnings } =
+    let Reading { model, warnings, .. } =
         deck::read_whole(&gathered, name).unwrap_or_else(|f| panic!("{}", lines(&f)));
     assert!(warnings.is_empty(), "{warnings:?}");
     let names: Vec<&str> = model.mesh.parts.iter().map(|part| part.name.as_str()).collect();

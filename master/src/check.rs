@@ -21,6 +21,8 @@ struct Checked {
     /// Of the reader and of the physics, a line each.
     warnings: Vec<String>,
     forecast: Option<Forecast>,
+    /// Of each part the counts of cells of its block; empty of a part with another mesh.
+    cells: Vec<Vec<u32>>,
 }
 
 /// Checks a deck.
@@ -38,7 +40,7 @@ pub fn run(path: &Path, json: bool, options: &Options) -> Result<ExitCode, Strin
         warn(&reading.warnings);
         if let Some(forecast) = &forecast {
             forecast.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-            print!("{name}: no fault{}", words(forecast));
+            print!("{name}: no fault{}", words(forecast, &reading.cells));
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -50,13 +52,14 @@ pub fn run(path: &Path, json: bool, options: &Options) -> Result<ExitCode, Strin
         warnings: of_reader.iter().map(Warning::to_string).chain(of_physics).collect(),
         faults: read.as_ref().err().map_or_else(Vec::new, |faults| lines(faults)),
         forecast,
+        cells: read.as_ref().map_or_else(|_| Vec::new(), |reading| reading.cells.clone()),
     };
     println!("{}", serde_json::to_string_pretty(&checked).map_err(|e| e.to_string())?);
     Ok(code)
 }
 
-/// The forecast of a deck without a fault, from the end of its first line on.
-fn words(forecast: &Forecast) -> String {
+/// The forecast of a deck without a fault, from the end of its first line on, with the counts of cells by part.
+fn words(forecast: &Forecast, cells: &[Vec<u32>]) -> String {
     let Forecast { parts, elements, nodes, .. } = forecast;
     let count = forecast.warnings.len();
     let doubts = match count {
@@ -68,13 +71,15 @@ fn words(forecast: &Forecast) -> String {
     let mut text = format!("{doubts}; {n_parts}, {elements} elements, {nodes} nodes\n");
     let width = parts.iter().map(|part| part.name.chars().count()).max().unwrap_or(0).max(4);
     text += &format!(
-        "  {:width$}  {:>10}  {:>10}  {:>10}  {:>12}  {:>10}\n",
+        "  {:width$}  {:>10}  {:>10}  {:>10}  {:>12}  {:>10}  cells\n",
         "part", "elements", "mass kg", "speed m/s", "least cell m", "step s"
     );
-    for part in parts {
+    for (part, cells) in parts.iter().zip(cells) {
+        let counts: Vec<String> = cells.iter().map(u32::to_string).collect();
+        let counts = if counts.is_empty() { "of a mesh".to_owned() } else { counts.join(" x ") };
         let step = part.step_s.map_or_else(|| "any".to_owned(), digits);
         text += &format!(
-            "  {:width$}  {:>10}  {:>10}  {:>10}  {:>12}  {:>10}\n",
+            "  {:width$}  {:>10}  {:>10}  {:>10}  {:>12}  {:>10}  {counts}\n",
             part.name,
             part.elements,
             digits(part.mass_kg),

@@ -96,9 +96,9 @@ fn drive_bits(drive: Drive) -> DriveBits {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Makes boundaries, walls and loads.
+/// Makes boundaries, which are `supports`, walls and loads.
 pub(super) fn make(
-    deck: &Deck,
+    (deck, supports): (&Deck, &[&Boundary]),
     names: &Names<'_>,
     curves: Curves<'_>,
     parts: &[PartDraft],
@@ -114,7 +114,7 @@ pub(super) fn make(
     let mut clamps: BTreeMap<u32, (u8, Span)> = BTreeMap::new();
     // By pair of boundaries and axis: the first node both prescribe differently, and how many.
     let mut conflicts: BTreeMap<(usize, usize, usize), (u32, usize)> = BTreeMap::new();
-    for (number, boundary) in (1..).zip(&deck.boundaries) {
+    for (number, boundary) in (1..).zip(supports.iter().copied()) {
         if let BoundaryKind::Transmit(faces) = &boundary.kind {
             let selected = names.several(&boundary.parts).unwrap_or_default();
             let asking = Asking { at: boundary.at, title: &boundary.title, selected: &selected };

@@ -16,7 +16,7 @@ use super::{
     names::Names,
     rigid::{self, RigidDraft},
     surface::{Face, outer_faces, smallest_face_dimension},
-    tie,
+    tie::{self, Tied},
     zones::clearance,
 };
 use crate::{
@@ -77,53 +77,19 @@ pub(super) fn make(
         );
         return None;
     }
-    let others = contact.default_interacts;
-    let mut interacts: Vec<bool> = (0..n * n).map(|i| others && i / n != i % n).collect();
-    let mut frictions = vec![contact.friction; n * n];
-    let mut kinetic = vec![contact.friction_kinetic; n * n];
-    if let Some(parts) = &contact.self_interaction {
-        for p in names.several(parts).unwrap_or_default() {
-            interacts[p * n + p] = true;
-        }
-    }
-    apply_pairs(&contact.pairs, names, &mut interacts, (&mut frictions, &mut kinetic), log);
-    let kinetic =
-        kinetic.iter().zip(&frictions).map(|(kinetic, friction)| kinetic.unwrap_or(*friction)).collect();
-    // A rigid body does not meet itself.
-    for parts in rigid::parts_of(rigid) {
-        for (a, b) in parts.iter().flat_map(|&a| parts.iter().map(move |&b| (a, b))) {
-            interacts[a as usize * n + b as usize] = false;
-        }
-    }
-    // Parts that are tied hold each other already.
-    let is_rigid = |part: usize| rigid::parts_of(rigid).any(|parts| parts.contains(&(part as u32)));
-    let tied = tie::tied(&contact.ties, names, &is_rigid, log);
-    for [a, b] in tied.iter().map(|tied| tied.parts) {
-        (interacts[a * n + b], interacts[b * n + a]) = (false, false);
-    }
+    let Meetings { interacts, frictions, kinetic, tied } = meetings(contact, names, rigid, log);
     let ties = tie::make(&contact.ties, &tied, assembly, materials, log);
     let assembly = &*assembly;
     let faces = outer_faces(assembly);
-    let mut touching = interacts.clone();
-    if !interacts.contains(&true) {
-        // The gap bounds only what nodes travel in a cycle.
-        tied.iter().for_each(|tied| touching[tied.parts[0] * n + tied.parts[1]] = true);
-    }
-    let smallest = smallest_face_dimension(assembly, &faces, &touching);
-    let gap = match contact.gap {
-        Gap::Fit => {
-            let fit = |face: f64| {
-                // A gap of half the thickness stands for it.
-                let most = thinnest(assembly, &interacts).map_or(GAP_FRACTION * face, |h| 0.5 * h.min(face));
-                let clearance = clearance(assembly, &interacts, &faces, most);
-                clearance.map_or(most, |d| (FIT_SHARE * d).clamp(FIT_LEAST * face, most))
-            };
-            smallest.map(fit)
+    let smallest = smallest_face_dimension(assembly, &faces, &touching(&interacts, &tied, n));
+    let most = smallest.map(|face| widest_fit(assembly, &interacts, face));
+    let gap = match (contact.gap, smallest.zip(most)) {
+        (Gap::Fit, Some((face, most))) => {
+            let clearance = clearance(assembly, &interacts, &faces, most);
+            Some(clearance.map_or(most, |d| (FIT_SHARE * d).clamp(FIT_LEAST * face, most)))
         }
-        Gap::Default => smallest.map(|face| GAP_FRACTION * face),
-        Gap::Fraction(fraction, origin) => of_fraction(fraction, origin, smallest, log),
-        Gap::Length(length, origin) => of_length(length, origin, smallest, log),
-        Gap::Broken => None,
+        (Gap::Fit, None) => None,
+        _ => fixed_gap(contact, smallest, log),
     };
     let slack = match contact.slack {
         Slack::Default => gap.map(|gap| default_slack(gap, smallest)),
@@ -162,6 +128,89 @@ pub(super) fn make(
         ..Settings::default()
     };
     Some(ContactDraft { settings, faces })
+}
+
+/// Which parts meet, by pair of parts, and how they rub.
+struct Meetings {
+    interacts: Vec<bool>,
+    frictions: Vec<f64>,
+    kinetic: Vec<f64>,
+    tied: Vec<Tied>,
+}
+
+fn meetings(contact: &Contact, names: &Names<'_>, rigid: &[RigidDraft<'_>], log: &Log<'_>) -> Meetings {
+    let n = names.len();
+    let others = contact.default_interacts;
+    let mut interacts: Vec<bool> = (0..n * n).map(|i| others && i / n != i % n).collect();
+    let mut frictions = vec![contact.friction; n * n];
+    let mut kinetic = vec![contact.friction_kinetic; n * n];
+    if let Some(parts) = &contact.self_interaction {
+        for p in names.several(parts).unwrap_or_default() {
+            interacts[p * n + p] = true;
+        }
+    }
+    apply_pairs(&contact.pairs, names, &mut interacts, (&mut frictions, &mut kinetic), log);
+    let kinetic: Vec<f64> =
+        kinetic.iter().zip(&frictions).map(|(kinetic, friction)| kinetic.unwrap_or(*friction)).collect();
+    // A rigid body does not meet itself.
+    for parts in rigid::parts_of(rigid) {
+        for (a, b) in parts.iter().flat_map(|&a| parts.iter().map(move |&b| (a, b))) {
+            interacts[a as usize * n + b as usize] = false;
+        }
+    }
+    // Parts that are tied hold each other already.
+    let is_rigid = |part: usize| rigid::parts_of(rigid).any(|parts| parts.contains(&(part as u32)));
+    let tied = tie::tied(&contact.ties, names, &is_rigid, log);
+    for [a, b] in tied.iter().map(|tied| tied.parts) {
+        (interacts[a * n + b], interacts[b * n + a]) = (false, false);
+    }
+    Meetings { interacts, frictions, kinetic, tied }
+}
+
+/// The pairs whose faces limit the gap.
+fn touching(interacts: &[bool], tied: &[Tied], n: usize) -> Vec<bool> {
+    let mut touching = interacts.to_vec();
+    if !interacts.contains(&true) {
+        // The gap bounds only what nodes travel in a cycle.
+        tied.iter().for_each(|tied| touching[tied.parts[0] * n + tied.parts[1]] = true);
+    }
+    touching
+}
+
+/// The widest gap that fits itself: that of bodies which start far from each other.
+fn widest_fit(assembly: &Assembly, interacts: &[bool], face: f64) -> f64 {
+    // A gap of half the thickness stands for it.
+    thinnest(assembly, interacts).map_or(GAP_FRACTION * face, |h| 0.5 * h.min(face))
+}
+
+/// A gap that does not fit itself.
+fn fixed_gap(contact: &Contact, smallest: Option<f64>, log: &Log<'_>) -> Option<f64> {
+    match contact.gap {
+        Gap::Fit | Gap::Default => smallest.map(|face| GAP_FRACTION * face),
+        Gap::Fraction(fraction, origin) => of_fraction(fraction, origin, smallest, log),
+        Gap::Length(length, origin) => of_length(length, origin, smallest, log),
+        Gap::Broken => None,
+    }
+}
+
+/// The gap of a mesh whose parts are yet to be moved to where they start; none after a fault.
+pub(super) fn gap_to_come(
+    contact: &Contact,
+    names: &Names<'_>,
+    assembly: &Assembly,
+    rigid: &[RigidDraft<'_>],
+    log: &Log<'_>,
+) -> Option<f64> {
+    if names.len() > MAX_CONTACT_PARTS {
+        return None;
+    }
+    let Meetings { interacts, tied, .. } = meetings(contact, names, rigid, log);
+    let faces = outer_faces(assembly);
+    let smallest = smallest_face_dimension(assembly, &faces, &touching(&interacts, &tied, names.len()));
+    match contact.gap {
+        Gap::Fit => smallest.map(|face| widest_fit(assembly, &interacts, face)),
+        _ => fixed_gap(contact, smallest, log),
+    }
 }
 
 /// The least thickness of shells that interact.

@@ -37,7 +37,14 @@ pub(super) fn nodes(
 ) -> Option<Vec<u32>> {
     match region {
         Region::All => Some(choose(assembly, selected, |_, _| true)),
-        Region::Face(name) => of_face(name, selected, assembly, log),
+        Region::Faces(names) => {
+            let faces: Option<Vec<Vec<u32>>> =
+                names.iter().map(|name| of_face(name, selected, assembly, log)).collect();
+            let mut nodes = faces?.concat();
+            nodes.sort_unstable();
+            nodes.dedup();
+            Some(nodes)
+        }
         Region::Box { low, high } => Some(choose(assembly, selected, |x, near| {
             (0..3).all(|a| x[a] >= low[a] - near && x[a] <= high[a] + near)
         })),

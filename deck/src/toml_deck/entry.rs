@@ -116,13 +116,34 @@ pub(super) fn direction(table: &Table<'_>, key: &'static str) -> Option<[f64; 3]
     None
 }
 
+/// The name of a face, or a list of such names.
+pub(super) fn face_names(value: Value<'_>) -> Option<Vec<Placed<String>>> {
+    if value.is_text() {
+        return text(value).map(|name| vec![name]);
+    }
+    if !value.is_list() {
+        value.fault(
+            "the name of a face, or a list of such names",
+            "write \"k-min\" or [\"i-min\", \"i-max\"]",
+        );
+        return None;
+    }
+    let names: Option<Vec<Placed<String>>> = value.items()?.into_iter().map(text).collect();
+    let names = names?;
+    if names.is_empty() {
+        value.fault("at least one face", "name a face or remove the key");
+        return None;
+    }
+    Some(names)
+}
+
 /// The nodes of an entry: all of its parts, or those of one face, box, plane or list.
 pub(super) fn region(table: &Table<'_>) -> Option<Region> {
     const WAYS: [&str; 4] = ["face", "box", "plane", "nodes"];
     let given: Vec<(&str, Value<'_>)> = WAYS.iter().filter_map(|w| table.get(w).map(|v| (*w, v))).collect();
     match given[..] {
         [] => Some(Region::All),
-        [("face", value)] => text(value).map(Region::Face),
+        [("face", value)] => face_names(value).map(Region::Faces),
         [("box", value)] => {
             let corners = value.table(format!("box of {}", table.title))?;
             let (low, high) = (corners.vector("min"), corners.vector("max"));

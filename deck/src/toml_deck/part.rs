@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use mechanics::{element::shell4::Rule, mesh::Section};
 
-use super::{entry::text, hourglass, shape};
+use super::{
+    entry::{face_names, text},
+    hourglass, shape,
+};
 use crate::{
     blocks::Block,
     geometry::norm,
@@ -14,7 +17,7 @@ use crate::{
     table::{Range, Table, Value},
     typed::{
         mesh::{Explicit, Numbers, PartMesh, Places, Source},
-        part::{Choice, Criterion, Erosion, Kind, Own, Part, Rotation},
+        part::{Choice, Clamp, Criterion, Erosion, Kind, Own, Part, Placement, Rotation, Side},
     },
 };
 
@@ -31,8 +34,9 @@ pub(super) fn read_materials(deck: &Table<'_>) -> Vec<Own> {
     materials
 }
 
-/// Reads every `[[part]]`. A part with a fault keeps its place in the list, so that others may refer to it.
-pub(super) fn read_parts(deck: &Table<'_>) -> Vec<Part> {
+/// Reads every `[[part]]` of a deck with these planes of symmetry. A part with a fault keeps its place in the list, so that others may
+/// refer to it.
+pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
     let tables = deck.tables("part", MAX_PARTS);
     if tables.is_empty() && !deck.has("part") {
         deck.faults.add(0, "a deck without [[part]]", "at least one part", "add a [[part]]");
@@ -64,10 +68,12 @@ pub(super) fn read_parts(deck: &Table<'_>) -> Vec<Part> {
         let hourglass = table
             .get("hourglass")
             .and_then(|v| hourglass::read(v, &format!("\"{name}\"")).map(|control| v.placed(control)));
-        let mesh = read_mesh(&table, &name, given, kind);
+        let mesh = read_mesh(&table, &name, given, (kind, planes));
         let kind = kind.unwrap_or(Kind::Solids);
         let rotate = table.get("rotate").and_then(|v| read_rotation(v, &table));
         let translate = table.get("translate").and_then(|v| v.vector().map(|by| v.placed(by)));
+        let place = table.get("place").and_then(|v| read_placement(v, &name));
+        let clamp = table.get("clamp").and_then(read_clamp);
         table.finish();
         Part {
             at,
@@ -82,6 +88,8 @@ pub(super) fn read_parts(deck: &Table<'_>) -> Vec<Part> {
             mesh,
             rotate,
             translate,
+            place,
+            clamp,
         }
     };
     tables.into_iter().enumerate().map(part).collect()
@@ -145,7 +153,7 @@ fn read_mesh(
     table: &Table<'_>,
     name: &str,
     given: Option<(Word, Value<'_>)>,
-    kind_of: Option<Kind>,
+    (kind_of, planes): (Option<Kind>, [bool; 3]),
 ) -> Option<PartMesh> {
     const KINDS: [&str; 7] = ["box", "cylinder", "sphere", "tube", "plate", "prism", "mesh"];
     let present: Vec<(&'static str, Value<'_>)> =
@@ -182,7 +190,7 @@ fn read_mesh(
             Some(Kind::Shells(section)) => Some(section),
             _ => None,
         };
-        let shape = shape::read(kind, &inner, section);
+        let shape = shape::read(kind, &inner, section, planes);
         inner.finish();
         shape.map(Source::Shape)
     } else if kind_of.is_none() {
@@ -311,6 +319,41 @@ fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
         mesh: None,
     };
     clean.then_some(Explicit { block: Block { positions, topology, faces: Vec::new() }, numbers })
+}
+
+/// `place = { above = "plate", gap = 0.1 }`.
+fn read_placement(value: Value<'_>, part: &str) -> Option<Placement> {
+    let table = value.table(format!("place of \"{part}\""))?;
+    let given: Vec<(Side, Value<'_>)> =
+        Side::ALL.into_iter().filter_map(|side| table.get(side.key()).map(|v| (side, v))).collect();
+    let gap = table.get("gap").map(|v| v.number(Range::NotNegative));
+    table.finish();
+    let [(side, other)] = given[..] else {
+        value.fault(
+            &format!("exactly one of {}", Side::ALL.map(Side::key).join(", ")),
+            "name the part that it stands beside, for instance { above = \"plate\" }",
+        );
+        return None;
+    };
+    let beside = text(other)?;
+    let gap = match gap {
+        Some(gap) => Some(gap?),
+        None => None,
+    };
+    Some(Placement { origin: value.origin(), side, beside, gap })
+}
+
+/// `clamp = "edges"`, or a list of faces.
+fn read_clamp(value: Value<'_>) -> Option<Clamp> {
+    if value.is_text() && value.text() == Some("edges") {
+        return Some(Clamp::Edges(value.origin()));
+    }
+    if !value.is_list() {
+        value
+            .fault("\"edges\", or a list of faces", "write \"edges\" or for instance [\"i-min\", \"i-max\"]");
+        return None;
+    }
+    face_names(value).map(Clamp::Faces)
 }
 
 /// `rotate` of a part.

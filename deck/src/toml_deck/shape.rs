@@ -12,21 +12,78 @@ use crate::{
 /// Most cells along one direction of a block.
 const MAX_CELLS: u64 = 10_000_000;
 
-/// Reads a block of that kind; `None` after reporting what is wrong.
-pub(super) fn read(kind: &str, table: &Table<'_>, section: Option<Section>) -> Option<Shape> {
+/// Reads a block of that kind in a deck with these planes of symmetry; `None` after reporting what is wrong.
+pub(super) fn read(
+    kind: &str,
+    table: &Table<'_>,
+    section: Option<Section>,
+    planes: [bool; 3],
+) -> Option<Shape> {
     match kind {
-        "box" => read_box(table),
+        "box" => read_box(table, planes),
         "cylinder" => read_cylinder(table),
         "sphere" => read_sphere(table),
-        "plate" => read_plate(table, section),
+        "plate" => read_plate(table, section, planes),
         "prism" => read_prism(table, section),
         _ => read_tube(table),
     }
 }
 
+/// Counts of cells as `cells` gives them, or as many as `lengths` over `cell` come to, rounded, at least one each. `lengths` are none
+/// where what they follow from could not be read.
+fn counts<const N: usize>(table: &Table<'_>, words: &str, lengths: Option<[f64; N]>) -> Option<[u64; N]> {
+    let (cells, cell) = (table.get("cells"), table.get("cell"));
+    match (cells, cell) {
+        (Some(cells), Some(cell)) => {
+            table.faults.add(
+                cell.at,
+                format!("{} beside {}", cell.words(), cells.words()),
+                "one of cell and cells",
+                "remove one of the two",
+            );
+            None
+        }
+        (Some(cells), None) => cells.integers::<N>(words, 1, MAX_CELLS),
+        (None, Some(cell)) => {
+            let length = cell.number(Range::Positive)?;
+            let counts = lengths?.map(|long| (long / length).round().max(1.0));
+            if let Some(most) = counts.iter().find(|count| **count > MAX_CELLS as f64) {
+                let expected = format!("at most {MAX_CELLS} cells along a direction; this gives {most:e}");
+                cell.fault(&expected, "give a longer cell");
+                return None;
+            }
+            Some(counts.map(|count| count as u64))
+        }
+        (None, None) => {
+            table.faults.add(
+                table.at,
+                format!("{} without \"cells\" and without \"cell\"", table.title),
+                format!("{words}, or the length of a cell"),
+                "add cells = [...] or cell = ...",
+            );
+            None
+        }
+    }
+}
+
+/// Whether a length from `origin` on has its middle at 0.
+fn is_centred(origin: f64, length: f64) -> bool {
+    (origin + 0.5 * length).abs() <= 1e-9 * length.abs()
+}
+
+/// Makes counts that follow from the length of a cell even where a plane of symmetry halves the body.
+fn even<const N: usize>(table: &Table<'_>, cells: &mut [u64; N], lengths: [f64; N], halved: [bool; N]) {
+    let Some(cell) = table.get("cell").and_then(|v| v.number(Range::Positive)) else { return };
+    for ((cells, length), halved) in cells.iter_mut().zip(lengths).zip(halved) {
+        if halved && *cells % 2 == 1 {
+            *cells = 2 * ((0.5 * length / cell).round() as u64).max(1);
+        }
+    }
+}
+
 const CELLS: &str = "three whole numbers [I, J, K] of at least 1";
 
-fn read_box(table: &Table<'_>) -> Option<Shape> {
+fn read_box(table: &Table<'_>, planes: [bool; 3]) -> Option<Shape> {
     if ["x", "y", "z"].iter().any(|key| table.has(key)) {
         let coordinates = ["x", "y", "z"].map(|key| read_coordinates(table, key));
         let [Some(x), Some(y), Some(z)] = coordinates else { return None };
@@ -36,7 +93,10 @@ fn read_box(table: &Table<'_>) -> Option<Shape> {
     let size = table
         .require("size", "[x, y, z]")
         .and_then(|v| v.numbers::<3>("three lengths [x, y, z]", Range::Positive));
-    let cells = table.require("cells", CELLS).and_then(|v| v.integers::<3>(CELLS, 1, MAX_CELLS));
+    let mut cells = counts(table, CELLS, size);
+    if let (Some(cells), Some(origin), Some(size)) = (&mut cells, origin, size) {
+        even(table, cells, size, [0, 1, 2].map(|a| planes[a] && is_centred(origin[a], size[a])));
+    }
     let grading = match table.get("grading") {
         None => Some([1.0; 3]),
         Some(v) => v.numbers::<3>(
@@ -100,7 +160,9 @@ fn read_cylinder(table: &Table<'_>) -> Option<Shape> {
     let sector = read_sector(table, &["full", "half", "quarter"]);
     let core_fraction = table.number_or("core_fraction", 0.5, CORE);
     let words = "three whole numbers [core, ring, length] of at least 1";
-    let cells = table.require("cells", words).and_then(|v| v.integers::<3>(words, 1, MAX_CELLS));
+    let along = |radius: f64| [core_fraction * radius, (1.0 - core_fraction) * radius];
+    let lengths = radius.map(along).zip(length).map(|([core, ring], length)| [core, ring, length]);
+    let cells = counts(table, words, lengths);
     Some(Shape::Cylinder {
         axis: axis?,
         base: base?,
@@ -118,7 +180,8 @@ fn read_sphere(table: &Table<'_>) -> Option<Shape> {
     let sector = read_sector(table, &["full", "half", "quarter", "octant"]);
     let core_fraction = table.number_or("core_fraction", 0.5, CORE);
     let words = "two whole numbers [core, layers] of at least 1";
-    let cells = table.require("cells", words).and_then(|v| v.integers::<2>(words, 1, MAX_CELLS));
+    let lengths = radius.map(|radius| [core_fraction * radius, (1.0 - core_fraction) * radius]);
+    let cells = counts(table, words, lengths);
     Some(Shape::Sphere {
         centre: centre?,
         radius: radius?,
@@ -141,8 +204,12 @@ fn read_tube(table: &Table<'_>) -> Option<Shape> {
         Range::Within(0.0, 360.0, "an angle above 0 and at most 360 degrees"),
     );
     let words = "three whole numbers [radial, angular, length] of at least 1";
-    let cells = table.require("cells", words).and_then(|v| v.integers::<3>(words, 1, MAX_CELLS));
-    let (inner, outer, cells) = (inner?, outer?, cells?);
+    let lengths = inner
+        .zip(outer)
+        .zip(length)
+        .map(|((inner, outer), length)| [outer - inner, 0.5 * (inner + outer) * angle.to_radians(), length]);
+    let cells = counts(table, words, lengths);
+    let (inner, outer, mut cells) = (inner?, outer?, cells?);
     if outer <= inner {
         table.faults.add(
             table.at,
@@ -151,6 +218,10 @@ fn read_tube(table: &Table<'_>) -> Option<Shape> {
             "change one of them",
         );
         return None;
+    }
+    if !table.has("cells") {
+        // A long cell still goes round.
+        cells[1] = cells[1].max((angle / 120.0).ceil() as u64);
     }
     if cells[1] as f64 * 120.0 < angle {
         table.faults.add(
@@ -173,11 +244,19 @@ fn read_tube(table: &Table<'_>) -> Option<Shape> {
 
 const SHELL_CELLS: &str = "two whole numbers [I, J] of at least 1";
 
-fn read_plate(table: &Table<'_>, section: Option<Section>) -> Option<Shape> {
+fn read_plate(table: &Table<'_>, section: Option<Section>, planes: [bool; 3]) -> Option<Shape> {
     let origin = table.vector("origin");
     let sides = [table.vector("side_i"), table.vector("side_j")];
-    let cells = table.require("cells", SHELL_CELLS).and_then(|v| v.integers::<2>(SHELL_CELLS, 1, MAX_CELLS));
+    let lengths = sides[0].zip(sides[1]).map(|(i, j)| [norm(i), norm(j)]);
+    let mut cells = counts(table, SHELL_CELLS, lengths);
     let [Some(i), Some(j)] = sides else { return None };
+    if let (Some(cells), Some(origin)) = (&mut cells, origin) {
+        // A side that alone runs across the plane.
+        let halved = |side: [f64; 3], other: [f64; 3]| {
+            (0..3).any(|a| planes[a] && other[a] == 0.0 && side[a] != 0.0 && is_centred(origin[a], side[a]))
+        };
+        even(table, cells, [norm(i), norm(j)], [halved(i, j), halved(j, i)]);
+    }
     let area = norm(cross(i, j));
     if !(area > 1e-9 * norm(i) * norm(j) && area.is_finite()) {
         table.faults.add(
@@ -197,12 +276,26 @@ fn read_prism(table: &Table<'_>, section: Option<Section>) -> Option<Shape> {
     let radius = table.number("radius", Range::Positive);
     let length = table.number("length", Range::Positive);
     let sides = table.get("sides").map(|v| v.integer(3, 1000));
-    let cells = table.require("cells", SHELL_CELLS).and_then(|v| v.integers::<2>(SHELL_CELLS, 1, MAX_CELLS));
-    let cells = cells?.map(|c| c as u32);
     let sides = match sides {
         None => None,
         Some(sides) => Some(sides? as u32),
     };
+    // Round it, one side of it, or all of a tube.
+    let turn = |radius: f64| match sides {
+        Some(sides) => 2.0 * radius * libm::sin(std::f64::consts::PI / f64::from(sides)),
+        None => 2.0 * std::f64::consts::PI * radius,
+    };
+    let lengths = radius.map(turn).zip(length).map(|(turn, length)| [turn, length]);
+    let mut cells = counts(table, SHELL_CELLS, lengths)?;
+    if !table.has("cells") {
+        cells[0] = sides.map_or(cells[0].max(3), |sides| u64::from(sides) * cells[0]);
+    }
+    if cells[0] > MAX_CELLS {
+        let read = format!("{} with {} cells round it", table.title, cells[0]);
+        table.faults.add(table.at, read, format!("at most {MAX_CELLS}"), "give a longer cell");
+        return None;
+    }
+    let cells = cells.map(|c| c as u32);
     if cells[0] < 3 || sides.is_some_and(|sides| cells[0] % sides != 0) {
         table.faults.add(
             table.at,

@@ -50,8 +50,8 @@ pub(crate) enum Parts {
 #[derive(Clone, Debug)]
 pub(crate) enum Region {
     All,
-    /// A named face of blocks.
-    Face(Placed<String>),
+    /// Named faces of blocks; at least one.
+    Faces(Vec<Placed<String>>),
     Box {
         low: [f64; 3],
         high: [f64; 3],

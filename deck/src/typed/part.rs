@@ -104,6 +104,68 @@ pub(crate) struct Part {
     pub(crate) mesh: Option<PartMesh>,
     pub(crate) rotate: Option<Rotation>,
     pub(crate) translate: Option<Placed<[f64; 3]>>,
+    pub(crate) place: Option<Placement>,
+    pub(crate) clamp: Option<Clamp>,
+}
+
+/// Where a part stands beside another, along one axis.
+#[derive(Clone, Debug)]
+pub(crate) struct Placement {
+    pub(crate) origin: Origin,
+    pub(crate) side: Side,
+    /// The other part.
+    pub(crate) beside: Placed<String>,
+    /// Distance of their outermost nodes (length); none where the contact gap is to serve.
+    pub(crate) gap: Option<f64>,
+}
+
+/// A side of a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    Above,
+    Below,
+    Right,
+    Left,
+    Behind,
+    Front,
+}
+
+impl Side {
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Above, Self::Below, Self::Right, Self::Left, Self::Behind, Self::Front];
+
+    /// Its key in a TOML deck.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::Above => "above",
+            Self::Below => "below",
+            Self::Right => "right",
+            Self::Left => "left",
+            Self::Behind => "behind",
+            Self::Front => "front",
+        }
+    }
+
+    /// Its axis, and whether it is the upper end of that.
+    pub(crate) fn axis(self) -> (usize, bool) {
+        match self {
+            Self::Right => (0, true),
+            Self::Left => (0, false),
+            Self::Behind => (1, true),
+            Self::Front => (1, false),
+            Self::Above => (2, true),
+            Self::Below => (2, false),
+        }
+    }
+}
+
+/// The faces of a part that are held.
+#[derive(Clone, Debug)]
+pub(crate) enum Clamp {
+    /// The sides of a plate, the rim of a disc, the ends of a tube.
+    Edges(Origin),
+    /// By name; at least one.
+    Faces(Vec<Placed<String>>),
 }
 
 /// A turn of a block before the run.

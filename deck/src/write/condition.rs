@@ -125,7 +125,10 @@ fn write_parts(text: &mut Text, parts: &Parts) {
 fn write_region(text: &mut Text, region: Option<&Region>) {
     match region {
         None | Some(Region::All) => {}
-        Some(Region::Face(name)) => text.key("face", quoted(&name.value)),
+        Some(Region::Faces(names)) => match &names[..] {
+            [name] => text.key("face", quoted(&name.value)),
+            names => text.key("face", list(names.iter().map(|name| quoted(&name.value)))),
+        },
         Some(Region::Box { low, high }) => {
             text.key("box", table(&[("min", vector(*low)), ("max", vector(*high))]));
         }

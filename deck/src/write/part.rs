@@ -13,7 +13,7 @@ use crate::{
     typed::{
         Deck,
         mesh::{Explicit, PartMesh, Source},
-        part::{Choice, Erosion, Kind, Part},
+        part::{Choice, Clamp, Erosion, Kind, Part},
     },
 };
 
@@ -116,6 +116,16 @@ fn write_part(text: &mut Text, part: &Part) {
     }
     if let Some(by) = &part.translate {
         text.key("translate", vector(by.value));
+    }
+    if let Some(place) = &part.place {
+        let mut keys = vec![(place.side.key(), quoted(&place.beside.value))];
+        keys.extend(place.gap.map(|gap| ("gap", format!("{gap:?}"))));
+        text.key("place", table(&keys));
+    }
+    match &part.clamp {
+        None => {}
+        Some(Clamp::Edges(_)) => text.key("clamp", quoted("edges")),
+        Some(Clamp::Faces(faces)) => text.key("clamp", list(faces.iter().map(|face| quoted(&face.value)))),
     }
 }
 

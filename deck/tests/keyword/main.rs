@@ -77,7 +77,7 @@ fn without_card(fault: &str) -> String {
 
 #[test]
 fn block_on_plate_is_a_quarter_with_curves_sets_and_contact() {
-    let Reading { model, warnings } = example("block-on-plate.k", None);
+    let Reading { model, warnings, .. } = example("block-on-plate.k", None);
     assert_eq!((model.title.as_str(), model.units.as_str()), ("Block on a plate", "mm-ms-kg"));
     assert_eq!((model.mesh.n_elements(), model.mesh.n_nodes()), (4 * 4 * 6 + 12 * 12 * 3, 851));
     let names: Vec<&str> = model.mesh.parts.iter().map(|p| p.name.as_str()).collect();
@@ -100,7 +100,7 @@ fn block_on_plate_is_a_quarter_with_curves_sets_and_contact() {
 
 #[test]
 fn ball_on_shell_has_clamped_shells_of_five_points_that_solids_meet() {
-    let Reading { model, warnings } = example("ball-on-shell.k", None);
+    let Reading { model, warnings, .. } = example("ball-on-shell.k", None);
     assert!(warnings.is_empty(), "{warnings:?}");
     let [sheet, ball] = &model.mesh.parts[..] else { panic!("two parts") };
     assert_eq!((sheet.name.as_str(), sheet.n_elements(), ball.n_elements()), ("sheet", 144, 64));
@@ -183,7 +183,7 @@ fn bar_on_wall_runs_the_case_that_is_chosen() {
     for (case, speed, title) in
         [(101, -190e3, "Bar on a wall, 190 m/s"), (102, -100e3, "Bar on a wall, 100 m/s")]
     {
-        let Reading { model, warnings } = example("bar-on-wall.k", Some(case));
+        let Reading { model, warnings, .. } = example("bar-on-wall.k", Some(case));
         assert_eq!((model.title.as_str(), model.units.as_str(), warnings.len()), (title, "mm-s-t", 0));
         assert!(model.velocity.iter().all(|v| v[2] == speed));
         let Shape::Plane { normal, .. } = model.setup.walls[0].shape else { panic!("a plane") };
@@ -200,7 +200,7 @@ fn bar_on_wall_runs_the_case_that_is_chosen() {
 
 #[test]
 fn punch_through_plate_erodes_by_failure_strain_and_mat_add_erosion_and_drops_freed_nodes() {
-    let Reading { model, warnings } = example("punch-through-plate.k", None);
+    let Reading { model, warnings, .. } = example("punch-through-plate.k", None);
     assert_eq!(
         (model.mesh.n_elements(), model.mesh.n_nodes()),
         (4 * 2 * 8 + 14 * 7 * 3, 5 * 3 * 9 + 15 * 8 * 4)

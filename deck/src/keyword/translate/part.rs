@@ -93,6 +93,8 @@ pub(super) fn write(t: &mut Translation<'_>) {
             mesh: (!t.without_section.contains(&id)).then_some(mesh),
             rotate: None,
             translate: None,
+            place: None,
+            clamp: None,
         };
         t.deck.parts.push(written);
     }
