@@ -8,7 +8,10 @@ use std::{
     fmt,
 };
 
-use crate::place::{Origin, Place};
+use crate::{
+    place::{Origin, Place},
+    schema::recorder::Recorder,
+};
 
 /// Most faults reported for one deck; the list ends with the number left out.
 pub const MAX_FAULTS: usize = 500;
@@ -63,6 +66,8 @@ pub struct Faults<'a> {
     list: RefCell<Vec<(u16, Fault)>>,
     /// Faults past [`MAX_FAULTS`], which are only counted.
     more: Cell<usize>,
+    /// What readers ask, where somebody wants to know.
+    pub(crate) recorder: Option<Recorder>,
 }
 
 impl<'a> Faults<'a> {
@@ -74,7 +79,12 @@ impl<'a> Faults<'a> {
     /// No faults yet of several files, of which there is at least one.
     pub(crate) fn of_files(files: &[(&'a str, &'a str)]) -> Self {
         let file = |(name, text): &(&'a str, &'a str)| File { name, text, line_starts: OnceCell::new() };
-        Self { files: files.iter().map(file).collect(), list: RefCell::new(Vec::new()), more: Cell::new(0) }
+        Self {
+            files: files.iter().map(file).collect(),
+            list: RefCell::new(Vec::new()),
+            more: Cell::new(0),
+            recorder: None,
+        }
     }
 
     /// Adds a fault at byte offset `at` of the text.

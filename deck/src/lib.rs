@@ -27,6 +27,7 @@ pub mod parameters;
 pub mod perturb;
 pub mod physics;
 mod place;
+pub mod schema;
 pub mod starters;
 pub mod table;
 mod toml_deck;

@@ -10,6 +10,7 @@ use toml::de::{DeTable, DeValue};
 use crate::{
     fault::{Faults, nearest},
     place::{Origin, Place, Placed},
+    schema::recorder::{Kind, Recorder},
 };
 
 /// Longest name of a part, material or gauge (characters).
@@ -33,6 +34,8 @@ pub struct Table<'a> {
     /// Where faults are reported.
     pub faults: &'a Faults<'a>,
     known: RefCell<BTreeSet<&'static str>>,
+    /// What it is to a recorder of what readers ask.
+    kind: usize,
 }
 
 /// A value of the deck and the key it stands under.
@@ -43,6 +46,9 @@ pub struct Value<'a> {
     pub at: usize,
     end: usize,
     key: &'static str,
+    /// The kind of the table that it stands in, and how many lists it is inside of there.
+    owner: usize,
+    depth: usize,
     /// Where faults are reported.
     pub faults: &'a Faults<'a>,
 }
@@ -50,7 +56,27 @@ pub struct Value<'a> {
 impl<'a> Table<'a> {
     /// A table called `title`, its header at offset `at`.
     pub fn new(table: &'a DeTable<'a>, at: usize, title: String, faults: &'a Faults<'a>) -> Self {
-        Self { table, at, title, faults, known: RefCell::new(BTreeSet::new()) }
+        Self::of_kind(table, at, title, faults, Recorder::WHOLE)
+    }
+
+    fn of_kind(
+        table: &'a DeTable<'a>,
+        at: usize,
+        title: String,
+        faults: &'a Faults<'a>,
+        kind: usize,
+    ) -> Self {
+        if let Some(recorder) = &faults.recorder {
+            recorder.begin(kind);
+        }
+        Self { table, at, title, faults, known: RefCell::new(BTreeSet::new()), kind }
+    }
+
+    /// A table that is read as all others of this name, wherever it stands.
+    pub(crate) fn shared(self, name: &'static str) -> Self {
+        let kind =
+            self.faults.recorder.as_ref().map_or(self.kind, |recorder| recorder.share(self.kind, name));
+        Self { kind, ..self }
     }
 
     /// Where it stands.
@@ -61,13 +87,27 @@ impl<'a> Table<'a> {
     /// The value under `key`, if the deck has one.
     pub fn get(&self, key: &'static str) -> Option<Value<'a>> {
         self.known.borrow_mut().insert(key);
+        if let Some(recorder) = &self.faults.recorder {
+            recorder.ask(self.kind, key);
+        }
         let spanned = self.table.get(key)?;
         let span = spanned.span();
-        Some(Value { value: spanned.get_ref(), at: span.start, end: span.end, key, faults: self.faults })
+        Some(Value {
+            value: spanned.get_ref(),
+            at: span.start,
+            end: span.end,
+            key,
+            owner: self.kind,
+            depth: 0,
+            faults: self.faults,
+        })
     }
 
     /// The value under `key`; its absence is a fault. `expected` says what belongs there.
     pub fn require(&self, key: &'static str, expected: &str) -> Option<Value<'a>> {
+        if let Some(recorder) = &self.faults.recorder {
+            recorder.require(self.kind, key, expected);
+        }
         let value = self.get(key);
         if value.is_none() {
             self.faults.add(
@@ -117,12 +157,20 @@ impl<'a> Table<'a> {
             );
             return Vec::new();
         }
+        value.record(Kind::List(None));
+        let one = Value { depth: 1, ..value };
         let mut tables = Vec::new();
         for (n, item) in array.iter().enumerate() {
             let title = format!("[[{key}]] {}", n + 1);
             match item.get_ref() {
                 DeValue::Table(table) => {
-                    tables.push(Table::new(table, item.span().start, title, self.faults));
+                    tables.push(Table::of_kind(
+                        table,
+                        item.span().start,
+                        title,
+                        self.faults,
+                        one.table_kind(),
+                    ));
                 }
                 _ => Value { value: item.get_ref(), at: item.span().start, end: item.span().end, ..value }
                     .fault("a table", &format!("write [[{key}]] before each")),
@@ -161,7 +209,7 @@ impl<'a> Table<'a> {
 }
 
 /// Which numbers a key takes.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Range {
     /// Any finite number.
     Any,
@@ -211,6 +259,29 @@ impl<'a> Value<'a> {
         Placed::new(value, self.origin())
     }
 
+    /// Notes what a reader asks of this value.
+    fn record(&self, kind: Kind) {
+        if let Some(recorder) = &self.faults.recorder {
+            recorder.note(self.owner, self.key, self.depth, kind);
+        }
+    }
+
+    /// The kind of the table that this value is.
+    fn table_kind(&self) -> usize {
+        match &self.faults.recorder {
+            Some(recorder) => recorder.table(self.owner, self.key, self.depth),
+            None => Recorder::WHOLE,
+        }
+    }
+
+    /// Notes a question whose answer decides how a reader goes on.
+    fn answered(&self, question: &'static str, answer: bool) -> bool {
+        if let Some(recorder) = &self.faults.recorder {
+            recorder.answer(self.owner, self.key, self.depth, question, answer);
+        }
+        answer
+    }
+
     /// Reports this value.
     pub fn fault(&self, expected: &str, advice: &str) {
         self.faults.add(self.at, self.words(), expected, advice);
@@ -218,6 +289,7 @@ impl<'a> Value<'a> {
 
     /// A finite number in `range`.
     pub fn number(&self, range: Range) -> Option<f64> {
+        self.record(Kind::Number(range));
         let number = match self.value {
             DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
             DeValue::Integer(integer) => {
@@ -241,6 +313,7 @@ impl<'a> Value<'a> {
 
     /// An integer from `min` to `max`.
     pub fn integer(&self, min: u64, max: u64) -> Option<u64> {
+        self.record(Kind::Integer(min, max));
         let number = match self.value {
             DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix()).ok(),
             _ => None,
@@ -253,6 +326,11 @@ impl<'a> Value<'a> {
     }
 
     pub fn text(&self) -> Option<&'a str> {
+        self.record(Kind::Text);
+        self.characters()
+    }
+
+    fn characters(&self) -> Option<&'a str> {
         match self.value {
             DeValue::String(text) => Some(text.as_ref()),
             _ => {
@@ -265,7 +343,8 @@ impl<'a> Value<'a> {
     /// A name: letters, digits, space, dash and underscore, at most [`MAX_NAME`]; it becomes a column
     /// heading or a file name.
     pub fn name(&self) -> Option<String> {
-        let text = self.text()?;
+        self.record(Kind::Name);
+        let text = self.characters()?;
         let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, ' ' | '-' | '_');
         if text.is_empty() || text.len() > MAX_NAME || !text.chars().all(fits) || text.trim() != text {
             self.fault(
@@ -279,7 +358,8 @@ impl<'a> Value<'a> {
 
     /// One of a few words; the index of the word.
     pub fn one_of(&self, words: &[&'static str]) -> Option<usize> {
-        let text = self.text()?;
+        self.record(Kind::Words(words.to_vec()));
+        let text = self.characters()?;
         let found = words.iter().position(|w| *w == text);
         if found.is_none() {
             let advice = match nearest(text, words.iter().copied()) {
@@ -293,6 +373,7 @@ impl<'a> Value<'a> {
 
     /// True or false.
     pub fn boolean(&self) -> Option<bool> {
+        self.record(Kind::Boolean);
         match self.value {
             DeValue::Boolean(b) => Some(*b),
             _ => {
@@ -330,7 +411,10 @@ impl<'a> Value<'a> {
     /// Exactly `N` values.
     pub fn fixed<const N: usize>(&self, expected: &str) -> Option<[Value<'a>; N]> {
         let items = match self.value {
-            DeValue::Array(array) if array.len() == N => self.items()?,
+            DeValue::Array(array) if array.len() == N => {
+                self.record(Kind::List(Some(N)));
+                self.list()?
+            }
             _ => {
                 self.fault(expected, &format!("write {N} values in square brackets"));
                 return None;
@@ -341,6 +425,11 @@ impl<'a> Value<'a> {
 
     /// The items of an array.
     pub fn items(&self) -> Option<Vec<Value<'a>>> {
+        self.record(Kind::List(None));
+        self.list()
+    }
+
+    fn list(&self) -> Option<Vec<Value<'a>>> {
         let DeValue::Array(array) = self.value else {
             self.fault("a list in square brackets", "write [ ... ]");
             return None;
@@ -352,6 +441,7 @@ impl<'a> Value<'a> {
                     value: item.get_ref(),
                     at: item.span().start,
                     end: item.span().end,
+                    depth: self.depth + 1,
                     ..*self
                 })
                 .collect(),
@@ -360,21 +450,23 @@ impl<'a> Value<'a> {
 
     /// Whether this is a text (rather than a list or table).
     pub fn is_text(&self) -> bool {
-        matches!(self.value, DeValue::String(_))
+        self.answered("a text", matches!(self.value, DeValue::String(_)))
     }
 
     pub fn is_list(&self) -> bool {
-        matches!(self.value, DeValue::Array(_))
+        self.answered("a list", matches!(self.value, DeValue::Array(_)))
     }
 
     pub fn is_table(&self) -> bool {
-        matches!(self.value, DeValue::Table(_))
+        self.answered("a table", matches!(self.value, DeValue::Table(_)))
     }
 
     /// A table called `title`.
     pub fn table(&self, title: String) -> Option<Table<'a>> {
         match self.value {
-            DeValue::Table(table) => Some(Table::new(table, self.at, title, self.faults)),
+            DeValue::Table(table) => {
+                Some(Table::of_kind(table, self.at, title, self.faults, self.table_kind()))
+            }
             _ => {
                 self.fault("a table", &format!("write {} = {{ ... }} or a [table] heading", self.key));
                 None

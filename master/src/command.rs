@@ -136,6 +136,8 @@ pub enum Command {
         /// The file to write, - for standard output; a file that is there stays [default: <NAME>.toml]
         file: Option<PathBuf>,
     },
+    /// Print a JSON Schema of TOML decks, by which editors complete and check them
+    Schema,
     /// List every error of a deck, or what a run of it would take and what in it is hardly meant, without running it
     Check {
         /// The deck

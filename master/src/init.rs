@@ -12,7 +12,7 @@ use deck::{
     starters::{STARTERS, Starter},
 };
 
-use crate::shell::quoted;
+use crate::shell::{print, quoted};
 
 /// Writes the deck of that name to `to`, by default its name with `.toml` here, to standard output where `to` is `-`. Without a name
 /// lists them.
@@ -21,13 +21,11 @@ use crate::shell::quoted;
 /// A name that no deck has, a file that is there already or cannot be written.
 pub fn run(name: Option<&str>, to: Option<&Path>) -> Result<ExitCode, String> {
     let Some(name) = name else {
-        println!("{}", list());
-        return Ok(ExitCode::SUCCESS);
+        return print(&list()).map(|()| ExitCode::SUCCESS);
     };
     let starter = STARTERS.iter().find(|starter| starter.name == name).ok_or_else(|| unknown(name))?;
     if to == Some(Path::new("-")) {
-        print!("{}", starter.text);
-        return Ok(ExitCode::SUCCESS);
+        return print(starter.text).map(|()| ExitCode::SUCCESS);
     }
     let path = to.map_or_else(|| PathBuf::from(format!("{name}.toml")), Path::to_path_buf);
     // No file is replaced, not even one that appears at this moment.
@@ -39,8 +37,7 @@ pub fn run(name: Option<&str>, to: Option<&Path>) -> Result<ExitCode, String> {
         _ => format!("{}: {e}", path.display()),
     })?;
     file.write_all(starter.text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
-    println!("{}", next(starter, &path));
-    Ok(ExitCode::SUCCESS)
+    print(&next(starter, &path)).map(|()| ExitCode::SUCCESS)
 }
 
 fn list() -> String {

@@ -7,7 +7,7 @@ use deck::{
     units::Units,
 };
 
-use crate::command::MaterialsArgs;
+use crate::{command::MaterialsArgs, shell::print};
 
 /// Prints the library, or one material of it.
 ///
@@ -26,8 +26,7 @@ pub fn run(args: &MaterialsArgs) -> Result<ExitCode, String> {
             if args.json { json(&cards)? } else { list(&cards) }
         }
     };
-    println!("{text}");
-    Ok(ExitCode::SUCCESS)
+    print(&text).map(|()| ExitCode::SUCCESS)
 }
 
 fn json(of: &impl serde::Serialize) -> Result<String, String> {

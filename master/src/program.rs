@@ -20,8 +20,9 @@ use crate::{
     ca_folder::CaFolder,
     certs, check, client,
     command::{Bench, Certs, Cli, Command, WorkerArgs},
-    convert, daemon, init, machine, materials, memory, newcomer, picture, processes, run, simulate, study,
-    verify,
+    convert, daemon, init, machine, materials, memory, newcomer, picture, processes, run,
+    shell::print,
+    simulate, study, verify,
 };
 
 /// The log: to standard error, of the levels that `BOLIDE_LOG` says (`debug`, or by module `info,worker=debug`), else from
@@ -64,6 +65,10 @@ pub fn main(compute: Compute) -> ExitCode {
         Command::Man { out } => manual(out.as_deref()),
         Command::Check { deck, json, reading } => check::run(&deck, json, &reading.options()),
         Command::Init { name, file } => init::run(name.as_deref(), file.as_deref()),
+        Command::Schema => serde_json::to_string_pretty(&deck::schema::json())
+            .map_err(|e| e.to_string())
+            .and_then(|schema| print(&schema))
+            .map(|()| ExitCode::SUCCESS),
         Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
         Command::Verify(args) => verify::run(&args),
         Command::Picture(args) => picture::run(&args),

@@ -1,4 +1,18 @@
-//! Words and command lines as a shell takes them.
+//! Words and command lines as a shell takes them, and texts that it passes on.
+
+use std::io::{self, ErrorKind, Write};
+
+/// Prints a text and ends its line. A reader that has heard enough, as `head` has, is no fault.
+///
+/// # Errors
+/// Standard output cannot be written.
+pub fn print(text: &str) -> Result<(), String> {
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(format!("standard output: {e}")),
+        _ => Ok(()),
+    }
+}
 
 /// A word as a shell takes it.
 pub fn quoted(word: &str) -> String {

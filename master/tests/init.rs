@@ -2,8 +2,9 @@
 
 use std::{
     fs,
+    io::Read,
     path::Path,
-    process::{Command, Output},
+    process::{Command, Output, Stdio},
 };
 
 use deck::starters::STARTERS;
@@ -68,6 +69,19 @@ fn a_file_that_is_there_stays_as_it_is() {
     assert!(other.status.success(), "{:?}", texts(&other));
     let printed = bolide(folder.path(), &["init", "taylor", "-"]);
     assert_eq!(printed.stdout, fs::read(folder.path().join("other.toml")).expect("a file"));
+}
+
+/// A pager that is left before the end.
+#[test]
+fn a_reader_that_leaves_early_is_no_fault() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bolide"));
+    let mut child = command.args(["schema"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let child = child.as_mut().expect("the binary of this build starts");
+    drop(child.stdout.take());
+    let mut told = String::new();
+    child.stderr.take().expect("a pipe").read_to_string(&mut told).expect("text");
+    assert!(child.wait().expect("it ends").success(), "{told}");
+    assert!(told.is_empty(), "{told}");
 }
 
 #[test]

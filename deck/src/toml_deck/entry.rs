@@ -55,7 +55,7 @@ pub(super) fn drive(value: Value<'_>) -> Option<Drive> {
     if !value.is_table() {
         return value.number(Range::Any).map(Drive::constant);
     }
-    let table = value.table("a value by curve".to_string())?;
+    let table = value.table("a value by curve".to_string())?.shared("drive");
     let constant = table.get("value").map(|v| v.number(Range::Any));
     let (factor, curve) = match constant {
         Some(value) => (value, None),

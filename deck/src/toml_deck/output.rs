@@ -2,7 +2,6 @@
 
 use super::entry::{direction, parts_of, text};
 use crate::{
-    fault::nearest,
     limits::{MAX_ENTRIES, MAX_SECTIONS},
     model::FIELD_NAMES,
     place::Placed,
@@ -42,21 +41,11 @@ fn read_contact_forces(table: &Table<'_>) -> Option<Placed<PartPairs>> {
 
 fn read_fields(table: &Table<'_>) -> Vec<String> {
     let mut fields = Vec::new();
-    let known = || FIELD_NAMES.into_iter();
     for item in table.get("fields").and_then(|v| v.items()).unwrap_or_default() {
-        let Some(name) = item.text() else { continue };
-        if known().any(|field| field == name) {
-            if !fields.iter().any(|f| f == name) {
-                fields.push(name.to_string());
-            }
-            continue;
+        let Some(name) = item.one_of(&FIELD_NAMES).map(|index| FIELD_NAMES[index]) else { continue };
+        if !fields.iter().any(|f| f == name) {
+            fields.push(name.to_string());
         }
-        let words: Vec<&str> = known().collect();
-        let advice = match nearest(name, known()) {
-            Some(near) => format!("write \"{near}\""),
-            None => "choose one of them".to_string(),
-        };
-        item.fault(&format!("one of {}", words.join(", ")), &advice);
     }
     fields
 }

@@ -25,6 +25,7 @@ use crate::{
 pub(super) fn read_materials(deck: &Table<'_>) -> Vec<Own> {
     let mut materials = Vec::new();
     for table in deck.tables("material", MAX_ENTRIES) {
+        let table = table.shared("material");
         let value = table.require("name", "a name in quotes");
         let name = value.and_then(|v| v.name()).unwrap_or_else(|| table.title.clone());
         let named = value.map(|v| v.origin());
@@ -100,7 +101,7 @@ fn read_choice(value: Value<'_>, part: &str) -> Option<Choice> {
     if !value.is_table() {
         return text(value).map(Choice::Named);
     }
-    let table = value.table(format!("material of \"{part}\""))?;
+    let table = value.table(format!("material of \"{part}\""))?.shared("material");
     let name = table.get("name").map_or(Some(part.to_string()), |v| v.name());
     library::read_material(table, name?).map(|material| Choice::Inline(Box::new(material)))
 }
