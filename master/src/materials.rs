@@ -46,7 +46,7 @@ fn unknown(name: &str) -> String {
 fn list(cards: &[Card]) -> String {
     let density = cards.first().map_or("", |card| &card.density.unit);
     let mut text = format!(
-        "{:24} {:>12}  {:11} {:17} {}\n",
+        "{:23} {:>10}  {:11} {:17} {}\n",
         "material",
         format!("rho {density}"),
         "eos",
@@ -59,7 +59,12 @@ fn list(cards: &[Card]) -> String {
             (None, Some(law)) => format!("({})", law.kind),
             (None, None) => String::new(),
         };
-        let line = format!("{name:24} {:>12}  {:11} {:17} {failure}", density.value, eos.kind, strength.kind);
+        let line = format!(
+            "{name:23} {:>10}  {:11} {:17} {failure}",
+            deck::fault::short(density.value),
+            eos.kind,
+            strength.kind
+        );
         text += line.trim_end();
         text.push('\n');
     }
@@ -130,7 +135,7 @@ mod tests {
             assert_eq!(text.lines().filter(|line| line.split(' ').next() == Some(name)).count(), 1, "{name}");
         }
         let widest = text.lines().map(str::len).max();
-        assert!(widest <= Some(82), "{widest:?}\n{text}");
+        assert!(widest <= Some(80), "{widest:?}\n{text}");
     }
 
     #[test]

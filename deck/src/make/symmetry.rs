@@ -23,31 +23,30 @@ pub(super) fn cut(deck: &Deck, parts: &mut [PartDraft], log: &Log<'_>) {
             let read =
                 |what: String| format!("part \"{}\" {what} the plane {plane} = 0 of [symmetry]", part.name);
             let is_own = part.numbers.is_none();
-            match block.side_of(axis) {
-                Some((below, above)) if below && above && !is_own => log.fault(
-                    part.at,
+            let refusal = match block.side_of(axis) {
+                Some((true, true)) if !is_own => Some((
                     read("of an explicit mesh across".to_string()),
                     format!("nodes at {plane} of 0 or more"),
                     "leave out what the plane mirrors from the mesh, or remove the plane",
-                ),
-                Some((below, above)) if below && above => {
-                    if let Err(Straddles { low, high }) = block.cut(axis) {
-                        log.fault(
-                            part.at,
-                            read(format!("with cells from {plane} = {} to {} across", short(low), short(high))),
-                            format!("cells that end at {plane} = 0"),
-                            "give it an even number of cells there, or place it so that a plane of nodes lies on it",
-                        );
-                        part.block = None;
-                    }
-                }
-                Some((true, _)) => log.fault(
-                    part.at,
+                )),
+                Some((true, true)) => block.cut(axis).err().map(|Straddles { low, high }| {
+                    (
+                        read(format!("with cells from {plane} = {} to {} across", short(low), short(high))),
+                        format!("cells that end at {plane} = 0"),
+                        "give it an even number of cells there, or place it so that a plane of nodes lies on it",
+                    )
+                }),
+                Some((true, false)) => Some((
                     read("below".to_string()),
                     format!("parts at {plane} of 0 or more: the plane mirrors them"),
                     "remove it if it is the mirror image of another part, else move it",
-                ),
-                _ => {}
+                )),
+                _ => None,
+            };
+            if let Some((read, expected, advice)) = refusal {
+                log.fault(part.at, read, expected, advice);
+                // That it has no nodes on the plane is no second fault.
+                part.block = None;
             }
         }
     }

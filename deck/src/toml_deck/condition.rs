@@ -5,7 +5,9 @@ use mechanics::{
     load::{Span, blast::Burst},
 };
 
-use super::entry::{AXES, circle, components, direction, drive, faces, parts, parts_of, region, span, text};
+use super::entry::{
+    AXES, circle, components, direction, drive, faces, nodes, parts, parts_of, region, span, text,
+};
 use crate::{
     limits::{MAX_CURVE_POINTS, MAX_ENTRIES},
     place::Place,
@@ -166,9 +168,9 @@ fn read_wall(table: Table<'_>) -> Option<Wall> {
     let friction = table.number_or("friction", 0.0, Range::NotNegative);
     let motion = read_motion(&table);
     let parts = parts_of(&table);
-    let nodes = match table.has("nodes") {
-        true => Some(region(&table)?),
-        false => None,
+    let nodes = match table.get("nodes") {
+        Some(value) => Some(nodes(value)?),
+        None => None,
     };
     let (at, title) = (table.place(), table.title.clone());
     table.finish();
@@ -204,7 +206,7 @@ pub(super) fn read_rigid(deck: &Table<'_>) -> Vec<Rigid> {
     let rigid = |table: Table<'_>| {
         let (at, title) = (table.place(), table.title.clone());
         // A body may be one of nodes alone.
-        let nodes = if table.has("nodes") { region(&table) } else { None };
+        let nodes = table.get("nodes").and_then(nodes);
         let members = match table.get("parts") {
             Some(value) => parts(value),
             None if nodes.is_some() => Parts::Named(Vec::new()),

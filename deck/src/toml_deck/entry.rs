@@ -121,13 +121,6 @@ pub(super) fn face_names(value: Value<'_>) -> Option<Vec<Placed<String>>> {
     if value.is_text() {
         return text(value).map(|name| vec![name]);
     }
-    if !value.is_list() {
-        value.fault(
-            "the name of a face, or a list of such names",
-            "write \"k-min\" or [\"i-min\", \"i-max\"]",
-        );
-        return None;
-    }
     let names: Option<Vec<Placed<String>>> = value.items()?.into_iter().map(text).collect();
     let names = names?;
     if names.is_empty() {
@@ -135,6 +128,15 @@ pub(super) fn face_names(value: Value<'_>) -> Option<Vec<Placed<String>>> {
         return None;
     }
     Some(names)
+}
+
+/// The name of a set of nodes, or a list of numbers.
+pub(super) fn nodes(value: Value<'_>) -> Option<Region> {
+    if value.is_text() {
+        return text(value).map(Region::Set);
+    }
+    let number = |item: Value<'_>| item.integer(1, u64::from(u32::MAX)).map(|id| item.placed(id as u32));
+    Some(Region::Numbers(value.items()?.into_iter().filter_map(number).collect()))
 }
 
 /// The nodes of an entry: all of its parts, or those of one face, box, plane or list.
@@ -156,12 +158,7 @@ pub(super) fn region(table: &Table<'_>) -> Option<Region> {
             plane.finish();
             Some(Region::Plane { point: point?, normal: normal? })
         }
-        [("nodes", value)] if value.is_text() => text(value).map(Region::Set),
-        [("nodes", value)] => {
-            let number =
-                |item: Value<'_>| item.integer(1, u64::from(u32::MAX)).map(|id| item.placed(id as u32));
-            Some(Region::Numbers(value.items()?.into_iter().filter_map(number).collect()))
-        }
+        [("nodes", value)] => nodes(value),
         _ => {
             let words: Vec<&str> = given.iter().map(|(way, _)| *way).collect();
             given[1].1.faults.add(

@@ -346,10 +346,10 @@ fn read_placement(value: Value<'_>, part: &str) -> Option<Placement> {
 
 /// `clamp = "edges"`, or a list of faces.
 fn read_clamp(value: Value<'_>) -> Option<Clamp> {
-    if value.is_text() && value.text() == Some("edges") {
-        return Some(Clamp::Edges(value.origin()));
-    }
-    if !value.is_list() {
+    if value.is_text() {
+        if value.text() == Some("edges") {
+            return Some(Clamp::Edges(value.origin()));
+        }
         value
             .fault("\"edges\", or a list of faces", "write \"edges\" or for instance [\"i-min\", \"i-max\"]");
         return None;
