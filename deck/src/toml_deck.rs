@@ -35,12 +35,60 @@ pub(crate) fn read(text: &str, log: &Log<'_>) -> Option<Deck> {
         return None;
     }
     let (document, errors) = DeTable::parse_recoverable(text);
-    for error in &errors {
+    let messages = errors.iter().map(|error| {
         let at = error.span().map_or(0, |span| span.start);
-        let message = error.message().trim().replace('\n', ", ");
+        (at, error.message().trim().replace('\n', ", "))
+    });
+    report(text, messages.collect(), log);
+    errors.is_empty().then(|| read_document(document.get_ref(), log))
+}
+
+/// What a parser says of a key in an array: one before it was not closed.
+const KEY_IN_ARRAY: &str = "unexpected `=` in array";
+
+/// Reports errors of syntax with their offsets: of each line the first, and none behind a bracket that is not closed, for they follow
+/// from it.
+fn report(text: &str, mut errors: Vec<(usize, String)>, log: &Log<'_>) {
+    errors.sort_by_key(|(at, _)| *at);
+    let in_array = errors.iter().find(|(_, message)| message.starts_with(KEY_IN_ARRAY)).map(|(at, _)| *at);
+    let opened = in_array.and_then(|at| unclosed(text.get(..at)?));
+    errors.retain(|(at, _)| opened.is_none_or(|opened| *at < opened));
+    errors.dedup_by_key(|(at, _)| log.faults.place(*at).0);
+    for (at, message) in errors {
         log.fault(Place::text(at), format!("a syntax error ({message})"), "TOML", "mend the line");
     }
-    errors.is_empty().then(|| read_document(document.get_ref(), log))
+    if let Some(opened) = opened {
+        let end = text[opened..].find('\n').map_or(text.len(), |long| opened + long);
+        let read = format!("a bracket that is not closed: {}", log.faults.quote(opened, end));
+        log.fault(Place::text(opened), read, "a list that ends with ]", "close it behind its last value");
+    }
+}
+
+/// Where the innermost list begins that a piece of a deck leaves open.
+fn unclosed(piece: &str) -> Option<usize> {
+    let mut open = Vec::new();
+    let mut quote = None;
+    let mut comment = false;
+    let mut escaped = false;
+    for (at, c) in piece.char_indices() {
+        match (quote, c) {
+            (_, '\n') => (quote, comment, escaped) = (None, false, false),
+            (Some('"'), '\\') if !escaped => escaped = true,
+            (Some(mark), c) => {
+                if c == mark && !escaped {
+                    quote = None;
+                }
+                escaped = false;
+            }
+            _ if comment => {}
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '#') => comment = true,
+            (None, '[') => open.push(at),
+            (None, ']') => drop(open.pop()),
+            (None, _) => {}
+        }
+    }
+    open.pop()
 }
 
 fn read_document(document: &DeTable<'_>, log: &Log<'_>) -> Deck {

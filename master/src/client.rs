@@ -21,11 +21,12 @@ use protocol::{
 };
 
 use crate::{
-    command::{ClientArgs, SubmitArgs},
+    command::{ClientArgs, MASTER, SubmitArgs},
     deck_file::{self, doubt, gather_deck, warn},
     machine::host_name,
     notify::notify,
     results::{Folder, create_anew},
+    shell::quoted,
 };
 
 pub mod screen;
@@ -239,8 +240,24 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
         println!("{{\"job\":{job}}}");
     } else {
         println!("job {job} submitted");
+        eprintln!("{}", next(job, &args.at));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The commands that follow a submission, for the master that it went to.
+fn next(job: u32, at: &ClientArgs) -> String {
+    let master =
+        if at.master == MASTER { String::new() } else { format!(" --master {}", quoted(&at.master)) };
+    let certs = at.certs.as_ref().map(|folder| format!(" --certs {}", quoted(&folder.display().to_string())));
+    let flags = master + &certs.unwrap_or_default();
+    let commands = [
+        (format!("bolide watch {job}{flags}"), "follows it until it ends"),
+        (format!("bolide results {job}{flags}"), "then fetches its results"),
+    ];
+    let width = commands.iter().map(|(command, _)| command.len()).max().unwrap_or(0);
+    let lines = commands.map(|(command, what)| format!("  {command:width$}   # {what}"));
+    format!("next:\n{}", lines.join("\n"))
 }
 
 /// `bolide watch`: ends as `run` would.
@@ -403,4 +420,18 @@ pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> 
         println!("{} files, {total} bytes in {}", files.len(), folder.display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_follows_a_submission_names_the_master_it_went_to() {
+        let at = ClientArgs { master: MASTER.to_owned(), certs: None, json: false };
+        assert!(next(3, &at).contains("  bolide watch 3     #"), "{}", next(3, &at));
+        let at = ClientArgs { master: "lab:9".to_owned(), certs: Some("my certs".into()), json: false };
+        let told = next(3, &at);
+        assert!(told.contains("bolide results 3 --master lab:9 --certs 'my certs'  "), "{told}");
+    }
 }

@@ -416,11 +416,14 @@ pub struct AddArgs {
     pub json: bool,
 }
 
+/// Where a client looks for its master.
+pub const MASTER: &str = "127.0.0.1:7117";
+
 /// How a client reaches a master, and how it prints.
 #[derive(Args, Clone, Debug)]
 pub struct ClientArgs {
     /// The master: HOST, HOST:PORT or [ADDRESS]:PORT
-    #[arg(long, default_value = "127.0.0.1:7117")]
+    #[arg(long, default_value = MASTER)]
     pub master: String,
     /// Folder with this host's certificates, as `bolide certs host` makes it
     #[arg(long, value_name = "FOLDER")]
