@@ -77,6 +77,12 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let faces = contact.as_ref().map(|contact| (&contact.settings, contact.faces.as_slice()));
     spans::check(&parts, &assembly, faces, &materials, log);
 
+    for (part, draft) in assembly.mesh.parts.iter_mut().zip(&parts) {
+        if draft.eight_points {
+            part.refine_points();
+        }
+    }
+
     let mut velocity = assembly.velocity;
     for (node, index) in conditions.constraint.iter().enumerate() {
         let held = &conditions.constraints[*index as usize];

@@ -156,7 +156,9 @@ fn measure(model: &Model, index: usize) -> Measured {
         let thinnest = match &part.topology {
             Topology::Shells { section, .. } => v / (section.thickness * longest),
             Topology::Trusses { .. } => longest,
-            Topology::Structured { .. } | Topology::Explicit { .. } => thinnest_way(&x),
+            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
+                thinnest_way(&x)
+            }
         };
         volume += v;
         area += part.thickness().map_or(0.0, |thickness| v / thickness);
@@ -193,7 +195,9 @@ fn measure(model: &Model, index: usize) -> Measured {
     this.cell = match &part.topology {
         Topology::Shells { .. } => (area / n).sqrt(),
         Topology::Trusses { .. } => this.least_cell,
-        Topology::Structured { .. } | Topology::Explicit { .. } => libm::cbrt(volume / n),
+        Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
+            libm::cbrt(volume / n)
+        }
     };
     if !is_rigid && part.n_corners() > 2 {
         // Linear viscosity damps the fastest wave of an element, and its step with it.

@@ -17,7 +17,7 @@ use crate::{
     place::{Place, Placed},
     units::Units,
 };
-use condition::{Boundary, Curve, Gravity, Load, Lumped, Parts, Relaxation, Rigid, Wall};
+use condition::{Boundary, Curve, Gravity, Load, Lumped, Parts, Region, Relaxation, Rigid, Wall};
 use contact::{Contact, Join};
 use part::{Own, Part};
 
@@ -168,18 +168,32 @@ impl Default for Output {
     }
 }
 
-/// A plane through bodies, whose force is wanted.
+/// What a cross-section cuts.
+#[derive(Clone, Debug)]
+pub(crate) enum Cut {
+    Plane {
+        /// Point and normal, of any length above 0; none where they could not be read.
+        plane: Option<[[f64; 3]; 2]>,
+        parts: Parts,
+        /// Elements whose centre is farther from the point are not cut.
+        radius: Option<f64>,
+    },
+    /// These elements, whose corners among these nodes are ahead of the cut.
+    Listed {
+        nodes: Region,
+        /// Numbers of solids, of shells and of trusses.
+        elements: [Vec<Placed<u32>>; 3],
+    },
+}
+
+/// A cut through bodies, whose force is wanted.
 #[derive(Clone, Debug)]
 pub(crate) struct Section {
     pub(crate) at: Place,
     /// What it is called in messages.
     pub(crate) title: String,
     pub(crate) name: Option<Placed<String>>,
-    pub(crate) parts: Parts,
-    /// Point and normal, of any length above 0; none where they could not be read.
-    pub(crate) plane: Option<[[f64; 3]; 2]>,
-    /// Elements whose centre is farther from the point are not cut.
-    pub(crate) radius: Option<f64>,
+    pub(crate) cut: Cut,
 }
 
 /// A history of a node or of an element.

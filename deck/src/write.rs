@@ -9,8 +9,8 @@ mod value;
 use mechanics::material::Material;
 
 use crate::typed::{
-    Control, Deck, Gauge, Kind, Output, Section, Spot,
-    condition::Parts,
+    Control, Cut, Deck, Gauge, Kind, Output, Section, Spot,
+    condition::{Parts, Region},
     contact::{Contact, Gap, Slack},
 };
 use value::{Text, list, names, quoted, vector};
@@ -147,13 +147,28 @@ fn write_section(text: &mut Text, section: &Section) {
     if let Some(name) = &section.name {
         text.key("name", quoted(&name.value));
     }
-    if !matches!(section.parts, Parts::All) {
-        text.key("parts", names(&section.parts));
+    match &section.cut {
+        Cut::Plane { plane, parts, radius } => {
+            if !matches!(parts, Parts::All) {
+                text.key("parts", names(parts));
+            }
+            if let Some([point, normal]) = plane {
+                text.key("plane", format!("{{ point = {}, normal = {} }}", vector(*point), vector(*normal)));
+            }
+            text.some("radius", *radius);
+        }
+        Cut::Listed { nodes, elements } => {
+            // Keyword decks alone are written, and they name their nodes.
+            if let Region::Set(name) = nodes {
+                text.key("nodes", quoted(&name.value));
+            }
+            for (key, ids) in ["solids", "shells", "trusses"].into_iter().zip(elements) {
+                if !ids.is_empty() {
+                    text.key(key, list(ids.iter().map(|id| id.value.to_string())));
+                }
+            }
+        }
     }
-    if let Some([point, normal]) = section.plane {
-        text.key("plane", format!("{{ point = {}, normal = {} }}", vector(point), vector(normal)));
-    }
-    text.some("radius", section.radius);
 }
 
 fn write_gauge(text: &mut Text, gauge: &Gauge) {

@@ -58,6 +58,9 @@ fn ihq_is_a_kind_of_hourglass_control_and_qm_its_coefficient() {
     let (found, warnings) = controlled("", "*CONTROL_HOURGLASS\n6,0.5\n");
     assert_eq!(found, of(Kind::AssumedStrain, 0.5));
     assert_eq!(warnings, ["HGID 5: no *HOURGLASS has this number, that of the deck serves"]);
+    assert_eq!(controlled("*HOURGLASS\n5,0\n", "").0, Hourglass::VISCOUS);
+    let plain = deck::read(&cube("1,1,1", ""), "a.k").unwrap_or_else(|faults| panic!("{}", faults[0]));
+    assert_eq!(plain.mesh.parts[0].hourglass, Hourglass::VISCOUS);
 }
 
 #[test]
@@ -68,4 +71,24 @@ fn elastic_control_on_a_fluid_is_a_warning_and_viscous() {
     assert_eq!(reading.model.mesh.parts[0].hourglass, Hourglass::viscous(0.1));
     let told = "IHQ 6: material 1 has no shear stiffness, control is viscous with 0.1";
     assert!(reading.warnings.iter().any(|warning| warning.words == told), "{:?}", reading.warnings);
+}
+
+#[test]
+fn elform_2_is_a_solid_of_eight_points_where_the_material_can() {
+    use mechanics::mesh::Topology;
+    let text = cube("1,1,1", "").replace("*SECTION_SOLID\n1,1", "*SECTION_SOLID\n1,2");
+    let reading = deck::read_whole(&text, "a.k").unwrap_or_else(|faults| panic!("{}", faults[0]));
+    assert!(matches!(reading.model.mesh.parts[0].topology, Topology::EightPoint { .. }));
+    assert!(reading.warnings.is_empty(), "{:?}", reading.warnings);
+    let written =
+        deck::convert(&text, "a.k", "out.mesh").unwrap_or_else(|faults| panic!("{}", faults[0])).deck;
+    assert!(written.contains("points = 8"), "{written}");
+    let fluid = text
+        .replace("*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3", "*MAT_NULL\n1,1e-9")
+        .replace("1,1,1\n", "1,1,1,1\n")
+        .replace("*END", "*EOS_GRUNEISEN\n1,1.48e6,1.75,0,0,0.28\n*END");
+    let reading = deck::read_whole(&fluid, "a.k").unwrap_or_else(|faults| panic!("{}", faults[0]));
+    assert!(matches!(reading.model.mesh.parts[0].topology, Topology::Explicit { .. }));
+    let told = "is computed with one point: eight need a material with shear stiffness";
+    assert!(reading.warnings.iter().any(|warning| warning.words.contains(told)), "{:?}", reading.warnings);
 }

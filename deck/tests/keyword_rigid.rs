@@ -292,3 +292,27 @@ fn a_plane_is_a_cross_section_by_its_heading() {
     let found = faults(ELASTIC, &plane(5.0));
     assert!(found.len() == 1 && found[0].contains("cross-section middle that cuts nothing"), "{found:?}");
 }
+
+#[test]
+fn sets_of_nodes_and_elements_are_the_cross_section_of_the_plane_between_them() {
+    // Shells 2 and 3, of which the set takes one, and the nodes on the far edge of shell 2.
+    let of = |sets: &str, section: &str| {
+        let more =
+            format!("{sets}*SET_NODE_LIST\n9\n5,6\n*DATABASE_CROSS_SECTION_SET_ID\n8,weld\n{section}\n");
+        good(ELASTIC, &more).output.sections
+    };
+    let plane = "*DATABASE_CROSS_SECTION_PLANE\n0,15,0,0,16,0,0\n\n";
+    let by_plane = &good(ELASTIC, plane).output.sections[0].cut;
+    for sets in [
+        "*SET_SHELL_LIST\n4\n2\n",
+        "*SET_SHELL_LIST_GENERATE\n4\n2,2\n",
+        "*SET_SHELL_GENERAL\n4\nALL\nDELEM,1,3\n",
+        "*SET_SHELL_GENERAL\n4\nPART,2\n",
+    ] {
+        let sections = of(sets, "9,0,0,4");
+        assert_eq!(sections[0].name, "weld");
+        assert_eq!(&sections[0].cut, by_plane, "{sets}");
+    }
+    let found = faults(ELASTIC, "*SET_NODE_LIST\n9\n5,6\n*DATABASE_CROSS_SECTION_SET\n9,3\n");
+    assert!(found.len() == 1 && found[0].contains("expected a set of solids of the deck"), "{found:?}");
+}

@@ -59,6 +59,7 @@ fn hourglass_control_is_that_of_the_part_or_of_the_deck_and_viscous_on_fluids() 
         controls("hourglass = { kind = \"stiffness\" }"),
         "assumed-strain 0.5, stiffness 0.05, viscous 0.1"
     );
+    assert_eq!(controls(""), "assumed-strain 0.5, viscous 0.1, viscous 0.1");
     assert_eq!(controls("hourglass = 0.03"), "assumed-strain 0.5, viscous 0.03, viscous 0.03");
     let fault = |tables: &str| {
         let faults = deck::read(&format!("{HEAD}{tables}"), "t.toml").expect_err("a fault");
@@ -317,4 +318,45 @@ fn the_same_text_gives_the_same_bits() {
     let bits = |m: &Model| m.mesh.positions.iter().flatten().map(|x| x.to_bits()).collect::<Vec<u64>>();
     assert_eq!(bits(&a), bits(&b));
     assert_eq!(a, b);
+}
+
+#[test]
+fn solids_have_one_point_or_eight_and_eight_only_where_the_material_can() {
+    use mechanics::mesh::Topology;
+    let eight = read(&cube("eight", [0.0; 3], "points = 8"));
+    assert!(matches!(eight.mesh.parts[0].topology, Topology::EightPoint { .. }));
+    let one = read(&cube("one", [0.0; 3], "points = 1"));
+    assert!(matches!(one.mesh.parts[0].topology, Topology::Structured { .. }));
+    let fault = |tables: &str| {
+        let faults = deck::read(&format!("{HEAD}{tables}"), "t.toml").expect_err("a fault");
+        faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    };
+    for (words, expected) in
+        [("points = 4", "expected 1 or 8"), ("points = 8\nhourglass = 0.1", "expected solids of one point")]
+    {
+        let faults = fault(&cube("a", [0.0; 3], words));
+        assert!(faults.contains(expected), "{words}: {faults}");
+    }
+    let water = cube("water", [0.0; 3], "points = 8").replace("LEAD", "WATER");
+    assert!(fault(&water).contains("expected a material with shear stiffness"));
+}
+
+#[test]
+fn a_section_lists_elements_that_are_there_and_have_some_of_its_nodes() {
+    let part = cube("a", [0.0; 3], "");
+    let fault = |section: &str| {
+        let tables = format!("{part}\n[[section]]\nname = \"s\"\n{section}\n");
+        let faults = deck::read(&format!("{HEAD}{tables}"), "t.toml").expect_err("a fault");
+        faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    };
+    for (section, expected) in [
+        ("nodes = [1]\nsolids = [77]", "expected the number of a solid"),
+        ("nodes = [1]\nshells = [1]", "expected the number of a shell"),
+        ("nodes = [999]\nsolids = [1]", "expected the number of a node"),
+        ("nodes = [1]", "that cuts nothing"),
+        ("nodes = \"weld\"\nsolids = [1]", "expected the name of a set of a mesh file"),
+    ] {
+        let faults = fault(section);
+        assert!(faults.contains(expected), "{section}: {faults}");
+    }
 }

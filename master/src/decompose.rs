@@ -125,9 +125,10 @@ impl Living {
                 return None;
             }
             Some(match &part.topology {
-                Topology::Explicit { .. } | Topology::Shells { .. } | Topology::Trusses { .. } => {
-                    Part::List(alive.to_vec())
-                }
+                Topology::Explicit { .. }
+                | Topology::EightPoint { .. }
+                | Topology::Shells { .. }
+                | Topology::Trusses { .. } => Part::List(alive.to_vec()),
                 Topology::Structured { cells } => {
                     let [ni, nj, nk] = cells.map(|n| n as usize);
                     let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
@@ -223,7 +224,10 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec
                     cut_planes(vec![all], shortest, order, speeds, &count, &mut pieces);
                 }
             }
-            Topology::Explicit { .. } | Topology::Shells { .. } | Topology::Trusses { .. } => {
+            Topology::Explicit { .. }
+            | Topology::EightPoint { .. }
+            | Topology::Shells { .. }
+            | Topology::Trusses { .. } => {
                 let n_elements = mesh_part.n_elements();
                 let centres: Vec<[f64; 3]> = (0..n_elements)
                     .map(|e| {

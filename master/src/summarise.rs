@@ -182,11 +182,17 @@ fn hourglass_warnings(
         }
         let name = &part.name;
         let of = if internal > 0.0 { format!(" of {internal:.3e}") } else { String::new() };
-        let assumed = in_mesh.section().is_some() || in_mesh.hourglass.kind == Kind::AssumedStrain;
-        let or = if assumed { "" } else { ", or give it hourglass = { kind = \"assumed-strain\" }" };
+        let advice = match in_mesh.hourglass.kind {
+            _ if in_mesh.section().is_some() => "refine its mesh where it bends or is struck",
+            Kind::AssumedStrain => {
+                "much of it bends inside single elements, so refine its mesh where it bends or is struck and see whether the answer stays"
+            }
+            Kind::Viscous | Kind::Stiffness => {
+                "refine its mesh where it bends or is struck, or give it hourglass = { kind = \"assumed-strain\" }"
+            }
+        };
         warnings.push(format!(
-            "part \"{name}\": hourglass energy {hourglass:.3e}, above a tenth of its internal energy{of}; refine its mesh where it \
-             bends or is struck{or}"
+            "part \"{name}\": hourglass energy {hourglass:.3e}, above a tenth of its internal energy{of}; {advice}"
         ));
     }
     warnings
@@ -266,8 +272,8 @@ mod tests {
             [
                 "part \"swallowed\": hourglass energy 1.100e0, above a tenth of its internal energy of 1.000e1; refine its mesh \
                  where it bends or is struck, or give it hourglass = { kind = \"assumed-strain\" }",
-                "part \"cold and bent\": hourglass energy 2.000e0, above a tenth of its internal energy; refine its mesh where it \
-                 bends or is struck",
+                "part \"cold and bent\": hourglass energy 2.000e0, above a tenth of its internal energy; much of it bends inside \
+                 single elements, so refine its mesh where it bends or is struck and see whether the answer stays",
             ]
         );
         // Without erosion elsewhere its own internal energy is what counts.

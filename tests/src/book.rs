@@ -78,6 +78,8 @@ macro_rules! each_case_of_the_book {
             gas: the_blast_of_lulesh_reaches_sedovs_radius quick;
             gas: a_point_blast_has_sedovs_radius_at_two_times long;
             order: shocks_converge_with_the_cells quick;
+            order: elastic_waves_and_bent_shells_converge_with_the_square_of_the_cells quick;
+            order: taylor_bars_and_blasts_converge_with_the_cells long;
             law: products_have_their_chapman_jouguet_state_and_follow_its_isentrope quick;
             law: a_detonation_runs_at_its_speed_with_its_pressure_behind quick;
             law: detonations_at_default_settings_reach_the_state_of_chapman_and_jouguet quick;

@@ -6,6 +6,7 @@ mod bits;
 mod bodies;
 mod book;
 mod documents;
+mod eight_points;
 mod erosion;
 mod fuzz;
 mod holders;
@@ -43,6 +44,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/exposed.rs"),
         include_str!("../src/book/soft.rs"),
         include_str!("../src/book/friction.rs"),
+        include_str!("../src/book/order.rs"),
     ]
     .concat();
     for name in tests::case::names() {

@@ -45,6 +45,22 @@ fn the_elements_at_a_support_pass_its_force() {
 }
 
 #[test]
+fn a_section_of_listed_nodes_and_elements_is_that_of_the_plane_between_them() {
+    // The nodes of the second plane of the bar and the elements before it.
+    let numbers = |n: u32, along: u32, first: u32| -> Vec<u32> {
+        (0..n).flat_map(|k| (0..n).map(move |j| first + along * (j + n * k))).collect()
+    };
+    let more = format!(
+        "[[section]]\nname = \"listed\"\nnodes = {:?}\nsolids = {:?}\n",
+        numbers(3, 9, 2),
+        numbers(2, 8, 1)
+    );
+    let model = bar(&more);
+    let [root, listed] = &model.output.sections[..] else { panic!("two sections") };
+    assert_eq!(root.cut, listed.cut);
+}
+
+#[test]
 fn a_section_of_a_shell_passes_the_force_of_its_support_and_turns_about_its_centre() {
     let solved = run(model(
         "title = \"strip\"\nunits = \"SI\"\n[control]\nend_time = 1\nend_cycle = 300\n[output]\nhistory_cycles = 1\n\

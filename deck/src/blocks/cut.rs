@@ -67,7 +67,7 @@ impl Block {
         let mut stays = || *kept.next().unwrap_or(&false);
         match &mut self.topology {
             Topology::Structured { cells } => *cells = left(*cells, &keeps),
-            Topology::Explicit { hexahedra } => {
+            Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
                 hexahedra.retain(|_| stays());
                 hexahedra.iter_mut().for_each(|corners| *corners = corners.each_ref().map(renumbered));
             }
@@ -96,7 +96,7 @@ impl Block {
     fn n_elements(&self) -> usize {
         match &self.topology {
             Topology::Structured { cells } => cells.iter().map(|c| *c as usize).product(),
-            Topology::Explicit { hexahedra } => hexahedra.len(),
+            Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
             Topology::Trusses { bars, .. } => bars.len(),
         }
@@ -112,7 +112,7 @@ impl Block {
                 let quad = [first, first + 1, first + ni + 2, first + ni + 1];
                 std::array::from_fn(|c| (quad[c % 4] + layer * (c / 4)) as u32)
             }
-            Topology::Explicit { hexahedra } => hexahedra[e],
+            Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra[e],
             Topology::Shells { quads, .. } => std::array::from_fn(|c| quads[e][c % 4]),
             Topology::Trusses { bars, .. } => std::array::from_fn(|c| bars[e][c % 2]),
         }

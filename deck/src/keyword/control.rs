@@ -25,19 +25,31 @@ const HARMLESS: [&str; 15] = [
     "CONTROL_SUBCYCLE",
 ];
 
-/// `*DATABASE_CROSS_SECTION_PLANE`.
+/// `*DATABASE_CROSS_SECTION_PLANE` or `_SET`.
 pub(super) struct SectionCard {
     pub(super) at: Place,
     /// Number and heading of `_ID`.
     pub(super) id: u32,
     pub(super) heading: String,
-    /// Set of parts; 0 is all.
-    pub(super) parts: u32,
-    /// Tail and head of the normal.
-    pub(super) tail: [f64; 3],
-    pub(super) head: [f64; 3],
-    /// 0 is none.
-    pub(super) radius: f64,
+    pub(super) cut: CutCard,
+}
+
+/// What it cuts.
+pub(super) enum CutCard {
+    Plane {
+        /// Set of parts; 0 is all.
+        parts: u32,
+        /// Tail and head of the normal.
+        tail: [f64; 3],
+        head: [f64; 3],
+        /// 0 is none.
+        radius: f64,
+    },
+    Sets {
+        nodes: u32,
+        /// Sets of solids, shells and beams; 0 is none.
+        elements: [u32; 3],
+    },
 }
 
 impl SectionCard {
@@ -49,6 +61,18 @@ impl SectionCard {
             if named == 1 { (title.id(0), title.words(1).to_string()) } else { (0, String::new()) };
         let cards = [block.card(named), block.card(named + 1)];
         let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+        if block.keyword.starts_with("DATABASE_CROSS_SECTION_SET") {
+            for (field, what) in [(4, "thick shells"), (5, "discrete elements")] {
+                if f.id(field) != 0 {
+                    context.log.warn(f.at, format!("the force of {what} is not in this section"));
+                }
+            }
+            if f.integer(7) != 0 {
+                f.fault(7, "ITYPE 0, the global system", "leave ID and ITYPE blank");
+            }
+            let cut = CutCard::Sets { nodes: f.id(0), elements: [f.id(1), f.id(3), f.id(2)] };
+            return Some(Self { at: f.at, id, heading, cut });
+        }
         let (tail, head) = (f.vector(1), f.vector(4));
         if geometry::unit(geometry::sub(head, tail)).is_none() {
             f.fault(4, "a head of the normal apart from its tail", "give XCH, YCH, ZCH");
@@ -69,7 +93,8 @@ impl SectionCard {
             f.fault(7, "a RADIUS of 0 or above", "give one, or leave it blank");
             return None;
         }
-        Some(Self { at: f.at, id, heading, parts: f.id(0), tail, head, radius })
+        let cut = CutCard::Plane { parts: f.id(0), tail, head, radius };
+        Some(Self { at: f.at, id, heading, cut })
     }
 }
 
@@ -224,14 +249,15 @@ impl ControlCards {
                     list.extend((0..8).map(|i| (card.at, f.id(i))).filter(|(_, id)| *id != 0));
                 }
             }
-            "DATABASE_CROSS_SECTION_PLANE" | "DATABASE_CROSS_SECTION_PLANE_ID" => {
+            "DATABASE_CROSS_SECTION_PLANE"
+            | "DATABASE_CROSS_SECTION_PLANE_ID"
+            | "DATABASE_CROSS_SECTION_SET"
+            | "DATABASE_CROSS_SECTION_SET_ID" => {
                 self.sections.extend(SectionCard::read(block, context));
             }
             word if word.starts_with("DATABASE_CROSS_SECTION") => context.log.warn(
                 block.at,
-                format!(
-                    "*{word}: the force of this section is not written; *DATABASE_CROSS_SECTION_PLANE is"
-                ),
+                format!("*{word}: the force of this section is not written; that of _PLANE or _SET is"),
             ),
             word => context.log.ignore(block.at, word),
         }

@@ -1,4 +1,6 @@
-//! The nodes, parts and segments that sets of a deck come to.
+//! The nodes, parts, segments and elements that sets of a deck come to.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{problem::Problem, set::Entry};
 use crate::{log::Log, place::Place};
@@ -15,6 +17,49 @@ impl Problem {
     /// Parts of a set, ascending.
     pub(super) fn part_set(&self, id: u32, by: Place, log: &Log<'_>) -> Vec<u32> {
         self.members(id, by, log, false, 0)
+    }
+
+    /// Solids (0), shells (1) or beams (2) of a set, ascending.
+    pub(super) fn element_set(&self, kind: usize, id: u32, by: Place, log: &Log<'_>) -> Vec<u32> {
+        let Some((at, entries)) = self.sets.elements[kind].get(&id) else {
+            let what = ["solids", "shells", "beams"][kind];
+            let expected = format!("a set of {what} of the deck");
+            log.fault(
+                by,
+                format!("set {id}"),
+                expected,
+                "define it by LIST, GENERATE or GENERAL, or name another",
+            );
+            return Vec::new();
+        };
+        let known: BTreeMap<u32, u32> = match kind {
+            0 => self.solids.iter().map(|element| (element.id, element.part)).collect(),
+            1 => self.shells.iter().map(|element| (element.id, element.part)).collect(),
+            _ => self.beams.iter().map(|element| (element.id, element.part)).collect(),
+        };
+        let mut members = BTreeSet::new();
+        let mut strange = 0;
+        for (entry, out) in entries {
+            let found: Vec<u32> = match entry {
+                Entry::All => known.keys().copied().collect(),
+                Entry::Node(id) => known.contains_key(id).then_some(*id).into_iter().collect(),
+                Entry::Range(first, last) => known.range(first..=last).map(|(id, _)| *id).collect(),
+                Entry::Part(part) => known.iter().filter(|(_, of)| *of == part).map(|(id, _)| *id).collect(),
+                Entry::Box(_) | Entry::Set(_) | Entry::Segment(_) => Vec::new(),
+            };
+            strange += usize::from(found.is_empty());
+            for id in found {
+                if *out {
+                    members.remove(&id)
+                } else {
+                    members.insert(id)
+                };
+            }
+        }
+        if strange > 0 {
+            log.warn(*at, format!("set {id}: {strange} of its entries name no element of the deck"));
+        }
+        members.into_iter().collect()
     }
 
     fn members(&self, id: u32, by: Place, log: &Log<'_>, of_nodes: bool, depth: usize) -> Vec<u32> {

@@ -61,7 +61,9 @@ pub(super) struct PartCard {
 /// `*SECTION_`.
 #[derive(Clone, Copy)]
 pub(super) enum Section {
-    Solid,
+    Solid {
+        eight_points: bool,
+    },
     Shell(ShellSection),
     /// Of a truss: its area.
     Truss(f64),

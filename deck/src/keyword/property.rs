@@ -50,17 +50,22 @@ pub(super) fn read_parts(problem: &mut Problem, block: &Block<'_>, context: &Con
 pub(super) fn read_solid_sections(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
         let f = context.fields(card, block.width, &TENS);
-        match f.integer(1) {
-            0 | 1 => {}
-            form @ (-2 | -1 | 2 | 3 | 10 | 13 | 15) => context.log.warn(
+        let form = f.integer(1);
+        let eight_points = matches!(form, -2..=-1 | 2..=3);
+        match form {
+            0..=2 => {}
+            -2 | -1 | 3 => context
+                .log
+                .warn(card.at, format!("ELFORM {form}: solids are computed with eight points, as ELFORM 2")),
+            10 | 13 | 15 => context.log.warn(
                 card.at,
                 format!(
                     "ELFORM {form}: solids are computed with one point and hourglass control, as ELFORM 1"
                 ),
             ),
-            _ => f.fault(1, "ELFORM 1", "take the Lagrangian solid of one point"),
+            _ => f.fault(1, "ELFORM 1 or 2", "take the Lagrangian solid of one or of eight points"),
         }
-        problem.sections.insert(f.id(0), (card.at, Section::Solid));
+        problem.sections.insert(f.id(0), (card.at, Section::Solid { eight_points }));
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::place::Place;
 
-/// One entry of a set of nodes or segments.
+/// One entry of a set; that of elements and parts is [`Entry::Node`], too.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Entry {
     All,
@@ -29,6 +29,8 @@ pub(super) struct Sets {
     pub(super) nodes: BTreeMap<u32, Described>,
     pub(super) parts: BTreeMap<u32, Described>,
     pub(super) segments: BTreeMap<u32, Described>,
+    /// Of solids, shells and beams.
+    pub(super) elements: [BTreeMap<u32, Described>; 3],
 }
 
 impl Sets {
@@ -40,8 +42,13 @@ impl Sets {
         let (kind, way) = word.split_once('_').unwrap_or((&word, ""));
         let kind = match kind {
             "NODE" | "PART" | "SEGMENT" => kind,
+            "SOLID" | "SHELL" | "BEAM"
+                if matches!(way, "" | "LIST" | "LIST_GENERATE" | "GENERATE" | "GENERAL") =>
+            {
+                kind
+            }
             _ => {
-                // What would use it names sets of nodes, parts or segments.
+                // What would use it names other sets.
                 context.log.ignore(block.at, &block.keyword);
                 return;
             }
@@ -62,11 +69,11 @@ impl Sets {
                     }
                     entries.push((Entry::Segment(face), false));
                 }
-                ("NODE" | "PART", "" | "LIST") => {
+                ("NODE" | "PART" | "SOLID" | "SHELL" | "BEAM", "" | "LIST") => {
                     let each = (0..8).map(|i| f.id(i)).filter(|id| *id != 0);
                     entries.extend(each.map(|id| (Entry::Node(id), false)));
                 }
-                ("NODE" | "PART", "LIST_GENERATE" | "GENERATE") => {
+                ("NODE" | "PART" | "SOLID" | "SHELL" | "BEAM", "LIST_GENERATE" | "GENERATE") => {
                     for i in (0..8).step_by(2).filter(|i| !f.blank(*i)) {
                         let (first, last) = (f.id(i), f.id(i + 1));
                         if last < first {
@@ -97,6 +104,9 @@ impl Sets {
         let sets = match kind {
             "NODE" => &mut self.nodes,
             "PART" => &mut self.parts,
+            "SOLID" => &mut self.elements[0],
+            "SHELL" => &mut self.elements[1],
+            "BEAM" => &mut self.elements[2],
             _ => &mut self.segments,
         };
         match sets.entry(id) {
@@ -127,6 +137,8 @@ fn general(kind: &str, f: &Fields<'_>, entries: &mut Vec<(Entry, bool)>) {
     match (kind, stem) {
         (_, "ALL") => entries.push((Entry::All, out)),
         ("NODE", "NODE") | ("PART", "PART") => entries.extend(numbers.map(|id| (Entry::Node(id), out))),
+        ("SOLID" | "SHELL" | "BEAM", "ELEM") => entries.extend(numbers.map(|id| (Entry::Node(id), out))),
+        ("SOLID" | "SHELL" | "BEAM", "PART") => entries.extend(numbers.map(|id| (Entry::Part(id), out))),
         ("NODE" | "SEGMENT", "PART") => entries.extend(numbers.map(|id| (Entry::Part(id), out))),
         ("NODE" | "SEGMENT", "BOX") => entries.extend(numbers.map(|id| (Entry::Box(id), out))),
         ("SEGMENT", "SEG") => {
@@ -138,7 +150,7 @@ fn general(kind: &str, f: &Fields<'_>, entries: &mut Vec<(Entry, bool)>) {
         }
         _ => f.fault(
             0,
-            "ALL, NODE, PART, BOX, SEG or one of them after D",
+            "ALL, NODE, ELEM, PART, BOX, SEG or one of them after D",
             "list the members in one of these ways",
         ),
     }

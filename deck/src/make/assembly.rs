@@ -301,7 +301,8 @@ fn owned<'a>(
     log: &Log<'_>,
 ) {
     let kind = match draft.block.as_ref().map(|block| &block.topology) {
-        None | Some(Topology::Structured { .. } | Topology::Explicit { .. }) => 0,
+        None
+        | Some(Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. }) => 0,
         Some(Topology::Shells { .. }) => 1,
         Some(Topology::Trusses { .. }) => 2,
     };

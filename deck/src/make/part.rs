@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
-    element::hourglass::Hourglass,
+    element::{hex8::eight_points, hourglass::Hourglass},
     erosion::{Criteria, GEOMETRIC_STRAIN},
     material::{Failure, Material, Strength},
     mesh::Topology,
@@ -30,6 +30,8 @@ pub(super) struct PartDraft {
     /// Index into the materials in use; none after a fault.
     pub(super) material: Option<u32>,
     pub(super) velocity: [f64; 3],
+    /// Whether its solids have eight points.
+    pub(super) eight_points: bool,
     /// Hourglass control of solids.
     pub(super) hourglass: Hourglass,
     /// When its elements erode; none if they do not.
@@ -67,6 +69,7 @@ pub(super) fn make(
         let material = materials.resolve(part);
         let of_material = material.map(|m| &materials.list[m as usize]);
         let erosion = part.erosion.as_ref().map(|given| criteria(given, part.kind, of_material, log));
+        let eight_points = has_eight_points(part, of_material, log);
         let hourglass = hourglass_of(part, of_material, hourglass, log);
         let (mut block, numbers) = mesh_of(part, meshes, &mut budget, log);
         match &mut block {
@@ -83,9 +86,39 @@ pub(super) fn make(
         if let Some(Topology::Shells { section, .. }) = block.as_mut().map(|block| &mut block.topology) {
             section.breaks = erosion.and_then(|criteria| criteria.plastic_strain);
         }
-        drafts.push(PartDraft { name, at, material, velocity, hourglass, erosion, block, numbers });
+        drafts.push(PartDraft {
+            name,
+            at,
+            material,
+            velocity,
+            eight_points,
+            hourglass,
+            erosion,
+            block,
+            numbers,
+        });
     }
     drafts
+}
+
+/// Whether the solids of a part have eight points. Those of a keyword deck whose material cannot be had so have one, with a warning.
+fn has_eight_points(part: &Part, material: Option<&Material>, log: &Log<'_>) -> bool {
+    let Some(origin) = part.eight_points else { return false };
+    if part.kind != Kind::Solids {
+        let expected = format!("solids: {} have their points in their section", part.kind.elements());
+        log.fault_of(origin, expected, "remove it");
+        return false;
+    }
+    let unfit = material.and_then(|material| eight_points::check(material).err());
+    let Some(unfit) = unfit else { return true };
+    match origin.at {
+        Place::Card { .. } => log.warn(
+            origin.at,
+            format!("part \"{}\" is computed with one point: eight need {unfit}", part.name),
+        ),
+        _ => log.fault_of(origin, unfit.to_string(), "remove it, or choose another material"),
+    }
+    false
 }
 
 /// The hourglass control of a part: its own or that of the deck, and viscous where the material cannot have elastic forces.
@@ -96,6 +129,10 @@ fn hourglass_of(part: &Part, material: Option<&Material>, of_deck: Hourglass, lo
     if part.kind != Kind::Solids {
         let expected = format!("solids: hourglass control of {} is not chosen", part.kind.elements());
         log.fault_of(origin, expected, "remove it");
+    }
+    if let (Some(_), Place::Text(_)) = (part.eight_points, origin.at) {
+        let expected = "solids of one point: those of eight need no hourglass control";
+        log.fault_of(origin, expected, "remove it, or points = 8");
     }
     if material.is_some_and(|material| own.on(material) != own) {
         log.fault_of(

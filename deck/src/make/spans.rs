@@ -48,7 +48,7 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
         let material = draft.material.and_then(|index| materials.get(index as usize));
         let Some(material) = material else { continue };
         let (kind, checked) = match &part.topology {
-            Topology::Structured { .. } | Topology::Explicit { .. } => continue,
+            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => continue,
             Topology::Shells { section, .. } => {
                 ("shells", section.check(material).map_err(|e| e.to_string()))
             }

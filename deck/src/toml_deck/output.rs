@@ -1,12 +1,12 @@
 //! `[output]`, `[[section]]` and `[[gauge]]`.
 
-use super::entry::{direction, parts_of, text};
+use super::entry::{direction, nodes, parts_of, text};
 use crate::{
-    limits::{MAX_ENTRIES, MAX_SECTIONS},
+    limits::{MAX_ENTRIES, MAX_ID, MAX_SECTIONS},
     model::FIELD_NAMES,
     place::Placed,
-    table::{Range, Table},
-    typed::{Gauge, Kind, Output, PartPairs, Section, Spot},
+    table::{Range, Table, Value},
+    typed::{Cut, Gauge, Kind, Output, PartPairs, Section, Spot, condition::Region},
 };
 
 /// Reads `[output]`.
@@ -50,22 +50,36 @@ fn read_fields(table: &Table<'_>) -> Vec<String> {
     fields
 }
 
-/// Reads every `[[section]]`: a plane through parts.
+/// Keys of the elements that a section lists.
+const LISTED: [&str; 3] = ["solids", "shells", "trusses"];
+
+/// Reads every `[[section]]`: a plane through parts, or nodes with elements.
 pub(super) fn read_sections(deck: &Table<'_>) -> Vec<Section> {
     let section = |table: Table<'_>| {
         let name = table.require("name", "a name in quotes");
         let name = name.and_then(|v| v.name().map(|name| v.placed(name)));
-        let parts = parts_of(&table);
-        let plane = table.require("plane", "{ point = [x, y, z], normal = [x, y, z] }");
-        let plane = plane.and_then(|v| v.table(format!("plane of {}", table.title))).and_then(|plane| {
-            let (point, normal) = (plane.vector("point"), direction(&plane, "normal"));
-            plane.finish();
-            Some([point?, normal?])
-        });
-        let radius = table.get("radius").and_then(|v| v.number(Range::Positive));
+        let cut = if let Some(given) = table.get("nodes") {
+            let nodes = nodes(given).unwrap_or(Region::Numbers(Vec::new()));
+            let number =
+                |item: Value<'_>| item.integer(1, u64::from(MAX_ID)).map(|id| item.placed(id as u32));
+            let elements = LISTED.map(|key| {
+                let items = table.get(key).and_then(|v| v.items()).unwrap_or_default();
+                items.into_iter().filter_map(number).collect()
+            });
+            Cut::Listed { nodes, elements }
+        } else {
+            let parts = parts_of(&table);
+            let plane = table.require("plane", "{ point = [x, y, z], normal = [x, y, z] }, or nodes");
+            let plane = plane.and_then(|v| v.table(format!("plane of {}", table.title))).and_then(|plane| {
+                let (point, normal) = (plane.vector("point"), direction(&plane, "normal"));
+                plane.finish();
+                Some([point?, normal?])
+            });
+            Cut::Plane { plane, parts, radius: table.get("radius").and_then(|v| v.number(Range::Positive)) }
+        };
         let (at, title) = (table.place(), table.title.clone());
         table.finish();
-        Section { at, title, name, parts, plane, radius }
+        Section { at, title, name, cut }
     };
     deck.tables("section", MAX_SECTIONS).into_iter().map(section).collect()
 }

@@ -13,7 +13,7 @@ use crate::{
     geometry::norm,
     library,
     limits::{MAX_ENTRIES, MAX_ID, MAX_PARTS},
-    place::Place,
+    place::{Origin, Place},
     table::{Range, Table, Value},
     typed::{
         mesh::{Explicit, Numbers, PartMesh, Places, Source},
@@ -66,6 +66,7 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
             }
         };
         let given = shell.map(|value| (Word::Shell, value)).or(truss.map(|value| (Word::Truss, value)));
+        let eight_points = table.get("points").and_then(read_points);
         let hourglass = table
             .get("hourglass")
             .and_then(|v| hourglass::read(v, &format!("\"{name}\"")).map(|control| v.placed(control)));
@@ -84,6 +85,7 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
             fracture,
             velocity,
             kind,
+            eight_points,
             hourglass,
             erosion,
             mesh,
@@ -94,6 +96,18 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
         }
     };
     tables.into_iter().enumerate().map(part).collect()
+}
+
+/// Where a part asks for eight points; none where it has one.
+fn read_points(value: Value<'_>) -> Option<Origin> {
+    match value.integer(1, 8)? {
+        1 => None,
+        8 => Some(value.origin()),
+        _ => {
+            value.fault("1 or 8", "take 8 for solids that need no hourglass control");
+            None
+        }
+    }
 }
 
 /// A material that a part names or writes inline.

@@ -97,6 +97,8 @@ pub(crate) struct Part {
     /// Initial velocity.
     pub(crate) velocity: [f64; 3],
     pub(crate) kind: Kind,
+    /// Where the part asks for solids of eight points.
+    pub(crate) eight_points: Option<Origin>,
     /// Hourglass control of solids; none where that of the deck serves.
     pub(crate) hourglass: Option<Placed<Hourglass>>,
     pub(crate) erosion: Option<Erosion>,

@@ -97,6 +97,9 @@ fn write_part(text: &mut Text, part: &Part) {
         keys.extend((!thins).then(|| ("thinning", "false".to_owned())));
         text.key("shell", table(&keys));
     }
+    if part.eight_points.is_some() {
+        text.key("points", "8");
+    }
     if let Some(control) = &part.hourglass {
         text.key("hourglass", hourglass(&control.value));
     }
@@ -162,7 +165,7 @@ fn explicit(own: &Explicit) -> String {
     };
     let numbers = &own.numbers.elements;
     let elements = match &own.block.topology {
-        Topology::Explicit { hexahedra } => {
+        Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
             list(hexahedra.iter().zip(numbers).map(|(corners, id)| element(id, corners)))
         }
         Topology::Shells { quads, .. } => {

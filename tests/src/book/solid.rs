@@ -23,17 +23,25 @@ const WALL: &str = "[[wall]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n";
 /// What others do: the foot's nodes stay on the wall, so that its rim cannot lift.
 const HELD: &str = "[[boundary]]\ntype = \"fixed\"\nparts = [\"bar\"]\nface = \"k-min\"\naxes = \"z\"\n";
 
-/// The copper bar with `[core, ring, length]` cells of a quarter.
-fn copper_bar(figures: &mut Figures, cells: [u32; 3], foot: &str) {
-    let family = if foot == WALL { "taylor copper, free foot" } else { "taylor copper, held foot" };
-    let deck = format!(
+/// The copper bar with `[core, ring, length]` cells of a quarter, at its end.
+fn struck_copper_bar(cells: [u32; 3], foot: &str) -> Solved {
+    run(model(&format!(
         "title = \"Taylor bar, copper\"\nunits = \"mm-ms-kg\"\n\
          [control]\nend_time = 0.08\nlinear_viscosity = 0.06\nquadratic_viscosity = 1.2247\nhourglass = 0.03\n\
          [[part]]\nname = \"bar\"\nmaterial = \"COPPER_TAYLOR_BENCHMARK\"\nvelocity = [0, 0, -227]\n\
          cylinder = {{ base = [0, 0, 0], radius = 3.2, length = 32.4, sector = \"quarter\", cells = {cells:?} }}\n\
          [[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"y\"\n{foot}"
-    );
-    let solved = run(model(&deck));
+    )))
+}
+
+/// Length (mm) of the copper bar with `n` by `n` cells in its core.
+pub(super) fn length_of_copper_bar(n: u32) -> f64 {
+    shape(&struck_copper_bar([n, n, 12 * n], HELD))[0]
+}
+
+fn copper_bar(figures: &mut Figures, cells: [u32; 3], foot: &str) {
+    let family = if foot == WALL { "taylor copper, free foot" } else { "taylor copper, held foot" };
+    let solved = struck_copper_bar(cells, foot);
     let n = solved.model.mesh.n_elements();
     let [length, radius, strain] = shape(&solved);
     let run_totals = &solved.outcome.run_totals;

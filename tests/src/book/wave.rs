@@ -2,6 +2,8 @@
 //!
 //! Bars are columns of cubes without Poisson's ratio, free at their sides; shocks run in columns held at their sides.
 
+use std::f64::consts::PI;
+
 use crate::{
     case::Figures,
     solve::{Solved, crossing, example, mean, model, run, run_with_states},
@@ -234,7 +236,6 @@ fn ringing(cells: u32, safety: f64, more: &str, mode: impl Fn(f64) -> f64) -> So
 }
 
 pub(super) fn bars_of_forty_cells_ring_at_their_frequencies(figures: &mut Figures) {
-    use std::f64::consts::PI;
     let free = ringing(40, 0.6666, "", |x| (PI * x).cos());
     let fixed = "[[boundary]]\ntype = \"fixed\"\nface = \"i-min\"\naxes = \"x\"\n";
     let clamped = ringing(40, 0.6666, fixed, |x| (0.5 * PI * x).sin());
@@ -242,8 +243,12 @@ pub(super) fn bars_of_forty_cells_ring_at_their_frequencies(figures: &mut Figure
     figures.add("ringing bar: fixed at one end", frequency(&clamped) / (2.0 * PI));
 }
 
+/// Frequency (Hz) of the first tone of a free bar of `cells` at a Courant number of 0.5; the exact one is 25 kHz.
+pub(super) fn first_tone(cells: u32) -> f64 {
+    frequency(&ringing(cells, 0.5, "", |x| (PI * x).cos())) / (2.0 * PI)
+}
+
 pub(super) fn short_waves_are_slow_by_what_central_differences_say(figures: &mut Figures) {
-    use std::f64::consts::PI;
     for (per_wave, courant) in [(10, 0.5), (10, 0.9), (20, 0.5)] {
         // 40 cells hold whole half waves, so that the mode is one of the mesh.
         let waves = 40.0 / f64::from(per_wave);

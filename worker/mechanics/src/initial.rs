@@ -5,7 +5,7 @@ use crate::{
     burn::lighting_time,
     constraint::{Circle, Constraint, MAX_WALLS},
     contact::{Extent, Settings},
-    element::shell4,
+    element::{hex8::eight_points, shell4},
     exact::{Quanta, Quantum},
     load::{Drive, SurfaceKind},
     material::Material,
@@ -68,6 +68,11 @@ pub fn state(
             let index = state.initial_volume.len();
             state.initial_volume.push(v);
             state.elements[field::TEMPERATURE][index] = material.initial_temperature();
+            if let Topology::EightPoint { .. } = part.topology {
+                for of_point in &mut state.own[eight_points::TEMPERATURES] {
+                    of_point[index] = material.initial_temperature();
+                }
+            }
             state.elements[field::RELATIVE_VOLUME][index] = 1.0;
             state.elements[field::ENERGY][index] = material.initial_energy();
             state.elements[field::PRESSURE][index] = material.initial_pressure();
@@ -219,7 +224,9 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         for e in 0..part.n_elements() {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
             force = force.max(match &part.topology {
-                Topology::Structured { .. } | Topology::Explicit { .. } => largest_face(&x) * strength,
+                Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
+                    largest_face(&x) * strength
+                }
                 // A shell pulls with its section; only loads act on its face.
                 Topology::Shells { section, .. } => {
                     let area = largest_face(&x);

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::element::{
-    hex8,
+    hex8::{self, eight_points},
     hourglass::{Hourglass, N_FORCES},
     shell4::{self, Rule},
 };
@@ -55,6 +55,11 @@ pub enum Topology {
         /// Corner nodes, in the order of the crate's documentation.
         hexahedra: Vec<[u32; 8]>,
     },
+    /// Hexahedra of eight points, likewise.
+    EightPoint {
+        /// Corner nodes, in the order of the crate's documentation.
+        hexahedra: Vec<[u32; 8]>,
+    },
     /// Four-node shells of one section: four indices into [`Part::nodes`] each.
     Shells {
         /// Corner nodes, to the left around the element seen from its upper side.
@@ -91,10 +96,25 @@ impl Section {
 }
 
 impl Part {
+    /// Makes its hexahedra such of eight points.
+    pub fn refine_points(&mut self) {
+        let n_elements = self.n_elements();
+        let hexahedra = match std::mem::replace(&mut self.topology, Topology::Structured { cells: [0; 3] }) {
+            Topology::Structured { cells } => (0..n_elements).map(|e| corners_of(cells, e)).collect(),
+            Topology::Explicit { hexahedra } => hexahedra,
+            other => {
+                self.topology = other;
+                return;
+            }
+        };
+        self.topology = Topology::EightPoint { hexahedra };
+        self.hourglass = Hourglass::NONE;
+    }
+
     pub fn n_elements(&self) -> usize {
         match &self.topology {
             Topology::Structured { cells } => cells.iter().map(|&c| c as usize).product(),
-            Topology::Explicit { hexahedra } => hexahedra.len(),
+            Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
             Topology::Trusses { bars, .. } => bars.len(),
         }
@@ -105,25 +125,10 @@ impl Part {
     /// two nodes stands for the four corners of an end.
     pub fn corners(&self, e: usize) -> [u32; 8] {
         match &self.topology {
-            Topology::Structured { cells } => {
-                let [ni, nj, _] = cells.map(|c| c as usize);
-                let (i, j, k) = (e % ni, e / ni % nj, e / ni / nj);
-                let row = ni + 1;
-                let plane = row * (nj + 1);
-                let n = i + j * row + k * plane;
-                [
-                    n,
-                    n + 1,
-                    n + 1 + row,
-                    n + row,
-                    n + plane,
-                    n + 1 + plane,
-                    n + 1 + row + plane,
-                    n + row + plane,
-                ]
-                .map(|local| self.nodes[local])
+            Topology::Structured { cells } => corners_of(*cells, e).map(|local| self.nodes[local as usize]),
+            Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
+                hexahedra[e].map(|local| self.nodes[local as usize])
             }
-            Topology::Explicit { hexahedra } => hexahedra[e].map(|local| self.nodes[local as usize]),
             Topology::Shells { quads, .. } => twice(quads[e]).map(|local| self.nodes[local as usize]),
             Topology::Trusses { bars, .. } => spread(bars[e]).map(|local| self.nodes[local as usize]),
         }
@@ -150,7 +155,7 @@ impl Part {
     /// Number of nodes of an element, the first of its [`Part::corners`].
     pub fn n_corners(&self) -> usize {
         match &self.topology {
-            Topology::Structured { .. } | Topology::Explicit { .. } => 8,
+            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => 8,
             Topology::Shells { .. } => 4,
             Topology::Trusses { .. } => 2,
         }
@@ -159,7 +164,9 @@ impl Part {
     /// The sides of an element that contact and loads may act on, indices into [`FACES`]. The upper side of a shell stands for both.
     pub fn sides(&self) -> &'static [usize] {
         match &self.topology {
-            Topology::Structured { .. } | Topology::Explicit { .. } => &[0, 1, 2, 3, 4, 5],
+            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
+                &[0, 1, 2, 3, 4, 5]
+            }
             Topology::Shells { .. } => &[UPPER],
             Topology::Trusses { .. } => &[],
         }
@@ -172,6 +179,7 @@ impl Part {
                 N_FORCES
             }
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::Trusses { .. } => 0,
+            Topology::EightPoint { .. } => eight_points::N_OWN,
             Topology::Shells { section, .. } => section.n_fields(),
         }
     }
@@ -180,7 +188,9 @@ impl Part {
     /// thickness.
     pub fn volume(&self, x: &[[f64; 3]; 8]) -> f64 {
         match &self.topology {
-            Topology::Structured { .. } | Topology::Explicit { .. } => hex8::volume(x),
+            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
+                hex8::volume(x)
+            }
             Topology::Shells { section, .. } => quad_area(&[x[0], x[1], x[2], x[3]]) * section.thickness,
             Topology::Trusses { area, .. } => distance(x[0], x[1]) * area,
         }
@@ -206,6 +216,16 @@ impl Mesh {
         }
         offsets
     }
+}
+
+/// Local nodes of the corners of element `e` of a grid.
+fn corners_of([ni, nj, _]: [u32; 3], e: usize) -> [u32; 8] {
+    let (ni, nj) = (ni as usize, nj as usize);
+    let (i, j, k) = (e % ni, e / ni % nj, e / ni / nj);
+    let row = ni + 1;
+    let plane = row * (nj + 1);
+    let n = i + j * row + k * plane;
+    [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| (n + d) as u32)
 }
 
 /// Corners of a hexahedron by their signs along its three natural axes.

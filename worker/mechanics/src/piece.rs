@@ -172,6 +172,10 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             let (corners, nodes) = as_rows_are(corners, nodes);
             (Topology::Explicit { hexahedra: corners }, nodes, list.clone())
         }
+        (Topology::EightPoint { hexahedra }, Region::List(list)) => {
+            let (hexahedra, nodes) = by_first_use(hexahedra, list);
+            (Topology::EightPoint { hexahedra }, nodes, list.clone())
+        }
         (Topology::Shells { quads, section }, Region::List(list)) => {
             let (quads, nodes) = by_first_use(quads, list);
             (Topology::Shells { quads, section: *section }, nodes, list.clone())

@@ -38,7 +38,7 @@ pub(super) fn write(t: &mut Translation<'_>, units: Option<&str>) {
         // Theirs enters as it is, ours squared.
         quadratic_viscosity: Some(quadratic.sqrt()),
         linear_viscosity: Some(linear),
-        hourglass: super::hourglass::of_deck(t),
+        hourglass: Some(super::hourglass::of_deck(t)),
         ..Control::new(at)
     });
 }

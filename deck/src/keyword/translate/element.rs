@@ -118,7 +118,7 @@ fn check_section(t: &mut Translation<'_>, id: u32, body: &Body) {
     match problem.sections.get(&part.section.value) {
         Some((at, section)) => {
             let goes_with = match section {
-                Section::Solid => "solids",
+                Section::Solid { .. } => "solids",
                 Section::Shell(_) => "shells",
                 Section::Truss(_) => "trusses",
             };

@@ -11,16 +11,16 @@ use crate::{
 /// LS-DYNA's coefficient where QM is blank.
 const USUAL: f64 = 0.1;
 
-/// Hourglass control of the parts that have none of their own.
-pub(super) fn of_deck(t: &Translation<'_>) -> Option<Hourglass> {
-    let (at, kind, coefficient) = t.problem.control.hourglass?;
-    Some(control(t, at, kind, coefficient))
+/// Hourglass control of the parts that have none of their own: that of LS-DYNA, viscous, where the deck says nothing.
+pub(super) fn of_deck(t: &Translation<'_>) -> Hourglass {
+    let given = t.problem.control.hourglass;
+    given.map_or(Hourglass::viscous(USUAL), |(at, kind, coefficient)| control(t, at, kind, coefficient))
 }
 
 /// Hourglass control of a part of solids that names one. Shells have their own.
 pub(super) fn of_part(t: &Translation<'_>, part: u32) -> Option<Placed<Hourglass>> {
     let card = &t.problem.parts[&part];
-    let of_solids = matches!(t.problem.sections.get(&card.section.value), Some((_, Section::Solid)));
+    let of_solids = matches!(t.problem.sections.get(&card.section.value), Some((_, Section::Solid { .. })));
     if card.hourglass == 0 || !of_solids {
         return None;
     }

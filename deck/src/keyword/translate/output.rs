@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use super::{contact, state::Translation};
 use crate::{
     geometry::sub,
-    keyword::control::SectionCard,
+    keyword::control::{CutCard, SectionCard},
     place::{Origin, Place, Placed},
     typed::{
-        Gauge, Kind, Section, Spot,
-        condition::{Parts, made},
+        Cut, Gauge, Kind, Section, Spot,
+        condition::{Parts, Region, made},
     },
 };
 
@@ -27,8 +27,12 @@ pub(super) fn write(t: &mut Translation<'_>) {
         t.deck.output.contact_forces = Some(Placed::new(pairs, Origin::card(at)));
     }
     for (number, card) in (1..).zip(&control.sections) {
+        let faults = log.count();
         let section = section(t, number, card);
-        t.deck.sections.push(section);
+        // Without a set that it names it would cut nothing, which is no second fault.
+        if log.count() == faults {
+            t.deck.sections.push(section);
+        }
     }
     let mut gauges: BTreeMap<u32, Place> = control.gauges.iter().map(|(at, id)| (*id, *at)).collect();
     for (at, set) in &control.gauge_sets {
@@ -50,27 +54,39 @@ pub(super) fn write(t: &mut Translation<'_>) {
 }
 
 /// A cross-section by its heading, or by its number.
-fn section(t: &Translation<'_>, number: u32, card: &SectionCard) -> Section {
+fn section(t: &mut Translation<'_>, number: u32, card: &SectionCard) -> Section {
     let at = card.at;
     let name = match (card.heading.as_str(), card.id) {
         ("", 0) => number.to_string(),
         ("", id) => id.to_string(),
         (heading, _) => heading.to_string(),
     };
-    let parts = match card.parts {
-        0 => Parts::All,
-        set => {
-            let members = t.problem.part_set(set, at, t.log);
-            let named = members.iter().filter_map(|id| t.names.get(id));
-            Parts::Named(named.map(|name| made(name.clone(), at)).collect())
+    let cut = match &card.cut {
+        CutCard::Plane { parts, tail, head, radius } => {
+            let parts = match *parts {
+                0 => Parts::All,
+                set => {
+                    let members = t.problem.part_set(set, at, t.log);
+                    let named = members.iter().filter_map(|id| t.names.get(id));
+                    Parts::Named(named.map(|name| made(name.clone(), at)).collect())
+                }
+            };
+            let radius = Some(*radius).filter(|radius| *radius > 0.0);
+            Cut::Plane { plane: Some([*tail, sub(*head, *tail)]), parts, radius }
+        }
+        CutCard::Sets { nodes, elements } => {
+            let nodes = t.problem.node_set(*nodes, at, t.log);
+            let nodes = Region::Set(t.set(&format!("cross-section {name}"), nodes, at));
+            let of = |(what, set): (usize, u32)| -> Vec<Placed<u32>> {
+                let members = match set {
+                    0 => Vec::new(),
+                    set => t.problem.element_set(what, set, at, t.log),
+                };
+                members.into_iter().map(|id| Placed::new(id, Origin::card(at))).collect()
+            };
+            let [solids, shells, beams] = *elements;
+            Cut::Listed { nodes, elements: [(0, solids), (1, shells), (2, beams)].map(of) }
         }
     };
-    Section {
-        at,
-        title: format!("cross-section {name}"),
-        name: Some(made(name, at)),
-        parts,
-        plane: Some([card.tail, sub(card.head, card.tail)]),
-        radius: Some(card.radius).filter(|radius| *radius > 0.0),
-    }
+    Section { at, title: format!("cross-section {name}"), name: Some(made(name, at)), cut }
 }

@@ -8,7 +8,7 @@ use super::{material::material_name, rigid, state::Translation};
 use crate::{
     geometry::{cross, sub},
     keyword::{material::Law, problem::Section},
-    place::Place,
+    place::{Origin, Place},
     table::MAX_NAME,
     typed::{
         condition::made,
@@ -88,6 +88,10 @@ pub(super) fn write(t: &mut Translation<'_>) {
             fracture: None,
             velocity: t.vector(at, "a velocity of", common),
             kind,
+            eight_points: match problem.sections.get(&part.section.value) {
+                Some((at, Section::Solid { eight_points: true })) => Some(Origin::card(*at)),
+                _ => None,
+            },
             hourglass: super::hourglass::of_part(t, id),
             erosion: erosion_of(t, part.material.value),
             mesh: (!t.without_section.contains(&id)).then_some(mesh),

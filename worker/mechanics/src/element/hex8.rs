@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+mod compression;
+pub mod eight_points;
 mod end;
 pub(crate) mod group;
 mod leaving;
@@ -30,6 +32,7 @@ use crate::{
     state::field,
     strength::StrengthLaw,
 };
+use compression::{Change, Compressed};
 use end::End;
 use stress::Stressed;
 use view::{BySlot, View};
@@ -213,8 +216,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     tally: &mut Tally<L>,
     vote: &mut ElementVote,
 ) {
-    let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
-    let dt = L::splat(step.dt);
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let elastic_control = laws.elastic_control();
     for axis in 0..3 {
         for array in [nodes.x[axis], nodes.v[axis], &*nodes.f[axis]] {
@@ -287,81 +289,26 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     } = end;
     let inverse_volume = inverse_by_64 * L::splat(64.0);
 
-    // 4. Pressure line at the new volume and the sound speed there.
-    let (pressure_before, energy_before, volume_before): (L, L, L) = (
-        view.state(slot, field::PRESSURE),
-        view.state(slot, field::ENERGY),
-        view.state(slot, field::RELATIVE_VOLUME),
-    );
-    let volume_change = L::select(zero.less(dt), relative_volume - volume_before, zero);
-    // The deviator works on the middle volume.
-    let middle = at_mid.volume() * inverse_initial;
-    let energy_before = (deviatoric_power * dt).mul_add(middle, energy_before);
-    let mut burnt = one;
-    let (mut time_to_light, mut pace_square) = (zero, zero);
-    if laws.eos.burns() {
-        let left = view.state::<L>(slot, field::TIME_TO_LIGHT) - dt;
-        let now = laws.eos.burn(left, relative_volume, initial_volume);
-        (time_to_light, burnt, pace_square) = (now.time_to_light, now.burnt, now.pace_square);
-    }
-    let mut line = laws.eos.line(relative_volume, burnt);
-    if S::REMEMBERS {
-        line.a = line.a + memory.added_pressure;
-    }
-    let energy = pressure_before.neg_mul_add(volume_change, energy_before);
-    let bulk =
-        line.stiffness(relative_volume, line.pressure(energy), energy).max(laws.eos.least_stiffness(burnt));
-    let mut stiffness = bulk + L::splat(4.0 / 3.0 * laws.strength.shear());
-    if S::REMEMBERS {
-        stiffness = stiffness + memory.added_stiffness;
-    }
-    let sound_square = stiffness * relative_volume * L::splat(1.0 / laws.density);
-    let sound = sound_square.sqrt();
-
-    // 5. Artificial viscosity in compression.
-    let density = L::splat(laws.density) * (initial_volume * inverse_volume);
-    let closing = L::select(volume_rate.less(zero), -volume_rate, zero);
-    let quadratic = L::splat(step.quadratic_viscosity * step.quadratic_viscosity);
-    let linear = L::splat(step.linear_viscosity);
-    let damping = (quadratic * length).mul_add(closing, linear * sound) * length;
-    let viscosity = density * damping * closing;
-    // The forces at both ends of a step do work in it, so its heat is that of their mean.
-    let heating = half * (view.state::<L>(slot, field::VISCOSITY) + viscosity);
-
-    // 6. Energy and pressure together.
-    let mut energy = line.energy_after(energy_before, pressure_before, heating, volume_change);
-    let mut pressure = line.pressure(energy);
+    // 4. Pressure line at the new volume, 5. viscosity, 6. energy and pressure together.
+    let change = Change {
+        initial_volume,
+        inverse_volume,
+        relative_volume,
+        length,
+        volume_rate,
+        deviatoric_power,
+        middle: at_mid.volume() * inverse_initial,
+        failed,
+        temperature: history.temperature,
+    };
+    let compressed = Compressed::of::<E, S, F>(&change, view, slot, laws, step, &memory);
+    let Compressed { volume_change, stiffness, sound_square, sound, density, damping, .. } = compressed;
+    let Compressed { viscosity, heating, energy, pressure, temperature, burn, .. } = compressed;
     let mut damage_after = damage;
     if laws.failure.fails() || S::REMEMBERS {
-        let mut least = L::select(failed, zero, L::splat(laws.failure.least_pressure()));
-        if S::REMEMBERS {
-            least = memory.least_pressure;
-        }
-        let cut = pressure.less(least);
-        let resistance = half.mul_add(pressure_before + least, heating);
-        energy = L::select(cut, resistance.neg_mul_add(volume_change, energy_before), energy);
-        pressure = L::select(cut, least, pressure);
         let plastic_strain = [plastic_before, history.plastic_strain];
-        let temperature = history.temperature;
-        let loading = Loading { stress, pressure, strain, plastic_strain, temperature };
+        let loading = Loading { stress, pressure, strain, plastic_strain, temperature: history.temperature };
         damage_after = if S::REMEMBERS { memory.damage } else { laws.failure.damage(damage, &loading) };
-    }
-
-    let mut temperature = history.temperature;
-    let by_energy = laws.strength.heating_by_energy();
-    if E::IS_CHOSEN && by_energy != 0.0 {
-        // The temperature before says how far the energy was above the cold curve, which is followed to the new volume.
-        let heat = view.state::<L>(slot, field::TEMPERATURE) * L::splat(1.0 / by_energy);
-        let cold_before = view.state::<L>(slot, field::ENERGY) - heat;
-        let line_before = laws.eos.line(volume_before, burnt);
-        let pressure_before = line_before.pressure(cold_before);
-        let chord = line.energy_after(cold_before, pressure_before, zero, volume_change);
-        // A shock crosses an element in a few steps: the curve bends between the ends of the chord, by the slopes there.
-        let slope_before = line_before.stiffness(volume_before, pressure_before, cold_before) / volume_before;
-        let slope = line.stiffness(relative_volume, line.pressure(chord), chord) / relative_volume;
-        let bend = volume_change * volume_change * (slope - slope_before);
-        let cold = L::splat(1.0 / 12.0).neg_mul_add(bend, chord);
-        temperature = (energy - cold) * L::splat(by_energy);
     }
 
     // 7. Hourglass forces: turned, grown, and yielding as the stress does. What they keep is written here, so that nothing of it
@@ -387,12 +334,15 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         let trial = growth(&laws.hourglass, &hourglass, &frame, step.dt);
         let mut elastic = trial.mul_add(one, &turned).scaled(left);
         let bent = stress_square(&elastic, &frame);
-        if L::any(L::splat(laws.hourglass.sound).less(bent)) {
+        let may_yield = L::splat(laws.hourglass.sound).less(bent);
+        if L::any(may_yield) {
             let factor = laws.strength.factor(strain.rate, history.temperature);
             let (yield_stress, _) =
                 laws.strength.flow(history.plastic_strain.max(L::splat(LEAST_STRAIN)), factor);
             let most = L::splat(PLASTIC) * yield_stress;
-            let share = L::select((most * most).less(bent), most / bent.sqrt(), one);
+            // Whether a lane yields is its own matter, whatever the others of its set do.
+            let yields = L::both(may_yield, (most * most).less(bent));
+            let share = L::select(yields, most / bent.sqrt(), one);
             elastic = elastic.scaled(share);
         }
         let power = elastic.mul_add(one, &turned).dot(&hourglass);
@@ -420,7 +370,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let double_inverse_square = L::splat(2.0 / 512.0) * inverse_volume * inverse_volume;
     let shear_square = L::splat(laws.strength.shear() / laws.density) * relative_volume;
     // The burn crosses elements faster than sound, and the step follows it.
-    let sound_square = if laws.eos.burns() { sound_square.max(pace_square) } else { sound_square };
+    let sound_square = if laws.eos.burns() { sound_square.max(burn.pace_square) } else { sound_square };
     let swing = Swing { damping, sound_square, shear_square, trace: spread.trace() * double_inverse_square };
     let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);
     let largest = spread.eigenvalue_bound() * double_inverse_square;
@@ -467,7 +417,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
             view.remember(slot, &memory, active);
         }
         if laws.eos.burns() {
-            view.set_state(slot, field::TIME_TO_LIGHT, time_to_light, active);
+            view.set_state(slot, field::TIME_TO_LIGHT, burn.time_to_light, active);
         }
         view.set_state(slot, field::PRESSURE, pressure, active);
         view.set_state(slot, field::ENERGY, energy, active);

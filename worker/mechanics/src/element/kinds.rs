@@ -1,6 +1,11 @@
 //! The kinds of elements that there are ([`group`](super::group)). A new one is an arm here.
 
-use super::{group::Group, hex8::group::Solids, shell4::Core, truss2::Trusses};
+use super::{
+    group::Group,
+    hex8::{eight_points::EightPoints, group::Solids},
+    shell4::Core,
+    truss2::Trusses,
+};
 use crate::{material::Material, mesh::Topology, piece::Piece, spin::Turning, state::ShellState};
 
 /// The elements of a piece, whose element arrays they take, and the rotations of its nodes where its kind turns them.
@@ -11,6 +16,7 @@ pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, 
     let n_nodes = piece.nodes.len();
     match &piece.topology {
         Topology::Structured { .. } | Topology::Explicit { .. } => (Box::new(Solids::of(piece)), None),
+        Topology::EightPoint { .. } => (Box::new(EightPoints::of(piece)), None),
         Topology::Shells { quads, section } => {
             let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);
             let fields = std::mem::take(&mut piece.own);

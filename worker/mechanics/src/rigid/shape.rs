@@ -222,7 +222,9 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
 /// Volume over the largest face; of a shell, area over the longest side; of a truss, its length.
 fn least_height(part: &Part, x: &[[f64; 3]; 8]) -> f64 {
     match &part.topology {
-        Topology::Structured { .. } | Topology::Explicit { .. } => return hex8::volume(x) / largest_face(x),
+        Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
+            return hex8::volume(x) / largest_face(x);
+        }
         Topology::Trusses { area, .. } => return part.volume(x) / area,
         Topology::Shells { .. } => {}
     }
@@ -291,7 +293,9 @@ impl Moments {
     fn add_element(&mut self, part: &Part, x: &[[f64; 3]; 8], density: f64) {
         let mass = density * part.volume(x);
         match &part.topology {
-            Topology::Structured { .. } | Topology::Explicit { .. } => self.add_hexahedron(x, density),
+            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
+                self.add_hexahedron(x, density)
+            }
             Topology::Shells { section, .. } => {
                 self.add_shell(&[x[0], x[1], x[2], x[3]], mass, section.thickness);
             }

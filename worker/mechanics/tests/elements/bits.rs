@@ -113,6 +113,29 @@ fn every_width_and_both_topologies_give_the_same_bits_for_every_law_and_hourglas
     }
 }
 
+#[test]
+fn bent_elements_that_heat_has_softened_yield_alike_on_every_width() {
+    let material = all_laws().swap_remove(7);
+    assert!(matches!(material.strength, mechanics::material::Strength::JohnsonCook { .. }));
+    for control in controls().into_iter().filter(Hourglass::is_elastic) {
+        for seed in 1..20 {
+            let mut piece = with_forces(stirred(&material, [7, 5, 3], seed), control, seed);
+            let mut draws = Draws(seed);
+            for element in 0..piece.elements.len() {
+                piece.fields[field::PLASTIC_STRAIN][element] = 0.0;
+                piece.fields[field::TEMPERATURE][element] = 1000.0 + 1600.0 * draws.next();
+                // Few pass the yield stress when cold.
+                let share = (draws.next() + 0.5).powi(6);
+                piece.own.iter_mut().for_each(|forces| forces[element] *= share);
+            }
+            let reference = three_cycles(&piece, &material, Width::Scalar);
+            for width in Width::ALL.into_iter().filter(|width| width.available()) {
+                assert!(three_cycles(&piece, &material, width) == reference, "{width}, {control:?}");
+            }
+        }
+    }
+}
+
 /// An explicit piece with its nodes numbered from the end: no corner of a slot is the next node of the last.
 fn numbered_backwards(piece: &Piece) -> Piece {
     let last = piece.nodes.len() as u32 - 1;

@@ -5,6 +5,7 @@
 
 mod bits;
 mod bodies;
+mod eight_points;
 mod energy;
 mod hourglass;
 mod laws;

@@ -56,7 +56,9 @@ impl Solids {
         let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
         let (layout, slots, reach) = match &piece.topology {
             Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
-            Topology::Explicit { hexahedra } => explicit(hexahedra, in_runs(hexahedra), n_nodes),
+            Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
+                explicit(hexahedra, in_runs(hexahedra), n_nodes)
+            }
             Topology::Shells { .. } | Topology::Trusses { .. } => panic!("no hexahedra"),
         };
         assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
@@ -110,8 +112,26 @@ impl Solids {
         kept.map(|array| self.by_element(array)).collect()
     }
 
+    pub fn n_elements(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// The layout beside the arrays by slot.
+    pub fn parts(&mut self) -> (&Layout, BySlot<'_>) {
+        let by_slot = BySlot {
+            fields: self.fields.each_mut().map(Vec::as_mut_slice),
+            hourglass: self.hourglass.each_mut().map(Vec::as_mut_slice),
+            history: &mut self.history,
+            initial_volume: &self.initial_volume,
+            alive: &self.alive,
+            elements: &self.slot_elements,
+            lowest: &self.lowest,
+        };
+        (&self.layout, by_slot)
+    }
+
     /// Nodes of the corners of the element of a slot.
-    fn corners_of(&self, slot: usize) -> [u32; 8] {
+    pub fn corners_of(&self, slot: usize) -> [u32; 8] {
         match &self.layout {
             Layout::Structured { row, plane, base } => {
                 let n = base[slot / SET] + (slot % SET) as u32;
@@ -158,13 +178,8 @@ impl Group for Solids {
         let hourglass = is_elastic
             .then(|| Amplitudes::from_array(self.hourglass.each_ref().map(|array| Scalar(array[slot]))));
         // The damage that the last step left chose the coefficient of that step.
-        let viscous = if state(DAMAGE) >= 1.0 {
-            self.control.of_failed(material)
-        } else if is_elastic {
-            0.0
-        } else {
-            self.control.coefficient
-        };
+        let viscous =
+            if state(DAMAGE) >= 1.0 { self.control.of_failed(material) } else { self.control.of_whole() };
         let stiffness = material.bulk() + 4.0 / 3.0 * material.shear();
         let sound = (stiffness / material.density).sqrt();
         let leaving = Leaving {
@@ -186,22 +201,10 @@ impl Group for Solids {
         call: &Call<'_>,
         vote: &mut ElementVote,
     ) {
-        let view = View {
-            layout: &self.layout,
-            reach: self.reach,
-            nodes,
-            slots: BySlot {
-                fields: self.fields.each_mut().map(Vec::as_mut_slice),
-                hourglass: self.hourglass.each_mut().map(Vec::as_mut_slice),
-                history: &mut self.history,
-                initial_volume: &self.initial_volume,
-                alive: &self.alive,
-                elements: &self.slot_elements,
-                lowest: &self.lowest,
-            },
-        };
+        let (reach, control) = (self.reach, self.control);
+        let (layout, slots) = self.parts();
         // SAFETY: corners and slots are inside their arrays since these were built.
-        unsafe { pass::run(view, call, self.control, vote) };
+        unsafe { pass::run(View { layout, reach, nodes, slots }, call, control, vote) };
     }
 
     fn element(&self, element: usize, _x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {

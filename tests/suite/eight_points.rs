@@ -1,0 +1,85 @@
+//! Solids of eight points in whole runs.
+
+use deck::Model;
+use tests::solve::{model, run};
+
+use crate::bits::{losing_a_worker_changes_no_bit, same_bits};
+
+/// A plate of eight points that is struck, breaks and is worn off, and a block of them that flows.
+fn struck_plate() -> Model {
+    model(
+        r#"
+        title = "plates of eight points"
+        units = "cm-g-us"
+        [control]
+        end_cycle = 300
+        end_time = 1e3
+        [[part]]
+        name = "target"
+        material = "AL_2024_T351"
+        fracture = true
+        points = 8
+        erosion = { geometric_strain = 0.3 }
+        box = { origin = [0, 0, 0], size = [9, 8, 2], cells = [9, 8, 2] }
+        [[part]]
+        name = "projectile"
+        material = "STEEL_1006"
+        points = 8
+        velocity = [0.02, 0.01, -0.15]
+        box = { origin = [1.3, 0.7, 2.2], size = [5, 6, 3], cells = [5, 6, 3] }
+        rotate = { axis = [1, 2, 0], degrees = 2, point = [4, 4, 2.2] }
+        translate = [0, 0, 0.2]
+        [[part]]
+        name = "pool"
+        material = "WATER"
+        box = { origin = [0, 0, -2.2], size = [9, 8, 2], cells = [6, 6, 2] }
+        [contact]
+        gap_length = 0.15
+        [output]
+        history_cycles = 1
+        "#,
+    )
+}
+
+#[test]
+fn solids_of_eight_points_have_the_same_bits_everywhere() {
+    let model = struck_plate();
+    let solved = run(model.clone());
+    assert!(solved.state.n_eroded() > 0);
+    let strained = solved.state.own.iter().filter(|array| array.iter().any(|value| *value != 0.0)).count();
+    assert!(strained > 48, "{strained} arrays of points");
+    let error = solved.outcome.run_totals.last.error;
+    assert!(error.abs() < 0.01, "energy error {error}");
+    same_bits(&model);
+}
+
+#[test]
+fn a_worker_with_solids_of_eight_points_that_is_lost_changes_no_bit() {
+    losing_a_worker_changes_no_bit(&struck_plate());
+}
+
+/// A bar of elements of 1 mm that is thrown across keeps its energy.
+#[test]
+fn an_elastic_bar_of_eight_points_keeps_its_energy_and_gives_none_to_hourglass_control() {
+    let mut model = model(
+        r#"
+        title = "bar"
+        units = "mm-ms-kg"
+        [control]
+        end_cycle = 20000
+        end_time = 1e3
+        [[part]]
+        name = "bar"
+        material = { density = 7.85e-6, eos = { type = "linear", bulk = 175 }, strength = { type = "elastic", shear = 80.77 } }
+        points = 8
+        box = { origin = [0, 0, 0], size = [20, 4, 4], cells = [20, 4, 4] }
+        "#,
+    );
+    for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
+        v[2] = 4.0 * (x[0] / 20.0 - 0.5).powi(2);
+    }
+    let solved = run(model);
+    let last = &solved.outcome.run_totals.last;
+    assert!(last.error.abs() < 1e-4, "energy error {}", last.error);
+    assert_eq!(last.hourglass, 0.0);
+}
