@@ -12,7 +12,7 @@ fn struck_plate() -> Model {
         title = "plates of eight points"
         units = "cm-g-us"
         [control]
-        end_cycle = 300
+        end_cycle = 260
         end_time = 1e3
         [[part]]
         name = "target"

@@ -202,8 +202,10 @@ fn contact_fault(problem: &Problem, vote: &Vote, cycle: u64) -> String {
     } else {
         ("an edge at node", format!("an edge at node {}", id(other & !EDGE)))
     };
+    let edges_meet = problem.model.setup.contact.as_ref().is_some_and(|contact| contact.edges);
+    let or_edges = if edges_meet { "" } else { ", or set contact.edges = true if edges cross there" };
     format!(
-        "{what} {} is {:.2} gaps into the contact zone of {whose} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap",
+        "{what} {} is {:.2} gaps into the contact zone of {whose} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap{or_edges}",
         id(node),
         vote.worst_depth
     )

@@ -1,16 +1,18 @@
 //! What a hit does: penalty force, friction, time-step vote and energies of one node against one face.
 //!
-//! The force is `k depth` along the line of node and closest point, so it has no moment about either, and goes
-//! back to the face's corners by its shape functions. `k` comes from static data of the pair alone. All terms
+//! The force is that of a [spring] along the line of node and closest point, so it has no moment about either, and goes
+//! back to the face's corners by its shape functions. Its stiffness comes from static data of the pair alone. All terms
 //! are multiples of a quantum, so they add in any order to the same bits; the node gets exactly minus what the
 //! corners get, so momentum is conserved to the bit.
 
 use serde::{Deserialize, Serialize};
 
 use crate::exact::Quantum;
+use spring::Spring;
 use stick::Held;
 
 pub(super) mod lanes;
+pub(super) mod spring;
 pub(super) mod stick;
 
 /// `omega dt` of a node between all its springs at most: the energy of a bounce is then right to 2.6 %.
@@ -24,8 +26,8 @@ const BOTH_SIDES: f64 = 2.0;
 pub struct Push {
     /// Penalty stiffness, the share of the hit included (force per length).
     pub stiffness: f64,
-    /// Depth in the zone (length).
-    pub depth: f64,
+    /// What the penalty spring does at the depth of the node.
+    pub spring: Spring<f64>,
     /// Unit vector of the force on the node.
     pub direction: [f64; 3],
     /// Shape functions of the face's corners at the closest point.
@@ -75,7 +77,7 @@ pub struct Reaction {
     pub corners: [[f64; 3]; 4],
     /// Force on the node: exactly minus the sum of the corners'.
     pub node: [f64; 3],
-    /// Energy in the spring, `k depth^2 / 2`, and in that across it, in multiples of the energy quantum.
+    /// Energy in the spring and in that across it, in multiples of the energy quantum.
     pub energy: f64,
     /// Energy that friction takes out in this cycle, in multiples of the energy quantum.
     pub friction: f64,
@@ -137,7 +139,7 @@ pub fn react(
     force_quantum: Quantum,
     energy_quantum: Quantum,
 ) -> Reaction {
-    let normal = push.stiffness * push.depth;
+    let normal = push.spring.force;
     let n = push.direction;
     let mut force = [normal * n[0], normal * n[1], normal * n[2]];
     let mut friction = 0.0;
@@ -147,7 +149,7 @@ pub fn react(
         }
         friction = energy_quantum.round(taken);
     }
-    let energy = energy_quantum.round(0.5 * normal * push.depth);
+    let energy = energy_quantum.round(push.spring.energy);
     reaction(push, force, energy, friction, force_quantum)
 }
 
@@ -159,12 +161,12 @@ pub(super) fn react_held(
     force_quantum: Quantum,
     energy_quantum: Quantum,
 ) -> Reaction {
-    let normal = push.stiffness * push.depth;
+    let normal = push.spring.force;
     let mut force = [0.0; 3];
     for a in 0..3 {
         force[a] = normal.mul_add(push.direction[a], held.force[a]);
     }
-    let energy = energy_quantum.round((0.5 * normal).mul_add(push.depth, held.stored));
+    let energy = energy_quantum.round(push.spring.energy + held.stored);
     reaction(push, force, energy, energy_quantum.round(held.taken), force_quantum)
 }
 

@@ -12,6 +12,7 @@ use super::{
     force::{
         self,
         lanes::{Pushes, Statics, Terms},
+        spring::Hardening,
     },
     joint::{
         self, Hit, Near,
@@ -40,6 +41,7 @@ use crate::{
 #[derive(Clone, Debug)]
 pub(super) struct NodeFace {
     settings: Settings,
+    hardening: Hardening,
     n_parts: usize,
     /// Pairs that can meet; `faces` are indices into the lists of active faces.
     candidates: Candidates,
@@ -107,6 +109,7 @@ impl NodeFace {
         }
         let mut contact = Self {
             n_parts: settings.n_parts(),
+            hardening: Hardening::of(settings.gap),
             settings: settings.clone(),
             candidates: Candidates::default(),
             faces: Vec::new(),
@@ -307,6 +310,7 @@ impl NodeFace {
             share: &work.share,
             stacking: &work.stacking,
             weights: &approach.weights,
+            hardening: self.hardening,
         };
         let (statics, pairs) = (&self.statics, &work.near_pairs);
         let quanta = (cycle.force_quantum, cycle.energy_quantum);
@@ -356,8 +360,8 @@ impl NodeFace {
         let depths = work.approach.depth[..n].iter().enumerate();
         for (i, &depth) in depths.filter(|(_, depth)| **depth > 0.0) {
             let (node, face) = (nodes[i] as usize, work.face[i] as usize);
-            let normal = statics.stiffness(node, face) * work.share[i] * depth;
-            by_pair.add(self.part[node], self.parts[face], quantum.round(0.5 * normal * depth), 0.0);
+            let spring = self.hardening.spring_of_one(statics.stiffness(node, face) * work.share[i], depth);
+            by_pair.add(self.part[node], self.parts[face], quantum.round(spring.energy), 0.0);
         }
     }
 
@@ -380,16 +384,18 @@ impl NodeFace {
             let k = statics.stiffness(node, face);
             let of_corners = nodes.map(|n| statics.inverse_mass[n as usize]);
             let inverse_mass = force::inverse_mass(statics.inverse_mass[node], of_corners, &weights);
-            frequency2 = frequency2.max(force::frequency2(k, work.stacking[i], inverse_mass));
             let depth = approach.depth[i];
+            let tangent = k * self.hardening.tangent_of_one(depth);
+            frequency2 = frequency2.max(force::frequency2(tangent, work.stacking[i], inverse_mass));
             if depth <= 0.0 {
                 continue;
             }
             vote.hits += 1;
             vote.deepest(depth / self.settings.gap, (self.global[node], self.ids[face]));
+            let stiffness = k * work.share[i];
             let push = force::Push {
-                stiffness: k * work.share[i],
-                depth,
+                stiffness,
+                spring: self.hardening.spring_of_one(stiffness, depth),
                 direction: [0, 1, 2].map(|a| approach.direction[a][i]),
                 weights,
             };

@@ -4,7 +4,7 @@ use super::{
     super::{
         BatchEdge, Settings, WARNING,
         batch::Batch,
-        force,
+        force::{self, spring::Hardening},
         pair::{Books, Cycle, Pairs},
         zone::Vector,
     },
@@ -37,6 +37,7 @@ pub(in super::super) struct Edges {
     sides: Vec<Side>,
     pairs: Vec<Pair>,
     gap: f64,
+    hardening: Hardening,
     friction_velocity: f64,
 }
 
@@ -70,7 +71,13 @@ impl Edges {
             }
         };
         let pairs = batch.listed.edges.pairs.iter().map(pair).collect();
-        Self { sides, pairs, gap: settings.gap, friction_velocity: settings.friction_velocity }
+        Self {
+            sides,
+            pairs,
+            gap: settings.gap,
+            hardening: Hardening::of(settings.gap),
+            friction_velocity: settings.friction_velocity,
+        }
     }
 
     /// Inverse of the mass that a pair moves, where the closest points may be soon: a gap nearer to the ends.
@@ -120,7 +127,8 @@ impl Edges {
         vote.hits += 1;
         vote.deepest(depth / self.gap, names);
         let depth = self.gap - distance;
-        let normal = pair.stiffness * weight.value * depth;
+        let spring = self.hardening.spring_of_one(pair.stiffness, depth);
+        let normal = weight.value * spring.force;
         let mut force = [normal * n[0], normal * n[1], normal * n[2]];
         let mut friction = 0.0;
         if pair.friction > 0.0 {
@@ -140,13 +148,13 @@ impl Edges {
                 friction = cycle.energy_quantum.round(taken);
             }
         }
-        let half = 0.5 * pair.stiffness * depth * depth;
+        let energy = spring.energy;
         let [mut of_u, mut of_v] = [[0.0; 3]; 2];
         if let Some([along, by_u, by_v]) = weight.slopes {
             for a in 0..3 {
-                force[a] = (-half).mul_add(along[a], force[a]);
-                of_u[a] = -(half * by_u[a]);
-                of_v[a] = -(half * by_v[a]);
+                force[a] = (-energy).mul_add(along[a], force[a]);
+                of_u[a] = -(energy * by_u[a]);
+                of_v[a] = -(energy * by_v[a]);
             }
         }
         let quantum = cycle.force_quantum;
@@ -169,7 +177,7 @@ impl Edges {
                 vote.force_bound = if magnitude > vote.force_bound { magnitude } else { vote.force_bound };
             }
         }
-        let energy = cycle.energy_quantum.round(weight.value * half);
+        let energy = cycle.energy_quantum.round(weight.value * energy);
         vote.energy += energy;
         vote.friction += friction;
         by_pair.energies.add(sides[0].part, sides[1].part, energy, friction);
@@ -209,7 +217,9 @@ impl Pairs for Edges {
                 continue;
             }
             let inverse_mass = self.inverse_mass(&closest, sides);
-            let stiffness = pair.stiffness * closest.weight_ahead(self.gap);
+            let depth = self.gap - closest.distance2.sqrt();
+            let tangent = pair.stiffness * self.hardening.tangent_of_one(depth);
+            let stiffness = tangent * closest.weight_ahead(self.gap);
             let voted = force::frequency2(stiffness, 1.0, inverse_mass);
             frequency2 = if voted > frequency2 { voted } else { frequency2 };
             if closest.crosses && closest.distance2 < self.gap * self.gap {

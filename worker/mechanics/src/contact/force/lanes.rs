@@ -1,6 +1,6 @@
 //! Forces of many hits at a time without friction, to the bits of [`react`](super::react).
 
-use super::BOTH_SIDES;
+use super::{BOTH_SIDES, spring::Hardening};
 use crate::{
     contact::near_pairs::NearPairs,
     exact::{Quantum, rounded},
@@ -47,6 +47,7 @@ pub(in crate::contact) struct Pushes<'a> {
     pub(in crate::contact) stacking: &'a [f64],
     /// Shape functions of the corners.
     pub(in crate::contact) weights: &'a [Vec<f64>; 4],
+    pub(in crate::contact) hardening: Hardening,
 }
 
 /// Forces by pair: three of the node, then three of each corner; multiples of the force quantum.
@@ -155,13 +156,14 @@ unsafe fn kernel<L: Lane>(
                 i += 1;
             }
             let stacking = L::load(pushes.stacking, at);
-            frequency2 = (L::splat(BOTH_SIDES) * stacking * k * inverse_mass).max(frequency2);
             let depth = L::load(pushes.depth, at);
             deepest = depth.max(deepest);
-            let normal = (k * L::load(pushes.share, at)) * depth;
+            let tangent = pushes.hardening.tangent(depth);
+            frequency2 = (L::splat(BOTH_SIDES) * stacking * (k * tangent) * inverse_mass).max(frequency2);
+            let spring = pushes.hardening.spring(k * L::load(pushes.share, at), depth);
             let mut a = 0;
             while a < 3 {
-                let force = normal * L::load(&pushes.direction[a], at);
+                let force = spring.force * L::load(&pushes.direction[a], at);
                 let corners = [
                     rounded(-(weights[0] * force), force_magic),
                     rounded(-(weights[1] * force), force_magic),
@@ -177,8 +179,7 @@ unsafe fn kernel<L: Lane>(
                 corners[3].store(&mut terms[12 + a], at);
                 a += 1;
             }
-            let stored = L::splat(0.5) * normal * depth;
-            energy = energy + rounded(stored, energy_magic);
+            energy = energy + rounded(spring.energy, energy_magic);
         }
         at += L::N;
     }

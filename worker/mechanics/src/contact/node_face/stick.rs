@@ -59,7 +59,7 @@ impl NodeFace {
         if keeps {
             sticking.elongation.copy_from_slice(&history.before(node)[first..first + 3]);
         }
-        let held = sticking.hold(push.stiffness, push.stiffness * push.depth, push.direction);
+        let held = sticking.hold(push.stiffness, push.spring.force, push.direction);
         if keeps {
             history.after_mut(node)[first..first + 3].copy_from_slice(&held.elongation);
         }

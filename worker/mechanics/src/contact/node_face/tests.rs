@@ -105,12 +105,14 @@ fn slowly(contact: &NodeFace, cycle: Cycle<'_>) -> ContactVote {
             let weights = frame(near.face).weights(&near.nearest, p);
             let of_corners = nodes.map(|n| statics.inverse_mass[n as usize]);
             let inverse_mass = force::inverse_mass(statics.inverse_mass[n], of_corners, &weights);
-            frequency2 = frequency2.max(force::frequency2(k, stacking, inverse_mass));
+            let tangent = hit.map_or(1.0, |hit| contact.hardening.tangent_of_one(hit.depth));
+            frequency2 = frequency2.max(force::frequency2(k * tangent, stacking, inverse_mass));
             let Some(hit) = hit else { continue };
             vote.hits += 1;
             vote.deepest(hit.depth / contact.settings.gap, (contact.global[n], near.id));
-            let push =
-                force::Push { stiffness: k * hit.share, depth: hit.depth, direction: hit.direction, weights };
+            let stiffness = k * hit.share;
+            let spring = contact.hardening.spring_of_one(stiffness, hit.depth);
+            let push = force::Push { stiffness, spring, direction: hit.direction, weights };
             let sliding = force::Sliding {
                 coefficient: contact.settings.friction[0],
                 regular: contact.settings.friction_velocity,
