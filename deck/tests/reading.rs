@@ -59,7 +59,7 @@ fn hourglass_control_is_that_of_the_part_or_of_the_deck_and_viscous_on_fluids() 
         controls("hourglass = { kind = \"stiffness\" }"),
         "assumed-strain 0.5, stiffness 0.05, viscous 0.1"
     );
-    assert_eq!(controls(""), "assumed-strain 0.5, viscous 0.1, viscous 0.1");
+    assert_eq!(controls(""), "assumed-strain 0.5, assumed-strain 1, viscous 0.1");
     assert_eq!(controls("hourglass = 0.03"), "assumed-strain 0.5, viscous 0.03, viscous 0.03");
     let fault = |tables: &str| {
         let faults = deck::read(&format!("{HEAD}{tables}"), "t.toml").expect_err("a fault");

@@ -386,6 +386,7 @@ fn half_a_bar_erodes() -> Model {
         end_cycle = 200
         plan_interval = 20
         safety_factor = 0.05
+        hourglass = 0.1
         [[part]]
         name = "bar"
         material = "STEEL_1006"

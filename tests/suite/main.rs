@@ -45,6 +45,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/soft.rs"),
         include_str!("../src/book/friction.rs"),
         include_str!("../src/book/order.rs"),
+        include_str!("../src/book/spheres.rs"),
     ]
     .concat();
     for name in tests::case::names() {

@@ -268,6 +268,8 @@ struct Throw {
     height: f64,
     /// Direction of flight.
     direction: [f64; 3],
+    /// Whether edges meet edges: a corner that strikes an edge crushes until edges cross where no node is near a face.
+    edges: bool,
 }
 
 const CORNER_UP: &str = "rotate = { axis = [1, -1, 0], degrees = 54.735610317245346 }";
@@ -286,6 +288,7 @@ fn throws() -> [Throw; 6] {
             offset: [0.0; 2],
             height: 6.0,
             direction: down,
+            edges: false,
         },
         Throw {
             name: "head-on, nodes on faces",
@@ -294,6 +297,7 @@ fn throws() -> [Throw; 6] {
             offset: [0.7, 0.5],
             height: 6.0,
             direction: down,
+            edges: false,
         },
         Throw {
             name: "grazing at one degree",
@@ -302,6 +306,7 @@ fn throws() -> [Throw; 6] {
             offset: [-2.0, 0.3],
             height: 6.0,
             direction: [graze.cos(), 0.0, -graze.sin()],
+            edges: false,
         },
         Throw {
             name: "corner on joint",
@@ -310,6 +315,7 @@ fn throws() -> [Throw; 6] {
             offset: [1.0, 1.0],
             height: 3.0 + tip,
             direction: down,
+            edges: false,
         },
         Throw {
             name: "corner on corner",
@@ -318,6 +324,7 @@ fn throws() -> [Throw; 6] {
             offset: [0.1, 0.05],
             height: 2.0 * tip,
             direction: down,
+            edges: false,
         },
         Throw {
             name: "corner on edge",
@@ -326,6 +333,7 @@ fn throws() -> [Throw; 6] {
             offset: [0.2, 0.1],
             height: ridge + tip,
             direction: down,
+            edges: true,
         },
     ]
 }
@@ -343,9 +351,10 @@ fn throw(throw: &Throw, fraction: f64, speed: f64) -> Result<Solved, String> {
     };
     let deck = format!(
         "title = \"{}\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = {:?}\n\
-         [contact]\ngap_fraction = {fraction:?}\nstiffness = 1\n{}{}translate = [{x:?}, {y:?}, {z:?}]\n",
+         [contact]\ngap_fraction = {fraction:?}\nstiffness = 1\nedges = {}\n{}{}translate = [{x:?}, {y:?}, {z:?}]\n",
         throw.name,
         4.0 / speed,
+        throw.edges,
         cube("lower", [0.0; 3], throw.lower),
         cube("upper", velocity, throw.upper),
     );

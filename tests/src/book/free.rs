@@ -1,7 +1,7 @@
 //! Small free bodies: whatever they do, at default settings none of them gains energy, and what is left of their vibration stays.
 //!
 //! Energy is kinetic, of elastic strain and of plastic work: what a body has without the heat of viscosity and of hourglass control. The
-//! totals books this heat by the velocities of half a step before, which for noise of the mesh is 10 to 40 % too much.
+//! totals book this heat by the velocities of half a step before, which for noise of the mesh is 10 to 40 % too much.
 
 use deck::Model;
 use master::results::history::PartEnergy;
@@ -76,7 +76,8 @@ fn shaken(mut model: Model, speed: f64) -> Model {
 fn growth(solved: &Solved) -> f64 {
     let is_of_shells = solved.model.mesh.parts[0].section().is_some();
     let usable = |part: &PartEnergy| {
-        // Hourglass control of shells is elastic: it gives back what it took. That of solids is viscous.
+        // Hourglass control of shells gives back all that it took. What that of solids holds is booked together with what its
+        // damping took, so it is left out: a body that gains energy gains motion.
         let stored = if is_of_shells { part.hourglass } else { 0.0 };
         part.kinetic + part.internal - part.viscosity + stored
     };

@@ -39,9 +39,9 @@ const FLUID: f64 = 0.1;
 const DAMPING: f64 = 3e-4;
 
 /// Share of the viscous coefficient of a fluid that resists an element which has failed, with elastic control. With all of it a sphere that
-/// breaks at 3 or 6 km/s gave more energy to hourglass control than to heat; a ten-thousandth of the wave impedance is what other codes give
-/// fluids.
-const FAILED: f64 = 1e-3;
+/// breaks at 3 or 6 km/s gave more energy to hourglass control than to heat; a ten-thousandth of the wave impedance and less is what other
+/// codes give fluids.
+const FAILED: f64 = 3e-4;
 
 /// What resists the hourglass modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,7 +86,7 @@ pub struct Hourglass {
 
 impl Default for Hourglass {
     fn default() -> Self {
-        Self::VISCOUS
+        Self::ASSUMED_STRAIN
     }
 }
 
@@ -95,6 +95,9 @@ impl Hourglass {
     pub const NONE: Self = Self::viscous(0.0);
     /// Viscous control with its usual coefficient.
     pub const VISCOUS: Self = Self::viscous(Kind::Viscous.usual());
+    /// Assumed strains with their usual coefficient: the default.
+    pub const ASSUMED_STRAIN: Self =
+        Self { kind: Kind::AssumedStrain, coefficient: Kind::AssumedStrain.usual() };
 
     pub const fn viscous(coefficient: f64) -> Self {
         Self { kind: Kind::Viscous, coefficient }
