@@ -76,6 +76,8 @@ pub enum Fate {
     Touch(usize, fn(&mut Machine)),
     /// This is done, with this number, to what a worker holds when it has next computed elements.
     TouchOnce(usize, Numbered, u64),
+    /// The user stops the run.
+    Stop,
 }
 
 /// Something that has arrived, or a task's end.
@@ -217,6 +219,7 @@ fn drive(
             Some(Fate::TouchOnce(host, touch, number)) => {
                 world.surroundings.places[host].touch_once = Some((touch, number));
             }
+            Some(Fate::Stop) => stop.store(true, Ordering::Relaxed),
             Some(Fate::Touch(host, touch)) => world.surroundings.places[host].touch = Some(touch),
             Some(Fate::Join(spec)) => {
                 world.surroundings.places.push(LocalWorker::new());

@@ -355,7 +355,9 @@ impl Job {
         let control = self.model().setup.control;
         let after = next + 1;
         if !self.epoch.schedule.is_stopping() {
-            let ends = self.ending.stop_asked
+            // Who stops a run gets an end that two computations agree on, where one of them is under way.
+            let stops = self.ending.stop_asked && self.twice.until().is_none_or(|until| after >= until);
+            let ends = stops
                 || self.ending.leaves
                 || self.account.failure.is_some()
                 || time_after >= control.end_time

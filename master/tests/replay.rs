@@ -5,6 +5,7 @@ use master::{
     event::WorkerSpec,
     options::{CheckpointEvery, SessionOptions},
 };
+use mechanics::flip::Target;
 use protocol::options::{JobOptions, Route};
 use tests::{
     bits::Fingerprint,
@@ -98,11 +99,16 @@ fn when_all_workers_differ_the_master_is_suspected() {
     assert!(why.contains("all 2 workers differ") && why.contains("look at its host"), "{why}");
 }
 
+/// Flips a bit that the number says of a position or velocity.
+fn flip(machine: &mut Machine, number: u64) {
+    let target = [Target::Positions, Target::Velocities][(number / 64 % 2) as usize];
+    machine.flip_bit(target, number / 128, (number % 64) as u32);
+}
+
 /// A run of which a part is computed twice, with one bit that flips at a step.
 fn with_flip(verify: f64, (at, host, place, bit): (u64, usize, u64, u32)) -> Result<Solved, String> {
     let mut workers = at_work(3, false, Route::Direct);
     workers.options.asked.verify = verify;
-    let flip = |machine: &mut Machine, number: u64| machine.flip(number / 64, (number % 64) as u32);
     let number = 64 * (place % (1 << 58)) + u64::from(bit);
     run(workers, &mut |step| (step == at).then_some(Fate::TouchOnce(host, flip, number)))
 }
@@ -143,4 +149,28 @@ fn no_single_flip_is_silent_where_all_is_computed_twice() {
     assert!(silent[0] > 0, "the flips change something");
     assert_eq!(silent[1], 0);
     assert!(found > 0 && named > 0, "{found} found, {named} named");
+}
+
+#[test]
+fn a_run_that_is_stopped_ends_with_what_two_computations_agree_on() {
+    let mut found = 0;
+    for k in 0..24_u64 {
+        // In the last interval, some cycles before its end.
+        let (at, number) = (211 + 37 * k, 64 * k.wrapping_mul(0x9e37_79b9) + 20 + k);
+        let mut fate = |step: u64| match step.checked_sub(at) {
+            Some(0) => Some(Fate::TouchOnce((k % 3) as usize, flip, number)),
+            Some(20) => Some(Fate::Stop),
+            _ => None,
+        };
+        let mut workers = at_work(3, false, Route::Direct);
+        workers.options.asked.verify = 1.0;
+        let solved = run(workers, &mut fate).unwrap_or_else(|e| panic!("flip {k}: {e}"));
+        assert!(solved.outcome.stopped && solved.state.cycle < 90, "flip {k}: it was stopped on its way");
+        let mut to_there = model(PLATES);
+        to_there.setup.control.end_cycle = solved.state.cycle;
+        let plain = solve(to_there, at_work(1, false, Route::Master)).expect("a good run");
+        Fingerprint::of(&plain).assert_equal(&Fingerprint::of(&solved), &format!("flip {k}"));
+        found += solved.outcome.differences.len();
+    }
+    assert!(found > 0, "no flip changed anything");
 }

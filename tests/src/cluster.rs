@@ -18,7 +18,8 @@ pub const DEADLINE: Duration = Duration::from_secs(120);
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
 /// What belongs in no binary but `bolide-under-test`: words of [`crate::failpoint`] and the name of the function behind its bug.
-pub const FAULTS: [&str; 5] = ["BOLIDE_FAIL", "die-in-", "die-before-", "a test has ordered", "plant_fault"];
+pub const FAULTS: [&str; 6] =
+    ["BOLIDE_FAIL", "die-in-", "die-before-", "a test has ordered", "plant_fault", "flip_bit"];
 
 /// Whether a program's code or data have these words in them, or one of its functions has them in its name. Debug information does
 /// not count: it also speaks of functions that the linker has left out.

@@ -12,6 +12,7 @@ use std::{
     },
 };
 
+use mechanics::flip::Target;
 use tracing::{
     Event, Subscriber,
     field::{Field, Visit},
@@ -100,6 +101,10 @@ pub fn compute(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
     let mut outcome = machine.run(task);
     match &mut outcome {
         Outcome::Computed if from_cycle("ulp", cycle) => machine.plant_fault(),
+        Outcome::Computed if in_cycle("flip", cycle) => {
+            // The volume of an element, which is not zero.
+            machine.flip_bit(Target::Constants, 100, 40);
+        }
         Outcome::Integrated(vote) if in_cycle("nan-vote", cycle) => {
             vote.parts.iter_mut().for_each(|part| part.internal = f64::NAN);
         }

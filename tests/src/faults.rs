@@ -130,9 +130,16 @@ impl Scene {
 
     /// Puts the job into the queue of a cluster with three workers.
     pub fn submit(&self, cluster: Cluster) -> Running {
+        self.submit_asking(cluster, &[])
+    }
+
+    /// The same with more flags of `submit`.
+    pub fn submit_asking(&self, cluster: Cluster, flags: &[&str]) -> Running {
         let (deck, cycles) = (self.deck.display().to_string(), self.cycles.to_string());
-        let arguments =
-            ["submit", "--wait", "--cycles", &cycles, "--min-workers", "3", "--snapshot-every", "0.2", &deck];
+        let mut arguments =
+            vec!["submit", "--wait", "--cycles", &cycles, "--min-workers", "3", "--snapshot-every", "0.2"];
+        arguments.extend(flags);
+        arguments.push(&deck);
         let submitted = Process::start("submit", &mut cluster.command("client", &arguments));
         Running { cluster, _submitted: submitted }
     }

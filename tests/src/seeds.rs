@@ -3,10 +3,11 @@
 //! Real sessions, real computation, packed messages, in a [`World`]; time, links, crashes and the disk are of this file. Frames of cycles
 //! overtake long control messages, links delay each message by what they like, hosts are slow, crash and come back, pairs
 //! of workers lose their links, masters restart from the last snapshot or leave and are followed by another, processors err
-//! by one unit in the last place.
+//! by one unit in the last place, bits flip in memory ([`flips`]).
 //! Whatever happens, the run must come to its end with the rows, energies and digest of the undisturbed one. A seed that
 //! does not is a bug, and the seed is all it takes to see it again.
 
+pub mod flips;
 mod plot;
 
 use std::{
@@ -25,7 +26,7 @@ use master::{
     sort::{Gathered, SortBasis, Sorted},
     world::{End, Error, Letter, Parcel, PeerFrame, Sessions, Surroundings, World},
 };
-use mechanics::state::GlobalState;
+use mechanics::{digest::digest, flip::Target, state::GlobalState};
 use protocol::message::{ToMaster, ToPeer, ToWorker};
 use worker::{
     compute::Machine,
@@ -33,7 +34,8 @@ use worker::{
     session::{self, Task},
 };
 
-pub use plot::{Fault, Plot, Stage};
+pub use flips::Flip;
+pub use plot::{Bug, Fault, Plot, Stage};
 
 use crate::{bits::Fingerprint, solve::Solved};
 
@@ -125,6 +127,8 @@ struct Process {
     /// How many times as long as usual its tasks take.
     slow: u64,
     spoilt: bool,
+    /// What befalls its memory after its next task.
+    flip: Option<Flip>,
     up: Lane,
     down: Lane,
     /// Its links to others, in an epoch.
@@ -140,6 +144,7 @@ impl Process {
             alive: true,
             slow: 1,
             spoilt: false,
+            flip: None,
             up: Lane::default(),
             down: Lane::default(),
             pairs: (0, Pairs::default()),
@@ -168,6 +173,8 @@ struct Weather {
     life: u64,
     hosts: Vec<Process>,
     disk: Disk,
+    /// Bits that have flipped, by host.
+    flipped: Vec<(usize, Target)>,
 }
 
 impl Weather {
@@ -212,10 +219,14 @@ impl Surroundings for Weather {
     }
 
     fn compute(&mut self, _: &Sessions, host: usize, task: Task) -> Result<(), Error> {
-        let Process { machine, spoilt, slow, .. } = &mut self.hosts[host];
+        let Process { machine, spoilt, slow, flip, .. } = &mut self.hosts[host];
         let outcome = machine.run(task);
         if *spoilt && matches!(outcome, session::Outcome::Computed) {
             machine.plant_fault();
+        }
+        if let Some(target) = flip.and_then(|flip| flip.befall(machine)) {
+            *flip = None;
+            self.flipped.push((host, target));
         }
         let at = self.now + *slow * (20 + self.draws.below(100));
         self.put(at, What::Done(host, outcome));
@@ -283,6 +294,8 @@ pub struct Played {
     pub solved: Solved,
     /// Things that happened, all messages and tasks included.
     pub count: u64,
+    /// Bits that flipped: in whose memory, and what.
+    pub flipped: Vec<(usize, Target)>,
 }
 
 /// Plays a problem to its end through a plot; `seed` draws all delays.
@@ -299,6 +312,7 @@ pub fn play(model: &Arc<Model>, options: &SessionOptions, seed: u64, plot: Plot)
         life: 0,
         hosts: Vec::new(),
         disk: Disk::default(),
+        flipped: Vec::new(),
     };
     let mut play = Play {
         world: World::new(0, weather),
@@ -326,7 +340,10 @@ impl Play {
         let cycle = resume.as_ref().map_or(0, |snapshot| snapshot.state.cycle);
         let mut options = self.options.clone();
         options.asked.snapshot_at = self.plot.snapshot_at.filter(|at| *at > cycle);
-        let (job, actions) = Job::new(Arc::clone(&self.model), &specs, options, resume)?;
+        let (mut job, actions) = Job::new(Arc::clone(&self.model), &specs, options, resume)?;
+        if self.plot.bug == Some(Bug::Narrow) {
+            job.plant_narrow_sum();
+        }
         weather.disk.rows = job.rows_before().iter().map(|row| HistoryRow::clone(row)).collect();
         weather.disk.states.retain(|state| state.cycle <= cycle);
         weather.life += 1;
@@ -364,9 +381,9 @@ impl Play {
             return Err(failure);
         }
         let state = outcome.state.clone().ok_or("a run without a final state")?;
-        let Disk { rows, states, snapshot } = self.world.surroundings.disk;
+        let Weather { disk: Disk { rows, states, snapshot }, flipped, .. } = self.world.surroundings;
         let solved = Solved { model: self.model, state, rows, states, snapshot, outcome };
-        Ok(Played { solved, count: self.count })
+        Ok(Played { solved, count: self.count, flipped })
     }
 
     /// A job that has ended ends the play, unless its process only leaves.
@@ -423,7 +440,7 @@ impl Play {
             Letter::ToPeer(host, frame) => self.hear_peer(host, frame),
             Letter::ToMaster(member, epoch, message) => {
                 let now = self.world.sessions.job.as_ref().map_or(epoch, Job::epoch);
-                let epoch = if self.plot.unfenced { epoch.max(now) } else { epoch };
+                let epoch = if self.plot.bug == Some(Bug::Unfenced) { epoch.max(now) } else { epoch };
                 Ok(self.world.hear(Letter::ToMaster(member, epoch, message))?)
             }
         }
@@ -486,6 +503,12 @@ impl Play {
                 let one_errs = alive.iter().any(|&host| weather.hosts[host].spoilt);
                 if let Some(host) = pick(host).filter(|_| alive.len() > 1 && !one_errs) {
                     weather.hosts[host].spoilt = true;
+                }
+            }
+            Fault::Flip(flip) => {
+                // What makes the only worker's numbers infinite ends the run, with the reason.
+                if let Some(host) = pick(flip.host).filter(|_| alive.len() > 1) {
+                    weather.hosts[host].flip = Some(flip);
                 }
             }
             Fault::Join => weather.put(now, What::Comes),
@@ -578,8 +601,34 @@ impl Play {
     }
 }
 
-/// What must be equal to the bit whatever happens: fingerprint, and cycles and times of the states that were written.
-pub fn seen(solved: &Solved) -> (Fingerprint, Vec<(u64, u64)>) {
-    let states = solved.states.iter().map(|state| (state.cycle, state.time.to_bits())).collect();
-    (Fingerprint::of(solved), states)
+/// What must be equal to the bit whatever happens: fingerprint, all sums over cycles, and the states that were written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    fingerprint: Fingerprint,
+    /// As a snapshot stores them.
+    run_totals: Vec<u8>,
+    /// Digest of each, and the bits of what contact keeps of its nodes.
+    states: Vec<(String, Vec<u64>)>,
+}
+
+impl Seen {
+    /// Of a run that came to its end.
+    ///
+    /// # Panics
+    /// If the sums cannot be encoded.
+    pub fn of(solved: &Solved) -> Self {
+        let mut run_totals = Vec::new();
+        protocol::codec::encode_into(&solved.outcome.run_totals, &mut run_totals).expect("sums are numbers");
+        let of_state = |state: &GlobalState| {
+            let kept = state.contact.iter().flatten().map(|number| (number + 0.0).to_bits()).collect();
+            (digest(state), kept)
+        };
+        let states = solved.states.iter().map(of_state).collect();
+        Self { fingerprint: Fingerprint::of(solved), run_totals, states }
+    }
+
+    /// Digest of the final state.
+    pub fn digest(&self) -> &str {
+        &self.fingerprint.digest
+    }
 }

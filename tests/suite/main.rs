@@ -8,6 +8,7 @@ mod book;
 mod documents;
 mod eight_points;
 mod erosion;
+mod flips;
 mod fuzz;
 mod holders;
 mod hourglass;

@@ -10,6 +10,7 @@ use std::{
 
 use mechanics::{
     cycle::{Domain, Load, Meter, Sets},
+    flip::Target,
     lanes::Width,
 };
 use protocol::{
@@ -174,10 +175,10 @@ impl Machine {
         self.domain.iter_mut().for_each(Domain::plant_fault);
     }
 
-    /// See [`Domain::flip`].
+    /// See [`Domain::flip_bit`]; nothing without a domain.
     #[doc(hidden)]
-    pub fn flip(&mut self, place: u64, bit: u32) {
-        self.domain.iter_mut().for_each(|domain| domain.flip(place, bit));
+    pub fn flip_bit(&mut self, target: Target, place: u64, bit: u32) -> bool {
+        self.domain.as_mut().is_some_and(|domain| domain.flip_bit(target, place, bit))
     }
 
     /// Does one task. Failures are outcomes.

@@ -32,6 +32,7 @@ impl Job {
             return self.prove_stop(cycle, actions);
         }
         if due {
+            self.twice.note_state(&state);
             actions.push(Action::State(Box::new(state.clone())));
         }
         if self.checkpoints.is_expected(cycle) {

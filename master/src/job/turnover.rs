@@ -112,14 +112,16 @@ impl Job {
         if cycle > self.epoch.schedule.first_cycle() {
             self.book(cycle - 1, &stopped.vote, actions);
         }
-        // Who asks for the end does not wait for a second computation: nothing is stored of the first.
-        let is_hurried = self.ending.leaves || self.ending.stop_asked;
-        if self.twice.is_chosen()
-            && cycle > self.epoch.schedule.first_cycle()
-            && !is_hurried
-            && !self.interval_stands(&stopped, actions)?
-        {
-            return Ok(());
+        if self.twice.is_chosen() && cycle > self.epoch.schedule.first_cycle() {
+            if self.ending.leaves {
+                // Whoever goes on with the run computes the interval again.
+                self.go_back(actions);
+                self.suspend_at_checkpoint(actions);
+                return Ok(());
+            }
+            if !self.interval_stands(&stopped, actions)? {
+                return Ok(());
+            }
         }
         if !self.epoch.schedule.pauses() {
             return self.stopped(stopped, actions);
@@ -167,12 +169,6 @@ impl Job {
             }
             return Ok(());
         }
-        let is_proved = !self.twice.is_chosen();
-        if self.ending.leaves && !is_proved {
-            self.go_back(actions);
-            self.suspend_at_checkpoint(actions);
-            return Ok(());
-        }
         self.adopt(state, vote)?;
         if due {
             // The next session begins behind it, so the checkpoint counts on its file.
@@ -183,9 +179,7 @@ impl Job {
             self.suspend_at_checkpoint(actions);
             return Ok(());
         }
-        if is_proved {
-            self.give_last_checkpoint(actions);
-        }
+        self.give_last_checkpoint(actions);
         self.finish_at_checkpoint(actions);
         Ok(())
     }

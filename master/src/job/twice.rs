@@ -3,16 +3,18 @@
 //! An interval leads from the newest checkpoint to the next. Its end depends on its beginning alone, on whichever workers it is
 //! computed, so a part of the intervals (`--verify`) is taken again by workers that have exchanged their sub-domains: neighbours in
 //! the order of speeds, so that nobody is given much more than it was. Two computations that agree, each sub-domain by another
-//! worker, make the end a checkpoint; until then nothing goes on from it. If they differ, further ones decide, and the worker of
+//! worker, make the end a checkpoint; until then nothing goes on from it, and a run that its user stops ends there. They agree if the
+//! state is the same, all that was written on the way, and all that the next cycle begins with. If they differ, further ones decide, and the worker of
 //! the first sub-domain whose votes were others is suspected by name. Results are written again each time, so that those of
 //! the last computation stay, which is one of the two that agree.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
-use mechanics::vote::Vote;
+use mechanics::{digest::digest, state::GlobalState, vote::Vote};
+use protocol::codec;
 
-use super::{Job, error::Error, samples::Stopped};
-use crate::{event::Action, incident::Difference};
+use super::{Job, checkpoints::Continuation, error::Error, samples::Stopped};
+use crate::{event::Action, incident::Difference, results::history::HistoryRow};
 
 /// Computations of an interval before the job gives up.
 const MOST: usize = 4;
@@ -48,14 +50,25 @@ pub(super) struct Twice {
     chosen: bool,
     trials: Vec<Trial>,
     votes: BTreeMap<u64, Vec<[u8; 32]>>,
+    /// Hash of the states that were written on the way.
+    states: blake3::Hasher,
+    /// A planted bug: the positions at the end are all that is compared.
+    narrow: bool,
 }
 
 impl Twice {
     /// Of a run of which this part is computed twice; `sum`, of the problem, says where in a row of intervals the first one is.
     pub(super) fn new(fraction: f64, sum: &[u8; 32]) -> Self {
         let phase = f64::from(u16::from_le_bytes([sum[0], sum[1]])) / 65536.0;
-        let mut twice =
-            Self { fraction, owed: phase, chosen: false, trials: Vec::new(), votes: BTreeMap::new() };
+        let mut twice = Self {
+            fraction,
+            owed: phase,
+            chosen: false,
+            trials: Vec::new(),
+            votes: BTreeMap::new(),
+            states: blake3::Hasher::new(),
+            narrow: false,
+        };
         twice.begin_interval();
         twice
     }
@@ -63,7 +76,7 @@ impl Twice {
     /// Another checkpoint is the newest.
     pub(super) fn begin_interval(&mut self) {
         self.trials.clear();
-        self.votes.clear();
+        self.begin_epoch();
         self.owed += self.fraction;
         self.chosen = self.fraction > 0.0 && self.owed >= 1.0;
         if self.chosen {
@@ -88,17 +101,27 @@ impl Twice {
         }
     }
 
-    /// An epoch begins: votes of the one before are forgotten.
-    pub(super) fn begin_epoch(&mut self) {
-        self.votes.clear();
+    /// A state is written for the user.
+    pub(super) fn note_state(&mut self, state: &GlobalState) {
+        if self.chosen {
+            put_state(state, &mut self.states);
+        }
     }
 
-    /// Who takes which position, of the workers that there are: where an interval is taken again, others than before.
-    pub(super) fn exchange(&self, alive: Vec<usize>) -> Vec<usize> {
+    /// An epoch begins: votes and states of the one before are forgotten.
+    pub(super) fn begin_epoch(&mut self) {
+        self.votes.clear();
+        self.states.reset();
+    }
+
+    /// Who takes which position, of the workers that there are: where an interval is taken again, others than before. Where workers have come
+    /// or gone since, it is begun anew, for of sub-domains that were cut otherwise nobody can say that each is another worker's.
+    pub(super) fn exchange(&mut self, alive: Vec<usize>) -> Vec<usize> {
         let Some(first) = self.trials.first() else { return alive };
         let mut before = first.at_work.clone();
         before.sort_unstable();
         if before != alive {
+            self.trials.clear();
             return alive;
         }
         let n = alive.len();
@@ -209,26 +232,71 @@ impl Job {
         }
     }
 
-    /// Hash of the state that an interval came to, of the rows on its way, and of what the next cycle begins with.
+    /// Plants a bug: of two computations of an interval the positions at the end are all that is compared. For tests of who finds it.
+    #[doc(hidden)]
+    pub fn plant_narrow_sum(&mut self) {
+        self.twice.narrow = true;
+    }
+
+    /// Hash of all that an interval came to.
     fn sum_of_interval(&self, stopped: &Stopped) -> Result<[u8; 32], Error> {
         let Stopped { state, vote, .. } = stopped;
+        if self.twice.narrow {
+            let positions = state.x.iter().flatten().flat_map(|x| x.to_le_bytes());
+            return Ok(*blake3::hash(&positions.collect::<Vec<u8>>()).as_bytes());
+        }
         let rest = self.rest_at(state.cycle, vote.clone())?;
         let first = self.checkpoints.newest().continuation.n_rows.min(self.account.rows.len());
-        let rows: Vec<_> = self.account.rows[first..].iter().map(|row| &**row).collect();
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(mechanics::digest::digest(state).as_bytes());
-        for number in state.contact.iter().flatten() {
-            hasher.update(&(number + 0.0).to_le_bytes());
-        }
-        let whole = (&self.account.failure, rows, rest.dt_previous, rest.dt);
-        protocol::codec::encode_into(&whole, &mut hasher).map_err(|e| Error::Unencoded(e.to_string()))?;
-        Ok(*hasher.finalize().as_bytes())
+        let way = Way {
+            states: &self.twice.states,
+            rows: &self.account.rows[first..],
+            failure: self.account.failure.as_deref(),
+        };
+        sum_of(&way, state, &rest).map_err(|e| Error::Unencoded(e.to_string()))
+    }
+}
+
+/// What an interval wrote and said on its way.
+struct Way<'a> {
+    /// Of the states that were written.
+    states: &'a blake3::Hasher,
+    rows: &'a [Arc<HistoryRow>],
+    failure: Option<&'a str>,
+}
+
+/// Hash of the state that an interval came to, of what it wrote on its way, and of all that the next cycle begins with.
+///
+/// # Errors
+/// If something cannot be encoded.
+fn sum_of(way: &Way<'_>, state: &GlobalState, rest: &Continuation) -> protocol::Result<[u8; 32]> {
+    let mut hasher = blake3::Hasher::new();
+    put_state(state, &mut hasher);
+    hasher.update(way.states.finalize().as_bytes());
+    let rows: Vec<&HistoryRow> = way.rows.iter().map(|row| &**row).collect();
+    // How fast bodies move against each other says when to sort, which no bit depends on, and follows from when that was done before.
+    let Continuation { dt_previous, dt, quanta, vote, walls, run_totals, n_rows, spread_rate: _ } = rest;
+    codec::encode_into(&(way.failure, rows, dt_previous, dt, quanta, walls), &mut hasher)?;
+    codec::encode_into(&(run_totals, n_rows), &mut hasher)?;
+    // The same goes for displacements since that sort, and for the pairs that it listed.
+    let vote = vote.clone().map(|vote| Vote { pairs: 0, extents: Vec::new(), ..vote });
+    codec::encode_into(&vote, &mut hasher)?;
+    Ok(*hasher.finalize().as_bytes())
+}
+
+/// Of all numbers of a state that a cycle changes.
+fn put_state(state: &GlobalState, hasher: &mut blake3::Hasher) {
+    hasher.update(digest(state).as_bytes());
+    for number in state.contact.iter().flatten() {
+        // Zeros of both signs are one number.
+        hasher.update(&(number + 0.0).to_le_bytes());
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use mechanics::{exact::Quantum, wall::Pose};
+
+    use super::{super::tests::job, *};
 
     fn trial(at_work: &[usize], sum: u8) -> Trial {
         let speeds = vec![1.0; at_work.len()];
@@ -258,6 +326,20 @@ mod tests {
     }
 
     #[test]
+    fn computations_by_workers_of_whom_one_is_gone_are_forgotten() {
+        let mut twice = Twice::new(1.0, &[0; 32]);
+        assert!(matches!(twice.judge(trial(&[0, 1, 2], 7)), Judgement::Again));
+        assert_eq!(twice.exchange(vec![0, 1, 2]), [1, 2, 0]);
+        assert_eq!((twice.exchange(vec![0, 2]), twice.until()), (vec![0, 2], None));
+        assert!(
+            matches!(twice.judge(trial(&[0, 2], 7)), Judgement::Again),
+            "the first computed sub-domains of others"
+        );
+        assert_eq!(twice.exchange(vec![0, 2]), [2, 0]);
+        assert!(matches!(twice.judge(trial(&[2, 0], 7)), Judgement::Agreed(wrong, _) if wrong.is_empty()));
+    }
+
+    #[test]
     fn of_three_computations_the_one_that_differs_is_wrong() {
         let mut twice = Twice::new(1.0, &[0; 32]);
         assert!(matches!(twice.judge(trial(&[0, 1, 2], 7)), Judgement::Again));
@@ -268,6 +350,58 @@ mod tests {
             }
             _ => panic!("two agree"),
         }
+    }
+
+    /// What a sum is made of.
+    struct Parts {
+        state: GlobalState,
+        rest: Continuation,
+        vote: Vote,
+        twice: Twice,
+    }
+
+    #[test]
+    fn all_that_is_written_or_gone_on_with_is_in_the_sum_and_when_to_sort_is_not() {
+        let (job, _) = job(2);
+        let checkpoint = job.checkpoints.newest();
+        let sum_with = |change: &dyn Fn(&mut Parts)| {
+            let mut parts = Parts {
+                state: GlobalState::clone(&checkpoint.state),
+                rest: checkpoint.continuation.clone(),
+                vote: Vote::empty(2),
+                twice: Twice::new(1.0, &[0; 32]),
+            };
+            change(&mut parts);
+            let Parts { state, rest, vote, twice } = parts;
+            let way = Way { states: &twice.states, rows: &[], failure: None };
+            sum_of(&way, &state, &Continuation { vote: Some(vote), ..rest }).expect("numbers")
+        };
+        let plain = sum_with(&|_| {});
+        let others = [
+            sum_with(&|parts| parts.state.v[3][1] = f64::MIN_POSITIVE),
+            sum_with(&|parts| parts.rest.dt = Some(1.0)),
+            sum_with(&|parts| parts.rest.quanta[1] = Quantum::for_reference(1e9, 42)),
+            sum_with(&|parts| parts.rest.run_totals.friction = f64::MIN_POSITIVE),
+            sum_with(&|parts| parts.rest.run_totals.worst_penetration = 0.5),
+            sum_with(&|parts| parts.rest.walls.push(Pose::default())),
+            sum_with(&|parts| parts.vote.courant = 1.0),
+            sum_with(&|parts| parts.vote.bodies.push(mechanics::rigid::State::default())),
+            sum_with(&|parts| parts.vote.gauges.push((0, [0.0; 6]))),
+            sum_with(&|parts| parts.twice.note_state(&parts.state)),
+        ];
+        for (at, other) in others.iter().enumerate() {
+            assert_ne!(*other, plain, "change {at}");
+            assert!(others[..at].iter().all(|before| before != other), "change {at} is as one before");
+        }
+        let same = [
+            sum_with(&|parts| parts.rest.spread_rate = 1.0),
+            sum_with(&|parts| (parts.vote.pairs, parts.vote.extents) = (9, Vec::new())),
+            sum_with(&|parts| {
+                parts.twice.note_state(&parts.state);
+                parts.twice.begin_epoch();
+            }),
+        ];
+        assert_eq!(same, [plain; 3]);
     }
 
     #[test]

@@ -13,7 +13,13 @@ use std::{
     time::Instant,
 };
 
-use tests::faults::{self, Scene};
+use tests::{
+    faults::{self, Scene},
+    seeds::flips::{self, Campaign},
+};
+
+/// Tries of single bits in memory, in one process.
+const FLIPS: u64 = 100;
 
 struct Asked {
     bolide: PathBuf,
@@ -110,6 +116,11 @@ fn play() -> Result<usize, String> {
             write(&asked, &format!("{text}{table}"))?;
         }
         text += &format!("\n## {name}, {} cycles\n\n{}", scene.cycles, faults::table(&rows));
+    }
+    if asked.only.is_none() {
+        let tries = Campaign::new().play_all(0..FLIPS);
+        different += tries.last().map_or(0, |tries| tries.iter().filter(|each| each.is_wrong()).count());
+        text += &flips::section(&tries);
     }
     let minutes = started.elapsed().as_secs_f64() / 60.0;
     text += &format!("\n{different} failed; {minutes:.1} minutes in all.\n");

@@ -1,19 +1,25 @@
-//! Plays many seeds of the world that goes wrong: `cargo run --release -p tests --bin seeds -- [COUNT [FIRST [unfenced]]]`.
+//! Plays many seeds of the world that goes wrong: `cargo run --release -p tests --bin seeds -- [COUNT [FIRST [BUG]]]`.
 //!
 //! 10,000 seeds from 0 unless said otherwise. Prints how many, how long, what happened; a seed that goes wrong is printed
-//! with its plot, and the program ends with failure. One seed again: `seeds -- 1 SEED`. With `unfenced` the master has a
-//! planted bug (it hears messages of epochs that are over), which some of the seeds must find.
+//! with its plot, and the program ends with failure. One seed again: `seeds -- 1 SEED`. With BUG the master has a planted one, which some of
+//! the seeds must find: `unfenced`, it hears messages of epochs that are over; `narrow`, it compares of two computations of an interval
+//! the positions at the end and nothing else.
 
 use std::{process::ExitCode, time::Instant};
 
-use tests::seeds::Stage;
+use tests::seeds::{Bug, Stage};
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |at: usize, default: u64| arguments.get(at).map_or(Ok(default), |text| text.parse::<u64>());
-    let planted = arguments.get(2).map(String::as_str);
-    let (Ok(count), Ok(first), None | Some("unfenced")) = (number(0, 10_000), number(1, 0), planted) else {
-        eprintln!("seeds: expected COUNT and FIRST, two numbers, and `unfenced` or nothing");
+    let bug = match arguments.get(2).map(String::as_str) {
+        None => Ok(None),
+        Some("unfenced") => Ok(Some(Bug::Unfenced)),
+        Some("narrow") => Ok(Some(Bug::Narrow)),
+        Some(other) => Err(other),
+    };
+    let (Ok(count), Ok(first), Ok(bug)) = (number(0, 10_000), number(1, 0), bug) else {
+        eprintln!("seeds: expected COUNT and FIRST, two numbers, and `unfenced`, `narrow` or nothing");
         return ExitCode::from(2);
     };
     // One thread: what a seed does may not depend on another.
@@ -27,8 +33,7 @@ fn main() -> ExitCode {
         let stage = Stage::new();
         let (mut wrong, mut happened, mut lost) = (0_u64, 0, 0);
         for seed in first..first + count {
-            let played = if planted.is_some() { stage.play_unfenced(seed) } else { stage.play(seed) };
-            match played {
+            match stage.play(seed, bug) {
                 Ok(played) => {
                     happened += played.count;
                     lost += played.solved.outcome.losses.len();
@@ -44,6 +49,6 @@ fn main() -> ExitCode {
             started.elapsed().as_secs_f64()
         );
         // A planted bug that nobody finds is the failure.
-        if (wrong == 0) == planted.is_none() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+        if (wrong == 0) == bug.is_none() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
     })
 }

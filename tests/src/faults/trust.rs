@@ -161,6 +161,21 @@ pub fn cases() -> Vec<Case> {
             seen.note = line.split("is dropped: ").nth(1).unwrap_or_default().to_owned();
             seen
         }),
+        case("a bit flipped in a worker's memory, --verify 1", 1, |scene, _| {
+            let mut cluster = scene.cluster(&[], None, &[]);
+            cluster.worker("a", "1");
+            cluster.worker("b", "1");
+            cluster.worker_that_fails("c", "flip:100");
+            let running = scene.submit_asking(cluster, &["--verify", "1"]);
+            running.wait_for_cycle(1);
+            let summary = scene.end(&running);
+            let warnings = summary["warnings"].as_array().expect("warnings");
+            let note = warnings
+                .iter()
+                .filter_map(serde_json::Value::as_str)
+                .find(|note| note.contains("was wrong and is not"));
+            Seen { cycles_lost: Some(0), note: note.expect("it is found").to_owned(), ..Seen::default() }
+        }),
         case("200 connections that say nothing or garbage", 1, |scene, _| {
             let running = begin(scene, |_| {});
             running.wait_for_cycle(1);

@@ -6,8 +6,8 @@ use deck::Model;
 use master::options::{CheckpointEvery, SessionOptions};
 use protocol::options::{JobOptions, Route};
 
-use super::{Draws, Played, play, seen};
-use crate::{bits::Fingerprint, solve::model};
+use super::{Draws, Flip, Played, Seen, play};
+use crate::solve::model;
 
 /// One thing that goes wrong. Hosts are picked among those alive by a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +38,8 @@ pub enum Fault {
     },
     /// From now on a host's elements are wrong by one unit in the last place.
     Spoil { host: u64 },
+    /// A bit flips in a host's memory.
+    Flip(Flip),
     /// A worker comes.
     Join,
     /// The master is gone, and starts anew from the disk.
@@ -55,14 +57,28 @@ pub struct Plot {
     pub snapshot_at: Option<u64>,
     /// Latest first.
     faults: Vec<(u64, Fault)>,
-    /// A planted fault: messages of epochs that are over reach the master as if they were of now.
-    pub(super) unfenced: bool,
+    /// A planted bug of the master.
+    pub(super) bug: Option<Bug>,
+}
+
+/// A bug that is planted in the master, for seeds to find.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bug {
+    /// Messages of epochs that are over reach it as if they were of now.
+    Unfenced,
+    /// What it compares of two computations of an interval is the positions at its end and nothing else.
+    Narrow,
 }
 
 impl Plot {
     /// Nothing goes wrong.
     pub fn quiet(workers: usize) -> Self {
         Self { workers, ..Self::default() }
+    }
+
+    /// One thing goes wrong, before this happening.
+    pub fn of(workers: usize, at: u64, fault: Fault) -> Self {
+        Self { faults: vec![(at, fault)], ..Self::quiet(workers) }
     }
 
     /// The fault that is due, if one is.
@@ -77,15 +93,15 @@ impl Plot {
 
 /// The problem, the answer, and how many things happen on the way to it.
 pub struct Stage {
-    model: Arc<Model>,
-    answer: (Fingerprint, Vec<(u64, u64)>),
+    pub(super) model: Arc<Model>,
+    pub(super) answer: Seen,
     length: u64,
 }
 
-/// Two small blocks that collide askew on a wall of finite mass, a plate of shells behind them, with friction and a gauge: a
-/// few cells, many cycles.
+/// Two small blocks that collide askew on a wall of finite mass, a plate of shells behind them, sand beside them, with friction, elastic
+/// hourglass control and a gauge: a few cells, many cycles, and numbers of every kind that a worker can hold.
 const DECK: &str = r#"
-    title = "two small blocks"
+    title = "small blocks"
     units = "cm-g-us"
     [control]
     end_cycle = 60
@@ -96,6 +112,12 @@ const DECK: &str = r#"
     name = "target"
     material = "AL_2024_T351"
     box = { origin = [0, 0, 0], size = [4, 3, 2], cells = [4, 3, 2] }
+    hourglass = { kind = "assumed-strain", coefficient = 1.0 }
+    [[part]]
+    name = "sand"
+    material = "SAND"
+    velocity = [-0.03, 0, 0]
+    box = { origin = [4.2, 0.6, 0.3], size = [2, 2, 1], cells = [2, 2, 1] }
     [[part]]
     name = "projectile"
     material = "STEEL_1006"
@@ -107,6 +129,17 @@ const DECK: &str = r#"
     velocity = [0, 0, -0.14]
     shell = { thickness = 0.3 }
     plate = { origin = [1.2, 0.8, 3.4], side_i = [2, 0.1, 0], side_j = [0, 2, 0.1], cells = [2, 3] }
+    [[material]]
+    name = "SAND"
+    density = 1.8
+    eos = { type = "linear", bulk = 0.03 }
+    [material.strength]
+    type = "soil-foam"
+    shear = 6e-4
+    unloading = 0.03
+    a0 = 1e-8
+    a2 = 0.3
+    points = [[0, 0], [0.05, 1e-4], [0.2, 1e-3]]
     [contact]
     gap_length = 0.15
     friction = 0.1
@@ -125,7 +158,7 @@ const DECK: &str = r#"
     point = [2, 1, 2]
 "#;
 
-fn options(route: Route) -> SessionOptions {
+pub(super) fn options(route: Route) -> SessionOptions {
     let asked = JobOptions { route: Some(route), sort_seed: Some(11), ..JobOptions::default() };
     SessionOptions { asked, waits: true, replay: true, ..SessionOptions::default() }
 }
@@ -137,13 +170,13 @@ impl Stage {
     /// If that fails, or has no contact.
     pub fn new() -> Self {
         let model = Arc::new(model(DECK));
-        let Played { solved, count } = match play(&model, &options(Route::Master), 0, Plot::quiet(3)) {
+        let Played { solved, count, .. } = match play(&model, &options(Route::Master), 0, Plot::quiet(3)) {
             Ok(played) => played,
             Err(why) => panic!("the undisturbed run: {why}"),
         };
         assert!(solved.outcome.run_totals.worst_penetration > 0.0, "no contact");
         assert!(solved.states.len() > 3 && solved.rows.len() > 15, "{} states", solved.states.len());
-        Self { model, answer: seen(&solved), length: count }
+        Self { model, answer: Seen::of(&solved), length: count }
     }
 
     pub fn plot(&self, seed: u64) -> (Plot, SessionOptions) {
@@ -164,7 +197,7 @@ impl Stage {
                 // In one case of three close behind the one before: in its rollback.
                 at = if draws.below(3) == 0 { at + draws.below(40) } else { draws.below(length) };
                 let (host, other) = (draws.below(64), draws.below(64));
-                let fault = match draws.below(16) {
+                let fault = match draws.below(18) {
                     0..=3 => Fault::Crash { host, returns: true },
                     4 | 5 => Fault::Crash { host, returns: false },
                     6 => Fault::Cut { host, long: false },
@@ -173,6 +206,7 @@ impl Stage {
                     11 => Fault::Slow { host, factor: 2 + draws.below(30) },
                     12 => Fault::Spoil { host },
                     13 | 14 => Fault::Join,
+                    15 | 16 => Fault::Flip(Flip::draw(&mut draws)),
                     _ if host < 32 => Fault::Master,
                     _ => Fault::Leave,
                 };
@@ -181,35 +215,35 @@ impl Stage {
             .collect();
         faults.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
         let store = draws.below(2) == 0;
-        (
-            Plot { snapshot_at, faults, ..Plot::quiet(workers) },
-            SessionOptions { keep, store, ..options(route) },
-        )
+        // One bit flips at most, and then all is computed twice.
+        let is_flip = |fault: &Fault| matches!(fault, Fault::Flip(_));
+        let mut flips = 0;
+        faults.retain(|(_, fault)| {
+            flips += u32::from(is_flip(fault));
+            flips <= 1 || !is_flip(fault)
+        });
+        let sometimes = [0.0, 0.0, 0.5, 1.0][draws.below(4) as usize];
+        let mut options = SessionOptions { keep, store, ..options(route) };
+        options.asked.verify = if flips > 0 { 1.0 } else { sometimes };
+        (Plot { snapshot_at, faults, ..Plot::quiet(workers) }, options)
     }
 
-    /// Plays a seed; gives what it took, or how it went wrong, with the seed and its plot.
+    /// Plays a seed; gives what it took, or how it went wrong, with the seed and its plot. A bug of the master may be planted.
     ///
     /// # Errors
     /// As said.
-    pub fn play(&self, seed: u64) -> Result<Played, String> {
-        self.perform(seed, false)
-    }
-
-    /// The same with a bug: the master hears messages of epochs that are over.
-    ///
-    /// # Errors
-    /// Where the bug shows.
-    pub fn play_unfenced(&self, seed: u64) -> Result<Played, String> {
-        self.perform(seed, true)
-    }
-
-    fn perform(&self, seed: u64, unfenced: bool) -> Result<Played, String> {
+    pub fn play(&self, seed: u64, bug: Option<Bug>) -> Result<Played, String> {
         let (plot, options) = self.plot(seed);
-        let plot = Plot { unfenced, ..plot };
-        let told = format!("seed {seed}: {plot:?}, {:?}, {:?}", options.route(), options.keep);
+        let plot = Plot { bug, ..plot };
+        let told = format!(
+            "seed {seed}: {plot:?}, {:?}, {:?}, {}",
+            options.route(),
+            options.keep,
+            options.asked.verify
+        );
         let played = play(&self.model, &options, seed, plot).map_err(|why| format!("{told}: {why}"))?;
-        if seen(&played.solved) != self.answer {
-            let (ours, theirs) = (&self.answer.0.digest, &played.solved.outcome.digest);
+        if Seen::of(&played.solved) != self.answer {
+            let (ours, theirs) = (self.answer.digest(), &played.solved.outcome.digest);
             return Err(format!("{told}: another result than undisturbed, digest {theirs}, not {ours}"));
         }
         Ok(played)

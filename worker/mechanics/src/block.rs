@@ -15,6 +15,7 @@ use crate::{
         place::Nodal,
     },
     erosion::criteria::Criteria,
+    flip::Target,
     lanes::{SET, Width},
     material::Material,
     mesh::Topology,
@@ -266,6 +267,28 @@ impl Block {
         if let Some(stress) = self.group.first_stress() {
             *stress = stress.next_up();
         }
+    }
+
+    /// The numbers of this target, for tests that flip bits in them. What [`Target::Votes`] are, and contact keeps of nodes, is
+    /// not here.
+    pub(crate) fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {
+        let Self { x, v, f, mass, turning, group, .. } = self;
+        let mut numbers = group.numbers_mut(target);
+        match (target, turning) {
+            (Target::Positions, _) => numbers.extend(x.iter_mut().map(Vec::as_mut_slice)),
+            (Target::Velocities, _) => numbers.extend(v.iter_mut().map(Vec::as_mut_slice)),
+            (Target::Spins, Some(turning)) => numbers.extend(turning.w.iter_mut().map(Vec::as_mut_slice)),
+            (Target::Forces, turning) => {
+                let moments = turning.iter_mut().flat_map(|turning| &mut turning.m);
+                numbers.extend(f.iter_mut().chain(moments).map(Vec::as_mut_slice));
+            }
+            (Target::Constants, turning) => {
+                numbers.push(mass);
+                numbers.extend(turning.as_mut().map(|turning| turning.inertia.as_mut_slice()));
+            }
+            _ => {}
+        }
+        numbers
     }
 
     /// Sets all forces and moments to zero.

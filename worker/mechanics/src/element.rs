@@ -87,6 +87,12 @@ impl Default for ElementVote {
 }
 
 impl ElementVote {
+    /// Its numbers, for tests that flip bits in them.
+    pub(crate) fn numbers_mut(&mut self) -> [&mut f64; 6] {
+        let Self { courant, volume_limit, internal, hourglass, viscosity, force_bound, .. } = self;
+        [courant, volume_limit, internal, hourglass, viscosity, force_bound]
+    }
+
     /// Joins the vote of other elements. Votes may be joined in any order.
     pub fn merge(&mut self, other: &ElementVote) {
         self.offer_courant(other.courant, other.courant_element);

@@ -98,6 +98,11 @@ pub(crate) struct Eroding {
 }
 
 impl Eroding {
+    /// Incremental strain by slot, for tests that flip bits in it.
+    pub(crate) fn strain_mut(&mut self) -> &mut [f64] {
+        &mut self.strain
+    }
+
     /// The erosion of a block whose piece carried `state`; elements that have eroded are taken out of the block. A part without
     /// criteria has nothing to watch, and none of its elements has eroded.
     pub(crate) fn new(

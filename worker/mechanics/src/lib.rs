@@ -33,6 +33,8 @@ mod eos;
 pub mod erosion;
 pub mod exact;
 mod failure;
+#[doc(hidden)]
+pub mod flip;
 pub mod initial;
 pub mod lanes;
 pub mod law;

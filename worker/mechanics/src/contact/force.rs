@@ -205,6 +205,14 @@ pub struct ContactVote {
     pub hits: u64,
 }
 
+impl ContactVote {
+    /// Its numbers, for tests that flip bits in them.
+    pub(crate) fn numbers_mut(&mut self) -> [&mut f64; 5] {
+        let Self { energy, friction, worst_depth, dt, force_bound, .. } = self;
+        [energy, friction, worst_depth, dt, force_bound]
+    }
+}
+
 impl Default for ContactVote {
     fn default() -> Self {
         Self {

@@ -73,6 +73,11 @@ impl History {
         &mut self.after[self.n * node..self.n * (node + 1)]
     }
 
+    /// Those at the start and at the end of the cycle, for tests that flip bits in them.
+    pub(crate) fn numbers_mut(&mut self) -> [&mut [f64]; 2] {
+        [&mut self.before, &mut self.after]
+    }
+
     /// Nothing has been computed in this cycle.
     pub(super) fn clear(&mut self) {
         self.after.fill(0.0);

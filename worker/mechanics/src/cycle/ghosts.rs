@@ -1,6 +1,7 @@
 //! Nodes that other workers bring.
 
 use crate::{
+    flip::Target,
     lanes::Width,
     nodes::{Advance, NodeSet, Nodes},
     wall::WallVote,
@@ -23,6 +24,19 @@ pub(super) struct Ghosts {
 }
 
 impl Ghosts {
+    /// The numbers of this target, for tests that flip bits in them.
+    pub fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {
+        let arrays = match target {
+            Target::Positions => self.x.as_mut_slice(),
+            Target::Velocities => &mut self.v,
+            Target::Forces => &mut self.f,
+            Target::Constants => std::slice::from_mut(&mut self.mass),
+            Target::History => &mut self.contact_history,
+            _ => &mut [],
+        };
+        arrays.iter_mut().map(Vec::as_mut_slice).collect()
+    }
+
     /// Integrates them. What they give walls goes to `unbooked`: their owners book it.
     pub fn integrate(&mut self, advance: &Advance<'_>, unbooked: &mut [WallVote], width: Width) {
         let mut nodes = Nodes {

@@ -3,7 +3,11 @@
 use rayon::prelude::*;
 
 use super::{Domain, Meter, deal::deal, held_block::HeldBlock};
-use crate::piece::Piece;
+use crate::{
+    erosion::Eroding,
+    flip::{Target, flip_bit},
+    piece::Piece,
+};
 
 impl Domain {
     /// Position, velocity and contact history of `nodes` (global), for workers that will have them as ghosts.
@@ -80,16 +84,25 @@ impl Domain {
         self.held_blocks.iter_mut().for_each(|held_block| held_block.block.plant_fault());
     }
 
-    /// Flips one bit of a velocity of a node: what a particle does to memory. For tests of who finds it.
+    /// Flips a bit (modulo 64) of a number of this target, at `place` (modulo their count): what a particle does. Gives whether
+    /// there is such a number. For tests of who finds it.
     #[doc(hidden)]
-    pub fn flip(&mut self, place: u64, bit: u32) {
-        let blocks = self.held_blocks.len().max(1) as u64;
-        let Some(held_block) = self.held_blocks.get_mut((place % blocks) as usize) else { return };
-        let block = &mut held_block.block;
-        let (place, n) = (place / blocks, block.nodes.len().max(1) as u64);
-        let numbers = if place.is_multiple_of(2) { &mut block.v } else { &mut block.x };
-        let number = &mut numbers[(place / 2 % 3) as usize][(place / 6 % n) as usize];
-        *number = f64::from_bits(number.to_bits() ^ 1 << (bit % 64));
+    pub fn flip_bit(&mut self, target: Target, place: u64, bit: u32) -> bool {
+        let mut numbers = Vec::new();
+        for held_block in &mut self.held_blocks {
+            let HeldBlock { block, contact_history, vote, reference, eroding, .. } = held_block;
+            numbers.extend(block.numbers_mut(target));
+            match target {
+                Target::Positions => numbers.extend(reference.iter_mut().map(Vec::as_mut_slice)),
+                Target::Elements => numbers.extend(eroding.as_mut().map(Eroding::strain_mut)),
+                Target::History => numbers.extend(contact_history.iter_mut().map(Vec::as_mut_slice)),
+                Target::Votes => numbers.extend(vote.numbers_mut().map(std::slice::from_mut)),
+                _ => {}
+            }
+        }
+        numbers.extend(self.ghosts.numbers_mut(target));
+        numbers.extend(self.contact.iter_mut().flat_map(|held| held.numbers_mut(target)));
+        flip_bit(numbers, place, bit)
     }
 
     /// [`Domain::pieces`] of a domain that is not needed any more: it goes as they come.

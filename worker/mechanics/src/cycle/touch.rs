@@ -13,6 +13,7 @@ use crate::{
     contact::{Batch, Contact, ContactVote, Cut, PairEnergies, Settings, Share},
     copy_index::CopyIndex,
     exact::Quanta,
+    flip::Target,
     lanes::Width,
 };
 
@@ -108,6 +109,19 @@ impl HeldContact {
             vote: ContactVote::default(),
             led: Vec::new(),
         })
+    }
+
+    /// The numbers of this target, for tests that flip bits in them.
+    pub fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {
+        let by_axis = match target {
+            Target::Positions => self.x.as_mut_slice(),
+            Target::Velocities => &mut self.v,
+            Target::Forces => &mut self.f,
+            Target::History => return self.contact.history.numbers_mut().into(),
+            Target::Votes => return self.vote.numbers_mut().map(std::slice::from_mut).into(),
+            _ => &mut [],
+        };
+        by_axis.iter_mut().map(Vec::as_mut_slice).collect()
     }
 
     /// Computes the forces at the positions as of now.

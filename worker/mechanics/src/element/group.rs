@@ -7,7 +7,10 @@
 use std::ops::Range;
 
 use super::{ElementVote, Step, layout::Layout, place::Nodal};
-use crate::{erosion::criteria::Criteria, lanes::Width, material::Material, spin::Turning, state::N_FIELDS};
+use crate::{
+    erosion::criteria::Criteria, flip::Target, lanes::Width, material::Material, spin::Turning,
+    state::N_FIELDS,
+};
 
 /// Stands for the global element index in a slot without an element.
 pub(crate) const PHANTOM: u32 = u32::MAX;
@@ -114,4 +117,7 @@ pub(crate) trait Group: Send + Sync {
 
     /// A number of the stress of the first element, for tests that change it; none without elements.
     fn first_stress(&mut self) -> Option<&mut f64>;
+
+    /// The arrays of numbers of this target, for tests that flip bits in them.
+    fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]>;
 }

@@ -12,6 +12,7 @@ use super::{
     place::Nodal,
 };
 use crate::{
+    flip::Target,
     lanes::{SET, scalar::Scalar},
     material::Material,
     mesh::spread,
@@ -279,5 +280,13 @@ impl Group for Trusses {
 
     fn first_stress(&mut self) -> Option<&mut f64> {
         self.fields[field::PRESSURE].first_mut()
+    }
+
+    fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {
+        match target {
+            Target::Constants => vec![&mut self.initial_volume],
+            Target::Elements => self.fields.iter_mut().map(Vec::as_mut_slice).collect(),
+            _ => Vec::new(),
+        }
     }
 }

@@ -21,6 +21,7 @@ use crate::{
     },
     eos::AnyEos,
     failure::AnyFailure,
+    flip::Target,
     lanes::{Lane, SET, dispatch::Task},
     material::Material,
     piece::Piece,
@@ -254,5 +255,12 @@ impl Group for EightPoints {
 
     fn first_stress(&mut self) -> Option<&mut f64> {
         self.solids.first_stress()
+    }
+
+    fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {
+        match target {
+            Target::Layers => self.points.iter_mut().map(Vec::as_mut_slice).collect(),
+            _ => self.solids.numbers_mut(target),
+        }
     }
 }

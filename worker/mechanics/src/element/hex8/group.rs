@@ -14,6 +14,7 @@ use crate::{
         layout::{Corners, Layout, explicit, in_runs, structured},
         place::Nodal,
     },
+    flip::Target,
     lanes::{SET, scalar::Scalar},
     material::Material,
     mesh::Topology,
@@ -256,5 +257,15 @@ impl Group for Solids {
 
     fn first_stress(&mut self) -> Option<&mut f64> {
         self.slots.first().map(|&slot| &mut self.fields[PRESSURE][slot as usize])
+    }
+
+    fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {
+        match target {
+            Target::Constants => vec![&mut self.initial_volume],
+            Target::Elements => self.fields.iter_mut().map(Vec::as_mut_slice).collect(),
+            Target::Layers => self.hourglass.iter_mut().map(Vec::as_mut_slice).collect(),
+            Target::History => self.history.iter_mut().map(Vec::as_mut_slice).collect(),
+            _ => Vec::new(),
+        }
     }
 }

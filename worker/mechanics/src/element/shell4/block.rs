@@ -14,6 +14,7 @@ use crate::{
     },
     erosion::criteria::Criteria,
     exact::Quantum,
+    flip::Target,
     lanes::{SET, Width},
     material::Material,
     mesh::{Section, quad_area, twice},
@@ -332,6 +333,15 @@ impl Group for Core {
 
     fn first_stress(&mut self) -> Option<&mut f64> {
         self.layers.first_mut().and_then(|layer| layer.first_mut())
+    }
+
+    fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {
+        match target {
+            Target::Constants => vec![&mut self.initial_volume, &mut self.element_mass],
+            Target::Elements => self.state.iter_mut().map(Vec::as_mut_slice).collect(),
+            Target::Layers => self.layers.iter_mut().map(Vec::as_mut_slice).collect(),
+            _ => Vec::new(),
+        }
     }
 }
 
