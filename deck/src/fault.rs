@@ -128,7 +128,7 @@ impl<'a> Faults<'a> {
     }
 
     /// Line and column of a place, both from 1.
-    fn line_and_column(&self, at: Place) -> (u32, u32) {
+    pub(crate) fn line_and_column(&self, at: Place) -> (u32, u32) {
         match at {
             Place::Text(at) => self.place(at as usize),
             Place::Card { line, column, .. } => (line, u32::from(column)),

@@ -18,6 +18,7 @@ mod fields;
 mod material;
 mod members;
 mod mesh;
+mod mesh_alone;
 mod parameter;
 mod problem;
 mod property;
@@ -27,8 +28,10 @@ mod set;
 mod translate;
 mod unit;
 
+pub(crate) use mesh_alone::read_mesh;
 pub(crate) use parameter::evaluate;
 pub use unit::NAMES as UNIT_NAMES;
+pub(crate) use unit::name_of as units_of;
 
 use crate::{
     bundle::Bundle,

@@ -38,10 +38,10 @@ mod write;
 use bundle::{Bundle, Kind};
 use fault::Faults;
 use log::Log;
-use mesh_file::MeshFile;
+use mesh_file::{Format, MeshFile};
 use typed::{
     Deck,
-    mesh::{Mesh, Meshes, Source},
+    mesh::{Meshes, Source},
     part::Part,
 };
 
@@ -57,7 +57,7 @@ pub use table::{MAX_NAME, MAX_NUMBER};
 pub struct Reading {
     /// The checked problem.
     pub model: Model,
-    /// What is done otherwise than the deck says; TOML decks have none.
+    /// What is done otherwise than the deck and its meshes say.
     pub warnings: Vec<Warning>,
     /// Of each part the counts of cells of its block, in the order of `cells` in a TOML deck; empty of a part with another mesh.
     pub cells: Vec<Vec<u32>>,
@@ -78,7 +78,7 @@ pub fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
 /// # Errors
 /// As [`read`].
 pub fn read_at_most(text: &str, file_name: &str, most_elements: u64) -> Result<Model, Vec<Fault>> {
-    let bundle = Bundle::of(text, file_name)?;
+    let bundle = deck_of(text, file_name)?;
     let reading = match Kind::of(bundle.files[0].1) {
         Kind::Keyword => read_keyword(&bundle, MESH, most_elements).map(|whole| whole.reading),
         _ => read_toml(&bundle, most_elements),
@@ -91,11 +91,24 @@ pub fn read_at_most(text: &str, file_name: &str, most_elements: u64) -> Result<M
 /// # Errors
 /// As [`read`].
 pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
-    let bundle = Bundle::of(text, file_name)?;
+    let bundle = deck_of(text, file_name)?;
     match Kind::of(bundle.files[0].1) {
         Kind::Keyword => read_keyword(&bundle, MESH, MAX_ELEMENTS).map(|whole| whole.reading),
         _ => read_toml(&bundle, MAX_ELEMENTS),
     }
+}
+
+/// The files of a deck; a mesh of another program is none.
+fn deck_of<'a>(text: &'a str, file_name: &'a str) -> Result<Bundle<'a>, Vec<Fault>> {
+    let bundle = Bundle::of(text, file_name)?;
+    let (name, text) = bundle.files[0];
+    if Format::is_foreign_mesh(name, text) {
+        let faults = Faults::new(name, text);
+        let advice = format!("write one that names this mesh: bolide convert {name}");
+        faults.add(0, "a mesh", "a deck, with materials and times", advice);
+        return Err(faults.into_list());
+    }
+    Ok(bundle)
 }
 
 /// Name of the mesh of a keyword deck that is not written.
@@ -115,23 +128,18 @@ fn read_toml(bundle: &Bundle<'_>, most_elements: u64) -> Result<Reading, Vec<Fau
         &substituted
     };
     let log = Log::toml(name, text).with_most_elements(most_elements);
-    let mut of_meshes = Vec::new();
-    let mut meshes = Meshes::new();
-    for (path, text) in &bundle.files[1..] {
-        // The deck names its meshes as it sees them.
-        let folder = name.rsplit_once('/').map_or(String::new(), |(folder, _)| format!("{folder}/"));
-        let seen = path.strip_prefix(&folder).unwrap_or(path);
-        let mesh = mesh_file::parse(text, path).map_err(|faults| of_meshes.extend(faults));
-        meshes.insert(seen.to_string(), mesh.ok().map(Mesh::from));
-    }
     let deck = toml_deck::read(text, &log);
-    let model = deck.as_ref().and_then(|deck| make::model(deck, &meshes, &log));
-    let mut reading = conclude(model, deck.as_ref(), log, bundle);
-    if !of_meshes.is_empty() {
-        of_meshes.extend(reading.err().unwrap_or_default());
-        reading = Err(of_meshes);
+    let mut meshes = mesh_file::read_all(bundle, deck.as_ref(), &log);
+    let model = deck.as_ref().and_then(|deck| make::model(deck, &meshes.by_name, &log));
+    let reading = conclude(model, deck.as_ref(), log, bundle);
+    if !meshes.faults.is_empty() {
+        meshes.faults.extend(reading.err().unwrap_or_default());
+        return Err(meshes.faults);
     }
-    reading
+    reading.map(|mut reading| {
+        meshes.warnings.append(&mut reading.warnings);
+        Reading { warnings: meshes.warnings, ..reading }
+    })
 }
 
 /// A keyword deck that can run, as a typed deck too.
@@ -223,6 +231,40 @@ pub fn convert(text: &str, file_name: &str, mesh_name: &str) -> Result<Converted
     }
     let WholeKeyword { reading, deck, mesh } = read_keyword(&bundle, mesh_name, MAX_ELEMENTS)?;
     Ok(Converted { deck: write::text(&deck), mesh: mesh.text(), warnings: reading.warnings })
+}
+
+/// A TOML deck to start from.
+#[derive(Clone, Debug)]
+pub struct Start {
+    pub deck: String,
+    /// What is not taken over, and what is assumed.
+    pub warnings: Vec<Warning>,
+}
+
+/// Writes a TOML deck to start from for a mesh of another program, whose path from that deck is `mesh_name`. Materials and units are not
+/// those of the file: it runs, and its user is to choose them.
+///
+/// # Errors
+/// Every fault of the mesh.
+pub fn start_from_mesh(text: &str, file_name: &str, mesh_name: &str) -> Result<Start, Vec<Fault>> {
+    let bundle = Bundle::of(text, file_name)?;
+    let (name, mesh_text) = bundle.files[0];
+    let asked = bundle.options.units.as_deref();
+    let Some(units) =
+        keyword::units_of(asked).and_then(|name| units::SETS.iter().find(|set| set.name == name))
+    else {
+        let faults = Faults::new(name, mesh_text);
+        let read = format!("--units {}", asked.unwrap_or_default());
+        faults.add(0, read, format!("one of {UNIT_NAMES}"), "choose one of them");
+        return Err(faults.into_list());
+    };
+    let (mesh, mut warnings) = mesh_file::read(&bundle, 0)?;
+    if asked.is_none() {
+        let words = format!("a mesh does not say its units, {} is assumed; give --units", units.name);
+        warnings.push(Warning { file: name.to_string(), line: 1, words });
+    }
+    let title = mesh_name.rsplit('/').next().unwrap_or(mesh_name);
+    Ok(Start { deck: mesh_file::skeleton::text(&mesh, title, mesh_name, units), warnings })
 }
 
 /// Names of the library's materials.

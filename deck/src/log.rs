@@ -191,10 +191,7 @@ impl<'a> Log<'a> {
     pub(crate) fn into_lists(self) -> (Vec<Fault>, Vec<Warning>) {
         let mut warnings = self.warnings.into_inner();
         let ignored = self.ignored.into_inner();
-        let line = |at: &Place| match at {
-            Place::Card { line, .. } => *line,
-            Place::Text(_) => 1,
-        };
+        let line = |at: &Place| self.faults.line_and_column(*at).0;
         if let Some(first) = ignored.values().min() {
             let names: Vec<String> =
                 ignored.iter().map(|(name, at)| format!("*{name} (line {})", line(at))).collect();
@@ -206,7 +203,7 @@ impl<'a> Log<'a> {
             Place::Card { file, .. } => self.files.get(usize::from(*file)).copied().unwrap_or("deck"),
             Place::Text(_) => self.files.first().copied().unwrap_or("deck"),
         };
-        let warnings = warnings
+        let warnings: Vec<Warning> = warnings
             .into_iter()
             .map(|(at, words)| Warning { file: file(&at).to_string(), line: line(&at), words })
             .collect();

@@ -13,7 +13,8 @@ use crate::typed::{
     condition::{Parts, Region},
     contact::{Contact, Gap, Slack},
 };
-use value::{Text, list, names, quoted, vector};
+pub(crate) use value::quoted;
+use value::{Text, list, names, vector};
 
 pub(crate) fn text(deck: &Deck) -> String {
     let mut text = Text::default();

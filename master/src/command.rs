@@ -153,12 +153,12 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Draw a state of a results folder as a PNG, coloured by a field
     Picture(PictureArgs),
-    /// Write an LS-DYNA keyword deck as a TOML deck, with its mesh in a file beside it
+    /// Write an LS-DYNA keyword deck as a TOML deck with its mesh beside it, or a TOML deck to start from for a mesh
     Convert {
-        /// The keyword deck
+        /// The keyword deck, or a mesh: Gmsh (.msh), Abaqus (.inp), Nastran (.bdf, .nas, .dat, .fem)
         deck: PathBuf,
-        /// The TOML deck to write; the mesh goes beside it, ending in .mesh
-        to: PathBuf,
+        /// The TOML deck to write; the mesh of a keyword deck goes beside it, ending in .mesh [default: <DECK>.toml]
+        to: Option<PathBuf>,
         /// Replace files that are there
         #[arg(long)]
         force: bool,

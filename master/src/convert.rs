@@ -1,26 +1,65 @@
-//! CONVERT: `bolide convert`, an LS-DYNA keyword deck as a TOML deck with its mesh in a file beside it.
+//! CONVERT: `bolide convert`, an LS-DYNA keyword deck as a TOML deck with its mesh in a file beside it; of a mesh of another program a TOML
+//! deck to start from, which names the mesh where it is.
 
 use std::{fs, path::Path, process::ExitCode};
 
-use deck::bundle::Options;
+use deck::{bundle::Options, mesh_file::Format};
 
 use crate::deck_file::{self, gather_deck, warn};
 
-/// Writes `to` and its mesh.
+/// Writes `to`, by default the name of the deck with the ending .toml, and of a keyword deck its mesh.
 ///
 /// # Errors
 /// Faults of the deck, or files that cannot be written.
-pub fn run(deck: &Path, to: &Path, force: bool, options: &Options) -> Result<ExitCode, String> {
+pub fn run(deck: &Path, to: Option<&Path>, force: bool, options: &Options) -> Result<ExitCode, String> {
+    let beside = deck.with_extension("toml");
+    let to = to.unwrap_or(&beside);
     let text = gather_deck(deck, options)?;
+    // Options make a bundle of one file too, which holds the text of the file.
+    match Format::is_foreign_mesh(&deck.display().to_string(), &text) {
+        true => start(deck, &text, to, force),
+        false => convert(deck, &text, to, force),
+    }
+}
+
+/// Writes a deck to start from for a mesh.
+fn start(mesh: &Path, text: &str, to: &Path, force: bool) -> Result<ExitCode, String> {
+    may_write(to, force)?;
+    // The deck names the mesh as seen from its own folder.
+    let folder =
+        |path: &Path| path.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
+    let seen = match (folder(mesh) == folder(to), mesh.file_name()) {
+        (true, Some(name)) => name.into(),
+        _ => fs::canonicalize(mesh).map_err(|e| format!("{}: {e}", mesh.display()))?,
+    };
+    let written = deck::start_from_mesh(text, &mesh.display().to_string(), &seen.display().to_string())
+        .map_err(|faults| deck_file::Error::of_faults(faults.iter().map(ToString::to_string)))?;
+    warn(&written.warnings);
+    fs::write(to, &written.deck).map_err(|e| format!("{}: {e}", to.display()))?;
+    println!(
+        "wrote {}: choose materials, supports and velocities there, then bolide run {}",
+        to.display(),
+        to.display()
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+fn may_write(path: &Path, force: bool) -> Result<(), String> {
+    if path.exists() && !force {
+        return Err(format!("{}: is there already; name another, or give --force", path.display()));
+    }
+    Ok(())
+}
+
+/// Writes a keyword deck as a TOML deck, with its mesh beside it.
+fn convert(deck: &Path, text: &str, to: &Path, force: bool) -> Result<ExitCode, String> {
     let mesh = to.with_extension("mesh");
     let name = mesh.file_name().and_then(|name| name.to_str());
     let name = name.ok_or_else(|| format!("{}: a file name is needed, such as model.toml", to.display()))?;
     for path in [to, &mesh] {
-        if path.exists() && !force {
-            return Err(format!("{}: is there already; name another, or give --force", path.display()));
-        }
+        may_write(path, force)?;
     }
-    let converted = deck::convert(&text, &deck.display().to_string(), name)
+    let converted = deck::convert(text, &deck.display().to_string(), name)
         .map_err(|faults| deck_file::Error::of_faults(faults.iter().map(ToString::to_string)))?;
     warn(&converted.warnings);
     for (path, text) in [(&*mesh, &converted.mesh), (to, &converted.deck)] {

@@ -69,7 +69,9 @@ pub fn main(compute: Compute) -> ExitCode {
             .map_err(|e| e.to_string())
             .and_then(|schema| print(&schema))
             .map(|()| ExitCode::SUCCESS),
-        Command::Convert { deck, to, force, reading } => convert::run(&deck, &to, force, &reading.options()),
+        Command::Convert { deck, to, force, reading } => {
+            convert::run(&deck, to.as_deref(), force, &reading.options())
+        }
         Command::Verify(args) => verify::run(&args),
         Command::Picture(args) => picture::run(&args),
         Command::Materials(args) => materials::run(&args),

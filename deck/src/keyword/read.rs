@@ -1,6 +1,8 @@
 //! Blocks of cards become a problem: this knows every keyword. What is read and cannot be honoured is a fault at its line;
 //! what changes nothing here goes into one warning.
 
+use std::collections::BTreeMap;
+
 use super::{
     blast::Blasts,
     cards::{Block, Lines},
@@ -13,7 +15,7 @@ use super::{
     property,
     rigid::RigidCards,
 };
-use crate::log::Log;
+use crate::{log::Log, place::Place};
 
 /// Keywords of several sections, each with a heading of its own where the keyword ends in `_TITLE`; and the cards of a
 /// section.
@@ -52,6 +54,47 @@ pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
         keyword(&mut problem, block, &context);
     }
     problem
+}
+
+/// Whether a keyword belongs to a mesh alone.
+fn is_of_mesh(word: &str) -> bool {
+    const WORDS: [&str; 10] = [
+        "KEYWORD",
+        "KEYWORD_ID",
+        "COMMENT",
+        "TITLE",
+        "NODE",
+        "ELEMENT_SOLID",
+        "ELEMENT_SHELL",
+        "ELEMENT_SHELL_THICKNESS",
+        "ELEMENT_BEAM",
+        "PART",
+    ];
+    WORDS.contains(&word)
+        || ["SET_NODE", "SET_PART", "SET_SEGMENT", "DEFINE_BOX"].iter().any(|stem| word.starts_with(stem))
+}
+
+/// Reads the blocks of a mesh alone; a warning names the others.
+pub(super) fn read_mesh(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
+    let mut left_out: BTreeMap<String, Place> = BTreeMap::new();
+    lines.blocks.retain(|block| {
+        let is = is_of_mesh(&block.keyword);
+        if !is {
+            left_out.entry(format!("*{}", block.keyword)).or_insert(block.at);
+        }
+        is
+    });
+    if let Some(first) = left_out.values().min() {
+        const LISTED: usize = 30;
+        let names =
+            left_out.iter().take(LISTED).map(|(name, at)| format!("{name} ({})", log.line(*at, *first)));
+        let mut names: Vec<String> = names.collect();
+        if left_out.len() > LISTED {
+            names.push(format!("{} more", left_out.len() - LISTED));
+        }
+        log.warn(*first, format!("left out, as only the mesh is taken over: {}", names.join(", ")));
+    }
+    read(lines, log)
 }
 
 /// Takes the headings of `_TITLE` out of a block.

@@ -18,6 +18,7 @@ use crate::{
     log::Log,
     typed::{Deck, mesh::Mesh},
 };
+pub(super) use element::corners_of;
 use state::Translation;
 
 /// Puts a problem into a typed deck, which calls its mesh `mesh_name`. What was reported is left out of it.

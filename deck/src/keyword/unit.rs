@@ -69,6 +69,17 @@ pub const NAMES: &str = "mm-s-t (mm-s-tonne), mm-ms-kg, cm-g-us (cm-us-g), in-s-
 const DENSITIES: std::ops::RangeInclusive<f64> = 20.0..=25_000.0;
 const SPEEDS: std::ops::RangeInclusive<f64> = 10.0..=20_000.0;
 
+/// The set of one of its names, in whatever case.
+fn set_of(asked: &str) -> Option<&'static Set> {
+    let asked = asked.to_ascii_lowercase();
+    SETS.iter().find(|set| set.name.eq_ignore_ascii_case(&asked) || set.others.contains(&asked.as_str()))
+}
+
+/// The name in a TOML deck of units that `--units` names; the first set where it names none.
+pub(crate) fn name_of(asked: Option<&str>) -> Option<&'static str> {
+    asked.map_or(Some(SETS[0].name), |asked| set_of(asked).map(|set| set.name))
+}
+
 /// The name of the units in a TOML deck; the first set where nothing tells.
 pub(super) fn choose<'m>(
     asked: Option<&str>,
@@ -90,13 +101,10 @@ pub(super) fn choose<'m>(
         DENSITIES.contains(&density) && speed.is_none_or(|speed| SPEEDS.contains(&speed))
     };
     if let Some(asked) = asked {
-        let asked = asked.to_ascii_lowercase();
-        let named =
-            |set: &&Set| set.name.eq_ignore_ascii_case(&asked) || set.others.contains(&asked.as_str());
-        let Some(set) = SETS.iter().find(named) else {
+        let Some(set) = set_of(asked) else {
             log.fault(
                 start,
-                format!("--units {}", log.quote(&asked)),
+                format!("--units {}", log.quote(asked)),
                 format!("one of {NAMES}"),
                 "choose one of them",
             );

@@ -18,7 +18,7 @@ use crate::{
     mesh_file::Body,
     place::{Origin, Place, Placed},
     typed::{
-        mesh::{Meshes, Numbers, PartMesh, Places, Source},
+        mesh::{Mesh, Meshes, Numbers, PartMesh, Places, Source},
         part::{Criterion, Erosion, Kind, Part},
     },
 };
@@ -272,7 +272,7 @@ fn mesh_of(
                 None => (None, None),
             }
         }
-        Source::Body { mesh: name, body } => {
+        Source::Body { mesh: name, body, .. } => {
             match body_of(part, mesh, name, body.as_ref(), meshes, budget, log) {
                 Some((block, numbers)) => (Some(block), Some(numbers)),
                 None => (None, None),
@@ -298,27 +298,34 @@ fn body_of(
     };
     let mesh = mesh.as_ref()?;
     let name = body.map_or(part.name.as_str(), |body| &body.value);
-    let holds = |body: &&Body| body.kind() == part.kind.elements() && body.elements().next().is_some();
-    if part.kind == Kind::Solids
-        && let Some(body) = mesh.file.body(name).filter(|body| body.kind() != part.kind.elements())
+    let holds = |body: &Body| body.kind() == part.kind.elements() && body.elements().next().is_some();
+    let of_kind = || mesh.file.bodies.iter().enumerate().filter(|(_, body)| holds(body));
+    let called = mesh.file.bodies_called(name).find(|(_, found)| holds(found));
+    if called.is_none()
+        && part.kind == Kind::Solids
+        && let Some((_, other)) = mesh.file.bodies_called(name).next()
     {
-        let (expected, advice) = match body.kind() {
+        let (expected, advice) = match other.kind() {
             "shells" => ("their thickness", "add shell = { thickness = ... } to the part"),
             _ => ("their cross-section", "add truss = { area = ... } to the part"),
         };
-        let read = format!("the {} of body \"{name}\" in part \"{}\"", body.kind(), part.name);
+        let read = format!("the {} of body \"{name}\" in part \"{}\"", other.kind(), part.name);
         log.fault(at.at, read, expected, advice);
         return None;
     }
-    let index = mesh.file.bodies.iter().position(|body| body.name == name);
-    let Some((index, found)) = index.map(|i| (i, &mesh.file.bodies[i])).filter(|(_, body)| holds(body))
-    else {
-        let names: Vec<&str> =
-            mesh.file.bodies.iter().filter(holds).map(|b| b.name.as_str()).take(20).collect();
+    // The only one need not be named.
+    let only = of_kind().next().filter(|_| body.is_none() && of_kind().count() == 1);
+    let Some((index, found)) = called.or(only) else {
+        const LISTED: usize = 20;
+        let mut names: Vec<String> = of_kind().take(LISTED).map(|(_, body)| body.title()).collect();
+        if of_kind().count() > LISTED {
+            names.push("...".to_string());
+        }
         let what = part.kind.elements();
+        let listed = if names.is_empty() { "it has none".to_string() } else { names.join(", ") };
         log.fault_of(
             body.unwrap_or(file).origin,
-            format!("a body with {what} of that file ({})", names.join(", ")),
+            format!("a body with {what} of that file ({listed})"),
             "choose one with body = \"name\"",
         );
         return None;
@@ -331,6 +338,7 @@ fn body_of(
         log.fault(at.at, read, expected, "correct the element");
         return None;
     }
+    warn_of_collapsed(part, at, mesh, found, log);
     let mut local: BTreeMap<u32, u32> = BTreeMap::new();
     for id in found.corners() {
         local.entry(id).or_insert(0);
@@ -360,6 +368,26 @@ fn body_of(
         mesh: Some(file.value.clone()),
     };
     Some((Block { positions, topology, faces: Vec::new() }, numbers))
+}
+
+/// Tells of elements that are computed as hexahedra or quadrilaterals whose corners coincide. Keyword decks told that already.
+fn warn_of_collapsed(part: &Part, at: &PartMesh, mesh: &Mesh, body: &Body, log: &Log<'_>) {
+    if !mesh.elements.is_empty() {
+        return;
+    }
+    let collapsed = |corners: &[u32]| (1..corners.len()).any(|i| corners[..i].contains(&corners[i]));
+    let count = body.elements().filter(|(_, corners)| collapsed(corners)).count();
+    if count > 0 {
+        let all = body.elements().count();
+        let (what, computed) = match part.kind {
+            Kind::Solids => ("wedges, pyramids or tetrahedra", "hexahedra whose corners coincide"),
+            _ => ("triangles", "quadrilaterals with two corners in one node"),
+        };
+        log.warn(
+            at.at,
+            format!("part \"{}\": {count} of {all} elements are {what}: computed as {computed}", part.name),
+        );
+    }
 }
 
 /// Turns a block, then moves it.

@@ -214,10 +214,18 @@ fn read_mesh(
         let mesh = inner.require("file", "the name of a mesh file").and_then(text);
         let body = match inner.get("body") {
             None => Some(None),
-            Some(value) => text(value).map(Some),
+            Some(value) if value.is_text() => text(value).map(Some),
+            Some(value) => {
+                let number = value.integer(0, u64::from(MAX_ID));
+                number.map(|number| Some(value.placed(number.to_string())))
+            }
+        };
+        let scale = match inner.get("scale") {
+            None => Some(None),
+            Some(value) => value.number(Range::Positive).map(|scale| Some(value.placed(scale))),
         };
         inner.finish();
-        mesh.zip(body).map(|(mesh, body)| Source::Body { mesh, body })
+        mesh.zip(body).zip(scale).map(|((mesh, body), scale)| Source::Body { mesh, body, scale })
     } else {
         read_explicit(inner, kind_of?).map(|own| Source::Explicit(Box::new(own)))
     };

@@ -38,10 +38,12 @@ pub(crate) struct PartMesh {
 pub(crate) enum Source {
     Shape(Shape),
     Explicit(Box<Explicit>),
-    /// A body of a mesh; without a name that of the part.
+    /// A body of a mesh, by its name or number; without one that of the part's name, or the only one.
     Body {
         mesh: Placed<String>,
         body: Option<Placed<String>>,
+        /// Factor on the positions of its nodes; 1 where there is none.
+        scale: Option<Placed<f64>>,
     },
 }
 

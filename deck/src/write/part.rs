@@ -146,9 +146,10 @@ fn write_mesh(text: &mut Text, mesh: &PartMesh) {
             text.key(kind, table(&keys));
         }
         Source::Explicit(own) => text.key("mesh", explicit(own)),
-        Source::Body { mesh, body } => {
+        Source::Body { mesh, body, scale } => {
             let mut keys = vec![("file", quoted(&mesh.value))];
             keys.extend(body.as_ref().map(|body| ("body", quoted(&body.value))));
+            keys.extend(scale.as_ref().map(|scale| ("scale", format!("{:?}", scale.value))));
             text.key("mesh", table(&keys));
         }
     }

@@ -51,7 +51,7 @@ impl Text {
 }
 
 /// A text in TOML's quotes. Control characters, which no reader lets through, become spaces.
-pub(super) fn quoted(words: &str) -> String {
+pub(crate) fn quoted(words: &str) -> String {
     let mut text = String::from("\"");
     for c in words.chars() {
         match c {

@@ -259,7 +259,7 @@ fn read_beams(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTr
 
 /// Corners such that those which coincide are neighbours: a tetrahedron repeats its last node, which would leave a face
 /// of all four.
-fn corners_of(nodes: [u32; 8]) -> [u32; 8] {
+pub(in crate::keyword) fn corners_of(nodes: [u32; 8]) -> [u32; 8] {
     let [a, b, c, d, rest @ ..] = nodes;
     let tetrahedron = rest.iter().all(|node| *node == d) && a != b && b != c && c != d && a != c;
     if tetrahedron { [a, b, c, c, d, d, d, d] } else { nodes }

@@ -1,0 +1,91 @@
+//! The mesh of a keyword file alone: nodes, elements by part, sets. All other keywords are left out.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{cards, problem::Problem, read, translate::corners_of};
+use crate::{
+    bundle::Bundle,
+    limits::MAX_NODES,
+    log::Log,
+    mesh_file::{Body, MeshFile, Read},
+    place::Place,
+};
+
+/// Reads the first file of a bundle, with what it includes.
+///
+/// # Errors
+/// Its faults, each with its line.
+pub(crate) fn read_mesh(bundle: &Bundle<'_>) -> Read {
+    let log = Log::keyword(&bundle.files);
+    let mut lines = cards::read(bundle, &log);
+    let problem = read::read_mesh(&mut lines, &log);
+    let mesh = mesh_of(&problem, &log);
+    let (faults, warnings) = log.into_lists();
+    if faults.is_empty() { Ok((mesh, warnings)) } else { Err(faults) }
+}
+
+fn mesh_of(problem: &Problem, log: &Log<'_>) -> MeshFile {
+    let mut mesh = MeshFile {
+        nodes: problem.nodes.iter().map(|node| (node.id, node.x)).collect(),
+        ..MeshFile::default()
+    };
+    let mut bodies: BTreeMap<(u32, usize), Body> = BTreeMap::new();
+    let solids = problem.solids.iter().map(|solid| (0, solid.id, solid.part, solid.at, &solid.nodes[..]));
+    let shells = problem.shells.iter().map(|shell| (1, shell.id, shell.part, shell.at, &shell.nodes[..]));
+    let beams = problem.beams.iter().map(|beam| (2, beam.id, beam.part, beam.at, &beam.nodes[..]));
+    let mut seen: [BTreeMap<u32, Place>; 3] = Default::default();
+    for (kind, id, part, at, nodes) in solids.chain(shells).chain(beams) {
+        if let Some(first) = seen[kind].insert(id, at) {
+            let expected = format!("a number other than {id}, which {} has", log.line(first, at));
+            log.fault(at, format!("element {id}"), expected, "renumber one");
+        }
+        if let Some(node) = nodes.iter().find(|node| problem.position(**node).is_none()) {
+            log.fault(at, format!("element {id} with node {node}"), "nodes of the mesh", "add the node");
+            continue;
+        }
+        let body = bodies.entry((part, kind)).or_default();
+        match (<[u32; 8]>::try_from(nodes), <[u32; 4]>::try_from(nodes), <[u32; 2]>::try_from(nodes)) {
+            (Ok(nodes), ..) => body.solids.push((id, corners_of(nodes))),
+            (_, Ok(nodes), _) => body.shells.push((id, nodes)),
+            (.., Ok(nodes)) => body.trusses.push((id, nodes)),
+            _ => {}
+        }
+    }
+    if bodies.is_empty() && log.count() == 0 {
+        let expected = "*ELEMENT_SOLID, *ELEMENT_SHELL or *ELEMENT_BEAM";
+        log.fault(Place::card(0, 1), "a mesh without elements", expected, "add the elements");
+    }
+    // A heading names its part where it tells it from others.
+    let (mut titles, mut several) = (BTreeSet::new(), BTreeSet::new());
+    for title in problem.parts.values().map(|part| part.title.trim()) {
+        if !titles.insert(title) {
+            several.insert(title);
+        }
+    }
+    for ((part, _), mut body) in bodies {
+        let title = problem.parts.get(&part).map_or("", |card| card.title.trim());
+        let named = !title.is_empty() && !several.contains(title);
+        body.name = if named { title.to_string() } else { format!("part {part}") };
+        body.number = Some(part);
+        mesh.bodies.push(body);
+    }
+    let mut members = 0;
+    for (id, (at, _)) in &problem.sets.nodes {
+        let nodes = problem.node_set(*id, *at, log);
+        members += nodes.len();
+        if members as u64 > MAX_NODES {
+            log.fault(
+                *at,
+                format!("set {id}"),
+                format!("at most {MAX_NODES} members of all sets"),
+                "remove sets",
+            );
+            break;
+        }
+        mesh.sets.insert(format!("set {id}"), nodes);
+    }
+    for (id, (at, _)) in &problem.sets.segments {
+        mesh.segments.insert(format!("set {id}"), problem.segment_set(*id, *at, log));
+    }
+    mesh
+}

@@ -1,0 +1,124 @@
+//! The mesh files that a deck names: read, scaled, and numbered apart from each other.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Format, MeshFile, read};
+use crate::{
+    bundle::Bundle,
+    fault::Fault,
+    include::beside,
+    limits::MAX_ID,
+    log::{Log, Warning},
+    place::Placed,
+    table::holds,
+    typed::{
+        Deck,
+        mesh::{Mesh, Meshes, Source},
+    },
+};
+
+/// The meshes of a deck, and what was found in their files.
+#[derive(Default)]
+pub(crate) struct OfDeck {
+    /// By the name that the deck has for them; none of a file with a fault, and none of a file that is not there.
+    pub(crate) by_name: Meshes,
+    pub(crate) faults: Vec<Fault>,
+    pub(crate) warnings: Vec<Warning>,
+}
+
+/// Reads every mesh file that a deck names; faults of the deck itself go to its log.
+pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) -> OfDeck {
+    let mut all = OfDeck::default();
+    let mut scales: BTreeMap<&str, Option<&Placed<f64>>> = BTreeMap::new();
+    // Numbers that other files have: of nodes and of elements.
+    let mut taken: [BTreeSet<u32>; 2] = Default::default();
+    for part in deck.map_or(&[][..], |deck| &deck.parts) {
+        let Some(Source::Body { mesh: file, scale, .. }) = part.mesh.as_ref().map(|mesh| &mesh.source) else {
+            continue;
+        };
+        if let Some(first) = scales.get(file.value.as_str()) {
+            let factor = |scale: Option<&Placed<f64>>| scale.map_or(1.0, |scale| scale.value);
+            let given = scale.as_ref();
+            if factor(*first) != factor(given) {
+                let expected =
+                    format!("one scale for all parts of \"{}\", as {} before", file.value, factor(*first));
+                let origin = given.map_or(file.origin, |given| given.origin);
+                log.fault_of(origin, expected, "give all its parts the same scale, for they share nodes");
+            }
+            continue;
+        }
+        scales.insert(&file.value, scale.as_ref());
+        let Some(index) = bundle.file(&beside(bundle.files[0].0, &file.value)) else { continue };
+        let mut mesh = match read(bundle, index) {
+            Ok((mesh, warnings)) => {
+                all.warnings.extend(warnings);
+                Some(mesh)
+            }
+            Err(faults) => {
+                all.faults.extend(faults);
+                None
+            }
+        };
+        if let Some(mesh) = &mut mesh {
+            if let Some(scale) = scale {
+                scaled(mesh, scale, log);
+            }
+            if Format::of(&file.value, bundle.files[index].1) != Format::Own {
+                all.warnings.extend(number_apart(mesh, &taken, bundle.files[index].0));
+            }
+            taken[0].extend(mesh.nodes.iter().map(|(id, _)| *id));
+            taken[1].extend(mesh.bodies.iter().flat_map(|body| body.elements().map(|(id, _)| id)));
+        }
+        all.by_name.insert(file.value.clone(), mesh.map(Mesh::from));
+    }
+    all
+}
+
+/// Scales the positions of the nodes.
+fn scaled(mesh: &mut MeshFile, scale: &Placed<f64>, log: &Log<'_>) {
+    for (id, x) in &mut mesh.nodes {
+        *x = x.map(|c| c * scale.value);
+        if !x.iter().all(|c| holds(*c)) {
+            let expected =
+                format!("a scale that leaves magnitudes from 1e-60 to 1e60; node {id} comes to {x:?}");
+            log.fault_of(scale.origin, expected, "choose another scale");
+            return;
+        }
+    }
+}
+
+/// Numbers nodes and elements on above those of other files where they meet them.
+fn number_apart(mesh: &mut MeshFile, taken: &[BTreeSet<u32>; 2], name: &str) -> Option<Warning> {
+    let nodes = || mesh.nodes.iter().map(|(id, _)| *id);
+    let elements = || mesh.bodies.iter().flat_map(|body| body.elements().map(|(id, _)| id));
+    let meet = [nodes().any(|id| taken[0].contains(&id)), elements().any(|id| taken[1].contains(&id))];
+    let greatest = [nodes().max().unwrap_or(0), elements().max().unwrap_or(0)];
+    let shift = [0, 1].map(|i| if meet[i] { taken[i].last().copied().unwrap_or(0) } else { 0 });
+    // What would pass the greatest number stays, and is a fault of the parts.
+    if shift == [0; 2] || (0..2).any(|i| u64::from(greatest[i]) + u64::from(shift[i]) > u64::from(MAX_ID)) {
+        return None;
+    }
+    let [of_nodes, of_elements] = shift;
+    mesh.nodes.iter_mut().for_each(|(id, _)| *id += of_nodes);
+    for body in &mut mesh.bodies {
+        body.solids
+            .iter_mut()
+            .for_each(|(id, corners)| (*id, *corners) = (*id + of_elements, corners.map(|n| n + of_nodes)));
+        body.shells
+            .iter_mut()
+            .for_each(|(id, corners)| (*id, *corners) = (*id + of_elements, corners.map(|n| n + of_nodes)));
+        body.trusses
+            .iter_mut()
+            .for_each(|(id, ends)| (*id, *ends) = (*id + of_elements, ends.map(|n| n + of_nodes)));
+    }
+    mesh.sets.values_mut().flatten().for_each(|id| *id += of_nodes);
+    mesh.segments.values_mut().flatten().flatten().for_each(|id| *id += of_nodes);
+    let words = [("nodes", of_nodes), ("elements", of_elements)]
+        .into_iter()
+        .filter(|(_, shift)| *shift > 0)
+        .map(|(what, shift)| format!("{what} have their numbers plus {shift}"))
+        .collect::<Vec<_>>()
+        .join(", ");
+    let words = format!("{words}, for another mesh file of the deck has the same");
+    Some(Warning { file: name.to_string(), line: 1, words })
+}
