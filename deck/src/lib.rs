@@ -127,7 +127,9 @@ fn read_toml(bundle: &Bundle<'_>, most_elements: u64) -> Result<Reading, Vec<Fau
         substituted = text;
         &substituted
     };
-    let log = Log::toml(name, text).with_most_elements(most_elements);
+    let mut files = bundle.files.clone();
+    files[0].1 = text;
+    let log = Log::toml(&files).with_most_elements(most_elements);
     let deck = toml_deck::read(text, &log);
     let mut meshes = mesh_file::read_all(bundle, deck.as_ref(), &log);
     let model = deck.as_ref().and_then(|deck| make::model(deck, &meshes.by_name, &log));
@@ -258,7 +260,7 @@ pub fn start_from_mesh(text: &str, file_name: &str, mesh_name: &str) -> Result<S
         faults.add(0, read, format!("one of {UNIT_NAMES}"), "choose one of them");
         return Err(faults.into_list());
     };
-    let (mesh, mut warnings) = mesh_file::read(&bundle, 0)?;
+    let mesh_file::Found { mesh, mut warnings, .. } = mesh_file::read(&bundle, 0)?;
     if asked.is_none() {
         let words = format!("a mesh does not say its units, {} is assumed; give --units", units.name);
         warnings.push(Warning { file: name.to_string(), line: 1, words });

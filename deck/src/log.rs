@@ -46,9 +46,9 @@ pub(crate) struct Log<'a> {
 }
 
 impl<'a> Log<'a> {
-    /// Nothing found yet in a TOML deck.
-    pub(crate) fn toml(name: &'a str, text: &'a str) -> Self {
-        Self::of(Dialect::Toml, &[(name, text)])
+    /// Nothing found yet in a TOML deck and its mesh files.
+    pub(crate) fn toml(files: &[(&'a str, &'a str)]) -> Self {
+        Self::of(Dialect::Toml, files)
     }
 
     /// Nothing found yet in the files of a keyword deck.
@@ -121,6 +121,9 @@ impl<'a> Log<'a> {
     /// keyword, as in a list of nodes.
     fn card(&self, at: Place) -> Option<String> {
         const FAR: u32 = 1000;
+        if self.dialect != Dialect::Keyword {
+            return None;
+        }
         let Place::Card { file, line, .. } = at else { return None };
         let mut number = 0;
         for line in (line.saturating_sub(FAR).max(1)..=line).rev() {
@@ -140,6 +143,11 @@ impl<'a> Log<'a> {
             Dialect::Toml => toml,
             Dialect::Keyword => keyword,
         }
+    }
+
+    /// Whether the user wrote keywords.
+    pub(crate) fn is_of_keywords(&self) -> bool {
+        self.dialect == Dialect::Keyword
     }
 
     /// `line 12`, with its file where that is not the one of `from`.

@@ -20,6 +20,7 @@ use crate::{
     keyword,
     limits::MAX_TEXT,
     log::Warning,
+    place::Place,
 };
 use draft::Report;
 pub(crate) use of_deck::read_all;
@@ -154,8 +155,17 @@ impl Format {
 /// Lines among which `*KEYWORD` stands.
 const HEAD: usize = 1000;
 
-/// A mesh and what its user should know of it, or its faults.
-pub(crate) type Read = Result<(MeshFile, Vec<Warning>), Vec<Fault>>;
+/// A mesh that was read.
+pub(crate) struct Found {
+    pub(crate) mesh: MeshFile,
+    /// Of the elements of each body, as cards of files of the bundle; empty where they are not known.
+    pub(crate) places: Vec<Vec<Place>>,
+    /// What is left out.
+    pub(crate) warnings: Vec<Warning>,
+}
+
+/// A mesh, or the faults of its file.
+pub(crate) type Read = Result<Found, Vec<Fault>>;
 
 /// Reads a mesh file that refers to no other.
 ///
@@ -163,7 +173,7 @@ pub(crate) type Read = Result<(MeshFile, Vec<Warning>), Vec<Fault>>;
 /// Its faults, each with its line.
 pub fn parse(text: &str, file_name: &str) -> Result<MeshFile, Vec<Fault>> {
     let bundle = Bundle { options: Default::default(), files: vec![(file_name, text)] };
-    read(&bundle, 0).map(|(mesh, _)| mesh)
+    read(&bundle, 0).map(|found| found.mesh)
 }
 
 /// Reads a file of a bundle as a mesh; a mesh of keywords may include other files of the bundle.
@@ -180,19 +190,31 @@ pub(crate) fn read(bundle: &Bundle<'_>, file: usize) -> Read {
         return Err(faults.into_list());
     }
     let other = |read: fn(&Report<'_>) -> draft::Draft| {
-        let report = Report::new(name, text);
+        let report = Report::new((name, text), file as u16);
         let draft = read(&report);
         draft.into_mesh(report)
     };
     match format {
-        Format::Own => own::parse(text, name).map(|mesh| (mesh, Vec::new())),
+        Format::Own => {
+            own::parse(text, name).map(|mesh| Found { mesh, places: Vec::new(), warnings: Vec::new() })
+        }
         Format::Gmsh => other(gmsh::read),
         Format::Abaqus => other(abaqus::read),
         Format::Nastran => other(nastran::read),
         Format::Keyword => {
             let mut files = bundle.files.clone();
             files.swap(0, file);
-            keyword::read_mesh(&Bundle { options: Default::default(), files })
+            let mut found = keyword::read_mesh(&Bundle { options: Default::default(), files })?;
+            for place in found.places.iter_mut().flatten() {
+                if let Place::Card { file: of, .. } = place {
+                    *of = match usize::from(*of) {
+                        0 => file as u16,
+                        other if other == file => 0,
+                        _ => *of,
+                    };
+                }
+            }
+            Ok(found)
         }
     }
 }

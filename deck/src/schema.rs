@@ -36,7 +36,7 @@ pub fn json() -> Value {
 fn recorded() -> Vec<TableKind> {
     let mut recorder = Recorder::new();
     for text in EVERY_KEY.into_iter().chain(STARTERS.map(|starter| starter.text)) {
-        let mut log = Log::toml("schema", text);
+        let mut log = Log::toml(&[("schema", text)]);
         log.faults.recorder = Some(recorder);
         let _ = toml_deck::read(text, &log);
         debug_assert_eq!(log.count(), 0, "a deck of the schema has faults");
@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn the_decks_of_the_schema_have_no_fault_and_leave_no_key_and_no_kind_of_value_out() {
         for text in EVERY_KEY {
-            let log = Log::toml("schema", text);
+            let log = Log::toml(&[("schema", text)]);
             let _ = toml_deck::read(text, &log);
             let faults = log.into_lists().0;
             assert!(faults.is_empty(), "{faults:#?}");

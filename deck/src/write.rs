@@ -203,7 +203,7 @@ mod tests {
     };
 
     fn read(text: &str, name: &str) -> (Deck, String) {
-        let log = Log::toml(name, text);
+        let log = Log::toml(&[(name, text)]);
         let deck = toml_deck::read(text, &log).unwrap_or_else(|| panic!("{name} has no syntax\n{text}"));
         let model = make::model(&deck, &Meshes::new(), &log);
         let faults = log.into_lists().0;

@@ -372,6 +372,30 @@ fn a_body_that_a_file_does_not_have_is_refused_with_those_that_it_has() {
 }
 
 #[test]
+fn an_element_that_a_deck_cannot_use_is_told_at_its_line_of_the_mesh_file() {
+    let inside_out = [
+        ("1 1 2 3 4 5 6 7 8", "1 5 6 7 8 1 2 3 4", "body.msh:61:1: read element 1"),
+        ("3, 4,\n 5, 6, 7, 8", "3, 4,\n 5, 7, 6, 8", "body.inp:18:1: read element 1"),
+        ("+HEX           7       8", "+HEX           8       7", "body.bdf:23:1: read element 1"),
+        ("1,1,1,2,3,4,5,6,7,8", "1,1,5,6,7,8,1,2,3,4", "body.k:23:1: read element 1"),
+    ];
+    for ((name, text, names), (from, to, expected)) in FILES.into_iter().zip(inside_out) {
+        assert!(text.contains(from), "{name}");
+        let text = text.replacen(from, to, 1);
+        // Another file beside it has places of its own.
+        let deck = deck_of(name, names, "").replace(
+            "[[boundary]]",
+            "[[part]]\nname = \"other\"\nmaterial = \"LEAD\"\nmesh = { file = \"other.mesh\" }\n[[boundary]]",
+        );
+        let own = "bolide mesh 1\nnodes 8\n91 9 0 0\n92 10 0 0\n93 10 1 0\n94 9 1 0\n95 9 0 1\n96 10 0 1\n97 10 1 1\n98 9 1 1\nsolids 1 \"other\"\n91 91 92 93 94 95 96 97 98\n";
+        let whole = gathered(&deck, &[("other.mesh", own), (name, &text)]);
+        let found = deck::read(&whole, "deck.toml").expect_err("an element inside out");
+        let told: Vec<String> = found.iter().map(ToString::to_string).collect();
+        assert!(told.iter().any(|fault| fault.starts_with(expected)), "{expected}\n{told:#?}");
+    }
+}
+
+#[test]
 fn a_mesh_is_no_deck_and_a_keyword_deck_of_any_ending_is() {
     let found = deck::read(NASTRAN, "a.bdf").expect_err("a mesh")[0].to_string();
     assert_eq!(

@@ -7,7 +7,7 @@ use crate::{
     bundle::Bundle,
     limits::MAX_NODES,
     log::Log,
-    mesh_file::{Body, MeshFile, Read},
+    mesh_file::{Body, Found, MeshFile, Read},
     place::Place,
 };
 
@@ -19,17 +19,18 @@ pub(crate) fn read_mesh(bundle: &Bundle<'_>) -> Read {
     let log = Log::keyword(&bundle.files);
     let mut lines = cards::read(bundle, &log);
     let problem = read::read_mesh(&mut lines, &log);
-    let mesh = mesh_of(&problem, &log);
+    let (mesh, places) = mesh_of(&problem, &log);
     let (faults, warnings) = log.into_lists();
-    if faults.is_empty() { Ok((mesh, warnings)) } else { Err(faults) }
+    if faults.is_empty() { Ok(Found { mesh, places, warnings }) } else { Err(faults) }
 }
 
-fn mesh_of(problem: &Problem, log: &Log<'_>) -> MeshFile {
+/// The mesh, and the places of the elements of each body.
+fn mesh_of(problem: &Problem, log: &Log<'_>) -> (MeshFile, Vec<Vec<Place>>) {
     let mut mesh = MeshFile {
         nodes: problem.nodes.iter().map(|node| (node.id, node.x)).collect(),
         ..MeshFile::default()
     };
-    let mut bodies: BTreeMap<(u32, usize), Body> = BTreeMap::new();
+    let mut bodies: BTreeMap<(u32, usize), (Body, Vec<Place>)> = BTreeMap::new();
     let solids = problem.solids.iter().map(|solid| (0, solid.id, solid.part, solid.at, &solid.nodes[..]));
     let shells = problem.shells.iter().map(|shell| (1, shell.id, shell.part, shell.at, &shell.nodes[..]));
     let beams = problem.beams.iter().map(|beam| (2, beam.id, beam.part, beam.at, &beam.nodes[..]));
@@ -43,7 +44,8 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> MeshFile {
             log.fault(at, format!("element {id} with node {node}"), "nodes of the mesh", "add the node");
             continue;
         }
-        let body = bodies.entry((part, kind)).or_default();
+        let (body, of_elements) = bodies.entry((part, kind)).or_default();
+        of_elements.push(at);
         match (<[u32; 8]>::try_from(nodes), <[u32; 4]>::try_from(nodes), <[u32; 2]>::try_from(nodes)) {
             (Ok(nodes), ..) => body.solids.push((id, corners_of(nodes))),
             (_, Ok(nodes), _) => body.shells.push((id, nodes)),
@@ -62,12 +64,14 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> MeshFile {
             several.insert(title);
         }
     }
-    for ((part, _), mut body) in bodies {
+    let mut places = Vec::new();
+    for ((part, _), (mut body, of_elements)) in bodies {
         let title = problem.parts.get(&part).map_or("", |card| card.title.trim());
         let named = !title.is_empty() && !several.contains(title);
         body.name = if named { title.to_string() } else { format!("part {part}") };
         body.number = Some(part);
         mesh.bodies.push(body);
+        places.push(of_elements);
     }
     let mut members = 0;
     for (id, (at, _)) in &problem.sets.nodes {
@@ -87,5 +91,5 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> MeshFile {
     for (id, (at, _)) in &problem.sets.segments {
         mesh.segments.insert(format!("set {id}"), problem.segment_set(*id, *at, log));
     }
-    mesh
+    (mesh, places)
 }

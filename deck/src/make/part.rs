@@ -18,7 +18,7 @@ use crate::{
     mesh_file::Body,
     place::{Origin, Place, Placed},
     typed::{
-        mesh::{Mesh, Meshes, Numbers, PartMesh, Places, Source},
+        mesh::{Meshes, Numbers, PartMesh, Places, Source},
         part::{Criterion, Erosion, Kind, Part},
     },
 };
@@ -333,12 +333,14 @@ fn body_of(
     let distinct =
         |corners: &[u32]| (0..corners.len()).filter(|&i| !corners[..i].contains(&corners[i])).count();
     let (counts, expected) = part.kind.distinct();
-    if let Some((id, corners)) = found.elements().find(|(_, corners)| !counts.contains(&distinct(corners))) {
+    let places = mesh.elements.get(index).map_or(Places::All(at.at), |places| Places::Each(places.clone()));
+    let strange = found.elements().enumerate().find(|(_, (_, corners))| !counts.contains(&distinct(corners)));
+    if let Some((e, (id, corners))) = strange {
         let read = format!("element {id} with {} different corners", distinct(corners));
-        log.fault(at.at, read, expected, "correct the element");
+        log.fault(places.of(e), read, expected, "correct the element");
         return None;
     }
-    warn_of_collapsed(part, at, mesh, found, log);
+    warn_of_collapsed(part, at, found, log);
     let mut local: BTreeMap<u32, u32> = BTreeMap::new();
     for id in found.corners() {
         local.entry(id).or_insert(0);
@@ -359,7 +361,6 @@ fn body_of(
     let corners: Vec<u32> = found.corners().map(|id| local[&id]).collect();
     let topology = part.kind.topology(corners.chunks(n_corners));
     let elements: Vec<u32> = found.elements().map(|(id, _)| id).collect();
-    let places = mesh.elements.get(index).map_or(Places::All(at.at), |places| Places::Each(places.clone()));
     let numbers = Numbers {
         nodes,
         elements,
@@ -371,8 +372,8 @@ fn body_of(
 }
 
 /// Tells of elements that are computed as hexahedra or quadrilaterals whose corners coincide. Keyword decks told that already.
-fn warn_of_collapsed(part: &Part, at: &PartMesh, mesh: &Mesh, body: &Body, log: &Log<'_>) {
-    if !mesh.elements.is_empty() {
+fn warn_of_collapsed(part: &Part, at: &PartMesh, body: &Body, log: &Log<'_>) {
+    if log.is_of_keywords() {
         return;
     }
     let collapsed = |corners: &[u32]| (1..corners.len()).any(|i| corners[..i].contains(&corners[i]));

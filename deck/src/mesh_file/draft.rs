@@ -5,11 +5,12 @@ use std::{
     collections::{BTreeMap, HashMap},
 };
 
-use super::{Body, MeshFile, Read};
+use super::{Body, Found, MeshFile, Read};
 use crate::{
     fault::Faults,
     limits::{MAX_ELEMENTS, MAX_ENTRIES, MAX_ID, MAX_NODES},
     log::Warning,
+    place::Place,
     table::MAX_NUMBER,
 };
 
@@ -26,6 +27,8 @@ const MAX_NAMED: usize = 3 * MAX_ENTRIES;
 pub(super) struct Report<'a> {
     pub(super) text: &'a str,
     name: &'a str,
+    /// Index of the file in its bundle.
+    file: u16,
     faults: Faults<'a>,
     warnings: RefCell<Vec<(usize, String)>>,
     /// Keywords that were left out: the offset of the first of each.
@@ -36,10 +39,11 @@ pub(super) struct Report<'a> {
 }
 
 impl<'a> Report<'a> {
-    pub(super) fn new(name: &'a str, text: &'a str) -> Self {
+    pub(super) fn new((name, text): (&'a str, &'a str), file: u16) -> Self {
         Self {
             text,
             name,
+            file,
             faults: Faults::new(name, text),
             warnings: RefCell::new(Vec::new()),
             left_out: RefCell::new(BTreeMap::new()),
@@ -73,8 +77,8 @@ impl<'a> Report<'a> {
         self.faults.count() >= MAX_REPORTED
     }
 
-    /// The mesh with the warnings, or the faults.
-    fn conclude(self, mesh: MeshFile) -> Read {
+    /// The mesh with the places of its elements and the warnings, or the faults.
+    fn conclude(self, mesh: MeshFile, places: Vec<Vec<Place>>) -> Read {
         let left_out = self.left_out.into_inner();
         let mut warnings = self.warnings.into_inner();
         if let Some(first) = left_out.values().min() {
@@ -95,7 +99,7 @@ impl<'a> Report<'a> {
             |(at, words)| Warning { file: self.name.to_string(), line: self.faults.place(at).0, words };
         let warnings = warnings.into_iter().map(warning).collect();
         let faults = self.faults.into_list();
-        if faults.is_empty() { Ok((mesh, warnings)) } else { Err(faults) }
+        if faults.is_empty() { Ok(Found { mesh, places, warnings }) } else { Err(faults) }
     }
 
     pub(super) fn warn(&self, at: usize, words: impl Into<String>) {
@@ -368,6 +372,7 @@ impl Draft {
             nodes.sort_unstable();
             nodes.dedup();
         }
+        let mut places = Vec::new();
         let mut mesh = MeshFile { sets, segments: self.segments, ..MeshFile::default() };
         for (name, number, indices) in self.bodies {
             let of_kind = |kind: usize| {
@@ -380,10 +385,16 @@ impl Draft {
             let trusses: Vec<_> = of_kind(2).map(|e| (e.id, [e.corners[0], e.corners[1]])).collect();
             let of_kinds =
                 [Body { solids, ..body.clone() }, Body { shells, ..body.clone() }, Body { trusses, ..body }];
-            mesh.bodies.extend(of_kinds.into_iter().filter(|body| body.elements().next().is_some()));
+            for (body, kind) in of_kinds.into_iter().zip([8, 4, 2]) {
+                if body.elements().next().is_some() {
+                    mesh.bodies.push(body);
+                    let place = |e: &Element| Place::card(report.file, report.faults.place(e.at).0);
+                    places.push(of_kind(kind).map(place).collect());
+                }
+            }
         }
         mesh.nodes = self.nodes;
-        report.conclude(mesh)
+        report.conclude(mesh, places)
     }
 }
 

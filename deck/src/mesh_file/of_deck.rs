@@ -50,16 +50,16 @@ pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) 
         scales.insert(&file.value, scale.as_ref());
         let Some(index) = bundle.file(&beside(bundle.files[0].0, &file.value)) else { continue };
         let mut mesh = match read(bundle, index) {
-            Ok((mesh, warnings)) => {
-                all.warnings.extend(warnings);
-                Some(mesh)
+            Ok(found) => {
+                all.warnings.extend(found.warnings);
+                Some(Mesh { file: found.mesh, elements: found.places })
             }
             Err(faults) => {
                 all.faults.extend(faults);
                 None
             }
         };
-        if let Some(mesh) = &mut mesh {
+        if let Some(Mesh { file: mesh, .. }) = &mut mesh {
             if let Some(scale) = scale {
                 scaled(mesh, scale, log);
             }
@@ -69,7 +69,7 @@ pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) 
             taken[0].extend(mesh.nodes.iter().map(|(id, _)| *id));
             taken[1].extend(mesh.bodies.iter().flat_map(|body| body.elements().map(|(id, _)| id)));
         }
-        all.by_name.insert(file.value.clone(), mesh.map(Mesh::from));
+        all.by_name.insert(file.value.clone(), mesh);
     }
     all
 }

@@ -15,14 +15,8 @@ pub(crate) type Meshes = BTreeMap<String, Option<Mesh>>;
 #[derive(Clone, Debug)]
 pub(crate) struct Mesh {
     pub(crate) file: MeshFile,
-    /// Of each element of each body, where the mesh is of a keyword deck; empty for a mesh file.
+    /// Of each element of each body; empty where they are not known.
     pub(crate) elements: Vec<Vec<Place>>,
-}
-
-impl From<MeshFile> for Mesh {
-    fn from(file: MeshFile) -> Self {
-        Self { file, elements: Vec::new() }
-    }
 }
 
 #[derive(Clone, Debug)]
