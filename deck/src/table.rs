@@ -120,6 +120,13 @@ impl<'a> Table<'a> {
         value
     }
 
+    /// Notes for a schema that a table must have a key whose absence its reader tells in words of its own.
+    pub(crate) fn must_have(&self, key: &'static str, expected: &str) {
+        if let Some(recorder) = &self.faults.recorder {
+            recorder.require(self.kind, key, expected);
+        }
+    }
+
     /// A number under `key` that passes `range`, or `default` where the key is absent or faulty (a faulty
     /// one is reported).
     pub fn number_or(&self, key: &'static str, default: f64, range: Range) -> f64 {

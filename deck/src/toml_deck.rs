@@ -134,6 +134,7 @@ fn read_document(document: &DeTable<'_>, log: &Log<'_>) -> Deck {
 
 /// Reads `[control]`.
 fn read_control(deck: &Table<'_>) -> Option<Control> {
+    deck.must_have("control", "when the run ends: end_time or end_cycle");
     let Some(control) = deck.get("control") else {
         let expected = "a [control] table with end_time or end_cycle";
         deck.faults.add(0, "a deck without [control]", expected, "add [control]");

@@ -3,7 +3,7 @@
 use std::{path::Path, process::ExitCode};
 
 use deck::{
-    Fault, Warning,
+    Fault, MAX_NUMBER, Warning,
     bundle::Options,
     fault::short,
     physics::{self, Forecast, GRIND_NS},
@@ -88,14 +88,18 @@ fn words(forecast: &Forecast, cells: &[Vec<u32>]) -> String {
             step
         );
     }
+    // A run of a count of cycles has no end in time.
+    let end = match forecast.end_time_s {
+        end if end <= MAX_NUMBER => format!(" to {} s", digits(end)),
+        _ => String::new(),
+    };
     let run = match (forecast.first_step_s, forecast.cycles, forecast.thread_s) {
         (Some(step), Some(cycles), Some(seconds)) => format!(
-            "first step {} s, {cycles} cycles to {} s, {} of thread time at {GRIND_NS} ns per element and cycle",
+            "first step {} s, {cycles} cycles{end}, {} of thread time at {GRIND_NS} ns per element and cycle",
             digits(step),
-            digits(forecast.end_time_s),
             span(seconds)
         ),
-        _ => format!("to {} s; the mesh limits no step", digits(forecast.end_time_s)),
+        _ => format!("the mesh limits no step{end}"),
     };
     text + &format!("  {run}\n  memory {} of master and worker\n", size(forecast.memory_bytes))
 }

@@ -38,6 +38,7 @@ pub(super) fn read_materials(deck: &Table<'_>) -> Vec<Own> {
 /// Reads every `[[part]]` of a deck with these planes of symmetry. A part with a fault keeps its place in the list, so that others may
 /// refer to it.
 pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
+    deck.must_have("part", "at least one [[part]]");
     let tables = deck.tables("part", MAX_PARTS);
     if tables.is_empty() && !deck.has("part") {
         deck.faults.add(0, "a deck without [[part]]", "at least one part", "add a [[part]]");
