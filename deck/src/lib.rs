@@ -102,7 +102,8 @@ pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
 fn deck_of<'a>(text: &'a str, file_name: &'a str) -> Result<Bundle<'a>, Vec<Fault>> {
     let bundle = Bundle::of(text, file_name)?;
     let (name, text) = bundle.files[0];
-    if Format::is_foreign_mesh(name, text) {
+    let is_toml = || Kind::of(text) == Kind::Toml && toml::de::DeTable::parse(text).is_ok();
+    if Format::is_foreign_mesh(name, text) && !is_toml() {
         let faults = Faults::new(name, text);
         let advice = format!("write one that names this mesh: bolide convert {name}");
         faults.add(0, "a mesh", "a deck, with materials and times", advice);

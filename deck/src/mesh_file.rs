@@ -26,7 +26,7 @@ use draft::Report;
 pub(crate) use of_deck::read_all;
 
 /// A mesh by the user's numbers. Every element names nodes of the mesh; numbers are unique among nodes and among the
-/// elements of one kind.
+/// elements of one kind; of other programs an element may be in several bodies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshFile {
     /// Number and position (length) of each node.

@@ -238,6 +238,12 @@ fn what_a_reader_cannot_take_is_refused_at_its_line() {
         ),
         (
             "body.bdf",
+            "$ large fields",
+            "INCLUDE 'more.bdf'",
+            "body.bdf:16:1: read INCLUDE 'more.bdf'; expected nodes and elements that are listed in this file; write the whole mesh to one file",
+        ),
+        (
+            "body.bdf",
             "GRID,7,,1.",
             "GRID,7,3,1.",
             "body.bdf:14:1: read a GRID in coordinate system 3; expected nodes in the basic coordinate system, 0 or blank; write the nodes in the basic system",
@@ -402,6 +408,8 @@ fn a_mesh_is_no_deck_and_a_keyword_deck_of_any_ending_is() {
         found,
         "a.bdf:1:1: read a mesh; expected a deck, with materials and times; write one that names this mesh: bolide convert a.bdf"
     );
+    let toml = "title = \"x\"\nunits = \"SI\"\n[control]\nend_cycle = 1\n[[part]]\nname = \"a\"\nmaterial = \"LEAD\"\nbox = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }\n";
+    assert!(deck::read(toml, "a.dat").is_ok());
     let found = deck::read(KEYWORD, "a.inp").expect_err("no times")[0].to_string();
     assert!(found.contains("*CONTROL_TERMINATION"), "{found}");
     assert_eq!(mesh_file::parse(KEYWORD, "a.inp"), mesh_file::parse(KEYWORD, "a.k"));

@@ -112,6 +112,11 @@ impl Reader<'_, '_> {
             if line.is_empty() {
                 continue;
             }
+            if starts_with(line, "INCLUDE") {
+                let expected = "nodes and elements that are listed in this file";
+                report.fault_of_line(at, expected, "write the whole mesh to one file");
+                continue;
+            }
             if bulk.is_some_and(|bulk| at <= bulk) {
                 goes_on = self.case_control(at, line, goes_on);
                 continue;

@@ -14,6 +14,7 @@ use crate::{
     typed::{
         Deck,
         mesh::{Mesh, Meshes, Source},
+        part::Part,
     },
 };
 
@@ -30,9 +31,15 @@ pub(crate) struct OfDeck {
 pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) -> OfDeck {
     let mut all = OfDeck::default();
     let mut scales: BTreeMap<&str, Option<&Placed<f64>>> = BTreeMap::new();
+    let parts = deck.map_or(&[][..], |deck| &deck.parts);
+    let file_of = |part: &Part| match part.mesh.as_ref().map(|mesh| &mesh.source) {
+        Some(Source::Body { mesh, .. }) => Some(mesh.value.clone()),
+        _ => None,
+    };
+    let several = parts.iter().filter_map(file_of).collect::<BTreeSet<_>>().len() > 1;
     // Numbers that other files have: of nodes and of elements.
     let mut taken: [BTreeSet<u32>; 2] = Default::default();
-    for part in deck.map_or(&[][..], |deck| &deck.parts) {
+    for part in parts {
         let Some(Source::Body { mesh: file, scale, .. }) = part.mesh.as_ref().map(|mesh| &mesh.source) else {
             continue;
         };
@@ -63,11 +70,13 @@ pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) 
             if let Some(scale) = scale {
                 scaled(mesh, scale, log);
             }
-            if Format::of(&file.value, bundle.files[index].1) != Format::Own {
+            if several && Format::of(&file.value, bundle.files[index].1) != Format::Own {
                 all.warnings.extend(number_apart(mesh, &taken, bundle.files[index].0));
             }
-            taken[0].extend(mesh.nodes.iter().map(|(id, _)| *id));
-            taken[1].extend(mesh.bodies.iter().flat_map(|body| body.elements().map(|(id, _)| id)));
+            if several {
+                taken[0].extend(mesh.nodes.iter().map(|(id, _)| *id));
+                taken[1].extend(mesh.bodies.iter().flat_map(|body| body.elements().map(|(id, _)| id)));
+            }
         }
         all.by_name.insert(file.value.clone(), mesh);
     }
