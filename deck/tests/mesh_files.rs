@@ -423,6 +423,11 @@ fn a_deck_to_start_from_runs_as_it_is_written() {
         let whole = gathered(&start.deck, &[(name, text)]);
         let model =
             deck::read(&whole, "deck.toml").unwrap_or_else(|faults| panic!("{faults:#?}\n{}", start.deck));
+        let moving = start.deck.replace("# velocity = [0, 0, 0]", "velocity = [0, 0, 1000]");
+        let model_of_moving = deck::read(&gathered(&moving, &[(name, text)]), "deck.toml")
+            .unwrap_or_else(|faults| panic!("{faults:#?}"));
+        let doubts = deck::physics::forecast(&model_of_moving).warnings;
+        assert!(doubts.iter().all(|doubt| !doubt.contains("end_time")), "{doubts:#?}");
         // A triangle of the shells is half a side; surfaces and curves of whole sides are no parts.
         assert_eq!(model.mesh.n_elements(), 6, "{}", start.deck);
         assert!(start.warnings.iter().any(|w| w.words.contains("mm-s-t is assumed; give --units")), "{name}");

@@ -24,7 +24,6 @@ pub fn run(deck: &Path, to: Option<&Path>, force: bool, options: &Options) -> Re
 
 /// Writes a deck to start from for a mesh.
 fn start(mesh: &Path, text: &str, to: &Path, force: bool) -> Result<ExitCode, String> {
-    may_write(to, force)?;
     // The deck names the mesh as seen from its own folder.
     let folder =
         |path: &Path| path.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
@@ -34,6 +33,7 @@ fn start(mesh: &Path, text: &str, to: &Path, force: bool) -> Result<ExitCode, St
     };
     let written = deck::start_from_mesh(text, &mesh.display().to_string(), &seen.display().to_string())
         .map_err(|faults| deck_file::Error::of_faults(faults.iter().map(ToString::to_string)))?;
+    may_write(to, force)?;
     warn(&written.warnings);
     fs::write(to, &written.deck).map_err(|e| format!("{}: {e}", to.display()))?;
     println!(
@@ -56,11 +56,11 @@ fn convert(deck: &Path, text: &str, to: &Path, force: bool) -> Result<ExitCode, 
     let mesh = to.with_extension("mesh");
     let name = mesh.file_name().and_then(|name| name.to_str());
     let name = name.ok_or_else(|| format!("{}: a file name is needed, such as model.toml", to.display()))?;
+    let converted = deck::convert(text, &deck.display().to_string(), name)
+        .map_err(|faults| deck_file::Error::of_faults(faults.iter().map(ToString::to_string)))?;
     for path in [to, &mesh] {
         may_write(path, force)?;
     }
-    let converted = deck::convert(text, &deck.display().to_string(), name)
-        .map_err(|faults| deck_file::Error::of_faults(faults.iter().map(ToString::to_string)))?;
     warn(&converted.warnings);
     for (path, text) in [(&*mesh, &converted.mesh), (to, &converted.deck)] {
         fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))?;

@@ -18,6 +18,7 @@ use crate::{
     fault::short,
     geometry::{norm, sub},
     model::Model,
+    table::MAX_NUMBER,
     units::Units,
 };
 
@@ -176,7 +177,8 @@ fn times(
         std::array::from_fn(|a| bodies.iter().map(|body| body.high[a]).fold(f64::NEG_INFINITY, f64::max)),
         std::array::from_fn(|a| bodies.iter().map(|body| body.low[a]).fold(f64::INFINITY, f64::min)),
     ));
-    if fastest * end > FARTHEST * size && !is_driven {
+    // A deck of cycles alone has no end in time.
+    if end <= MAX_NUMBER && fastest * end > FARTHEST * size && !is_driven {
         doubts.push(format!(
             "end_time {} {time}: the fastest part travels {} times the size of the whole model until then; an impact is over after a few, \
              some {} {time}",
