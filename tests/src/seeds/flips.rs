@@ -130,7 +130,7 @@ impl Campaign {
     pub fn play(&self, number: u64, fraction: usize) -> Try {
         let mut draws = Draws::new(number ^ 0xf11b);
         let flip = Flip::draw(&mut draws);
-        let at = draws.below(1 << 32) * self.lengths[fraction] >> 32;
+        let at = (draws.below(1 << 32) * self.lengths[fraction]) >> 32;
         // Which intervals are computed twice follows from the deck, title and all.
         let model = Model { title: format!("try {number}"), ..Model::clone(&self.stage.model) };
         let plot = Plot::of(WORKERS, at, Fault::Flip(flip));
