@@ -39,7 +39,7 @@ pub struct Difference {
     pub begins: u64,
     /// The cycle at whose start it ends.
     pub ends: u64,
-    /// The first cycle whose votes show it; none if the state at the end alone does.
+    /// The first cycle whose votes show it; none if the end alone does.
     pub cycle: Option<u64>,
     /// Workers of the sub-domains that show it first.
     pub workers: Vec<String>,
@@ -49,12 +49,13 @@ impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { begins, ends, cycle, workers } = self;
         write!(f, "one computation of cycles {begins} to {ends} was wrong and is not in the results; ")?;
+        let names = workers.join(", ");
         match cycle {
-            Some(cycle) => {
-                let workers = workers.join(", ");
-                write!(f, "it differs first in cycle {cycle}, on {workers}: test the memory there")
+            Some(cycle) => write!(f, "it differs first in cycle {cycle}, on {names}: test the memory there"),
+            None if workers.is_empty() => {
+                f.write_str("nothing shows on which worker: test the memory of all hosts")
             }
-            None => f.write_str("no vote shows on which worker: test the memory of all hosts"),
+            None => write!(f, "it differs at the end, on {names}: test the memory there"),
         }
     }
 }

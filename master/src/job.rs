@@ -282,6 +282,10 @@ impl Job {
                     return self.blame(worker, cycle, &what, actions);
                 }
                 self.tally.note_work((index, self.workers.n()), work);
+                if last.is_some() {
+                    let noted = self.twice.note_end((worker, n), &pieces);
+                    noted.map_err(|e| Error::Unencoded(e.to_string()))?;
+                }
                 let before = Arc::clone(&self.checkpoints.newest().state);
                 match self.epoch.worker_states.add((worker, n), cycle, (pieces, last), &before)? {
                     Some(worker_state) => self.collected(worker_state, actions),

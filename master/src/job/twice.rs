@@ -5,12 +5,12 @@
 //! the order of speeds, so that nobody is given much more than it was. Two computations that agree, each sub-domain by another
 //! worker, make the end a checkpoint; until then nothing goes on from it, and a run that its user stops ends there. They agree if the
 //! state is the same, all that was written on the way, and all that the next cycle begins with. If they differ, further ones decide, and the worker of
-//! the first sub-domain whose votes were others is suspected by name. Results are written again each time, so that those of
+//! the first sub-domain whose votes were others, or else its elements and nodes at the end, is suspected by name. Results are written again each time, so that those of
 //! the last computation stay, which is one of the two that agree.
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use mechanics::{digest::digest, state::GlobalState, vote::Vote};
+use mechanics::{digest::digest, piece::Piece, state::GlobalState, vote::Vote};
 use protocol::codec;
 
 use super::{Job, checkpoints::Continuation, error::Error, samples::Stopped};
@@ -31,6 +31,8 @@ struct Trial {
     sum: [u8; 32],
     /// By cycle and position: hash of the sub-domain's vote.
     votes: BTreeMap<u64, Vec<[u8; 32]>>,
+    /// By position: hash of the sub-domain's elements and nodes at the end.
+    ends: Vec<[u8; 32]>,
 }
 
 /// What follows from a computation of an interval.
@@ -50,9 +52,10 @@ pub(super) struct Twice {
     chosen: bool,
     trials: Vec<Trial>,
     votes: BTreeMap<u64, Vec<[u8; 32]>>,
+    ends: Vec<[u8; 32]>,
     /// Hash of the states that were written on the way.
     states: blake3::Hasher,
-    /// A planted bug: the positions at the end are all that is compared.
+    /// A planted bug: rows of the history are all that is compared.
     narrow: bool,
 }
 
@@ -66,6 +69,7 @@ impl Twice {
             chosen: false,
             trials: Vec::new(),
             votes: BTreeMap::new(),
+            ends: Vec::new(),
             states: blake3::Hasher::new(),
             narrow: false,
         };
@@ -101,6 +105,24 @@ impl Twice {
         }
     }
 
+    /// A worker's pieces have come, where all stop; `n` are at work.
+    ///
+    /// # Errors
+    /// If they cannot be encoded.
+    pub(super) fn note_end(
+        &mut self,
+        (position, n): (usize, usize),
+        pieces: &[Piece],
+    ) -> protocol::Result<()> {
+        if self.chosen {
+            let mut hasher = blake3::Hasher::new();
+            codec::encode_into(&pieces, &mut hasher)?;
+            self.ends.resize(n, [0; 32]);
+            self.ends[position] = *hasher.finalize().as_bytes();
+        }
+        Ok(())
+    }
+
     /// A state is written for the user.
     pub(super) fn note_state(&mut self, state: &GlobalState) {
         if self.chosen {
@@ -111,6 +133,7 @@ impl Twice {
     /// An epoch begins: votes and states of the one before are forgotten.
     pub(super) fn begin_epoch(&mut self) {
         self.votes.clear();
+        self.ends.clear();
         self.states.reset();
     }
 
@@ -181,14 +204,23 @@ fn hash_of(vote: &Vote) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// The first cycle in which votes differ, and the positions whose do.
-fn first_difference(wrong: &Trial, right: &Trial) -> Option<(u64, Vec<usize>)> {
-    wrong.votes.iter().find_map(|(&cycle, votes)| {
-        let others = right.votes.get(&cycle).filter(|others| others.len() == votes.len())?;
-        let positions: Vec<usize> = (0..votes.len()).filter(|&p| votes[p] != others[p]).collect();
+/// The first cycle in which votes differ, and the positions whose do. Where none do, no cycle, and the positions whose elements and nodes
+/// differ at the end, unless all do: then the difference has spread, or the sub-domains are others.
+fn first_difference(wrong: &Trial, right: &Trial) -> (Option<u64>, Vec<usize>) {
+    let differing = |ours: &[[u8; 32]], theirs: &[[u8; 32]]| -> Vec<usize> {
+        let n = if ours.len() == theirs.len() { ours.len() } else { 0 };
+        (0..n).filter(|&p| ours[p] != theirs[p]).collect()
+    };
+    let of_votes = wrong.votes.iter().find_map(|(&cycle, votes)| {
+        let positions = differing(votes, right.votes.get(&cycle)?);
         // The vote that comes with a cycle is of the one before.
         (!positions.is_empty()).then(|| (cycle.saturating_sub(1), positions))
-    })
+    });
+    if let Some((cycle, positions)) = of_votes {
+        return (Some(cycle), positions);
+    }
+    let at_end = differing(&wrong.ends, &right.ends);
+    (None, if at_end.len() < wrong.ends.len() { at_end } else { Vec::new() })
 }
 
 impl Job {
@@ -209,16 +241,14 @@ impl Job {
             cycle: ends,
             sum: self.sum_of_interval(stopped)?,
             votes: std::mem::take(&mut self.twice.votes),
+            ends: std::mem::take(&mut self.twice.ends),
         };
         match self.twice.judge(trial) {
             Judgement::Agreed(wrong, right) => {
                 for wrong in wrong {
-                    let found = first_difference(&wrong, &right);
-                    let names = |p: &usize| self.workers.spec(wrong.at_work[*p]).name.clone();
-                    let (cycle, workers) = match &found {
-                        Some((cycle, positions)) => (Some(*cycle), positions.iter().map(names).collect()),
-                        None => (None, Vec::new()),
-                    };
+                    let (cycle, positions) = first_difference(&wrong, &right);
+                    let name = |p: usize| self.workers.spec(wrong.at_work[p]).name.clone();
+                    let workers = positions.into_iter().map(name).collect();
                     self.tally.differences.push(Difference { begins, ends, cycle, workers });
                 }
                 Ok(true)
@@ -232,7 +262,7 @@ impl Job {
         }
     }
 
-    /// Plants a bug: of two computations of an interval the positions at the end are all that is compared. For tests of who finds it.
+    /// Plants a bug: of two computations of an interval the rows of the history are all that is compared. For tests of who finds it.
     #[doc(hidden)]
     pub fn plant_narrow_sum(&mut self) {
         self.twice.narrow = true;
@@ -241,10 +271,6 @@ impl Job {
     /// Hash of all that an interval came to.
     fn sum_of_interval(&self, stopped: &Stopped) -> Result<[u8; 32], Error> {
         let Stopped { state, vote, .. } = stopped;
-        if self.twice.narrow {
-            let positions = state.x.iter().flatten().flat_map(|x| x.to_le_bytes());
-            return Ok(*blake3::hash(&positions.collect::<Vec<u8>>()).as_bytes());
-        }
         let rest = self.rest_at(state.cycle, vote.clone())?;
         let first = self.checkpoints.newest().continuation.n_rows.min(self.account.rows.len());
         let way = Way {
@@ -252,6 +278,11 @@ impl Job {
             rows: &self.account.rows[first..],
             failure: self.account.failure.as_deref(),
         };
+        if self.twice.narrow {
+            let rows: Vec<&HistoryRow> = way.rows.iter().map(|row| &**row).collect();
+            let bytes = codec::encode(&rows).map_err(|e| Error::Unencoded(e.to_string()))?;
+            return Ok(*blake3::hash(&bytes).as_bytes());
+        }
         sum_of(&way, state, &rest).map_err(|e| Error::Unencoded(e.to_string()))
     }
 }
@@ -300,7 +331,14 @@ mod tests {
 
     fn trial(at_work: &[usize], sum: u8) -> Trial {
         let speeds = vec![1.0; at_work.len()];
-        Trial { at_work: at_work.to_vec(), speeds, cycle: 9, sum: [sum; 32], votes: BTreeMap::new() }
+        Trial {
+            at_work: at_work.to_vec(),
+            speeds,
+            cycle: 9,
+            sum: [sum; 32],
+            votes: BTreeMap::new(),
+            ends: Vec::new(),
+        }
     }
 
     #[test]
@@ -323,6 +361,20 @@ mod tests {
             assert!(matches!(twice.judge(trial(&at_work, sum)), Judgement::Again));
         }
         assert!(matches!(twice.judge(trial(&[1, 0], 2)), Judgement::Never));
+    }
+
+    #[test]
+    fn the_first_votes_that_differ_name_a_worker_and_else_the_end_does_unless_all_differ() {
+        let with = |votes: &[(u64, [u8; 2])], ends: [u8; 2]| Trial {
+            votes: votes.iter().map(|&(cycle, both)| (cycle, both.map(|byte| [byte; 32]).to_vec())).collect(),
+            ends: ends.map(|byte| [byte; 32]).to_vec(),
+            ..trial(&[0, 1], 1)
+        };
+        let right = with(&[(5, [1, 2]), (6, [3, 4])], [8, 9]);
+        let named = |votes, ends| first_difference(&with(votes, ends), &right);
+        assert_eq!(named(&[(5, [1, 2]), (6, [3, 7])], [7, 7]), (Some(5), vec![1]));
+        assert_eq!(named(&[(5, [1, 2]), (6, [3, 4])], [7, 9]), (None, vec![0]));
+        assert_eq!(named(&[(5, [1, 2]), (6, [3, 4])], [7, 7]), (None, vec![]));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! 10,000 seeds from 0 unless said otherwise. Prints how many, how long, what happened; a seed that goes wrong is printed
 //! with its plot, and the program ends with failure. One seed again: `seeds -- 1 SEED`. With BUG the master has a planted one, which some of
 //! the seeds must find: `unfenced`, it hears messages of epochs that are over; `narrow`, it compares of two computations of an interval
-//! the positions at the end and nothing else.
+//! rows of the history and nothing else.
 
 use std::{process::ExitCode, time::Instant};
 

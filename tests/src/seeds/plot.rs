@@ -66,7 +66,7 @@ pub struct Plot {
 pub enum Bug {
     /// Messages of epochs that are over reach it as if they were of now.
     Unfenced,
-    /// What it compares of two computations of an interval is the positions at its end and nothing else.
+    /// What it compares of two computations of an interval are rows of the history and nothing else.
     Narrow,
 }
 
