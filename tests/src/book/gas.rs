@@ -221,7 +221,8 @@ fn blast(n: u32, gamma: f64, energy: f64, end: f64, safety: f64) -> Solved {
 
 /// Where the pressure of a blast falls to half of its peak outside: means over shells of half a cell.
 fn front(solved: &Solved, state: &GlobalState, h: f64) -> f64 {
-    let mut shells = vec![(0.0, 0_usize); 80];
+    // Up to a radius of 1.25, beyond the front and short of the far corners.
+    let mut shells = vec![(0.0, 0_usize); (2.5 / h).ceil() as usize];
     for (x, _, e) in profile(solved, state, &[1.0; 4]) {
         let r = x.iter().map(|c| c * c).sum::<f64>().sqrt();
         if let Some(shell) = shells.get_mut((r / (0.5 * h)) as usize) {
