@@ -4,6 +4,8 @@
 //! `FOLDER/NAME/` holds `ca.pem`, `host.pem` and `host-key.pem` and is what is copied to the host. What
 //! the files are used for is in [`protocol::tls`].
 
+pub mod arguments;
+
 use protocol::tls::{Paths, Role};
 use rcgen::{
     BasicConstraints, Certificate, CertificateParams, CertificateSigningRequestParams, DistinguishedName,
