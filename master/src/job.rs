@@ -191,6 +191,9 @@ impl Job {
 
     fn finish(&mut self, state: Option<GlobalState>, actions: &mut Vec<Action>) {
         self.ending.over = true;
+        if let Some(state) = &state {
+            self.note_fragments(state);
+        }
         let failure = self.account.failure.take();
         self.epoch.send_all(actions, |_| ToWorker::Release);
         let digest = state.as_ref().map(digest::digest).unwrap_or_default();
@@ -215,6 +218,7 @@ impl Job {
             rebalances: std::mem::take(&mut tally.rebalances),
             losses: std::mem::take(&mut tally.losses),
             differences: std::mem::take(&mut tally.differences),
+            runaways: tally.fragments.take_runaways(),
         })));
     }
 

@@ -29,6 +29,7 @@ pub mod event;
 pub mod exchange;
 pub mod files;
 pub mod footprint;
+pub mod fragments;
 pub mod hosts;
 pub mod http;
 pub mod incident;
