@@ -39,9 +39,10 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
-    // Decks, results and the queue are the owner's alone.
-    rustix::process::umask(rustix::fs::Mode::RWXG | rustix::fs::Mode::RWXO);
     let port = args.link.map(|rate| Shape::port(Wire::ethernet(rate)));
+    // Decks, results and the queue are the owner's alone.
+    system::private::from_now_on(&args.spool)
+        .map_err(|e| format!("spool folder {}: {e}", args.spool.display()))?;
     let (spool, left) = Spool::open(&args.spool)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)

@@ -38,7 +38,6 @@ pub mod interrupt;
 pub mod job;
 pub mod machine;
 pub mod materials;
-pub mod memory;
 pub mod neighbour;
 pub mod newcomer;
 pub mod node_owners;

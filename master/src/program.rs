@@ -21,7 +21,7 @@ use crate::{
     certs::{self, arguments::Certs},
     check, client,
     command::{Bench, Cli, Command, WorkerArgs},
-    convert, daemon, init, machine, materials, memory, newcomer, picture, processes, run,
+    convert, daemon, init, machine, materials, newcomer, picture, processes, run,
     shell::print,
     simulate, study, verify,
 };
@@ -39,7 +39,7 @@ pub fn log<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
 
 /// Does what the command line says. `compute` is what computes the tasks of a worker.
 pub fn main(compute: Compute) -> ExitCode {
-    memory::return_large_arrays();
+    system::allocator::return_large_arrays();
     let result = match Cli::parse().command {
         Command::Run(args) => run::run_and_tell(&args),
         Command::Study(args) => study::run(&args),

@@ -91,10 +91,9 @@ impl From<drive::Error> for Failure {
     }
 }
 
-/// Whether a reason ends in an error by which Linux says that it has none left of something: memory (12), files (23, 24), room on a
-/// disk (28, 122).
+/// Whether a reason ends in an error by which the system says that it has none left of something.
 fn is_shortage(reason: &str) -> bool {
-    [12, 23, 24, 28, 122].iter().any(|number| reason.contains(&format!("(os error {number})")))
+    system::files::SHORTAGES.iter().any(|number| reason.contains(&format!("(os error {number})")))
 }
 
 /// Runs the job; gives how it ended. A bug becomes a failure of this job alone.

@@ -17,9 +17,8 @@
 
 use std::{
     collections::BTreeSet,
-    fs::{self, File, TryLockError},
+    fs::{self, File},
     io,
-    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
 
@@ -141,19 +140,10 @@ impl Spool {
         let queue = folder.join("queue");
         fs::create_dir_all(&queue).map_err(fault)?;
         // An earlier release left it open to all.
-        fs::set_permissions(&queue, fs::Permissions::from_mode(0o700)).map_err(fault)?;
-        // Of the folder itself, which nobody can take away from a master unnoticed, as a file in it could be.
-        let lock = File::open(folder).map_err(fault)?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(format!(
-                    "spool folder {}: another master uses it; name another with --spool",
-                    folder.display()
-                ));
-            }
-            Err(TryLockError::Error(error)) => return Err(fault(error)),
-        }
+        system::private::close(&queue).map_err(fault)?;
+        let lock = system::folders::lock(folder).map_err(fault)?.ok_or_else(|| {
+            format!("spool folder {}: another master uses it; name another with --spool", folder.display())
+        })?;
         let spool = Self { folder: folder.to_owned(), _lock: lock };
         let mut left = Left { first: 1, ..Left::default() };
         let mut records = BTreeSet::new();
