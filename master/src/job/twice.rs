@@ -7,6 +7,9 @@
 //! state is the same, all that was written on the way, and all that the next cycle begins with. If they differ, further ones decide, and the worker of
 //! the first sub-domain whose votes were others, or else its elements and nodes at the end, is suspected by name. Results are written again each time, so that those of
 //! the last computation stay, which is one of the two that agree.
+//!
+//! A fault that the workers' numbers lead to, such as a force that exact sums cannot hold, ends an interval as well. It is compared like
+//! any other end: where others do not come to it, the run goes on.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -25,8 +28,8 @@ struct Trial {
     /// Workers by position: who computed which sub-domain.
     at_work: Vec<usize>,
     speeds: Vec<f64>,
-    /// The cycle at whose start it ended.
-    cycle: u64,
+    /// The cycle at whose start it ended; none if a fault ended it.
+    cycle: Option<u64>,
     /// Hash of all that it came to.
     sum: [u8; 32],
     /// By cycle and position: hash of the sub-domain's vote.
@@ -95,7 +98,7 @@ impl Twice {
 
     /// Where it ends, if it is being taken again.
     pub(super) fn until(&self) -> Option<u64> {
-        self.trials.first().map(|trial| trial.cycle)
+        self.trials.iter().find_map(|trial| trial.cycle)
     }
 
     /// A worker's vote of the cycle before this one has come; `n` are at work.
@@ -233,19 +236,50 @@ impl Job {
         stopped: &Stopped,
         actions: &mut Vec<Action>,
     ) -> Result<bool, Error> {
+        let sum = self.sum_of_interval(stopped)?;
+        self.computation_stands(Some(stopped.state.cycle), sum, actions)
+    }
+
+    /// Something went wrong. A fault that the numbers of an interval led to is compared first, where it is computed twice: if nobody else
+    /// has come to it yet, the interval is being taken again.
+    ///
+    /// # Errors
+    /// The fault if it stands, or if no two computations agree.
+    pub(super) fn judge_fault(&mut self, fault: Error, actions: &mut Vec<Action>) -> Result<(), Error> {
+        if !self.twice.is_chosen() || !fault.follows_from_numbers() {
+            return Err(fault);
+        }
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(fault.to_string().as_bytes());
+        hasher.update(&self.epoch.schedule.completed().to_le_bytes());
+        let sum = *hasher.finalize().as_bytes();
+        if self.computation_stands(None, sum, actions)? { Err(fault) } else { Ok(()) }
+    }
+
+    /// A computation of the interval has ended, with this sum. Gives whether it stands; else the interval is being taken again.
+    ///
+    /// # Errors
+    /// If no two computations of it agree.
+    fn computation_stands(
+        &mut self,
+        cycle: Option<u64>,
+        sum: [u8; 32],
+        actions: &mut Vec<Action>,
+    ) -> Result<bool, Error> {
         let begins = self.checkpoints.newest().cycle();
-        let ends = stopped.state.cycle;
+        let reached = cycle.unwrap_or_else(|| self.epoch.schedule.completed());
         let trial = Trial {
             at_work: self.epoch.at_work.clone(),
             speeds: self.epoch.shares.speeds.clone(),
-            cycle: ends,
-            sum: self.sum_of_interval(stopped)?,
+            cycle,
+            sum,
             votes: std::mem::take(&mut self.twice.votes),
             ends: std::mem::take(&mut self.twice.ends),
         };
         match self.twice.judge(trial) {
             Judgement::Agreed(wrong, right) => {
                 for wrong in wrong {
+                    let ends = right.cycle.or(wrong.cycle).unwrap_or(reached);
                     let (cycle, positions) = first_difference(&wrong, &right);
                     let name = |p: usize| self.workers.spec(wrong.at_work[p]).name.clone();
                     let workers = positions.into_iter().map(name).collect();
@@ -258,7 +292,7 @@ impl Job {
                 self.next_epoch(actions)?;
                 Ok(false)
             }
-            Judgement::Never => Err(Error::NoTwoAgree { begins, ends, computations: MOST }),
+            Judgement::Never => Err(Error::NoTwoAgree { begins, ends: reached, computations: MOST }),
         }
     }
 
@@ -334,7 +368,7 @@ mod tests {
         Trial {
             at_work: at_work.to_vec(),
             speeds,
-            cycle: 9,
+            cycle: Some(9),
             sum: [sum; 32],
             votes: BTreeMap::new(),
             ends: Vec::new(),
