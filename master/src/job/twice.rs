@@ -5,7 +5,7 @@
 //! the order of speeds, so that nobody is given much more than it was. Two computations that agree, each sub-domain by another
 //! worker, make the end a checkpoint; until then nothing goes on from it, and a run that its user stops ends there. They agree if the
 //! state is the same, all that was written on the way, and all that the next cycle begins with. If they differ, further ones decide, and the worker of
-//! the first sub-domain whose votes were others, or else its elements and nodes at the end, is suspected by name. Results are written again each time, so that those of
+//! the first sub-domain whose votes were others, or else its elements and nodes at the end, is suspected by name; the third time it is dismissed. Results are written again each time, so that those of
 //! the last computation stay, which is one of the two that agree.
 //!
 //! A fault that the workers' numbers lead to, such as a force that exact sums cannot hold, ends an interval as well. It is compared like
@@ -21,6 +21,8 @@ use crate::{event::Action, incident::Difference, results::history::HistoryRow};
 
 /// Computations of an interval before the job gives up.
 const MOST: usize = 4;
+/// Wrong computations that name a worker before it is dismissed. One or two may be a stray bit.
+const WRONG_LIMIT: u32 = 3;
 
 /// One computation of an interval.
 #[derive(Clone, Debug)]
@@ -58,6 +60,8 @@ pub(super) struct Twice {
     ends: Vec<[u8; 32]>,
     /// Hash of the states that were written on the way.
     states: blake3::Hasher,
+    /// By index of the worker: wrong computations that name it, of all intervals.
+    named: BTreeMap<usize, u32>,
     /// A planted bug: rows of the history are all that is compared.
     narrow: bool,
 }
@@ -74,6 +78,7 @@ impl Twice {
             votes: BTreeMap::new(),
             ends: Vec::new(),
             states: blake3::Hasher::new(),
+            named: BTreeMap::new(),
             narrow: false,
         };
         twice.begin_interval();
@@ -138,6 +143,23 @@ impl Twice {
         self.votes.clear();
         self.ends.clear();
         self.states.reset();
+    }
+
+    /// A wrong computation names these workers, by index.
+    fn name(&mut self, workers: &[usize]) {
+        workers.iter().for_each(|&index| *self.named.entry(index).or_default() += 1);
+    }
+
+    /// The worker that was wrong again and again, by index, and how often; none while another was named as often.
+    pub(super) fn worst(&self) -> Option<(usize, u32)> {
+        let (&index, &times) = self.named.iter().max_by_key(|(_, times)| **times)?;
+        let alone = self.named.values().filter(|&&other| other == times).count() == 1;
+        (alone && times >= WRONG_LIMIT).then_some((index, times))
+    }
+
+    /// Nothing is held against a worker any more, by index: it is gone.
+    pub(super) fn forget(&mut self, index: usize) {
+        self.named.remove(&index);
     }
 
     /// Who takes which position, of the workers that there are: where an interval is taken again, others than before. Where workers have come
@@ -281,8 +303,9 @@ impl Job {
                 for wrong in wrong {
                     let ends = right.cycle.or(wrong.cycle).unwrap_or(reached);
                     let (cycle, positions) = first_difference(&wrong, &right);
-                    let name = |p: usize| self.workers.spec(wrong.at_work[p]).name.clone();
-                    let workers = positions.into_iter().map(name).collect();
+                    let indices: Vec<usize> = positions.into_iter().map(|p| wrong.at_work[p]).collect();
+                    self.twice.name(&indices);
+                    let workers = self.workers.names(&indices);
                     self.tally.differences.push(Difference { begins, ends, cycle, workers });
                 }
                 Ok(true)
@@ -409,6 +432,20 @@ mod tests {
         assert_eq!(named(&[(5, [1, 2]), (6, [3, 7])], [7, 7]), (Some(5), vec![1]));
         assert_eq!(named(&[(5, [1, 2]), (6, [3, 4])], [7, 9]), (None, vec![0]));
         assert_eq!(named(&[(5, [1, 2]), (6, [3, 4])], [7, 7]), (None, vec![]));
+    }
+
+    #[test]
+    fn whoever_three_wrong_computations_name_is_the_worst_unless_another_was_named_as_often() {
+        let mut twice = Twice::new(1.0, &[0; 32]);
+        twice.name(&[4, 2]);
+        twice.name(&[2]);
+        assert_eq!(twice.worst(), None, "twice may be chance");
+        twice.name(&[2, 4]);
+        assert_eq!(twice.worst(), Some((2, 3)));
+        twice.name(&[4]);
+        assert_eq!(twice.worst(), None, "it is one of two");
+        twice.forget(2);
+        assert_eq!(twice.worst(), Some((4, 3)));
     }
 
     #[test]
