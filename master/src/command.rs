@@ -365,6 +365,10 @@ pub struct WorkerArgs {
     /// Compute threads [default: the cores that it may use]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
+    /// Memory that its share of a job may take (GB); a job whose share would take more waits for other workers [default: what is available
+    /// when it starts]
+    #[arg(long, value_name = "GB", value_parser = amount)]
+    pub memory: Option<f64>,
     /// Name, unlike that of any other worker: with certificates, that in this host's, or NAME@ANY [default: host name and process
     /// id]
     #[arg(long)]

@@ -21,6 +21,7 @@ use crate::{
     machine::host_name,
     notice::{Notice, WAITING_NOTICES},
     scheduler::{Scheduler, retention::Limits},
+    scrub,
     spool::Spool,
 };
 
@@ -74,6 +75,8 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
             age: args.keep_days.map(|days| Duration::from_secs_f64(days * 86_400.0)),
             bytes: args.keep_gb.map(|gigabytes| (gigabytes * 1e9) as u64),
         };
+        let over = left.jobs.iter().filter(|(record, _)| record.ended.is_some());
+        scrub::begin(over.map(|(record, _)| (record.job, spool.results(record.job))).collect());
         let scheduler = Scheduler::new(args.spool.clone(), spool, left, notices, board).keeping(limits);
         scheduler.run(heard, &stop, &acceptor).await;
         Ok(ExitCode::SUCCESS)

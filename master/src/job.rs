@@ -154,7 +154,8 @@ impl Job {
         if self.ending.over {
             return actions;
         }
-        if let Err(error) = self.hear(event, &mut actions) {
+        let heard = self.hear(event, &mut actions);
+        if let Err(error) = heard.or_else(|fault| self.judge_fault(fault, &mut actions)) {
             // Ends the job without a final state.
             self.account.failure = Some(error.to_string());
             self.finish(None, &mut actions);

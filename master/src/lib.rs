@@ -57,6 +57,7 @@ pub mod results;
 pub mod run;
 pub mod run_totals;
 pub mod scheduler;
+pub mod scrub;
 pub mod service;
 pub mod shell;
 pub mod simulate;

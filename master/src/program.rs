@@ -111,6 +111,7 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
         },
         speed,
         threads: args.threads.unwrap_or(cores),
+        memory: args.memory.map(|gigabytes| (gigabytes * 1e9) as u64),
         certs: args.certs,
         patience: Duration::from_secs(args.patience),
         once: args.once,

@@ -13,7 +13,7 @@ use tracing::{info, warn};
 
 use crate::{
     command::RunArgs,
-    deck_file::read_deck_with,
+    deck_file::{gather_deck, read_gathered},
     embedded::{self, Traffic},
     event::{Outcome, WorkerSpec},
     interrupt::stop_on_interrupt,
@@ -22,7 +22,7 @@ use crate::{
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     processes::Processes,
-    results::{self, Folder, report, trace},
+    results::{self, Folder, Summary, report, trace},
     shell::quoted,
     snapshot::{
         self, Snapshot,
@@ -60,7 +60,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         pin.apply()?;
     }
     let asked = &args.job;
-    let mut model = read_deck_with(&args.deck, &args.reading.options())?;
+    let text = gather_deck(&args.deck, &args.reading.options())?;
+    let mut model = read_gathered(&text, &args.deck.display().to_string())?;
     bring_end_forward(&mut model, asked)?;
     let model = Arc::new(model);
     let n = args.workers as usize;
@@ -99,6 +100,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let (mut job, first) = Job::new(Arc::clone(&model), &specs, options, resume)?;
     let census = bare.unwrap_or_else(|| SurfaceCensus::of(&job, &model));
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
+    output.keep_input(&text, asked.end_time)?;
+    drop(text);
     if let Some(folder) = &output.folder {
         let snapshots = folder.file(store::FOLDER);
         if !in_place {
@@ -210,12 +213,14 @@ pub fn conclude(
     json: bool,
 ) -> Result<ExitCode, String> {
     let summary = summarise(model, census, outcome, traffic, threads, wall_s);
+    let summary = Summary { input: output.input.clone(), ..summary };
     for warning in &summary.warnings {
         warn!("{warning}");
     }
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        output.seal()?;
     }
     if json {
         println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);

@@ -29,7 +29,7 @@ use crate::{
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
     queue::Change,
-    results::{self, Folder, TRACE, report, trace},
+    results::{self, Folder, Summary, TRACE, report, trace},
     snapshot::{Snapshot, keeper::Keeper, store::Store},
     summarise::{SurfaceCensus, summarise},
 };
@@ -179,6 +179,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     });
     let folder = folder.transpose().map_err(|e| e.to_string())?;
     let mut output = Output::new(Arc::clone(&model), folder, true)?;
+    output.keep_input(&order.text, order.options.end_time)?;
     let results = output.folder.as_ref().map(|folder| folder.path().to_owned());
     output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     output.go_on(&job, states)?;
@@ -217,6 +218,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     }
     let threads = specs.iter().map(|spec| spec.threads).sum();
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
+    let summary = Summary { input: reporter.output.input.clone(), ..summary };
     for warning in &summary.warnings {
         warn!(job = order.number, "{warning}");
     }
@@ -227,6 +229,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
             trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
                 .map_err(|e| e.to_string())?;
         }
+        reporter.output.seal()?;
     }
     order.status.send_modify(|status| {
         status.cycle = summary.cycles;

@@ -128,6 +128,7 @@ pub fn summarise(
             .chain(outcome.differences.iter().map(ToString::to_string))
             .collect(),
         digest: outcome.digest.clone(),
+        input: None,
     }
 }
 

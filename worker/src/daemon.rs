@@ -54,6 +54,8 @@ pub struct Options {
     /// Relative speed.
     pub speed: f64,
     pub threads: u32,
+    /// Memory that it may take (bytes); none for what is available.
+    pub memory: Option<u64>,
     /// Folder with this host's certificates.
     pub certs: Option<PathBuf>,
     /// How long a master that cannot be reached is dialled.
@@ -148,6 +150,7 @@ fn greeting(options: &Options) -> Hello {
     );
     hello.token.clone_from(&options.token);
     hello.proof = Some(mechanics::proof::of_this_machine());
+    hello.memory = options.memory.or_else(system::memory::available).unwrap_or_default();
     hello
 }
 
