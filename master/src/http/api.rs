@@ -34,6 +34,7 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use super::{api_state::ApiState, board};
 use crate::{
+    client,
     desk::{self, Brought},
     notice::{self, Notice, ask},
     queue,
@@ -213,7 +214,7 @@ async fn job(
 ) -> Result<Json<serde_json::Value>, Fault> {
     let watch = ask(&api_state.notices, |answer| Notice::Watch(Some(job), answer)).await??;
     let status = watch.borrow().clone();
-    Ok(Json(json!(status)))
+    Ok(Json(client::as_json(&status)))
 }
 
 async fn cancel(
