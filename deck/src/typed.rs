@@ -221,4 +221,6 @@ pub(crate) enum Spot {
     Number(Placed<u32>),
     /// The nearest to this point.
     Point(Placed<[f64; 3]>),
+    /// The nearest to the centre of its part.
+    Centre,
 }

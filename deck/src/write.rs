@@ -186,7 +186,8 @@ fn write_gauge(text: &mut Text, gauge: &Gauge) {
             }
             text.key("point", vector(point.value));
         }
-        None => {}
+        Some(Spot::Centre) if element => text.key("of", quoted("element")),
+        Some(Spot::Centre) | None => {}
     }
     if let Some(part) = &gauge.part {
         text.key("part", quoted(&part.value));

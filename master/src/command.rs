@@ -207,9 +207,9 @@ pub struct RunArgs {
     /// What the deck leaves open
     #[command(flatten)]
     pub reading: ReadingArgs,
-    /// Number of workers
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub workers: u32,
+    /// Number of workers [default: one for each of --speeds, else 1]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub workers: Option<u32>,
     /// Relative speeds of the workers, separated by commas; missing ones are 1
     #[arg(long, value_delimiter = ',')]
     pub speeds: Vec<f64>,

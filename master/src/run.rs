@@ -64,7 +64,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let mut model = read_gathered(&text, &args.deck.display().to_string())?;
     bring_end_forward(&mut model, asked)?;
     let model = Arc::new(model);
-    let n = args.workers as usize;
+    let n = args.workers.map_or(args.speeds.len().max(1), |n| n as usize);
     let cores = worker::processors::cores();
     let threads = args.threads.map_or(cores, |t| t as usize);
     let specs: Vec<WorkerSpec> = speeds_for(n, &args.speeds)?

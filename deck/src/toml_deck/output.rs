@@ -84,7 +84,7 @@ pub(super) fn read_sections(deck: &Table<'_>) -> Vec<Section> {
     deck.tables("section", MAX_SECTIONS).into_iter().map(section).collect()
 }
 
-/// Reads every `[[gauge]]`: at a node or element number, or at the node or element nearest to a point.
+/// Reads every `[[gauge]]`: at a node or element number, or at the node or element nearest to a point or to the centre of a part.
 pub(super) fn read_gauges(deck: &Table<'_>) -> Vec<Gauge> {
     let gauge = |table: Table<'_>| {
         let value = table.require("name", "a name in quotes");
@@ -99,12 +99,15 @@ pub(super) fn read_gauges(deck: &Table<'_>) -> Vec<Gauge> {
                 number.map(|id| Spot::Number(value.placed(id as u32)))
             }
             (None, Some(value)) => value.vector().map(|point| Spot::Point(value.placed(point))),
+            (None, None) if table.has("part") => Some(Spot::Centre),
             _ => {
                 table.faults.add(
                     table.at,
                     format!("{} with neither or both of {key} and point", table.title),
                     "one of them",
-                    format!("write {key} = number or point = [x, y, z]"),
+                    format!(
+                        "write {key} = number or point = [x, y, z], or part = \"name\" alone for its centre"
+                    ),
                 );
                 None
             }

@@ -58,6 +58,8 @@ pub struct HistoryRow {
     pub momentum: [f64; 3],
     /// One entry per part, in deck order.
     pub parts: Vec<PartEnergy>,
+    /// Momentum of each part (mass length per time), in deck order; they add up to `momentum`.
+    pub part_momenta: Vec<[f64; 3]>,
     /// One entry per gauge, in deck order.
     pub gauges: Vec<GaugeRow>,
     /// State of the element of each element gauge, see [`mechanics::block::Block::reading`].
@@ -230,6 +232,7 @@ impl History {
     /// If the row has not one entry per part and per gauge of the model.
     pub fn append(&mut self, row: &HistoryRow) -> Result<(), Error> {
         assert_eq!(row.parts.len(), self.n_parts, "parts of the row and of the model");
+        assert_eq!(row.part_momenta.len(), self.n_parts, "momenta of the row and parts of the model");
         assert_eq!(row.gauges.len(), self.gauges.len(), "gauges of the row and of the model");
         assert_eq!(
             row.element_gauges.len(),
@@ -245,7 +248,12 @@ impl History {
             .chain(row.momentum)
             .chain([row.eroded, row.eroded_mass].into_iter().filter(|_| self.erodes))
             .chain([row.wall_loss].into_iter().filter(|_| self.has_walls))
-            .chain(row.parts.iter().flat_map(PartEnergy::numbers))
+            .chain(
+                row.parts
+                    .iter()
+                    .zip(&row.part_momenta)
+                    .flat_map(|(part, momentum)| part.numbers().into_iter().chain(*momentum)),
+            )
             .chain(row.gauges.iter().zip(&self.gauges).flat_map(|(gauge, start)| {
                 let moved: [f64; 3] = std::array::from_fn(|axis| gauge.x[axis] - start[axis]);
                 gauge.x.into_iter().chain(gauge.v).chain(moved)
@@ -402,6 +410,8 @@ pub fn columns(model: &Model) -> Vec<String> {
     }
     for part in &model.mesh.parts {
         columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
+        let axes = ["x", "y", "z"].iter();
+        columns.extend(axes.map(|axis| format!("{}:momentum_{axis} [{mass}*{length}/{time}]", part.name)));
     }
     for gauge in &model.output.gauges {
         columns.extend(["x", "y", "z"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));

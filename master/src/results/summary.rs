@@ -158,6 +158,12 @@ const NAMED_PARTS: usize = 4;
 pub struct NamedPart {
     /// Its name in the deck.
     pub name: String,
+    /// Its mass at the start; a node that parts share counts with the first of them, a rigid body with its first part.
+    #[serde(default)]
+    pub mass: f64,
+    /// Its momentum at the end.
+    #[serde(default)]
+    pub momentum: [f64; 3],
     pub kinetic: f64,
     pub internal: f64,
     /// Energy taken by hourglass forces.
