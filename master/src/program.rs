@@ -20,7 +20,7 @@ use crate::{
     ca_folder::CaFolder,
     certs, check, client,
     command::{Bench, Certs, Cli, Command, WorkerArgs},
-    convert, daemon, init, machine, materials, memory, newcomer, picture, processes, run,
+    convert, daemon, export, init, machine, materials, memory, newcomer, picture, processes, run,
     shell::print,
     simulate, study, verify,
 };
@@ -74,6 +74,7 @@ pub fn main(compute: Compute) -> ExitCode {
         }
         Command::Verify(args) => verify::run(&args),
         Command::Picture(args) => picture::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Materials(args) => materials::run(&args),
     };
     result.unwrap_or_else(|reason| {

@@ -3,7 +3,7 @@
 //! A results folder holds `state-NNNNNN.vtu` (one file per written state, [`vtu`]), `results.pvd` (the index
 //! that ParaView opens, with the time of each state), where the deck asks for it `contact-NNNNNN.vtp` and `contact.pvd`
 //! (the same of the contact surface, [`surface`]), `history.csv` ([`history`]), `summary.json`
-//! ([`summary`]) and `report.html` ([`report`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
+//! ([`summary`]) and `report.html` ([`report`]), and the same states in other formats where they are wanted ([`format`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
 //! Only the history grows in place, by whole rows. So the folder of a killed run opens.
 //!
 //! Nothing here computes physics or decides when to write.
@@ -15,12 +15,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub mod d3plot;
+pub mod field_unit;
+pub mod format;
+pub mod hdf5;
 pub mod history;
 pub mod report;
 pub mod summary;
 pub mod surface;
 pub mod trace;
 pub mod von_mises;
+pub mod vtkhdf;
 pub mod vtu;
 pub mod writer;
 
@@ -250,6 +255,7 @@ fn is_written_by_a_run(name: &str) -> bool {
     let state = stem.strip_prefix("state-").and_then(|n| n.strip_suffix(".vtu"));
     let contact = || stem.strip_prefix("contact-").and_then(|n| n.strip_suffix(".vtp"));
     [PVD, CONTACT_PVD, HISTORY, SUMMARY, REPORT, TRACE].contains(&stem)
+        || format::FORMATS.iter().any(|format| format.writes(stem))
         || state
             .or_else(contact)
             .is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
@@ -370,6 +376,9 @@ mod tests {
             "contact.pvd",
             "history.csv",
             "summary.json",
+            "results.vtkhdf",
+            "d3plot",
+            "d3plot01",
             ".state-000000.vtu.tmp",
             ".results.pvd.tmp",
         ] {

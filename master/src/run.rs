@@ -16,13 +16,14 @@ use crate::{
     deck_file::read_deck_with,
     embedded::{self, Traffic},
     event::{Outcome, WorkerSpec},
+    export,
     interrupt::stop_on_interrupt,
     job::Job,
     notify::notify,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     processes::Processes,
-    results::{self, Folder, report, trace},
+    results::{self, Folder, format, report, trace},
     shell::quoted,
     snapshot::{
         self, Snapshot,
@@ -62,6 +63,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let asked = &args.job;
     let mut model = read_deck_with(&args.deck, &args.reading.options())?;
     bring_end_forward(&mut model, asked)?;
+    let others: Vec<_> = args.format.iter().filter(|name| !model.output.formats.contains(name)).collect();
+    model.output.formats.extend(others.into_iter().cloned().collect::<Vec<_>>());
     let model = Arc::new(model);
     let n = args.workers as usize;
     let cores = worker::processors::cores();
@@ -216,6 +219,9 @@ pub fn conclude(
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        for written in format::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
+            info!("{}", export::line(&written));
+        }
     }
     if json {
         println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
