@@ -8,7 +8,8 @@
 
 use std::{net::SocketAddr, path::PathBuf};
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, builder::PossibleValuesParser};
+use deck::model::FORMAT_NAMES;
 use protocol::{
     options::{self, Balance, JobOptions, Route},
     shape::Rate,
@@ -16,7 +17,7 @@ use protocol::{
 use worker::processors::Processors;
 
 use crate::{
-    bench::grind::Speed, certs::arguments::Certs, picture::arguments::PictureArgs,
+    bench::grind::Speed, certs::arguments::Certs, export::ExportArgs, picture::arguments::PictureArgs,
     study::arguments::StudyArgs, verify::arguments::VerifyArgs,
 };
 pub use crate::{client::Until, reading::ReadingArgs};
@@ -152,6 +153,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Draw a state of a results folder as a PNG, coloured by a field
     Picture(PictureArgs),
+    /// Write the states of a results folder in another format: one VTKHDF file, or d3plot
+    Export(ExportArgs),
     /// Write an LS-DYNA keyword deck as a TOML deck with its mesh beside it, or a TOML deck to start from for a mesh
     Convert {
         /// The keyword deck, or a mesh: Gmsh (.msh), Abaqus (.inp), Nastran (.bdf, .nas, .dat, .fem)
@@ -228,6 +231,9 @@ pub struct RunArgs {
     /// Results folder [default: the one resumed from, else results/<deck name>]
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// Formats of the states beside VTU, separated by commas, as `formats` of [output] has them
+    #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(FORMAT_NAMES), conflicts_with = "no_output")]
+    pub format: Vec<String>,
     /// Replace the results in an existing folder
     #[arg(long)]
     pub force: bool,

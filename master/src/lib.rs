@@ -27,6 +27,7 @@ pub mod embedded;
 pub mod erosion;
 pub mod event;
 pub mod exchange;
+pub mod export;
 pub mod files;
 pub mod footprint;
 pub mod fragments;

@@ -21,7 +21,7 @@ use crate::{
     certs::{self, arguments::Certs},
     check, client,
     command::{Bench, Cli, Command, WorkerArgs},
-    convert, daemon, init, machine, materials, newcomer, picture, processes, run,
+    convert, daemon, export, init, machine, materials, newcomer, picture, processes, run,
     shell::print,
     simulate, study, verify,
 };
@@ -75,6 +75,7 @@ pub fn main(compute: Compute) -> ExitCode {
         }
         Command::Verify(args) => verify::run(&args),
         Command::Picture(args) => picture::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Materials(args) => materials::run(&args),
     };
     result.unwrap_or_else(|reason| {

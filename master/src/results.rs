@@ -3,7 +3,8 @@
 //! A results folder holds `state-NNNNNN.vtu` (one file per written state, [`vtu`]), `results.pvd` (the index
 //! that ParaView opens, with the time of each state), where the deck asks for it `contact-NNNNNN.vtp` and `contact.pvd`
 //! (the same of the contact surface, [`surface`]), `history.csv` ([`history`]), `summary.json`
-//! ([`summary`]), `report.html` ([`report`]), the deck that it was computed from with all that it refers to (`input.deck`), and, where the run
+//! ([`summary`]), `report.html` ([`report`]), the same states in other formats where they are wanted ([`format`]), the deck that it was
+//! computed from with all that it refers to (`input.deck`), and, where the run
 //! came to an end, checksums of all that ([`sums`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
 //! Only the history grows in place, by whole rows. So the folder of a killed run opens.
 //!
@@ -16,6 +17,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub mod d3plot;
+pub mod field_unit;
+pub mod format;
+pub mod hdf5;
 pub mod history;
 pub mod report;
 pub mod summary;
@@ -23,6 +28,7 @@ pub mod sums;
 pub mod surface;
 pub mod trace;
 pub mod von_mises;
+pub mod vtkhdf;
 pub mod vtu;
 pub mod writer;
 
@@ -253,7 +259,9 @@ pub fn contact_name(index: u32) -> String {
 /// Whether a run writes files of this name: the only ones that `--force` removes.
 fn is_written_by_a_run(name: &str) -> bool {
     let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".tmp")).unwrap_or(name);
-    [PVD, CONTACT_PVD, HISTORY, SUMMARY, REPORT, TRACE, INPUT, SUMS].contains(&stem) || is_of_a_state(stem)
+    [PVD, CONTACT_PVD, HISTORY, SUMMARY, REPORT, TRACE, INPUT, SUMS].contains(&stem)
+        || is_of_a_state(stem)
+        || format::FORMATS.iter().any(|format| format.writes(stem))
 }
 
 /// Whether a file of this name is a state or its contact surface.
@@ -380,6 +388,9 @@ mod tests {
             "contact.pvd",
             "history.csv",
             "summary.json",
+            "results.vtkhdf",
+            "d3plot",
+            "d3plot01",
             ".state-000000.vtu.tmp",
             ".results.pvd.tmp",
         ] {

@@ -16,13 +16,14 @@ use crate::{
     deck_file::{gather_deck, read_gathered},
     embedded::{self, Traffic},
     event::{Outcome, WorkerSpec},
+    export,
     interrupt::stop_on_interrupt,
     job::Job,
     notify::notify,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     processes::Processes,
-    results::{self, Folder, Summary, report, trace},
+    results::{self, Folder, Summary, format, report, trace},
     shell::quoted,
     snapshot::{
         self, Snapshot,
@@ -63,6 +64,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let text = gather_deck(&args.deck, &args.reading.options())?;
     let mut model = read_gathered(&text, &args.deck.display().to_string())?;
     bring_end_forward(&mut model, asked)?;
+    let others: Vec<_> = args.format.iter().filter(|name| !model.output.formats.contains(name)).collect();
+    model.output.formats.extend(others.into_iter().cloned().collect::<Vec<_>>());
     let model = Arc::new(model);
     let n = args.workers.map_or(args.speeds.len().max(1), |n| n as usize);
     let cores = worker::processors::cores();
@@ -220,6 +223,9 @@ pub fn conclude(
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        for written in format::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
+            info!("{}", export::line(&written));
+        }
         output.seal()?;
     }
     if json {

@@ -23,13 +23,14 @@ use crate::{
     drive::{self, Input, WorkerLink, drive},
     embedded::Sink,
     event::{Action, Deal, WorkerSpec},
+    export,
     http::board::{self, Board, JobView},
     job::Job,
     notice::Notice,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
     queue::Change,
-    results::{self, Folder, Summary, TRACE, report, trace},
+    results::{self, Folder, Summary, TRACE, format, report, trace},
     snapshot::{Snapshot, keeper::Keeper, store::Store},
     summarise::{SurfaceCensus, summarise},
 };
@@ -225,6 +226,9 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        for written in format::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
+            info!(job = order.number, "{}", export::line(&written));
+        }
         if order.options.trace {
             trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
                 .map_err(|e| e.to_string())?;
