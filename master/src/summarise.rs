@@ -124,9 +124,11 @@ pub fn summarise(
         losses: outcome.losses.clone(),
         warnings: hourglass_warnings(&model.mesh.parts, &parts, run_totals.eroded, run_totals.scale())
             .into_iter()
+            .chain(outcome.runaways.iter().map(ToString::to_string))
             .chain(outcome.differences.iter().map(ToString::to_string))
             .collect(),
         digest: outcome.digest.clone(),
+        input: None,
     }
 }
 

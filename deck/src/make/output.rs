@@ -31,6 +31,7 @@ pub(super) fn make(
         snapshot_seconds: given.snapshot_seconds,
         snapshot_cycles: given.snapshot_cycles,
         fields: given.fields.clone(),
+        formats: given.formats.clone(),
         compress: given.compress,
         workers: given.workers,
         contact_surface: surface.is_some(),
@@ -115,8 +116,14 @@ impl Finder<'_> {
                 node
             }
             (Spot::Number(id), Kind::Element) => {
-                let mut ids = self.assembly.mesh.parts.iter().flat_map(|part| &part.element_ids);
-                let found = ids.position(|&other| other == id.value).map(|index| index as u32);
+                // Of another part it may be an element of another kind.
+                let only = gauge.part.as_ref().and_then(|part| self.names.one(part));
+                let parts = self.assembly.mesh.parts.iter().enumerate();
+                let mut ids =
+                    parts.flat_map(|(p, part)| part.element_ids.iter().map(move |other| (p, *other)));
+                let found = ids
+                    .position(|(p, other)| other == id.value && only.is_none_or(|only| only == p))
+                    .map(|index| index as u32);
                 if found.is_none() {
                     let advice = "choose an element of the mesh, or write point = [x, y, z]";
                     self.log.fault_of(id.origin, "the number of an element", advice);

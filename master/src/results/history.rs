@@ -15,13 +15,12 @@ use deck::model::Model;
 use mechanics::{
     contact::PairVote,
     cross_section::SectionVote,
-    law::Unit,
     material::Material,
     state::{N_FIELDS, field},
 };
 use serde::{Deserialize, Serialize};
 
-use super::{Error, Folder, HISTORY, Units, von_mises::von_mises, write_whole};
+use super::{Error, Folder, HISTORY, Units, field_unit::unit_of_variable, von_mises::von_mises, write_whole};
 
 /// One row of the table. Energies and momentum of the whole problem, in the deck's units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -395,7 +394,8 @@ fn header(model: &Model) -> String {
 
 /// The columns of the history of a model: names with units.
 pub fn columns(model: &Model) -> Vec<String> {
-    let Units { length, mass, time, energy, stress, force, specific } = Units::named(&model.units);
+    let of_deck = Units::named(&model.units);
+    let Units { length, mass, time, energy, stress, force, specific } = of_deck;
     let mut columns = vec!["cycle".to_owned(), format!("time [{time}]"), format!("dt [{time}]")];
     let energies = ["kinetic", "internal", "hourglass", "contact", "friction", "external", "total"];
     columns.extend(energies.iter().map(|name| format!("{name} [{energy}]")));
@@ -428,10 +428,9 @@ pub fn columns(model: &Model) -> Vec<String> {
         }));
         columns.extend(material(model, gauge.element).history().iter().map(|variable| {
             let name = format!("{}:{}", gauge.name, variable.name);
-            match variable.unit {
-                Unit::NONE => name,
-                Unit::STRESS => format!("{name} [{stress}]"),
-                unit => format!("{name} [{}]", product(unit, [length, mass, time])),
+            match unit_of_variable(variable.unit, &of_deck) {
+                unit if unit.is_empty() => name,
+                unit => format!("{name} [{unit}]"),
             }
         }));
     }
@@ -457,12 +456,6 @@ pub fn columns(model: &Model) -> Vec<String> {
         columns.push("eroded elements".to_owned());
     }
     columns
-}
-
-/// A unit by the names of length, mass and time.
-fn product(unit: Unit, names: [&str; 3]) -> String {
-    let powers = names.into_iter().zip([unit.length, unit.mass, unit.time]).filter(|(_, power)| *power != 0);
-    powers.map(|(name, power)| format!("{name}^{power}")).collect::<Vec<_>>().join("*")
 }
 
 /// A header cell: quoted where a name holds a comma or a quote (RFC 4180); control characters become spaces, so

@@ -3,6 +3,7 @@
 #![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
 
 mod folder;
+mod formats;
 
 use std::{
     fs,
