@@ -14,7 +14,7 @@ pub fn begin(folders: Vec<(u32, PathBuf)>) {
         return;
     }
     let look = move || {
-        worker::compute::lowest_priority();
+        system::processors::lowest_priority();
         let (mut count, mut damaged) = (0, 0);
         for (job, folder) in folders {
             match sums::check(&folder) {
