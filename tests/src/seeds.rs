@@ -3,10 +3,13 @@
 //! Real sessions, real computation, packed messages, in a [`World`]; time, links, crashes and the disk are of this file. Frames of cycles
 //! overtake long control messages, links delay each message by what they like, hosts are slow, crash and come back, pairs
 //! of workers lose their links, masters restart from the last snapshot or leave and are followed by another, processors err
-//! by one unit in the last place, bits flip in memory ([`flips`]).
+//! by one unit in the last place, bits flip in memory ([`flips`]), in stored files and in frames, tasks never end, clocks jump, and the
+//! [`disk`] is full or loses power.
 //! Whatever happens, the run must come to its end with the rows, energies and digest of the undisturbed one. A seed that
 //! does not is a bug, and the seed is all it takes to see it again.
 
+mod befall;
+mod disk;
 pub mod flips;
 mod plot;
 
@@ -22,7 +25,6 @@ use master::{
     job::Job,
     options::SessionOptions,
     results::history::HistoryRow,
-    snapshot::Snapshot,
     sort::{Gathered, SortBasis, Sorted},
     world::{End, Error, Letter, Parcel, PeerFrame, Sessions, Surroundings, World},
 };
@@ -34,6 +36,7 @@ use worker::{
     session::{self, Task},
 };
 
+use disk::Disk;
 pub use flips::Flip;
 pub use plot::{Bug, Fault, Plot, Stage};
 
@@ -129,6 +132,10 @@ struct Process {
     spoilt: bool,
     /// What befalls its memory after its next task.
     flip: Option<Flip>,
+    /// Its tasks never end.
+    stuck: bool,
+    /// The bit that flips in the next frame of a cycle that it sends to the master.
+    garbled: Option<u32>,
     up: Lane,
     down: Lane,
     /// Its links to others, in an epoch.
@@ -145,20 +152,14 @@ impl Process {
             slow: 1,
             spoilt: false,
             flip: None,
+            stuck: false,
+            garbled: None,
             up: Lane::default(),
             down: Lane::default(),
             pairs: (0, Pairs::default()),
             held: Vec::new(),
         }
     }
-}
-
-/// What was written to the disk.
-#[derive(Default)]
-struct Disk {
-    rows: Vec<HistoryRow>,
-    states: Vec<GlobalState>,
-    snapshot: Option<Snapshot>,
 }
 
 /// What the sessions of one seed stand in.
@@ -229,7 +230,9 @@ impl Surroundings for Weather {
             self.flipped.push((host, target));
         }
         let at = self.now + *slow * (20 + self.draws.below(100));
-        self.put(at, What::Done(host, outcome));
+        if !self.hosts[host].stuck {
+            self.put(at, What::Done(host, outcome));
+        }
         Ok(())
     }
 
@@ -246,20 +249,7 @@ impl Surroundings for Weather {
     }
 
     fn take(&mut self, action: Action) -> Result<(), Error> {
-        let disk = &mut self.disk;
-        match action {
-            Action::Row(row) => disk.rows.push(*row),
-            Action::State(state) => disk.states.push(*state),
-            Action::Snapshot(snapshot) | Action::Checkpoint { snapshot, .. } => {
-                disk.snapshot = Some(*snapshot);
-            }
-            Action::Rewind { rows, cycle } => {
-                disk.rows.truncate(rows);
-                disk.states.retain(|state| state.cycle <= cycle);
-            }
-            _ => {}
-        }
-        Ok(())
+        Ok(self.disk.take(action)?)
     }
 
     fn dismiss(&mut self, host: usize) {
@@ -311,7 +301,7 @@ pub fn play(model: &Arc<Model>, options: &SessionOptions, seed: u64, plot: Plot)
         next: 0,
         life: 0,
         hosts: Vec::new(),
-        disk: Disk::default(),
+        disk: Disk::new(plot.bug),
         flipped: Vec::new(),
     };
     let mut play = Play {
@@ -336,7 +326,7 @@ impl Play {
         let members: Vec<usize> = (0..workers).map(|_| self.come()).collect();
         let specs: Vec<WorkerSpec> = members.iter().map(|&host| spec(host)).collect();
         let weather = &mut self.world.surroundings;
-        let resume = weather.disk.snapshot.clone();
+        let resume = weather.disk.newest()?;
         let cycle = resume.as_ref().map_or(0, |snapshot| snapshot.state.cycle);
         let mut options = self.options.clone();
         options.asked.snapshot_at = self.plot.snapshot_at.filter(|at| *at > cycle);
@@ -381,13 +371,18 @@ impl Play {
             return Err(failure);
         }
         let state = outcome.state.clone().ok_or("a run without a final state")?;
-        let Weather { disk: Disk { rows, states, snapshot }, flipped, .. } = self.world.surroundings;
-        let solved = Solved { model: self.model, state, rows, states, snapshot, outcome };
+        let Weather { disk: Disk { rows, states, .. }, flipped, .. } = self.world.surroundings;
+        let solved = Solved { model: self.model, state, rows, states, snapshot: None, outcome };
         Ok(Played { solved, count: self.count, flipped })
     }
 
     /// A job that has ended ends the play, unless its process only leaves.
     fn settle(&mut self) {
+        if self.world.surroundings.disk.is_short && self.world.sessions.job.is_some() {
+            // The queue pauses, and the job goes on where it was stored, even if it had just come to its end.
+            self.world.outcome();
+            return self.without_master();
+        }
         match self.world.outcome() {
             Some(outcome) if outcome.suspended => self.without_master(),
             Some(outcome) => self.outcome = Some(outcome),
@@ -439,10 +434,28 @@ impl Play {
             Letter::ToWorker(host, message) => self.hear(host, message),
             Letter::ToPeer(host, frame) => self.hear_peer(host, frame),
             Letter::ToMaster(member, epoch, message) => {
+                let host = self.world.sessions.host_of(member);
+                let Some(message) = self.garble(host, message) else {
+                    return self.miss(host, "the checksum of a frame does not match");
+                };
                 let now = self.world.sessions.job.as_ref().map_or(epoch, Job::epoch);
                 let epoch = if self.plot.bug == Some(Bug::Unfenced) { epoch.max(now) } else { epoch };
                 Ok(self.world.hear(Letter::ToMaster(member, epoch, message))?)
             }
+        }
+    }
+
+    /// What arrives of a message in which a bit flips on its way: nothing, for frames have checksums.
+    fn garble(&mut self, host: usize, mut message: ToMaster) -> Option<ToMaster> {
+        let garbled = &mut self.world.surroundings.hosts[host].garbled;
+        match (&mut message, *garbled) {
+            (ToMaster::Cycle { partials, .. }, Some(bit)) if !partials.is_empty() => {
+                *garbled = None;
+                let at = bit as usize % partials.len();
+                partials[at] = f64::from_bits(partials[at].to_bits() ^ (1 << (bit % 52)));
+                (self.plot.bug == Some(Bug::Deaf)).then_some(message)
+            }
+            _ => Some(message),
         }
     }
 
@@ -451,100 +464,6 @@ impl Play {
         let Some(member) = self.world.sessions.part(host) else { return Ok(()) };
         self.world.surroundings.hosts[host].alive = false;
         Ok(self.world.apply(Event::Lost(member, why.to_owned()))?)
-    }
-
-    fn befall(&mut self, fault: Fault) -> Result<(), String> {
-        let (weather, sessions) = (&mut self.world.surroundings, &self.world.sessions);
-        let now = weather.now;
-        let alive: Vec<usize> = (0..weather.hosts.len())
-            .filter(|&host| weather.hosts[host].alive && sessions.hosts[host].member.is_some())
-            .collect();
-        let pick = |number: u64| (!alive.is_empty()).then(|| alive[(number % alive.len() as u64) as usize]);
-        match fault {
-            Fault::Crash { host, returns } => {
-                let Some(host) = pick(host) else { return Ok(()) };
-                weather.hosts[host].alive = false;
-                let noticed = now + 10 * weather.draws.delay();
-                weather.put(noticed, What::Missed(host, "it crashed"));
-                if returns {
-                    // Before or after its ghost is noticed.
-                    let back = now + 20 * weather.draws.delay();
-                    weather.put(back, What::Comes);
-                }
-            }
-            Fault::Cut { host, long } => {
-                let Some(host) = pick(host) else { return Ok(()) };
-                let until = now + 50 * weather.draws.delay();
-                let Process { up, down, .. } = &mut weather.hosts[host];
-                (up.cut_until, down.cut_until) = (until, until);
-                if long {
-                    weather.put(until - (until - now) / 2, What::Missed(host, "it was silent"));
-                    weather.put(until + 10, What::Comes);
-                }
-            }
-            Fault::PairCut { host, other } => {
-                let (Some(host), Some(other)) = (pick(host), pick(other)) else { return Ok(()) };
-                // What was under way between them is gone; each finds out by itself.
-                let between = [host, other].map(End::Host);
-                weather.happenings.retain(|_, what| {
-                    !matches!(what, What::Arrives(parcel)
-                        if between == [parcel.from, parcel.to] || between == [parcel.to, parcel.from])
-                });
-                self.cut_pair(host, other)?;
-                self.cut_pair(other, host)?;
-            }
-            Fault::Slow { host, factor } => {
-                if let Some(host) = pick(host) {
-                    weather.hosts[host].slow = factor;
-                }
-            }
-            Fault::Spoil { host } => {
-                // One errs at a time: where all do, the master suspects itself and ends the job.
-                let one_errs = alive.iter().any(|&host| weather.hosts[host].spoilt);
-                if let Some(host) = pick(host).filter(|_| alive.len() > 1 && !one_errs) {
-                    weather.hosts[host].spoilt = true;
-                }
-            }
-            Fault::Flip(flip) => {
-                // What makes the only worker's numbers infinite ends the run, with the reason.
-                if let Some(host) = pick(flip.host).filter(|_| alive.len() > 1) {
-                    weather.hosts[host].flip = Some(flip);
-                }
-            }
-            Fault::Join => weather.put(now, What::Comes),
-            Fault::Master => self.without_master(),
-            Fault::Leave => self.world.apply(Event::Suspend)?,
-        }
-        Ok(())
-    }
-
-    /// The master is gone; its workers give it up, and others call the next one.
-    fn without_master(&mut self) {
-        let World { sessions, surroundings: weather, .. } = &mut self.world;
-        sessions.job = None;
-        for host in 0..sessions.hosts.len() {
-            weather.hosts[host].alive = false;
-            sessions.part(host);
-        }
-        let back = weather.now + 10 * weather.draws.delay();
-        weather.put(back, What::MasterReturns);
-    }
-
-    /// A worker finds its link to another ended: what may be lost goes again, relayed.
-    fn cut_pair(&mut self, host: usize, other: usize) -> Result<(), String> {
-        let (weather, sessions) = (&mut self.world.surroundings, &self.world.sessions);
-        let Some(position) = sessions.position(other) else { return Ok(()) };
-        let epoch = sessions.hosts[host].session.epoch();
-        let (of, pairs) = &mut weather.hosts[host].pairs;
-        if sessions.job.as_ref().map(Job::epoch) != Some(epoch) || *of != epoch {
-            return Ok(());
-        }
-        if let Some((kept, _)) = pairs.lose(position) {
-            for message in kept {
-                self.world.send(host, ToMaster::Relay { to: position, message })?;
-            }
-        }
-        Ok(())
     }
 
     fn hear(&mut self, host: usize, message: ToWorker) -> Result<(), String> {

@@ -3,7 +3,9 @@
 //! 10,000 seeds from 0 unless said otherwise. Prints how many, how long, what happened; a seed that goes wrong is printed
 //! with its plot, and the program ends with failure. One seed again: `seeds -- 1 SEED`. With BUG the master has a planted one, which some of
 //! the seeds must find: `unfenced`, it hears messages of epochs that are over; `narrow`, it compares of two computations of an interval
-//! rows of the history and nothing else.
+//! rows of the history and nothing else; `trusting`, it looks at no checksum of a stored file; `unsynced`, it stores a snapshot before the
+//! states that this counts on are durable; `careless`, it goes on where the disk has no room for results; `deaf`, it looks at no checksum of a
+//! frame; `patient`, it never gives up a worker that computes nothing.
 
 use std::{process::ExitCode, time::Instant};
 
@@ -12,14 +14,16 @@ use tests::seeds::{Bug, Stage};
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |at: usize, default: u64| arguments.get(at).map_or(Ok(default), |text| text.parse::<u64>());
-    let bug = match arguments.get(2).map(String::as_str) {
+    let bug = match arguments.get(2) {
         None => Ok(None),
-        Some("unfenced") => Ok(Some(Bug::Unfenced)),
-        Some("narrow") => Ok(Some(Bug::Narrow)),
-        Some(other) => Err(other),
+        Some(word) => {
+            let named = Bug::ALL.iter().find(|(name, _)| name == word);
+            named.map(|(_, bug)| Some(*bug)).ok_or(word)
+        }
     };
     let (Ok(count), Ok(first), Ok(bug)) = (number(0, 10_000), number(1, 0), bug) else {
-        eprintln!("seeds: expected COUNT and FIRST, two numbers, and `unfenced`, `narrow` or nothing");
+        let names: Vec<&str> = Bug::ALL.iter().map(|(name, _)| *name).collect();
+        eprintln!("seeds: expected COUNT and FIRST, two numbers, and nothing or one of {}", names.join(", "));
         return ExitCode::from(2);
     };
     // One thread: what a seed does may not depend on another.

@@ -331,8 +331,7 @@ fn stuck_alone(scene: &Scene) -> Running {
     let submitted = cluster.json(&["submit", "--cycles", &cycles, "--snapshot-every", "0.2", &deck]);
     assert_eq!(submitted["job"], 1);
     let running = scene.watch(cluster);
-    running.wait_for_cycle(110);
-    std::thread::sleep(Duration::from_secs(1));
+    running.cluster.master.wait_for("its computing is stuck");
     running
 }
 

@@ -40,6 +40,21 @@ pub enum Fault {
     Spoil { host: u64 },
     /// A bit flips in a host's memory.
     Flip(Flip),
+    /// The next writes find no room on the disk.
+    Full {
+        /// How many: rows, states and snapshots.
+        writes: u64,
+    },
+    /// A bit flips in a stored file, and the master is gone, so that the next one reads it.
+    Rot,
+    /// The master's machine loses power before the last rename of a snapshot was durable.
+    PowerLoss,
+    /// The task that a host computes never ends, and its link lives on.
+    Stick { host: u64 },
+    /// A bit flips in a frame that a host sends to the master.
+    Garble { host: u64, bit: u32 },
+    /// The clock jumps: what waits for a time is due now, or an hour later.
+    Clock { ahead: bool },
     /// A worker comes.
     Join,
     /// The master is gone, and starts anew from the disk.
@@ -68,6 +83,29 @@ pub enum Bug {
     Unfenced,
     /// What it compares of two computations of an interval are rows of the history and nothing else.
     Narrow,
+    /// It goes on from a stored file whatever the checksum says.
+    Trusting,
+    /// It stores a snapshot before the states that this counts on are durable.
+    Unsynced,
+    /// It goes on where a row or state found no room.
+    Careless,
+    /// It takes frames whatever the checksum says.
+    Deaf,
+    /// It never gives up a worker whose link lives.
+    Patient,
+}
+
+impl Bug {
+    /// Each with its name on the command line.
+    pub const ALL: [(&str, Self); 7] = [
+        ("unfenced", Self::Unfenced),
+        ("narrow", Self::Narrow),
+        ("trusting", Self::Trusting),
+        ("unsynced", Self::Unsynced),
+        ("careless", Self::Careless),
+        ("deaf", Self::Deaf),
+        ("patient", Self::Patient),
+    ];
 }
 
 impl Plot {
@@ -197,7 +235,7 @@ impl Stage {
                 // In one case of three close behind the one before: in its rollback.
                 at = if draws.below(3) == 0 { at + draws.below(40) } else { draws.below(length) };
                 let (host, other) = (draws.below(64), draws.below(64));
-                let fault = match draws.below(18) {
+                let fault = match draws.below(26) {
                     0..=3 => Fault::Crash { host, returns: true },
                     4 | 5 => Fault::Crash { host, returns: false },
                     6 => Fault::Cut { host, long: false },
@@ -207,8 +245,14 @@ impl Stage {
                     12 => Fault::Spoil { host },
                     13 | 14 => Fault::Join,
                     15 | 16 => Fault::Flip(Flip::draw(&mut draws)),
-                    _ if host < 32 => Fault::Master,
-                    _ => Fault::Leave,
+                    17 if host < 32 => Fault::Master,
+                    17 => Fault::Leave,
+                    18 => Fault::Full { writes: 1 + other },
+                    19 | 20 => Fault::Rot,
+                    21 => Fault::PowerLoss,
+                    22 => Fault::Stick { host },
+                    23 | 24 => Fault::Garble { host, bit: draws.below(1 << 20) as u32 },
+                    _ => Fault::Clock { ahead: host < 32 },
                 };
                 (at, fault)
             })
