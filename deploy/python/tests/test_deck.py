@@ -148,5 +148,5 @@ def test_a_deck_that_is_changed_leaves_its_copies() -> None:
 
 
 def test_the_library_says_laws_and_units() -> None:
-    assert len(bo.materials()) == 31
+    assert len(bo.materials()) >= 31
     assert bo.material("LEAD", units="mm-ms-kg")["eos"]["type"] == "shock"

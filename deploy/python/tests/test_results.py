@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
+import shutil
 import signal
 import threading
 from pathlib import Path
@@ -146,6 +147,22 @@ def test_shear_changes_sign_across_the_plane_that_mirrors_it() -> None:
     assert np.array_equal(half["stress_xy"][:n], -half["stress_xy"][n:])
     assert np.array_equal(half["stress_yz"][:n], half["stress_yz"][n:])
     assert np.abs(stress[:, 3]).max() > 0
+
+
+def test_results_that_are_opened_later_know_their_planes_by_the_deck_kept_with_them(
+    result: bo.Result, tmp_path: Path
+) -> None:
+    folder = tmp_path / "copied"
+    shutil.copytree(result.folder, folder)
+    deck = ball_on_plate().toml()
+    mesh = "bolide mesh 1\n[symmetry]\n"
+    bundle = f"#bolide-bundle 1\ntitle other\nfile {len(deck)} deck.toml\n{deck}\nfile {len(mesh)} a.mesh\n{mesh}\n"
+    for kept in (deck, bundle):
+        (folder / "input.deck").write_text(kept)
+        assert bo.Result(folder).symmetry == ("x", "y")
+        assert bo.Result(folder).mesh(-1).mirror().n_cells == 4 * result.mesh(-1).n_cells
+    (folder / "input.deck").write_text("*KEYWORD\n*END\n")
+    assert bo.Result(folder).symmetry == ()
 
 
 def test_pictures_show_something(result: bo.Result) -> None:

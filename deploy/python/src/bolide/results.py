@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+import tomllib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Sequence
 from functools import cached_property
@@ -212,16 +213,13 @@ class Result:
 
     @cached_property
     def symmetry(self) -> tuple[str, ...]:
-        """Planes of symmetry of the deck, such as `("x", "y")`; none where the deck is not known."""
-        if self.deck is None or self.deck.suffix.lower() != ".toml":
-            return ()
-        import tomllib
-
-        try:
-            tree = tomllib.loads(self.deck.read_text(encoding="utf-8"))
-        except (OSError, tomllib.TOMLDecodeError):
-            return ()
-        return tuple(tree.get("symmetry", {}).get("planes", ()))
+        """Planes of symmetry of the deck, such as `("x", "y")`, by the deck that was run or the one kept with the results."""
+        for path in (self.deck, self.folder / "input.deck"):
+            if path is not None and path.is_file():
+                planes = _planes(path)
+                if planes is not None:
+                    return planes
+        return ()
 
     def mesh(self, index: int | None = -1, *, time: float | None = None) -> State:
         """A state as a mesh of pyvista.
@@ -300,3 +298,18 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         return self.path.read_bytes()
+
+
+def _planes(path: Path) -> tuple[str, ...] | None:
+    """Planes of symmetry of a deck; None of one that is not TOML."""
+    text = path.read_bytes()
+    if text.startswith(b"#bolide-bundle"):
+        # The deck is the first of its files: `file BYTES NAME`, and its text below.
+        _, _, rest = text.partition(b"\nfile ")
+        size, _, rest = rest.partition(b" ")
+        text = rest.partition(b"\n")[2][: int(size)] if size.isdigit() else b""
+    try:
+        tree = tomllib.loads(text.decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return None
+    return tuple(tree.get("symmetry", {}).get("planes", ()))
