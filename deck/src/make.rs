@@ -31,7 +31,9 @@ mod zones;
 
 use mechanics::{
     contact::Settings,
+    element::hourglass::Hourglass,
     initial,
+    mesh::Topology,
     setup::{Control, Setup},
 };
 
@@ -80,6 +82,9 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     for (part, draft) in assembly.mesh.parts.iter_mut().zip(&parts) {
         if draft.eight_points {
             part.refine_points();
+        }
+        if let Topology::Tetrahedra { .. } = part.topology {
+            part.hourglass = Hourglass::NONE;
         }
     }
 

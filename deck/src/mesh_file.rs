@@ -5,6 +5,7 @@
 //! materials, supports and loads of the other formats are not taken over, and a warning names what was left out.
 
 mod abaqus;
+mod composite;
 mod draft;
 mod gmsh;
 mod nastran;
@@ -52,6 +53,8 @@ pub struct Body {
     pub number: Option<u32>,
     /// Number and corners of each hexahedron.
     pub solids: Vec<(u32, [u32; 8])>,
+    /// Number and nodes of each tetrahedron with nodes on its edges, in the order of [`mechanics::element::tet10`].
+    pub tetrahedra: Vec<(u32, [u32; 10])>,
     /// Number and corners of each shell.
     pub shells: Vec<(u32, [u32; 4])>,
     /// Number and ends of each truss. A body has elements of one kind.
@@ -68,7 +71,8 @@ impl Body {
     pub fn elements(&self) -> impl Iterator<Item = (u32, &[u32])> {
         let solids = self.solids.iter().map(|(id, nodes)| (*id, &nodes[..]));
         let shells = self.shells.iter().map(|(id, nodes)| (*id, &nodes[..]));
-        solids.chain(shells).chain(self.trusses.iter().map(|(id, nodes)| (*id, &nodes[..])))
+        let tetrahedra = self.tetrahedra.iter().map(|(id, nodes)| (*id, &nodes[..]));
+        solids.chain(tetrahedra).chain(shells).chain(self.trusses.iter().map(|(id, nodes)| (*id, &nodes[..])))
     }
 
     /// Its name in messages, with its number where it has one.

@@ -14,7 +14,7 @@ use mechanics::{
 use serde::Serialize;
 
 use crate::{
-    geometry::{EDGES, dot, norm, scaled, sub},
+    geometry::{EDGES, cross, dot, norm, scaled, sub},
     model::Model,
     units::Units,
 };
@@ -152,10 +152,12 @@ fn measure(model: &Model, index: usize) -> Measured {
     for e in 0..part.n_elements() {
         let corners = part.corners(e);
         let x = corners.map(|n| mesh.positions[n as usize]);
-        let (v, longest) = (part.volume(&x), longest_edge(&x));
+        let (v, longest) = (part.volume_of(e, &mesh.positions), longest_edge(&x));
         let thinnest = match &part.topology {
             Topology::Shells { section, .. } => v / (section.thickness * longest),
             Topology::Trusses { .. } => longest,
+            // A third of the least height: a node stands half-way up.
+            Topology::Tetrahedra { .. } => v / largest_side(&x),
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
                 thinnest_way(&x)
             }
@@ -163,8 +165,9 @@ fn measure(model: &Model, index: usize) -> Measured {
         volume += v;
         area += part.thickness().map_or(0.0, |thickness| v / thickness);
         this.least_cell = this.least_cell.min(thinnest);
-        if longest / thinnest > this.flattest.0 {
-            this.flattest = (longest / thinnest, e);
+        let height = if let Topology::Tetrahedra { .. } = part.topology { 3.0 * thinnest } else { thinnest };
+        if longest / height > this.flattest.0 {
+            this.flattest = (longest / height, e);
         }
         for (x, n) in x.iter().zip(corners) {
             for axis in 0..3 {
@@ -198,6 +201,8 @@ fn measure(model: &Model, index: usize) -> Measured {
         Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
             libm::cbrt(volume / n)
         }
+        // The distance of nodes.
+        Topology::Tetrahedra { .. } => libm::cbrt(0.75 * volume / n),
     };
     if !is_rigid && part.n_corners() > 2 {
         // Linear viscosity damps the fastest wave of an element, and its step with it.
@@ -206,6 +211,13 @@ fn measure(model: &Model, index: usize) -> Measured {
         this.step = setup.control.safety_factor * damped * this.least_cell / sound;
     }
     this
+}
+
+/// Area of the largest side of the tetrahedron that a hexahedron collapses to.
+fn largest_side(x: &[[f64; 3]; 8]) -> f64 {
+    let [a, b, c, d] = [0, 1, 2, 4].map(|corner| x[corner]);
+    let area = |[p, q, r]: [[f64; 3]; 3]| 0.5 * norm(cross(sub(q, p), sub(r, p)));
+    [[a, b, c], [a, b, d], [b, c, d], [c, a, d]].map(area).into_iter().fold(0.0, f64::max)
 }
 
 fn longest_edge(x: &[[f64; 3]; 8]) -> f64 {

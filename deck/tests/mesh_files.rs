@@ -173,8 +173,8 @@ fn what_a_reader_cannot_take_is_refused_at_its_line() {
         (
             "body.msh",
             "3 1 4 1\n4 5 6 7 11",
-            "3 1 11 1\n4 5 6 7 11 1 2 3 4 8 9",
-            "body.msh:66:1: read elements of type 11 (tetrahedra of ten nodes); expected elements of first order: points, lines, triangles, quadrilaterals, tetrahedra, hexahedra, prisms, pyramids; mesh in first order: Mesh.ElementOrder = 1",
+            "3 1 12 1\n4 5 6 7 11 1 2 3 4 8 9",
+            "body.msh:66:1: read elements of type 12 (hexahedra of 20 or 27 nodes); expected elements of first order (points, lines, triangles, quadrilaterals, tetrahedra, hexahedra, prisms, pyramids) or tetrahedra of ten nodes; mesh in first order: Mesh.ElementOrder = 1",
         ),
         (
             "body.msh",
@@ -209,8 +209,8 @@ fn what_a_reader_cannot_take_is_refused_at_its_line() {
         (
             "body.inp",
             "type=C3D4",
-            "type=C3D10M",
-            "body.inp:24:1: read elements of type C3D10M; expected elements of first order: C3D8, C3D6, C3D5, C3D4, S4, S3, T3D2 in their forms; mesh in first order",
+            "type=C3D20",
+            "body.inp:24:1: read elements of type C3D20; expected elements of first order, or C3D10: C3D8, C3D6, C3D5, C3D4, S4, S3, T3D2 in their forms; mesh in first order",
         ),
         (
             "body.inp",
@@ -258,13 +258,13 @@ fn what_a_reader_cannot_take_is_refused_at_its_line() {
             "body.bdf",
             "       7      11\n",
             "       7      11       1       2\n",
-            "body.bdf:27:1: read the CTETRA 4 of more than 4 nodes; expected elements of first order, with corners alone: CHEXA, CPENTA, CPYRAM, CTETRA, CQUAD4, CTRIA3; mesh in first order",
+            "body.bdf:27:1: read CTETRA 4 1 5 6 7 11 1 2; expected CTETRA, number, property and 10 nodes; correct the entry",
         ),
         (
             "body.bdf",
             "CQUAD4 ",
             "CQUAD8 ",
-            "body.bdf:28:1: read an element CQUAD8; expected elements of first order, with corners alone: CHEXA, CPENTA, CPYRAM, CTETRA, CQUAD4, CTRIA3; mesh in first order",
+            "body.bdf:28:1: read an element CQUAD8; expected elements of first order, with corners alone, or CTETRA with all ten: CHEXA, CPENTA, CPYRAM, CTETRA, CQUAD4, CTRIA3; mesh in first order",
         ),
         (
             "body.bdf",

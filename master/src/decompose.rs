@@ -127,6 +127,7 @@ impl Living {
             Some(match &part.topology {
                 Topology::Explicit { .. }
                 | Topology::EightPoint { .. }
+                | Topology::Tetrahedra { .. }
                 | Topology::Shells { .. }
                 | Topology::Trusses { .. } => Part::List(alive.to_vec()),
                 Topology::Structured { cells } => {
@@ -226,6 +227,7 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec
             }
             Topology::Explicit { .. }
             | Topology::EightPoint { .. }
+            | Topology::Tetrahedra { .. }
             | Topology::Shells { .. }
             | Topology::Trusses { .. } => {
                 let n_elements = mesh_part.n_elements();

@@ -128,7 +128,7 @@ impl Eroded {
         for part in &model.mesh.parts {
             for e in 0..part.n_elements() {
                 if self.is_on_surface(element, cycle) {
-                    part.corners(e).into_iter().for_each(|n| held[n as usize] = true);
+                    part.nodes_of(e).iter().for_each(|&n| held[n as usize] = true);
                 }
                 element += 1;
             }

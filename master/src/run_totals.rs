@@ -320,8 +320,7 @@ impl RunTotals {
         for &element in &vote.eroded {
             let part = offsets.partition_point(|&first| first <= element as usize) - 1;
             let Some(of_part) = model.mesh.parts.get(part) else { continue };
-            let corners = of_part.corners(element as usize - offsets[part]);
-            let volume = of_part.volume(&corners.map(|n| model.mesh.positions[n as usize]));
+            let volume = of_part.volume_of(element as usize - offsets[part], &model.mesh.positions);
             self.eroded_mass += model.setup.materials[of_part.material as usize].density * volume;
         }
         self.eroded_elements += vote.eroded.len() as u64;

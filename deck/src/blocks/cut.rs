@@ -1,6 +1,6 @@
 //! Blocks cut at a plane across an axis, through the origin: whole elements stay or go.
 
-use mechanics::mesh::Topology;
+use mechanics::{element::tet10, mesh::Topology};
 
 use super::block::Block;
 use crate::geometry::{norm, sub};
@@ -42,7 +42,12 @@ impl Block {
         }
         let mut used = vec![false; self.positions.len()];
         for e in (0..keeps.len()).filter(|e| keeps[*e]) {
-            self.corners(e).into_iter().for_each(|node| used[node as usize] = true);
+            match &self.topology {
+                Topology::Tetrahedra { tetrahedra } => {
+                    tetrahedra[e].iter().for_each(|node| used[*node as usize] = true);
+                }
+                _ => self.corners(e).into_iter().for_each(|node| used[node as usize] = true),
+            }
         }
         let mut new = vec![u32::MAX; used.len()];
         let mut positions = Vec::new();
@@ -71,6 +76,10 @@ impl Block {
                 hexahedra.retain(|_| stays());
                 hexahedra.iter_mut().for_each(|corners| *corners = corners.each_ref().map(renumbered));
             }
+            Topology::Tetrahedra { tetrahedra } => {
+                tetrahedra.retain(|_| stays());
+                tetrahedra.iter_mut().for_each(|nodes| *nodes = nodes.each_ref().map(renumbered));
+            }
             Topology::Shells { quads, .. } => {
                 quads.retain(|_| stays());
                 quads.iter_mut().for_each(|corners| *corners = corners.each_ref().map(renumbered));
@@ -97,6 +106,7 @@ impl Block {
         match &self.topology {
             Topology::Structured { cells } => cells.iter().map(|c| *c as usize).product(),
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra.len(),
+            Topology::Tetrahedra { tetrahedra } => tetrahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
             Topology::Trusses { bars, .. } => bars.len(),
         }
@@ -113,6 +123,7 @@ impl Block {
                 std::array::from_fn(|c| (quad[c % 4] + layer * (c / 4)) as u32)
             }
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra[e],
+            Topology::Tetrahedra { tetrahedra } => tet10::collapsed(&tetrahedra[e]),
             Topology::Shells { quads, .. } => std::array::from_fn(|c| quads[e][c % 4]),
             Topology::Trusses { bars, .. } => std::array::from_fn(|c| bars[e][c % 2]),
         }

@@ -41,7 +41,7 @@ pub(super) fn read_nodes(problem: &mut Problem, block: &Block<'_>, context: &Con
     }
 }
 
-/// `*ELEMENT_SOLID`, on one line or on two.
+/// `*ELEMENT_SOLID`, on one line or on two; with ten nodes on the second a tetrahedron with nodes on its edges.
 pub(super) fn read_solids(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
     problem.solids.reserve(block.cards.len());
@@ -59,11 +59,19 @@ pub(super) fn read_solids(problem: &mut Problem, block: &Block<'_>, context: &Co
             (f, 2)
         };
         if first == 0 && (nodes.integer(8) != 0 || nodes.integer(9) != 0) {
-            nodes.fault(
-                8,
-                "at most eight nodes",
-                "mesh with hexahedra; ten-node tetrahedra are not computed",
-            );
+            let all: [u32; 10] = std::array::from_fn(|i| nodes.id(i));
+            if all.contains(&0) {
+                nodes.fault(8, "eight nodes, or ten of a tetrahedron", "complete the element");
+                continue;
+            }
+            let [a, b, c, d, edges @ ..] = all;
+            problem.solids.push(Solid {
+                id,
+                part,
+                nodes: [a, b, c, d, d, d, d, d],
+                edges: Some(edges),
+                at: card.at,
+            });
             continue;
         }
         let mut corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| nodes.id(first + i));
@@ -73,7 +81,7 @@ pub(super) fn read_solids(problem: &mut Problem, block: &Block<'_>, context: &Co
                 corners[i] = corners[i - 1];
             }
         }
-        problem.solids.push(Solid { id, part, nodes: corners, at: card.at });
+        problem.solids.push(Solid { id, part, nodes: corners, edges: None, at: card.at });
     }
 }
 

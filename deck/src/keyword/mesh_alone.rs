@@ -32,6 +32,8 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> (MeshFile, Vec<Vec<Place>>) {
     };
     let mut bodies: BTreeMap<(u32, usize), (Body, Vec<Place>)> = BTreeMap::new();
     let solids = problem.solids.iter().map(|solid| (0, solid.id, solid.part, solid.at, &solid.nodes[..]));
+    let mut edges: BTreeMap<u32, [u32; 6]> = BTreeMap::new();
+    edges.extend(problem.solids.iter().filter_map(|solid| Some((solid.id, solid.edges?))));
     let shells = problem.shells.iter().map(|shell| (1, shell.id, shell.part, shell.at, &shell.nodes[..]));
     let beams = problem.beams.iter().map(|beam| (2, beam.id, beam.part, beam.at, &beam.nodes[..]));
     let mut seen: [BTreeMap<u32, Place>; 3] = Default::default();
@@ -40,13 +42,19 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> (MeshFile, Vec<Vec<Place>>) {
             let expected = format!("a number other than {id}, which {} has", log.line(first, at));
             log.fault(at, format!("element {id}"), expected, "renumber one");
         }
-        if let Some(node) = nodes.iter().find(|node| problem.position(**node).is_none()) {
+        let on_edges = edges.get(&id).filter(|_| kind == 0).into_iter().flatten();
+        let mut all = nodes.iter().chain(on_edges);
+        if let Some(node) = all.find(|node| problem.position(**node).is_none()) {
             log.fault(at, format!("element {id} with node {node}"), "nodes of the mesh", "add the node");
             continue;
         }
         let (body, of_elements) = bodies.entry((part, kind)).or_default();
         of_elements.push(at);
         match (<[u32; 8]>::try_from(nodes), <[u32; 4]>::try_from(nodes), <[u32; 2]>::try_from(nodes)) {
+            (Ok([a, b, c, d, ..]), ..) if edges.contains_key(&id) => {
+                let [e, f, g, h, i, j] = edges[&id];
+                body.tetrahedra.push((id, [a, b, c, d, e, f, g, h, i, j]));
+            }
             (Ok(nodes), ..) => body.solids.push((id, corners_of(nodes))),
             (_, Ok(nodes), _) => body.shells.push((id, nodes)),
             (.., Ok(nodes)) => body.trusses.push((id, nodes)),

@@ -27,6 +27,8 @@ pub(super) struct Solid {
     pub(super) id: u32,
     pub(super) part: u32,
     pub(super) nodes: [u32; 8],
+    /// Nodes on the edges of a tetrahedron that has such.
+    pub(super) edges: Option<[u32; 6]>,
     pub(super) at: Place,
 }
 
@@ -150,7 +152,8 @@ impl Problem {
 
     /// Nodes of the elements of a part, ascending.
     pub(super) fn nodes_of_part(&self, part: u32) -> Vec<u32> {
-        let solids = self.solids.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
+        let solids = self.solids.iter().filter(|e| e.part == part);
+        let solids = solids.flat_map(|e| e.nodes.into_iter().chain(e.edges.into_iter().flatten()));
         let shells = self.shells.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
         let beams = self.beams.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
         let mut nodes: Vec<u32> = solids.chain(shells).chain(beams).collect();

@@ -53,7 +53,8 @@ pub(super) fn read_solid_sections(problem: &mut Problem, block: &Block<'_>, cont
         let form = f.integer(1);
         let eight_points = matches!(form, -2..=-1 | 2..=3);
         match form {
-            0..=2 => {}
+            // Those of tetrahedra with nodes on their edges, which are known by these.
+            0..=2 | 16 | 17 => {}
             -2 | -1 | 3 => context
                 .log
                 .warn(card.at, format!("ELFORM {form}: solids are computed with eight points, as ELFORM 2")),

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use mechanics::{
+    element::tet10,
     material::Material,
     mesh::{Mesh, Part, Topology},
 };
@@ -68,8 +69,7 @@ impl Assembly {
         volumes.clear();
         for part in &mesh.parts {
             for e in 0..part.n_elements() {
-                let corners = part.corners(e).map(|node| mesh.positions[node as usize]);
-                volumes.push(part.volume(&corners));
+                volumes.push(part.volume_of(e, &mesh.positions));
             }
         }
     }
@@ -302,7 +302,12 @@ fn owned<'a>(
 ) {
     let kind = match draft.block.as_ref().map(|block| &block.topology) {
         None
-        | Some(Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. }) => 0,
+        | Some(
+            Topology::Structured { .. }
+            | Topology::Explicit { .. }
+            | Topology::EightPoint { .. }
+            | Topology::Tetrahedra { .. },
+        ) => 0,
         Some(Topology::Shells { .. }) => 1,
         Some(Topology::Trusses { .. }) => 2,
     };
@@ -332,6 +337,18 @@ fn owned<'a>(
 fn edges(positions: &[[f64; 3]], part: &Part) -> (f64, f64) {
     let (mut low, mut high) = (f64::INFINITY, 0.0f64);
     for e in 0..part.n_elements() {
+        if let Topology::Tetrahedra { .. } = part.topology {
+            let nodes = part.nodes_of(e);
+            for (edge, [a, b]) in tet10::EDGES.into_iter().enumerate() {
+                for end in [a, b] {
+                    let ends = [nodes[4 + edge], nodes[end]].map(|node| positions[node as usize]);
+                    let long = norm(sub(ends[0], ends[1]));
+                    low = low.min(long);
+                    high = high.max(long);
+                }
+            }
+            continue;
+        }
         let corners = part.corners(e);
         for [a, b] in EDGES.into_iter().filter(|[a, b]| corners[*a] != corners[*b]) {
             let long = norm(sub(positions[corners[a] as usize], positions[corners[b] as usize]));
@@ -509,9 +526,10 @@ fn velocities(assembly: &mut Assembly, materials: &[Material]) {
     for (p, part) in mesh.parts.iter().enumerate() {
         let density = materials.get(part.material as usize).map_or(1.0, |m| m.density);
         for e in 0..part.n_elements() {
-            let mass = density * assembly.volumes[element] / 8.0;
+            let whole = density * assembly.volumes[element];
             element += 1;
-            for node in part.corners(e) {
+            for (&node, share) in part.nodes_of(e).iter().zip(part.shares()) {
+                let mass = whole * share;
                 if count[node as usize] > 1 {
                     let list = holders.entry(node).or_default();
                     match list.iter_mut().find(|(q, _)| *q == p) {

@@ -2,12 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::{
-    load::{
-        Gravity, Loads, MAX_FORCES, NodalForce, Relaxation, SurfaceKind, SurfaceLoad,
-        blast::{Burst, Charge},
-    },
-    mesh::FACES,
+use mechanics::load::{
+    Gravity, Loads, MAX_FORCES, NodalForce, Relaxation, SurfaceKind, SurfaceLoad,
+    blast::{Burst, Charge},
 };
 
 use super::{
@@ -111,8 +108,9 @@ fn exploding(
     let mut nearest = f64::MAX;
     for &(element, side) in faces {
         let p = offsets.partition_point(|&first| first <= element as usize) - 1;
-        let corners = mesh.parts[p].corners(element as usize - offsets[p]);
-        let places = FACES[usize::from(side)].map(|c| mesh.positions[corners[c] as usize]);
+        let part = &mesh.parts[p];
+        let nodes = part.nodes_of(element as usize - offsets[p]);
+        let places = part.side(usize::from(side)).map(|c| mesh.positions[nodes[c] as usize]);
         let centre = std::array::from_fn(|a| 0.25 * places.iter().map(|x| x[a]).sum::<f64>());
         nearest = nearest.min(charge.scaled_distance(centre));
     }

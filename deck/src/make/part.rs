@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
-    element::{hex8::eight_points, hourglass::Hourglass},
+    element::{hex8::eight_points, hourglass::Hourglass, tet10},
     erosion::{Criteria, GEOMETRIC_STRAIN},
     material::{Failure, Material, Strength},
     mesh::Topology,
@@ -81,6 +81,12 @@ pub(super) fn make(
                 }
             }
             None => {}
+        }
+        if let (Some(origin), Some(Topology::Tetrahedra { .. })) =
+            (part.eight_points, block.as_ref().map(|block| &block.topology))
+        {
+            let expected = "solids of first order: tetrahedra of ten nodes have four points";
+            log.fault_of(origin, expected, "remove it");
         }
         let (name, at, velocity) = (part.name.clone(), part.at, part.velocity);
         if let Some(Topology::Shells { section, .. }) = block.as_mut().map(|block| &mut block.topology) {
@@ -332,7 +338,17 @@ fn body_of(
     };
     let distinct =
         |corners: &[u32]| (0..corners.len()).filter(|&i| !corners[..i].contains(&corners[i])).count();
+    let of_two_orders = called.is_some()
+        && found.tetrahedra.is_empty()
+        && mesh.file.bodies_called(name).any(|(_, other)| !other.tetrahedra.is_empty());
+    if part.kind == Kind::Solids && of_two_orders {
+        let read = format!("body \"{name}\" with solids of first order and tetrahedra of ten nodes");
+        log.fault(at.at, read, "solids of one of them", "make two bodies of them");
+        return None;
+    }
     let (counts, expected) = part.kind.distinct();
+    let (counts, expected) =
+        if found.tetrahedra.is_empty() { (counts, expected) } else { (&[tet10::NODES][..], "ten") };
     let places = mesh.elements.get(index).map_or(Places::All(at.at), |places| Places::Each(places.clone()));
     let strange = found.elements().enumerate().find(|(_, (_, corners))| !counts.contains(&distinct(corners)));
     if let Some((e, (id, corners))) = strange {
@@ -357,9 +373,13 @@ fn body_of(
             nodes.push(*id);
         }
     }
-    let n_corners = part.kind.n_corners();
     let corners: Vec<u32> = found.corners().map(|id| local[&id]).collect();
-    let topology = part.kind.topology(corners.chunks(n_corners));
+    let topology = if found.tetrahedra.is_empty() {
+        part.kind.topology(corners.chunks(part.kind.n_corners()))
+    } else {
+        let tetrahedra = found.tetrahedra.iter().map(|(_, nodes)| nodes.map(|id| local[&id])).collect();
+        Topology::Tetrahedra { tetrahedra }
+    };
     let elements: Vec<u32> = found.elements().map(|(id, _)| id).collect();
     let numbers = Numbers {
         nodes,
@@ -380,7 +400,14 @@ fn warn_of_collapsed(part: &Part, at: &PartMesh, body: &Body, log: &Log<'_>) {
     let count = body.elements().filter(|(_, corners)| collapsed(corners)).count();
     if count > 0 {
         let all = body.elements().count();
+        let are_tetrahedra =
+            count == all && body.solids.iter().all(|(_, n)| n[4..] == [n[4]; 4] && n[2] == n[3]);
         let (what, computed) = match part.kind {
+            Kind::Solids if are_tetrahedra => (
+                "tetrahedra",
+                "hexahedra whose corners coincide, too stiff where they flow or keep their volume; \
+                 tetrahedra = \"composite\" in the mesh of the part puts nodes on their edges",
+            ),
             Kind::Solids => ("wedges, pyramids or tetrahedra", "hexahedra whose corners coincide"),
             _ => ("triangles", "quadrilaterals with two corners in one node"),
         };

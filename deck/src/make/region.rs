@@ -177,7 +177,14 @@ fn segments(name: &Placed<String>, assembly: &Assembly, outer: &[Face], log: &Lo
         log.fault_of(name.origin, "the name of segments of a mesh file", advice);
         return Vec::new();
     };
+    // A triangle may repeat any of its nodes.
     let sorted = |mut nodes: [u32; 4]| {
+        nodes.sort_unstable();
+        for i in 1..4 {
+            if nodes[i] == nodes[i - 1] {
+                nodes[i - 1] = u32::MAX;
+            }
+        }
         nodes.sort_unstable();
         nodes
     };

@@ -59,13 +59,13 @@ pub(super) fn make(
     sections
 }
 
-/// Elements with a bit for each corner ahead.
-type Cuts = Vec<(u32, u8)>;
+/// Elements with a bit for each node ahead.
+type Cuts = Vec<(u32, u16)>;
 
-/// Bits of the corners that are ahead; none of an element of which all are or none is.
-fn ahead(n_corners: usize, is_ahead: impl Fn(usize) -> bool) -> Option<u8> {
-    let ahead: u8 = (0..n_corners).map(|i| u8::from(is_ahead(i)) << i).sum();
-    let all = (0..n_corners).map(|i| 1 << i).sum::<u8>();
+/// Bits of the nodes that are ahead; none of an element of which all are or none is.
+fn ahead(n_corners: usize, is_ahead: impl Fn(usize) -> bool) -> Option<u16> {
+    let ahead: u16 = (0..n_corners).map(|i| u16::from(is_ahead(i)) << i).sum();
+    let all = (0..n_corners).map(|i| 1 << i).sum::<u16>();
     (ahead != 0 && ahead != all).then_some(ahead)
 }
 
@@ -95,7 +95,8 @@ fn by_plane(
         let near = ON_PLANE * assembly.smallest_edge[p];
         for e in 0..part.n_elements() {
             let corners = part.corners(e).map(|n| mesh.positions[n as usize]);
-            let is_ahead = |i: usize| dot(sub(corners[i], point), normal) >= -near;
+            let nodes = part.nodes_of(e);
+            let is_ahead = |i: usize| dot(sub(mesh.positions[nodes[i] as usize], point), normal) >= -near;
             let centre = [0, 1, 2].map(|a| 0.125 * corners.iter().map(|x| x[a]).sum::<f64>());
             if radius.is_some_and(|radius| norm(sub(centre, point)) > radius) {
                 continue;
@@ -110,7 +111,7 @@ fn by_plane(
 /// Which of [`Cut::Listed`] the elements of a part are among.
 fn kind_of(part: &Part) -> usize {
     match part.n_corners() {
-        8 => 0,
+        8 | 10 => 0,
         4 => 1,
         _ => 2,
     }
@@ -135,7 +136,7 @@ fn listed(
         let kind = kind_of(part);
         for (e, id) in part.element_ids.iter().enumerate().filter(|(_, id)| wanted[kind].contains_key(id)) {
             missing[kind].remove(id);
-            let corners = part.corners(e);
+            let corners = part.nodes_of(e);
             let ahead = ahead(part.n_corners(), |i| nodes.binary_search(&corners[i]).is_ok());
             if !is_rigid(bodies, p) {
                 cuts.extend(ahead.map(|ahead| ((offset + e) as u32, ahead)));
@@ -157,7 +158,7 @@ fn section(elements: Cuts, assembly: &Assembly) -> CrossSection {
     let (mut sum, mut n_corners) = ([0.0; 3], 0.0);
     for &(element, ahead) in &elements {
         let p = offsets.partition_point(|&first| first <= element as usize) - 1;
-        let corners = mesh.parts[p].corners(element as usize - offsets[p]);
+        let corners = mesh.parts[p].nodes_of(element as usize - offsets[p]);
         for (_, node) in corners.iter().enumerate().filter(|(i, _)| ahead >> i & 1 == 1) {
             for (sum, x) in sum.iter_mut().zip(mesh.positions[*node as usize]) {
                 *sum += x;

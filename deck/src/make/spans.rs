@@ -2,7 +2,7 @@
 
 use mechanics::{
     contact::Settings,
-    element::truss2,
+    element::{tet10, truss2},
     material::{Failure, Material},
     mesh::Topology,
 };
@@ -49,6 +49,20 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
         let Some(material) = material else { continue };
         let (kind, checked) = match &part.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => continue,
+            Topology::Tetrahedra { .. } => {
+                if let Err(unfit) = tet10::check(material) {
+                    log.fault(
+                        draft.at,
+                        format!(
+                            "part \"{}\" of tetrahedra of ten nodes, of \"{}\"",
+                            part.name, material.name
+                        ),
+                        unfit.to_string(),
+                        "choose another material, or mesh the part with elements of first order",
+                    );
+                }
+                continue;
+            }
             Topology::Shells { section, .. } => {
                 ("shells", section.check(material).map_err(|e| e.to_string()))
             }
@@ -136,6 +150,25 @@ fn folded(assembly: &Assembly, p: usize, offset: usize, own: &Numbers, log: &Log
     }
     let mut n_folded = 0;
     for e in 0..part.n_elements() {
+        if let Topology::Tetrahedra { .. } = part.topology {
+            let nodes = part.nodes_of(e);
+            let x = std::array::from_fn(|i| assembly.mesh.positions[nodes[i] as usize]);
+            if !tet10::is_upright(&x) {
+                n_folded += 1;
+                if n_folded <= MAX_NAMED {
+                    log.fault(
+                        own.element_places.of(e),
+                        format!(
+                            "element {} of part \"{}\", of ten nodes, with a corner without volume",
+                            part.element_ids[e], part.name
+                        ),
+                        "nodes on edges between their corners and near the middle of these",
+                        "correct the order of the nodes, or straighten the edges",
+                    );
+                }
+            }
+            continue;
+        }
         let nodes = part.corners(e);
         let corners = nodes.map(|node| assembly.mesh.positions[node as usize]);
         let (corner, jacobian) = worst_corner(&corners);

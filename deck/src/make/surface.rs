@@ -9,7 +9,7 @@ use crate::geometry::{FACES, norm, sub};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Face {
     pub(super) part: u32,
-    /// Global element, and which of its faces in the order of [`mechanics::mesh::FACES`], which is not that of ours.
+    /// Global element, and which [side](mechanics::mesh::Part::side) of it; those of hexahedra are in another order than our faces.
     pub(super) element: u32,
     pub(super) side: u8,
     /// Global nodes, outward by the right hand.
@@ -27,6 +27,17 @@ pub(super) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
     for (p, part) in assembly.mesh.parts.iter().enumerate() {
         let first = keyed.len();
         for e in 0..part.n_elements() {
+            if let Topology::Tetrahedra { .. } = part.topology {
+                let (own, element) = (part.nodes_of(e), (offsets[p] + e) as u32);
+                for &side in part.sides() {
+                    let nodes = part.side(side).map(|node| own[node]);
+                    let Some(key) = key_of(nodes) else { continue };
+                    let face = Face { part: p as u32, element, side: side as u8, nodes, inside: false };
+                    keyed.push((key, order, face));
+                    order += 1;
+                }
+                continue;
+            }
             let corners = part.corners(e);
             for (f, face) in FACES.iter().enumerate() {
                 // A shell is one face, its upper side.
@@ -49,7 +60,7 @@ pub(super) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
                 order += 1;
             }
         }
-        if matches!(part.topology, Topology::Explicit { .. }) {
+        if matches!(part.topology, Topology::Explicit { .. } | Topology::Tetrahedra { .. }) {
             let mut own = keyed.split_off(first);
             own.sort_unstable_by_key(|(key, order, _)| (*key, *order));
             keyed.extend(own.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0]));

@@ -106,7 +106,7 @@ pub(super) fn read(report: &Report<'_>) -> Draft {
         reader.keyword(&card);
     }
     for (kind, at) in std::mem::take(&mut reader.strange) {
-        report.warn(at, format!("elements of type {kind} are left out: only C3D8, C3D6, C3D5, C3D4, S4, S3 and T3D2 in their forms are computed"));
+        report.warn(at, format!("elements of type {kind} are left out: only C3D8, C3D6, C3D5, C3D4, C3D10, S4, S3 and T3D2 in their forms are computed"));
     }
     reader.put_together()
 }
@@ -239,7 +239,8 @@ impl Reader<'_, '_> {
             Some(Ok(form)) => form,
             Some(Err(())) => {
                 let read = format!("elements of type {kind}");
-                let expected = "elements of first order: C3D8, C3D6, C3D5, C3D4, S4, S3, T3D2 in their forms";
+                let expected =
+                    "elements of first order, or C3D10: C3D8, C3D6, C3D5, C3D4, S4, S3, T3D2 in their forms";
                 report.fault(card.at, read, expected, "mesh in first order");
                 return;
             }
@@ -369,6 +370,7 @@ fn form_of(kind: &str) -> Option<Result<Form, ()>> {
             6 => Ok(Form::Wedge),
             5 => Ok(Form::Pyramid),
             4 => Ok(Form::Tetrahedron),
+            10 => Ok(Form::TetrahedronOfTen),
             _ => Err(()),
         });
     }

@@ -5,6 +5,8 @@ use std::{
     collections::{BTreeMap, HashMap},
 };
 
+use mechanics::element::tet10;
+
 use super::{Body, Found, MeshFile, Read};
 use crate::{
     fault::Faults,
@@ -141,9 +143,15 @@ pub(super) enum Form {
     /// A quadrilateral and the apex.
     Pyramid,
     Tetrahedron,
+    /// Its corners, and nodes on the edges 0-1, 1-2, 2-0, 0-3, 1-3, 2-3.
+    TetrahedronOfTen,
     Quadrilateral,
     Triangle,
+    /// A side of the last, which is no element: corners, and nodes on the edges 0-1, 1-2, 2-0.
+    TriangleOfSix,
     Line,
+    /// An edge of that, likewise: its ends, and the node between them.
+    LineOfThree,
 }
 
 impl Form {
@@ -154,15 +162,22 @@ impl Form {
             Self::Wedge => 6,
             Self::Pyramid => 5,
             Self::Tetrahedron | Self::Quadrilateral => 4,
-            Self::Triangle => 3,
+            Self::TetrahedronOfTen => 10,
+            Self::TriangleOfSix => 6,
+            Self::Triangle | Self::LineOfThree => 3,
             Self::Line => 2,
         }
     }
 
-    /// Corners of the solid, shell or truss that is computed, [`Form::kind`] of them: of a wedge, a pyramid or a tetrahedron those of a
+    /// Nodes of the solid, shell or truss that is computed, [`Form::kind`] of them: of a wedge, a pyramid or a tetrahedron those of a
     /// hexahedron whose corners coincide along edges.
-    fn corners(self, n: &[u32]) -> [u32; 8] {
-        match self {
+    fn corners(self, n: &[u32]) -> [u32; tet10::NODES] {
+        let mut all = [0; tet10::NODES];
+        let corners = match self {
+            Self::TetrahedronOfTen | Self::TriangleOfSix | Self::LineOfThree => {
+                all[..self.n_nodes()].copy_from_slice(&n[..self.n_nodes()]);
+                return all;
+            }
             Self::Hexahedron => [n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7]],
             // The side between the two triangles is the base, the edge opposite to it the top.
             Self::Wedge => [n[1], n[0], n[3], n[4], n[2], n[2], n[5], n[5]],
@@ -171,7 +186,9 @@ impl Form {
             Self::Quadrilateral => [n[0], n[1], n[2], n[3], 0, 0, 0, 0],
             Self::Triangle => [n[0], n[1], n[2], n[2], 0, 0, 0, 0],
             Self::Line => [n[0], n[1], 0, 0, 0, 0, 0, 0],
-        }
+        };
+        all[..8].copy_from_slice(&corners);
+        all
     }
 
     fn kind(self) -> usize {
@@ -179,6 +196,7 @@ impl Form {
             Self::Hexahedron | Self::Wedge | Self::Pyramid | Self::Tetrahedron => 8,
             Self::Quadrilateral | Self::Triangle => 4,
             Self::Line => 2,
+            Self::TetrahedronOfTen | Self::TriangleOfSix | Self::LineOfThree => self.n_nodes(),
         }
     }
 }
@@ -189,9 +207,10 @@ pub(super) struct Element {
     pub(super) id: u32,
     /// Offset of its line.
     at: usize,
-    /// Corners that it has: 8 of a solid, 4 of a shell, 2 of a truss.
+    /// Nodes that it has: 8 of a solid, 10 of a tetrahedron with nodes on its edges, 4 of a shell, 2 of a truss; 6 and 3 of sides and edges of
+    /// such tetrahedra.
     kind: usize,
-    corners: [u32; 8],
+    corners: [u32; tet10::NODES],
 }
 
 impl Element {
@@ -380,12 +399,17 @@ impl Draft {
                 elements.filter(move |element| element.kind == kind)
             };
             let body = Body { name, number, ..Body::default() };
-            let solids: Vec<_> = of_kind(8).map(|e| (e.id, e.corners)).collect();
+            let solids: Vec<_> = of_kind(8).map(|e| (e.id, std::array::from_fn(|i| e.corners[i]))).collect();
+            let tetrahedra: Vec<_> = of_kind(10).map(|e| (e.id, e.corners)).collect();
             let shells: Vec<_> = of_kind(4).map(|e| (e.id, [0, 1, 2, 3].map(|i| e.corners[i]))).collect();
             let trusses: Vec<_> = of_kind(2).map(|e| (e.id, [e.corners[0], e.corners[1]])).collect();
-            let of_kinds =
-                [Body { solids, ..body.clone() }, Body { shells, ..body.clone() }, Body { trusses, ..body }];
-            for (body, kind) in of_kinds.into_iter().zip([8, 4, 2]) {
+            let of_kinds = [
+                Body { solids, ..body.clone() },
+                Body { tetrahedra, ..body.clone() },
+                Body { shells, ..body.clone() },
+                Body { trusses, ..body },
+            ];
+            for (body, kind) in of_kinds.into_iter().zip([8, 10, 4, 2]) {
                 if body.elements().next().is_some() {
                     mesh.bodies.push(body);
                     let place = |e: &Element| Place::card(report.file, report.faults.place(e.at).0);

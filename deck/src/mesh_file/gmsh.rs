@@ -280,7 +280,7 @@ impl<'a> Reader<'a, '_> {
     fn element(&mut self, entity: Tag, form: Option<Form>) -> Result<(), Stop> {
         let (at, line) = self.needed("Elements")?;
         let n = form.map_or(1, Form::n_nodes);
-        let mut numbers = [0; 9];
+        let mut numbers = [0; 11];
         let mut given = 0;
         for word in line.split_whitespace() {
             let Some(number) = word.parse::<u32>().ok().filter(|_| given < numbers.len()) else {
@@ -294,6 +294,10 @@ impl<'a> Reader<'a, '_> {
             let expected = format!("the tag of an element and {n} nodes");
             self.report.fault_of_line(at, expected, "correct the line, or the counts before it");
             return Err(Stop);
+        }
+        if form == Some(Form::TetrahedronOfTen) {
+            // Its last two edges are 2-3 and 1-3 here.
+            numbers.swap(9, 10);
         }
         let nodes = &numbers[1..=n];
         match form {
@@ -345,11 +349,14 @@ impl<'a> Reader<'a, '_> {
             self.draft.set(0, &name, nodes, self.report);
         }
         if dimension == 2 {
-            let face = |index: &u32| {
-                let corners = self.draft.elements[*index as usize].corners();
-                <[u32; 4]>::try_from(corners).ok()
+            let faces_of = |index: &u32| match *self.draft.elements[*index as usize].corners() {
+                [a, b, c, d] => vec![[a, b, c, d]],
+                [a, b, c, ab, bc, ca] => {
+                    vec![[a, ab, ca, ca], [ab, b, bc, bc], [ca, bc, c, c], [ab, bc, ca, ca]]
+                }
+                _ => Vec::new(),
             };
-            let faces: Vec<[u32; 4]> = elements.iter().filter_map(face).collect();
+            let faces: Vec<[u32; 4]> = elements.iter().flat_map(faces_of).collect();
             self.draft.segments.entry(name.clone()).or_default().extend(faces);
         }
         self.draft.body(0, name, number, elements, self.report);
@@ -362,7 +369,7 @@ fn tag_of(dimension: i64, tag: i64) -> Option<Tag> {
     Some((dimension, u32::try_from(tag).ok()?))
 }
 
-const EXPECTED: &str = "elements of first order: points, lines, triangles, quadrilaterals, tetrahedra, hexahedra, prisms, pyramids";
+const EXPECTED: &str = "elements of first order (points, lines, triangles, quadrilaterals, tetrahedra, hexahedra, prisms, pyramids) or tetrahedra of ten nodes";
 
 /// The form of a type of elements, none of points; or what it is, where it is not read.
 fn form_of(kind: i64) -> Result<Option<Form>, &'static str> {
@@ -374,11 +381,11 @@ fn form_of(kind: i64) -> Result<Option<Form>, &'static str> {
         5 => Form::Hexahedron,
         6 => Form::Wedge,
         7 => Form::Pyramid,
+        8 => Form::LineOfThree,
+        9 => Form::TriangleOfSix,
+        11 => Form::TetrahedronOfTen,
         15 => return Ok(None),
-        8 => return Err("lines of three nodes"),
-        9 => return Err("triangles of six nodes"),
         10 | 16 => return Err("quadrilaterals of eight or nine nodes"),
-        11 => return Err("tetrahedra of ten nodes"),
         12 | 17 => return Err("hexahedra of 20 or 27 nodes"),
         13 | 18 => return Err("prisms of 15 or 18 nodes"),
         14 | 19 => return Err("pyramids of 13 or 14 nodes"),

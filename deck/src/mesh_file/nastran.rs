@@ -21,8 +21,7 @@ const ELEMENTS: [(&str, Form); 11] = [
     ("CROD", Form::Line),
     ("CONROD", Form::Line),
 ];
-const FIRST_ORDER: &str =
-    "elements of first order, with corners alone: CHEXA, CPENTA, CPYRAM, CTETRA, CQUAD4, CTRIA3";
+const FIRST_ORDER: &str = "elements of first order, with corners alone, or CTETRA with all ten: CHEXA, CPENTA, CPYRAM, CTETRA, CQUAD4, CTRIA3";
 
 /// Elements of higher order alone.
 const HIGHER: [&str; 3] = ["CQUAD8", "CTRIA6", "CQUAD"];
@@ -223,6 +222,11 @@ impl Reader<'_, '_> {
     /// `CHEXA, number, property, nodes`; of a CONROD there is no property.
     fn element(&mut self, entry: &Entry, form: Form) {
         let first = if entry.name == "CONROD" { 1 } else { 2 };
+        let has_more = |n: usize| (first + n..entry.fields.len()).any(|i| !entry.field(i).is_empty());
+        let form = match form {
+            Form::Tetrahedron if has_more(form.n_nodes()) => Form::TetrahedronOfTen,
+            form => form,
+        };
         let n = form.n_nodes();
         let nodes: Option<Vec<u32>> =
             (first..first + n).map(|i| entry.integer(i).filter(|node| *node > 0)).collect();
@@ -232,8 +236,11 @@ impl Reader<'_, '_> {
             self.report.fault_of_line(entry.at, expected, "correct the entry");
             return;
         };
-        let is_solid = matches!(form, Form::Hexahedron | Form::Wedge | Form::Pyramid | Form::Tetrahedron);
-        if is_solid && (first + n..entry.fields.len()).any(|i| !entry.field(i).is_empty()) {
+        let is_solid = matches!(
+            form,
+            Form::Hexahedron | Form::Wedge | Form::Pyramid | Form::Tetrahedron | Form::TetrahedronOfTen
+        );
+        if is_solid && has_more(n) {
             let read = format!("the {} {id} of more than {n} nodes", entry.name);
             self.report.fault(entry.at, read, FIRST_ORDER, "mesh in first order");
             return;

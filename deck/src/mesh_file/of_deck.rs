@@ -2,14 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Format, MeshFile, read};
+use super::{
+    Format, MeshFile,
+    composite::{self, Unfit},
+    read,
+};
 use crate::{
     bundle::Bundle,
     fault::Fault,
     include::beside,
-    limits::MAX_ID,
+    limits::{MAX_ID, MAX_NODES},
     log::{Log, Warning},
-    place::Placed,
+    place::{Origin, Placed},
     table::holds,
     typed::{
         Deck,
@@ -55,6 +59,11 @@ pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) 
             continue;
         }
         scales.insert(&file.value, scale.as_ref());
+        let asks = |part: &&Part| file_of(part).as_ref() == Some(&file.value);
+        let composite = parts.iter().filter(asks).find_map(|part| match part.mesh.as_ref()?.source {
+            Source::Body { composite, .. } => composite,
+            _ => None,
+        });
         let Some(index) = bundle.file(&beside(bundle.files[0].0, &file.value)) else { continue };
         let mut mesh = match read(bundle, index) {
             Ok(found) => {
@@ -70,6 +79,9 @@ pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) 
             if let Some(scale) = scale {
                 scaled(mesh, scale, log);
             }
+            if let Some(origin) = composite {
+                raised(mesh, origin, log);
+            }
             if several && Format::of(&file.value, bundle.files[index].1) != Format::Own {
                 all.warnings.extend(number_apart(mesh, &taken, bundle.files[index].0));
             }
@@ -81,6 +93,27 @@ pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) 
         all.by_name.insert(file.value.clone(), mesh);
     }
     all
+}
+
+/// Puts nodes on the edges of the tetrahedra, as a part asks at `origin`.
+fn raised(mesh: &mut MeshFile, origin: Origin, log: &Log<'_>) {
+    let (expected, advice) = match composite::raise(mesh) {
+        Ok(()) => return,
+        Err(Unfit::Others(body, id)) => (
+            format!(
+                "no other solids than tetrahedra of four nodes in the file; body {body} has element {id}"
+            ),
+            "put bodies of other solids into a file of their own, or take it out",
+        ),
+        Err(Unfit::NoneThere) => ("tetrahedra of four nodes in the file".to_string(), "take it out"),
+        Err(Unfit::TooMany(n)) => (
+            format!(
+                "at most {MAX_NODES} nodes and numbers of at most {MAX_ID}; with those on edges there are {n}"
+            ),
+            "make a coarser mesh, or renumber its nodes",
+        ),
+    };
+    log.fault_of(origin, expected, advice);
 }
 
 /// Scales the positions of the nodes.
@@ -113,6 +146,9 @@ fn number_apart(mesh: &mut MeshFile, taken: &[BTreeSet<u32>; 2], name: &str) -> 
         body.solids
             .iter_mut()
             .for_each(|(id, corners)| (*id, *corners) = (*id + of_elements, corners.map(|n| n + of_nodes)));
+        body.tetrahedra
+            .iter_mut()
+            .for_each(|(id, nodes)| (*id, *nodes) = (*id + of_elements, nodes.map(|n| n + of_nodes)));
         body.shells
             .iter_mut()
             .for_each(|(id, corners)| (*id, *corners) = (*id + of_elements, corners.map(|n| n + of_nodes)));

@@ -23,7 +23,8 @@
 //! 5 0 0.1 0
 //! ```
 //!
-//! A triangle among shells names its last node twice. Bodies of one file share the nodes that they both name.
+//! A solid names eight nodes, or ten of a tetrahedron with nodes on its edges, as all solids of its body do. A triangle among shells names
+//! its last node twice. Bodies of one file share the nodes that they both name.
 
 use std::{collections::BTreeSet, fmt::Write as _};
 
@@ -39,6 +40,8 @@ const FIRST: &str = "bolide mesh 1";
 
 /// Most faults reported for one file.
 const MAX_REPORTED: usize = 50;
+
+const MIXED: &str = "make a body of the others";
 
 impl MeshFile {
     /// The text of this mesh; [`parse`] reads it back to the bit.
@@ -241,6 +244,20 @@ fn row(
             known(nodes, &[id])?;
             let list = if matches!(section, Section::Spins) { &mut mesh.spins } else { &mut mesh.velocities };
             list.push((id, v));
+        }
+        Section::Solids(body) if line.split_whitespace().count() == 11 => {
+            let [id, of_element @ ..] = numbers::<11>(line)?;
+            if !elements[0].insert(id) {
+                return Err((format!("an element number other than {id}"), "renumber one"));
+            }
+            known(nodes, &of_element)?;
+            if !mesh.bodies[*body].solids.is_empty() {
+                return Err(("eight nodes, as the elements before".to_string(), MIXED));
+            }
+            mesh.bodies[*body].tetrahedra.push((id, of_element));
+        }
+        Section::Solids(body) if !mesh.bodies[*body].tetrahedra.is_empty() => {
+            return Err(("ten nodes, as the elements before".to_string(), MIXED));
         }
         Section::Solids(body) => {
             let [id, corners @ ..] = numbers::<9>(line)?;

@@ -225,8 +225,20 @@ fn read_mesh(
             None => Some(None),
             Some(value) => value.number(Range::Positive).map(|scale| Some(value.placed(scale))),
         };
+        let composite = match inner.get("tetrahedra") {
+            None => Some(None),
+            Some(value) => {
+                let word = value.one_of(&["collapsed", "composite"]);
+                word.map(|word| (word == 1).then(|| value.origin()))
+            }
+        };
         inner.finish();
-        mesh.zip(body).zip(scale).map(|((mesh, body), scale)| Source::Body { mesh, body, scale })
+        mesh.zip(body).zip(scale).zip(composite).map(|(((mesh, body), scale), composite)| Source::Body {
+            mesh,
+            body,
+            scale,
+            composite,
+        })
     } else {
         read_explicit(inner, kind_of?).map(|own| Source::Explicit(Box::new(own)))
     };

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::{
     blocks::{Block, Shape},
     mesh_file::MeshFile,
-    place::{Place, Placed},
+    place::{Origin, Place, Placed},
 };
 
 /// Meshes by the name that the deck has for them; none where a file could not be read, which was reported.
@@ -38,6 +38,8 @@ pub(crate) enum Source {
         body: Option<Placed<String>>,
         /// Factor on the positions of its nodes; 1 where there is none.
         scale: Option<Placed<f64>>,
+        /// Where it asks for nodes on the edges of tetrahedra of four, for all parts of the file.
+        composite: Option<Origin>,
     },
 }
 

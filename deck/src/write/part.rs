@@ -146,10 +146,11 @@ fn write_mesh(text: &mut Text, mesh: &PartMesh) {
             text.key(kind, table(&keys));
         }
         Source::Explicit(own) => text.key("mesh", explicit(own)),
-        Source::Body { mesh, body, scale } => {
+        Source::Body { mesh, body, scale, composite } => {
             let mut keys = vec![("file", quoted(&mesh.value))];
             keys.extend(body.as_ref().map(|body| ("body", quoted(&body.value))));
             keys.extend(scale.as_ref().map(|scale| ("scale", format!("{:?}", scale.value))));
+            keys.extend(composite.map(|_| ("tetrahedra", quoted("composite"))));
             text.key("mesh", table(&keys));
         }
     }
@@ -168,6 +169,9 @@ fn explicit(own: &Explicit) -> String {
     let elements = match &own.block.topology {
         Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
             list(hexahedra.iter().zip(numbers).map(|(corners, id)| element(id, corners)))
+        }
+        Topology::Tetrahedra { tetrahedra } => {
+            list(tetrahedra.iter().zip(numbers).map(|(nodes, id)| element(id, nodes)))
         }
         Topology::Shells { quads, .. } => {
             list(quads.iter().zip(numbers).map(|(corners, id)| element(id, corners)))

@@ -6,7 +6,10 @@
 //! (0) and the maximum (65535); the part of each face as `u16`.
 
 use deck::model::Model;
-use mechanics::state::{GlobalState, field};
+use mechanics::{
+    element::tet10,
+    state::{GlobalState, field},
+};
 
 use crate::{
     picture::skin::{Cell, outside},
@@ -48,10 +51,12 @@ impl Outer {
             (0..part.n_elements()).filter(move |e| !state.is_eroded(first + e)).map(move |e| {
                 let corners = part.corners(e);
                 let [a, b, c, d, ..] = corners;
-                (
-                    first + e,
-                    if part.n_corners() == 8 { Cell::Solid(corners) } else { Cell::Face([a, b, c, d]) },
-                )
+                let cell = match part.n_corners() {
+                    8 => Cell::Solid(corners),
+                    tet10::NODES => Cell::Tetrahedron(part.nodes_of(e).padded()),
+                    _ => Cell::Face([a, b, c, d]),
+                };
+                (first + e, cell)
             })
         });
         let seen = outside(mesh.n_nodes(), cells);

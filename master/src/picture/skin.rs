@@ -5,7 +5,7 @@ use crate::results::{
     Error,
     vtu::read::{Heading, Piece},
 };
-use mechanics::mesh::FACES;
+use mechanics::{element::tet10, mesh::FACES};
 
 /// What is drawn.
 pub struct Skin {
@@ -135,6 +135,8 @@ fn start(piece: &Piece, points: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, Error> {
 pub enum Cell {
     /// A hexahedron, its sides in the order of [`FACES`]; corners repeat in a collapsed one.
     Solid([u32; 8]),
+    /// A tetrahedron with nodes on its edges; its sides are the triangles of [`tet10::SIDES`].
+    Tetrahedron([u32; tet10::NODES]),
     /// A face by itself, which nothing hides: a shell, or one of a contact surface.
     Face([u32; 4]),
 }
@@ -144,11 +146,22 @@ impl Cell {
     fn of(corners: &[u32]) -> Option<Self> {
         match *corners {
             [a, b, c, d, e, f, g, h] => Some(Self::Solid([a, b, c, d, e, f, g, h])),
+            [a, b, c, d, e, f, g, h, i, j] => Some(Self::Tetrahedron([a, b, c, d, e, f, g, h, i, j])),
             [first, .., last] => Some(Self::Face(std::array::from_fn(|i| {
                 corners.get(i).copied().unwrap_or(if i == 0 { first } else { last })
             }))),
             _ => None,
         }
+    }
+
+    /// The corners of each of its sides, outward by the right-hand rule; a face has none beside itself.
+    fn sides(&self) -> impl Iterator<Item = [u32; 4]> + '_ {
+        let (nodes, sides): (&[u32], &[[usize; 4]]) = match self {
+            Self::Solid(corners) => (corners, &FACES),
+            Self::Tetrahedron(nodes) => (nodes, &tet10::SIDES),
+            Self::Face(_) => (&[], &[]),
+        };
+        sides.iter().map(move |side| side.map(|corner| nodes[corner]))
     }
 }
 
@@ -172,9 +185,8 @@ pub fn outside(
 ) -> Vec<(usize, [u32; 4])> {
     let for_each_side = |visit: &mut dyn FnMut(u32, Side)| {
         for (cell, shape) in cells.clone() {
-            let Cell::Solid(corners) = shape else { continue };
-            for (side, local) in (0..).zip(&FACES) {
-                if let Some([lowest, key @ ..]) = distinct(local.map(|corner| corners[corner])) {
+            for (side, corners) in (0..).zip(shape.sides()) {
+                if let Some([lowest, key @ ..]) = distinct(corners) {
                     visit(lowest, Side { key, cell: cell as u32, side });
                 }
             }
@@ -207,9 +219,10 @@ pub fn outside(
     for (cell, shape) in cells {
         match shape {
             Cell::Face(corners) => faces.push((cell, corners)),
-            Cell::Solid(corners) => {
+            Cell::Solid(_) | Cell::Tetrahedron(_) => {
+                let sides: Vec<[u32; 4]> = shape.sides().collect();
                 while let Some((_, side)) = seen.next_if(|(number, _)| *number as usize == cell) {
-                    faces.push((cell, FACES[side as usize].map(|corner| corners[corner])));
+                    faces.push((cell, sides[side as usize]));
                 }
             }
         }

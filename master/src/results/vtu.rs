@@ -11,7 +11,8 @@ pub mod read;
 
 use deck::model::Model;
 use mechanics::{
-    element::shell4,
+    element::{shell4, tet10},
+    mesh::Nodes,
     state::{GlobalState, PartHistory, field},
 };
 
@@ -29,6 +30,7 @@ const VTK_HEXAHEDRON: u8 = 12;
 /// Cell type of the four-node quadrilateral: shells.
 const VTK_LINE: u8 = 3;
 const VTK_QUAD: u8 = 9;
+const VTK_QUADRATIC_TETRA: u8 = 24;
 
 /// Fields whose numbers identify rather than measure: written whatever the deck selects.
 const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
@@ -171,6 +173,12 @@ impl Elements<'_> {
         self.model.mesh.parts[part].corners(local).map(i64::from)
     }
 
+    /// All nodes of an element, a shell's twice.
+    fn nodes(&self, element: usize) -> Nodes {
+        let (part, local) = self.locate(element);
+        self.model.mesh.parts[part].nodes_of(local)
+    }
+
     fn n_corners(&self, element: usize) -> usize {
         self.model.mesh.parts[self.locate(element).0].n_corners()
     }
@@ -254,7 +262,7 @@ fn stream(
     let (mut corners, mut ends) = (Vec::new(), Vec::new());
     if mixed {
         for &e in &kept {
-            corners.extend_from_slice(&elements.corners(e)[..elements.n_corners(e)]);
+            corners.extend(elements.nodes(e)[..elements.n_corners(e)].iter().map(|&node| i64::from(node)));
             ends.push(corners.len() as i64);
         }
     }
@@ -277,6 +285,7 @@ fn stream(
                 out.push(match if mixed { elements.n_corners(kept[cell]) } else { 8 } {
                     2 => VTK_LINE,
                     4 => VTK_QUAD,
+                    tet10::NODES => VTK_QUADRATIC_TETRA,
                     _ => VTK_HEXAHEDRON,
                 });
             }),

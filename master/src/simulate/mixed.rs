@@ -193,7 +193,7 @@ fn owners(mesh: &Mesh, layout: &[Subdomain]) -> Vec<u32> {
     for s in layout {
         let part = &mesh.parts[s.part];
         let mut take = |element: usize| {
-            for node in part.corners(element) {
+            for &node in part.nodes_of(element).iter() {
                 let owner = &mut owner[node as usize];
                 if *owner == u32::MAX {
                     *owner = s.worker as u32;

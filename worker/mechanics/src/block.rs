@@ -18,7 +18,7 @@ use crate::{
     flip::Target,
     lanes::{SET, Width},
     material::Material,
-    mesh::Topology,
+    mesh::{Nodes, Topology},
     piece::Piece,
     spin::Turning,
     state::{N_FIELDS, ShellState},
@@ -247,6 +247,17 @@ impl Block {
         self.group.corners(element)
     }
 
+    /// Local nodes of a local element, in the order of [`Part::nodes_of`](crate::mesh::Part::nodes_of).
+    pub fn nodes_of(&self, element: usize) -> Nodes {
+        self.group.nodes(element)
+    }
+
+    /// Local nodes of a side of a local element, see [`Part::side`](crate::mesh::Part::side).
+    pub fn side(&self, element: usize, side: usize) -> [u32; 4] {
+        let nodes = self.nodes_of(element);
+        self.topology.side(side).map(|node| nodes[node])
+    }
+
     /// For each set, whether one of its elements has a node that `marked` (by local node) holds true: the sets to
     /// compute before the forces of those nodes travel.
     ///
@@ -256,7 +267,7 @@ impl Block {
         assert!(marked.len() == self.nodes.len(), "{} marks, {} nodes", marked.len(), self.nodes.len());
         let mut touching = vec![false; self.alive().len()];
         for element in 0..self.elements.len() {
-            let touches = self.corners(element).iter().any(|&node| marked[node as usize]);
+            let touches = self.nodes_of(element).iter().any(|&node| marked[node as usize]);
             touching[self.slot(element) / SET] |= touches;
         }
         touching

@@ -15,6 +15,7 @@ use crate::{
     exact::Quantum,
     lanes::{SET, Width},
     material::Material,
+    mesh::Nodes,
     rigid::cross,
     setup::Control,
 };
@@ -26,8 +27,8 @@ pub struct CrossSection {
     pub origin: [f64; 3],
     /// A power of two that is at least as long as the problem (length).
     pub arm: f64,
-    /// Global element index, ascending, and a bit for each corner ahead.
-    pub elements: Vec<(u32, u8)>,
+    /// Global element index, ascending, and a bit for each of its nodes ahead.
+    pub elements: Vec<(u32, u16)>,
 }
 
 /// What passes through a cross-section at `t_n`: exact sums.
@@ -157,7 +158,7 @@ impl Cuts {
     /// What `sections` cut of a block.
     pub fn of(sections: &[CrossSection], block: &Block) -> Self {
         let mut cuts = Self::default();
-        let mut found: Vec<(u32, [u32; 8], Cut)> = Vec::new();
+        let mut found: Vec<(u32, Nodes, Cut)> = Vec::new();
         for (index, section) in (0..).zip(sections) {
             let before = found.len();
             for (local, element) in block.elements.iter().enumerate() {
@@ -165,16 +166,17 @@ impl Cuts {
                     continue;
                 };
                 let (corners, ahead, slot) =
-                    (block.corners(local), section.elements[at].1, block.slot(local));
+                    (block.nodes_of(local), section.elements[at].1, block.slot(local));
                 let mut nodes: Vec<u32> =
-                    (0..8).filter(|i| ahead >> i & 1 == 1).map(|i| corners[i]).collect();
+                    (0..corners.len()).filter(|i| ahead >> i & 1 == 1).map(|i| corners[i]).collect();
                 nodes.sort_unstable();
                 nodes.dedup();
                 let cut = Cut { lane: (slot % SET) as u8, section: cuts.sections.len(), nodes };
                 found.push(((slot / SET) as u32, corners, cut));
             }
             if found.len() > before {
-                let terms = 8 * section.elements.len() as u64;
+                let terms: u64 =
+                    section.elements.iter().map(|(_, ahead)| u64::from(ahead.count_ones().max(8))).sum();
                 cuts.sections.push(Held {
                     index,
                     origin: section.origin,
@@ -192,7 +194,7 @@ impl Cuts {
     }
 
     /// Puts an element into the first pass of its set whose elements share no node with it.
-    fn take_in(&mut self, set: u32, corners: [u32; 8], cut: Cut) {
+    fn take_in(&mut self, set: u32, corners: Nodes, cut: Cut) {
         if self.sets.last().is_none_or(|last| last.set != set) {
             self.sets.push(CutSet { set, lanes: 0, alive: 0, passes: Vec::new() });
         }
@@ -208,7 +210,7 @@ impl Cuts {
         });
         let pass = &mut of_set.passes[at];
         pass.lanes |= bit;
-        pass.touched.extend(corners);
+        pass.touched.extend_from_slice(&corners);
         pass.cuts.push(cut);
     }
 

@@ -18,6 +18,7 @@ pub(crate) mod modes;
 pub(crate) mod place;
 pub(crate) mod rotation;
 pub mod shell4;
+pub mod tet10;
 pub mod truss2;
 pub(crate) mod vector;
 pub(crate) mod viscosity;

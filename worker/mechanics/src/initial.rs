@@ -1,11 +1,11 @@
-//! The state a run starts from: masses by eighths of element masses and those that a deck puts at nodes, elements at rest volume without deviatoric stress,
+//! The state a run starts from: masses by the shares of element masses that their nodes carry and those that a deck puts at nodes, elements at rest volume without deviatoric stress,
 //! gases at their pressure, explosives with the time until they are lit.
 
 use crate::{
     burn::lighting_time,
     constraint::{Circle, Constraint, MAX_WALLS},
     contact::{Extent, Settings},
-    element::{hex8::eight_points, shell4},
+    element::{hex8::eight_points, shell4, tet10},
     exact::{Quanta, Quantum},
     load::{Drive, SurfaceKind},
     material::Material,
@@ -18,7 +18,7 @@ use crate::{
 
 /// The state at time zero.
 ///
-/// Nodal masses are exact sums of rounded eighths, so that the order of elements and the joins do not matter.
+/// Nodal masses are exact sums of rounded shares, so that the order of elements and the joins do not matter.
 ///
 /// # Errors
 /// Names the first element without a positive volume.
@@ -58,7 +58,7 @@ pub fn state(
         }
         for e in 0..part.n_elements() {
             let corners = part.corners(e).map(|n| mesh.positions[n as usize]);
-            let v = part.volume(&corners);
+            let v = part.volume_of(e, &mesh.positions);
             if v <= 0.0 || !v.is_finite() {
                 return Err(format!(
                     "element {} of part `{}`: volume {v:e}, must be positive",
@@ -71,6 +71,11 @@ pub fn state(
             if let Topology::EightPoint { .. } = part.topology {
                 for of_point in &mut state.own[eight_points::TEMPERATURES] {
                     of_point[index] = material.initial_temperature();
+                }
+            }
+            if let Topology::Tetrahedra { .. } = part.topology {
+                for (array, value) in state.own.iter_mut().zip(tet10::at_start(material)) {
+                    array[index] = value;
                 }
             }
             state.elements[field::RELATIVE_VOLUME][index] = 1.0;
@@ -87,14 +92,13 @@ pub fn state(
     debug_assert_eq!(state.elements.len(), N_FIELDS);
     let masses = mass_of.iter().copied().chain(mesh.lumped.iter().map(|(_, mass)| *mass));
     let heaviest = masses.fold(f64::MIN_POSITIVE, f64::max);
-    // 64 eighths at a node stay below 2^53 quanta.
+    // 64 shares at a node stay below 2^53 quanta.
     let quantum = Quantum::for_reference(heaviest, 50);
     let mut index = 0;
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
-            let eighth = quantum.round(mass_of[index] * 0.125);
-            for n in part.corners(e) {
-                state.mass[n as usize] += eighth;
+            for (&n, share) in part.nodes_of(e).iter().zip(part.shares()) {
+                state.mass[n as usize] += quantum.round(mass_of[index] * share);
             }
             index += 1;
         }
@@ -224,9 +228,10 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         for e in 0..part.n_elements() {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
             force = force.max(match &part.topology {
-                Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
-                    largest_face(&x) * strength
-                }
+                Topology::Structured { .. }
+                | Topology::Explicit { .. }
+                | Topology::EightPoint { .. }
+                | Topology::Tetrahedra { .. } => largest_face(&x) * strength,
                 // A shell pulls with its section; only loads act on its face.
                 Topology::Shells { section, .. } => {
                     let area = largest_face(&x);

@@ -190,7 +190,7 @@ pub struct Gravity {
 pub struct SurfaceLoad {
     /// What acts.
     pub kind: SurfaceKind,
-    /// Global element index and index into [`crate::mesh::FACES`].
+    /// Global element index and [side](crate::mesh::Part::side) of the element.
     pub faces: Vec<(u32, u8)>,
 }
 

@@ -6,6 +6,7 @@ use crate::element::{
     hex8::{self, eight_points},
     hourglass::{Hourglass, N_FORCES},
     shell4::{self, Rule},
+    tet10,
 };
 
 /// The whole mesh of a problem. Owned by the master; workers get pieces of it.
@@ -73,6 +74,47 @@ pub enum Topology {
         /// Initial area of the cross-section.
         area: f64,
     },
+    /// Composite tetrahedra: ten indices into [`Part::nodes`] each, in the order of [`tet10`].
+    Tetrahedra { tetrahedra: Vec<[u32; tet10::NODES]> },
+}
+
+/// The nodes of an element, as many as its kind has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Nodes {
+    list: [u32; MAX_NODES],
+    count: u8,
+}
+
+/// Most nodes of an element.
+pub const MAX_NODES: usize = tet10::NODES;
+
+impl Nodes {
+    pub(crate) fn of<const N: usize>(nodes: [u32; N]) -> Self {
+        const { assert!(N <= MAX_NODES) };
+        let mut list = [u32::MAX; MAX_NODES];
+        list[..N].copy_from_slice(&nodes);
+        Self { list, count: N as u8 }
+    }
+
+    /// The nodes, and `u32::MAX` behind the last.
+    pub fn padded(&self) -> [u32; MAX_NODES] {
+        self.list
+    }
+}
+
+impl std::ops::Deref for Nodes {
+    type Target = [u32];
+
+    fn deref(&self) -> &[u32] {
+        &self.list[..usize::from(self.count)]
+    }
+}
+
+/// How densely elements of a kind have nodes and sides, see [`Part::spacing`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spacing {
+    pub node: f64,
+    pub side: f64,
 }
 
 /// Thickness of shells and the points through it.
@@ -92,6 +134,16 @@ impl Section {
     /// Number of arrays that such shells have of their own ([`crate::piece::Piece::own`]).
     pub fn n_fields(&self) -> usize {
         shell4::ELEMENT + shell4::LAYER * self.rule.points().map_or(0, |points| points.len())
+    }
+}
+
+impl Topology {
+    /// See [`Part::side`].
+    pub(crate) fn side(&self, side: usize) -> [usize; 4] {
+        match self {
+            Self::Tetrahedra { .. } => tet10::SIDES[side],
+            _ => FACES[side],
+        }
     }
 }
 
@@ -115,6 +167,7 @@ impl Part {
         match &self.topology {
             Topology::Structured { cells } => cells.iter().map(|&c| c as usize).product(),
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra.len(),
+            Topology::Tetrahedra { tetrahedra } => tetrahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
             Topology::Trusses { bars, .. } => bars.len(),
         }
@@ -122,15 +175,55 @@ impl Part {
 
     /// Corners of element `e` of this part as global node indices. A shell is a hexahedron without height: its four
     /// corners twice, so that its first two faces are its lower and its upper side and the others vanish. A truss has no face: each of its
-    /// two nodes stands for the four corners of an end.
+    /// two nodes stands for the four corners of an end. A tetrahedron is the hexahedron that collapses to its four corners.
     pub fn corners(&self, e: usize) -> [u32; 8] {
         match &self.topology {
             Topology::Structured { cells } => corners_of(*cells, e).map(|local| self.nodes[local as usize]),
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
                 hexahedra[e].map(|local| self.nodes[local as usize])
             }
+            Topology::Tetrahedra { tetrahedra } => {
+                tet10::collapsed(&tetrahedra[e]).map(|local| self.nodes[local as usize])
+            }
             Topology::Shells { quads, .. } => twice(quads[e]).map(|local| self.nodes[local as usize]),
             Topology::Trusses { bars, .. } => spread(bars[e]).map(|local| self.nodes[local as usize]),
+        }
+    }
+
+    /// Every node of element `e` of this part, as global node indices: those that carry its mass and its forces and that its
+    /// [sides](Part::side) name. Of kinds with no more nodes than a hexahedron they are its [`Part::corners`].
+    pub fn nodes_of(&self, e: usize) -> Nodes {
+        match &self.topology {
+            Topology::Tetrahedra { tetrahedra } => {
+                Nodes::of(tetrahedra[e].map(|local| self.nodes[local as usize]))
+            }
+            _ => Nodes::of(self.corners(e)),
+        }
+    }
+
+    /// The share of the mass of an element that each of its [`Part::nodes_of`] carries.
+    pub fn shares(&self) -> &'static [f64] {
+        match &self.topology {
+            Topology::Tetrahedra { .. } => &tet10::SHARES,
+            _ => &[0.125; 8],
+        }
+    }
+
+    /// The nodes of a [side](Part::sides), indices into [`Part::nodes_of`], outward by the right-hand rule; the last two are the same in a
+    /// triangle.
+    ///
+    /// # Panics
+    /// If elements of this kind have no such side.
+    pub fn side(&self, side: usize) -> [usize; 4] {
+        self.topology.side(side)
+    }
+
+    /// Volume that belongs to a node inside such elements, over that of one of them, and volume of the hexahedron whose side has the
+    /// area of one of its sides, likewise: contact takes masses and stiffness of both.
+    pub fn spacing(&self) -> Spacing {
+        match &self.topology {
+            Topology::Tetrahedra { .. } => tet10::SPACING,
+            _ => Spacing { node: 1.0, side: 1.0 },
         }
     }
 
@@ -152,21 +245,24 @@ impl Part {
         self.section().map(|section| section.thickness)
     }
 
-    /// Number of nodes of an element, the first of its [`Part::corners`].
+    /// Number of nodes of an element, the first of its [`Part::nodes_of`].
     pub fn n_corners(&self) -> usize {
         match &self.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => 8,
+            Topology::Tetrahedra { .. } => tet10::NODES,
             Topology::Shells { .. } => 4,
             Topology::Trusses { .. } => 2,
         }
     }
 
-    /// The sides of an element that contact and loads may act on, indices into [`FACES`]. The upper side of a shell stands for both.
+    /// The sides of an element that contact and loads may act on, see [`Part::side`]: of a hexahedron its [`FACES`]. The upper side of
+    /// a shell stands for both; each face of a tetrahedron is four triangles.
     pub fn sides(&self) -> &'static [usize] {
         match &self.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
                 &[0, 1, 2, 3, 4, 5]
             }
+            Topology::Tetrahedra { .. } => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15],
             Topology::Shells { .. } => &[UPPER],
             Topology::Trusses { .. } => &[],
         }
@@ -180,17 +276,29 @@ impl Part {
             }
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::Trusses { .. } => 0,
             Topology::EightPoint { .. } => eight_points::N_OWN,
+            Topology::Tetrahedra { .. } => tet10::N_OWN,
             Topology::Shells { section, .. } => section.n_fields(),
         }
     }
 
+    /// Volume of element `e` of this part with the nodes of the mesh at `x`; of a shell, area times initial thickness.
+    pub fn volume_of(&self, e: usize, x: &[[f64; 3]]) -> f64 {
+        match &self.topology {
+            Topology::Tetrahedra { tetrahedra } => {
+                tet10::volume(&tetrahedra[e].map(|local| x[self.nodes[local as usize] as usize]))
+            }
+            _ => self.volume(&self.corners(e).map(|n| x[n as usize])),
+        }
+    }
+
     /// Volume of an element of this part whose [`Part::corners`] stand at `x`; of a shell, area times initial
-    /// thickness.
+    /// thickness; of a tetrahedron, as if its edges were straight.
     pub fn volume(&self, x: &[[f64; 3]; 8]) -> f64 {
         match &self.topology {
-            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
-                hex8::volume(x)
-            }
+            Topology::Structured { .. }
+            | Topology::Explicit { .. }
+            | Topology::EightPoint { .. }
+            | Topology::Tetrahedra { .. } => hex8::volume(x),
             Topology::Shells { section, .. } => quad_area(&[x[0], x[1], x[2], x[3]]) * section.thickness,
             Topology::Trusses { area, .. } => distance(x[0], x[1]) * area,
         }

@@ -176,6 +176,10 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             let (hexahedra, nodes) = by_first_use(hexahedra, list);
             (Topology::EightPoint { hexahedra }, nodes, list.clone())
         }
+        (Topology::Tetrahedra { tetrahedra }, Region::List(list)) => {
+            let (tetrahedra, nodes) = by_first_use(tetrahedra, list);
+            (Topology::Tetrahedra { tetrahedra }, nodes, list.clone())
+        }
         (Topology::Shells { quads, section }, Region::List(list)) => {
             let (quads, nodes) = by_first_use(quads, list);
             (Topology::Shells { quads, section: *section }, nodes, list.clone())

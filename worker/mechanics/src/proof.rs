@@ -15,7 +15,7 @@ use crate::{
     lanes::{Width, functions, scalar::Scalar},
     load::Loads,
     material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
-    mesh::{Part, Topology},
+    mesh::{MAX_NODES, Part, Topology},
     piece::Piece,
     setup::{Control, Setup},
     state::{N_FIELDS, ShellState, field},
@@ -318,7 +318,7 @@ fn of_contact(friction: f64, width: Width, hasher: &mut blake3::Hasher) {
         let first = i / 6 * 7 + i % 6;
         let nodes = [first, first + 1, first + 8, first + 7];
         let stiffness = 1.0 + draws.next();
-        batch.faces.push(BatchFace { nodes, id: i, part: 0, stiffness, corners: [u32::MAX; 8] });
+        batch.faces.push(BatchFace { nodes, id: i, part: 0, stiffness, corners: [u32::MAX; MAX_NODES] });
     }
     batch.units.push(BatchUnit { nodes: (49..249).collect(), faces: (0..36).collect() });
     let settings = Settings {

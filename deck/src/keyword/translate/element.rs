@@ -40,7 +40,8 @@ pub(super) fn read(t: &mut Translation<'_>) {
             log.fault(at, format!("element {id}"), expected, "renumber one");
             continue;
         }
-        if let Some(node) = solid.nodes.iter().find(|node| problem.position(**node).is_none()) {
+        let mut all = solid.nodes.iter().chain(solid.edges.iter().flatten());
+        if let Some(node) = all.find(|node| problem.position(**node).is_none()) {
             log.fault(at, format!("element {id} with node {node}"), "nodes of the deck", "add the node");
             continue;
         }
@@ -64,7 +65,7 @@ pub(super) fn read(t: &mut Translation<'_>) {
             );
             continue;
         }
-        if distinct < 8 {
+        if distinct < 8 && solid.edges.is_none() {
             collapsed.get_or_insert((at, 0)).1 += 1;
         }
         let v = volume(&corners);
@@ -77,9 +78,15 @@ pub(super) fn read(t: &mut Translation<'_>) {
             );
             continue;
         }
-        t.used.extend(solid.nodes);
+        t.used.extend(solid.nodes.into_iter().chain(solid.edges.into_iter().flatten()));
         let found = bodies.entry(solid.part).or_insert_with(|| Found::of(solid.part));
-        found.body.solids.push((id, nodes));
+        match solid.edges {
+            Some([e, f, g, h, i, j]) => {
+                let [a, b, c, d, ..] = solid.nodes;
+                found.body.tetrahedra.push((id, [a, b, c, d, e, f, g, h, i, j]));
+            }
+            None => found.body.solids.push((id, nodes)),
+        }
         found.places.push(at);
     }
     if let Some((at, count)) = collapsed {
@@ -122,7 +129,14 @@ fn check_section(t: &mut Translation<'_>, id: u32, body: &Body) {
                 Section::Shell(_) => "shells",
                 Section::Truss(_) => "trusses",
             };
-            let lists = [!body.solids.is_empty(), !body.shells.is_empty(), !body.trusses.is_empty()];
+            if !body.solids.is_empty() && !body.tetrahedra.is_empty() {
+                let read = format!("part {id} with solids of eight and of ten nodes");
+                log.fault(part.at, read, "solids of one of them", "make a part of the others");
+                t.without_section.insert(id);
+                return;
+            }
+            let is_of_solids = !body.solids.is_empty() || !body.tetrahedra.is_empty();
+            let lists = [is_of_solids, !body.shells.is_empty(), !body.trusses.is_empty()];
             let several = lists.into_iter().filter(|is| *is).count() > 1;
             if body.kind() == goes_with && !several {
                 return;
@@ -130,7 +144,7 @@ fn check_section(t: &mut Translation<'_>, id: u32, body: &Body) {
             let (other, expected) = match goes_with {
                 "solids" if body.shells.is_empty() => ("beams", "a *SECTION_BEAM"),
                 "solids" => ("shells", "a *SECTION_SHELL"),
-                _ if !body.solids.is_empty() => ("solids", "a *SECTION_SOLID"),
+                _ if is_of_solids => ("solids", "a *SECTION_SOLID"),
                 "shells" => ("beams", "a *SECTION_BEAM"),
                 _ => ("shells", "a *SECTION_SHELL"),
             };

@@ -77,6 +77,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
             mesh: made(t.mesh_name.to_string(), at),
             body: Some(made(format!("part {id}"), at)),
             scale: None,
+            composite: None,
         };
         let mesh = PartMesh { at, title: format!("the mesh of part {id}"), source };
         let known = problem.materials.contains_key(&part.material.value);

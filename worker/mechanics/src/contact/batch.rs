@@ -11,6 +11,7 @@ use super::{
     ties::BatchTies,
     work_unit::WorkUnit,
 };
+use crate::mesh::MAX_NODES;
 
 /// The units of one worker: everything contact needs of their nodes and faces except position and velocity.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -50,8 +51,8 @@ pub struct BatchFace {
     pub part: u32,
     /// `K A^2 / V` of its element (force per length).
     pub stiffness: f64,
-    /// Global nodes of its element.
-    pub corners: [u32; 8],
+    /// Global nodes of its element, and `u32::MAX` behind the last.
+    pub corners: [u32; MAX_NODES],
 }
 
 /// One unit of a batch.

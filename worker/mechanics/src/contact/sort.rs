@@ -20,6 +20,7 @@ use super::{
     surface::{Face, Surface},
     work_unit::WorkUnit,
 };
+use crate::mesh::MAX_NODES;
 
 /// Greatest cube index along an axis: three of them fit one key.
 const MAX_CUBE: f64 = 2_097_000.0;
@@ -357,7 +358,7 @@ fn sort_faces(
             high[a] = high[a].min(grid.last[a]);
         }
         // Own corners that can be in a unit and are permitted: to be taken off its count.
-        let mut own = [NO_UNIT; 8];
+        let mut own = [NO_UNIT; MAX_NODES];
         for (own, &node) in own.iter_mut().zip(&face.own) {
             if node != u32::MAX && permitted[surface.node_part[node as usize] as usize] {
                 *own = unit_of[node as usize];

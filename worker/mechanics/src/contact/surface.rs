@@ -13,10 +13,8 @@ use serde::{Deserialize, Serialize};
 use super::edges::{Edge, features::features};
 use crate::{
     material::Material,
-    mesh::{Mesh, Part},
+    mesh::{MAX_NODES, Mesh, Part},
 };
-
-pub use crate::mesh::FACES as SIDES;
 
 /// Depth (gaps) within which the penalty stops a node at the closing speed of its part; the rest of 0.9 is for the bodies
 /// behind it.
@@ -66,27 +64,27 @@ pub struct Face {
     pub nodes: [u32; 4],
     /// Global element index.
     pub element: u32,
-    /// Side of the element, an index into [`SIDES`].
+    /// Side of the element, see [`Part::side`].
     pub side: u32,
     /// Part of the element.
     pub part: u32,
     /// `K A^2 / V` of the element in its initial geometry (force per length).
     pub stiffness: f64,
-    /// Global nodes of the element: nodes that never interact with this face.
-    pub corners: [u32; 8],
+    /// Global nodes of the element, which never interact with this face, and `u32::MAX` behind the last.
+    pub corners: [u32; MAX_NODES],
     /// Surface nodes among those, each once, and `u32::MAX` in the other places.
-    pub own: [u32; 8],
+    pub own: [u32; MAX_NODES],
 }
 
 impl Face {
     /// Whether it is a shell, which pushes nodes away on both its sides.
-    pub fn is_shell(corners: &[u32; 8]) -> bool {
-        corners[..4] == corners[4..] && corners[0] != corners[1]
+    pub fn is_shell(corners: &[u32; MAX_NODES]) -> bool {
+        corners[..4] == corners[4..8] && corners[0] != corners[1]
     }
 
     /// A number that stays with this face when the surface is redefined.
     pub fn key(&self) -> u64 {
-        u64::from(self.element) * 6 + u64::from(self.side)
+        u64::from(self.element) * 16 + u64::from(self.side)
     }
 }
 
@@ -130,17 +128,19 @@ impl Surface {
             while element as usize >= offsets[part + 1] {
                 part += 1;
             }
-            let corners = mesh.parts[part].corners(element as usize - offsets[part]);
+            let e = element as usize - offsets[part];
+            let corners = mesh.parts[part].nodes_of(e);
             let bulk = materials[mesh.parts[part].material as usize].bulk();
-            let nodes = SIDES[side as usize].map(|c| corners[c]);
+            let nodes = mesh.parts[part].side(side as usize).map(|c| corners[c]);
             let area = area(nodes.map(|n| mesh.positions[n as usize]));
-            let volume = mesh.parts[part].volume(&corners.map(|n| mesh.positions[n as usize]));
+            let volume = mesh.parts[part].volume_of(e, &mesh.positions);
             for n in nodes {
                 index[n as usize] = 0;
             }
             let stiffness = stiffness_of(&mesh.parts[part], bulk, area, volume);
             let part = part as u32;
-            faces.push(Face { nodes, element, side, part, stiffness, corners, own: [u32::MAX; 8] });
+            let corners = corners.padded();
+            faces.push(Face { nodes, element, side, part, stiffness, corners, own: [u32::MAX; MAX_NODES] });
         }
         let on_faces = index.clone();
         for (part, _) in mesh.parts.iter().zip(erodes).filter(|(_, erodes)| **erodes) {
@@ -165,45 +165,46 @@ impl Surface {
         for (p, part) in (0..).zip(&mesh.parts) {
             let bulk = materials[part.material as usize].bulk();
             for e in 0..part.n_elements() {
-                let corners = part.corners(e);
+                let corners = part.nodes_of(e);
                 if corners.iter().all(|&n| index[n as usize] == u32::MAX) {
                     continue;
                 }
-                let positions = corners.map(|n| mesh.positions[n as usize]);
-                let volume = part.volume(&positions);
+                let volume = part.volume_of(e, &mesh.positions);
+                let of_node = part.spacing().node * volume;
                 for (corner, n) in corners.iter().map(|&n| index[n as usize] as usize).enumerate() {
                     if n == u32::MAX as usize {
                         continue;
                     }
-                    around[n] += 0.125 * volume;
+                    around[n] += part.shares()[corner] * volume;
                     if on_faces[nodes[n] as usize] == 0 {
                         continue;
                     }
                     // A node without faces is as stiff as the sides that it was a corner of.
                     node_part[n] = node_part[n].min(p);
-                    let sides = part.sides().iter().map(|&side| SIDES[side]);
+                    let sides = part.sides().iter().map(|&side| part.side(side));
                     for side in sides.filter(|side| active[n] && side.contains(&corner)) {
-                        let area = area(side.map(|c| positions[c]));
+                        let area = area(side.map(|c| mesh.positions[corners[c] as usize]));
                         node_stiffness[n] += stiffness_of(part, bulk, area, volume);
-                        node_share[n] += volume;
+                        node_share[n] += of_node;
                         count[n] += 1;
                     }
                 }
             }
         }
         for face in &mut faces {
-            let x = face.corners.map(|n| mesh.positions[n as usize]);
-            let face_volume = mesh.parts[face.part as usize].volume(&x);
+            let of_part = &mesh.parts[face.part as usize];
+            let e = face.element as usize - offsets[face.part as usize];
+            let of_node = of_part.spacing().node * of_part.volume_of(e, &mesh.positions);
             face.nodes = face.nodes.map(|n| index[n as usize]);
             for (i, n) in face.corners.into_iter().enumerate() {
-                if !face.corners[..i].contains(&n) {
+                if n != u32::MAX && !face.corners[..i].contains(&n) {
                     face.own[i] = index[n as usize];
                 }
             }
             for n in face.nodes.map(|n| n as usize) {
                 node_part[n] = node_part[n].min(face.part);
                 node_stiffness[n] += face.stiffness;
-                node_share[n] += face_volume;
+                node_share[n] += of_node;
                 count[n] += 1;
             }
         }
@@ -261,13 +262,16 @@ impl Surface {
         let depth = STOPPING_DEPTH * settings.gap;
         let mut sum = vec![0.0; self.nodes.len()];
         let mut count = vec![0_u32; self.nodes.len()];
-        let least = |part: usize, corners: &[u32; 8]| {
-            let density = materials[mesh.parts[part].material as usize].density;
-            let mass = density * mesh.parts[part].volume(&corners.map(|n| mesh.positions[n as usize]));
+        let offsets = mesh.element_offsets();
+        let least = |part: usize, e: usize| {
+            let of_part = &mesh.parts[part];
+            let density = materials[of_part.material as usize].density;
+            let mass = density * (of_part.spacing().node * of_part.volume_of(e, &mesh.positions));
             0.5 * mass * speed[part] * speed[part] / (depth * depth * settings.stiffness)
         };
         for face in &mut self.faces {
-            let least = least(face.part as usize, &face.corners);
+            let part = face.part as usize;
+            let least = least(part, face.element as usize - offsets[part]);
             face.stiffness = face.stiffness.max(least);
             for n in face.nodes {
                 sum[n as usize] += face.stiffness;
@@ -285,11 +289,10 @@ impl Surface {
         }
         for (p, part) in mesh.parts.iter().enumerate() {
             for e in 0..part.n_elements() {
-                let corners = part.corners(e);
-                for node in corners {
-                    let Ok(n) = self.nodes.binary_search(&node) else { continue };
+                for node in part.nodes_of(e).iter() {
+                    let Ok(n) = self.nodes.binary_search(node) else { continue };
                     if self.active[n] && count[n] == 0 {
-                        self.node_stiffness[n] = self.node_stiffness[n].max(least(p, &corners));
+                        self.node_stiffness[n] = self.node_stiffness[n].max(least(p, e));
                     }
                 }
             }
@@ -343,7 +346,7 @@ fn stiffness_of(part: &Part, bulk: f64, area: f64, volume: f64) -> f64 {
     match part.thickness() {
         // As the shell itself resists in its plane: across its thickness it would rule the time step.
         Some(thickness) => bulk * thickness,
-        None if volume > 0.0 => bulk * area * area / volume,
+        None if volume > 0.0 => bulk * area * area / (part.spacing().side * volume),
         None => 0.0,
     }
 }
@@ -358,7 +361,7 @@ fn freed(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, erodes: &[bool], nodes: &[u32
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
             if alive(element) {
-                part.corners(e).into_iter().for_each(|n| held[n as usize] = true);
+                part.nodes_of(e).iter().for_each(|&n| held[n as usize] = true);
             }
             element += 1;
         }
@@ -399,10 +402,10 @@ fn for_each_side(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, visit: &mut dyn FnMut
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
             if alive(element) {
-                let corners = part.corners(e);
+                let corners = part.nodes_of(e);
                 // A shell is one face, whose zone acts on both its sides.
                 for &side in part.sides() {
-                    let mut key = SIDES[side].map(|c| corners[c]);
+                    let mut key = part.side(side).map(|c| corners[c]);
                     key.sort_unstable();
                     for i in 1..4 {
                         if key[i] == key[i - 1] {

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::{ElementVote, Step, layout::Layout, place::Nodal};
 use crate::{
-    erosion::criteria::Criteria, flip::Target, lanes::Width, material::Material, spin::Turning,
+    erosion::criteria::Criteria, flip::Target, lanes::Width, material::Material, mesh::Nodes, spin::Turning,
     state::N_FIELDS,
 };
 
@@ -62,6 +62,11 @@ pub(crate) trait Group: Send + Sync {
 
     /// Nodes of the corners of an element. A kind with fewer corners than a hexahedron names some of them twice.
     fn corners(&self, element: usize) -> [u32; 8];
+
+    /// All nodes of an element, in the order of [`Part::nodes_of`](crate::mesh::Part::nodes_of).
+    fn nodes(&self, element: usize) -> Nodes {
+        Nodes::of(self.corners(element))
+    }
 
     /// Adds forces and moments of the elements at `x_n`, brings their state from `n-1` to `n` (unless the step is zero) and adds
     /// their votes. The result depends neither on the width, nor on the order of sets, nor on how they are cut into calls.

@@ -5,13 +5,13 @@
 
 use std::ops::Range;
 
-mod compression;
+pub(super) mod compression;
 pub mod eight_points;
 mod end;
 pub(crate) mod group;
 mod leaving;
 mod pass;
-mod stress;
+pub(super) mod stress;
 mod view;
 
 use super::{
@@ -35,7 +35,8 @@ use crate::{
 use compression::{Change, Compressed};
 use end::End;
 use stress::Stressed;
-use view::{BySlot, View};
+pub(super) use view::BySlot;
+use view::View;
 
 /// Volume of a hexahedron with these corners, as the kernel computes it, to the bit.
 pub fn volume(corners: &[[f64; 3]; 8]) -> f64 {
@@ -77,19 +78,19 @@ impl<E: EquationOfState, S, F> Laws<E, S, F> {
 }
 
 /// Running sums and extremes by lane. Sums are exact and extremes order-free, so lanes join in any way.
-struct Tally<L> {
-    internal: L,
-    hourglass: L,
-    viscosity: L,
-    largest_force: L,
-    largest_rate: L,
+pub(super) struct Tally<L> {
+    pub internal: L,
+    pub hourglass: L,
+    pub viscosity: L,
+    pub largest_force: L,
+    pub largest_rate: L,
     /// Greatest frequency of an element so far, whose inverse is the least Courant limit.
     frequency: f64,
 }
 
 impl<L: Lane> Tally<L> {
     #[inline(always)]
-    fn new(vote: &ElementVote) -> Self {
+    pub fn new(vote: &ElementVote) -> Self {
         let zero = L::splat(0.0);
         Self {
             internal: zero,
@@ -102,7 +103,7 @@ impl<L: Lane> Tally<L> {
     }
 
     #[inline(always)]
-    fn join(&self, vote: &mut ElementVote) {
+    pub fn join(&self, vote: &mut ElementVote) {
         for lane in 0..L::N {
             vote.internal += self.internal.to_array()[lane];
             vote.hourglass += self.hourglass.to_array()[lane];
@@ -451,7 +452,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
 /// Votes against the lanes of `bad`, whose elements are turned inside out or hold numbers that are none.
 #[cold]
 #[inline(never)]
-fn offer_faults(volumes: &[f64; SET], bad: u32, elements: &[u32], vote: &mut ElementVote) {
+pub(super) fn offer_faults(volumes: &[f64; SET], bad: u32, elements: &[u32], vote: &mut ElementVote) {
     for (lane, (&volume, &element)) in volumes.iter().zip(elements).enumerate() {
         if bad >> lane & 1 == 1 {
             vote.offer_fault(Fault { element, volume });

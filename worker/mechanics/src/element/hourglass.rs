@@ -177,6 +177,11 @@ impl Resistance {
         }
     }
 
+    /// Of an element whose stress at its points resists all its motions, and part of which yields with the stress.
+    pub fn of_points(material: &Material) -> Self {
+        Self { elastic: true, ..Self::of_failed_alone(material) }
+    }
+
     /// Of an element whose stress at eight points resists its modes, until it fails.
     pub fn of_failed_alone(material: &Material) -> Self {
         Self { failed: FAILED * FLUID, ..Self::of(Hourglass::NONE, material) }

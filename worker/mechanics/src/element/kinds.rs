@@ -4,6 +4,7 @@ use super::{
     group::Group,
     hex8::{eight_points::EightPoints, group::Solids},
     shell4::Core,
+    tet10::group::Tetrahedra,
     truss2::Trusses,
 };
 use crate::{material::Material, mesh::Topology, piece::Piece, spin::Turning, state::ShellState};
@@ -17,6 +18,7 @@ pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, 
     match &piece.topology {
         Topology::Structured { .. } | Topology::Explicit { .. } => (Box::new(Solids::of(piece)), None),
         Topology::EightPoint { .. } => (Box::new(EightPoints::of(piece)), None),
+        Topology::Tetrahedra { .. } => (Box::new(Tetrahedra::of(piece)), None),
         Topology::Shells { quads, section } => {
             let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);
             let fields = std::mem::take(&mut piece.own);

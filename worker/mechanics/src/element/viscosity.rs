@@ -47,7 +47,7 @@ impl<L: Lane> Spread<L> {
     }
 
     #[inline(always)]
-    fn add(&mut self, g: &Vector<L>) {
+    pub fn add(&mut self, g: &Vector<L>) {
         self.xx = g.x.mul_add(g.x, self.xx);
         self.yy = g.y.mul_add(g.y, self.yy);
         self.zz = g.z.mul_add(g.z, self.zz);

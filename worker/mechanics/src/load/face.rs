@@ -20,8 +20,8 @@ use crate::{
 pub(crate) struct LoadedFace {
     /// Index into [`Loads::surfaces`].
     load: u32,
-    /// Index into [`FACES`].
-    side: u8,
+    /// Local nodes of the face; the last two are the same in a triangle.
+    nodes: [usize; 4],
     /// Local nodes of the element's corners.
     corners: [u32; 8],
     /// Faces of the element that transmit.
@@ -58,7 +58,8 @@ pub(crate) fn faces_of(block: &Block, loads: &Loads, material: &Material) -> Vec
             if let Some(e) = find(element).filter(|&e| block.is_alive(e)) {
                 let corners = block.corners(e);
                 let (force, power) = ([[0.0; 3]; 4], 0.0);
-                found.push((e, LoadedFace { load, side, corners, together: 0.0, impedance, force, power }));
+                let nodes = block.side(e, usize::from(side)).map(|node| node as usize);
+                found.push((e, LoadedFace { load, nodes, corners, together: 0.0, impedance, force, power }));
             }
         }
     }
@@ -89,13 +90,6 @@ fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-impl LoadedFace {
-    /// Local nodes of the face.
-    fn nodes(&self) -> [usize; 4] {
-        FACES[usize::from(self.side)].map(|corner| self.corners[corner] as usize)
-    }
-}
-
 /// Adds the loads at `time` to the forces of the block, and keeps them for [`work`].
 pub(crate) fn apply(
     faces: &mut [LoadedFace],
@@ -108,7 +102,7 @@ pub(crate) fn apply(
     let mut vote = FaceVote { force_bound: 0.0, limit: f64::INFINITY };
     let damping = 8.0 * block.hourglass.damping() + 2.0 * control.linear_viscosity;
     for face in faces {
-        let nodes = face.nodes();
+        let nodes = face.nodes;
         let at = |values: &[Vec<f64>; 3], n: usize| [values[0][n], values[1][n], values[2][n]];
         let areas = corner_areas(nodes.map(|n| at(&block.x, n)));
         let velocities = nodes.map(|n| at(&block.v, n));
@@ -184,7 +178,7 @@ pub(crate) fn work(faces: &[LoadedFace], block: &Block, half_steps: f64, quantum
     let mut sum = Work::default();
     for face in faces {
         let after: f64 = face
-            .nodes()
+            .nodes
             .iter()
             .zip(&face.force)
             .map(|(&n, f)| f[0] * block.v[0][n] + f[1] * block.v[1][n] + f[2] * block.v[2][n])

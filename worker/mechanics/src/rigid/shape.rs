@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use super::{Body, Pull, State, cross, dot, full};
 use crate::{
     constraint::{Circle, Constraint},
-    element::hex8,
+    element::{hex8, tet10},
     exact::Quantum,
     initial::largest_face,
     load::{Drive, Loads},
@@ -84,20 +84,21 @@ pub fn body(
         let inside = given.parts.binary_search(&p).is_ok();
         let density = materials[part.material as usize].density;
         for e in 0..part.n_elements() {
-            let corners = part.corners(e);
-            let places = corners.map(|n| nodes.binary_search(&n).ok());
-            if places.iter().all(Option::is_none) {
+            // A shell has each corner twice.
+            let shares = part.nodes_of(e);
+            let places = shares.iter().zip(part.shares());
+            let mut places =
+                places.filter_map(|(n, share)| Some((nodes.binary_search(n).ok()?, share))).peekable();
+            if places.peek().is_none() {
                 continue;
             }
-            let x = corners.map(|n| mesh.positions[n as usize]);
             account.get_or_insert(p);
             if inside {
-                own.add_element(part, &x.map(|x| minus(x, first)), density);
+                own.add_element(part, e, &|n| minus(mesh.positions[n as usize], first), density);
             }
-            // A shell has each corner twice.
-            let eighth = density * part.volume(&x) * 0.125;
-            for place in places.into_iter().flatten() {
-                nodal[place][usize::from(!inside)] += eighth;
+            let mass = density * part.volume_of(e, &mesh.positions);
+            for (place, share) in places {
+                nodal[place][usize::from(!inside)] += mass * share;
             }
         }
     }
@@ -222,9 +223,10 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
 /// Volume over the largest face; of a shell, area over the longest side; of a truss, its length.
 fn least_height(part: &Part, x: &[[f64; 3]; 8]) -> f64 {
     match &part.topology {
-        Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
-            return hex8::volume(x) / largest_face(x);
-        }
+        Topology::Structured { .. }
+        | Topology::Explicit { .. }
+        | Topology::EightPoint { .. }
+        | Topology::Tetrahedra { .. } => return hex8::volume(x) / largest_face(x),
         Topology::Trusses { area, .. } => return part.volume(x) / area,
         Topology::Shells { .. } => {}
     }
@@ -290,11 +292,19 @@ impl Moments {
         }
     }
 
-    fn add_element(&mut self, part: &Part, x: &[[f64; 3]; 8], density: f64) {
-        let mass = density * part.volume(x);
+    /// Adds element `e` of a part, whose nodes stand where `at` says.
+    fn add_element(&mut self, part: &Part, e: usize, at: &dyn Fn(u32) -> [f64; 3], density: f64) {
+        let x = part.corners(e).map(at);
+        let mass = density * part.volume(&x);
         match &part.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
-                self.add_hexahedron(x, density)
+                self.add_hexahedron(&x, density)
+            }
+            Topology::Tetrahedra { tetrahedra } => {
+                let of_node = |local: u32| at(part.nodes[local as usize]);
+                tet10::small(&tetrahedra[e].map(of_node))
+                    .iter()
+                    .for_each(|x| self.add_tetrahedron(x, density));
             }
             Topology::Shells { section, .. } => {
                 self.add_shell(&[x[0], x[1], x[2], x[3]], mass, section.thickness);
@@ -304,6 +314,19 @@ impl Moments {
                 let r = 0.5 * (1.0 + side / 3.0_f64.sqrt());
                 self.add(0.5 * mass, std::array::from_fn(|a| x[0][a] + r * (x[1][a] - x[0][a])));
             }),
+        }
+    }
+
+    /// Four points of a quarter of the volume each give the second moments of a tetrahedron.
+    fn add_tetrahedron(&mut self, x: &[[f64; 3]; 4], density: f64) {
+        let [a, b, c] = [1, 2, 3].map(|i| minus(x[i], x[0]));
+        let mass = density * dot(a, cross(b, c)) / 6.0;
+        let far = 0.25 * (1.0 + 3.0 / 5.0_f64.sqrt());
+        let near = (1.0 - far) / 3.0;
+        for corner in 0..4 {
+            let weight = |i: usize| if i == corner { far } else { near };
+            let place = |axis: usize| (0..4).map(|i| weight(i) * x[i][axis]).sum();
+            self.add(0.25 * mass, std::array::from_fn(place));
         }
     }
 

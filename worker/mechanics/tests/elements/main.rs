@@ -9,4 +9,5 @@ mod eight_points;
 mod energy;
 mod hourglass;
 mod laws;
+mod tet10;
 mod waves;

@@ -54,7 +54,7 @@ fn patch(random: &mut Random, bump: f64) -> (Batch, [Vec<f64>; 3]) {
             id: i,
             part: 0,
             stiffness: 1.0 + random.next(),
-            corners: [u32::MAX; 8],
+            corners: [u32::MAX; crate::mesh::MAX_NODES],
         });
     }
     batch.units.push(BatchUnit { nodes: (49..449).collect(), faces: (0..36).collect() });

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// How an element changes in a step.
-pub(super) struct Change<L: Lane> {
+pub(in crate::element) struct Change<L: Lane> {
     pub initial_volume: L,
     /// At the end of the step, as are the next two.
     pub inverse_volume: L,
@@ -29,7 +29,7 @@ pub(super) struct Change<L: Lane> {
 }
 
 /// What the change of volume leaves.
-pub(super) struct Compressed<L> {
+pub(in crate::element) struct Compressed<L> {
     pub volume_change: L,
     /// `K + 4G/3`.
     pub stiffness: L,

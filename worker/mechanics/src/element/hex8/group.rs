@@ -13,6 +13,7 @@ use crate::{
         hourglass::{Amplitudes, Hourglass, N_FORCES},
         layout::{Corners, Layout, explicit, in_runs, structured},
         place::Nodal,
+        tet10,
     },
     flip::Target,
     lanes::{SET, scalar::Scalar},
@@ -52,13 +53,17 @@ impl Solids {
     /// Those of a piece, whose element arrays go one by one.
     ///
     /// # Panics
-    /// If the arrays do not fit the topology or the hourglass control, or the topology is none of hexahedra.
+    /// If the arrays do not fit the topology or the hourglass control, or the topology is none of solids.
     pub fn of(piece: &mut Piece) -> Self {
         let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
         let (layout, slots, reach) = match &piece.topology {
             Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
                 explicit(hexahedra, in_runs(hexahedra), n_nodes)
+            }
+            Topology::Tetrahedra { tetrahedra } => {
+                let hexahedra: Vec<_> = tetrahedra.iter().map(tet10::collapsed).collect();
+                explicit(&hexahedra, in_runs(&hexahedra), n_nodes)
             }
             Topology::Shells { .. } | Topology::Trusses { .. } => panic!("no hexahedra"),
         };
@@ -111,6 +116,11 @@ impl Solids {
     fn own(&self) -> Vec<Vec<f64>> {
         let kept = self.hourglass.iter().filter(|array| !array.is_empty());
         kept.map(|array| self.by_element(array)).collect()
+    }
+
+    /// A field of the element of a slot.
+    pub fn field(&self, field: usize, slot: usize) -> f64 {
+        self.fields[field][slot]
     }
 
     pub fn n_elements(&self) -> usize {

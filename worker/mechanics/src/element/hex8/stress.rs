@@ -27,7 +27,7 @@ impl BySlot<'_> {
 
     /// Writes the history variables of the active lanes; the others keep theirs.
     #[inline(always)]
-    pub(super) fn remember<L: Lane>(&mut self, slot: usize, memory: &Memory<L>, active: L::Mask) {
+    pub(in crate::element) fn remember<L: Lane>(&mut self, slot: usize, memory: &Memory<L>, active: L::Mask) {
         let kept: Memory<L> = self.memory(slot);
         let mut i = 0;
         while i < MAX_HISTORY && i < self.history.len() {
@@ -41,7 +41,7 @@ impl BySlot<'_> {
 }
 
 /// The deviatoric stress of the end of a step and what came with it.
-pub(super) struct Stressed<L: Lane> {
+pub(in crate::element) struct Stressed<L: Lane> {
     pub stress: Deviator<L>,
     /// Its power per volume, with the mean of the stresses before and after.
     pub power: L,
