@@ -88,6 +88,7 @@ macro_rules! each_case_of_the_book {
             law: johnson_cook_has_its_point_values_in_an_element quick;
             solid: the_copper_bar_is_as_long_and_its_foot_as_wide_as_others_find quick;
             solid: finer_copper_bars_come_nearer_to_what_others_converge_to long;
+            solid: the_copper_bar_of_tetrahedra_ends_as_that_of_hexahedra_of_their_spacing quick;
             solid: the_johnson_cook_bar_ends_as_a_code_of_the_same_mesh_finds quick;
             solid: a_soft_sphere_bounces_off_a_wall_as_hertz_says long;
             solid: steel_spheres_bounce_off_a_wall_as_hertz_says long;
@@ -99,6 +100,7 @@ macro_rules! each_case_of_the_book {
             structure: a_cantilever_of_one_point_elements_rings_at_its_reduced_bending_stiffness quick;
             structure: a_cantilever_of_assumed_strains_rings_as_a_beam_with_one_layer quick;
             structure: a_cantilever_of_eight_points_is_hardly_softer_than_a_beam quick;
+            structure: a_cantilever_of_composite_tetrahedra_rings_as_a_beam quick;
             spheres: a_ball_keeps_its_motion_for_ten_bounces long;
             spheres: spheres_that_meet_off_centre_part_along_the_line_of_centres long;
             structure: higher_tones_of_a_cantilever_are_those_of_timoshenko_with_that_stiffness long;

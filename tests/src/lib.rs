@@ -4,7 +4,7 @@
 //! [`failpoint`] harms them, [`proxy`] stands between them, [`sshd`] beside them, [`browser`] and [`terminal`] look at
 //! them; [`book`] holds the cases, [`case`] compares a figure with a published or derived one of `reference.toml` and says
 //! how it went; [`fuzz`] damages what comes from outside, [`seeds`] plays the pure sessions in a world that goes wrong;
-//! [`checker`] looks for nodes inside foreign bodies, without asking the contact code.
+//! [`tetrahedra`] cuts hexahedra up; [`checker`] looks for nodes inside foreign bodies, without asking the contact code.
 
 pub mod bits;
 pub mod book;
@@ -21,3 +21,4 @@ pub mod seeds;
 pub mod solve;
 pub mod sshd;
 pub mod terminal;
+pub mod tetrahedra;

@@ -19,6 +19,7 @@ mod seeds;
 mod spans;
 mod sums;
 mod tearing;
+mod tetrahedra;
 mod trusses;
 
 /// A row that nobody computes would look like one that holds.

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use crate::{
     case::Figures,
     solve::{Solved, crossing, model, run},
+    tetrahedra::cut,
 };
 use deck::Model;
 use mechanics::{mesh::Topology, state::field};
@@ -25,13 +26,30 @@ const HELD: &str = "[[boundary]]\ntype = \"fixed\"\nparts = [\"bar\"]\nface = \"
 
 /// The copper bar with `[core, ring, length]` cells of a quarter, at its end.
 fn struck_copper_bar(cells: [u32; 3], foot: &str) -> Solved {
-    run(model(&format!(
+    run(copper_bar_deck(cells, foot))
+}
+
+fn copper_bar_deck(cells: [u32; 3], foot: &str) -> Model {
+    model(&format!(
         "title = \"Taylor bar, copper\"\nunits = \"mm-ms-kg\"\n\
          [control]\nend_time = 0.08\nlinear_viscosity = 0.06\nquadratic_viscosity = 1.2247\nhourglass = 0.03\n\
          [[part]]\nname = \"bar\"\nmaterial = \"COPPER_TAYLOR_BENCHMARK\"\nvelocity = [0, 0, -227]\n\
          cylinder = {{ base = [0, 0, 0], radius = 3.2, length = 32.4, sector = \"quarter\", cells = {cells:?} }}\n\
          [[boundary]]\ntype = \"symmetry\"\naxis = \"x\"\n[[boundary]]\ntype = \"symmetry\"\naxis = \"y\"\n{foot}"
-    )))
+    ))
+}
+
+/// The bar of composite tetrahedra whose nodes are as far apart as those of the hexahedra it is compared with.
+pub(super) fn the_copper_bar_of_tetrahedra_ends_as_that_of_hexahedra_of_their_spacing(figures: &mut Figures) {
+    let hexahedra = shape(&struck_copper_bar([4, 4, 36], HELD));
+    let solved = run(cut(copper_bar_deck([2, 2, 18], HELD), |_| true));
+    let tetrahedra = shape(&solved);
+    for (name, i) in [("length", 0), ("radius of the foot", 1)] {
+        let figure = format!("taylor copper, tetrahedra: {name} over that of hexahedra");
+        figures.add(&figure, tetrahedra[i] / hexahedra[i]);
+    }
+    figures.add("taylor copper, tetrahedra: length (mm)", tetrahedra[0]);
+    figures.add("taylor copper: energy error", solved.outcome.run_totals.last.error);
 }
 
 /// Length (mm) of the copper bar with `n` by `n` cells in its core.
