@@ -16,6 +16,9 @@ use crate::{
 /// Most faults reported for one deck; the list ends with the number left out.
 pub const MAX_FAULTS: usize = 500;
 
+/// Most faults in a row that differ in their lines alone.
+const MAX_ALIKE: usize = 3;
+
 /// Longest piece of deck text quoted in a fault (characters).
 const MAX_QUOTE: usize = 60;
 
@@ -211,6 +214,32 @@ impl<'a> Faults<'a> {
         }
         list
     }
+}
+
+/// Of faults that say the same of line after line, as a column of numbers that is shifted gives, the first few, of which the last tells
+/// how many follow; and of those that are equal in all words the first.
+pub(crate) fn once_for_one_cause(list: Vec<Fault>) -> Vec<Fault> {
+    let alike = |a: &Fault, b: &Fault| {
+        (&a.file, a.column, &a.expected, &a.advice) == (&b.file, b.column, &b.expected, &b.advice)
+    };
+    let mut kept: Vec<Fault> = Vec::new();
+    let mut rest = list.into_iter().peekable();
+    while let Some(first) = rest.next() {
+        let mut run = vec![first];
+        while let Some(next) = rest.next_if(|next| alike(&run[0], next)) {
+            if !run.contains(&next) {
+                run.push(next);
+            }
+        }
+        let hidden = run.len().saturating_sub(MAX_ALIKE);
+        let last_line = run.last().map_or(0, |fault| fault.line);
+        run.truncate(MAX_ALIKE);
+        if let (Some(last), true) = (run.last_mut(), hidden > 0) {
+            last.advice.push_str(&format!("; {hidden} more lines have this fault, to line {last_line}"));
+        }
+        kept.append(&mut run);
+    }
+    kept
 }
 
 /// Words on one line, cut to a readable length.

@@ -14,7 +14,9 @@ mod contact;
 mod control;
 mod define;
 mod erosion;
+mod explosive;
 mod fields;
+mod inertia;
 mod material;
 mod members;
 mod mesh;
@@ -26,6 +28,7 @@ mod read;
 mod rigid;
 mod set;
 mod translate;
+mod transmit;
 mod unit;
 
 pub(crate) use mesh_alone::read_mesh;

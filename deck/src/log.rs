@@ -3,7 +3,7 @@
 use std::{cell::RefCell, collections::BTreeMap, fmt};
 
 use crate::{
-    fault::{Fault, Faults, MAX_FAULTS},
+    fault::{Fault, Faults, MAX_FAULTS, once_for_one_cause},
     limits::MAX_ELEMENTS,
     place::{Origin, Place},
 };
@@ -215,6 +215,10 @@ impl<'a> Log<'a> {
             .into_iter()
             .map(|(at, words)| Warning { file: file(&at).to_string(), line: line(&at), words })
             .collect();
-        (self.faults.into_list(), warnings)
+        let faults = match self.dialect {
+            Dialect::Keyword => once_for_one_cause(self.faults.into_list()),
+            Dialect::Toml => self.faults.into_list(),
+        };
+        (faults, warnings)
     }
 }

@@ -3,6 +3,9 @@
 use mechanics::{cross_section::CrossSection, mesh::Mesh, setup::Setup};
 use serde::{Deserialize, Serialize};
 
+/// Names that [`Output::formats`] may hold: formats of results beside VTU.
+pub const FORMAT_NAMES: [&str; 2] = ["vtkhdf", "d3plot"];
+
 /// Names that [`Output::fields`] may hold: fields of nodes and elements in the results.
 pub const FIELD_NAMES: [&str; 23] = [
     "velocity",
@@ -65,6 +68,8 @@ pub struct Output {
     pub snapshot_cycles: Option<u64>,
     /// Element and node fields to write, by name; empty means the default set.
     pub fields: Vec<String>,
+    /// Formats in which the states are written beside VTU, of [`FORMAT_NAMES`].
+    pub formats: Vec<String>,
     /// Whether the numbers of states are compressed.
     pub compress: bool,
     /// Whether states hold the worker of every element.
@@ -90,6 +95,7 @@ impl Default for Output {
             snapshot_seconds: None,
             snapshot_cycles: None,
             fields: Vec::new(),
+            formats: Vec::new(),
             compress: true,
             workers: false,
             contact_surface: false,

@@ -143,6 +143,7 @@ pub(crate) struct Output {
     pub(crate) snapshot_seconds: Option<f64>,
     pub(crate) snapshot_cycles: Option<u64>,
     pub(crate) fields: Vec<String>,
+    pub(crate) formats: Vec<String>,
     pub(crate) compress: bool,
     pub(crate) workers: bool,
     pub(crate) contact_surface: Option<Placed<bool>>,
@@ -160,6 +161,7 @@ impl Default for Output {
             snapshot_seconds: None,
             snapshot_cycles: None,
             fields: Vec::new(),
+            formats: Vec::new(),
             compress,
             workers,
             contact_surface: None,
@@ -221,4 +223,6 @@ pub(crate) enum Spot {
     Number(Placed<u32>),
     /// The nearest to this point.
     Point(Placed<[f64; 3]>),
+    /// The nearest to the centre of its part.
+    Centre,
 }

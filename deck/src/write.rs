@@ -133,6 +133,9 @@ fn write_output(text: &mut Text, output: &Output) {
     if !output.fields.is_empty() {
         text.key("fields", list(output.fields.iter().map(|field| quoted(field))));
     }
+    if !output.formats.is_empty() {
+        text.key("formats", list(output.formats.iter().map(|format| quoted(format))));
+    }
     text.some("compress", Some(output.compress).filter(|on| *on != defaults.compress));
     text.some("workers", Some(output.workers).filter(|on| *on != defaults.workers));
     text.some("contact_surface", output.contact_surface.as_ref().map(|on| on.value));
@@ -186,7 +189,8 @@ fn write_gauge(text: &mut Text, gauge: &Gauge) {
             }
             text.key("point", vector(point.value));
         }
-        None => {}
+        Some(Spot::Centre) if element => text.key("of", quoted("element")),
+        Some(Spot::Centre) | None => {}
     }
     if let Some(part) = &gauge.part {
         text.key("part", quoted(&part.value));

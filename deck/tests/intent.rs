@@ -340,3 +340,26 @@ fn clamps_that_hold_nothing_are_told() {
         "{told:#?}"
     );
 }
+
+#[test]
+fn a_gauge_of_a_part_alone_stands_at_its_centre_also_where_a_plane_cuts_it() {
+    let plate = part("plate", "box = { origin = [-10, -10, -4], size = [20, 20, 4], cell = 1 }");
+    let ball = part(
+        "ball",
+        "sphere = { centre = [0, 0, 0], radius = 5, cells = [3, 3] }\nplace = { above = \"plate\", gap = 1 }",
+    );
+    let gauge = "[[gauge]]\nname = \"middle\"\npart = \"ball\"\n";
+    for symmetry in ["", "[symmetry]\nplanes = [\"x\", \"y\"]\n"] {
+        let model = model(&format!("{plate}{ball}{gauge}{symmetry}"));
+        let found = model.mesh.positions[model.output.gauges[0].node as usize];
+        assert!(found.iter().zip([0.0, 0.0, 6.0]).all(|(x, at)| (x - at).abs() < 1e-9), "{found:?}");
+        let ball = model.mesh.parts.iter().find(|part| part.name == "ball").expect("a ball");
+        assert!(ball.nodes.contains(&model.output.gauges[0].node));
+    }
+    let of_element = model(&format!("{plate}{ball}{gauge}of = \"element\"\n"));
+    let (first, n) = (of_element.mesh.element_offsets()[1], of_element.mesh.parts[1].n_elements());
+    let element = of_element.output.element_gauges[0].element as usize;
+    assert!((first..first + n).contains(&element), "{element}");
+    let told = faults(&format!("{plate}[[gauge]]\nname = \"middle\"\npart = \"bal\"\n"));
+    assert!(told.len() == 1 && told[0].contains("read part = \"bal\""), "{told:#?}");
+}

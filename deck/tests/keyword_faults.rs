@@ -47,6 +47,18 @@ fn an_element_on_two_cards_may_have_zeros_on_the_first() {
 }
 
 #[test]
+fn shifted_columns_of_many_cards_are_told_three_times_and_counted() {
+    let cards: String = (1..=8).map(|node| format!("{node:>8}{0:>8}{0:>8}{1:>8}{1:>8}\n", 0, 1)).collect();
+    let told = faults(&cube(&format!("*BOUNDARY_SPC_NODE\n{cards}")));
+    let number: Vec<&String> = told.iter().filter(|fault| fault.contains("(field 4, card")).collect();
+    assert_eq!(number.len(), 3, "{told:#?}");
+    assert!(number[2].ends_with("; 5 more lines have this fault, to line 30"), "{}", number[2]);
+    // One that is told twice in the same words is one.
+    let twice = faults("*KEYWORD\n*PARAMETER\nR,tend,1e-6\n*END\n");
+    assert_eq!(twice.iter().filter(|fault| fault.contains("R,tend")).count(), 1, "{twice:#?}");
+}
+
+#[test]
 fn every_section_under_one_keyword_has_its_title() {
     let solid = "*SECTION_SOLID_TITLE\nfirst\n2,1\nsecond\n1,1\n";
     assert_eq!(good(&cube_of("*KEYWORD", solid, ELEMENT, "")).model, good(&cube("")).model);

@@ -98,14 +98,16 @@ export function facts(parent, pairs) {
     });
 }
 
-export function faults(box, name, list, text) {
-  const lines = text.split('\n');
+/// Faults of a deck, `name`, at their lines; `texts` has each of its files by name.
+export function faults(box, name, list, texts) {
   const items = list.map(fault => {
+    const lines = (texts.get(fault.file) ?? '').split('\n');
     const line = lines[fault.line - 1] ?? '';
     const at = Math.max(0, [...line].slice(0, fault.column - 1).join('').length);
     const word = (line.slice(at).match(/^("[^"]*"|[^\s,\]}]+)/) ?? [''])[0];
+    const where = fault.file === name ? '' : `${fault.file}, `;
     return element('li', {},
-      element('b', { textContent: `line ${fault.line}, column ${fault.column}` }),
+      element('b', { textContent: `${where}line ${fault.line}, column ${fault.column}` }),
       element('pre', {}, line.slice(0, at), element('mark', { textContent: word }), line.slice(at + word.length)),
       `read ${fault.read}; expected ${fault.expected}; ${fault.advice}`);
   });

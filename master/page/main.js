@@ -1,5 +1,6 @@
 // The page: hears the overview as a stream, asks for the chosen job's sheet and surfaces, hands both to what draws.
 
+import * as files from '/files.js';
 import * as lists from '/lists.js';
 import * as curves from '/curves.js';
 import * as timeline from '/timeline.js';
@@ -67,7 +68,12 @@ function overview() {
   lists.hosts($('hosts'), hosts);
   $('no-hosts').hidden = here > 0;
   $('hosts').closest('.scroll').hidden = hosts.length === 0;
-  if ($('join').textContent !== join) $('join').textContent = join;
+  if ($('join').textContent !== join) {
+    $('join').textContent = join;
+    // Submitted jobs go to the master of this page, wherever it listens.
+    const flags = (join.match(/--(master|certs) \S+/g) ?? []).join(' ');
+    $('submit-line').textContent = `bolide submit DECK.toml ${flags}`.trim();
+  }
   job();
 }
 
@@ -97,7 +103,7 @@ function job() {
   if (now.cycle) facts.push(['cycle', String(now.cycle)], ['time', `${lists.number(now.time, 5)} ${units?.time ?? ''}`]);
   if (running && brief?.dt) facts.push(['time step', `${lists.number(brief.dt, 3)} ${units?.time ?? ''}`]);
   if (brief) facts.push(['elements', brief.elements.toLocaleString('en')]);
-  if (brief?.imbalance) facts.push(['imbalance', brief.imbalance.toFixed(3)]);
+  if (brief?.imbalance) facts.push(['imbalance, measured', brief.imbalance.toFixed(3)]);
   if (now.ended?.digest) facts.push(['digest', now.ended.digest]);
   lists.facts($('facts'), facts);
   $('failure').hidden = !now.ended?.failure;
@@ -235,21 +241,23 @@ async function surface() {
   $('state').setAttribute('aria-valuetext', $('at').textContent);
 }
 
-async function submit(file) {
+/// Submits a deck, which may come with the files that it names.
+async function submit(coming) {
   const box = $('faults');
   box.hidden = true;
-  let text = '';
+  let deck = { name: '', text: '', texts: new Map() };
   try {
-    text = await file.text();
-    const query = new URLSearchParams({ name: file.name, min_workers: $('min-workers').value || '1' });
+    deck = files.bundle(await coming);
+    const { name, text } = deck;
+    const query = new URLSearchParams({ name, min_workers: $('min-workers').value || '1' });
     if ($('cycles').value) query.set('cycles', $('cycles').value);
     const { job } = await (await ask(`/api/jobs?${query}`, { method: 'POST', body: text })).json();
     page.overview = await (await ask('/api/overview')).json();
     choose(job);
     if (innerWidth < 860) $('job').scrollIntoView();
   } catch (error) {
-    if (error.faults) lists.faults(box, file.name, error.faults, text);
-    else lists.say(box, `${file.name}: ${error.message}`);
+    if (error.faults) lists.faults(box, deck.name, error.faults, deck.texts);
+    else lists.say(box, [deck.name, error.message].filter(Boolean).join(': '));
   }
   $('file').value = '';
 }
@@ -265,10 +273,10 @@ function start() {
   addEventListener('dragleave', event => event.relatedTarget ?? drop.classList.remove('over'));
   addEventListener('drop', event => {
     drop.classList.remove('over');
-    const [file] = event.dataTransfer.files;
-    if (file) submit(file);
+    // What is dropped is to be taken before this call ends.
+    if (event.dataTransfer.files.length) submit(files.dropped(event.dataTransfer));
   });
-  $('file').addEventListener('change', event => event.target.files[0] && submit(event.target.files[0]));
+  $('file').addEventListener('change', event => event.target.files.length && submit(files.read([...event.target.files])));
   $('field').addEventListener('change', surface);
   $('reset').addEventListener('click', () => bodies.fit());
   $('state').addEventListener('input', () => {
@@ -290,7 +298,21 @@ function start() {
       await surface();
     }, 200);
   });
+  // One click asks, a second one within five seconds ends the job.
+  let asked;
+  const calm = () => {
+    clearTimeout(asked);
+    asked = undefined;
+    $('cancel').textContent = 'Cancel';
+  };
+  $('cancel').addEventListener('blur', calm);
   $('cancel').addEventListener('click', async () => {
+    if (asked === undefined) {
+      $('cancel').textContent = 'End this job?';
+      asked = setTimeout(calm, 5000);
+      return;
+    }
+    calm();
     try {
       await ask(`/api/jobs/${page.chosen}/cancel`, { method: 'POST' });
     } catch (error) {

@@ -19,6 +19,7 @@ use protocol::{
     token::Token,
 };
 use serde::{Deserialize, Serialize};
+use system::Readers;
 use tokio::sync::watch;
 
 use crate::certs::{self, Error};
@@ -82,7 +83,7 @@ impl CaFolder {
         let token = Token { pin, secret: tls::secret().map_err(|e| Error::Rule(e.to_string()))? };
         let grant = Grant { role, expires: now().saturating_add(hours.saturating_mul(3600)) };
         let text = serde_json::to_string(&grant).map_err(|e| Error::Rule(e.to_string()))?;
-        certs::write(&tokens.join(token.id()), &text, 0o600)?;
+        certs::write(&tokens.join(token.id()), &text, Readers::Owner)?;
         Ok(token)
     }
 
@@ -126,8 +127,7 @@ impl CaFolder {
             _ => Error::Io { path: path.clone(), error },
         })?;
         let tokens = self.folder.join("tokens");
-        let synced = fs::File::open(&tokens).and_then(|folder| folder.sync_all());
-        synced.map_err(|error| Error::Io { path: tokens, error })?;
+        system::folders::sync(&tokens).map_err(|error| Error::Io { path: tokens, error })?;
         let addresses: Vec<String> = address.iter().map(ToString::to_string).collect();
         certs::sign_request(&self.folder, request, name, &addresses, grant.role)
     }
@@ -184,7 +184,7 @@ impl CaFolder {
         }
         let text: String = list.iter().map(|fingerprint| format!("{fingerprint}\n")).collect();
         let (path, temporary) = (self.folder.join("revoked"), self.folder.join(".revoked.tmp"));
-        certs::write(&temporary, &text, 0o644)?;
+        certs::write(&temporary, &text, Readers::All)?;
         fs::rename(&temporary, &path).map_err(|error| Error::Io { path, error })?;
         Ok(found)
     }

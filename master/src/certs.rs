@@ -4,6 +4,8 @@
 //! `FOLDER/NAME/` holds `ca.pem`, `host.pem` and `host-key.pem` and is what is copied to the host. What
 //! the files are used for is in [`protocol::tls`].
 
+pub mod arguments;
+
 use protocol::tls::{Paths, Role};
 use rcgen::{
     BasicConstraints, Certificate, CertificateParams, CertificateSigningRequestParams, DistinguishedName,
@@ -15,6 +17,7 @@ use std::io::{ErrorKind, Write};
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use system::Readers;
 
 /// Days that a CA is valid.
 pub const CA_DAYS: u64 = 3650;
@@ -84,8 +87,8 @@ pub fn make_ca(folder: &Path, force: bool) -> Result<PathBuf, Error> {
     let unusable = |error| Error::Unusable { path: path.clone(), error };
     let key = KeyPair::generate().map_err(unusable)?;
     let certificate = authority().self_signed(&key).map_err(unusable)?;
-    write(&key_path, &key.serialize_pem(), 0o600)?;
-    write(&path, &certificate.pem(), 0o644)?;
+    write(&key_path, &key.serialize_pem(), Readers::Owner)?;
+    write(&path, &certificate.pem(), Readers::All)?;
     Ok(path)
 }
 
@@ -116,9 +119,9 @@ pub fn make_host(
 
     record(folder, &certificate)?;
     create_folder(&host_folder)?;
-    write(&paths.key, &key.serialize_pem(), 0o600)?;
-    write(&paths.certificate, &certificate.pem(), 0o644)?;
-    write(&paths.ca, &authority_pem, 0o644)?;
+    write(&paths.key, &key.serialize_pem(), Readers::Owner)?;
+    write(&paths.certificate, &certificate.pem(), Readers::All)?;
+    write(&paths.ca, &authority_pem, Readers::All)?;
     Ok(paths)
 }
 
@@ -136,7 +139,7 @@ fn record(folder: &Path, certificate: &Certificate) -> Result<(), Error> {
     let issued = folder.join("issued");
     create_folder(&issued)?;
     let name = format!("{}.pem", protocol::tls::fingerprint(certificate.der()));
-    write(&issued.join(name), &certificate.pem(), 0o644)
+    write(&issued.join(name), &certificate.pem(), Readers::All)
 }
 
 /// Signs the key of a newcomer's request (PKCS#10, DER) for the host `name`; what else the request says does not count.
@@ -170,9 +173,9 @@ pub(crate) fn install(folder: &Path, key: &KeyPair, certificate: &str, ca: &str)
     let paths = Paths::in_folder(folder);
     check_absent(&[&paths.ca, &paths.certificate, &paths.key], false)?;
     create_folder(folder)?;
-    write(&paths.key, &key.serialize_pem(), 0o600)?;
-    write(&paths.ca, ca, 0o644)?;
-    write(&paths.certificate, certificate, 0o644)?;
+    write(&paths.key, &key.serialize_pem(), Readers::Owner)?;
+    write(&paths.ca, ca, Readers::All)?;
+    write(&paths.certificate, certificate, Readers::All)?;
     Ok(paths)
 }
 
@@ -279,9 +282,9 @@ fn read(path: &Path) -> Result<String, Error> {
     })
 }
 
-/// Writes a new file that has `mode` from its first moment on; what was at `path` is removed before, so
+/// Writes a new file that is for these readers from its first moment on; what was at `path` is removed before, so
 /// that an old mode or a link does not live on.
-pub(crate) fn write(path: &Path, text: &str, mode: u32) -> Result<(), Error> {
+pub(crate) fn write(path: &Path, text: &str, readers: Readers) -> Result<(), Error> {
     let fault = |error| Error::Io { path: path.to_owned(), error };
     match fs::remove_file(path) {
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(fault(error)),
@@ -289,11 +292,7 @@ pub(crate) fn write(path: &Path, text: &str, mode: u32) -> Result<(), Error> {
     }
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
-    #[cfg(not(unix))]
-    let _ = mode;
-    let mut file = options.open(path).map_err(fault)?;
+    let mut file = system::private::open(&options, path, readers).map_err(fault)?;
     file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(fault)
 }
 
@@ -305,12 +304,6 @@ mod tests {
 
     fn folder() -> tempfile::TempDir {
         tempfile::tempdir().expect("a folder for the test")
-    }
-
-    #[cfg(unix)]
-    fn mode(path: &Path) -> u32 {
-        use std::os::unix::fs::PermissionsExt;
-        fs::metadata(path).expect("the file is there").permissions().mode() & 0o777
     }
 
     #[tokio::test]
@@ -338,17 +331,18 @@ mod tests {
     }
 
     #[test]
-    #[cfg(unix)]
     fn keys_are_for_their_owner_only() {
+        let others = |path: &Path| system::private::open_to_others(path).expect("the file is there");
         let folder = folder();
         let authority = make_ca(folder.path(), false).expect("a new CA");
         let host = make_host(folder.path(), "pc", &[], Role::Client, false).expect("a host");
-        assert_eq!(mode(&folder.path().join("ca-key.pem")), 0o600);
-        assert_eq!(mode(&host.key), 0o600);
+        assert_eq!(others(&folder.path().join("ca-key.pem")), None);
+        assert_eq!(others(&host.key), None);
         // Replacing a key that was open to all closes it.
-        fs::set_permissions(&host.key, std::os::unix::fs::PermissionsExt::from_mode(0o666)).expect("ours");
+        write(&host.key, "", Readers::All).expect("ours");
+        assert!(others(&host.key).is_some());
         make_host(folder.path(), "pc", &[], Role::Client, true).expect("forced");
-        assert_eq!(mode(&host.key), 0o600);
+        assert_eq!(others(&host.key), None);
         assert_eq!(fs::read(authority).expect("CA"), fs::read(host.ca).expect("its copy"));
     }
 

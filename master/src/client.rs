@@ -315,6 +315,17 @@ fn dial_again(at: &ClientArgs, why: &str) -> Result<Client, String> {
     }
 }
 
+/// A status as programs read it: the summary of a job that is over as JSON, not as text within.
+pub fn as_json(status: &Status) -> serde_json::Value {
+    let mut value = serde_json::json!(status);
+    if let Some(summary) = value.pointer_mut("/ended/summary")
+        && let Some(read) = summary.as_str().and_then(|text| serde_json::from_str(text).ok())
+    {
+        *summary = read;
+    }
+    value
+}
+
 /// `bolide jobs`.
 ///
 /// # Errors
@@ -322,7 +333,7 @@ fn dial_again(at: &ClientArgs, why: &str) -> Result<Client, String> {
 pub fn jobs(at: &ClientArgs) -> Result<ExitCode, String> {
     let jobs = Client::new(at)?.jobs()?;
     if at.json {
-        println!("{}", serde_json::to_string(&jobs).map_err(|e| e.to_string())?);
+        println!("{}", serde_json::Value::from_iter(jobs.iter().map(as_json)));
         return Ok(ExitCode::SUCCESS);
     }
     println!("{:>5}  {:<10} {:>9} {:>12}  {:<40} note", "job", "state", "cycle", "time", "title");
@@ -425,6 +436,16 @@ pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_summary_in_a_status_is_json_and_no_text_of_it() {
+        let mut status = Status::queued(3, "plates".to_owned());
+        assert_eq!(as_json(&status)["ended"], serde_json::Value::Null);
+        let summary = Some(r#"{"cycles":40,"digest":"ab"}"#.to_owned());
+        status.ended = Some(protocol::request::Ended { summary, ..Default::default() });
+        assert_eq!(as_json(&status)["ended"]["summary"]["cycles"], 40);
+        assert_eq!(as_json(&status)["job"], 3);
+    }
 
     #[test]
     fn what_follows_a_submission_names_the_master_it_went_to() {

@@ -8,17 +8,17 @@
 
 use std::{net::SocketAddr, path::PathBuf};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, builder::PossibleValuesParser};
+use deck::model::FORMAT_NAMES;
 use protocol::{
     options::{self, Balance, JobOptions, Route},
     shape::Rate,
-    tls,
 };
 use worker::processors::Processors;
 
 use crate::{
-    bench::grind::Speed, picture::arguments::PictureArgs, study::arguments::StudyArgs,
-    verify::arguments::VerifyArgs,
+    bench::grind::Speed, certs::arguments::Certs, export::ExportArgs, picture::arguments::PictureArgs,
+    study::arguments::StudyArgs, verify::arguments::VerifyArgs,
 };
 pub use crate::{client::Until, reading::ReadingArgs};
 
@@ -153,6 +153,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Draw a state of a results folder as a PNG, coloured by a field
     Picture(PictureArgs),
+    /// Write the states of a results folder in another format: one VTKHDF file, or d3plot
+    Export(ExportArgs),
     /// Write an LS-DYNA keyword deck as a TOML deck with its mesh beside it, or a TOML deck to start from for a mesh
     Convert {
         /// The keyword deck, or a mesh: Gmsh (.msh), Abaqus (.inp), Nastran (.bdf, .nas, .dat, .fem)
@@ -208,9 +210,9 @@ pub struct RunArgs {
     /// What the deck leaves open
     #[command(flatten)]
     pub reading: ReadingArgs,
-    /// Number of workers
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub workers: u32,
+    /// Number of workers [default: one for each of --speeds, else 1]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub workers: Option<u32>,
     /// Relative speeds of the workers, separated by commas; missing ones are 1
     #[arg(long, value_delimiter = ',')]
     pub speeds: Vec<f64>,
@@ -229,6 +231,9 @@ pub struct RunArgs {
     /// Results folder [default: the one resumed from, else results/<deck name>]
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// Formats of the states beside VTU, separated by commas, as `formats` of [output] has them
+    #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(FORMAT_NAMES), conflicts_with = "no_output")]
+    pub format: Vec<String>,
     /// Replace the results in an existing folder
     #[arg(long)]
     pub force: bool,
@@ -366,6 +371,10 @@ pub struct WorkerArgs {
     /// Compute threads [default: the cores that it may use]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
+    /// Memory that its share of a job may take (GB); a job whose share would take more waits for other workers [default: what is available
+    /// when it starts]
+    #[arg(long, value_name = "GB", value_parser = amount)]
+    pub memory: Option<f64>,
     /// Name, unlike that of any other worker: with certificates, that in this host's, or NAME@ANY [default: host name and process
     /// id]
     #[arg(long)]
@@ -514,107 +523,4 @@ pub struct MessagesArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-}
-
-/// What `certs` makes.
-#[derive(Debug, Subcommand)]
-pub enum Certs {
-    /// A certificate authority in a folder: ca.pem, and ca-key.pem, which stays there
-    Ca {
-        /// The folder
-        folder: PathBuf,
-        /// Replace the CA that is there; its hosts' certificates then become useless
-        #[arg(long)]
-        force: bool,
-    },
-    /// The certificate of a host, in FOLDER/NAME, which is copied to that host
-    Host {
-        /// The folder of the CA
-        folder: PathBuf,
-        /// Name of the host
-        name: String,
-        /// Another name or address under which the host is dialled; may be given several times
-        #[arg(long)]
-        address: Vec<String>,
-        /// What the host may be
-        #[arg(long, value_enum)]
-        role: CertRole,
-        /// Replace the certificate that is there
-        #[arg(long)]
-        force: bool,
-    },
-    /// Issue a token with which a bare PC gets a certificate from the running master, once
-    Token {
-        /// The folder of the CA
-        folder: PathBuf,
-        /// What the host may be
-        #[arg(long, value_enum, default_value = "worker")]
-        role: JoinRole,
-        /// How long the token is good (hours)
-        #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=8760))]
-        hours: u64,
-        /// The master, for the line to paste
-        #[arg(long, value_name = "HOST:PORT", default_value = "HOST:PORT")]
-        master: String,
-    },
-    /// Exchange a token at a master for this host's certificate
-    Join {
-        /// The master: HOST, HOST:PORT or [ADDRESS]:PORT
-        master: String,
-        /// The token, as `bolide certs token` prints it
-        token: String,
-        /// Folder for the certificate
-        folder: PathBuf,
-        /// Name of this host [default: its host name]
-        #[arg(long)]
-        name: Option<String>,
-    },
-    /// Revoke every certificate of a host: a running master ends its links
-    Revoke {
-        /// The folder of the CA
-        folder: PathBuf,
-        /// Name of the host
-        name: String,
-    },
-}
-
-/// What a host that joins by a token may be: masters are made where the CA is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum JoinRole {
-    /// Computes
-    Worker,
-    /// Submits and watches jobs
-    Client,
-}
-
-impl JoinRole {
-    /// The same as certificates spell it.
-    pub const fn role(self) -> tls::Role {
-        match self {
-            Self::Worker => tls::Role::Worker,
-            Self::Client => tls::Role::Client,
-        }
-    }
-}
-
-/// What the holder of a certificate may be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum CertRole {
-    /// Listens, and may be anything else too
-    Master,
-    /// Computes
-    Worker,
-    /// Submits and watches jobs
-    Client,
-}
-
-impl CertRole {
-    /// The same as certificates spell it.
-    pub const fn role(self) -> tls::Role {
-        match self {
-            Self::Master => tls::Role::Master,
-            Self::Worker => tls::Role::Worker,
-            Self::Client => tls::Role::Client,
-        }
-    }
 }

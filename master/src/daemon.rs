@@ -21,6 +21,7 @@ use crate::{
     machine::host_name,
     notice::{Notice, WAITING_NOTICES},
     scheduler::{Scheduler, retention::Limits},
+    scrub,
     spool::Spool,
 };
 
@@ -39,9 +40,10 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
-    // Decks, results and the queue are the owner's alone.
-    rustix::process::umask(rustix::fs::Mode::RWXG | rustix::fs::Mode::RWXO);
     let port = args.link.map(|rate| Shape::port(Wire::ethernet(rate)));
+    // Decks, results and the queue are the owner's alone.
+    system::private::from_now_on(&args.spool)
+        .map_err(|e| format!("spool folder {}: {e}", args.spool.display()))?;
     let (spool, left) = Spool::open(&args.spool)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -73,6 +75,8 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
             age: args.keep_days.map(|days| Duration::from_secs_f64(days * 86_400.0)),
             bytes: args.keep_gb.map(|gigabytes| (gigabytes * 1e9) as u64),
         };
+        let over = left.jobs.iter().filter(|(record, _)| record.ended.is_some());
+        scrub::begin(over.map(|(record, _)| (record.job, spool.results(record.job))).collect());
         let scheduler = Scheduler::new(args.spool.clone(), spool, left, notices, board).keeping(limits);
         scheduler.run(heard, &stop, &acceptor).await;
         Ok(ExitCode::SUCCESS)

@@ -21,8 +21,15 @@ pub fn read_deck(path: &Path) -> Result<Model, Error> {
 /// # Errors
 /// Every fault of it, one per line.
 pub fn read_deck_with(path: &Path, options: &Reading) -> Result<Model, Error> {
-    let text = gather_deck(path, options)?;
-    let reading = deck::read_whole(&text, &path.display().to_string())
+    read_gathered(&gather_deck(path, options)?, &path.display().to_string())
+}
+
+/// Reads and checks the text of a deck with the files that it refers to; warnings go to standard error.
+///
+/// # Errors
+/// Every fault of it, one per line.
+pub fn read_gathered(text: &str, name: &str) -> Result<Model, Error> {
+    let reading = deck::read_whole(text, name)
         .map_err(|faults| Error::of_faults(faults.iter().map(ToString::to_string)))?;
     warn(&reading.warnings);
     doubt(&reading.model);

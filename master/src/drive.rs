@@ -21,9 +21,9 @@ use protocol::{
     order::{Outbox, Place},
     wire,
 };
+use system::processors::lowest_priority;
 use tokio::sync::{Notify, mpsc};
 use tracing::warn;
-use worker::compute::lowest_priority;
 
 use crate::{
     embedded::{Sink, Traffic, timed_sort},

@@ -20,8 +20,9 @@ use protocol::{
     message::{ToMaster, Work},
     phase::{Phase, Report},
 };
+use system::clock::thread_cpu_ns;
 use worker::{
-    compute::{Machine, ThreadClock, thread_cpu_ns},
+    compute::{Machine, ThreadClock},
     session::{self, Task},
     stopwatch::{Lap, Stopwatch},
 };

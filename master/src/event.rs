@@ -9,6 +9,7 @@ use protocol::{
 };
 
 use crate::{
+    fragments::Runaway,
     incident::{Difference, Loss, Rebalance},
     results::history::HistoryRow,
     run_totals::RunTotals,
@@ -162,4 +163,6 @@ pub struct Outcome {
     pub losses: Vec<Loss>,
     /// Computations that were found wrong, since another one came to something else.
     pub differences: Vec<Difference>,
+    /// Fragments that gained energy though nothing pushed them.
+    pub runaways: Vec<Runaway>,
 }

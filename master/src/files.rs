@@ -1,6 +1,4 @@
-//! FILES: how many files this process may have open, and how many of them connections may take.
-
-use rustix::process::{Resource, getrlimit, setrlimit};
+//! FILES: how many of the files that this process may have open connections may take.
 
 /// The soft limit that a master raises itself to, where the hard one allows it.
 const WANTED: u64 = 16_384;
@@ -9,16 +7,7 @@ const KEPT: u64 = 512;
 
 /// Raises the soft limit of open files; gives how many of them connections may take.
 pub fn raise_limit() -> usize {
-    let mut limit = getrlimit(Resource::Nofile);
-    let raised = WANTED.min(limit.maximum.unwrap_or(WANTED));
-    if limit.current.is_some_and(|current| current < raised) {
-        let before = limit.current;
-        limit.current = Some(raised);
-        if setrlimit(Resource::Nofile, limit).is_err() {
-            limit.current = before;
-        }
-    }
-    for_connections(limit.current.unwrap_or(WANTED))
+    for_connections(system::files::raise_limit(WANTED))
 }
 
 /// Of a low limit half is kept.

@@ -1,11 +1,13 @@
-//! Ctrl-C and SIGTERM as a flag.
+//! Requests to end, such as Ctrl-C, as a flag.
 
 use std::sync::{
     Arc,
     atomic::{AtomicBool, Ordering},
 };
 
-/// A flag that Ctrl-C or SIGTERM sets, saying `what` happens now; a second one ends the process at once.
+use system::interrupts::Interrupts;
+
+/// A flag that Ctrl-C, or another request to end, sets, saying `what` happens now; a second one ends the process at once.
 pub fn stop_on_interrupt(what: &'static str) -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
@@ -15,16 +17,11 @@ pub fn stop_on_interrupt(what: &'static str) -> Arc<AtomicBool> {
             return;
         };
         runtime.block_on(async {
-            use tokio::signal::unix::{SignalKind, signal};
-            let Ok(mut interrupt) = signal(SignalKind::interrupt()) else { return };
-            let Ok(mut term) = signal(SignalKind::terminate()) else { return };
+            let Ok(mut interrupts) = Interrupts::listen() else { return };
             // The caller waits for this.
             let _ = heeded.send(());
             loop {
-                tokio::select! {
-                    _ = interrupt.recv() => {}
-                    _ = term.recv() => {}
-                }
+                interrupts.next().await;
                 if flag.swap(true, Ordering::Relaxed) {
                     std::process::exit(130);
                 }

@@ -154,7 +154,8 @@ impl Job {
         if self.ending.over {
             return actions;
         }
-        if let Err(error) = self.hear(event, &mut actions) {
+        let heard = self.hear(event, &mut actions);
+        if let Err(error) = heard.or_else(|fault| self.judge_fault(fault, &mut actions)) {
             // Ends the job without a final state.
             self.account.failure = Some(error.to_string());
             self.finish(None, &mut actions);
@@ -191,6 +192,9 @@ impl Job {
 
     fn finish(&mut self, state: Option<GlobalState>, actions: &mut Vec<Action>) {
         self.ending.over = true;
+        if let Some(state) = &state {
+            self.note_fragments(state);
+        }
         let failure = self.account.failure.take();
         self.epoch.send_all(actions, |_| ToWorker::Release);
         let digest = state.as_ref().map(digest::digest).unwrap_or_default();
@@ -215,6 +219,7 @@ impl Job {
             rebalances: std::mem::take(&mut tally.rebalances),
             losses: std::mem::take(&mut tally.losses),
             differences: std::mem::take(&mut tally.differences),
+            runaways: tally.fragments.take_runaways(),
         })));
     }
 

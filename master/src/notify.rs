@@ -2,7 +2,7 @@
 
 use std::{
     path::Path,
-    process::{Command, ExitCode, Stdio},
+    process::{ExitCode, Stdio},
 };
 
 /// Runs a command in a shell, with what is over in its environment: `BOLIDE_JOB`, the deck, the study or the number of the job; `BOLIDE_STATE`, one
@@ -15,8 +15,8 @@ pub fn notify(command: Option<&str>, job: &str, folder: Option<&Path>, result: &
         Ok(code) if *code == ExitCode::SUCCESS => ("done", ""),
         Ok(_) => ("stopped", ""),
     };
-    let mut shell = Command::new("sh");
-    shell.args(["-c", command]).stdin(Stdio::null());
+    let mut shell = system::children::shell(command);
+    shell.stdin(Stdio::null());
     shell.env("BOLIDE_JOB", job).env("BOLIDE_STATE", state).env("BOLIDE_REASON", reason.replace('\0', " "));
     shell.env(
         "BOLIDE_FOLDER",

@@ -10,9 +10,12 @@ use crate::{
     embedded::Sink,
     event::{Action, Limit, Progress},
     job::Job,
+    queue::sum_of,
     results::{
-        Folder,
+        self, Folder, INPUT,
         history::{History, HistoryRow},
+        summary::Input,
+        sums,
         vtu::Series,
         writer::Writer,
     },
@@ -27,6 +30,8 @@ pub struct Output {
     model: Arc<Model>,
     /// The results folder; none with `--no-output`.
     pub folder: Option<Folder>,
+    /// What the run is computed from, as the folder holds it.
+    pub input: Option<Input>,
     /// Where bases go; none where nothing is stored.
     pub keeper: Option<Keeper>,
     history: Option<History>,
@@ -50,7 +55,9 @@ impl Output {
     /// # Errors
     /// What the disk refused.
     pub fn new(model: Arc<Model>, folder: Option<Folder>, json: bool) -> Result<Self, String> {
-        let fault = |e: crate::results::Error| e.to_string();
+        let fault = |e: results::Error| e.to_string();
+        // They are of what stood there before.
+        folder.as_ref().map_or(Ok(()), sums::remove).map_err(fault)?;
         let history = folder.as_ref().map(|f| History::create(f, &model)).transpose().map_err(fault)?;
         let series = folder.as_ref().map(|f| Series::new(f, &model)).transpose().map_err(fault)?;
         let writer = series.map(|series| Writer::start(series, Arc::clone(&model))).transpose()?;
@@ -65,6 +72,7 @@ impl Output {
         Ok(Self {
             model,
             folder,
+            input: None,
             keeper: None,
             history,
             row_ends,
@@ -76,6 +84,29 @@ impl Output {
             started: Instant::now(),
             last_line: Instant::now(),
         })
+    }
+
+    /// Keeps the deck, gathered, with the results, and the end that was asked for beside it.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn keep_input(&mut self, text: &str, end_time: Option<f64>) -> Result<(), String> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let write = |out: &mut std::io::BufWriter<_>| std::io::Write::write_all(out, text.as_bytes());
+        results::write_whole(&folder.file(INPUT), write).map_err(|e| e.to_string())?;
+        self.input = Some(Input { deck: sum_of(text), end_time });
+        Ok(())
+    }
+
+    /// Writes the checksums of a folder that is complete.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn seal(&self) -> Result<(), String> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        // The last state of a run may stand in place of one that had a sum.
+        let known = self.sums.len().min(self.states.len());
+        sums::write(folder, &self.sums[..known]).map_err(|e| e.to_string())
     }
 
     /// Writes what belongs before the first cycle of a session: the rows so far, and the first state. `states` are those
@@ -133,7 +164,7 @@ impl Output {
 
     /// Drops all rows but the first so many, and states of later cycles than this.
     fn rewind(&mut self, rows: usize, cycle: u64) -> Result<(), String> {
-        let fault = |e: crate::results::Error| e.to_string();
+        let fault = |e: results::Error| e.to_string();
         self.row_ends.truncate(rows + 1);
         if let (Some(history), Some(&end)) = (&mut self.history, self.row_ends.last()) {
             history.roll_back(end).map_err(fault)?;
@@ -217,7 +248,7 @@ pub fn progress_line(model: &Model, progress: &Progress, elapsed: f64) -> (Strin
     };
     let eta =
         if share > 0.0 { format!("  ETA {:.0} s", elapsed * (1.0 - share) / share) } else { String::new() };
-    let units = crate::results::Units::named(&model.units).time;
+    let units = results::Units::named(&model.units).time;
     let line = format!(
         "cycle {}  t {:.4e} {units}  dt {:.3e} ({limit})  {grind:.0} ns/element wall{eta}",
         progress.cycle, progress.time, progress.dt

@@ -3,7 +3,6 @@
 use std::{
     collections::BTreeMap,
     net::Ipv4Addr,
-    os::unix::process::CommandExt,
     path::PathBuf,
     process::{Child, Command, Stdio},
     sync::{Arc, atomic::AtomicBool},
@@ -63,17 +62,17 @@ impl Processes {
         runtime.spawn(listen(listener, Arc::clone(&acceptor)));
         let mut started = Self { acceptor, worker_links: Vec::new(), children: Vec::new(), runtime: None };
         for spec in specs {
-            let child = Command::new(&binary)
+            let mut command = Command::new(&binary);
+            command
                 .args(["worker", "--once", "--master", &address.to_string(), "--name", &spec.name])
                 .args(["--speed", &spec.speed.to_string(), "--threads", &spec.threads.to_string()])
                 .env(TOKEN, &token)
                 .env("BOLIDE_LOG", std::env::var("BOLIDE_LOG").unwrap_or_else(|_| "warn".to_owned()))
                 .stdin(Stdio::null())
-                .stdout(Stdio::null())
-                // Ctrl-C is for this process, which ends the run at a whole cycle.
-                .process_group(0)
-                .spawn()
-                .map_err(|e| format!("starting {} worker: {e}", binary.display()))?;
+                .stdout(Stdio::null());
+            // Ctrl-C is for this process, which ends the run at a whole cycle.
+            system::children::apart(&mut command);
+            let child = command.spawn().map_err(|e| format!("starting {} worker: {e}", binary.display()))?;
             started.children.push(child);
         }
         started.worker_links = runtime.block_on(join(specs, &mut heard, &mut started.children))?;

@@ -18,9 +18,10 @@ use crate::{
     add, bench,
     bench::grind::Speed,
     ca_folder::CaFolder,
-    certs, check, client,
-    command::{Bench, Certs, Cli, Command, WorkerArgs},
-    convert, daemon, init, machine, materials, memory, newcomer, picture, processes, run,
+    certs::{self, arguments::Certs},
+    check, client,
+    command::{Bench, Cli, Command, WorkerArgs},
+    convert, daemon, export, init, machine, materials, newcomer, picture, processes, run,
     shell::print,
     simulate, study, verify,
 };
@@ -38,7 +39,7 @@ pub fn log<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
 
 /// Does what the command line says. `compute` is what computes the tasks of a worker.
 pub fn main(compute: Compute) -> ExitCode {
-    memory::return_large_arrays();
+    system::allocator::return_large_arrays();
     let result = match Cli::parse().command {
         Command::Run(args) => run::run_and_tell(&args),
         Command::Study(args) => study::run(&args),
@@ -74,6 +75,7 @@ pub fn main(compute: Compute) -> ExitCode {
         }
         Command::Verify(args) => verify::run(&args),
         Command::Picture(args) => picture::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Materials(args) => materials::run(&args),
     };
     result.unwrap_or_else(|reason| {
@@ -110,6 +112,7 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
         },
         speed,
         threads: args.threads.unwrap_or(cores),
+        memory: args.memory.map(|gigabytes| (gigabytes * 1e9) as u64),
         certs: args.certs,
         patience: Duration::from_secs(args.patience),
         once: args.once,

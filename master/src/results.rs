@@ -3,7 +3,9 @@
 //! A results folder holds `state-NNNNNN.vtu` (one file per written state, [`vtu`]), `results.pvd` (the index
 //! that ParaView opens, with the time of each state), where the deck asks for it `contact-NNNNNN.vtp` and `contact.pvd`
 //! (the same of the contact surface, [`surface`]), `history.csv` ([`history`]), `summary.json`
-//! ([`summary`]) and `report.html` ([`report`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
+//! ([`summary`]), `report.html` ([`report`]), the same states in other formats where they are wanted ([`format`]), the deck that it was
+//! computed from with all that it refers to (`input.deck`), and, where the run
+//! came to an end, checksums of all that ([`sums`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
 //! Only the history grows in place, by whole rows. So the folder of a killed run opens.
 //!
 //! Nothing here computes physics or decides when to write.
@@ -15,12 +17,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub mod d3plot;
+pub mod field_unit;
+pub mod format;
+pub mod hdf5;
 pub mod history;
 pub mod report;
 pub mod summary;
+pub mod sums;
 pub mod surface;
 pub mod trace;
 pub mod von_mises;
+pub mod vtkhdf;
 pub mod vtu;
 pub mod writer;
 
@@ -36,6 +44,10 @@ pub const SUMMARY: &str = "summary.json";
 pub const REPORT: &str = "report.html";
 /// Name of the trace of a job's workers.
 pub const TRACE: &str = "trace.json";
+/// Name of the deck that was computed, gathered with the files that it refers to.
+pub const INPUT: &str = "input.deck";
+/// Name of the checksums.
+pub const SUMS: &str = "checksums.json";
 
 pub use deck::model::FIELD_NAMES;
 pub use summary::Summary;
@@ -247,12 +259,18 @@ pub fn contact_name(index: u32) -> String {
 /// Whether a run writes files of this name: the only ones that `--force` removes.
 fn is_written_by_a_run(name: &str) -> bool {
     let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".tmp")).unwrap_or(name);
-    let state = stem.strip_prefix("state-").and_then(|n| n.strip_suffix(".vtu"));
-    let contact = || stem.strip_prefix("contact-").and_then(|n| n.strip_suffix(".vtp"));
-    [PVD, CONTACT_PVD, HISTORY, SUMMARY, REPORT, TRACE].contains(&stem)
-        || state
-            .or_else(contact)
-            .is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
+    [PVD, CONTACT_PVD, HISTORY, SUMMARY, REPORT, TRACE, INPUT, SUMS].contains(&stem)
+        || is_of_a_state(stem)
+        || format::FORMATS.iter().any(|format| format.writes(stem))
+}
+
+/// Whether a file of this name is a state or its contact surface.
+fn is_of_a_state(name: &str) -> bool {
+    let state = name.strip_prefix("state-").and_then(|n| n.strip_suffix(".vtu"));
+    let contact = || name.strip_prefix("contact-").and_then(|n| n.strip_suffix(".vtp"));
+    state
+        .or_else(contact)
+        .is_some_and(|n| (6..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Creates a file that was not there: what stood under the name is removed, a link itself and not what it leads to, so
@@ -370,6 +388,9 @@ mod tests {
             "contact.pvd",
             "history.csv",
             "summary.json",
+            "results.vtkhdf",
+            "d3plot",
+            "d3plot01",
             ".state-000000.vtu.tmp",
             ".results.pvd.tmp",
         ] {

@@ -13,16 +13,17 @@ use tracing::{info, warn};
 
 use crate::{
     command::RunArgs,
-    deck_file::read_deck_with,
+    deck_file::{gather_deck, read_gathered},
     embedded::{self, Traffic},
     event::{Outcome, WorkerSpec},
+    export,
     interrupt::stop_on_interrupt,
     job::Job,
     notify::notify,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     processes::Processes,
-    results::{self, Folder, report, trace},
+    results::{self, Folder, Summary, format, report, trace},
     shell::quoted,
     snapshot::{
         self, Snapshot,
@@ -60,10 +61,13 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         pin.apply()?;
     }
     let asked = &args.job;
-    let mut model = read_deck_with(&args.deck, &args.reading.options())?;
+    let text = gather_deck(&args.deck, &args.reading.options())?;
+    let mut model = read_gathered(&text, &args.deck.display().to_string())?;
     bring_end_forward(&mut model, asked)?;
+    let others: Vec<_> = args.format.iter().filter(|name| !model.output.formats.contains(name)).collect();
+    model.output.formats.extend(others.into_iter().cloned().collect::<Vec<_>>());
     let model = Arc::new(model);
-    let n = args.workers as usize;
+    let n = args.workers.map_or(args.speeds.len().max(1), |n| n as usize);
     let cores = worker::processors::cores();
     let threads = args.threads.map_or(cores, |t| t as usize);
     let specs: Vec<WorkerSpec> = speeds_for(n, &args.speeds)?
@@ -99,6 +103,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let (mut job, first) = Job::new(Arc::clone(&model), &specs, options, resume)?;
     let census = bare.unwrap_or_else(|| SurfaceCensus::of(&job, &model));
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
+    output.keep_input(&text, asked.end_time)?;
+    drop(text);
     if let Some(folder) = &output.folder {
         let snapshots = folder.file(store::FOLDER);
         if !in_place {
@@ -210,12 +216,17 @@ pub fn conclude(
     json: bool,
 ) -> Result<ExitCode, String> {
     let summary = summarise(model, census, outcome, traffic, threads, wall_s);
+    let summary = Summary { input: output.input.clone(), ..summary };
     for warning in &summary.warnings {
         warn!("{warning}");
     }
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        for written in format::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
+            info!("{}", export::line(&written));
+        }
+        output.seal()?;
     }
     if json {
         println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);

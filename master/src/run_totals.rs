@@ -77,6 +77,8 @@ pub struct RunTotals {
     pub joined: Vec<usize>,
     /// The first time step that was booked (time); none before it.
     pub first_step: Option<f64>,
+    /// Mass by part, as momentum is booked: a node that parts share counts with the first of them, a rigid body with its account.
+    pub masses: Vec<f64>,
     /// Momentum before the first cycle.
     pub initial_momentum: [f64; 3],
     /// Greatest momentum of a part before the first cycle.
@@ -179,6 +181,7 @@ impl RunTotals {
             scales: vec![PartScale::default(); model.mesh.parts.len()],
             joined: bodies::joined(model),
             first_step: None,
+            masses: masses(model, mass),
             initial_momentum,
             part_momentum,
             worst_courant: 0.0,
@@ -248,6 +251,7 @@ impl RunTotals {
             error,
             momentum: vote.momentum,
             parts: self.parts[1].clone(),
+            part_momenta: vote.parts.iter().map(|part| part.momentum).collect(),
             gauges: vote
                 .gauges
                 .iter()
@@ -373,4 +377,21 @@ impl RunTotals {
             .sum();
         change.sqrt() / self.part_momentum
     }
+}
+
+/// Mass of each part, of nodes with these masses.
+fn masses(model: &Model, mass: &[f64]) -> Vec<f64> {
+    let mut counted = vec![false; model.mesh.n_nodes()];
+    for body in &model.setup.bodies {
+        body.nodes.iter().for_each(|&node| counted[node as usize] = true);
+    }
+    let of_part = |part: &Part| {
+        let own = part.nodes.iter().filter(|&&node| !std::mem::replace(&mut counted[node as usize], true));
+        own.map(|&node| mass[node as usize]).sum()
+    };
+    let mut masses: Vec<f64> = model.mesh.parts.iter().map(of_part).collect();
+    for body in &model.setup.bodies {
+        masses[body.account as usize] += body.mass;
+    }
+    masses
 }

@@ -25,7 +25,7 @@ use worker::notify;
 use crate::{
     connection::Acceptor,
     drive::{self, Input, WorkerLink},
-    footprint,
+    footprint::{self, Bearer},
     hosts::Hosts,
     http::board::Board,
     notice::{Error, Notice},
@@ -492,17 +492,23 @@ impl Scheduler {
             let what = format!("{}; tried again within {} s", pause.why, pause.seconds);
             return waiting.iter().for_each(|entry| self.wait_for(entry.id, what.clone()));
         }
-        let idle: Vec<&WorkerLink> =
-            self.hosts.idle().filter_map(|host| self.worker_links.get(&host.incarnation)).collect();
-        let names: Vec<&str> = idle.iter().map(|worker_link| worker_link.spec.name.as_str()).collect();
+        let idle: Vec<(&WorkerLink, u64)> = self
+            .hosts
+            .idle()
+            .filter_map(|host| Some((self.worker_links.get(&host.incarnation)?, host.memory)))
+            .collect();
+        let bearers: Vec<Bearer<'_>> = idle
+            .iter()
+            .map(|(link, memory)| Bearer { name: &link.spec.name, speed: link.spec.speed, memory: *memory })
+            .collect();
         let running: Vec<u32> = self.running.keys().copied().collect();
         let available = footprint::available();
-        let allotments = allotment::among(&waiting, &running, &names, self.started.elapsed(), available);
+        let allotments = allotment::among(&waiting, &running, &bearers, self.started.elapsed(), available);
         for (job, what) in allotments.waits {
             self.wait_for(job, what);
         }
         if let Some(job) = allotments.starts {
-            let worker_links = idle.into_iter().cloned().collect();
+            let worker_links = idle.into_iter().map(|(worker_link, _)| worker_link.clone()).collect();
             self.start(job, worker_links);
         }
     }

@@ -23,13 +23,14 @@ use crate::{
     drive::{self, Input, WorkerLink, drive},
     embedded::Sink,
     event::{Action, Deal, WorkerSpec},
+    export,
     http::board::{self, Board, JobView},
     job::Job,
     notice::Notice,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
     queue::Change,
-    results::{self, Folder, TRACE, report, trace},
+    results::{self, Folder, Summary, TRACE, format, report, trace},
     snapshot::{Snapshot, keeper::Keeper, store::Store},
     summarise::{SurfaceCensus, summarise},
 };
@@ -91,10 +92,9 @@ impl From<drive::Error> for Failure {
     }
 }
 
-/// Whether a reason ends in an error by which Linux says that it has none left of something: memory (12), files (23, 24), room on a
-/// disk (28, 122).
+/// Whether a reason ends in an error by which the system says that it has none left of something.
 fn is_shortage(reason: &str) -> bool {
-    [12, 23, 24, 28, 122].iter().any(|number| reason.contains(&format!("(os error {number})")))
+    system::files::SHORTAGES.iter().any(|number| reason.contains(&format!("(os error {number})")))
 }
 
 /// Runs the job; gives how it ended. A bug becomes a failure of this job alone.
@@ -180,6 +180,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     });
     let folder = folder.transpose().map_err(|e| e.to_string())?;
     let mut output = Output::new(Arc::clone(&model), folder, true)?;
+    output.keep_input(&order.text, order.options.end_time)?;
     let results = output.folder.as_ref().map(|folder| folder.path().to_owned());
     output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     output.go_on(&job, states)?;
@@ -218,16 +219,21 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     }
     let threads = specs.iter().map(|spec| spec.threads).sum();
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
+    let summary = Summary { input: reporter.output.input.clone(), ..summary };
     for warning in &summary.warnings {
         warn!(job = order.number, "{warning}");
     }
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        for written in format::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
+            info!(job = order.number, "{}", export::line(&written));
+        }
         if order.options.trace {
             trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
                 .map_err(|e| e.to_string())?;
         }
+        reporter.output.seal()?;
     }
     order.status.send_modify(|status| {
         status.cycle = summary.cycles;

@@ -7,6 +7,7 @@
 //! SPOOL/queue/job-7.json.copy     the same, for when the record is damaged
 //! SPOOL/queue/job-7.toml          its deck, until it is done or cancelled; and a copy of it
 //! SPOOL/queue/job-7.snapshots/    where it can be gone on with, until then
+//! SPOOL/queue/last                the highest number of a job that was removed: it is not given again
 //! ```
 //!
 //! A record is replaced whole and synchronised at every change of state, before anybody is told of the change. A job that a
@@ -17,9 +18,8 @@
 
 use std::{
     collections::BTreeSet,
-    fs::{self, File, TryLockError},
+    fs::{self, File},
     io,
-    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
 
@@ -28,6 +28,7 @@ use protocol::{
     request::{Ended, State},
 };
 use serde::{Deserialize, Serialize};
+use tracing::warn;
 
 use crate::{
     queue::{Starts, sum_of},
@@ -141,21 +142,12 @@ impl Spool {
         let queue = folder.join("queue");
         fs::create_dir_all(&queue).map_err(fault)?;
         // An earlier release left it open to all.
-        fs::set_permissions(&queue, fs::Permissions::from_mode(0o700)).map_err(fault)?;
-        // Of the folder itself, which nobody can take away from a master unnoticed, as a file in it could be.
-        let lock = File::open(folder).map_err(fault)?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(format!(
-                    "spool folder {}: another master uses it; name another with --spool",
-                    folder.display()
-                ));
-            }
-            Err(TryLockError::Error(error)) => return Err(fault(error)),
-        }
+        system::private::close(&queue).map_err(fault)?;
+        let lock = system::folders::lock(folder).map_err(fault)?.ok_or_else(|| {
+            format!("spool folder {}: another master uses it; name another with --spool", folder.display())
+        })?;
         let spool = Self { folder: folder.to_owned(), _lock: lock };
-        let mut left = Left { first: 1, ..Left::default() };
+        let mut left = Left { first: spool.last_removed().saturating_add(1), ..Left::default() };
         let mut records = BTreeSet::new();
         for folder in [folder, &queue] {
             for entry in fs::read_dir(folder).map_err(fault)? {
@@ -178,7 +170,10 @@ impl Spool {
     /// Reads a job, mends what has a copy and says what was damaged.
     fn scrub(&self, job: u32, left: &mut Left) {
         let mut record = match read_record(&self.record(job), job) {
-            Ok(record) => record,
+            Ok(record) => {
+                self.mend_copy(job, &record, left);
+                record
+            }
             Err(damage) => match read_record(&self.copy(job), job) {
                 Ok(record) => {
                     left.warnings.push(format!("{damage}; its copy is used"));
@@ -203,6 +198,19 @@ impl Spool {
         left.jobs.push((record, text));
     }
 
+    /// Makes a copy of a record that is not the same anew: for as long as it is damaged, the record must not be.
+    fn mend_copy(&self, job: u32, record: &Record, left: &mut Left) {
+        let damage = match read_record(&self.copy(job), job) {
+            Ok(copy) if copy == *record => return,
+            // The master ended between the two.
+            Ok(_) => None,
+            Err(damage) => Some(damage),
+        };
+        let mended = fs::read(self.record(job)).and_then(|bytes| write_durably(&self.copy(job), &bytes));
+        let what = if mended.is_ok() { "it is made anew" } else { "it is not mended" };
+        left.warnings.extend(damage.map(|damage| format!("{damage}; {what}")));
+    }
+
     /// The deck of a job that is not done or cancelled, which has this checksum; an empty one matches all.
     ///
     /// # Errors
@@ -220,8 +228,16 @@ impl Spool {
     fn text_or_copy(&self, job: u32, stated: &str, left: &mut Left) -> Result<String, Fault> {
         let damage = read_deck(self.deck(job), stated).err();
         let text = self.text(job, stated);
-        if let (Some(damage), Ok(_)) = (damage, &text) {
-            left.warnings.push(format!("{damage}; its copy is used"));
+        match (damage, &text) {
+            (Some(damage), Ok(_)) => left.warnings.push(format!("{damage}; its copy is used")),
+            (None, Ok(text)) => {
+                if let Err(damage) = read_deck(self.deck_copy(job), stated) {
+                    let mended = write_durably(&self.deck_copy(job), text.as_bytes());
+                    let what = if mended.is_ok() { "it is made anew" } else { "it is not mended" };
+                    left.warnings.push(format!("{damage}; {what}"));
+                }
+            }
+            _ => {}
         }
         text
     }
@@ -290,8 +306,23 @@ impl Spool {
         Ok(())
     }
 
+    /// The highest number of a job that was removed; 0 if none was.
+    fn last_removed(&self) -> u32 {
+        let text = fs::read_to_string(self.last()).unwrap_or_default();
+        text.trim().parse().unwrap_or_default()
+    }
+
+    fn last(&self) -> PathBuf {
+        self.folder.join("queue/last")
+    }
+
     /// Removes all of a job but its results.
     pub fn forget(&self, job: u32) {
+        if job > self.last_removed()
+            && let Err(error) = write_durably(&self.last(), format!("{job}\n").as_bytes())
+        {
+            warn!(job, "{}: {error}; the next master may give its number again", self.last().display());
+        }
         // As above.
         let _ = fs::remove_file(self.record(job));
         let _ = fs::remove_file(self.copy(job));
@@ -376,6 +407,39 @@ mod tests {
         fs::remove_file(&path).expect("it is there");
         let (_, left) = Spool::open(folder.path()).expect("readable");
         assert_eq!((left.jobs.len(), left.warnings.len()), (1, 1), "{:?}", left.warnings);
+    }
+
+    #[test]
+    fn a_damaged_copy_is_made_anew_before_the_file_itself_is_damaged_too() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (spool, _) = Spool::open(folder.path()).expect("new");
+        spool.add(&record(7), "a deck").expect("room");
+        for path in [spool.copy(7), spool.deck_copy(7)] {
+            let whole = fs::read(&path).expect("written");
+            let mut damaged = whole.clone();
+            damaged[3] ^= 1;
+            fs::write(&path, damaged).expect("room");
+            let mut left = Left::default();
+            spool.scrub(7, &mut left);
+            assert!(left.jobs.len() == 1 && left.warnings.len() == 1, "{left:?}");
+            assert!(left.warnings[0].ends_with("it is made anew"), "{left:?}");
+            assert_eq!(fs::read(&path).ok(), Some(whole));
+        }
+    }
+
+    #[test]
+    fn the_number_of_a_job_that_was_removed_is_not_given_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (spool, left) = Spool::open(folder.path()).expect("new");
+        assert_eq!(left.first, 1);
+        for job in [7, 8] {
+            spool.add(&record(job), "a deck").expect("room");
+        }
+        spool.forget(8);
+        spool.forget(7);
+        drop(spool);
+        let (_, left) = Spool::open(folder.path()).expect("readable");
+        assert_eq!((left.first, left.jobs.len()), (9, 0));
     }
 
     #[test]

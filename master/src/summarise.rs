@@ -61,7 +61,7 @@ pub fn summarise(
     let per = |value: f64, by: f64| if by > 0.0 { value / by } else { 0.0 };
     let run_cycles = outcome.cycles_run as f64;
     let units = &outcome.census;
-    let parts = named_parts(model, &run_totals.last.parts, outcome.state.as_ref());
+    let parts = named_parts(model, run_totals, outcome.state.as_ref());
     Summary {
         title: model.title.clone(),
         elements,
@@ -124,9 +124,11 @@ pub fn summarise(
         losses: outcome.losses.clone(),
         warnings: hourglass_warnings(&model.mesh.parts, &parts, run_totals.eroded, run_totals.scale())
             .into_iter()
+            .chain(outcome.runaways.iter().map(ToString::to_string))
             .chain(outcome.differences.iter().map(ToString::to_string))
             .collect(),
         digest: outcome.digest.clone(),
+        input: None,
     }
 }
 
@@ -141,8 +143,8 @@ fn worst_body(model: &Model, run_totals: &RunTotals) -> Option<NamedBody> {
     Some(NamedBody { parts, gain: worst.gain, error: worst.error })
 }
 
-/// Energies of the parts beside their names, and what each has lost to erosion.
-fn named_parts(model: &Model, parts: &[PartEnergy], state: Option<&GlobalState>) -> Vec<NamedPart> {
+/// Masses, momenta and energies of the parts beside their names, and what each has lost to erosion.
+fn named_parts(model: &Model, run_totals: &RunTotals, state: Option<&GlobalState>) -> Vec<NamedPart> {
     let offsets = model.mesh.element_offsets();
     let eroded = |p: usize| {
         let elements = offsets[p]..offsets[p] + model.mesh.parts[p].n_elements();
@@ -151,13 +153,15 @@ fn named_parts(model: &Model, parts: &[PartEnergy], state: Option<&GlobalState>)
     let of = |(p, (part, e)): (usize, (&mechanics::mesh::Part, &PartEnergy))| NamedPart {
         eroded_elements: eroded(p),
         name: part.name.clone(),
+        mass: run_totals.masses.get(p).copied().unwrap_or_default(),
+        momentum: run_totals.last.part_momenta.get(p).copied().unwrap_or_default(),
         kinetic: e.kinetic,
         internal: e.internal,
         hourglass: e.hourglass,
         viscosity: e.viscosity,
         external: e.external,
     };
-    model.mesh.parts.iter().zip(parts).enumerate().map(of).collect()
+    model.mesh.parts.iter().zip(&run_totals.last.parts).enumerate().map(of).collect()
 }
 
 /// Share of the internal energy of a part above which its hourglass energy is told.

@@ -4,6 +4,9 @@
 //! from the last one to the end. Every interval begins from its own snapshot, so a fault in one does not show in those behind it.
 //! Rows of history, state files, contact surfaces, the snapshot at its end and the summary's digest are [compared](compare) bit by bit.
 //! Which worker computed an element is taken over from the file: it changes no number.
+//!
+//! The deck is the one that the folder holds, with the hash that its summary states. With `--files` nothing is computed: files are compared
+//! with [their checksums](sums).
 
 pub mod arguments;
 mod compare;
@@ -18,13 +21,17 @@ use std::{
 use deck::model::Model;
 
 use crate::{
-    deck_file::read_deck_with,
+    deck_file::{read_deck_with, read_gathered},
     embedded,
     event::WorkerSpec,
     interrupt::stop_on_interrupt,
     job::Job,
     options::{SessionOptions, bring_end_forward},
-    results::{SUMMARY, Summary},
+    queue::sum_of,
+    results::{
+        INPUT, SUMMARY, SUMS, Summary,
+        sums::{self, Checked},
+    },
     snapshot::{self, Snapshot, store},
 };
 use arguments::VerifyArgs;
@@ -35,6 +42,14 @@ use compare::{Comparison, Difference};
 enum Error {
     /// The summary is of another deck.
     OtherDeck { results: PathBuf, written: String, given: String },
+    /// The folder holds no deck.
+    NoDeck(PathBuf),
+    /// The deck in the folder is not the one that the summary is of.
+    DamagedDeck { path: PathBuf, stated: String, computed: String },
+    /// Flags say how to read a deck that is not named.
+    Reading(Vec<String>),
+    /// The folder has no checksums.
+    NoSums(PathBuf),
     /// Nothing in the folder says how far the run came.
     NoEnd(PathBuf),
     /// `--from` or `--to` leave nothing.
@@ -49,6 +64,26 @@ impl fmt::Display for Error {
             Self::OtherDeck { results, written, given } => write!(
                 f,
                 "{} holds results of {written:?}, the deck is {given:?}; name with --deck the deck that they were computed from",
+                results.display()
+            ),
+            Self::NoDeck(results) => write!(
+                f,
+                "{} holds no {INPUT}; name with --deck the deck that it was computed from",
+                results.display()
+            ),
+            Self::DamagedDeck { path, stated, computed } => write!(
+                f,
+                "{}: its BLAKE3 is {computed}, {SUMMARY} says {stated}; name with --deck the deck that the results were computed from",
+                path.display()
+            ),
+            Self::Reading(words) => write!(
+                f,
+                "{}: the deck that the folder holds was read with its flags already; leave them out, or name a deck with --deck",
+                words.join(" ")
+            ),
+            Self::NoSums(results) => write!(
+                f,
+                "{} holds no {SUMS}: the run did not come to its end; verify it without --files",
                 results.display()
             ),
             Self::NoEnd(results) => write!(
@@ -88,13 +123,19 @@ impl From<Error> for String {
 /// Whatever kept it from comparing.
 pub fn run(args: &VerifyArgs) -> Result<ExitCode, String> {
     let results = &args.results;
-    let mut model = read_deck_with(&args.deck, &args.reading.options())?;
+    if args.files {
+        return check_files(results);
+    }
     let summary = read_summary(results)?;
+    let mut model = read_input(args, summary.as_ref())?;
     if let Some(summary) = summary.as_ref().filter(|summary| summary.title != model.title) {
         let (written, given) = (summary.title.clone(), model.title);
         return Err(Error::OtherDeck { results: results.clone(), written, given }.into());
     }
-    let asked = protocol::options::JobOptions { end_time: args.end_time, ..Default::default() };
+    let written =
+        summary.as_ref().and_then(|summary| summary.input.as_ref()).and_then(|input| input.end_time);
+    let end_time = args.end_time.or(written);
+    let asked = protocol::options::JobOptions { end_time, ..Default::default() };
     bring_end_forward(&mut model, &asked)?;
     let mut differences = Vec::new();
     let snapshots = snapshots_of(results, &mut differences)?;
@@ -143,6 +184,49 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, String> {
         println!("cycle {}: {}", other.cycle, other.place);
     }
     Ok(ExitCode::FAILURE)
+}
+
+/// Compares the files of a folder with their checksums.
+fn check_files(results: &Path) -> Result<ExitCode, String> {
+    let checked = sums::check(results).map_err(|e| e.to_string())?;
+    let Checked { count, damaged } = checked.ok_or_else(|| Error::NoSums(results.to_owned()))?;
+    for error in &damaged {
+        println!("{error}");
+    }
+    if damaged.is_empty() {
+        println!("{count} checksums match");
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!(
+        "{} of {count} checksums do not match; what can be computed again `bolide verify` names",
+        damaged.len()
+    );
+    Ok(ExitCode::FAILURE)
+}
+
+/// The deck that the results were computed from: the one that is named, or else the one in the folder, which is that of the summary.
+fn read_input(args: &VerifyArgs, summary: Option<&Summary>) -> Result<Model, String> {
+    if let Some(deck) = &args.deck {
+        return Ok(read_deck_with(deck, &args.reading.options())?);
+    }
+    let words = args.reading.words();
+    if !words.is_empty() {
+        return Err(Error::Reading(words).into());
+    }
+    let path = args.results.join(INPUT);
+    let text = match fs::read_to_string(&path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Err(Error::NoDeck(args.results.clone()).into());
+        }
+        text => text.map_err(|e| format!("cannot read {}: {e}", path.display()))?,
+    };
+    let computed = sum_of(&text);
+    match summary.and_then(|summary| summary.input.as_ref()) {
+        Some(input) if input.deck != computed => {
+            Err(Error::DamagedDeck { path, stated: input.deck.clone(), computed }.into())
+        }
+        _ => Ok(read_gathered(&text, &path.display().to_string())?),
+    }
 }
 
 fn read_summary(results: &Path) -> Result<Option<Summary>, String> {

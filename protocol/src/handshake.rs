@@ -22,7 +22,7 @@ use std::fmt;
 /// 9: trusses, numbers of supports and hourglass control of pieces in assignments; nodes tied to faces in assignments and plans; in
 /// votes the work of each wall and support, and what nodes lost at walls,
 /// and readings of element gauges with history variables behind them; requests to remove a job;
-/// the strain at which layers of shells break in assignments; the part of a job that is computed twice; cross-sections in assignments
+/// memory of workers in [`Hello`]; the strain at which layers of shells break in assignments; the part of a job that is computed twice; cross-sections in assignments
 /// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans.
 pub const VERSION: u16 = 9;
 
@@ -115,6 +115,8 @@ pub struct Hello {
     pub member: Option<Membership>,
     /// Of a worker: what the fixed problem of `mechanics::proof` comes to on its processor; none for other roles.
     pub proof: Option<String>,
+    /// Of a worker: memory that its process may take (bytes), 0 where its system does not say. 0 for other roles.
+    pub memory: u64,
 }
 
 impl Hello {
@@ -140,6 +142,7 @@ impl Hello {
             peer_port: 0,
             member: None,
             proof: None,
+            memory: 0,
         }
     }
 

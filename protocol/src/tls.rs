@@ -449,21 +449,11 @@ fn unusable(path: &Path, why: &dyn fmt::Display) -> Error {
 }
 
 /// Refuses a key that others on the machine can read.
-#[cfg(unix)]
 fn check_private(path: &Path) -> Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    let mode = std::fs::metadata(path).map_err(|error| unusable(path, &error))?.permissions().mode() & 0o777;
-    if mode & 0o077 == 0 {
-        return Ok(());
+    match system::private::open_to_others(path).map_err(|error| unusable(path, &error))? {
+        None => Ok(()),
+        Some(why) => Err(Error::Certificate(format!("{} {why}", path.display()))),
     }
-    let path = path.display();
-    Err(Error::Certificate(format!("{path} has mode {mode:04o}, must be 0600; run chmod 600 {path}")))
-}
-
-/// Permissions are not a number here.
-#[cfg(not(unix))]
-fn check_private(_: &Path) -> Result<()> {
-    Ok(())
 }
 
 /// The words for a failed read, write or handshake: a fault of certificates on one line with what to do,

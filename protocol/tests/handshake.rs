@@ -50,6 +50,7 @@ fn greeting_has_its_golden_bytes() {
         0, 0,                                            // takes no peers
         0,                                               // no place in a job
         0,                                               // no proof
+        0, 0, 0, 0, 0, 0, 0, 0,                          // does not say what memory it has
     ];
     assert_eq!(frame.payload, golden);
     assert_eq!(frame.header, Header::new(Kind::Hello));

@@ -80,7 +80,8 @@ fn three_unequal_workers_under_tls_give_the_digest_of_run() {
 #[test]
 fn a_process_for_each_worker_gives_the_digest_of_one_process() {
     // On this route no byte depends on which links stand already.
-    let three = ["--cycles", "40", "--route", "master", "--workers", "3", "--speeds", "1,2,0.5"];
+    // Their speeds say how many workers there are.
+    let three = ["--cycles", "40", "--route", "master", "--speeds", "1,2,0.5"];
     let summary = run(&[&three[..], &["--processes"]].concat());
     assert_eq!(digest_of(&summary), reference());
     assert_eq!((&summary["workers"], &summary["cycles"]), (&3.into(), &40.into()));

@@ -6,9 +6,10 @@ use tests::cluster::{Said, said};
 
 use crate::{BOLIDE, small};
 
+/// With the deck that the folder holds.
 fn verify(results: &Path, arguments: &[&str]) -> Said {
     let mut command = Command::new(BOLIDE);
-    said(command.arg("verify").arg(results).args(["--deck", &small(), "--threads", "1"]).args(arguments))
+    said(command.arg("verify").arg(results).args(["--threads", "1"]).args(arguments))
 }
 
 /// Flips the lowest bit of a byte.
@@ -66,6 +67,19 @@ fn a_folder_is_equal_until_a_bit_of_a_row_a_state_or_a_snapshot_flips() {
         fs::write(&state, &bytes).expect("room");
     }
 
+    let input = out.join("input.deck");
+    let text = fs::read_to_string(&input).expect("the deck");
+    assert_eq!(text, fs::read_to_string(small()).expect("the deck"));
+    fs::write(&input, text.replace("-0.05", "-0.06")).expect("room");
+    let refused = verify(&out, &["--interval", "1"]);
+    assert!(refused.code == Some(1) && refused.err.contains("input.deck: its BLAKE3 is "), "{refused:?}");
+    assert_eq!(verify(&out, &["--deck", &small(), "--interval", "1"]).code, Some(0), "with the deck named");
+    let damaged = verify(&out, &["--files"]);
+    assert!(damaged.code == Some(1) && damaged.out.contains("input.deck: damaged"), "{damaged:?}");
+    fs::write(&input, text).expect("room");
+    let whole = verify(&out, &["--files"]);
+    assert!(whole.code == Some(0) && whole.out.contains("checksums match"), "{whole:?}");
+
     // A state whose numbers are others: that of another run.
     let other = folder.path().join("other");
     let text = fs::read_to_string(small()).expect("the deck");
@@ -100,10 +114,10 @@ fn a_folder_of_a_run_with_another_end_or_without_its_last_files_is_told_from_a_d
     command.args(["run", &small(), "--threads", "1", "--end-time", "50", "--out"]).arg(&out);
     let ran = said(&mut command);
     assert_eq!(ran.code, Some(0), "{ran:?}");
-    let equal = verify(&out, &["--end-time", "50"]);
-    assert_eq!(equal.code, Some(0), "{equal:?}");
+    let equal = verify(&out, &[]);
+    assert_eq!(equal.code, Some(0), "the summary says which end was asked for: {equal:?}");
     // Another end shows in the last step, not before.
-    let found = verify(&out, &[]);
+    let found = verify(&out, &["--end-time", "60"]);
     assert_eq!(found.code, Some(1), "{found:?}");
     let (first, _) = found.out.split_once(": history.csv, row of cycle ").expect("the last row differs");
     let cycle = first.rsplit(' ').next().and_then(|word| word.parse::<u64>().ok());

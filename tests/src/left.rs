@@ -2,8 +2,8 @@
 
 use std::{fs, path::Path};
 
-/// Digest, energies, and the bytes of each file but those that hold times of day and wall times: the summary and the
-/// report that draws it.
+/// Digest, energies, and the bytes of each file but those that hold times of day and wall times: the summary, the
+/// report that draws it, and the checksums of both.
 pub struct Left {
     /// Of the final state.
     pub digest: String,
@@ -23,7 +23,8 @@ impl Left {
             .expect("a results folder")
             .map(|entry| entry.expect("readable").path())
             .filter(|path| {
-                path.is_file() && !path.ends_with("summary.json") && !path.ends_with("report.html")
+                let timed = ["summary.json", "report.html", "checksums.json"];
+                path.is_file() && !timed.iter().any(|name| path.ends_with(name))
             })
             .map(|path| {
                 let name = path.file_name().expect("a file").to_string_lossy().into_owned();

@@ -4,7 +4,8 @@
 //! [`failpoint`] harms them, [`proxy`] stands between them, [`sshd`] beside them, [`browser`] and [`terminal`] look at
 //! them; [`book`] holds the cases, [`case`] compares a figure with a published or derived one of `reference.toml` and says
 //! how it went; [`fuzz`] damages what comes from outside, [`seeds`] plays the pure sessions in a world that goes wrong;
-//! [`tetrahedra`] cuts hexahedra up; [`checker`] looks for nodes inside foreign bodies, without asking the contact code.
+//! [`tetrahedra`] cuts hexahedra up; [`weekend`] has real processes harmed for hours; [`checker`] looks for nodes inside foreign bodies,
+//! without asking the contact code.
 
 pub mod bits;
 pub mod book;
@@ -22,3 +23,4 @@ pub mod solve;
 pub mod sshd;
 pub mod terminal;
 pub mod tetrahedra;
+pub mod weekend;

@@ -119,3 +119,53 @@ fn the_overviews_stay_short() {
         );
     }
 }
+
+/// The last two cells of the row of a Markdown table that begins with this one.
+fn last_cells(text: &str, first: &str) -> [String; 2] {
+    let head = format!("| {first} |");
+    let row = text.lines().find(|line| line.starts_with(&head)).unwrap_or_else(|| panic!("no row {first}"));
+    let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+    [cells[cells.len() - 2].to_owned(), cells[cells.len() - 1].to_owned()]
+}
+
+/// Our defaults beside those of other codes are what a deck without these keys is read as.
+#[test]
+fn the_defaults_that_the_book_tells_are_those_of_the_code() {
+    let page = fs::read_to_string(repository("deploy/book/coming-from.md")).expect("a page of the book");
+    let (_, text) = page.split_once("## Defaults").expect("a table of defaults");
+    let part = |name: &str, at: f64| {
+        format!(
+            "[[part]]\nname = \"{name}\"\nmaterial = \"STEEL_4340\"\nerosion = {{}}\n\
+             box = {{ origin = [0, 0, {at}], size = [1, 1, 1], cell = 0.5 }}\n"
+        )
+    };
+    let deck = format!(
+        "title = \"defaults\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = 1\n[contact]\n{}{}",
+        part("a", 0.0),
+        part("b", 2.0)
+    );
+    let model = deck::read(&deck, "defaults.toml").unwrap_or_else(|faults| panic!("{faults:?}"));
+    let (control, contact) = (&model.setup.control, model.setup.contact.as_ref().expect("contact"));
+    let hourglass = model.mesh.parts[0].hourglass;
+    let starts = |row: &str, words: String| {
+        let [toml, _] = last_cells(text, row);
+        assert!(toml.starts_with(&words), "{row}: the page says {toml:?}, the code {words:?}");
+    };
+    starts("factor of the time step", format!("`safety_factor` {:?}", control.safety_factor));
+    starts("linear viscosity", format!("`linear_viscosity` {:?}", control.linear_viscosity));
+    starts("quadratic viscosity", format!("`quadratic_viscosity` {:?}", control.quadratic_viscosity));
+    starts("growth of the time step", format!("`growth` {:?}", control.growth));
+    starts("stops on an energy error", format!("`energy_error` {:?}", control.energy_error));
+    starts("penalty stiffness", format!("`stiffness` {:?}", contact.stiffness));
+    starts("friction", format!("`friction` {}", contact.friction[1]));
+    // Cells of 0.5 have the smallest faces.
+    starts("gap of contact", format!("`gap_fraction` {:?}", contact.gap / 0.5));
+    assert_eq!(format!("{:?}", hourglass.kind), "AssumedStrain");
+    starts("hourglass control", format!("`assumed-strain` {}", hourglass.coefficient));
+    assert!(!contact.interacts[0], "parts do not meet themselves");
+    starts("contact of a body with itself", "`self_interaction` none".to_owned());
+    assert!(!contact.ignores_initial);
+    starts("parts that start inside others", "`initial_penetration` `refuse`".to_owned());
+    assert!(model.setup.erosion.retain_inertia);
+    starts("freed nodes", "`retain_inertia` true".to_owned());
+}

@@ -7,7 +7,7 @@ use master::{
     http::board::Point,
     results::{
         Folder, HISTORY, REPORT, Summary,
-        history::{History, Table},
+        history::{History, HistoryRow, Table},
         report,
     },
 };
@@ -93,6 +93,7 @@ fn energies_add_up_wherever_they_are_shown() {
             ];
             adds_up(&parts, point.total, 1e-6, "page");
         }
+        assert_momenta(&solved.rows, &path);
         report::write(&out, &Summary::default(), &solved.model.units).expect("a report");
         let page = std::fs::read_to_string(scratch.path().join(REPORT)).expect("the report");
         // The wall of one example waits for a load of another case: nothing moves.
@@ -114,6 +115,17 @@ fn energies_add_up_wherever_they_are_shown() {
         eroding += usize::from(solved.rows.last().is_some_and(|row| row.eroded != 0.0));
     }
     assert_eq!(eroding, 3, "examples that lost energy by erosion");
+}
+
+/// Momenta of parts are exact sums: those of all parts are the momentum to the bit.
+fn assert_momenta(rows: &[HistoryRow], path: &Path) {
+    for row in rows {
+        let sum = row
+            .part_momenta
+            .iter()
+            .fold([0.0; 3], |sum: [f64; 3], part| std::array::from_fn(|axis| sum[axis] + part[axis]));
+        assert_eq!(sum, row.momentum, "{}, cycle {}", path.display(), row.cycle);
+    }
 }
 
 /// The page's script names the shares that the master sends.

@@ -17,6 +17,7 @@ use protocol::{
     message::{Assign, Work, sampled_block},
     phase::Phase,
 };
+use system::clock::thread_cpu_ns;
 
 use crate::{
     session::{Outcome, Task},
@@ -76,32 +77,6 @@ impl ThreadClock {
             contact_ns: self.contact.load(Ordering::Relaxed),
         }
     }
-}
-
-/// Gives the calling thread the lowest priority of the machine's ordinary ones, for good: it runs on what others leave
-/// idle. A machine that refuses leaves it as it was.
-pub fn lowest_priority() {
-    let _ = rustix::process::setpriority_process(Some(rustix::thread::gettid()), LOWEST);
-}
-
-/// Confines the calling thread, and all that it starts from now on, to processors of this machine.
-///
-/// # Errors
-/// If the machine has none of them, or refuses.
-pub fn pin(processors: &[usize]) -> Result<(), String> {
-    let mut set = rustix::thread::CpuSet::new();
-    processors.iter().filter(|n| **n < rustix::thread::CpuSet::MAX_CPU).for_each(|&n| set.set(n));
-    rustix::thread::sched_setaffinity(None, &set)
-        .map_err(|e| format!("processors {processors:?}: {e}; `nproc --all` says how many there are"))
-}
-
-/// The highest nice value of Linux.
-const LOWEST: i32 = 19;
-
-/// CPU time of the calling thread so far (ns).
-pub fn thread_cpu_ns() -> u64 {
-    let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64
 }
 
 /// Positions for a sort, if one is due; a blocking one replaces those under way.

@@ -23,6 +23,7 @@ use protocol::{
     wire,
 };
 use rayon::ThreadPool;
+use system::interrupts::Interrupts;
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
 
@@ -53,6 +54,8 @@ pub struct Options {
     /// Relative speed.
     pub speed: f64,
     pub threads: u32,
+    /// Memory that it may take (bytes); none for what is available.
+    pub memory: Option<u64>,
     /// Folder with this host's certificates.
     pub certs: Option<PathBuf>,
     /// How long a master that cannot be reached is dialled.
@@ -147,24 +150,19 @@ fn greeting(options: &Options) -> Hello {
     );
     hello.token.clone_from(&options.token);
     hello.proof = Some(mechanics::proof::of_this_machine());
+    hello.memory = options.memory.or_else(system::memory::available).unwrap_or_default();
     hello
 }
 
-/// At Ctrl-C or SIGTERM asks to leave at the next plan boundary; ends at the second one, or when the master takes too long.
+/// At Ctrl-C, or another request to end, asks to leave at the next plan boundary; ends at the second one, or when the master takes too long.
 async fn leave_by_and_by(told: &watch::Sender<bool>) {
-    use tokio::signal::unix::{SignalKind, signal};
-    let both = (signal(SignalKind::interrupt()), signal(SignalKind::terminate()));
-    let (Ok(mut interrupt), Ok(mut term)) = both else { return std::future::pending().await };
-    tokio::select! {
-        _ = interrupt.recv() => {}
-        _ = term.recv() => {}
-    }
+    let Ok(mut interrupts) = Interrupts::listen() else { return std::future::pending().await };
+    interrupts.next().await;
     warn!("leaving at the next plan boundary; once more to leave at once");
     notify::say("STOPPING=1\nSTATUS=leaving at the next plan boundary");
     told.send_replace(true);
     tokio::select! {
-        _ = interrupt.recv() => {}
-        _ = term.recv() => {}
+        () = interrupts.next() => {}
         () = tokio::time::sleep(LEAVE_LIMIT) => {
             warn!("no plan boundary within {} s; leaving", LEAVE_LIMIT.as_secs());
         }

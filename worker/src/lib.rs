@@ -3,7 +3,7 @@
 //! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics; [`daemon`]
 //! carries bytes between a master and the compute thread of [`runner`]; [`peers`] between that and other workers.
 //! [`stopwatch`] tells where the time goes, [`notify`] a service manager how this process does;
-//! [`processors`] confines it to some of this machine's.
+//! [`processors`] confines it to some of this machine's, [`memory`] says what there is of that.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 

@@ -1,6 +1,6 @@
 //! Processors that a process is confined to, as users list them.
 
-use std::{collections::HashSet, fs, path::Path, str::FromStr};
+use std::str::FromStr;
 
 /// Processors of this machine, as in `0,2-3`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,7 +15,8 @@ impl Processors {
     /// # Errors
     /// If this machine has none of them.
     pub fn apply(&self) -> Result<(), String> {
-        crate::compute::pin(&self.0)
+        system::processors::pin(&self.0)
+            .map_err(|e| format!("processors {:?}: {e}; `nproc --all` says how many there are", self.0))
     }
 }
 
@@ -24,17 +25,7 @@ impl Processors {
 /// a container.
 pub fn cores() -> usize {
     let granted = std::thread::available_parallelism().map_or(1, usize::from);
-    let allowed = rustix::thread::sched_getaffinity(None)
-        .map(|set| (0..=Processors::LAST).filter(|&n| set.is_set(n)).collect::<Vec<_>>());
-    let distinct = |allowed: Vec<usize>| cores_among(&allowed, Path::new("/sys/devices/system/cpu"));
-    allowed.ok().and_then(distinct).map_or(granted, |cores| cores.clamp(1, granted))
-}
-
-/// Number of cores that processors belong to; none if one of them does not say.
-fn cores_among(processors: &[usize], folder: &Path) -> Option<usize> {
-    let siblings =
-        |n: &usize| fs::read_to_string(folder.join(format!("cpu{n}/topology/thread_siblings_list"))).ok();
-    Some(processors.iter().map(siblings).collect::<Option<HashSet<String>>>()?.len())
+    system::processors::n_cores().map_or(granted, |cores| cores.clamp(1, granted))
 }
 
 impl FromStr for Processors {
@@ -62,16 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn threads_of_one_core_count_once() {
-        let folder = std::env::temp_dir().join(format!("bolide-cores-{}", std::process::id()));
-        for (n, siblings) in [(0, "0,4\n"), (1, "1,5\n"), (4, "0,4\n"), (5, "1,5\n"), (8, "8\n")] {
-            let topology = folder.join(format!("cpu{n}/topology"));
-            fs::create_dir_all(&topology).expect("a folder");
-            fs::write(topology.join("thread_siblings_list"), siblings).expect("a file");
-        }
-        let found = [&[0, 1, 4, 5, 8][..], &[0, 4], &[1, 8], &[0, 9]].map(|list| cores_among(list, &folder));
-        fs::remove_dir_all(&folder).expect("the folder that was made");
-        assert_eq!(found, [Some(3), Some(1), Some(2), None]);
+    fn a_process_has_at_least_one_core_and_no_more_than_it_was_granted() {
         let granted = std::thread::available_parallelism().map_or(1, usize::from);
         assert!((1..=granted).contains(&cores()));
     }

@@ -133,7 +133,9 @@ pub(super) struct Mass {
 pub(super) struct Force {
     pub(super) at: Place,
     pub(super) target: Target,
+    /// Of the global system, or of a coordinate system of this number as it is at the start.
     pub(super) axis: usize,
+    pub(super) system: u32,
     pub(super) curve: u32,
     pub(super) factor: f64,
 }
@@ -404,10 +406,8 @@ impl Conditions {
             "LOAD_NODE_POINT" | "LOAD_NODE_SET" => {
                 let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
                 let Some(axis) = axis_of(f, 1) else { return };
-                if f.id(4) != 0 {
-                    f.fault(4, "the global system", "leave CID blank and give components");
-                }
-                self.forces.push(Force { at, target, axis, curve: f.id(2), factor: scale(f, 3) });
+                let (curve, factor, system) = (f.id(2), scale(f, 3), f.id(4));
+                self.forces.push(Force { at, target, axis, curve, factor, system });
             }
             "LOAD_SEGMENT" | "LOAD_SEGMENT_SET" => {
                 let (set, i) = if of_set { (f.id(0), 2) } else { (0, 1) };

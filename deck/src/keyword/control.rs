@@ -98,6 +98,21 @@ impl SectionCard {
     }
 }
 
+/// Adds the numbers of cards of eight to a list.
+fn listed(block: &Block<'_>, context: &Context<'_>, list: &mut Vec<(Place, u32)>) {
+    for card in &block.cards {
+        let f = context.fields(card, block.width, &TENS);
+        list.extend((0..8).map(|i| (card.at, f.id(i))).filter(|(_, id)| *id != 0));
+    }
+}
+
+/// Adds the numbers at the head of cards to a list.
+fn headed(block: &Block<'_>, context: &Context<'_>, list: &mut Vec<(Place, u32)>) {
+    for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
+        list.push((card.at, context.fields(card, block.width, &[10, 70]).id(0)));
+    }
+}
+
 /// What the control cards say; none is what no card said.
 #[derive(Default)]
 pub(super) struct ControlCards {
@@ -118,6 +133,9 @@ pub(super) struct ControlCards {
     /// Nodes and sets of nodes whose motion is to be written.
     pub(super) gauges: Vec<(Place, u32)>,
     pub(super) gauge_sets: Vec<(Place, u32)>,
+    /// The same of solids (0) and shells (1).
+    pub(super) element_gauges: [Vec<(Place, u32)>; 2],
+    pub(super) element_gauge_sets: [Vec<(Place, u32)>; 2],
 }
 
 impl ControlCards {
@@ -241,14 +259,16 @@ impl ControlCards {
                     self.period = Some((card.at, period));
                 }
             }
-            word @ ("DATABASE_HISTORY_NODE" | "DATABASE_HISTORY_NODE_SET") => {
-                let sets = word.ends_with("SET");
-                for card in &block.cards {
-                    let f = context.fields(card, block.width, &TENS);
-                    let list = if sets { &mut self.gauge_sets } else { &mut self.gauges };
-                    list.extend((0..8).map(|i| (card.at, f.id(i))).filter(|(_, id)| *id != 0));
-                }
-            }
+            "DATABASE_HISTORY_NODE" => listed(block, context, &mut self.gauges),
+            "DATABASE_HISTORY_NODE_SET" => listed(block, context, &mut self.gauge_sets),
+            "DATABASE_HISTORY_SOLID" => listed(block, context, &mut self.element_gauges[0]),
+            "DATABASE_HISTORY_SOLID_SET" => listed(block, context, &mut self.element_gauge_sets[0]),
+            "DATABASE_HISTORY_SHELL" => listed(block, context, &mut self.element_gauges[1]),
+            "DATABASE_HISTORY_SHELL_SET" => listed(block, context, &mut self.element_gauge_sets[1]),
+            // One of a card, with a heading behind it.
+            "DATABASE_HISTORY_NODE_ID" => headed(block, context, &mut self.gauges),
+            "DATABASE_HISTORY_SOLID_ID" => headed(block, context, &mut self.element_gauges[0]),
+            "DATABASE_HISTORY_SHELL_ID" => headed(block, context, &mut self.element_gauges[1]),
             "DATABASE_CROSS_SECTION_PLANE"
             | "DATABASE_CROSS_SECTION_PLANE_ID"
             | "DATABASE_CROSS_SECTION_SET"

@@ -62,6 +62,27 @@ impl Limits {
         }
     }
 
+    /// Reads two fields with the relative volumes, of expansion and of compaction, at which elements leave: 0 for none.
+    pub(super) fn read_volumes(&mut self, f: &Fields<'_>, fields: [usize; 2], names: [&'static str; 2]) {
+        let volumes = fields.map(|i| f.real(i, 0.0));
+        let criteria = [(Criterion::Expansion, 1.0), (Criterion::Compaction, -1.0)];
+        for (((i, name), volume), (criterion, sign)) in
+            fields.into_iter().zip(names).zip(volumes).zip(criteria)
+        {
+            if volume == 0.0 || volume >= NEVER {
+                continue;
+            }
+            // Ours are logarithms of the volume over the initial one.
+            let limit = if volume > 0.0 { sign * libm::log(volume) } else { -1.0 };
+            if criterion.range().admits(limit) {
+                self.add(criterion, f.placed(i, name, limit));
+            } else {
+                let side = if sign > 0.0 { "above 1" } else { "between 0 and 1" };
+                f.fault(i, format!("{name}: a relative volume {side}"), "correct it, or leave it blank");
+            }
+        }
+    }
+
     /// Reads a field that holds the least time step of an element: 0 for none.
     pub(super) fn read_time_step(&mut self, f: &Fields<'_>, i: usize, name: &'static str) {
         let step = f.real(i, 0.0);

@@ -12,6 +12,7 @@ use super::{
     cards::Block,
     condition::AXES_OF_CODE,
     erosion::Limits,
+    explosive::{self, Jwl},
     fields::{Context, Fields, TENS},
 };
 use crate::{
@@ -71,6 +72,11 @@ pub(super) enum Law {
     Null {
         cut_off: Placed<f64>,
     },
+    /// Speed and pressure of detonation.
+    Explosive {
+        speed: f64,
+        pressure: f64,
+    },
     /// Axes along which and about which the part does not move.
     Rigid {
         held: [[bool; 3]; 2],
@@ -84,6 +90,7 @@ pub(super) enum EosCard {
         s: f64,
         gamma: f64,
     },
+    Jwl(Jwl),
     /// C0 to C6 and E0.
     Polynomial {
         origin: Origin,
@@ -261,10 +268,12 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
             if f[0].real(3, 0.0) != 0.0 {
                 log.warn(cards[0].at, "MU: fluids have no shear viscosity here");
             }
-            for i in [4, 5].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
-                f[0].fault(i, "no relative volume at which elements fail", "leave TEROD and CEROD blank");
-            }
+            limits.read_volumes(&f[0], [4, 5], ["TEROD", "CEROD"]);
             (None, Some(Law::Null { cut_off: f[0].placed(2, "PC", cut_off) }))
+        }
+        "MAT_HIGH_EXPLOSIVE_BURN" | "MAT_008" => {
+            needs_moduli = false;
+            (None, explosive::read_material(&f[0], context))
         }
         "MAT_RIGID" => {
             if f[0].real(4, 0.0) != 0.0 {
@@ -412,6 +421,7 @@ pub(super) fn read_eos(block: &Block<'_>, context: &Context<'_>) -> Option<EosCa
                 gamma: not_negative(&f[0], 5),
             })
         }
+        "EOS_JWL" | "EOS_002" => explosive::read_jwl(&f[0]),
         "EOS_LINEAR_POLYNOMIAL" | "EOS_001" => {
             if !matches!(f[1].real(1, 0.0), 0.0 | 1.0) {
                 f[1].fault(1, "a relative volume of 1 at the start", "leave V0 blank");
@@ -424,7 +434,7 @@ pub(super) fn read_eos(block: &Block<'_>, context: &Context<'_>) -> Option<EosCa
             log.fault(
                 block.at,
                 format!("*{}", log.quote(&block.keyword)),
-                "EOS_GRUNEISEN or EOS_LINEAR_POLYNOMIAL",
+                "EOS_GRUNEISEN, EOS_LINEAR_POLYNOMIAL or EOS_JWL",
                 "choose one of them",
             );
             None

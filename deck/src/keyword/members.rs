@@ -44,6 +44,10 @@ impl Problem {
                 Entry::All => known.keys().copied().collect(),
                 Entry::Node(id) => known.contains_key(id).then_some(*id).into_iter().collect(),
                 Entry::Range(first, last) => known.range(first..=last).map(|(id, _)| *id).collect(),
+                Entry::Steps(first, last, step) => {
+                    let range = known.range(first..=last).map(|(id, _)| *id);
+                    range.filter(|id| (id - first).is_multiple_of(*step)).collect()
+                }
                 Entry::Part(part) => known.iter().filter(|(_, of)| *of == part).map(|(id, _)| *id).collect(),
                 Entry::Box(_) | Entry::Set(_) | Entry::Segment(_) => Vec::new(),
             };
@@ -87,6 +91,13 @@ impl Problem {
                     self.nodes.iter().map(|n| n.id).filter(|id| (first..=last).contains(&id)).collect()
                 }
                 Entry::Range(first, last) => self.parts.range(first..=last).map(|(id, _)| *id).collect(),
+                Entry::Steps(first, last, step) => {
+                    let is = |id: &u32| (first..=last).contains(&id) && (id - first).is_multiple_of(*step);
+                    match of_nodes {
+                        true => self.nodes.iter().map(|n| n.id).filter(is).collect(),
+                        false => self.parts.keys().copied().filter(is).collect(),
+                    }
+                }
                 Entry::Part(part) => self.nodes_of_part(*part),
                 Entry::Box(number) => {
                     let inside = self.within(*number, *at, log);

@@ -8,6 +8,7 @@ use super::{
     contact::ContactCard,
     control::ControlCards,
     erosion::Limits,
+    explosive::DetonationCard,
     material::{EosCard, MaterialCard},
     rigid::RigidCards,
     set::Sets,
@@ -135,6 +136,9 @@ pub(super) struct Problem {
     pub(super) systems: BTreeMap<u32, [[f64; 3]; 3]>,
     /// Direction of each vector.
     pub(super) vectors: BTreeMap<u32, [f64; 3]>,
+    pub(super) detonations: Vec<DetonationCard>,
+    /// Sets of segments through which waves leave.
+    pub(super) transmitting: Vec<(Place, u32)>,
     pub(super) blasts: Blasts,
     pub(super) conditions: Conditions,
     pub(super) rigid: RigidCards,

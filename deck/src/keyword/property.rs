@@ -1,8 +1,8 @@
 //! `*PART`, `*SECTION_` and `*HOURGLASS`.
 
 use super::{
-    cards::Block,
-    fields::{Context, TENS},
+    cards::{Block, Card},
+    fields::{Context, Fields, TENS},
     problem::{Hourglass, PartCard, Problem, Section, ShellSection},
 };
 
@@ -16,34 +16,39 @@ pub(super) fn read_parts(problem: &mut Problem, block: &Block<'_>, context: &Con
             return;
         };
         let f = context.fields(card, block.width, &TENS);
-        let part = PartCard {
-            at: card.at,
-            title: cards[0].text.trim().to_string(),
-            section: f.reference(1, "SECID"),
-            material: f.reference(2, "MID"),
-            eos: f.reference(3, "EOSID"),
-            hourglass: f.id(4),
-        };
-        if f.integer(6) != 0 {
-            f.fault(6, "no adaptive mesh", "leave ADPOPT blank");
-        }
-        if f.integer(5) != 0 {
-            f.fault(5, "no part of its own for gravity", "leave GRAV blank");
-        }
+        read_part(problem, &cards[0], &f, context);
         if contact {
             context.log.warn(
                 card.at,
                 "*PART_CONTACT: its third card is not used; contact takes its friction from *CONTACT",
             );
         }
-        let id = f.id(0);
-        if let Some(first) = problem.parts.insert(id, part) {
-            f.fault(
-                0,
-                format!("a part number other than {id}, which {} has", context.log.line(first.at, card.at)),
-                "renumber one",
-            );
-        }
+    }
+}
+
+/// The heading and the card with the numbers of a part.
+pub(super) fn read_part(problem: &mut Problem, heading: &Card<'_>, f: &Fields<'_>, context: &Context<'_>) {
+    let part = PartCard {
+        at: f.at,
+        title: heading.text.trim().to_string(),
+        section: f.reference(1, "SECID"),
+        material: f.reference(2, "MID"),
+        eos: f.reference(3, "EOSID"),
+        hourglass: f.id(4),
+    };
+    if f.integer(6) != 0 {
+        f.fault(6, "no adaptive mesh", "leave ADPOPT blank");
+    }
+    if f.integer(5) != 0 {
+        f.fault(5, "no part of its own for gravity", "leave GRAV blank");
+    }
+    let id = f.id(0);
+    if let Some(first) = problem.parts.insert(id, part) {
+        f.fault(
+            0,
+            format!("a part number other than {id}, which {} has", context.log.line(first.at, f.at)),
+            "renumber one",
+        );
     }
 }
 

@@ -8,12 +8,13 @@ use super::{
     cards::{Block, Lines},
     condition::Conditions,
     contact::ContactCard,
-    define, erosion,
+    define, erosion, explosive,
     fields::{Context, TENS},
-    material, mesh,
+    inertia, material, mesh,
     problem::{Problem, UnitsCard},
     property,
     rigid::RigidCards,
+    transmit,
 };
 use crate::{log::Log, place::Place};
 
@@ -137,6 +138,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "ELEMENT_SHELL_THICKNESS" => mesh::read_shells(problem, block, context, true),
         "PART" => property::read_parts(problem, block, context, false),
         "PART_CONTACT" => property::read_parts(problem, block, context, true),
+        "PART_INERTIA" => inertia::read(problem, block, context),
         "SECTION_SOLID" => property::read_solid_sections(problem, block, context),
         "SECTION_SHELL" => property::read_shell_sections(problem, block, context),
         "SECTION_BEAM" => property::read_beam_sections(problem, block, context),
@@ -147,6 +149,10 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "DEFINE_COORDINATE_SYSTEM" | "DEFINE_COORDINATE_NODES" | "DEFINE_COORDINATE_VECTOR" => {
             define::read_system(problem, block, context);
         }
+        "BOUNDARY_NON_REFLECTING" => transmit::read(problem, block, context),
+        "INITIAL_DETONATION" => explosive::read_detonations(problem, block, context),
+        // Lines that other programs draw.
+        "ELEMENT_PLOTEL" => log.ignore(block.at, "ELEMENT_PLOTEL"),
         "CONTROL_UNITS" => {
             let card = block.card(0);
             let f = context.fields(&card, block.width, &TENS);

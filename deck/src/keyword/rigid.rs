@@ -6,6 +6,7 @@ use super::{
     cards::Block,
     condition::{AXES_OF_CODE, Driven, Target, Way, motions},
     fields::{Context, Fields, TENS},
+    inertia::Inertia,
 };
 use crate::place::Place;
 
@@ -34,11 +35,20 @@ pub(super) struct BodyMotion {
     pub(super) how: Driven,
 }
 
-/// A rigid body of the nodes of a set.
+/// The nodes of a rigid body without parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum BodyNodes {
+    Set(u32),
+    /// Those of a spot weld.
+    Pair([u32; 2]),
+}
+
+/// A rigid body of nodes.
 pub(super) struct NodalBody {
     pub(super) at: Place,
+    /// 0 of a spot weld, which nothing moves.
     pub(super) id: u32,
-    pub(super) set: u32,
+    pub(super) nodes: BodyNodes,
     /// Translations, then rotations that are held, by axis.
     pub(super) held: [[bool; 3]; 2],
 }
@@ -68,6 +78,8 @@ pub(super) struct RigidCards {
     pub(super) starts: Vec<BodyStart>,
     pub(super) of_nodes: Vec<NodalBody>,
     pub(super) extra: Vec<ExtraNodes>,
+    /// Of parts by number.
+    pub(super) inertias: BTreeMap<u32, Inertia>,
 }
 
 impl RigidCards {
@@ -86,6 +98,8 @@ impl RigidCards {
                 | "CONSTRAINED_NODAL_RIGID_BODY"
                 | "CONSTRAINED_NODAL_RIGID_BODY_SPC"
                 | "CONSTRAINED_NODAL_RIGID_BODY_INERTIA"
+                | "CONSTRAINED_SPOTWELD"
+                | "CONSTRAINED_SPOTWELD_ID"
                 | "CONSTRAINED_EXTRA_NODES_NODE"
                 | "CONSTRAINED_EXTRA_NODES_SET"
         )
@@ -122,6 +136,10 @@ impl RigidCards {
             }),
             word => {
                 let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
+                if named && word == "CONSTRAINED_SPOTWELD" {
+                    // The number of the weld.
+                    cards.next();
+                }
                 while let Some(card) = cards.next() {
                     let f = context.fields(card, block.width, &TENS);
                     self.line(word, &f);
@@ -170,6 +188,14 @@ impl RigidCards {
                 spin: f.vector(4),
                 system: f.id(7),
             }),
+            "CONSTRAINED_SPOTWELD" => {
+                let fails = [(2, "SN"), (3, "SS"), (6, "TF"), (7, "EP")];
+                for (i, name) in fails.into_iter().filter(|(i, _)| (1e-30..1e19).contains(&f.real(*i, 0.0))) {
+                    f.fault(i, format!("{name} blank: spot welds do not fail here"), "leave it blank");
+                }
+                let nodes = BodyNodes::Pair([f.id(0), f.id(1)]);
+                self.of_nodes.push(NodalBody { at, id: 0, nodes, held: Default::default() });
+            }
             "CONSTRAINED_EXTRA_NODES_NODE" | "CONSTRAINED_EXTRA_NODES_SET" => {
                 let target =
                     if word.ends_with("_SET") { Target::NodeSet(f.id(1)) } else { Target::Node(f.id(1)) };
@@ -183,7 +209,8 @@ impl RigidCards {
                         "leave DRFLAG and RRFLAG blank",
                     );
                 }
-                self.of_nodes.push(NodalBody { at, id: f.id(0), set: f.id(2), held: Default::default() });
+                let nodes = BodyNodes::Set(f.id(2));
+                self.of_nodes.push(NodalBody { at, id: f.id(0), nodes, held: Default::default() });
             }
         }
     }

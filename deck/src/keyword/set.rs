@@ -14,6 +14,8 @@ pub(super) enum Entry {
     All,
     Node(u32),
     Range(u32, u32),
+    /// From the first to the last in steps.
+    Steps(u32, u32, u32),
     Part(u32),
     Box(u32),
     Set(u32),
@@ -43,7 +45,10 @@ impl Sets {
         let kind = match kind {
             "NODE" | "PART" | "SEGMENT" => kind,
             "SOLID" | "SHELL" | "BEAM"
-                if matches!(way, "" | "LIST" | "LIST_GENERATE" | "GENERATE" | "GENERAL") =>
+                if matches!(
+                    way,
+                    "" | "LIST" | "LIST_GENERATE" | "LIST_GENERATE_INCREMENT" | "GENERATE" | "GENERAL"
+                ) =>
             {
                 kind
             }
@@ -83,6 +88,22 @@ impl Sets {
                         entries.push((Entry::Range(first, last), false));
                     }
                 }
+                ("NODE" | "PART" | "SOLID" | "SHELL" | "BEAM", "LIST_GENERATE_INCREMENT") => {
+                    let [first, last, step] = [0, 1, 2].map(|i| f.id(i));
+                    if last < first || step == 0 {
+                        f.fault(
+                            1,
+                            "a last number not below the first, and a step above 0",
+                            "correct the range",
+                        );
+                        continue;
+                    }
+                    entries.push((Entry::Steps(first, last, step), false));
+                }
+                // What stands behind the number is used by keywords that are not read.
+                ("NODE" | "PART", "COLUMN") => {
+                    entries.extend(Some(f.id(0)).filter(|id| *id != 0).map(|id| (Entry::Node(id), false)));
+                }
                 ("NODE" | "PART", "ADD") => {
                     let each = (0..8).map(|i| f.id(i)).filter(|id| *id != 0);
                     entries.extend(each.map(|id| (Entry::Set(id), false)));
@@ -90,7 +111,8 @@ impl Sets {
                 (_, "GENERAL") => general(kind, &f, &mut entries),
                 _ => {
                     let log = context.log;
-                    let expected = "SET_NODE, SET_PART or SET_SEGMENT with LIST, GENERATE, GENERAL or ADD";
+                    let expected =
+                        "SET_NODE, SET_PART or SET_SEGMENT with LIST, GENERATE, COLUMN, GENERAL or ADD";
                     log.fault(
                         block.at,
                         format!("*{}", log.quote(&block.keyword)),

@@ -5,6 +5,7 @@ mod condition;
 mod contact;
 mod control;
 mod element;
+mod explosive;
 mod hourglass;
 mod material;
 mod motion;
@@ -40,6 +41,8 @@ pub(super) fn translate(
     condition::write_motions(&mut t);
     condition::write_forces(&mut t);
     condition::write_pressures(&mut t);
+    condition::write_transmitting(&mut t);
+    explosive::write_detonations(&mut t);
     blast::write(&mut t);
     condition::write_gravity(&mut t);
     condition::write_part_gravities(&mut t);

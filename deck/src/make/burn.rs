@@ -19,15 +19,22 @@ pub(super) fn make(
     match (deck.detonations.first(), explosive) {
         (None, Some(part)) => log.fault(
             part.at,
-            format!("part \"{}\" of an explosive in a deck without [[detonation]]", part.name),
+            format!(
+                "part \"{}\" of an explosive in a deck without {}",
+                part.name,
+                log.say("[[detonation]]", "*INITIAL_DETONATION")
+            ),
             "at least one point that lights it",
-            "add [[detonation]] with point = [x, y, z]",
+            log.say("add [[detonation]] with point = [x, y, z]", "add *INITIAL_DETONATION"),
         ),
         // A part whose material could not be read may have been meant.
         (Some((at, _)), None) if parts.iter().all(|part| part.material.is_some()) => log.fault(
             *at,
-            "[[detonation]] in a deck without an explosive",
-            "a part with a jwl equation of state",
+            log.say(
+                "[[detonation]] in a deck without an explosive",
+                "*INITIAL_DETONATION in a deck without an explosive",
+            ),
+            log.say("a part with a jwl equation of state", "a part of *MAT_HIGH_EXPLOSIVE_BURN"),
             "remove it, or choose an explosive",
         ),
         _ => {}

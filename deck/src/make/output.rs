@@ -31,6 +31,7 @@ pub(super) fn make(
         snapshot_seconds: given.snapshot_seconds,
         snapshot_cycles: given.snapshot_cycles,
         fields: given.fields.clone(),
+        formats: given.formats.clone(),
         compress: given.compress,
         workers: given.workers,
         contact_surface: surface.is_some(),
@@ -39,7 +40,8 @@ pub(super) fn make(
         gauges: Vec::new(),
         element_gauges: Vec::new(),
     };
-    let finder = Finder { names, assembly, log };
+    let planes = deck.symmetry.as_ref().map_or([false; 3], |symmetry| symmetry.planes);
+    let finder = Finder { names, assembly, planes, log };
     for gauge in &deck.gauges {
         if let Some(name) = &gauge.name
             && (output.gauges.iter().any(|g| g.name == name.value)
@@ -96,6 +98,8 @@ fn contact_forces(deck: &Deck, names: &Names<'_>, log: &Log<'_>) -> Vec<[u32; 2]
 struct Finder<'a> {
     names: &'a Names<'a>,
     assembly: &'a Assembly,
+    /// Planes of symmetry.
+    planes: [bool; 3],
     log: &'a Log<'a>,
 }
 
@@ -112,8 +116,14 @@ impl Finder<'_> {
                 node
             }
             (Spot::Number(id), Kind::Element) => {
-                let mut ids = self.assembly.mesh.parts.iter().flat_map(|part| &part.element_ids);
-                let found = ids.position(|&other| other == id.value).map(|index| index as u32);
+                // Of another part it may be an element of another kind.
+                let only = gauge.part.as_ref().and_then(|part| self.names.one(part));
+                let parts = self.assembly.mesh.parts.iter().enumerate();
+                let mut ids =
+                    parts.flat_map(|(p, part)| part.element_ids.iter().map(move |other| (p, *other)));
+                let found = ids
+                    .position(|(p, other)| other == id.value && only.is_none_or(|only| only == p))
+                    .map(|index| index as u32);
                 if found.is_none() {
                     let advice = "choose an element of the mesh, or write point = [x, y, z]";
                     self.log.fault_of(id.origin, "the number of an element", advice);
@@ -126,43 +136,70 @@ impl Finder<'_> {
                     Some(part) => self.names.one(part).into_iter().collect(),
                 };
                 match of {
-                    Kind::Node => self.nearest_node(point, &selected),
-                    Kind::Element => self.nearest_element(point, &selected),
+                    Kind::Node => {
+                        let (node, part, distance) = self.nearest_node(point.value, &selected)?;
+                        let id = self.assembly.mesh.node_ids[node as usize];
+                        self.within_a_cell(point, part, distance, &format!("a node; the nearest, {id},"));
+                        Some(node)
+                    }
+                    Kind::Element => {
+                        let (element, part, distance) = self.nearest_element(point.value, &selected)?;
+                        self.within_a_cell(point, part, distance, "the centre of an element; the nearest");
+                        Some(element)
+                    }
+                }
+            }
+            (Spot::Centre, of) => {
+                let part = self.names.one(gauge.part.as_ref()?)?;
+                let centre = self.centre(part)?;
+                match of {
+                    Kind::Node => self.nearest_node(centre, &[part]).map(|(node, ..)| node),
+                    Kind::Element => self.nearest_element(centre, &[part]).map(|(element, ..)| element),
                 }
             }
         }
     }
 
-    /// The node of the selected parts nearest to a point, the lowest of several.
-    fn nearest_node(&self, point: &Placed<[f64; 3]>, selected: &[usize]) -> Option<u32> {
+    /// The middle of the box around a part; of the whole body, where a plane of symmetry cuts it.
+    fn centre(&self, part: usize) -> Option<[f64; 3]> {
+        let mesh = &self.assembly.mesh;
+        let nodes = &mesh.parts.get(part).filter(|part| !part.nodes.is_empty())?.nodes;
+        let tolerance = 1e-3 * self.assembly.largest_edge[part];
+        Some([0, 1, 2].map(|axis| {
+            let along = || nodes.iter().map(|&node| mesh.positions[node as usize][axis]);
+            let (low, high) =
+                (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
+            if self.planes[axis] && low.abs() <= tolerance { 0.0 } else { 0.5 * (low + high) }
+        }))
+    }
+
+    /// Reports a point from which `what` of the part is farther than a cell.
+    fn within_a_cell(&self, point: &Placed<[f64; 3]>, part: usize, distance: f64, what: &str) {
+        let cell = self.assembly.largest_edge[part];
+        if distance > cell {
+            let expected =
+                format!("a point within one cell ({}) of {what} is {} away", short(cell), short(distance));
+            self.log.fault_of(point.origin, expected, "move the point into a part");
+        }
+    }
+
+    /// The node of the selected parts nearest to a point, the lowest of several, with its part and distance.
+    fn nearest_node(&self, point: [f64; 3], selected: &[usize]) -> Option<(u32, usize, f64)> {
         let mesh = &self.assembly.mesh;
         let mut best: Option<(u32, usize, f64)> = None;
         for &p in selected {
             for &node in &mesh.parts[p].nodes {
-                let distance = norm(sub(mesh.positions[node as usize], point.value));
+                let distance = norm(sub(mesh.positions[node as usize], point));
                 if best.is_none_or(|(_, _, d)| distance < d) {
                     best = Some((node, p, distance));
                 }
             }
         }
-        let (node, p, distance) = best?;
-        if distance > self.assembly.largest_edge[p] {
-            self.log.fault_of(
-                point.origin,
-                format!(
-                    "a point within one cell ({}) of a node; the nearest, {}, is {} away",
-                    short(self.assembly.largest_edge[p]),
-                    mesh.node_ids[node as usize],
-                    short(distance)
-                ),
-                "move the point into a part",
-            );
-        }
-        Some(node)
+        best
     }
 
-    /// The element of the selected parts whose centre is nearest to a point.
-    fn nearest_element(&self, point: &Placed<[f64; 3]>, selected: &[usize]) -> Option<u32> {
+    /// The element of the selected parts whose centre is nearest to a point, with its part and distance.
+    fn nearest_element(&self, point: [f64; 3], selected: &[usize]) -> Option<(u32, usize, f64)> {
         let mesh = &self.assembly.mesh;
         let offsets = mesh.element_offsets();
         let mut best: Option<(u32, usize, f64)> = None;
@@ -170,24 +207,12 @@ impl Finder<'_> {
             for e in 0..mesh.parts[p].n_elements() {
                 let corners = mesh.parts[p].corners(e).map(|n| mesh.positions[n as usize]);
                 let centre = [0, 1, 2].map(|a| 0.125 * corners.iter().map(|x| x[a]).sum::<f64>());
-                let distance = norm(sub(centre, point.value));
+                let distance = norm(sub(centre, point));
                 if best.is_none_or(|(_, _, least)| distance < least) {
                     best = Some(((offsets[p] + e) as u32, p, distance));
                 }
             }
         }
-        let (element, p, distance) = best?;
-        if distance > self.assembly.largest_edge[p] {
-            self.log.fault_of(
-                point.origin,
-                format!(
-                    "a point within one cell ({}) of the centre of an element; the nearest is {} away",
-                    short(self.assembly.largest_edge[p]),
-                    short(distance)
-                ),
-                "move the point into a part",
-            );
-        }
-        Some(element)
+        best
     }
 }

@@ -3,7 +3,7 @@
 use super::entry::{direction, nodes, parts_of, text};
 use crate::{
     limits::{MAX_ENTRIES, MAX_ID, MAX_SECTIONS},
-    model::FIELD_NAMES,
+    model::{FIELD_NAMES, FORMAT_NAMES},
     place::Placed,
     table::{Range, Table, Value},
     typed::{Cut, Gauge, Kind, Output, PartPairs, Section, Spot, condition::Region},
@@ -17,7 +17,8 @@ pub(super) fn read(deck: &Table<'_>) -> Output {
     output.history_cycles = table.integer_or("history_cycles", 10, 1, 1_000_000_000) as u32;
     output.snapshot_seconds = table.get("snapshot_seconds").and_then(|v| v.number(Range::Positive));
     output.snapshot_cycles = table.get("snapshot_cycles").and_then(|v| v.integer(1, 1_000_000_000));
-    output.fields = read_fields(&table);
+    output.fields = read_names(&table, "fields", &FIELD_NAMES);
+    output.formats = read_names(&table, "formats", &FORMAT_NAMES);
     let flag = |key: &'static str| table.get(key).and_then(|v| v.boolean());
     output.compress = flag("compress").unwrap_or(true);
     output.workers = flag("workers").unwrap_or(false);
@@ -39,15 +40,16 @@ fn read_contact_forces(table: &Table<'_>) -> Option<Placed<PartPairs>> {
     Some(value.placed(pairs))
 }
 
-fn read_fields(table: &Table<'_>) -> Vec<String> {
-    let mut fields = Vec::new();
-    for item in table.get("fields").and_then(|v| v.items()).unwrap_or_default() {
-        let Some(name) = item.one_of(&FIELD_NAMES).map(|index| FIELD_NAMES[index]) else { continue };
-        if !fields.iter().any(|f| f == name) {
-            fields.push(name.to_string());
+/// A list of names that are known, each once.
+fn read_names(table: &Table<'_>, key: &'static str, known: &[&'static str]) -> Vec<String> {
+    let mut names = Vec::new();
+    for item in table.get(key).and_then(|v| v.items()).unwrap_or_default() {
+        let Some(name) = item.one_of(known).map(|index| known[index]) else { continue };
+        if !names.iter().any(|n| n == name) {
+            names.push(name.to_string());
         }
     }
-    fields
+    names
 }
 
 /// Keys of the elements that a section lists.
@@ -84,7 +86,7 @@ pub(super) fn read_sections(deck: &Table<'_>) -> Vec<Section> {
     deck.tables("section", MAX_SECTIONS).into_iter().map(section).collect()
 }
 
-/// Reads every `[[gauge]]`: at a node or element number, or at the node or element nearest to a point.
+/// Reads every `[[gauge]]`: at a node or element number, or at the node or element nearest to a point or to the centre of a part.
 pub(super) fn read_gauges(deck: &Table<'_>) -> Vec<Gauge> {
     let gauge = |table: Table<'_>| {
         let value = table.require("name", "a name in quotes");
@@ -99,12 +101,15 @@ pub(super) fn read_gauges(deck: &Table<'_>) -> Vec<Gauge> {
                 number.map(|id| Spot::Number(value.placed(id as u32)))
             }
             (None, Some(value)) => value.vector().map(|point| Spot::Point(value.placed(point))),
+            (None, None) if table.has("part") => Some(Spot::Centre),
             _ => {
                 table.faults.add(
                     table.at,
                     format!("{} with neither or both of {key} and point", table.title),
                     "one of them",
-                    format!("write {key} = number or point = [x, y, z]"),
+                    format!(
+                        "write {key} = number or point = [x, y, z], or part = \"name\" alone for its centre"
+                    ),
                 );
                 None
             }

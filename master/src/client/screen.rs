@@ -1,6 +1,6 @@
 //! SCREEN: the whole terminal as a page of lines, and the keys that are pressed meanwhile.
 //!
-//! A terminal is what understands the escape sequences of ECMA-48, as all do that Linux and macOS have. Lines that are too
+//! A terminal is what understands the escape sequences of ECMA-48, as those of Linux, macOS and Windows do. Lines that are too
 //! long end at its edge. Dropping a screen gives the terminal back as it was.
 
 use std::{
@@ -8,10 +8,7 @@ use std::{
     time::Duration,
 };
 
-use rustix::{
-    event::{PollFd, PollFlags, Timespec, poll},
-    termios::{OptionalActions, Termios, tcgetattr, tcgetwinsize, tcsetattr},
-};
+use system::terminal::Terminal;
 
 /// The other page of the terminal, without cursor and without wrapping.
 const ENTER: &str = "\x1b[?1049h\x1b[?25l\x1b[?7l";
@@ -58,7 +55,7 @@ impl Key {
 
 /// The terminal of this process while it shows a page.
 pub struct Screen {
-    before: Termios,
+    terminal: Terminal,
 }
 
 impl Screen {
@@ -67,11 +64,7 @@ impl Screen {
     /// # Errors
     /// If there is none, or it refuses.
     pub fn open() -> io::Result<Self> {
-        let before = tcgetattr(io::stdin())?;
-        let mut raw = before.clone();
-        raw.make_raw();
-        tcsetattr(io::stdin(), OptionalActions::Now, &raw)?;
-        let screen = Self { before };
+        let screen = Self { terminal: Terminal::open()? };
         io::stdout().write_all(ENTER.as_bytes())?;
         Ok(screen)
     }
@@ -81,8 +74,7 @@ impl Screen {
     /// # Errors
     /// If the terminal does not say.
     pub fn size(&self) -> io::Result<(usize, usize)> {
-        let size = tcgetwinsize(io::stdout())?;
-        Ok((usize::from(size.ws_col), usize::from(size.ws_row)))
+        self.terminal.size()
     }
 
     /// Shows lines from the top, and nothing below them.
@@ -102,17 +94,8 @@ impl Screen {
     /// # Errors
     /// If the terminal is gone.
     pub fn key(&self, wait: Duration) -> io::Result<Option<Key>> {
-        let stdin = io::stdin();
-        let mut watched = [PollFd::new(&stdin, PollFlags::IN)];
-        let wait = Timespec { tv_sec: wait.as_secs() as i64, tv_nsec: i64::from(wait.subsec_nanos()) };
-        match poll(&mut watched, Some(&wait)) {
-            Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(None),
-            Ok(_) => {}
-            Err(error) => return Err(error.into()),
-        }
         let mut bytes = [0; 64];
-        let n = rustix::io::read(&stdin, &mut bytes)?;
-        Ok(Some(Key::of(&bytes[..n])))
+        Ok(self.terminal.read(wait, &mut bytes)?.map(Key::of))
     }
 }
 
@@ -120,7 +103,6 @@ impl Drop for Screen {
     fn drop(&mut self) {
         // A terminal that is gone needs nothing back.
         let _ = io::stdout().write_all(LEAVE.as_bytes()).and_then(|()| io::stdout().flush());
-        let _ = tcsetattr(io::stdin(), OptionalActions::Now, &self.before);
     }
 }
 

@@ -92,7 +92,7 @@ fn imbalance(shares: &[Share]) -> Option<f64> {
     (total > 0.0 && speed > 0.0).then(|| most * speed / total)
 }
 
-/// Cells of a job: number, state, cycle, rate, balance, title, note.
+/// Cells of a job: number, state, cycle, rate, planned imbalance (the page shows the measured one), title, note.
 fn job_cells(job: &Status, seen: &Seen) -> [String; 7] {
     let failure = job.ended.as_ref().and_then(|ended| ended.failure.clone());
     let digest = job.ended.as_ref().and_then(|ended| ended.digest.clone());
@@ -129,7 +129,7 @@ fn host_cells(host: &HostRow, seen: &Seen) -> [String; 7] {
     ]
 }
 
-const JOB_TITLES: [&str; 7] = ["job", "state", "cycle", "cycles/s", "balance", "title", "note"];
+const JOB_TITLES: [&str; 7] = ["job", "state", "cycle", "cycles/s", "planned", "title", "note"];
 const HOST_TITLES: [&str; 7] = ["host", "state", "speed", "threads", "lanes", "elements", "note"];
 
 fn plain(seen: &Seen) -> String {

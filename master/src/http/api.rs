@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `GET /api/overview` | `{version, join, jobs, hosts}`; a job is a status with `brief` once it runs |
 //! | `GET /api/events` | the same as server-sent events, whenever it changes, at most twice a second |
-//! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N`, body the deck | `{job}`; 422 `{faults: [{line, column, ...}]}` |
+//! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N`, body the deck | `{job}`; 422 `{faults: [{file, line, column, ...}]}` |
 //! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes}`, or 422 as above |
 //! | `POST /api/jobs/N/cancel` | `{done}` |
 //! | `GET /api/jobs/N` | the job's status |
@@ -34,6 +34,7 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use super::{api_state::ApiState, board};
 use crate::{
+    client,
     desk::{self, Brought},
     notice::{self, Notice, ask},
     queue,
@@ -147,6 +148,8 @@ struct Asked {
 /// A fault of a deck and its place.
 #[derive(Serialize)]
 struct Place {
+    /// Its file, of a deck of several.
+    file: String,
     line: u32,
     column: u32,
     read: String,
@@ -167,6 +170,7 @@ impl From<desk::Error> for Fault {
             return Self(status, json!({ "error": error.to_string() }));
         };
         let place = |fault: deck::Fault| Place {
+            file: fault.file,
             line: fault.line,
             column: fault.column,
             read: fault.read,
@@ -213,7 +217,7 @@ async fn job(
 ) -> Result<Json<serde_json::Value>, Fault> {
     let watch = ask(&api_state.notices, |answer| Notice::Watch(Some(job), answer)).await??;
     let status = watch.borrow().clone();
-    Ok(Json(json!(status)))
+    Ok(Json(client::as_json(&status)))
 }
 
 async fn cancel(

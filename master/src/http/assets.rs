@@ -5,10 +5,11 @@ use axum::{Router, http::header, routing::get};
 use super::api_state::ApiState;
 
 /// Path, type and text of every file.
-const FILES: [(&str, &str, &str); 8] = [
+const FILES: [(&str, &str, &str); 9] = [
     ("/", "text/html; charset=utf-8", include_str!("../../page/index.html")),
     ("/style.css", "text/css; charset=utf-8", include_str!("../../page/style.css")),
     ("/main.js", JS, include_str!("../../page/main.js")),
+    ("/files.js", JS, include_str!("../../page/files.js")),
     ("/lists.js", JS, include_str!("../../page/lists.js")),
     ("/curves.js", JS, include_str!("../../page/curves.js")),
     ("/timeline.js", JS, include_str!("../../page/timeline.js")),

@@ -132,7 +132,7 @@ impl Guard {
 }
 
 fn make(path: &Path) -> Result<String, String> {
-    use std::{io::Write, os::unix::fs::OpenOptionsExt};
+    use std::io::Write;
     let mut bytes = [0u8; 16];
     ring::default_provider()
         .secure_random
@@ -141,8 +141,8 @@ fn make(path: &Path) -> Result<String, String> {
     let token: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
     let fault = |e: std::io::Error| format!("{}: {e}", path.display());
     let mut options = std::fs::OpenOptions::new();
-    options.write(true).create(true).truncate(true).mode(0o600);
-    let mut file = options.open(path).map_err(fault)?;
+    options.write(true).create(true).truncate(true);
+    let mut file = system::private::open(&options, path, system::Readers::Owner).map_err(fault)?;
     file.write_all(token.as_bytes()).map_err(fault)?;
     Ok(token)
 }

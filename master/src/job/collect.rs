@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use mechanics::vote::Vote;
+use mechanics::{state::GlobalState, vote::Vote};
 
 use super::{
     Job,
@@ -33,6 +33,7 @@ impl Job {
         }
         if due {
             self.twice.note_state(&state);
+            self.note_fragments(&state);
             actions.push(Action::State(Box::new(state.clone())));
         }
         if self.checkpoints.is_expected(cycle) {
@@ -40,6 +41,12 @@ impl Job {
             return self.complete_checkpoint(cycle, actions);
         }
         Ok(())
+    }
+
+    /// Compares the fragments of a state that is written with those before.
+    pub(super) fn note_fragments(&mut self, state: &GlobalState) {
+        let model = &self.problem.model;
+        self.tally.fragments.see(&model.mesh, &model.setup.bodies, state);
     }
 
     /// A worker's sample of a cycle has come.

@@ -191,6 +191,13 @@ pub enum TooNear {
     Edges([[u32; 2]; 2]),
 }
 
+impl Error {
+    /// Whether workers' numbers led to it, which a flipped bit could have changed.
+    pub(super) const fn follows_from_numbers(&self) -> bool {
+        matches!(self, Self::Problem(_) | Self::UnknownElement(_) | Self::Force { .. } | Self::Element(_))
+    }
+}
+
 impl From<UnknownElement> for Error {
     fn from(unknown: UnknownElement) -> Self {
         Self::UnknownElement(unknown)

@@ -22,8 +22,12 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64], n_parts: usize
             return Some("the state of a rigid body in its vote is no number".to_owned());
         }
         let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
-        let numbers =
-            energies.chain(vote.momentum).chain([vote.contact, vote.friction, vote.external.whole()]);
+        let momentum = vote.parts.iter().flat_map(|p| p.momentum);
+        let numbers = energies.chain(momentum).chain(vote.momentum).chain([
+            vote.contact,
+            vote.friction,
+            vote.external.whole(),
+        ]);
         let released = vote.released.iter().flat_map(|released| released.pairs()).map(|pair| pair.contact);
         let held = vote.walls.iter().flat_map(|wall| [wall.work.whole(), wall.loss.whole()]);
         let numbers = numbers.chain(released).chain(held);

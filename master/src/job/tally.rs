@@ -3,7 +3,10 @@
 use mechanics::contact::Census;
 use protocol::{message::Work, phase::Report};
 
-use crate::incident::{Difference, Loss, Rebalance};
+use crate::{
+    fragments::Watch,
+    incident::{Difference, Loss, Rebalance},
+};
 
 /// What a job counts for its summary.
 #[derive(Default)]
@@ -23,6 +26,7 @@ pub(super) struct Tally {
     pub(super) rebalances: Vec<Rebalance>,
     pub(super) losses: Vec<Loss>,
     pub(super) differences: Vec<Difference>,
+    pub(super) fragments: Watch,
 }
 
 impl Tally {

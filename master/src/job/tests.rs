@@ -245,6 +245,52 @@ fn a_contact_deeper_than_nine_tenths_of_the_gap_stops_the_run_with_its_node() {
     );
 }
 
+/// Plays an epoch that was dealt to two workers, up to a force of cycle 0 that no exact sum holds; gives what comes of it.
+fn blown_up(job: &mut Job, dealt: &[Action]) -> Vec<Action> {
+    let of = |action: &Action| match action {
+        Action::Send(to, ToWorker::Assign(assign)) => Some((*to, assign.plan.exchange.len())),
+        _ => None,
+    };
+    let workers: Vec<(usize, usize)> = dealt.iter().filter_map(of).collect();
+    assert_eq!(workers.len(), 2, "both are at work");
+    let vote = |force_bound| Some(Box::new(Vote { courant: 1e-4, force_bound, ..Vote::empty(2) }));
+    let mut last = Vec::new();
+    for turn in 0..3 {
+        for &(worker, n_exchange) in &workers {
+            let message = match turn {
+                0 => ToMaster::Ready { vote: vote(1.0), lanes: "scalar".into() },
+                1 => cycle(0, n_exchange),
+                _ => match cycle(1, n_exchange) {
+                    ToMaster::Cycle { cycle, partials, gathered, busy, .. } => {
+                        ToMaster::Cycle { cycle, vote: vote(1e300), partials, gathered, busy }
+                    }
+                    other => other,
+                },
+            };
+            last = job.apply(Event::Message(worker, job.epoch(), message));
+        }
+    }
+    last
+}
+
+#[test]
+fn a_force_beyond_exact_sums_is_computed_again_by_others_and_ends_the_job_if_they_come_to_it_too() {
+    let model = Arc::new(deck::read(DECK, "two cubes").expect("a good deck"));
+    for verify in [0.0, 1.0] {
+        let asked = JobOptions { verify, ..JobOptions::default() };
+        let options = SessionOptions { asked, ..SessionOptions::default() };
+        let (mut job, dealt) =
+            Job::new(Arc::clone(&model), &specs(2), options, None).expect("a good problem");
+        let mut actions = blown_up(&mut job, &dealt);
+        if verify > 0.0 {
+            assert!(!job.is_over() && job.at_work() == [1, 0], "each sub-domain is another worker's");
+            assert!(actions.iter().any(|a| matches!(a, Action::Rewind { rows: 0, cycle: 0 })));
+            actions = blown_up(&mut job, &actions);
+        }
+        assert!(failure(&actions).starts_with("a force of up to 1e300, exact sums hold"), "{verify}");
+    }
+}
+
 #[test]
 fn images_of_another_version_are_refused_with_both_versions() {
     let (mut job, _) = started(1);

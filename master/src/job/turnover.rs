@@ -79,6 +79,28 @@ impl Job {
         self.next_epoch(actions)
     }
 
+    /// A worker that wrong computations have named again and again leaves the job at this cycle, where all have stopped, if others are
+    /// there.
+    fn dismiss_worst(&mut self, cycle: u64, actions: &mut Vec<Action>) -> Result<(), Error> {
+        let Some((index, times)) = self.twice.worst() else { return Ok(()) };
+        let alive = self.workers.alive();
+        if alive == [index] {
+            return Ok(());
+        }
+        self.twice.forget(index);
+        if !alive.contains(&index) {
+            return Ok(());
+        }
+        self.workers.lose(index)?;
+        let why = format!(
+            "{times} computations of intervals that others computed otherwise name it; test its memory, or keep it out"
+        );
+        actions.push(Action::Dismiss(index, why.clone()));
+        let worker = self.workers.spec(index).name.clone();
+        self.tally.losses.push(Loss { worker, cycle, back_to: cycle, why });
+        Ok(())
+    }
+
     /// Everything that was booked after the checkpoint is forgotten, here and in the results.
     pub(super) fn go_back(&mut self, actions: &mut Vec<Action>) {
         let checkpoint = self.checkpoints.newest();
@@ -143,6 +165,7 @@ impl Job {
         self.adopt(state, vote)?;
         self.twice.begin_interval();
         self.store(cycle, actions);
+        self.dismiss_worst(cycle, actions)?;
         let (at_work, shares) = (&self.epoch.at_work, &self.epoch.shares);
         if let Some(rebalance) = self.balancing.adopt(cycle, self.workers.names(at_work), shares) {
             self.workers.set_speeds(at_work, &rebalance.speeds_after);

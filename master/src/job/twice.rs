@@ -5,8 +5,11 @@
 //! the order of speeds, so that nobody is given much more than it was. Two computations that agree, each sub-domain by another
 //! worker, make the end a checkpoint; until then nothing goes on from it, and a run that its user stops ends there. They agree if the
 //! state is the same, all that was written on the way, and all that the next cycle begins with. If they differ, further ones decide, and the worker of
-//! the first sub-domain whose votes were others, or else its elements and nodes at the end, is suspected by name. Results are written again each time, so that those of
+//! the first sub-domain whose votes were others, or else its elements and nodes at the end, is suspected by name; the third time it is dismissed. Results are written again each time, so that those of
 //! the last computation stay, which is one of the two that agree.
+//!
+//! A fault that the workers' numbers lead to, such as a force that exact sums cannot hold, ends an interval as well. It is compared like
+//! any other end: where others do not come to it, the run goes on.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -18,6 +21,8 @@ use crate::{event::Action, incident::Difference, results::history::HistoryRow};
 
 /// Computations of an interval before the job gives up.
 const MOST: usize = 4;
+/// Wrong computations that name a worker before it is dismissed. One or two may be a stray bit.
+const WRONG_LIMIT: u32 = 3;
 
 /// One computation of an interval.
 #[derive(Clone, Debug)]
@@ -25,8 +30,8 @@ struct Trial {
     /// Workers by position: who computed which sub-domain.
     at_work: Vec<usize>,
     speeds: Vec<f64>,
-    /// The cycle at whose start it ended.
-    cycle: u64,
+    /// The cycle at whose start it ended; none if a fault ended it.
+    cycle: Option<u64>,
     /// Hash of all that it came to.
     sum: [u8; 32],
     /// By cycle and position: hash of the sub-domain's vote.
@@ -55,6 +60,8 @@ pub(super) struct Twice {
     ends: Vec<[u8; 32]>,
     /// Hash of the states that were written on the way.
     states: blake3::Hasher,
+    /// By index of the worker: wrong computations that name it, of all intervals.
+    named: BTreeMap<usize, u32>,
     /// A planted bug: rows of the history are all that is compared.
     narrow: bool,
 }
@@ -71,6 +78,7 @@ impl Twice {
             votes: BTreeMap::new(),
             ends: Vec::new(),
             states: blake3::Hasher::new(),
+            named: BTreeMap::new(),
             narrow: false,
         };
         twice.begin_interval();
@@ -95,7 +103,7 @@ impl Twice {
 
     /// Where it ends, if it is being taken again.
     pub(super) fn until(&self) -> Option<u64> {
-        self.trials.first().map(|trial| trial.cycle)
+        self.trials.iter().find_map(|trial| trial.cycle)
     }
 
     /// A worker's vote of the cycle before this one has come; `n` are at work.
@@ -135,6 +143,23 @@ impl Twice {
         self.votes.clear();
         self.ends.clear();
         self.states.reset();
+    }
+
+    /// A wrong computation names these workers, by index.
+    fn name(&mut self, workers: &[usize]) {
+        workers.iter().for_each(|&index| *self.named.entry(index).or_default() += 1);
+    }
+
+    /// The worker that was wrong again and again, by index, and how often; none while another was named as often.
+    pub(super) fn worst(&self) -> Option<(usize, u32)> {
+        let (&index, &times) = self.named.iter().max_by_key(|(_, times)| **times)?;
+        let alone = self.named.values().filter(|&&other| other == times).count() == 1;
+        (alone && times >= WRONG_LIMIT).then_some((index, times))
+    }
+
+    /// Nothing is held against a worker any more, by index: it is gone.
+    pub(super) fn forget(&mut self, index: usize) {
+        self.named.remove(&index);
     }
 
     /// Who takes which position, of the workers that there are: where an interval is taken again, others than before. Where workers have come
@@ -233,22 +258,54 @@ impl Job {
         stopped: &Stopped,
         actions: &mut Vec<Action>,
     ) -> Result<bool, Error> {
+        let sum = self.sum_of_interval(stopped)?;
+        self.computation_stands(Some(stopped.state.cycle), sum, actions)
+    }
+
+    /// Something went wrong. A fault that the numbers of an interval led to is compared first, where it is computed twice: if nobody else
+    /// has come to it yet, the interval is being taken again.
+    ///
+    /// # Errors
+    /// The fault if it stands, or if no two computations agree.
+    pub(super) fn judge_fault(&mut self, fault: Error, actions: &mut Vec<Action>) -> Result<(), Error> {
+        if !self.twice.is_chosen() || !fault.follows_from_numbers() {
+            return Err(fault);
+        }
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(fault.to_string().as_bytes());
+        hasher.update(&self.epoch.schedule.completed().to_le_bytes());
+        let sum = *hasher.finalize().as_bytes();
+        if self.computation_stands(None, sum, actions)? { Err(fault) } else { Ok(()) }
+    }
+
+    /// A computation of the interval has ended, with this sum. Gives whether it stands; else the interval is being taken again.
+    ///
+    /// # Errors
+    /// If no two computations of it agree.
+    fn computation_stands(
+        &mut self,
+        cycle: Option<u64>,
+        sum: [u8; 32],
+        actions: &mut Vec<Action>,
+    ) -> Result<bool, Error> {
         let begins = self.checkpoints.newest().cycle();
-        let ends = stopped.state.cycle;
+        let reached = cycle.unwrap_or_else(|| self.epoch.schedule.completed());
         let trial = Trial {
             at_work: self.epoch.at_work.clone(),
             speeds: self.epoch.shares.speeds.clone(),
-            cycle: ends,
-            sum: self.sum_of_interval(stopped)?,
+            cycle,
+            sum,
             votes: std::mem::take(&mut self.twice.votes),
             ends: std::mem::take(&mut self.twice.ends),
         };
         match self.twice.judge(trial) {
             Judgement::Agreed(wrong, right) => {
                 for wrong in wrong {
+                    let ends = right.cycle.or(wrong.cycle).unwrap_or(reached);
                     let (cycle, positions) = first_difference(&wrong, &right);
-                    let name = |p: usize| self.workers.spec(wrong.at_work[p]).name.clone();
-                    let workers = positions.into_iter().map(name).collect();
+                    let indices: Vec<usize> = positions.into_iter().map(|p| wrong.at_work[p]).collect();
+                    self.twice.name(&indices);
+                    let workers = self.workers.names(&indices);
                     self.tally.differences.push(Difference { begins, ends, cycle, workers });
                 }
                 Ok(true)
@@ -258,7 +315,7 @@ impl Job {
                 self.next_epoch(actions)?;
                 Ok(false)
             }
-            Judgement::Never => Err(Error::NoTwoAgree { begins, ends, computations: MOST }),
+            Judgement::Never => Err(Error::NoTwoAgree { begins, ends: reached, computations: MOST }),
         }
     }
 
@@ -334,7 +391,7 @@ mod tests {
         Trial {
             at_work: at_work.to_vec(),
             speeds,
-            cycle: 9,
+            cycle: Some(9),
             sum: [sum; 32],
             votes: BTreeMap::new(),
             ends: Vec::new(),
@@ -375,6 +432,20 @@ mod tests {
         assert_eq!(named(&[(5, [1, 2]), (6, [3, 7])], [7, 7]), (Some(5), vec![1]));
         assert_eq!(named(&[(5, [1, 2]), (6, [3, 4])], [7, 9]), (None, vec![0]));
         assert_eq!(named(&[(5, [1, 2]), (6, [3, 4])], [7, 7]), (None, vec![]));
+    }
+
+    #[test]
+    fn whoever_three_wrong_computations_name_is_the_worst_unless_another_was_named_as_often() {
+        let mut twice = Twice::new(1.0, &[0; 32]);
+        twice.name(&[4, 2]);
+        twice.name(&[2]);
+        assert_eq!(twice.worst(), None, "twice may be chance");
+        twice.name(&[2, 4]);
+        assert_eq!(twice.worst(), Some((2, 3)));
+        twice.name(&[4]);
+        assert_eq!(twice.worst(), None, "it is one of two");
+        twice.forget(2);
+        assert_eq!(twice.worst(), Some((4, 3)));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::{
     canvas::{INK, Image},
     colour::{Colour, viridis},
 };
-use crate::results::{Units, vtu::read::Piece};
+use crate::results::{Units, field_unit::unit_of, vtu::read::Piece};
 
 /// Room right of the bodies for the colour bar, above them for the title, and around them (pixels).
 const BAR_ROOM: f64 = 150.0;
@@ -46,21 +46,7 @@ pub fn frame((width, height): (u32, u32)) -> Frame {
 
 /// A field in words: `plastic strain`, `pressure (GPa)`.
 pub fn words(field: &str, units: &Units) -> String {
-    let Units { length, mass, time, stress, force, specific, .. } = units;
-    let base = ["_x", "_y", "_z"].iter().find_map(|end| field.strip_suffix(end)).unwrap_or(field);
-    let unit = match base {
-        "velocity" => format!("{length}/{time}"),
-        "displacement" | "gap" | "thickness" => (*length).to_owned(),
-        "pressure" | "viscosity" | "von_mises" | "von_mises_max" | "contact_pressure" => (*stress).to_owned(),
-        name if name.starts_with("stress_") => (*stress).to_owned(),
-        "temperature" => "K".to_owned(),
-        "density" => format!("{mass}/{length}3"),
-        "energy" => (*specific).to_owned(),
-        "contact_force" => (*force).to_owned(),
-        "mass" => (*mass).to_owned(),
-        "time_to_light" => (*time).to_owned(),
-        _ => String::new(),
-    };
+    let unit = unit_of(field, units);
     let name = field.replace('_', " ");
     if unit.is_empty() { name } else { format!("{name} ({unit})") }
 }

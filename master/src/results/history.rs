@@ -15,13 +15,12 @@ use deck::model::Model;
 use mechanics::{
     contact::PairVote,
     cross_section::SectionVote,
-    law::Unit,
     material::Material,
     state::{N_FIELDS, field},
 };
 use serde::{Deserialize, Serialize};
 
-use super::{Error, Folder, HISTORY, Units, von_mises::von_mises, write_whole};
+use super::{Error, Folder, HISTORY, Units, field_unit::unit_of_variable, von_mises::von_mises, write_whole};
 
 /// One row of the table. Energies and momentum of the whole problem, in the deck's units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -58,6 +57,8 @@ pub struct HistoryRow {
     pub momentum: [f64; 3],
     /// One entry per part, in deck order.
     pub parts: Vec<PartEnergy>,
+    /// Momentum of each part (mass length per time), in deck order; they add up to `momentum`.
+    pub part_momenta: Vec<[f64; 3]>,
     /// One entry per gauge, in deck order.
     pub gauges: Vec<GaugeRow>,
     /// State of the element of each element gauge, see [`mechanics::block::Block::reading`].
@@ -230,6 +231,7 @@ impl History {
     /// If the row has not one entry per part and per gauge of the model.
     pub fn append(&mut self, row: &HistoryRow) -> Result<(), Error> {
         assert_eq!(row.parts.len(), self.n_parts, "parts of the row and of the model");
+        assert_eq!(row.part_momenta.len(), self.n_parts, "momenta of the row and parts of the model");
         assert_eq!(row.gauges.len(), self.gauges.len(), "gauges of the row and of the model");
         assert_eq!(
             row.element_gauges.len(),
@@ -245,7 +247,12 @@ impl History {
             .chain(row.momentum)
             .chain([row.eroded, row.eroded_mass].into_iter().filter(|_| self.erodes))
             .chain([row.wall_loss].into_iter().filter(|_| self.has_walls))
-            .chain(row.parts.iter().flat_map(PartEnergy::numbers))
+            .chain(
+                row.parts
+                    .iter()
+                    .zip(&row.part_momenta)
+                    .flat_map(|(part, momentum)| part.numbers().into_iter().chain(*momentum)),
+            )
             .chain(row.gauges.iter().zip(&self.gauges).flat_map(|(gauge, start)| {
                 let moved: [f64; 3] = std::array::from_fn(|axis| gauge.x[axis] - start[axis]);
                 gauge.x.into_iter().chain(gauge.v).chain(moved)
@@ -387,7 +394,8 @@ fn header(model: &Model) -> String {
 
 /// The columns of the history of a model: names with units.
 pub fn columns(model: &Model) -> Vec<String> {
-    let Units { length, mass, time, energy, stress, force, specific } = Units::named(&model.units);
+    let of_deck = Units::named(&model.units);
+    let Units { length, mass, time, energy, stress, force, specific } = of_deck;
     let mut columns = vec!["cycle".to_owned(), format!("time [{time}]"), format!("dt [{time}]")];
     let energies = ["kinetic", "internal", "hourglass", "contact", "friction", "external", "total"];
     columns.extend(energies.iter().map(|name| format!("{name} [{energy}]")));
@@ -402,6 +410,8 @@ pub fn columns(model: &Model) -> Vec<String> {
     }
     for part in &model.mesh.parts {
         columns.extend(PartEnergy::NAMES.iter().map(|kind| format!("{}:{kind} [{energy}]", part.name)));
+        let axes = ["x", "y", "z"].iter();
+        columns.extend(axes.map(|axis| format!("{}:momentum_{axis} [{mass}*{length}/{time}]", part.name)));
     }
     for gauge in &model.output.gauges {
         columns.extend(["x", "y", "z"].iter().map(|axis| format!("{}:{axis} [{length}]", gauge.name)));
@@ -418,10 +428,9 @@ pub fn columns(model: &Model) -> Vec<String> {
         }));
         columns.extend(material(model, gauge.element).history().iter().map(|variable| {
             let name = format!("{}:{}", gauge.name, variable.name);
-            match variable.unit {
-                Unit::NONE => name,
-                Unit::STRESS => format!("{name} [{stress}]"),
-                unit => format!("{name} [{}]", product(unit, [length, mass, time])),
+            match unit_of_variable(variable.unit, &of_deck) {
+                unit if unit.is_empty() => name,
+                unit => format!("{name} [{unit}]"),
             }
         }));
     }
@@ -447,12 +456,6 @@ pub fn columns(model: &Model) -> Vec<String> {
         columns.push("eroded elements".to_owned());
     }
     columns
-}
-
-/// A unit by the names of length, mass and time.
-fn product(unit: Unit, names: [&str; 3]) -> String {
-    let powers = names.into_iter().zip([unit.length, unit.mass, unit.time]).filter(|(_, power)| *power != 0);
-    powers.map(|(name, power)| format!("{name}^{power}")).collect::<Vec<_>>().join("*")
 }
 
 /// A header cell: quoted where a name holds a comma or a quote (RFC 4180); control characters become spaces, so

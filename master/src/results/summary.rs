@@ -91,6 +91,19 @@ pub struct Summary {
     pub warnings: Vec<String>,
     /// Hash of the final state (hexadecimal).
     pub digest: String,
+    /// What it was computed from; none where no folder was written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input: Option<Input>,
+}
+
+/// What a run was computed from, so that it can be computed again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Input {
+    /// BLAKE3 of `input.deck` (hexadecimal).
+    pub deck: String,
+    /// The end that was asked for beside the deck (time).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end_time: Option<f64>,
 }
 
 /// Wall-clock time of a worker since its first cycle, by what it did (s).
@@ -145,6 +158,12 @@ const NAMED_PARTS: usize = 4;
 pub struct NamedPart {
     /// Its name in the deck.
     pub name: String,
+    /// Its mass at the start; a node that parts share counts with the first of them, a rigid body with its first part.
+    #[serde(default)]
+    pub mass: f64,
+    /// Its momentum at the end.
+    #[serde(default)]
+    pub momentum: [f64; 3],
     pub kinetic: f64,
     pub internal: f64,
     /// Energy taken by hourglass forces.

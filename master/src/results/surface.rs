@@ -94,7 +94,7 @@ impl Probe {
         );
         let moment = (state.time, state.cycle);
         write_whole(&folder.file(&contact_name(index)), |out| {
-            write_piece(out, "PolyData", &sizes, moment, &sections, model.output.compress)
+            write_piece(out, model, "PolyData", &sizes, moment, &sections)
         })
     }
 

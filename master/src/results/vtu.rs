@@ -7,9 +7,10 @@
 use std::{collections::BTreeSet, io, io::Write, path::Path};
 
 mod appended;
+pub mod field_data;
 pub mod read;
 
-use deck::model::Model;
+use deck::model::{Model, Output};
 use mechanics::{
     element::{shell4, tet10},
     mesh::Nodes,
@@ -17,7 +18,7 @@ use mechanics::{
 };
 
 use super::{
-    Error, FIELD_NAMES, Folder, PVD, state_name,
+    Error, FIELD_NAMES, Folder, PVD, field_unit, format, state_name,
     surface::Probe,
     von_mises::{plane_von_mises, von_mises},
     write_whole,
@@ -60,6 +61,34 @@ pub struct Fields {
 }
 
 impl Fields {
+    /// The fields of a deck, and those that its formats need.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`].
+    pub fn of(output: &Output) -> Result<Self, Error> {
+        let mut fields = Self::select(&output.fields)?;
+        for format in output.formats.iter().filter_map(|name| format::named(name)) {
+            fields.add(format.fields());
+        }
+        Ok(fields)
+    }
+
+    /// Adds those that a format needs and a state has, whose run was asked for that format beside its deck.
+    pub fn add_those_of(&mut self, written: &read::Piece) {
+        let has = |name: &str| written.headings.iter().any(|heading| heading.name == name);
+        for format in format::FORMATS {
+            if format.fields().iter().all(|name| has(name)) {
+                self.add(format.fields());
+            }
+        }
+    }
+
+    fn add(&mut self, names: &[&str]) {
+        for (known, selected) in FIELD_NAMES.iter().zip(&mut self.selected) {
+            *selected |= names.contains(known);
+        }
+    }
+
     /// The fields of `output.fields`; an empty list selects all but the relative volume,
     /// the components of stress, the nodal mass and the time until the detonation arrives.
     ///
@@ -139,8 +168,8 @@ impl<'a> Array<'a> {
         self.tuples as u64 * self.components as u64 * self.width as u64
     }
 
-    /// The element that announces the array, which starts `offset` bytes into the appended data.
-    fn describe(&self, out: &mut impl Write, offset: u64) -> io::Result<()> {
+    /// The element that announces the array, which starts `offset` bytes into the appended data, with its unit.
+    fn describe(&self, out: &mut impl Write, offset: u64, unit: &str) -> io::Result<()> {
         write!(out, r#"        <DataArray type="{}" Name="{}""#, self.kind, self.name)?;
         if self.grouped && self.components != 1 {
             write!(out, r#" NumberOfComponents="{}""#, self.components)?;
@@ -150,7 +179,17 @@ impl<'a> Array<'a> {
                 write!(out, r#" ComponentName{index}="{name}""#)?;
             }
         }
-        writeln!(out, r#" format="appended" offset="{offset}"/>"#)
+        write!(out, r#" format="appended" offset="{offset}""#)?;
+        if unit.is_empty() {
+            return writeln!(out, "/>");
+        }
+        writeln!(out, ">")?;
+        // The key by which VTK keeps the unit of an array.
+        writeln!(
+            out,
+            r#"          <InformationKey name="UNITS_LABEL" location="vtkDataArray">{unit}</InformationKey>"#
+        )?;
+        writeln!(out, "        </DataArray>")
     }
 }
 
@@ -295,34 +334,27 @@ fn stream(
         [("PointData", &point), ("CellData", &cell), ("Points", &points), ("Cells", &cells)];
     let sizes = format!(r#"NumberOfPoints="{n_nodes}" NumberOfCells="{n_cells}""#);
     let moment = (state.time, state.cycle);
-    write_piece(out, "UnstructuredGrid", &sizes, moment, &sections, model.output.compress)
+    write_piece(out, model, "UnstructuredGrid", &sizes, moment, &sections)
 }
 
 /// A VTK file of one piece: `grid` is the kind of its data, `sizes` the attributes of the piece, `moment` time and cycle.
 pub(super) fn write_piece(
     out: &mut impl Write,
+    model: &Model,
     grid: &str,
     sizes: &str,
-    (time, cycle): (f64, u64),
+    moment: (f64, u64),
     sections: &[(&str, &[Array])],
-    compress: bool,
 ) -> io::Result<()> {
+    let compress = model.output.compress;
     let compressor = if compress { r#" compressor="vtkZLibDataCompressor""# } else { "" };
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(
         out,
         r#"<VTKFile type="{grid}" version="1.0" byte_order="LittleEndian" header_type="UInt64"{compressor}>"#
     )?;
-    writeln!(out, "  <{grid}>\n    <FieldData>")?;
-    writeln!(
-        out,
-        r#"      <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{time:?}</DataArray>"#
-    )?;
-    writeln!(
-        out,
-        r#"      <DataArray type="Int64" Name="cycle" NumberOfTuples="1" format="ascii">{cycle}</DataArray>"#
-    )?;
-    writeln!(out, "    </FieldData>")?;
+    writeln!(out, "  <{grid}>")?;
+    field_data::write(out, model, moment)?;
     writeln!(out, "    <Piece {sizes}>")?;
     // Where an array begins is said before it comes, so what is compressed is compressed first.
     let arrays = || sections.iter().flat_map(|(_, arrays)| *arrays);
@@ -332,7 +364,7 @@ pub(super) fn write_piece(
     for (section, arrays) in sections {
         writeln!(out, "      <{section}>")?;
         for array in *arrays {
-            array.describe(out, offset)?;
+            array.describe(out, offset, &field_unit::unit_in(model, array.name))?;
             offset += sized.next().map_or(0, Appended::n_bytes);
         }
         writeln!(out, "      </{section}>")?;
@@ -460,7 +492,7 @@ impl Series {
     pub fn new(folder: &Folder, model: &Model) -> Result<Self, Error> {
         Ok(Self {
             folder: folder.clone(),
-            fields: Fields::select(&model.output.fields)?,
+            fields: Fields::of(&model.output)?,
             probe: None,
             times: Vec::new(),
         })

@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
-use crate::{footprint, queue::Entry};
+use crate::{
+    footprint::{self, Bearer},
+    queue::Entry,
+};
 
 /// Most jobs that run at a time. A job takes all idle workers, so a second one would find only those that come later.
 const JOBS_AT_ONCE: usize = 1;
@@ -24,7 +27,7 @@ pub(super) struct Allotments {
 pub(super) fn among(
     waiting: &[&Entry],
     running: &[u32],
-    idle: &[&str],
+    idle: &[Bearer<'_>],
     since_start: Duration,
     available: Option<u64>,
 ) -> Allotments {
@@ -61,12 +64,12 @@ enum Allotment {
     Wait(String),
 }
 
-/// What becomes of a job beside those that are `running`, with workers of these names `idle`, so long after the master's
+/// What becomes of a job beside those that are `running`, with these workers `idle`, so long after the master's
 /// start, with so much memory `available`.
 fn of(
     entry: &Entry,
     running: &[u32],
-    idle: &[&str],
+    idle: &[Bearer<'_>],
     since_start: Duration,
     available: Option<u64>,
 ) -> Allotment {
@@ -79,7 +82,7 @@ fn of(
         // Any worker will do for what was begun with enough of them.
         Some(at_work) => {
             let all = at_work.len();
-            let back = at_work.iter().filter(|name| idle.contains(&name.as_str())).count();
+            let back = at_work.iter().filter(|name| idle.iter().any(|worker| worker.name == **name)).count();
             if idle.is_empty() || back < all && since_start < RETURN_LIMIT {
                 return Allotment::Wait(format!("its workers: {back} of {all} are back"));
             }
@@ -90,7 +93,7 @@ fn of(
         }
         None => {}
     }
-    footprint::shortage(entry.elements, available).map_or(Allotment::Start, Allotment::Wait)
+    footprint::shortage(entry.elements, available, idle).map_or(Allotment::Start, Allotment::Wait)
 }
 
 /// The job that is given a worker which has just come: of those that run the first; none without any.
@@ -122,6 +125,10 @@ mod tests {
         }
     }
 
+    fn named<'a>(names: &[&'a str]) -> Vec<Bearer<'a>> {
+        names.iter().map(|name| Bearer { name, speed: 1.0, memory: 0 }).collect()
+    }
+
     fn waits_for(what: &str) -> Allotment {
         Allotment::Wait(what.to_owned())
     }
@@ -129,18 +136,21 @@ mod tests {
     #[test]
     fn a_job_starts_once_enough_workers_are_idle_and_no_other_runs() {
         let (entry, late) = (job(2, None), Duration::from_secs(60));
-        assert_eq!(of(&entry, &[], &["a"], late, None), waits_for("2 workers, 1 are idle"));
-        assert_eq!(of(&entry, &[], &["a", "b"], Duration::ZERO, None), Allotment::Start);
-        assert_eq!(of(&entry, &[3], &["a", "b"], late, None), waits_for("job 3"));
+        assert_eq!(of(&entry, &[], &named(&["a"]), late, None), waits_for("2 workers, 1 are idle"));
+        assert_eq!(of(&entry, &[], &named(&["a", "b"]), Duration::ZERO, None), Allotment::Start);
+        assert_eq!(of(&entry, &[3], &named(&["a", "b"]), late, None), waits_for("job 3"));
         assert_eq!(of(&job(0, None), &[], &[], late, None), waits_for("1 worker, 0 are idle"));
     }
 
     #[test]
     fn an_interrupted_job_waits_for_its_workers_a_while_and_then_takes_any() {
         let (entry, soon) = (job(5, Some(&["a", "b"])), Duration::from_secs(1));
-        assert_eq!(of(&entry, &[], &["a", "x"], soon, None), waits_for("its workers: 1 of 2 are back"));
-        assert_eq!(of(&entry, &[], &["b", "a"], soon, None), Allotment::Start);
-        assert_eq!(of(&entry, &[], &["x"], RETURN_LIMIT, None), Allotment::Start);
+        assert_eq!(
+            of(&entry, &[], &named(&["a", "x"]), soon, None),
+            waits_for("its workers: 1 of 2 are back")
+        );
+        assert_eq!(of(&entry, &[], &named(&["b", "a"]), soon, None), Allotment::Start);
+        assert_eq!(of(&entry, &[], &named(&["x"]), RETURN_LIMIT, None), Allotment::Start);
         assert_eq!(of(&entry, &[], &[], RETURN_LIMIT, None), waits_for("its workers: 0 of 2 are back"));
     }
 
@@ -152,26 +162,36 @@ mod tests {
         let waiting = [&large, &small, &smaller];
         let said = |pairs: &[(u32, &str)]| pairs.iter().map(|&(id, what)| (id, what.to_owned())).collect();
         assert_eq!(
-            among(&waiting, &[], &["a"], late, None),
+            among(&waiting, &[], &named(&["a"]), late, None),
             Allotments { starts: Some(2), waits: said(&[(1, "2 workers, 1 are idle"), (3, "job 2")]) }
         );
-        assert_eq!(among(&waiting, &[], &["a", "b"], late, None).starts, Some(1), "it has its turn with two");
+        assert_eq!(
+            among(&waiting, &[], &named(&["a", "b"]), late, None).starts,
+            Some(1),
+            "it has its turn with two"
+        );
         let huge = Entry { elements: 10_000_000, ..of(5, 1, None) };
-        let short = among(&[&huge, &small], &[], &["a"], late, Some(1_000_000_000));
+        let short = among(&[&huge, &small], &[], &named(&["a"]), late, Some(1_000_000_000));
         assert_eq!(short.starts, Some(2));
         assert!(short.waits[0].1.starts_with("memory: 11.1 GB on the master"), "{short:?}");
+        let little = Bearer { memory: 1_000_000_000, ..named(&["a"])[0] };
+        let short = among(&[&huge, &small], &[], &[little], late, None);
+        assert!(
+            short.starts == Some(2) && short.waits[0].1.starts_with("memory: 6.0 GB on worker a"),
+            "{short:?}"
+        );
         assert_eq!(
             among(&waiting, &[7], &[], late, None).waits,
             said(&[(1, "job 7"), (2, "job 7, then 1 job before it"), (3, "job 7, then 2 jobs before it")]),
         );
         let interrupted = of(4, 1, Some(&["a", "b"]));
         assert_eq!(
-            among(&[&interrupted, &small], &[], &["a"], Duration::ZERO, None),
+            among(&[&interrupted, &small], &[], &named(&["a"]), Duration::ZERO, None),
             Allotments { starts: None, waits: said(&[(4, "its workers: 1 of 2 are back"), (2, "job 4")]) },
         );
-        assert_eq!(among(&[&interrupted, &small], &[], &["a"], late, None).starts, Some(4));
+        assert_eq!(among(&[&interrupted, &small], &[], &named(&["a"]), late, None).starts, Some(4));
         let huge = Entry { elements: 10_000_000, ..of(4, 1, Some(&["a"])) };
-        let short = among(&[&huge, &small], &[], &["a"], late, Some(1_000_000_000));
+        let short = among(&[&huge, &small], &[], &named(&["a"]), late, Some(1_000_000_000));
         assert_eq!(short.starts, Some(2), "one that waits for memory blocks none");
     }
 

@@ -41,15 +41,16 @@ struct Kept {
     bytes: u64,
 }
 
-/// The jobs that are removed, the oldest first.
+/// The jobs that are removed, the oldest first. For room the one that ended last is not: its user has hardly seen it.
 fn expired(kept: &[Kept], limits: &Limits) -> Vec<u32> {
     let mut oldest_first = kept.to_vec();
     oldest_first.sort_by_key(|kept| std::cmp::Reverse((kept.age, std::cmp::Reverse(kept.job))));
+    let last = oldest_first.last().map(|kept| kept.job);
     let mut left: u64 = kept.iter().map(|kept| kept.bytes).sum();
     let mut expired = Vec::new();
     for Kept { job, age, bytes } in oldest_first {
         let old = limits.age.is_some_and(|most| age > most);
-        let large = limits.bytes.is_some_and(|most| left > most);
+        let large = Some(job) != last && limits.bytes.is_some_and(|most| left > most);
         if old || large {
             left -= bytes;
             expired.push(job);
@@ -146,7 +147,12 @@ mod tests {
         assert_eq!(expired(&all, &Limits { age: days(5), bytes: None }), [1]);
         assert_eq!(expired(&all, &Limits { age: None, bytes: Some(115) }), [1, 2]);
         assert_eq!(expired(&all, &Limits { age: days(1), bytes: Some(100) }), [1, 2, 3]);
-        assert_eq!(expired(&all, &Limits { age: None, bytes: Some(0) }), [1, 2, 3, 4]);
+        assert_eq!(
+            expired(&all, &Limits { age: None, bytes: Some(0) }),
+            [1, 2, 3],
+            "what has just ended stays"
+        );
+        assert!(expired(&all[3..], &Limits { age: days(0), bytes: Some(0) }).is_empty(), "it has no age yet");
     }
 
     #[test]

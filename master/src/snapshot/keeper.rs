@@ -4,7 +4,6 @@
 //! cannot keep up loses checkpoints, not cycles. A disk that refuses is a warning: the run goes on with the older ones.
 
 use std::{
-    fs::File,
     path::{Path, PathBuf},
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
     thread::JoinHandle,
@@ -92,7 +91,7 @@ impl Keeper {
         shared.write_queue().kept.cycle = store.generations().first().map(|g| g.cycle);
         let of_thread = Arc::clone(&shared);
         let thread = std::thread::Builder::new().name("snapshots".to_owned()).spawn(move || {
-            worker::compute::lowest_priority();
+            system::processors::lowest_priority();
             serve(&of_thread, store, results.as_deref());
         });
         let thread = thread.map_err(|e| format!("a thread for snapshots: {e}"))?;
@@ -159,7 +158,7 @@ fn serve(shared: &Shared, mut store: Store, results: Option<&Path>) {
         write_queue.writing = true;
         drop(write_queue);
         let (cycle, started) = (snapshot.state.cycle, Instant::now());
-        let synced = results.map_or(Ok(()), |folder| File::open(folder)?.sync_all());
+        let synced = results.map_or(Ok(()), system::folders::sync);
         let result = synced.map_err(|e| format!("results folder: {e}")).and_then(|()| store.put(&snapshot));
         drop(snapshot);
         let took = started.elapsed();

@@ -13,7 +13,6 @@
 use std::{
     collections::BTreeMap,
     fmt, fs, io,
-    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     sync::Arc,
@@ -140,8 +139,7 @@ impl Batch {
         let script =
             RUN_TASK.replace("BOLIDE", &quoted(&binary.display().to_string())).replace("THREADS", &threads);
         let path = folder.join("run-task");
-        fs::write(&path, script).map_err(at(&path))?;
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).map_err(at(&path))?;
+        system::children::script(&path, &script).map_err(at(&path))?;
         Ok(Self { engine, folder, cache, most, tasks: BTreeMap::new() })
     }
 
@@ -176,8 +174,8 @@ impl Batch {
             Engine::Command(template) => {
                 for identity in idle {
                     let line = template.replace("{run}", &self.command_of(&identity));
-                    let mut command = Command::new("sh");
-                    command.args(["-c", &line]).stdin(Stdio::null()).stdout(Stdio::null());
+                    let mut command = system::children::shell(&line);
+                    command.stdin(Stdio::null()).stdout(Stdio::null());
                     let child = command.spawn().map_err(|source| Error::Start { program: line, source })?;
                     if let Some(tracked) = self.tasks.get_mut(&identity) {
                         tracked.engine = Held::Launcher(child);

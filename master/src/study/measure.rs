@@ -520,9 +520,13 @@ impl Quantity {
                 Ok(start) => Ok(dot(vector(name, "v")?, start) / dot(start, start).sqrt()),
                 Err(_) => {
                     let start = facts.part(name)?.velocity.ok_or_else(|| Error::NoVelocity(name.clone()))?;
-                    let energy = column(&format!("{name}:kinetic"))?;
-                    let ratio = energy[energy.len() - 1] / energy[0];
-                    Ok(dot(start, start).sqrt() * ratio.max(0.0).sqrt())
+                    let along = |momentum: [f64; 3]| dot(momentum, start);
+                    let mut first = [0.0; 3];
+                    for (p, axis) in first.iter_mut().zip(AXES) {
+                        *p = column(&format!("{name}:momentum_{axis}"))?[0];
+                    }
+                    let ratio = along(vector(name, "momentum_")?) / along(first);
+                    Ok(dot(start, start).sqrt() * ratio)
                 }
             },
             Self::Displacement(name, Some(axis)) => {

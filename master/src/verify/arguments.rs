@@ -16,12 +16,15 @@ use crate::command::ReadingArgs;
 pub struct VerifyArgs {
     /// The results folder of a run that has ended or was stopped
     pub results: PathBuf,
-    /// The deck that it was computed from
+    /// The deck that it was computed from [default: the one that the folder holds]
     #[arg(long)]
-    pub deck: PathBuf,
+    pub deck: Option<PathBuf>,
     /// What a keyword deck does not say
     #[command(flatten)]
     pub reading: ReadingArgs,
+    /// Only compare the files with their checksums; nothing is computed
+    #[arg(long, conflicts_with_all = ["deck", "from", "to", "interval", "end_time"])]
+    pub files: bool,
     /// First cycle to compare; computing begins at the last snapshot before it
     #[arg(long, value_name = "CYCLE")]
     pub from: Option<u64>,
@@ -31,7 +34,7 @@ pub struct VerifyArgs {
     /// Only this interval between kept snapshots, counted from 1: start to first snapshot, and so on
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["from", "to"])]
     pub interval: Option<usize>,
-    /// --end-time that the run was given
+    /// --end-time that the run was given [default: what its summary says]
     #[arg(long)]
     pub end_time: Option<f64>,
     /// Number of workers

@@ -74,7 +74,7 @@ impl Comparison {
         let mut comparison = Self {
             results: results.to_owned(),
             scratch,
-            fields: Fields::select(&model.output.fields).map_err(|e| e.to_string())?,
+            fields: Fields::of(&model.output).map_err(|e| e.to_string())?,
             model: Arc::new(model.clone()),
             history: None,
             probe: None,
@@ -107,6 +107,9 @@ impl Comparison {
             }
         }
         let listed = read::index(results).map_err(|e| e.to_string())?;
+        if let Some(first) = listed.first().and_then(|(_, file)| Piece::open(file).ok()) {
+            comparison.fields.add_those_of(&first);
+        }
         comparison.states = listed.iter().map(|(time, _)| *time).zip(0..).collect();
         Ok(comparison)
     }

@@ -3,6 +3,7 @@
 #![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
 
 mod folder;
+mod formats;
 
 use std::{
     fs,
@@ -265,6 +266,7 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
             };
             model.mesh.parts.len()
         ],
+        part_momenta: vec![[x, -x / 7.0, 5e-324]; model.mesh.parts.len()],
         gauges: vec![GaugeRow { x: [1.0, 2.0, x], v: [0.1, 0.2, 0.3] }; model.output.gauges.len()],
         element_gauges: vec![
             (0..mechanics::state::N_FIELDS).map(|f| 0.25 + x + f as f64).collect();
@@ -443,6 +445,7 @@ fn history_reads_back_to_the_same_bits_under_names_with_units() {
     assert_eq!(table.columns[..4], ["cycle", "time [us]", "dt [us]", "kinetic [Mbar*cm3]"]);
     assert!(table.columns.contains(&"momentum_x [g*cm/us]".to_owned()));
     assert!(table.columns.contains(&"target, lower:internal [Mbar*cm3]".to_owned()));
+    assert!(table.columns.contains(&"target, lower:momentum_z [g*cm/us]".to_owned()));
     for name in [
         "tip:vz [cm/us]",
         "tip:uz [cm]",
@@ -459,9 +462,10 @@ fn history_reads_back_to_the_same_bits_under_names_with_units() {
         let mut expected = vec![row.cycle as f64, row.time, row.dt, row.kinetic, row.internal, row.hourglass];
         expected.extend([row.contact, row.friction, row.external, row.total, row.error]);
         expected.extend(row.momentum);
-        expected.extend(
-            row.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity, p.external]),
-        );
+        for (p, momentum) in row.parts.iter().zip(&row.part_momenta) {
+            expected.extend([p.kinetic, p.internal, p.hourglass, p.viscosity, p.external]);
+            expected.extend(momentum);
+        }
         for g in &row.gauges {
             let start = model.mesh.positions[0];
             expected.extend(g.x.into_iter().chain(g.v).chain([0, 1, 2].map(|a| g.x[a] - start[a])));

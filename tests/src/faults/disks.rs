@@ -121,10 +121,10 @@ pub(super) fn skipped() -> Seen {
 }
 
 /// A file system in memory, gone with this value.
-pub(super) struct Disk(PathBuf);
+pub(crate) struct Disk(PathBuf);
 
 impl Disk {
-    pub(super) fn mount(folder: &Path, size: &str) -> Option<Self> {
+    pub(crate) fn mount(folder: &Path, size: &str) -> Option<Self> {
         let mut command = Command::new("mount");
         command.args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(folder);
         command.output().is_ok_and(|o| o.status.success()).then(|| Self(folder.to_owned()))

@@ -195,7 +195,52 @@ pub fn cases() -> Vec<Case> {
                 || cluster.find_job(1).is_none().then_some(()),
             );
             assert!(!cluster.results(1).exists(), "its results as well");
-            Seen { note: "the oldest are removed, with their results".into(), ..Seen::default() }
+            assert!(cluster.find_job(3).is_some(), "what has just ended stays");
+            cluster.client(&["rm", "3"]);
+            cluster.master.kill();
+            cluster.restart_master();
+            let next = cluster.json(&["submit", &deck, "--cycles", "20"]);
+            assert_eq!(next["job"], 4, "the number of a job that was removed is not given again");
+            Seen {
+                note: "the oldest are removed, with their results; the last one stays".into(),
+                ..Seen::default()
+            }
+        }),
+        case("one bit of a result of a job that is over, the master started anew", |scene, _| {
+            let mut cluster = scene.cluster(&[], None, &[]);
+            cluster.worker("a", "1");
+            let deck = scene.deck.display().to_string();
+            cluster.json(&["submit", &deck, "--cycles", "20"]);
+            wait_for_state(&cluster, 1, "done");
+            let path = cluster.results(1).join("history.csv");
+            let mut bytes = fs::read(&path).expect("written");
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 1;
+            fs::write(&path, bytes).expect("room");
+            cluster.master.kill();
+            cluster.restart_master();
+            let line = cluster.master.wait_for("history.csv: damaged");
+            assert!(line.contains("job=1"), "{line}");
+            Seen { note: "a warning names the file".into(), ..Seen::default() }
+        }),
+        case("worker whose memory is too small for its share; another job behind it", |scene, _| {
+            let mut cluster = scene.cluster(&[], None, &[]);
+            // 27,000 elements take 50 MB.
+            cluster.worker_with("small", "1", &["--memory", "0.04"]);
+            let deck = scene.deck.display().to_string();
+            cluster.json(&["submit", &deck, "--cycles", "20"]);
+            let small = cluster.folder().join("small.toml");
+            let text = "title = \"cube\"\nunits = \"SI\"\n[control]\nend_cycle = 20\n[[part]]\nname = \"cube\"\nmaterial = \"LEAD\"\nbox = { origin = [0, 0, 0], size = [1, 1, 1], cells = [3, 3, 3] }\n";
+            fs::write(&small, text).expect("room");
+            let small = small.display().to_string();
+            cluster.json(&["submit", &small]);
+            wait_for_state(&cluster, 2, "done");
+            let waits = cluster.job(1)["waits_for"].as_str().unwrap_or_default().to_owned();
+            assert!(waits.starts_with("memory: ") && waits.contains(" on worker small "), "{waits}");
+            cluster.worker("b", "1");
+            cluster.worker("c", "20");
+            wait_for_state(&cluster, 1, "done");
+            Seen { note: "it waits with both numbers; the other one passes it".into(), ..Seen::default() }
         }),
         case("another user of the PC asks a master on loopback", |scene, _| {
             let Some(seen) = another_user(&scene.bolide) else {

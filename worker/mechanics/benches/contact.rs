@@ -14,7 +14,6 @@ use mechanics::{
     lanes::Width,
     mesh::Mesh,
 };
-use rustix::time::{ClockId, clock_gettime};
 use world::{add_block, materials, on_surface, settings, without_self};
 
 #[expect(dead_code, reason = "the tests of contact use all of it")]
@@ -27,8 +26,7 @@ const SLACK: f64 = 0.5;
 
 /// Thread CPU time in seconds.
 fn now() -> f64 {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+    system::clock::thread_cpu_ns() as f64 * 1e-9
 }
 
 /// Median and least of the nanoseconds of `n` calls.

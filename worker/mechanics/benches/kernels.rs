@@ -29,7 +29,6 @@ use mechanics::{
     setup::{Control, Setup},
     state::{N_FIELDS, field},
 };
-use rustix::time::{ClockId, clock_gettime};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 #[path = "kernels/laws.rs"]
@@ -102,8 +101,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
 
 /// Thread CPU time in seconds.
 fn now() -> f64 {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+    system::clock::thread_cpu_ns() as f64 * 1e-9
 }
 
 /// Step of the kernels alone.

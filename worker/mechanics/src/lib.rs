@@ -35,6 +35,7 @@ pub mod exact;
 mod failure;
 #[doc(hidden)]
 pub mod flip;
+mod fused;
 pub mod initial;
 pub mod lanes;
 pub mod law;

@@ -49,7 +49,7 @@ pub struct Vote {
     pub external: Work,
     /// Momentum of all nodes at `t_n`, `m v_n`.
     pub momentum: [f64; 3],
-    /// Energies by part.
+    /// Energies and momentum by part.
     pub parts: Vec<PartVote>,
     /// What nodes gave each wall and support, see [`crate::setup::Setup::n_holders`]; empty if none was touched.
     pub walls: Vec<WallVote>,
@@ -110,7 +110,7 @@ pub struct Watched {
     pub row_cycles: u32,
 }
 
-/// Energies of one part in one cycle.
+/// Energies and momentum of one part in one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartVote {
     /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`: the kinetic energy at `t_n` that central differences conserve; at the start of a run
@@ -124,6 +124,8 @@ pub struct PartVote {
     pub viscosity: f64,
     /// Energy that left with eroded elements and dropped nodes in this cycle.
     pub gone: f64,
+    /// Momentum of its nodes at `t_n`; parts add up to [`Vote::momentum`].
+    pub momentum: [f64; 3],
     /// Work of prescribed velocities, walls and loads in this cycle.
     pub external: Work,
 }
@@ -189,6 +191,7 @@ impl Vote {
             mine.hourglass += theirs.hourglass;
             mine.viscosity += theirs.viscosity;
             mine.gone += theirs.gone;
+            (0..3).for_each(|axis| mine.momentum[axis] += theirs.momentum[axis]);
             mine.external.merge(theirs.external);
         }
         for (mine, theirs) in self.extents.iter_mut().zip(&other.extents) {

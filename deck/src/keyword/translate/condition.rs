@@ -250,11 +250,11 @@ pub(super) fn write_part_gravities(t: &mut Translation<'_>) {
 /// Forces, alike ones together.
 pub(super) fn write_forces(t: &mut Translation<'_>) {
     let problem = t.problem;
-    // By curve, axis and factor: how often each node is named.
+    // By curve, axis, factor and system: how often each node is named.
     type Group = (Place, BTreeMap<u32, u32>);
-    let mut groups: BTreeMap<(u32, usize, u64), Group> = BTreeMap::new();
+    let mut groups: BTreeMap<(u32, usize, u64, u32), Group> = BTreeMap::new();
     for given in &problem.conditions.forces {
-        let key = (given.curve, given.axis, given.factor.to_bits());
+        let key = (given.curve, given.axis, given.factor.to_bits(), given.system);
         let nodes = t.nodes(given.target, given.at);
         let group = groups.entry(key).or_insert((given.at, BTreeMap::new()));
         for node in nodes {
@@ -262,7 +262,7 @@ pub(super) fn write_forces(t: &mut Translation<'_>) {
         }
     }
     let mut n = 0;
-    for ((curve, axis, bits), (at, nodes)) in groups {
+    for ((curve, axis, bits, system), (at, nodes)) in groups {
         let Some(curve) = t.curve(curve, Meaning::Velocity, at) else { continue };
         // A node that is named several times is pushed as often.
         let most = nodes.values().copied().max().unwrap_or(0);
@@ -283,6 +283,7 @@ pub(super) fn write_forces(t: &mut Translation<'_>) {
             let nodes = Some(Region::Set(t.set(&format!("force {n}"), list, at)));
             let mut force = [0.0; 3];
             force[axis] = f64::from_bits(bits) * f64::from(times);
+            let force = if system == 0 { force } else { t.turned(force, system, at) };
             let force = Some(t.vector(at, "a force of", force));
             let drive = Drive::along(curve.clone(), 1.0);
             push_load(t, at, "a force", LoadKind::Force { force, by_mass: false, drive, nodes });
@@ -343,6 +344,27 @@ pub(super) fn write_pressures(t: &mut Translation<'_>) {
         let pressure = Some(Drive::along(curve, f64::from_bits(bits) + 0.0));
         let faces = Some(Faces::Segments(made(name, at)));
         push_load(t, at, "a pressure", LoadKind::Pressure { pressure, faces });
+    }
+}
+
+/// Adds the faces through which waves leave.
+pub(super) fn write_transmitting(t: &mut Translation<'_>) {
+    let problem = t.problem;
+    for (n, &(at, set)) in (1..).zip(&problem.transmitting) {
+        let faces = problem.segment_set(set, at, t.log);
+        if faces.is_empty() {
+            continue;
+        }
+        let name = format!("transmitting faces {n}");
+        t.mesh.segments.insert(name.clone(), faces);
+        let of_solids = |id: &&u32| problem.solids.iter().any(|solid| solid.part == **id);
+        let parts = t.names.keys().filter(of_solids).map(|id| made(t.names[id].clone(), at)).collect();
+        t.deck.boundaries.push(Boundary {
+            at,
+            title: "*BOUNDARY_NON_REFLECTING".to_string(),
+            parts: Parts::Named(parts),
+            kind: BoundaryKind::Transmit(Some(Faces::Segments(made(name, at)))),
+        });
     }
 }
 

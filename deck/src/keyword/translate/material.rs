@@ -7,6 +7,7 @@ use mechanics::material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARD
 use super::state::Translation;
 use crate::{
     keyword::{
+        explosive::Jwl,
         material::{EosCard, Law, MaterialCard},
         problem::PartCard,
     },
@@ -110,7 +111,30 @@ fn eos_of(
         }
         return Some(*own);
     }
+    match (eos, &material.law) {
+        (Some(EosCard::Jwl(jwl)), Law::Explosive { speed, pressure }) => {
+            let Jwl { a, b, r1, r2, omega, energy } = *jwl;
+            return Some(Eos::Jwl {
+                a,
+                b,
+                r1,
+                r2,
+                omega,
+                energy,
+                detonation: *speed,
+                cj_pressure: *pressure,
+            });
+        }
+        (Some(EosCard::Jwl(_)), _) | (_, Law::Explosive { .. }) => {
+            let expected = "*MAT_HIGH_EXPLOSIVE_BURN with *EOS_JWL: one goes with the other";
+            log.fault_of(part.eos.origin, expected, "give both, or neither");
+            return None;
+        }
+        _ => {}
+    }
     match (eos, material.elastic) {
+        // Told above.
+        (Some(EosCard::Jwl(_)), _) => None,
         (Some(EosCard::Grueneisen { c, s, gamma }), _) => {
             Some(Eos::Shock { c0: *c, s: s + 0.0, gamma: gamma + 0.0 })
         }
@@ -192,7 +216,7 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
             strength
         }
         Law::Elastic | Law::Rigid { .. } => Strength::Elastic { shear: shear() },
-        Law::Null { .. } => Strength::Hydro,
+        Law::Null { .. } | Law::Explosive { .. } => Strength::Hydro,
         Law::Bilinear { yield_stress, tangent, rate } => {
             if !(0.0 <= tangent.value && tangent.value < young) {
                 let expected = format!("a tangent modulus from 0 to below Young's {young}");

@@ -51,6 +51,46 @@ pub(super) fn write(t: &mut Translation<'_>) {
             part: None,
         });
     }
+    element_gauges(t);
+}
+
+/// Histories of solids and shells, which may have the same numbers.
+fn element_gauges(t: &mut Translation<'_>) {
+    let (problem, log) = (t.problem, t.log);
+    for (kind, what) in [(0, "solid"), (1, "shell")] {
+        let mut gauges: BTreeMap<u32, Place> =
+            problem.control.element_gauges[kind].iter().map(|(at, id)| (*id, *at)).collect();
+        for (at, set) in &problem.control.element_gauge_sets[kind] {
+            gauges.extend(problem.element_set(kind, *set, *at, log).into_iter().map(|id| (id, *at)));
+        }
+        if gauges.is_empty() {
+            continue;
+        }
+        let part_of: BTreeMap<u32, u32> = match kind {
+            0 => problem.solids.iter().map(|element| (element.id, element.part)).collect(),
+            _ => problem.shells.iter().map(|element| (element.id, element.part)).collect(),
+        };
+        let n = gauges.len();
+        for (index, (id, at)) in gauges.into_iter().enumerate() {
+            if index == MAX_GAUGES {
+                log.warn(
+                    at,
+                    format!("histories of {n} {what}s: those of the first {MAX_GAUGES} are written"),
+                );
+                break;
+            }
+            let Some(part) = part_of.get(&id).and_then(|part| t.names.get(part)) else {
+                log.fault(at, format!("{what} {id}"), format!("a {what} of the deck"), "correct the number");
+                continue;
+            };
+            t.deck.gauges.push(Gauge {
+                name: Some(made(format!("{what} {id}"), at)),
+                of: Kind::Element,
+                spot: Some(Spot::Number(Placed::new(id, Origin::card(at)))),
+                part: Some(made(part.clone(), at)),
+            });
+        }
+    }
 }
 
 /// A cross-section by its heading, or by its number.

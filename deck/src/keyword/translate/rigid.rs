@@ -7,7 +7,11 @@ use super::{
     state::{Bodies, Translation},
 };
 use crate::{
-    keyword::{condition::Way, material::Law, rigid::Members},
+    keyword::{
+        condition::Way,
+        material::Law,
+        rigid::{BodyNodes, Members},
+    },
     place::Place,
     typed::condition::{Circle, Components, Drive, Parts, Region, Rigid, made},
 };
@@ -54,6 +58,7 @@ pub(super) fn find_bodies(t: &mut Translation<'_>) {
         }
     }
     join_neighbours(t, &mut bodies);
+    problem.check_inertias(|id| bodies.of(id).is_some(), log);
     t.bodies = bodies;
     t.bodies.starts = starts(t);
 }
@@ -85,6 +90,10 @@ fn join_neighbours(t: &Translation<'_>, bodies: &mut Bodies) {
 /// What bodies begin with by `*INITIAL_VELOCITY_RIGID_BODY`.
 fn starts(t: &Translation<'_>) -> BTreeMap<u32, [[f64; 3]; 2]> {
     let mut starts = BTreeMap::new();
+    // Those of the part go before velocities of nodes, and *INITIAL_VELOCITY_RIGID_BODY before both.
+    for (part, given) in &t.problem.rigid.inertias {
+        starts.extend(t.bodies.of(*part).map(|lead| (lead, given.start)));
+    }
     for start in &t.problem.rigid.starts {
         let turned = |v| t.turned(v, start.system, start.at);
         if let Some(lead) = body_at(t, start.part, start.at) {
@@ -156,6 +165,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
         let nodes = extra
             .remove(&lead)
             .map(|(place, nodes)| Region::Set(t.set(&format!("extra nodes of part {lead}"), nodes, place)));
+        let inertia = problem.inertia_of(&parts, log);
         let spun = t.bodies.starts.get(&lead).map(|[_, spin]| *spin);
         let start_spin = spun.map(|spin| t.vector(at, "an angular velocity of", spin));
         t.deck.rigid.push(Rigid {
@@ -163,8 +173,8 @@ pub(super) fn write(t: &mut Translation<'_>) {
             title: format!("the rigid body of part {lead}"),
             parts: Parts::Named(parts.iter().map(|id| made(t.names[id].clone(), at)).collect()),
             nodes,
-            mass: None,
-            inertia: None,
+            mass: inertia.map(|(mass, _)| mass),
+            inertia: inertia.map(|(_, inertia)| inertia),
             start_spin,
             velocity,
             spin,
@@ -172,7 +182,10 @@ pub(super) fn write(t: &mut Translation<'_>) {
         });
     }
     for given in &problem.rigid.of_nodes {
-        let set = problem.node_set(given.set, given.at, log);
+        let set = match given.nodes {
+            BodyNodes::Set(set) => problem.node_set(set, given.at, log),
+            BodyNodes::Pair(pair) => pair.to_vec(),
+        };
         let nodes: Vec<u32> = set.iter().copied().filter(|node| t.used.contains(node)).collect();
         if nodes.len() < 2 {
             log.fault(
@@ -188,7 +201,10 @@ pub(super) fn write(t: &mut Translation<'_>) {
                 format!("{} nodes of the body have no element: they are left out", set.len() - nodes.len());
             log.warn(given.at, words);
         }
-        let title = format!("the nodal rigid body {}", given.id);
+        let title = match given.nodes {
+            BodyNodes::Set(_) => format!("the nodal rigid body {}", given.id),
+            BodyNodes::Pair([a, b]) => format!("the spot weld of nodes {a} and {b}"),
+        };
         let ([velocity, spin], circle) = led(t, (&mut motions, given.id), given.held, &title);
         let nodes = Some(Region::Set(t.set(&title, nodes, given.at)));
         t.deck.rigid.push(Rigid {
@@ -269,7 +285,7 @@ fn motions(t: &mut Translation<'_>) -> Motions {
     let (problem, log) = (t.problem, t.log);
     let mut motions = Motions::new();
     for motion in &problem.rigid.motions {
-        let nodal = problem.rigid.of_nodes.iter().find(|body| body.id == motion.part);
+        let nodal = problem.rigid.of_nodes.iter().find(|body| body.id != 0 && body.id == motion.part);
         let lead = match nodal {
             Some(body) => Some(body.id),
             None => body_at(t, motion.part, motion.at),

@@ -1,11 +1,12 @@
 //! Reads the VTK files and indices that [`super`] writes: no XML parser, but lines whose form is known.
 
 use std::{
+    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
 
-use super::{super::PVD, appended};
+use super::{super::PVD, appended, field_data};
 use crate::results::Error;
 
 /// What stands between head and numbers.
@@ -20,10 +21,12 @@ pub struct Heading {
     pub name: String,
     /// `PointData`, `CellData`, `Points`, `Cells`, `Polys`.
     pub section: String,
-    /// VTK's name of the type.
-    kind: String,
+    /// VTK's name of the type: `Float64`, `Int64`, `UInt32`, `UInt8`.
+    pub kind: String,
     /// Numbers per tuple.
     pub components: usize,
+    /// Its unit; empty for plain numbers.
+    pub unit: String,
     offset: usize,
 }
 
@@ -42,6 +45,8 @@ pub struct Piece {
     pub n_cells: usize,
     /// Its arrays, in the order of the file.
     pub headings: Vec<Heading>,
+    /// Lists of words by name: the [`super::field_data`].
+    words: BTreeMap<String, Vec<String>>,
 }
 
 impl Piece {
@@ -70,6 +75,7 @@ impl Piece {
             n_points: 0,
             n_cells: 0,
             headings: Vec::new(),
+            words: BTreeMap::new(),
         };
         let mut section = String::new();
         for (line, text) in (1..).zip(head.lines().map(str::trim)) {
@@ -89,6 +95,10 @@ impl Piece {
                 piece.n_points = number("NumberOfPoints")?;
                 let cells = if text.contains("NumberOfCells") { "NumberOfCells" } else { "NumberOfPolys" };
                 piece.n_cells = number(cells)?;
+            } else if let (true, Some(codes)) = (text.contains(r#" type="String""#), content(text)) {
+                let words = field_data::read(codes)
+                    .ok_or_else(|| malformed(line, "expected the codes of words".to_owned()))?;
+                piece.words.insert(word("Name")?, words);
             } else if let (true, Some(value)) = (text.starts_with("<DataArray"), content(text)) {
                 let value: f64 =
                     value.parse().map_err(|_| malformed(line, format!("expected a number in {text:?}")))?;
@@ -105,20 +115,27 @@ impl Piece {
                     section: section.clone(),
                     kind: word("type")?,
                     components: components.min(64),
+                    unit: String::new(),
                     offset: number("offset")?,
                 });
-            } else if let Some(name) = text.strip_prefix('<').and_then(|text| text.strip_suffix('>')) {
+            } else if text.starts_with("<InformationKey") {
+                if let (Some(heading), Some(unit)) = (piece.headings.last_mut(), content(text)) {
+                    heading.unit = unit.to_owned();
+                }
+            } else if let Some(name) = text.strip_prefix('<').and_then(|text| text.strip_suffix('>'))
+                && !name.starts_with('/')
+            {
                 section = name.to_owned();
             }
         }
         Ok(piece)
     }
 
-    /// The numbers of `tuples` tuples of an array, as decimal numbers.
+    /// The numbers of `tuples` tuples of an array as they are in the file: little-endian, of the width of their type.
     ///
     /// # Errors
     /// [`Error::Malformed`] where they are not what the head announces.
-    pub fn numbers(&self, heading: &Heading, tuples: usize) -> Result<Vec<f64>, Error> {
+    pub fn bytes(&self, heading: &Heading, tuples: usize) -> Result<Vec<u8>, Error> {
         let malformed = |what: String| Error::Malformed {
             path: self.path.clone(),
             line: 1,
@@ -135,7 +152,15 @@ impl Piece {
             .ok_or_else(|| malformed("more numbers than any file holds".into()))?;
         let from = self.start.checked_add(heading.offset).and_then(|from| self.bytes.get(from..));
         let from = from.ok_or_else(|| malformed("the file ends before it".into()))?;
-        let bytes = appended::decode(from, self.compressed, expected).map_err(malformed)?;
+        appended::decode(from, self.compressed, expected).map_err(malformed)
+    }
+
+    /// The numbers of `tuples` tuples of an array, as decimal numbers.
+    ///
+    /// # Errors
+    /// As [`Self::bytes`].
+    pub fn numbers(&self, heading: &Heading, tuples: usize) -> Result<Vec<f64>, Error> {
+        let bytes = self.bytes(heading, tuples)?;
         let wide = bytes.chunks_exact(8).map(|b| <[u8; 8]>::try_from(b).expect("chunks of eight"));
         Ok(match heading.kind.as_str() {
             "Float64" => wide.map(f64::from_le_bytes).collect(),
@@ -163,6 +188,11 @@ impl Piece {
             line: 1,
             what: format!("no array {name} in {section}"),
         })
+    }
+
+    /// The words of a list of the field data, such as [`field_data::PART_NAMES`]; none where the file has no such list.
+    pub fn words(&self, name: &str) -> &[String] {
+        self.words.get(name).map_or(&[], Vec::as_slice)
     }
 
     /// Positions of the points.

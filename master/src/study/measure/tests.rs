@@ -5,13 +5,14 @@ use super::*;
 fn history() -> Table {
     let columns =
         ["time [ms]", "rear:x [mm]", "rear:y [mm]", "rear:z [mm]", "rear:vx [m/s]", "rear:vy [m/s]"];
-    let more = ["rear:vz [m/s]", "rear:ux [mm]", "rear:uy [mm]", "rear:uz [mm]", "rod:kinetic [J]"];
+    let more = ["rear:vz [m/s]", "rear:ux [mm]", "rear:uy [mm]", "rear:uz [mm]"];
+    let of_rod = ["rod:momentum_x [kg*mm/ms]", "rod:momentum_y [kg*mm/ms]", "rod:momentum_z [kg*mm/ms]"];
     let rows = vec![
-        vec![0.0, 0.0, 0.0, 20.0, 0.0, 0.0, -300.0, 0.0, 0.0, 0.0, 8.0],
-        vec![0.1, 0.0, 0.0, 1.0, 0.0, 0.0, -100.0, 3.0, 4.0, -19.0, 4.0],
-        vec![0.2, 0.0, 0.0, -8.0, 0.0, 4.0, -75.0, 0.0, 0.0, -28.0, 2.0],
+        vec![0.0, 0.0, 0.0, 20.0, 0.0, 0.0, -300.0, 0.0, 0.0, 0.0, 0.0, 0.0, -8.0],
+        vec![0.1, 0.0, 0.0, 1.0, 0.0, 0.0, -100.0, 3.0, 4.0, -19.0, 1.0, 0.0, -2.0],
+        vec![0.2, 0.0, 0.0, -8.0, 0.0, 4.0, -75.0, 0.0, 0.0, -28.0, 1.0, 0.5, 0.5],
     ];
-    Table { columns: columns.iter().chain(&more).map(|c| (*c).to_owned()).collect(), rows }
+    Table { columns: columns.iter().chain(&more).chain(&of_rod).map(|c| (*c).to_owned()).collect(), rows }
 }
 
 fn facts() -> Facts {
@@ -47,7 +48,8 @@ fn formulas_have_the_values_of_their_history() {
         ("last( rear:vz )**2 + sqrt(mean(rear:x))", 5625.0),
         ("cycles / 2", 35.0),
         ("residual velocity of rear", 75.0),
-        ("residual velocity of rod", 150.0),
+        // It comes back with a sixteenth of what it had.
+        ("residual velocity of rod", -18.75),
         ("max displacement of rear", 28.0),
         ("max displacement of rear along x", 3.0),
         ("perforated", 1.0),

@@ -203,7 +203,10 @@ impl Domain {
             vote.parts[part].kinetic += held.booked.kinetic;
             vote.parts[part].external.merge(held.booked.external);
             vote.external.merge(held.booked.external);
-            (0..3).for_each(|a| vote.momentum[a] += held.booked.momentum[a]);
+            for a in 0..3 {
+                vote.momentum[a] += held.booked.momentum[a];
+                vote.parts[part].momentum[a] += held.booked.momentum[a];
+            }
         }
     }
 }

@@ -68,6 +68,7 @@ impl Domain {
             vote.parts[part].external.merge(held_block.booked.external);
             for a in 0..3 {
                 vote.momentum[a] += held_block.booked.momentum[a];
+                vote.parts[part].momentum[a] += held_block.booked.momentum[a];
             }
             if self.reads_sections {
                 vote.add_sections(held_block.cuts.take());

@@ -1,0 +1,180 @@
+"""Runs and what they leave."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import signal
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY, ball_on_plate
+
+import bolide as bo
+
+
+def test_columns_have_plain_names_and_the_bits_of_the_file(result: bo.Result) -> None:
+    with (result.folder / "history.csv").open(newline="") as file:
+        header, *rows = list(csv.reader(file))
+    assert result.history.index.name == "time"
+    for index, column in enumerate(header):
+        name = column.rsplit(" [", 1)[0]
+        if name == "time":
+            continue
+        plain = (
+            name.replace(":", ".").replace("eroded mass", "eroded_mass").replace("eroded elements", "eroded_elements")
+        )
+        assert [float(row[index]) for row in rows] == list(result.history[plain]), column
+    assert result.units["kinetic"] == "J"
+    assert result.units["ball.kinetic"] == "J"
+    assert result.units["rim.vz"] == "mm/ms"
+    assert result.units["ball.vz"] == "mm/ms"
+    assert result.units["error"] == ""
+
+
+def test_momenta_of_parts_add_up_and_give_their_velocities(result: bo.Result) -> None:
+    history = result.history
+    for axis in "xyz":
+        parts = history[f"ball.momentum_{axis}"] + history[f"plate.momentum_{axis}"]
+        assert np.array_equal(parts, history[f"momentum_{axis}"])
+    ball = result["ball"]
+    # A quarter of a ball; its facets lie inside of the sphere.
+    assert 0.7 < ball.mass / (7.83e-6 * math.pi / 6 * 1000 / 4) < 1.0
+    assert history["ball.vz"].iloc[0] == pytest.approx(-800, rel=1e-12)
+    assert ball.velocity[2] == pytest.approx(history["ball.vz"].iloc[-1], abs=5)
+    assert ball.residual_velocity == pytest.approx(-ball.velocity[2])
+    assert 0 < ball.residual_velocity < 800
+    assert math.isnan(result["plate"].residual_velocity)
+
+
+def test_a_run_has_the_same_bits_on_any_number_of_workers(result: bo.Result) -> None:
+    told: list[float] = []
+    three = ball_on_plate().run(workers=3, threads=1, speeds=[1, 2, 0.5], progress=told.append)
+    assert three.summary["workers"] == 3
+    assert three.digest == result.digest
+    assert (three.folder / "history.csv").read_bytes() == (result.folder / "history.csv").read_bytes()
+    assert told[-1] == 1.0
+    assert told == sorted(told)
+    assert three.folder == Path("results/ball-plate")
+
+
+def test_results_of_the_user_are_not_replaced_unasked() -> None:
+    deck = ball_on_plate()
+    deck.run(out="mine", cycles=5, progress=False)
+    with pytest.raises(bo.RunError, match="mine"):
+        deck.run(out="mine", cycles=5, progress=False)
+    assert deck.run(out="mine", cycles=7, force=True, progress=False).summary["cycles"] == 7
+
+
+def test_a_run_that_fails_says_why_and_leaves_its_results() -> None:
+    deck = ball_on_plate()
+    deck.tables["control"]["time_step_floor"] = 1e-4
+    with pytest.raises(bo.RunError, match="time step") as told:
+        deck.run(progress=False)
+    assert told.value.result is not None
+    assert len(told.value.result.history) >= 1
+
+
+def test_an_interrupt_saves_a_checkpoint_and_says_how_to_resume() -> None:
+    deck = ball_on_plate()
+    deck.tables["control"]["end_time"] = 100.0
+    deck.output(period=50.0)
+    done: list[float] = []
+
+    def interrupt(share: float) -> None:
+        # The run has written rows, so it is under way.
+        if share > 0 and not done:
+            done.append(share)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    assert threading.current_thread() is threading.main_thread()
+    with pytest.raises(KeyboardInterrupt, match="--resume"):
+        deck.run(progress=interrupt)
+    assert done
+
+
+def test_gauges_parts_and_columns_that_do_not_exist_list_near_ones(result: bo.Result) -> None:
+    rim = result["rim"]
+    assert rim.history["ux"].iloc[0] == 0.0
+    assert rim.history.units["ux"] == "mm"
+    assert result.gauges == ["rim"]
+    for attempt, near in [
+        (lambda: result["bal"], "near names: ball"),
+        (lambda: result.gauge("rin"), "near names: rim"),
+        (lambda: result.history["kinetik"], "near names: kinetic"),
+        (lambda: result.mesh(-1).plot("plastic_strian"), "near names: plastic_strain"),
+        (lambda: result.picture(parts=["plat"]), "near names: plate"),
+    ]:
+        with pytest.raises(KeyError) as told:
+            attempt()
+        assert near in str(told.value)
+    with pytest.raises(AttributeError, match="residual_velocity"):
+        _ = result["ball"].residual_velocty
+
+
+def test_a_mirrored_state_is_the_whole_body(result: bo.Result) -> None:
+    quarter = result.mesh(-1)
+    whole = quarter.mirror()
+    assert whole.planes == []
+    assert whole.n_cells == 4 * quarter.n_cells
+    volumes = whole.compute_cell_sizes()["Volume"]
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(4 * quarter.compute_cell_sizes()["Volume"].sum(), rel=1e-12)
+    # No node lies twice on a plane, and what leaves to one side leaves to the other as well.
+    assert len(np.unique(np.round(whole.points, 9), axis=0)) == whole.n_points
+    moved = np.asarray(whole.point_data["displacement"])
+    assert np.abs(moved[:, :2].sum(axis=0)).max() < 1e-9
+    starts = whole.points - moved
+    assert np.allclose(sorted(starts[:, 0]), sorted(-starts[:, 0]), atol=1e-9)
+    ball = whole.part("ball")
+    assert ball.n_cells == 4 * quarter.part("ball").n_cells
+    assert ball.time == result.times[-1]
+
+
+def test_shear_changes_sign_across_the_plane_that_mirrors_it() -> None:
+    deck = ball_on_plate()
+    deck.output(fields=["stress", "stress_xy", "stress_yz"])
+    quarter = deck.run(cycles=60, progress=False).mesh(-1)
+    half = quarter.mirror("x")
+    assert half.planes == ["y"]
+    stress, n = np.asarray(half["stress"]), quarter.n_cells
+    assert np.array_equal(stress[:n, [0, 1, 2, 4]], stress[n:, [0, 1, 2, 4]])
+    assert np.array_equal(stress[:n, [3, 5]], -stress[n:, [3, 5]])
+    assert np.array_equal(half["stress_xy"][:n], -half["stress_xy"][n:])
+    assert np.array_equal(half["stress_yz"][:n], half["stress_yz"][n:])
+    assert np.abs(stress[:, 3]).max() > 0
+
+
+def test_pictures_show_something(result: bo.Result) -> None:
+    image = result.mesh(-1).mirror().plot("plastic_strain", screenshot="state.png")
+    assert Path("state.png").stat().st_size > 5000
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 50
+    picture = result.picture(field="velocity-z", cut="y", parts=["plate"])
+    assert picture._repr_png_().startswith(b"\x89PNG")
+    axes = result.plot("ball.vz", "rim.vz")
+    assert axes.get_xlabel() == "time [ms]"
+    assert axes.get_ylabel() == "[mm/ms]"
+
+
+def test_states_are_found_by_number_and_time(result: bo.Result) -> None:
+    assert len(result.times) == 21
+    assert result.mesh(0).time == 0.0
+    assert result.mesh(time=0.0101).time == pytest.approx(0.01, abs=3e-4)
+    with pytest.raises(IndexError, match="there are 21"):
+        result.mesh(21)
+
+
+def test_a_keyword_deck_runs_from_its_file() -> None:
+    deck = REPOSITORY / "deck/examples/block-on-plate.k"
+    result = bo.run(deck, cycles=5, progress=False)
+    assert result.summary["cycles"] == 5
+    assert result.deck == deck
+    assert any("DATABASE_GLSTAT" in warning for warning in result.warnings)
+
+
+def test_a_folder_without_results_is_told() -> None:
+    with pytest.raises(bo.BolideError, match="no results"):
+        bo.Result("nowhere")

@@ -1,0 +1,58 @@
+//! What Bolide asks of the operating system beyond Rust's standard library: one module for each purpose, of the same functions
+//! in `unix` and in `windows`. Nothing outside this crate asks which system it runs on.
+//!
+//! | module | purpose |
+//! |---|---|
+//! | [`allocator`] | memory of large arrays goes back to the system |
+//! | [`callers`] | whose process is at the other end of a loopback connection |
+//! | [`children`] | processes that this one starts, and its own end |
+//! | [`clock`] | processor time of a thread |
+//! | [`files`] | how many files may be open; errors by which the system says that it has none left of something |
+//! | [`folders`] | names that outlive a loss of power; a folder that one process has |
+//! | [`host`] | the name of this machine |
+//! | [`interrupts`] | Ctrl-C and the like |
+//! | [`memory`] | how much memory there is |
+//! | [`notice`] | what a service manager is told |
+//! | [`private`] | files that are their owner's alone |
+//! | [`processors`] | which processors threads may use, and how urgent a thread is |
+//! | [`terminal`] | keys one by one, and the size of the screen |
+
+#[cfg(unix)]
+mod unix;
+#[cfg(unix)]
+pub use unix::{
+    allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, private,
+    processors, terminal,
+};
+
+#[cfg(windows)]
+mod windows;
+#[cfg(windows)]
+pub use windows::{
+    allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, private,
+    processors, terminal,
+};
+
+/// Who may read a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Readers {
+    /// Its owner, and who administers the machine.
+    Owner,
+    /// Everybody on this machine whom its folder lets in.
+    All,
+}
+
+/// Whose process opened a connection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Caller {
+    /// A process of the user of this one.
+    Own,
+    /// One of the machine's administrator: root, or the system itself.
+    Administrator,
+    /// One of another user; the names of both.
+    Other { theirs: String, ours: String },
+    /// The system does not list the connection: it is closed already, or comes from elsewhere.
+    Unlisted,
+    /// This system has no list of connections.
+    NoList,
+}

@@ -1,0 +1,15 @@
+//! Linux, and as far as their means are the same other Unixes.
+
+pub mod allocator;
+pub mod callers;
+pub mod children;
+pub mod clock;
+pub mod files;
+pub mod folders;
+pub mod host;
+pub mod interrupts;
+pub mod memory;
+pub mod notice;
+pub mod private;
+pub mod processors;
+pub mod terminal;

@@ -1,0 +1,56 @@
+//! Which processors threads may use, and how urgent a thread is.
+
+use std::{collections::HashSet, fs, io, path::Path};
+
+use rustix::thread::{CpuSet, gettid, sched_getaffinity, sched_setaffinity};
+
+/// The highest nice value of Linux.
+const LOWEST: i32 = 19;
+
+/// Gives the calling thread the lowest priority of the machine's ordinary ones, for good: it runs on what others leave
+/// idle. A machine that refuses leaves it as it was.
+pub fn lowest_priority() {
+    let _ = rustix::process::setpriority_process(Some(gettid()), LOWEST);
+}
+
+/// Confines the calling thread, and all that it starts from now on, to processors of this machine.
+///
+/// # Errors
+/// If the machine has none of them, or refuses.
+pub fn pin(processors: &[usize]) -> io::Result<()> {
+    let mut set = CpuSet::new();
+    processors.iter().filter(|n| **n < CpuSet::MAX_CPU).for_each(|&n| set.set(n));
+    Ok(sched_setaffinity(None, &set)?)
+}
+
+/// Number of cores that this process may use, however many processors each has; none if the machine does not say.
+pub fn n_cores() -> Option<usize> {
+    let allowed = sched_getaffinity(None).ok()?;
+    let allowed: Vec<usize> = (0..CpuSet::MAX_CPU).filter(|&n| allowed.is_set(n)).collect();
+    cores_among(&allowed, Path::new("/sys/devices/system/cpu"))
+}
+
+/// Number of cores that processors belong to; none if one of them does not say.
+fn cores_among(processors: &[usize], folder: &Path) -> Option<usize> {
+    let siblings =
+        |n: &usize| fs::read_to_string(folder.join(format!("cpu{n}/topology/thread_siblings_list"))).ok();
+    Some(processors.iter().map(siblings).collect::<Option<HashSet<String>>>()?.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_of_one_core_count_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let folder = folder.path();
+        for (n, siblings) in [(0, "0,4\n"), (1, "1,5\n"), (4, "0,4\n"), (5, "1,5\n"), (8, "8\n")] {
+            let topology = folder.join(format!("cpu{n}/topology"));
+            fs::create_dir_all(&topology).expect("a folder");
+            fs::write(topology.join("thread_siblings_list"), siblings).expect("a file");
+        }
+        let found = [&[0, 1, 4, 5, 8][..], &[0, 4], &[1, 8], &[0, 9]].map(|list| cores_among(list, folder));
+        assert_eq!(found, [Some(3), Some(1), Some(2), None]);
+    }
+}

@@ -1,0 +1,16 @@
+//! Windows from version 10 on.
+
+pub mod allocator;
+pub mod callers;
+pub mod children;
+pub mod clock;
+pub mod files;
+pub mod folders;
+pub mod host;
+mod identity;
+pub mod interrupts;
+pub mod memory;
+pub mod notice;
+pub mod private;
+pub mod processors;
+pub mod terminal;
