@@ -2,7 +2,8 @@
 
 use super::{
     Deviator, Elastic, Heat, History, Hydro, JohnsonCook, RateFactor, Strain, Strength, StrengthLaw,
-    Tabulated, Voce, VonMises,
+    Tabulated, Voce, VonMises, apart::Apart, modified_johnson_cook::ModifiedCook,
+    zerilli_armstrong::Dislocations,
 };
 use crate::{lanes::Lane, material::Material};
 
@@ -16,6 +17,8 @@ macro_rules! of_any {
             AnyStrength::Tabulated($law) => $call,
             AnyStrength::JohnsonCook($law) => $call,
             AnyStrength::Voce($law) => $call,
+            AnyStrength::ModifiedJohnsonCook($law) => $call,
+            AnyStrength::ZerilliArmstrong($law) => $call,
         }
     };
 }
@@ -29,6 +32,8 @@ pub(crate) enum AnyStrength {
     Tabulated(Tabulated),
     JohnsonCook(JohnsonCook),
     Voce(Voce),
+    ModifiedJohnsonCook(Apart<ModifiedCook>),
+    ZerilliArmstrong(Apart<Dislocations>),
 }
 
 impl AnyStrength {
@@ -66,8 +71,17 @@ impl AnyStrength {
                 })
             }
             Strength::Voce(law) => Self::Voce(law),
+            Strength::ModifiedJohnsonCook(law) => {
+                Self::ModifiedJohnsonCook(Apart(ModifiedCook::new(&law, material.density)))
+            }
+            Strength::ZerilliArmstrong(law) => {
+                Self::ZerilliArmstrong(Apart(Dislocations::new(&law, material.density)))
+            }
             // Their elements have a kernel of their own, see [`AnyRemembering`]; others ask for the stiffness.
             Strength::JohnsonHolmquist(law) => Self::Elastic(Elastic { shear: law.shear }),
+            Strength::SteinbergGuinan(law) => Self::Elastic(Elastic { shear: law.shear }),
+            Strength::SegmentedCeramic(law) => Self::Elastic(Elastic { shear: law.shear }),
+            Strength::HolmquistJohnsonCook(law) => Self::Elastic(Elastic { shear: law.shear }),
             Strength::MooneyRivlin(law) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::Ogden(law) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::Viscoelastic(law) => Self::Elastic(Elastic { shear: law.shear }),
