@@ -96,9 +96,11 @@ impl Units {
         let joules = ["SI", "mm-ms-kg"].contains(&self.name);
         let word = match [l, m, t] {
             [0, 0, 0] if kelvin > 0 => return power("K", kelvin),
+            [0, 0, 0] if kelvin < 0 => "1".to_string(),
             [0, 0, 0] => String::new(),
             [1, 0, -1] => velocity.to_string(),
             [-1, 1, -2] => stress.to_string(),
+            [1, -1, 2] => format!("1/{stress}"),
             [2, 0, -2] if joules => "J/kg".to_string(),
             [2, 0, -2] => format!("({velocity})2"),
             _ => {
@@ -163,6 +165,9 @@ impl Units {
                     t1: stress(t1),
                     t2: stress(t2),
                 },
+                Eos::Porous(_) | Eos::Tabulated(_) => {
+                    material.eos.converted(&|unit, x| scale(x, self.power(unit)))
+                }
                 Eos::IdealGas { gamma, energy } => {
                     Eos::IdealGas { gamma, energy: scale(energy, self.specific_energy()) }
                 }
@@ -231,6 +236,8 @@ impl Units {
             Failure::Hydrostatic { tension, heals } => {
                 Failure::Hydrostatic { tension: stress(tension), heals }
             }
+            // Work per volume is a stress.
+            Failure::CockcroftLatham { work } => Failure::CockcroftLatham { work: stress(work) },
             // Strains alone.
             Failure::None | Failure::PlasticStrain { .. } | Failure::JohnsonCook { .. } => failure,
         }

@@ -2,8 +2,11 @@
 
 use deck::{Model, bundle};
 use mechanics::{
-    material::{Eos, Material, Strength},
-    strength::{CrushableFoam, LowDensityFoam, MooneyRivlin, Ogden, SoilFoam, Viscoelastic},
+    material::{Eos, Failure, Material, Strength},
+    strength::{
+        CrushableFoam, HolmquistJohnsonCook, LowDensityFoam, ModifiedJohnsonCook, MooneyRivlin, Ogden,
+        SoilFoam, SteinbergGuinan, Viscoelastic, ZerilliArmstrong,
+    },
 };
 
 /// One cube of a material.
@@ -21,9 +24,21 @@ fn read(text: &str) -> Model {
 
 /// The material of a cube, which a converted deck has too.
 fn material(card: &str) -> Material {
-    let text = cube(card, "");
-    let model = read(&text);
-    let converted = deck::convert(&text, "a.k", "out.mesh").expect("it was read");
+    of_deck(&cube(card, ""))
+}
+
+/// The same of a material beside a shock line.
+fn shocked(card: &str) -> Material {
+    of_deck(&beside_a_shock_line(card))
+}
+
+fn beside_a_shock_line(card: &str) -> String {
+    cube(&format!("*EOS_GRUNEISEN\n1,3.9e6,1.49,,,2.0\n{card}"), ",1")
+}
+
+fn of_deck(text: &str) -> Material {
+    let model = read(text);
+    let converted = deck::convert(text, "a.k", "out.mesh").expect("it was read");
     let mesh = converted.mesh;
     let mut open = |path: &str| (path == "some/out.mesh").then(|| mesh.clone());
     let packed = bundle::gather("some/out.toml", converted.deck, &bundle::Options::default(), &mut open);
@@ -33,7 +48,11 @@ fn material(card: &str) -> Material {
 }
 
 fn fault(card: &str) -> String {
-    let faults = deck::read(&cube(card, ""), "a.k").expect_err(card);
+    fault_of(&cube(card, ""))
+}
+
+fn fault_of(text: &str) -> String {
+    let faults = deck::read(text, "a.k").expect_err(text);
     faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
@@ -124,4 +143,199 @@ fn viscoelastic_relaxes_from_g0_to_gi() {
     let gruneisen = "*EOS_GRUNEISEN\n1,3.9e6,1.49\n*MAT_006\n1,1.1e-9,2000.,100.,30.,50.\n";
     let faults = deck::read(&cube(gruneisen, ",1"), "a.k").expect_err("two equations");
     assert!(faults[0].to_string().contains("no *EOS: BULK of the material is one"), "{}", faults[0]);
+}
+
+#[test]
+fn modified_johnson_cook_breaks_by_the_work_of_cockcroft_and_latham() {
+    let card = |first: &str, second: &str, last: &str, critical: &str| {
+        format!(
+            "*MAT_MODIFIED_JOHNSON_COOK\n1,7.85e-9,2.0e5,0.25{first}\n5e-4,293,1800{second}\n499,382,0.458,0.0079,0.893\n120,9,40,150\n{last}\n{critical}\n"
+        )
+    };
+    let weldox = card(",,0.9,4.52e8", ",293,0,1", "1,1516", "1800");
+    let steel = material(&weldox);
+    let law = ModifiedJohnsonCook {
+        shear: 8e4,
+        a: 499.0,
+        b: 382.0,
+        n: 0.458,
+        q1: 120.0,
+        c1: 9.0,
+        q2: 40.0,
+        c2: 150.0,
+        c: 0.0079,
+        m: 0.893,
+        t_melt: 1800.0,
+        t_room: 293.0,
+        specific_heat: 4.52e8,
+        rate0: 5e-4,
+        taylor_quinney: 0.9,
+    };
+    assert_eq!(steel.strength, Strength::ModifiedJohnsonCook(law));
+    assert_eq!(steel.failure, Failure::CockcroftLatham { work: 1516.0 });
+    let Eos::Linear { bulk } = steel.eos else { panic!("{steel:?}") };
+    assert!((bulk / (2.0e5 / 1.5) - 1.0).abs() < 1e-12, "{bulk}");
+    // Broken elements leave.
+    assert_eq!(read(&cube(&weldox, "")).setup.erosion.parts[0].map(|limits| limits.failure), Some(true));
+    assert_eq!(material(&weldox.replace("MAT_MODIFIED_JOHNSON_COOK", "MAT_107")), steel);
+    let cold = material(&card("", "", "", ""));
+    assert_eq!(cold.failure, Failure::None);
+    let Strength::ModifiedJohnsonCook(law) = cold.strength else { panic!("{cold:?}") };
+    assert_eq!((law.taylor_quinney, law.m), (0.0, 1.0));
+    for (deck, words) in [
+        (card(",1", "", "", ""), "no damage in the yield stress"),
+        (card("", ",,1", "", ""), "the law of Johnson and Cook"),
+        (card("", ",400", "", ""), "room temperature at the start"),
+        (card("", "", "1,0,0.07,1.7", ""), "the fracture criterion of Cockcroft and Latham"),
+        (card("", ",,,1", "1,0", ""), "WC"),
+        (card(",,0.9,4.52e8", "", "", "1620"), "no temperature at which elements leave"),
+        (card("", "", "", ",900"), "no shear stress at which elements leave"),
+        (card(",,0.9,4.52e8", "", "", "").replace("293,1800", "293,200"), "a melting temperature above"),
+    ] {
+        assert!(fault(&deck).contains(words), "{words}: {}", fault(&deck));
+    }
+}
+
+#[test]
+fn concrete_has_its_constants_and_leaves_by_fs() {
+    let card = |lock: &str, fs: &str| {
+        format!(
+            "*MAT_JOHNSON_HOLMQUIST_CONCRETE\n1,2.44e-9,14860,0.79,1.6,0.007,0.61,48\n4,1,0.01,7,16,0.001,800,{lock}\n0.04,1,85000,-171000,208000,{fs}\n"
+        )
+    };
+    let concrete = material(&card("0.1", "0.8"));
+    let law = HolmquistJohnsonCook {
+        shear: 14860.0,
+        a: 0.79,
+        b: 1.6,
+        n: 0.61,
+        c: 0.007,
+        rate0: 1.0,
+        compressive_strength: 48.0,
+        strength_limit: 7.0,
+        tension: 4.0,
+        crush_pressure: 16.0,
+        crush_compression: 0.001,
+        lock_pressure: 800.0,
+        lock_compression: 0.1,
+        k1: 85000.0,
+        k2: -171_000.0,
+        k3: 208_000.0,
+        d1: 0.04,
+        d2: 1.0,
+        least_strain: 0.01,
+    };
+    assert_eq!(concrete.strength, Strength::HolmquistJohnsonCook(law));
+    assert_eq!(concrete.eos, Eos::Linear { bulk: 16000.0 });
+    assert_eq!(material(&card("0.1", "0.8").replace("JOHNSON_HOLMQUIST_CONCRETE", "111")), concrete);
+    let limits = |fs: &str| read(&cube(&card("0.1", fs), "")).setup.erosion.parts[0].expect("limits");
+    assert_eq!((limits("0.8").plastic_strain, limits("0.8").tension), (Some(0.8), None));
+    assert_eq!((limits("").plastic_strain, limits("").tension), (None, Some(4.0)));
+    assert!(fault(&card("0.1", "-1")).contains("no failure by the damaged strength"));
+    assert!(fault(&card("0.0005", "1")).contains("a lock point beyond the crush point"));
+}
+
+#[test]
+fn zerilli_armstrong_is_of_one_lattice_or_the_other() {
+    let card = |n: &str, rest: &str, heat: &str| {
+        format!(
+            "*MAT_MODIFIED_ZERILLI_ARMSTRONG\n1,7.89e-9,80000,1,{n},294\n65,1033,0.00698,0.000415,266,10{rest}\n1,0,0,{heat}\n"
+        )
+    };
+    let law = ZerilliArmstrong {
+        shear: 80_000.0,
+        c0: 75.0,
+        c1: 1033.0,
+        c2: 0.0,
+        c3: 0.00698,
+        c4: 0.000_415,
+        c5: 266.0,
+        n: 0.289,
+        t_room: 294.0,
+        specific_heat: 4.52e8,
+        rate0: 1.0,
+        taylor_quinney: 1.0,
+    };
+    let iron = shocked(&card("0.289", "", "4.52e8"));
+    assert_eq!(iron.strength, Strength::ZerilliArmstrong(law));
+    assert_eq!(iron.eos, Eos::Shock { c0: 3.9e6, s: 1.49, gamma: 2.0 });
+    let copper = shocked(&card("0", "", "0").replace("MODIFIED_ZERILLI_ARMSTRONG", "065"));
+    let Strength::ZerilliArmstrong(face) = copper.strength else { panic!("{copper:?}") };
+    assert_eq!((face.c0, face.c1, face.c2, face.c5, face.taylor_quinney), (331.0, 0.0, 1033.0, 0.0, 0.0));
+    let worn = read(&beside_a_shock_line(&card("0", ",0.7", "0")));
+    assert_eq!(worn.setup.erosion.parts[0].expect("limits").plastic_strain, Some(0.7));
+    for (deck, words) in [
+        (card("0.289", "", "4.52e8,1"), "a constant heat capacity"),
+        (
+            card("0.289", "", "1").replace("1,0,0,", "1,0.1,0,"),
+            "hardening that does not depend on temperature",
+        ),
+        (card("0.289", "", "1").replace(",294\n", ",294,-100\n"), "no pressure cut-off"),
+    ] {
+        let told = fault_of(&beside_a_shock_line(&deck));
+        assert!(told.contains(words), "{words}: {told}");
+    }
+    assert!(fault(&card("0", "", "0")).contains("the number of an *EOS"));
+}
+
+#[test]
+fn steinberg_guinan_has_its_heat_by_the_gas_constant() {
+    let card = |second: &str, third: &str| {
+        format!(
+            "*MAT_STEINBERG\n1,8.93e-9,47700,120,36,0.45,0,640\n2.83e-5,2.9e-5,3.77e-4,{second}\n{third}\n"
+        )
+    };
+    let law = SteinbergGuinan {
+        shear: 47_700.0,
+        yield_stress: 120.0,
+        yield_limit: 640.0,
+        beta: 36.0,
+        n: 0.45,
+        initial_strain: 0.0,
+        pressure_factor: 2.83e-5,
+        yield_pressure_factor: 2.9e-5,
+        temperature_factor: 3.77e-4,
+        t_melt: 1790.0,
+        melt_gamma: 2.02,
+        melt_a: 1.5,
+        t_room: 300.0,
+        specific_heat: 3.0 * 1.14 / 8.93e-9,
+        tension: 1e30,
+    };
+    let copper = shocked(&card("0,63.5,1790,2.02,1.5", "-1e30,2,1.14"));
+    assert_eq!(copper.strength, Strength::SteinbergGuinan(law));
+    let cut = shocked(&card("0,0,1790,2.02,1.5", "-900,1,1.14").replace("STEINBERG", "011"));
+    assert_eq!(cut.strength, Strength::SteinbergGuinan(SteinbergGuinan { tension: 900.0, ..law }));
+    for (deck, words) in [
+        (card("0.1,0,1790,2.02,1.5", ",,1.14"), "no softening by energy"),
+        (card("0,63.5,1790,2.02,1.5", ""), "the heat capacity 3 R'"),
+        (card("0,0,1790,2.02,1.5", "-900,2,1.14"), "a cut-off of the pressure alone"),
+        (card("0,0,1790,2.02,1.5", "900,1,1.14"), "a pressure cut-off below 0"),
+        (card("0,0,1790,2.02,1.5", ",,1.14,0,0,0,1.0"), "the cold energy of the equation of state"),
+        (card("0,0,200,2.02,1.5", ",,1.14"), "a melting temperature above room temperature"),
+    ] {
+        let told = fault_of(&beside_a_shock_line(&deck));
+        assert!(told.contains(words), "{words}: {told}");
+    }
+}
+
+#[test]
+fn a_tabulated_pressure_has_points_or_curves_by_the_logarithm_of_the_volume() {
+    let null = "*MAT_NULL\n1,1e-9\n";
+    let table = |first: &str, points: &str| cube(&format!("{null}*EOS_TABULATED\n{first}\n{points}"), ",1");
+    let points = "0,-0.1,-0.3,0.1\n\n0,200,900,-150\n\n1,0.9,0.8,1.1\n\n";
+    let Eos::Tabulated(law) = of_deck(&table("1,1.5", points)).eos else { panic!("a table") };
+    assert_eq!(law.gamma, 1.5);
+    assert_eq!(
+        law.pressure.points().collect::<Vec<_>>(),
+        [[-0.1, -150.0], [0.0, 0.0], [0.1, 200.0], [0.3, 900.0]]
+    );
+    assert_eq!(law.factor.points().collect::<Vec<_>>(), [[-0.1, 1.1], [0.0, 1.0], [0.1, 0.9], [0.3, 0.8]]);
+    let curves = "*DEFINE_CURVE\n8\n-0.3,900\n-0.1,200\n0,0\n0.1,-150\n*DEFINE_CURVE\n9\n-0.3,0.8\n-0.1,0.9\n0,1\n0.1,1.1\n";
+    assert_eq!(of_deck(&table("1,1.5,,,8,9", curves)).eos, Eos::Tabulated(law));
+    assert!(fault_of(&table("1,1.5,7", points)).contains("no energy at the start"));
+    assert!(fault_of(&table("1,1.5", &points.replace("0,200", "5,200"))).contains("0 at rest"));
+    assert!(
+        fault_of(&table("1,1.5", &points.replace("-0.1,-0.3", "-0.1,-0.1"))).contains("different volumes")
+    );
 }

@@ -46,7 +46,7 @@ fn unknown(name: &str) -> String {
 fn list(cards: &[Card]) -> String {
     let density = cards.first().map_or("", |card| &card.density.unit);
     let mut text = format!(
-        "{:23} {:>10}  {:11} {:17} {}\n",
+        "{:23} {:>9}  {:10} {:22} {}\n",
         "material",
         format!("rho {density}"),
         "eos",
@@ -56,11 +56,11 @@ fn list(cards: &[Card]) -> String {
     for Card { name, density, eos, strength, failure, fracture, .. } in cards {
         let failure = match (failure, fracture) {
             (Some(law), _) => law.kind.clone(),
-            (None, Some(law)) => format!("({})", law.kind),
+            (None, Some(_)) => "(fracture)".to_owned(),
             (None, None) => String::new(),
         };
         let line = format!(
-            "{name:23} {:>10}  {:11} {:17} {failure}",
+            "{name:23} {:>9}  {:10} {:22} {failure}",
             deck::fault::short(density.value),
             eos.kind,
             strength.kind
@@ -68,7 +68,7 @@ fn list(cards: &[Card]) -> String {
         text += line.trim_end();
         text.push('\n');
     }
-    text + "\nA failure in brackets is that of parts with fracture = true.\n`bolide materials NAME` prints constants, source and a block for a deck."
+    text + "\n(fracture): a failure law for parts with fracture = true.\n`bolide materials NAME` prints constants, source and a block for a deck."
 }
 
 /// A material as a table, and as a block of a deck.

@@ -25,7 +25,7 @@ pub(super) struct Limits {
 
 impl Limits {
     /// Elements leave as soon as they come to a limit; of several of one criterion the lowest counts.
-    fn add(&mut self, criterion: Criterion, limit: Placed<f64>) {
+    pub(super) fn add(&mut self, criterion: Criterion, limit: Placed<f64>) {
         match self.list.iter_mut().find(|(known, _)| *known == criterion) {
             Some((_, known)) if limit.value < known.value => *known = limit,
             Some(_) => {}

@@ -1,12 +1,11 @@
 //! `*MAT_` and `*EOS_`: constants of a deck.
 
+mod brittle;
 mod foam;
+mod metal;
 mod rubber;
 
-use mechanics::{
-    material::{Eos, Strength},
-    strength::JohnsonHolmquist,
-};
+use mechanics::material::{Eos, Failure, Strength};
 
 use super::{
     cards::Block,
@@ -31,6 +30,7 @@ pub(super) struct MaterialCard {
     pub(super) erosion: Limits,
 }
 
+#[expect(clippy::large_enum_variant, reason = "one for a material of the deck")]
 pub(super) enum Law {
     Elastic,
     /// Yield stress, tangent modulus, rate constants.
@@ -55,10 +55,13 @@ pub(super) enum Law {
         specific_heat: f64,
         damage: Option<[f64; 5]>,
     },
+    /// A strength that our declared laws have, beside an equation of state of the deck.
+    Strength(Strength),
     /// A strength that our declared laws have, and the equation of state that the card gives with it.
     Whole {
         strength: Strength,
         eos: Eos,
+        failure: Failure,
         /// What of the card is that equation.
         given: &'static str,
     },
@@ -91,6 +94,12 @@ pub(super) enum EosCard {
         gamma: f64,
     },
     Jwl(Jwl),
+    /// Pressure and energy factor by the logarithm of the relative volume: curves of the deck, or points where they have none.
+    Tabulated {
+        gamma: f64,
+        curves: [Placed<u32>; 2],
+        points: [Vec<[f64; 2]>; 2],
+    },
     /// C0 to C6 and E0.
     Polynomial {
         origin: Origin,
@@ -100,30 +109,31 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 15] = [
+const NUMBERS: [(&str, &str); 19] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
     ("MAT_005", "MAT_SOIL_AND_FOAM"),
     ("MAT_006", "MAT_VISCOELASTIC"),
     ("MAT_009", "MAT_NULL"),
+    ("MAT_011", "MAT_STEINBERG"),
     ("MAT_015", "MAT_JOHNSON_COOK"),
     ("MAT_020", "MAT_RIGID"),
     ("MAT_024", "MAT_PIECEWISE_LINEAR_PLASTICITY"),
     ("MAT_027", "MAT_MOONEY-RIVLIN_RUBBER"),
     ("MAT_057", "MAT_LOW_DENSITY_FOAM"),
     ("MAT_063", "MAT_CRUSHABLE_FOAM"),
+    ("MAT_065", "MAT_MODIFIED_ZERILLI_ARMSTRONG"),
     ("MAT_077_O", "MAT_OGDEN_RUBBER"),
     ("MAT_077", "MAT_OGDEN_RUBBER"),
     ("MAT_098", "MAT_SIMPLIFIED_JOHNSON_COOK"),
+    ("MAT_107", "MAT_MODIFIED_JOHNSON_COOK"),
     ("MAT_110", "MAT_JOHNSON_HOLMQUIST_CERAMICS"),
+    ("MAT_111", "MAT_JOHNSON_HOLMQUIST_CONCRETE"),
 ];
 
 /// Temperatures (K) and specific heat of a material that is not warmed: whatever the units, it stays cold.
 const COLD: [f64; 2] = [300.0, 1e6];
 const COLD_HEAT: f64 = 1e40;
-
-/// SFMAX where the card has none.
-const UNLIMITED: f64 = 1e20;
 
 /// Reads a `*MAT_` keyword; none after a fault without which nothing is known of it.
 pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialCard> {
@@ -239,9 +249,25 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
             }
             (None, law)
         }
+        "MAT_MODIFIED_JOHNSON_COOK" => {
+            needs_moduli = false;
+            (None, metal::modified_johnson_cook(&f, moduli(2), &mut limits))
+        }
+        "MAT_MODIFIED_ZERILLI_ARMSTRONG" => {
+            needs_moduli = false;
+            (None, metal::zerilli_armstrong(&f, &mut limits, log))
+        }
+        "MAT_STEINBERG" => {
+            needs_moduli = false;
+            (None, metal::steinberg_guinan(&f, density))
+        }
         "MAT_JOHNSON_HOLMQUIST_CERAMICS" => {
             needs_moduli = false;
-            (None, johnson_holmquist(&f, &mut limits))
+            (None, brittle::johnson_holmquist(&f, &mut limits))
+        }
+        "MAT_JOHNSON_HOLMQUIST_CONCRETE" => {
+            needs_moduli = false;
+            (None, brittle::concrete(&f, &mut limits, log))
         }
         "MAT_VISCOELASTIC" => {
             needs_moduli = false;
@@ -353,48 +379,8 @@ fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool) -> Option<Law> {
     })
 }
 
-/// Three cards of `*MAT_JOHNSON_HOLMQUIST_CERAMICS`.
-fn johnson_holmquist(f: &[Fields<'_>; 8], limits: &mut Limits) -> Option<Law> {
-    let [shear, a, n] = [(2, "G"), (3, "A"), (7, "N")].map(|(i, what)| f[0].positive(i, what));
-    let [b, c] = [4, 5].map(|i| not_negative(&f[0], i));
-    // Without a fractured strength its exponent says nothing.
-    let m = if b > 0.0 { f[0].positive(6, "M") } else { Some(1.0) };
-    let [tension, hel, hel_pressure] =
-        [(1, "T"), (3, "HEL"), (4, "PHEL")].map(|(i, what)| f[1].positive(i, what));
-    let fractured_limit = Some(f[1].real(2, 0.0)).filter(|limit| *limit > 0.0).unwrap_or(UNLIMITED);
-    let beta = f[1].within(5, 0.0, Range::Within(-f64::MIN_POSITIVE, 1.0, "a number from 0 to 1"));
-    let (d1, d2) = (not_negative(&f[2], 0), f[2].positive(1, "D2"));
-    let k1 = f[2].positive(2, "K1");
-    let [k2, k3] = [3, 4].map(|i| f[2].real(i, 0.0));
-    match f[2].real(5, 0.0) {
-        fs if fs < 0.0 => f[2].fault(5, "no failure by the pressure", "leave FS blank"),
-        _ => limits.read_failure_strain(&f[2], 5, "FS"),
-    }
-    let (hel, hel_pressure) = (hel?, hel_pressure?);
-    if hel <= hel_pressure {
-        f[1].fault(3, "a HEL above PHEL", "correct one of them");
-        return None;
-    }
-    let constants = JohnsonHolmquist {
-        shear: shear?,
-        a: a?,
-        b,
-        c,
-        m: m?,
-        n: n?,
-        rate0: Some(f[1].real(0, 1.0)).filter(|rate| *rate > 0.0).unwrap_or(1.0),
-        tension: tension?,
-        fractured_limit,
-        hel_stress: 1.5 * (hel - hel_pressure),
-        hel_pressure,
-        beta,
-        d1,
-        d2: d2?,
-    };
-    let a1 = k1?;
-    let eos = Eos::Polynomial { a1, a2: k2, a3: k3, b0: 0.0, b1: 0.0, t1: a1, t2: 0.0 };
-    Some(Law::Whole { strength: Strength::JohnsonHolmquist(constants), eos, given: "K1, K2 and K3" })
-}
+/// Five fields of sixteen columns.
+const SIXTEENS: [usize; 5] = [16; 5];
 
 /// Reads an `*EOS_` keyword; none after a fault.
 pub(super) fn read_eos(block: &Block<'_>, context: &Context<'_>) -> Option<EosCard> {
@@ -430,11 +416,34 @@ pub(super) fn read_eos(block: &Block<'_>, context: &Context<'_>) -> Option<EosCa
             let origin = f[0].origin(1, "C0");
             Some(EosCard::Polynomial { origin, c, energy: f[1].real(0, 0.0) })
         }
+        "EOS_TABULATED" | "EOS_009" => {
+            if f[0].real(2, 0.0) != 0.0 {
+                f[0].fault(2, "no energy at the start", "leave E0 blank");
+            }
+            if !matches!(f[0].real(3, 0.0), 0.0 | 1.0) {
+                f[0].fault(3, "a relative volume of 1 at the start", "leave V0 blank");
+            }
+            let curves = [f[0].reference(4, "LCC"), f[0].reference(5, "LCT")];
+            // Volumes, pressures and factors stand on two cards each, where a curve does not have them.
+            let rows: [_; 6] = std::array::from_fn(|i| block.card(i + 1));
+            let row = |i: usize| {
+                let fields = [i, i + 1].map(|i| context.fields(&rows[i], block.width, &SIXTEENS));
+                fields.iter().flat_map(|f| (0..5).map(|k| (f.blank(k), f.real(k, 0.0)))).collect::<Vec<_>>()
+            };
+            let given = curves.iter().any(|curve| curve.value == 0);
+            let [volumes, pressures, factors] = [0, 2, 4].map(|i| if given { row(i) } else { Vec::new() });
+            let n = volumes.iter().zip(&pressures).take_while(|(v, p)| !v.0 || !p.0).count();
+            let of = |values: &[(bool, f64)]| -> Vec<[f64; 2]> {
+                volumes.iter().zip(values).take(n).map(|(at, value)| [at.1, value.1]).collect()
+            };
+            let points = [of(&pressures), of(&factors)];
+            Some(EosCard::Tabulated { gamma: not_negative(&f[0], 1), curves, points })
+        }
         _ => {
             log.fault(
                 block.at,
                 format!("*{}", log.quote(&block.keyword)),
-                "EOS_GRUNEISEN, EOS_LINEAR_POLYNOMIAL or EOS_JWL",
+                "EOS_GRUNEISEN, EOS_LINEAR_POLYNOMIAL, EOS_TABULATED or EOS_JWL",
                 "choose one of them",
             );
             None

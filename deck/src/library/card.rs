@@ -130,8 +130,10 @@ const SPECIFIC: Unit = Unit { length: 2, mass: 0, time: -2 };
 const NONE: Measure = Measure::of(Unit::NONE);
 const STRESS: Measure = Measure::of(Unit::STRESS);
 const RATE: Measure = Measure::of(Unit::RATE);
+const COMPLIANCE: Measure = Measure::of(Unit::COMPLIANCE);
 const SPEED: Measure = Measure::of(VELOCITY);
 const KELVIN: Measure = Measure { unit: Unit::NONE, kelvin: 1 };
+const PER_KELVIN: Measure = Measure { unit: Unit::NONE, kelvin: -1 };
 const HEAT: Measure = Measure { unit: SPECIFIC, kelvin: -1 };
 
 /// The law with what it says of itself.
@@ -168,7 +170,7 @@ struct About {
 const SHEAR: (&str, Measure, &str) = ("shear", STRESS, "shear modulus");
 
 /// The laws that materials of the library have.
-const LAWS: [About; 12] = [
+const LAWS: [About; 18] = [
     About {
         role: Role::Eos,
         kind: "linear",
@@ -253,6 +255,69 @@ const LAWS: [About; 12] = [
     },
     About {
         role: Role::Strength,
+        kind: "modified-johnson-cook",
+        formula: "yield stress = (a + b e^n + q1 (1 - exp(-c1 e)) + q2 (1 - exp(-c2 e)))(1 + rate/rate0)^c (1 - T*^m), T* = (T - t_room)/(t_melt - t_room)",
+        constants: &[
+            SHEAR,
+            ("a", STRESS, "yield stress at the start, at rest and t_room"),
+            ("b", STRESS, "factor of hardening by a power"),
+            ("n", NONE, "exponent of hardening"),
+            ("q1", STRESS, "hardening that the first term comes to"),
+            ("c1", NONE, "how fast, by the plastic strain"),
+            ("q2", STRESS, "hardening that the second term comes to"),
+            ("c2", NONE, "how fast, by the plastic strain"),
+            ("c", NONE, "exponent of the rate"),
+            ("m", NONE, "exponent of thermal softening"),
+            ("t_melt", KELVIN, "melting temperature: no strength above"),
+            ("t_room", KELVIN, "temperature at the start"),
+            ("specific_heat", HEAT, "energy that warms a unit of mass by 1 K"),
+            ("rate0", RATE, "reference strain rate"),
+            ("taylor_quinney", NONE, "share of the plastic work that becomes heat"),
+        ],
+    },
+    About {
+        role: Role::Strength,
+        kind: "zerilli-armstrong",
+        formula: "yield stress = c0 + (c1 + c2 sqrt(e)) exp(-c3 T + c4 T ln(rate/rate0)) + c5 e^n",
+        constants: &[
+            SHEAR,
+            ("c0", STRESS, "part that rate and temperature do not change"),
+            ("c1", STRESS, "thermal part of body-centred metals"),
+            ("c2", STRESS, "factor of the hardening of face-centred metals"),
+            ("c3", PER_KELVIN, "softening by temperature"),
+            ("c4", PER_KELVIN, "hardening by the logarithm of the rate"),
+            ("c5", STRESS, "factor of the hardening of body-centred metals"),
+            ("n", NONE, "exponent of that hardening"),
+            ("t_room", KELVIN, "temperature at the start"),
+            ("specific_heat", HEAT, "energy that warms a unit of mass by 1 K"),
+            ("rate0", RATE, "unit of the rate under the logarithm"),
+            ("taylor_quinney", NONE, "share of the plastic work that becomes heat"),
+        ],
+    },
+    About {
+        role: Role::Strength,
+        kind: "steinberg-guinan",
+        formula: "G = shear f(pressure_factor), yield stress = min(yield_stress (1 + beta (e + initial_strain))^n, yield_limit) f(yield_pressure_factor), f(A) = 1 + A p/eta^(1/3) - temperature_factor (T - t_room), eta = rho/rho0; both 0 above the melting curve",
+        constants: &[
+            ("shear", STRESS, "shear modulus at rest and t_room"),
+            ("yield_stress", STRESS, "yield stress at the start, at rest and t_room"),
+            ("yield_limit", STRESS, "the most that hardening comes to"),
+            ("beta", NONE, "factor of hardening"),
+            ("n", NONE, "exponent of hardening"),
+            ("initial_strain", NONE, "plastic strain before the start"),
+            ("pressure_factor", COMPLIANCE, "stiffening by pressure"),
+            ("yield_pressure_factor", COMPLIANCE, "strengthening by pressure"),
+            ("temperature_factor", PER_KELVIN, "softening by temperature"),
+            ("t_melt", KELVIN, "melting temperature at rest"),
+            ("melt_gamma", NONE, "Grueneisen's coefficient of the melting curve"),
+            ("melt_a", NONE, "its change by volume"),
+            ("t_room", KELVIN, "temperature at the start"),
+            ("specific_heat", HEAT, "energy that warms a unit of mass by 1 K"),
+            ("tension", STRESS, "mean tension that it bears"),
+        ],
+    },
+    About {
+        role: Role::Strength,
         kind: "johnson-holmquist",
         formula: "strength = hel_stress (s_i - D (s_i - s_f)), s_i = a (P* + T*)^n (1 + c ln(rate/rate0)), s_f = b P*^m (1 + c ln(rate/rate0))",
         constants: &[
@@ -274,6 +339,52 @@ const LAWS: [About; 12] = [
     },
     About {
         role: Role::Strength,
+        kind: "johnson-holmquist-1",
+        formula: "strength by lines from 0 at -tension to strength1 at pressure1 and strength2 at pressure2, times 1 + c ln(rate/rate0), until the damage is 1; then alpha p, at most failed_limit",
+        constants: &[
+            SHEAR,
+            ("strength1", STRESS, "strength at pressure1"),
+            ("pressure1", STRESS, "pressure of the first point"),
+            ("strength2", STRESS, "strength at pressure2 and above"),
+            ("pressure2", STRESS, "pressure of the second point"),
+            ("c", NONE, "factor of the logarithm of the rate"),
+            ("rate0", RATE, "strain rate up to which the strength stays"),
+            ("tension", STRESS, "mean tension that the intact material bears"),
+            ("alpha", NONE, "strength of failed material for each unit of pressure"),
+            ("failed_limit", STRESS, "greatest strength of failed material"),
+            ("fracture_strain", NONE, "greatest plastic strain to fracture"),
+            ("fracture_pressure", STRESS, "pressure from which on it is that"),
+            ("beta", NONE, "share of released elastic energy that swells it"),
+        ],
+    },
+    About {
+        role: Role::Strength,
+        kind: "holmquist-johnson-cook",
+        formula: "strength = compressive_strength (a (1 - D) + b P*^n)(1 + c ln(rate/rate0)), at most strength_limit; the pressure crushes pores from the crush to the lock point",
+        constants: &[
+            SHEAR,
+            ("a", NONE, "cohesion, over compressive_strength"),
+            ("b", NONE, "factor of the pressure"),
+            ("n", NONE, "exponent of the pressure"),
+            ("c", NONE, "factor of the logarithm of the rate"),
+            ("rate0", RATE, "strain rate up to which the strength stays"),
+            ("compressive_strength", STRESS, "uniaxial compressive strength at rest"),
+            ("strength_limit", NONE, "greatest strength, over compressive_strength"),
+            ("tension", STRESS, "mean tension that it bears"),
+            ("crush_pressure", STRESS, "pressure at which pores begin to collapse"),
+            ("crush_compression", NONE, "rho/rho0 - 1 there"),
+            ("lock_pressure", STRESS, "pressure at which all have collapsed"),
+            ("lock_compression", NONE, "rho/rho0 - 1 without pores and pressure"),
+            ("k1", STRESS, "bulk modulus without pores"),
+            ("k2", STRESS, "factor of the square"),
+            ("k3", STRESS, "factor of the cube"),
+            ("d1", NONE, "strain to fracture where P* + T* is 1"),
+            ("d2", NONE, "exponent of that strain"),
+            ("least_strain", NONE, "least strain to fracture"),
+        ],
+    },
+    About {
+        role: Role::Strength,
         kind: "ogden",
         formula: "Cauchy stress = 1/J sum of mu_i (l^alpha_i - mean) along the principal stretches l at unit volume",
         constants: &[
@@ -290,6 +401,12 @@ const LAWS: [About; 12] = [
         kind: "hydrostatic",
         formula: "fails where the pressure falls to -tension",
         constants: &[("tension", STRESS, "mean tension that it bears")],
+    },
+    About {
+        role: Role::Failure,
+        kind: "cockcroft-latham",
+        formula: "fails where the integral of the greatest principal stress, in tension, over the plastic strain comes to work",
+        constants: &[("work", STRESS, "critical plastic work per volume")],
     },
     About {
         role: Role::Failure,
@@ -338,7 +455,13 @@ mod tests {
                     ("Pa", "GPa") => 1e-9,
                     ("kg/m3", "kg/mm3") => 1e-9,
                     ("1/s", "1/ms") => 1e-3,
-                    ("m/s", "m/s") | ("K", "K") | ("J/kg/K", "J/kg/K") | ("J/kg", "J/kg") | ("", "") => 1.0,
+                    ("1/Pa", "1/GPa") => 1e9,
+                    ("m/s", "m/s")
+                    | ("K", "K")
+                    | ("1/K", "1/K")
+                    | ("J/kg/K", "J/kg/K")
+                    | ("J/kg", "J/kg")
+                    | ("", "") => 1.0,
                     other => panic!("{name}: {} in {other:?}", si.key),
                 };
                 assert!(
@@ -382,7 +505,7 @@ mod tests {
     fn near_names_hold_the_pieces_or_are_spelt_alike() {
         assert_eq!(near("4340"), ["STEEL_4340"]);
         assert_eq!(near("steel"), ["MILD_STEEL", "STEEL_1006", "STEEL_4340", "STEEL_S7_TOOL"]);
-        assert_eq!(near("6061-t6"), ["AL_6061_T6"]);
+        assert_eq!(near("6061-t6"), ["AL_6061_T6", "AL_6061_T6_SG"]);
         assert_eq!(near("TUNGSTEN_ALLOI"), ["TUNGSTEN_ALLOY"]);
         assert!(near("banana").is_empty());
         assert!(near("--").is_empty());

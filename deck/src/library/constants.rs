@@ -1,6 +1,6 @@
 //! The laws of a material as a deck writes them: the word after `type`, and constants by key.
 
-use mechanics::material::{CowperSymonds, Eos, Failure, Heat, Strength};
+use mechanics::material::{CowperSymonds, Eos, Failure, Heat, Strength, Tabulated};
 
 use super::HEATS;
 
@@ -11,6 +11,8 @@ pub(crate) struct Written {
     pub(crate) constants: Vec<(&'static str, f64)>,
     /// Points of its curve; none of a law without one.
     pub(crate) points: Vec<[f64; 2]>,
+    /// Points of a second curve by its key; none where they are not given.
+    pub(crate) factors: Vec<[f64; 2]>,
     /// The rate factor of its yield stress.
     pub(crate) rate: Option<CowperSymonds>,
     /// A choice by a word, and one by true or false, where they are not the default.
@@ -32,6 +34,15 @@ pub(crate) fn of_eos(eos: Eos) -> Written {
             "polynomial",
             &[("a1", a1), ("a2", a2), ("a3", a3), ("b0", b0), ("b1", b1), ("t1", t1), ("t2", t2)],
         ),
+        Eos::Tabulated(law) => Written {
+            points: law.pressure.points().collect(),
+            factors: law.factor.points().collect(),
+            ..Written::new(Tabulated::NAME, &[("gamma", law.gamma)])
+        },
+        Eos::Porous(_) => {
+            let (kind, constants) = eos.declared().expect("a law that declares its constants");
+            Written::new(kind, &constants)
+        }
         Eos::IdealGas { gamma, energy } => Written::new("ideal-gas", &[("gamma", gamma), ("energy", energy)]),
         Eos::Jwl { a, b, r1, r2, omega, energy, detonation, cj_pressure } => Written::new(
             "jwl",
@@ -103,6 +114,7 @@ pub(crate) fn of_failure(failure: Failure) -> Option<Written> {
         Failure::Hydrostatic { tension, heals } => {
             Written { flag: Some(("heals", heals)), ..Written::new("hydrostatic", &[("tension", tension)]) }
         }
+        Failure::CockcroftLatham { work } => Written::new("cockcroft-latham", &[("work", work)]),
         Failure::JohnsonCook { d: [d1, d2, d3, d4, d5] } => {
             Written::new("johnson-cook", &[("d1", d1), ("d2", d2), ("d3", d3), ("d4", d4), ("d5", d5)])
         }

@@ -100,6 +100,8 @@ fn values(model: &Model, measured: &[Measured], units: &Units, doubts: &mut Vec<
         let (yields, shear) = match &material.strength {
             Strength::VonMises { shear, yield_stress, .. } => (*yield_stress, *shear),
             Strength::JohnsonCook { shear, a, .. } => (*a, *shear),
+            Strength::ModifiedJohnsonCook(law) => (law.a, law.shear),
+            Strength::SteinbergGuinan(law) => (law.yield_stress, law.shear),
             _ => (0.0, 0.0),
         };
         if yields > STRONGEST * shear && !is_rigid {

@@ -56,6 +56,9 @@ fn law(written: Written) -> String {
     if !written.points.is_empty() {
         keys.push(("points", list(written.points.iter().map(|point| numbers(point)))));
     }
+    if !written.factors.is_empty() {
+        keys.push(("factors", list(written.factors.iter().map(|point| numbers(point)))));
+    }
     keys.extend(written.rate.map(|rate| {
         let words = table(&plain(&[("reference", rate.reference), ("exponent", rate.exponent)]));
         ("cowper_symonds", words)

@@ -14,9 +14,15 @@ pub(crate) mod ideal_gas;
 pub(crate) mod jwl;
 pub(crate) mod linear;
 pub(crate) mod polynomial;
+pub(crate) mod porous;
 pub(crate) mod shock;
+pub(crate) mod tabulated;
 
-pub(crate) use {ideal_gas::IdealGas, jwl::Jwl, linear::Linear, polynomial::Polynomial, shock::Shock};
+pub use porous::Porous;
+pub use tabulated::{MAX_POINTS, Points, Tabulated};
+pub(crate) use {
+    ideal_gas::IdealGas, jwl::Jwl, linear::Linear, polynomial::Polynomial, shock::Shock, tabulated::ByPoints,
+};
 
 /// A law of pressure.
 pub(crate) trait EquationOfState: Copy {
@@ -43,6 +49,7 @@ pub(crate) trait EquationOfState: Copy {
 }
 
 /// Any of the laws, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
+#[expect(clippy::large_enum_variant, reason = "one for a block; its points stand in place")]
 #[derive(Clone, Copy)]
 pub(crate) enum AnyEos {
     Linear(Linear),
@@ -50,6 +57,7 @@ pub(crate) enum AnyEos {
     Polynomial(Polynomial),
     IdealGas(IdealGas),
     Jwl(Jwl),
+    Tabulated(ByPoints),
 }
 
 impl AnyEos {
@@ -61,6 +69,9 @@ impl AnyEos {
             Eos::Polynomial { a1, a2, a3, b0, b1, t1, t2 } => {
                 Self::Polynomial(Polynomial { a: [a1, a2, a3], b: [b0, b1], t: [t1, t2] })
             }
+            Eos::Tabulated(law) => Self::Tabulated(ByPoints::new(&law)),
+            // The solid: its elements have a kernel that brings its line to their distension, see `strength/porous.rs`.
+            Eos::Porous(law) => Self::Shock(law.solid()),
             Eos::IdealGas { gamma, .. } => Self::IdealGas(IdealGas { gamma }),
             Eos::Jwl { a, b, r1, r2, omega, energy: _, detonation, cj_pressure } => {
                 let unburnt_stiffness = material.density * detonation * detonation;
@@ -93,6 +104,7 @@ impl EquationOfState for AnyEos {
             Self::Polynomial(law) => law.line(v, burnt),
             Self::IdealGas(law) => law.line(v, burnt),
             Self::Jwl(law) => law.line(v, burnt),
+            Self::Tabulated(law) => law.line(v, burnt),
         }
     }
 
@@ -104,6 +116,7 @@ impl EquationOfState for AnyEos {
             Self::Polynomial(law) => law.least_stiffness(burnt),
             Self::IdealGas(law) => law.least_stiffness(burnt),
             Self::Jwl(law) => law.least_stiffness(burnt),
+            Self::Tabulated(law) => law.least_stiffness(burnt),
         }
     }
 
@@ -150,6 +163,20 @@ pub(crate) struct Line<L> {
 }
 
 impl<L: Lane> Line<L> {
+    /// That of a porous solid, from this one of the solid at its own volume: its pressure over the distension, its volume the `stretch` of the
+    /// relative one and its energy per volume that of fewer solid. Without pores, 1 and 1, it is the same to the bit.
+    #[inline(always)]
+    pub fn of_porous(&self, distension: L, stretch: L) -> Self {
+        let share = L::splat(1.0) / distension;
+        let by_volume = share * stretch;
+        Self {
+            a: self.a * share,
+            b: self.b * stretch,
+            slope_a: self.slope_a * by_volume,
+            slope_b: self.slope_b * (stretch * stretch),
+        }
+    }
+
     /// Pressure at energy E per initial volume.
     #[inline(always)]
     pub fn pressure(&self, energy: L) -> L {

@@ -11,6 +11,7 @@ use crate::{
     strength::{Deviator, Strain},
 };
 
+pub(crate) mod cockcroft_latham;
 pub(crate) mod hydrostatic;
 pub(crate) mod johnson_cook;
 pub(crate) mod plastic_strain;
@@ -72,6 +73,7 @@ pub(crate) enum AnyFailure {
     PrincipalStress(principal_stress::PrincipalStress),
     Hydrostatic(hydrostatic::Hydrostatic),
     JohnsonCook(johnson_cook::JohnsonCookDamage),
+    CockcroftLatham(cockcroft_latham::CockcroftLatham),
 }
 
 impl AnyFailure {
@@ -88,6 +90,9 @@ impl AnyFailure {
             }
             Failure::Hydrostatic { tension, heals } => {
                 Self::Hydrostatic(hydrostatic::Hydrostatic { tension, heals })
+            }
+            Failure::CockcroftLatham { work } => {
+                Self::CockcroftLatham(cockcroft_latham::CockcroftLatham { inverse_work: 1.0 / work })
             }
             Failure::JohnsonCook { d } => {
                 // Zeros make the factors of rate and temperature 1.
@@ -117,6 +122,7 @@ impl FailureLaw for AnyFailure {
             Self::PrincipalStress(law) => law.damage(damage, loading),
             Self::Hydrostatic(law) => law.damage(damage, loading),
             Self::JohnsonCook(law) => law.damage(damage, loading),
+            Self::CockcroftLatham(law) => law.damage(damage, loading),
         }
     }
 

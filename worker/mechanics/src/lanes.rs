@@ -112,6 +112,9 @@ pub trait Lane:
     /// The lanes moved up by one, zero in the first; and the last lane, which falls out.
     fn shifted_up(self) -> (Self, f64);
 
+    /// Does a part of a kernel in a function of its own, which has the instructions of these lanes.
+    fn apart<T: dispatch::Apart>(task: T);
+
     /// The lanes in order, zeros behind them.
     #[inline(always)]
     fn to_array(self) -> [f64; SET] {

@@ -23,6 +23,14 @@ impl Unit {
     pub const STRESS: Self = Self { length: -1, mass: 1, time: -2 };
     /// Square of a stress.
     pub const STRESS_SQUARED: Self = Self { length: -2, mass: 2, time: -4 };
+    /// One over a stress.
+    pub const COMPLIANCE: Self = Self { length: 1, mass: -1, time: 2 };
+    /// Energy per mass; with temperatures in K also that per kelvin.
+    pub const SPECIFIC_ENERGY: Self = Self { length: 2, mass: 0, time: -2 };
+    /// Length per time.
+    pub const VELOCITY: Self = Self { length: 1, mass: 0, time: -1 };
+    /// Mass per volume.
+    pub const DENSITY: Self = Self { length: -3, mass: 1, time: 0 };
     /// Strain per time.
     pub const RATE: Self = Self { length: 0, mass: 0, time: -1 };
 }

@@ -8,10 +8,11 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::eos::{MAX_POINTS, Points, Porous, Tabulated};
 pub use crate::strength::{CowperSymonds, Hardening, Heat, MAX_HARDENING, Strength};
 use crate::{
-    law::Variable,
-    strength::{AnyStrength, StrengthLaw},
+    law::{Declaration, Unit, Variable},
+    strength::{AnyRemembering, AnyStrength, StrengthLaw, porous},
 };
 
 /// One material: constants in the deck's consistent units.
@@ -30,6 +31,7 @@ pub struct Material {
 }
 
 /// Equation of state: pressure from `mu = rho/rho0 - 1` and internal energy.
+#[expect(clippy::large_enum_variant, reason = "one for a material; its points stand in place")]
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Eos {
     /// `p = K ln(rho/rho0)`: linear in the logarithmic volume strain, no energy term.
@@ -64,6 +66,10 @@ pub enum Eos {
         /// T2 (stress).
         t2: f64,
     },
+    /// By points.
+    Tabulated(Tabulated),
+    /// A porous solid that is compacted.
+    Porous(Porous),
     /// `p = (gamma - 1) rho e`.
     IdealGas {
         /// Ratio of specific heats.
@@ -114,6 +120,11 @@ pub enum Failure {
         /// Whether compression makes the element whole again, as in a fluid.
         heals: bool,
     },
+    /// When the plastic work of the greatest principal stress, where it is a tension, comes to a limit (Cockcroft and Latham 1968).
+    CockcroftLatham {
+        /// The limit (energy per volume).
+        work: f64,
+    },
     /// Damage `sum of (plastic strain increment / e_f)`,
     /// `e_f = (d1 + d2 exp(d3 eta))(1 + d4 ln max(rate/rate0, 1))(1 + d5 T*)`, `eta = -p / von Mises stress`
     /// (Johnson and Cook 1985). `rate0` and the temperatures of T* are those of the Johnson-Cook strength; with another
@@ -124,6 +135,44 @@ pub enum Failure {
     },
 }
 
+impl Eos {
+    /// The laws that declare their constants.
+    pub const DECLARED: &'static [Declaration<Eos>] = &[Declaration {
+        name: Porous::NAME,
+        constants: Porous::CONSTANTS,
+        of: |values| Eos::Porous(Porous::of(values)),
+    }];
+
+    /// The name and the constants by key of a law that declares them.
+    pub fn declared(&self) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
+        match self {
+            Eos::Porous(law) => Some((Porous::NAME, law.constants())),
+            _ => None,
+        }
+    }
+
+    /// A law that declares its constants with each as `convert` makes it of its unit and value; any other law as it is.
+    pub fn converted(self, convert: &dyn Fn(Unit, f64) -> f64) -> Self {
+        match self {
+            Eos::Porous(law) => Eos::Porous(law.converted(convert)),
+            Eos::Tabulated(mut law) => {
+                law.pressure.value = law.pressure.value.map(|stress| convert(Unit::STRESS, stress));
+                Eos::Tabulated(law)
+            }
+            other => other,
+        }
+    }
+
+    /// What the constants would have to be, where each is within its bounds and in a material of this density they make no law.
+    pub fn fault(&self, density: f64) -> Option<&'static str> {
+        match self {
+            Eos::Porous(law) => law.fault(density),
+            Eos::Tabulated(law) => law.fault(),
+            _ => None,
+        }
+    }
+}
+
 impl Material {
     /// Shear modulus G (stress); zero without strength.
     pub fn shear(&self) -> f64 {
@@ -132,7 +181,24 @@ impl Material {
 
     /// The history variables of its laws.
     pub fn history(&self) -> &'static [Variable] {
-        if self.is_gas() { &[] } else { self.strength.history() }
+        match self.eos {
+            _ if self.is_gas() => &[],
+            Eos::Porous(_) => porous::HISTORY,
+            _ => self.strength.history(),
+        }
+    }
+
+    /// Whether its laws see and keep more of an element than damage, plastic strain and temperature. Such a material is for solids of one
+    /// point, and has what failure its strength makes.
+    pub fn remembers(&self) -> bool {
+        AnyRemembering::of(self).is_some()
+    }
+
+    /// Whether its strength does, whatever the equation of state beside it, or takes its heat from the internal energy: then it stands
+    /// beside none that keeps something of an element, too.
+    pub fn has_strength_with_energy(&self) -> bool {
+        let by_energy = matches!(self.strength, Strength::JohnsonCook { heat: Heat::InternalEnergy, .. });
+        by_energy || AnyRemembering::of_strength(self).is_some()
     }
 
     /// Whether the equation of state is that of a gas, which has no strength.
@@ -147,6 +213,8 @@ impl Material {
             Eos::Linear { bulk } => bulk,
             Eos::Shock { c0, .. } => self.density * c0 * c0,
             Eos::Polynomial { a1, .. } => a1,
+            Eos::Tabulated(law) => law.bulk(),
+            Eos::Porous(law) => self.density * law.porous_speed * law.porous_speed,
             Eos::IdealGas { gamma, .. } => gamma * self.initial_pressure(),
             Eos::Jwl { detonation, .. } => self.density * detonation * detonation,
         }
@@ -158,6 +226,7 @@ impl Material {
             Eos::IdealGas { energy, .. } => self.density * energy,
             Eos::Jwl { energy, .. } => energy,
             Eos::Linear { .. } | Eos::Shock { .. } | Eos::Polynomial { .. } => 0.0,
+            Eos::Tabulated(_) | Eos::Porous(_) => 0.0,
         }
     }
 
@@ -181,6 +250,9 @@ impl Material {
     pub fn initial_temperature(&self) -> f64 {
         match self.strength {
             Strength::JohnsonCook { t_room, .. } => t_room,
+            Strength::ModifiedJohnsonCook(law) => law.t_room,
+            Strength::ZerilliArmstrong(law) => law.t_room,
+            Strength::SteinbergGuinan(law) => law.t_room,
             _ => 0.0,
         }
     }

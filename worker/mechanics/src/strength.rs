@@ -11,42 +11,56 @@ use crate::{
     element::vector::{Tensor, Vector},
     lanes::Lane,
     law::{Curved, Declaration, MAX_HISTORY, Unit, Variable},
-    material::Material,
 };
 
+pub(crate) mod any;
+pub(crate) mod apart;
 pub(crate) mod cowper_symonds;
 pub(crate) mod crushable_foam;
 pub(crate) mod curve;
 pub(crate) mod elastic;
 pub(crate) mod finite_strain;
+pub(crate) mod holmquist_johnson_cook;
 pub(crate) mod johnson_cook;
 pub(crate) mod johnson_holmquist;
 pub(crate) mod low_density_foam;
+pub(crate) mod modified_johnson_cook;
 pub(crate) mod mooney_rivlin;
 pub(crate) mod ogden;
 pub(crate) mod plane_stress;
+pub(crate) mod porous;
 pub(crate) mod principal;
 pub(crate) mod remembering;
+pub(crate) mod segmented_ceramic;
 pub(crate) mod soil_foam;
+pub(crate) mod steinberg_guinan;
 pub(crate) mod tabulated;
+pub(crate) mod tangent;
 pub(crate) mod viscoelastic;
 pub(crate) mod voce;
 pub(crate) mod von_mises;
+pub(crate) mod zerilli_armstrong;
 
 pub use cowper_symonds::CowperSymonds;
 pub use crushable_foam::CrushableFoam;
 pub use curve::{Hardening, MAX_HARDENING};
+pub use holmquist_johnson_cook::HolmquistJohnsonCook;
 pub use johnson_cook::Heat;
 pub use johnson_holmquist::JohnsonHolmquist;
 pub use low_density_foam::LowDensityFoam;
+pub use modified_johnson_cook::ModifiedJohnsonCook;
 pub use mooney_rivlin::MooneyRivlin;
 pub use ogden::Ogden;
+pub use segmented_ceramic::SegmentedCeramic;
 pub use soil_foam::SoilFoam;
+pub use steinberg_guinan::SteinbergGuinan;
 pub use viscoelastic::Viscoelastic;
 pub use voce::Voce;
+pub use zerilli_armstrong::ZerilliArmstrong;
 pub(crate) use {
-    cowper_symonds::RateFactor, elastic::Elastic, elastic::Hydro, johnson_cook::JohnsonCook,
-    remembering::AnyRemembering, tabulated::Tabulated, von_mises::VonMises,
+    any::AnyStrength, cowper_symonds::RateFactor, elastic::Elastic, elastic::Hydro,
+    johnson_cook::JohnsonCook, principal::greatest_principal, remembering::AnyRemembering,
+    tabulated::Tabulated, von_mises::VonMises,
 };
 
 /// Deviatoric stress, or the deviator of the rate of deformation.
@@ -169,6 +183,8 @@ pub(crate) struct Around<L> {
     pub density: L,
     /// Volume over initial volume.
     pub relative_volume: L,
+    /// The same before the step.
+    pub relative_volume_before: L,
     /// Velocity gradient in the middle of the step, by rows of the velocity.
     pub gradient: Tensor<L>,
     /// Axial vector of the spin of the step, by which the trial was turned.
@@ -191,6 +207,10 @@ pub(crate) struct Memory<L> {
     pub variables: [L; MAX_HISTORY],
     /// Damage, 0 to 1, with which the step begins; after the update, with which the next one begins.
     pub damage: L,
+    /// Volume over that of the solid, whose equation of state it is; 1 without pores.
+    pub distension: L,
+    /// The distension at the start over that now: what takes the relative volume to that of the solid.
+    pub stretch: L,
     /// Added to the pressure of the equation of state.
     pub added_pressure: L,
     /// The pressure goes no lower (stress).
@@ -203,10 +223,12 @@ impl<L: Lane> Memory<L> {
     /// Of a law that keeps nothing.
     #[inline(always)]
     pub fn none() -> Self {
-        let zero = L::splat(0.0);
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
         Self {
             variables: [zero; MAX_HISTORY],
             damage: zero,
+            distension: one,
+            stretch: one,
             added_pressure: zero,
             least_pressure: zero,
             added_stiffness: zero,
@@ -240,8 +262,8 @@ pub(crate) trait StrengthLaw: Copy {
     /// Shear modulus G (stress).
     fn shear(&self) -> f64;
 
-    /// Yield stress and its slope at a plastic strain, times `factor`: what plane stress returns to. A law that never yields has
-    /// none.
+    /// Yield stress and its slope at a plastic strain, with the `factor` of [`StrengthLaw::factor`]: what plane stress returns to. A law
+    /// that never yields has none.
     #[inline(always)]
     fn flow<L: Lane>(&self, _strain: L, _factor: L) -> (L, L) {
         (L::splat(f64::MAX), L::splat(0.0))
@@ -290,31 +312,6 @@ pub(crate) trait StrengthLaw: Copy {
     ) -> Deviator<L> {
         trial
     }
-}
-
-/// The laws of this module by their names in [`AnyStrength`]: the one list that calls go by.
-macro_rules! of_any {
-    ($any:expr, $law:ident => $call:expr) => {
-        match $any {
-            AnyStrength::Hydro($law) => $call,
-            AnyStrength::Elastic($law) => $call,
-            AnyStrength::VonMises($law) => $call,
-            AnyStrength::Tabulated($law) => $call,
-            AnyStrength::JohnsonCook($law) => $call,
-            AnyStrength::Voce($law) => $call,
-        }
-    };
-}
-
-/// Any of the laws, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
-#[derive(Clone, Copy)]
-pub(crate) enum AnyStrength {
-    Hydro(Hydro),
-    Elastic(Elastic),
-    VonMises(VonMises),
-    Tabulated(Tabulated),
-    JohnsonCook(JohnsonCook),
-    Voce(Voce),
 }
 
 /// Strength law.
@@ -375,8 +372,18 @@ pub enum Strength {
     },
     /// Von Mises yield with saturating hardening.
     Voce(Voce),
+    /// Johnson and Cook's with saturating hardening and a rate factor that is a power.
+    ModifiedJohnsonCook(ModifiedJohnsonCook),
+    /// By the motion of dislocations.
+    ZerilliArmstrong(ZerilliArmstrong),
+    /// Shear modulus and yield stress follow pressure and temperature.
+    SteinbergGuinan(SteinbergGuinan),
     /// Ceramics and glass, with damage and bulking.
     JohnsonHolmquist(JohnsonHolmquist),
+    /// Ceramics whose strength falls when damage is whole.
+    SegmentedCeramic(SegmentedCeramic),
+    /// Concrete, with damage and a curve of crushing.
+    HolmquistJohnsonCook(HolmquistJohnsonCook),
     /// Rubber by the invariants of its stretch.
     MooneyRivlin(MooneyRivlin),
     /// Rubber by its principal stretches.
@@ -451,7 +458,7 @@ macro_rules! declared_laws {
 }
 
 declared_laws!(
-    Voce, JohnsonHolmquist, MooneyRivlin, Ogden, Viscoelastic;
+    Voce, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, MooneyRivlin, Ogden, Viscoelastic;
     CrushableFoam, LowDensityFoam, SoilFoam,
 );
 
@@ -460,6 +467,8 @@ impl Strength {
     pub fn history(&self) -> &'static [Variable] {
         match self {
             Strength::JohnsonHolmquist(_) => JohnsonHolmquist::HISTORY,
+            Strength::SegmentedCeramic(_) => SegmentedCeramic::HISTORY,
+            Strength::HolmquistJohnsonCook(_) => HolmquistJohnsonCook::HISTORY,
             Strength::MooneyRivlin(_) => MooneyRivlin::HISTORY,
             Strength::Ogden(_) => Ogden::HISTORY,
             Strength::Viscoelastic(_) => Viscoelastic::HISTORY,
@@ -472,12 +481,18 @@ impl Strength {
 
     /// Whether the law damages its elements itself.
     pub fn damages(&self) -> bool {
-        matches!(self, Strength::JohnsonHolmquist(_))
+        use Strength::{HolmquistJohnsonCook, JohnsonHolmquist, SegmentedCeramic};
+        matches!(self, JohnsonHolmquist(_) | SegmentedCeramic(_) | HolmquistJohnsonCook(_))
     }
 
     /// What the constants would have to be, where each is within its bounds and together they make no law.
     pub fn fault(&self) -> Option<&'static str> {
         match self {
+            Strength::ModifiedJohnsonCook(law) => law.fault(),
+            Strength::ZerilliArmstrong(law) => law.fault(),
+            Strength::SteinbergGuinan(law) => law.fault(),
+            Strength::SegmentedCeramic(law) => law.fault(),
+            Strength::HolmquistJohnsonCook(law) => law.fault(),
             Strength::Ogden(law) => law.fault(),
             Strength::Viscoelastic(law) => law.fault(),
             Strength::SoilFoam(law, curve) => law.fault(curve),
@@ -488,110 +503,11 @@ impl Strength {
     /// The bulk modulus of a law that makes the pressure itself: the equation of state beside it has this one.
     pub fn bulk(&self) -> Option<f64> {
         match self {
+            Strength::HolmquistJohnsonCook(law) => Some(law.bulk()),
             Strength::CrushableFoam(law, _) => Some(law.bulk()),
             Strength::LowDensityFoam(law, _) => Some(law.bulk()),
             Strength::SoilFoam(law, _) => Some(law.unloading),
             _ => None,
         }
-    }
-}
-
-impl AnyStrength {
-    /// That of a material, made ready. Gases have none.
-    pub fn of(material: &Material) -> Self {
-        match material.strength {
-            _ if material.is_gas() => Self::Hydro(Hydro),
-            Strength::Hydro => Self::Hydro(Hydro),
-            Strength::Elastic { shear } => Self::Elastic(Elastic { shear }),
-            Strength::VonMises { shear, yield_stress, hardening, rate } => {
-                Self::VonMises(VonMises { shear, yield_stress, hardening, rate: RateFactor::of(rate) })
-            }
-            Strength::Tabulated { shear, hardening, rate } => {
-                Self::Tabulated(Tabulated::new(shear, &hardening, RateFactor::of(rate)))
-            }
-            Strength::JohnsonCook { shear, a, b, n, c, m, t_melt, t_room, specific_heat, rate0, heat } => {
-                let heating = 1.0 / (material.density * specific_heat);
-                let [by_work, by_energy] = match heat {
-                    Heat::PlasticWork => [heating, 0.0],
-                    Heat::InternalEnergy => [0.0, heating],
-                };
-                Self::JohnsonCook(JohnsonCook {
-                    shear,
-                    a,
-                    b,
-                    n,
-                    c,
-                    m,
-                    t_room,
-                    inverse_range: 1.0 / (t_melt - t_room),
-                    heating,
-                    by_work,
-                    by_energy,
-                    inverse_rate0: 1.0 / rate0,
-                })
-            }
-            Strength::Voce(law) => Self::Voce(law),
-            // Their elements have a kernel of their own, see [`AnyRemembering`]; others ask for the stiffness.
-            Strength::JohnsonHolmquist(law) => Self::Elastic(Elastic { shear: law.shear }),
-            Strength::MooneyRivlin(law) => Self::Elastic(Elastic { shear: law.shear() }),
-            Strength::Ogden(law) => Self::Elastic(Elastic { shear: law.shear() }),
-            Strength::Viscoelastic(law) => Self::Elastic(Elastic { shear: law.shear }),
-            Strength::CrushableFoam(law, _) => Self::Elastic(Elastic { shear: law.shear() }),
-            Strength::LowDensityFoam(law, _) => Self::Elastic(Elastic { shear: law.shear() }),
-            Strength::SoilFoam(law, _) => Self::Elastic(Elastic { shear: law.shear }),
-        }
-    }
-}
-
-impl StrengthLaw for AnyStrength {
-    #[inline(always)]
-    fn deviatoric(&self) -> bool {
-        of_any!(self, law => law.deviatoric())
-    }
-
-    #[inline(always)]
-    fn plastic(&self) -> bool {
-        of_any!(self, law => law.plastic())
-    }
-
-    #[inline(always)]
-    fn thermal(&self) -> bool {
-        of_any!(self, law => law.thermal())
-    }
-
-    #[inline(always)]
-    fn shear(&self) -> f64 {
-        of_any!(self, law => law.shear())
-    }
-
-    #[inline(always)]
-    fn flow<L: Lane>(&self, strain: L, factor: L) -> (L, L) {
-        of_any!(self, law => law.flow(strain, factor))
-    }
-
-    #[inline(always)]
-    fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
-        of_any!(self, law => law.factor(rate, temperature))
-    }
-
-    #[inline(always)]
-    fn heating(&self) -> f64 {
-        of_any!(self, law => law.heating())
-    }
-
-    #[inline(always)]
-    fn heating_by_energy(&self) -> f64 {
-        of_any!(self, law => law.heating_by_energy())
-    }
-
-    #[inline(always)]
-    fn update<L: Lane>(
-        &self,
-        trial: Deviator<L>,
-        strain: Strain<L>,
-        history: &mut History<L>,
-        active: L::Mask,
-    ) -> Deviator<L> {
-        of_any!(self, law => law.update(trial, strain, history, active))
     }
 }

@@ -1,7 +1,7 @@
 //! `*MAT_` of rubber and of what relaxes.
 
 use mechanics::{
-    material::{Eos, Strength},
+    material::{Eos, Failure, Strength},
     strength::{MooneyRivlin, Ogden, Viscoelastic},
 };
 
@@ -19,7 +19,8 @@ fn nearly_incompressible(strength: Strength, shear: f64, f: &Fields<'_>, i: usiz
         return None;
     }
     let bulk = 2.0 * shear * (1.0 + poisson) / (3.0 * (1.0 - 2.0 * poisson));
-    Some(Law::Whole { strength, eos: Eos::Linear { bulk }, given: "Poisson's ratio" })
+    let (eos, failure) = (Eos::Linear { bulk }, Failure::None);
+    Some(Law::Whole { strength, eos, failure, given: "Poisson's ratio" })
 }
 
 /// A field that asks for more than the constants of the card.
@@ -75,5 +76,5 @@ pub(super) fn viscoelastic(f: &[Fields<'_>; 8]) -> Option<Law> {
         f[0].fault(4, "a GI that is not above G0", "correct one of them");
         return None;
     }
-    Some(Law::Whole { strength, eos: Eos::Linear { bulk: bulk? }, given: "BULK" })
+    Some(Law::Whole { strength, eos: Eos::Linear { bulk: bulk? }, failure: Failure::None, given: "BULK" })
 }

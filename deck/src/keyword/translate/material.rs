@@ -2,7 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use mechanics::material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength};
+use mechanics::material::{
+    CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, MAX_POINTS, Material, Points, Strength,
+    Tabulated,
+};
 
 use super::state::Translation;
 use crate::{
@@ -62,6 +65,7 @@ fn make(t: &Translation<'_>, card: &MaterialCard, part: &PartCard, name: String)
         Law::Null { cut_off } if cut_off.value < 0.0 => {
             Failure::Hydrostatic { tension: -cut_off.value, heals: true }
         }
+        Law::Whole { failure, .. } => *failure,
         Law::JohnsonCook { damage: Some(d), .. } => Failure::JohnsonCook { d: d.map(|d| d + 0.0) },
         _ => Failure::None,
     };
@@ -79,7 +83,7 @@ fn make(t: &Translation<'_>, card: &MaterialCard, part: &PartCard, name: String)
                 );
             }
             // Told with the strength.
-            (Clash::Failure | Clash::Damage, _) => {}
+            (Clash::Failure | Clash::Damage | Clash::Porous, _) => {}
         }
     }
     Some(material)
@@ -109,7 +113,10 @@ fn eos_of(
             );
             log.fault_of(part.eos.origin, expected, "leave EOSID blank");
         }
-        return Some(*own);
+        return Some(match own {
+            Eos::Linear { bulk } => Eos::Linear { bulk: t.number(material.at, "a bulk modulus of", *bulk) },
+            own => *own,
+        });
     }
     match (eos, &material.law) {
         (Some(EosCard::Jwl(jwl)), Law::Explosive { speed, pressure }) => {
@@ -137,6 +144,35 @@ fn eos_of(
         (Some(EosCard::Jwl(_)), _) => None,
         (Some(EosCard::Grueneisen { c, s, gamma }), _) => {
             Some(Eos::Shock { c0: *c, s: s + 0.0, gamma: gamma + 0.0 })
+        }
+        (Some(EosCard::Tabulated { gamma, curves, points }), _) => {
+            let mut tables = Vec::new();
+            for (curve, points) in curves.iter().zip(points) {
+                let points = match curve.value {
+                    0 => points.clone(),
+                    id => t.points(id, curve.origin.at)?.to_vec(),
+                };
+                // The card has the logarithm of the relative volume, which compression makes negative.
+                let mut points: Vec<[f64; 2]> =
+                    points.iter().map(|[at, value]| [-at + 0.0, *value]).collect();
+                points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+                let ascends = points.windows(2).all(|w| w[0][0] < w[1][0]);
+                if !ascends || !(1..=MAX_POINTS).contains(&points.len()) {
+                    let expected = format!("1 to {MAX_POINTS} points at different volumes");
+                    log.fault_of(curve.origin, expected, "correct the points, or fit fewer");
+                    return None;
+                }
+                let number = |value: f64| t.number(curve.origin.at, "a value of", value);
+                let points: Vec<[f64; 2]> = points.iter().map(|[at, value]| [*at, number(*value)]).collect();
+                tables.push(Points::through(&points));
+            }
+            let law =
+                Eos::Tabulated(Tabulated { gamma: gamma + 0.0, pressure: tables[0], factor: tables[1] });
+            if let Some(expected) = law.fault(material.density) {
+                log.fault_of(curves[0].origin, expected, "correct the points");
+                return None;
+            }
+            Some(law)
         }
         (Some(EosCard::Polynomial { origin, c, energy }), _) => {
             let refuse = |what: &str, advice: &str| {
@@ -194,7 +230,7 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
     let rate_of =
         |rate: &Option<[f64; 2]>| rate.map(|[reference, exponent]| CowperSymonds { reference, exponent });
     Some(match &material.law {
-        Law::Whole { strength, .. } => *strength,
+        Law::Strength(strength) | Law::Whole { strength, .. } => *strength,
         Law::Curved { strength, curve, points } => {
             let mut points = match curve.value {
                 0 => points.clone(),

@@ -8,7 +8,10 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::Lane;
+use super::{
+    Lane,
+    dispatch::{Apart, apart_on_avx2},
+};
 
 /// Four f64 in a register.
 #[derive(Clone, Copy)]
@@ -239,5 +242,11 @@ impl Lane for Avx2 {
             let shifted = _mm256_blend_pd::<0b0001>(turned, _mm256_setzero_pd());
             (Self(shifted), _mm256_cvtsd_f64(turned))
         })
+    }
+
+    #[inline(always)]
+    fn apart<T: Apart>(task: T) {
+        // SAFETY: the machine has the instructions, see the head of the file.
+        unsafe { apart_on_avx2(task) }
     }
 }

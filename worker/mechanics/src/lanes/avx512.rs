@@ -8,7 +8,11 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{Lane, avx2::four};
+use super::{
+    Lane,
+    avx2::four,
+    dispatch::{Apart, apart_on_avx512},
+};
 
 /// Eight f64 in a register.
 #[derive(Clone, Copy)]
@@ -236,5 +240,11 @@ impl Lane for Avx512 {
             let shifted = _mm512_maskz_mov_pd(0b1111_1110, turned);
             (Self(shifted), _mm512_cvtsd_f64(turned))
         })
+    }
+
+    #[inline(always)]
+    fn apart<T: Apart>(task: T) {
+        // SAFETY: the machine has the instructions, see the head of the file.
+        unsafe { apart_on_avx512(task) }
     }
 }

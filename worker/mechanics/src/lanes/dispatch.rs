@@ -101,3 +101,44 @@ unsafe fn on_avx2<T: Task>(task: T) -> T::Output {
 unsafe fn on_avx512<T: Task>(task: T) -> T::Output {
     task.run::<Avx512>()
 }
+
+/// A part of a calculation on lanes that is a function of its own, called by [`Lane::apart`]: a law that is long and stands in many
+/// kernels is then compiled once for each width. Arguments and answers go through memory, so it does the work of a whole set. [`Apart::run`]
+/// is to be `#[inline(always)]`, as that of a [`Task`].
+pub trait Apart {
+    /// Does the work; the task holds references to what it changes.
+    fn run(self);
+}
+
+/// [`Apart::run`] of lanes that need no instructions of their own.
+#[inline(never)]
+pub(super) fn apart_plain<T: Apart>(task: T) {
+    task.run();
+}
+
+/// # Safety
+/// The machine has FMA.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "fma")]
+#[inline(never)]
+pub(super) unsafe fn apart_on_fma<T: Apart>(task: T) {
+    task.run();
+}
+
+/// # Safety
+/// The machine has [`Width::Avx2`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+#[inline(never)]
+pub(super) unsafe fn apart_on_avx2<T: Apart>(task: T) {
+    task.run();
+}
+
+/// # Safety
+/// The machine has [`Width::Avx512`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+#[inline(never)]
+pub(super) unsafe fn apart_on_avx512<T: Apart>(task: T) {
+    task.run();
+}

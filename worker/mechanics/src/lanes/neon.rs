@@ -5,7 +5,10 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::Lane;
+use super::{
+    Lane,
+    dispatch::{Apart, apart_plain},
+};
 
 /// Two f64 in a register.
 #[derive(Clone, Copy)]
@@ -215,5 +218,10 @@ impl Lane for Neon {
     #[inline(always)]
     fn shifted_up(self) -> (Self, f64) {
         neon!((Self(vextq_f64::<1>(vdupq_n_f64(0.0), self.0)), vgetq_lane_f64::<1>(self.0)))
+    }
+
+    #[inline(always)]
+    fn apart<T: Apart>(task: T) {
+        apart_plain(task);
     }
 }

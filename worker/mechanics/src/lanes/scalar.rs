@@ -2,7 +2,12 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::Lane;
+#[cfg(target_arch = "x86_64")]
+use super::dispatch::apart_on_fma;
+use super::{
+    Lane,
+    dispatch::{Apart, apart_plain},
+};
 
 /// One f64.
 #[derive(Clone, Copy, Debug)]
@@ -181,5 +186,15 @@ impl Lane for Scalar {
     #[inline(always)]
     fn shifted_up(self) -> (Self, f64) {
         (Self(0.0), self.0)
+    }
+
+    #[inline(always)]
+    fn apart<T: Apart>(task: T) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("fma") {
+            // SAFETY: the machine has FMA.
+            return unsafe { apart_on_fma(task) };
+        }
+        apart_plain(task);
     }
 }

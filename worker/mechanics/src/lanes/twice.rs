@@ -5,7 +5,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::Lane;
+use super::{Lane, dispatch::Apart};
 
 /// The lanes of one register and, behind them, those of another.
 #[derive(Clone, Copy)]
@@ -181,5 +181,10 @@ impl<L: Lane> Lane for Twice<L> {
         // What falls out of the one goes into the first lane of the other.
         let ((low, carry), (high, last)) = (self.0.shifted_up(), self.1.shifted_up());
         (Self(low, L::select(L::mask(1), L::splat(carry), high)), last)
+    }
+
+    #[inline(always)]
+    fn apart<T: Apart>(task: T) {
+        L::apart(task);
     }
 }

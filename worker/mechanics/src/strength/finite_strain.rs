@@ -157,9 +157,11 @@ pub(super) mod tests {
 
     impl Cube {
         pub fn of(strength: Strength, bulk: f64) -> Self {
-            let eos = Eos::Linear { bulk };
-            let material =
-                Material { name: "a".into(), density: 1000.0, eos, strength, failure: Failure::None };
+            let (eos, failure) = (Eos::Linear { bulk }, Failure::None);
+            Self::of_material(Material { name: "a".into(), density: 1000.0, eos, strength, failure })
+        }
+
+        pub fn of_material(material: Material) -> Self {
             let corners: Vec<[f64; 3]> =
                 (0..8_u32).map(|n| [n % 2, n / 2 % 2, n / 4].map(|c| f64::from(c) - 0.5)).collect();
             let history = material.history();
@@ -174,7 +176,11 @@ pub(super) mod tests {
                 mass: vec![1.0; 8],
                 constraint: vec![0; 8],
                 initial_volume: vec![1.0],
-                fields: std::array::from_fn(|k| vec![f64::from(k == field::RELATIVE_VOLUME)]),
+                fields: std::array::from_fn(|k| match k {
+                    field::RELATIVE_VOLUME => vec![1.0],
+                    field::TEMPERATURE => vec![material.initial_temperature()],
+                    _ => vec![0.0],
+                }),
                 erosion: None,
                 history: history.iter().map(|variable| vec![variable.initial]).collect(),
                 contact: Vec::new(),

@@ -108,6 +108,17 @@ impl Ceramic {
     }
 }
 
+/// The bulking pressure after a release of elastic energy, where something presses: `elastic` is the pressure without it, `stiffness` the
+/// bulk modulus times the share of the energy that swells.
+#[inline(always)]
+pub(super) fn bulked<L: Lane>(elastic: L, bulking: L, released: L, stiffness: f64) -> L {
+    let zero = L::splat(0.0);
+    let pressed = elastic + bulking;
+    let root = pressed.mul_add(pressed, L::splat(2.0 * stiffness) * released).sqrt();
+    let swells = L::both(zero.less(released), zero.less_equal(pressed));
+    L::select(swells, root - elastic, bulking)
+}
+
 impl StrengthLaw for Ceramic {
     const REMEMBERS: bool = true;
 
@@ -149,10 +160,7 @@ impl StrengthLaw for Ceramic {
         let released = L::select(yields, released * L::splat(1.0 / (6.0 * self.law.shear)), zero);
         memory.variables[RELEASED] = memory.variables[RELEASED] + released;
         let elastic = L::splat(self.bulk) * (one / around.relative_volume - one);
-        let pressed = elastic + bulking;
-        let root = pressed.mul_add(pressed, L::splat(2.0 * self.law.beta * self.bulk) * released).sqrt();
-        let swells = L::both(zero.less(released), zero.less_equal(pressed));
-        memory.variables[BULKING] = L::select(swells, root - elastic, bulking);
+        memory.variables[BULKING] = bulked(elastic, bulking, released, self.law.beta * self.bulk);
         trial.scaled(L::select(yields, strength / sigma, one))
     }
 }
@@ -352,6 +360,7 @@ mod tests {
                 pressure_before: zero,
                 energy: zero,
                 density: Scalar(2610.0),
+                relative_volume_before: Scalar(1.0),
                 relative_volume: Scalar(0.96),
                 gradient: Tensor { x: still, y: still, z: still },
                 spin: still,

@@ -51,7 +51,7 @@ impl PlaneLaw {
         if material.is_gas() {
             return Err("a gas");
         }
-        if !material.history().is_empty() {
+        if material.remembers() {
             return Err(material
                 .strength
                 .declared()

@@ -56,6 +56,14 @@ pub(super) fn principal<L: Lane>(b: &Symmetric<L>) -> ([L; 3], [Vector<L>; 3]) {
     ([b.xx, b.yy, b.zz], [x, y, z])
 }
 
+/// The greatest principal value of a deviator.
+#[inline(always)]
+pub(crate) fn greatest_principal<L: Lane>(s: &Deviator<L>) -> L {
+    let Deviator { xx, yy, zz, xy, yz, zx } = *s;
+    let ([x, y, z], _) = principal(&Symmetric { xx, yy, zz, xy, yz, zx });
+    x.max(y).max(z)
+}
+
 /// The tensor with these values along these axes.
 #[inline(always)]
 pub(super) fn along<L: Lane>(values: &[L; 3], axes: &[Vector<L>; 3]) -> Deviator<L> {

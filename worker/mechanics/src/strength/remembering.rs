@@ -1,10 +1,15 @@
-//! The laws with history variables. They have a kernel of their own, so that the other one does not become slower.
+//! The laws with history variables, or that see pressure and energy ([`StrengthLaw::remember`]). They have a kernel of their own, so that the other one does not become slower.
 
 use super::{
     Around, Deviator, History, Memory, MooneyRivlin, Ogden, Strength, StrengthLaw, Viscoelastic,
-    crushable_foam::Crushable, johnson_holmquist::Ceramic, low_density_foam::LowDensity, soil_foam::Soil,
+    apart::Apart, crushable_foam::Crushable, holmquist_johnson_cook::Concrete, johnson_holmquist::Ceramic,
+    low_density_foam::LowDensity, porous::PorousSolid, segmented_ceramic::Segmented, soil_foam::Soil,
+    steinberg_guinan::Metal,
 };
-use crate::{lanes::Lane, material::Material};
+use crate::{
+    lanes::Lane,
+    material::{Eos, Material},
+};
 
 /// Any of them, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
 #[derive(Clone, Copy)]
@@ -16,6 +21,10 @@ pub(crate) enum AnyRemembering {
     CrushableFoam(Crushable),
     LowDensityFoam(LowDensity),
     SoilFoam(Soil),
+    Porous(Apart<PorousSolid>),
+    HolmquistJohnsonCook(Apart<Concrete>),
+    SteinbergGuinan(Apart<Metal>),
+    SegmentedCeramic(Apart<Segmented>),
 }
 
 /// The laws by their names: the one list that calls go by.
@@ -29,6 +38,10 @@ macro_rules! of_any {
             AnyRemembering::CrushableFoam($law) => $call,
             AnyRemembering::LowDensityFoam($law) => $call,
             AnyRemembering::SoilFoam($law) => $call,
+            AnyRemembering::Porous($law) => $call,
+            AnyRemembering::HolmquistJohnsonCook($law) => $call,
+            AnyRemembering::SteinbergGuinan($law) => $call,
+            AnyRemembering::SegmentedCeramic($law) => $call,
         }
     };
 }
@@ -36,8 +49,16 @@ macro_rules! of_any {
 impl AnyRemembering {
     /// That of a material, made ready; none if its law has no history variables.
     pub fn of(material: &Material) -> Option<Self> {
-        match material.strength {
+        match &material.eos {
+            Eos::Porous(law) => Some(Self::Porous(Apart(PorousSolid::new(law, material)))),
             _ if material.is_gas() => None,
+            _ => Self::of_strength(material),
+        }
+    }
+
+    /// That of a strength law, whatever the equation of state beside it.
+    pub fn of_strength(material: &Material) -> Option<Self> {
+        match material.strength {
             Strength::JohnsonHolmquist(law) => {
                 Some(Self::JohnsonHolmquist(Ceramic::new(&law, material.bulk())))
             }
@@ -47,6 +68,15 @@ impl AnyRemembering {
             Strength::CrushableFoam(law, curve) => Some(Self::CrushableFoam(Crushable::new(&law, &curve))),
             Strength::LowDensityFoam(law, curve) => Some(Self::LowDensityFoam(LowDensity::new(&law, &curve))),
             Strength::SoilFoam(law, curve) => Some(Self::SoilFoam(Soil::new(&law, &curve))),
+            Strength::HolmquistJohnsonCook(law) => {
+                Some(Self::HolmquistJohnsonCook(Apart(Concrete::new(&law))))
+            }
+            Strength::SteinbergGuinan(law) => {
+                Some(Self::SteinbergGuinan(Apart(Metal::new(&law, material.density))))
+            }
+            Strength::SegmentedCeramic(law) => {
+                Some(Self::SegmentedCeramic(Apart(Segmented::new(&law, material.bulk()))))
+            }
             _ => None,
         }
     }
@@ -58,6 +88,16 @@ impl StrengthLaw for AnyRemembering {
     #[inline(always)]
     fn plastic(&self) -> bool {
         of_any!(self, law => law.plastic())
+    }
+
+    #[inline(always)]
+    fn thermal(&self) -> bool {
+        of_any!(self, law => law.thermal())
+    }
+
+    #[inline(always)]
+    fn heating_by_energy(&self) -> f64 {
+        of_any!(self, law => law.heating_by_energy())
     }
 
     #[inline(always)]

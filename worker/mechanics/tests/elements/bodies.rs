@@ -100,6 +100,57 @@ pub fn all_laws() -> Vec<Material> {
         Strength::Voce(mechanics::strength::Voce { shear, yield_stress: 3e8, q: 2e8, b: 12.0 }),
         Failure::None,
     );
+    let modified = mechanics::strength::ModifiedJohnsonCook {
+        shear,
+        a: 3e8,
+        b: 4e8,
+        n: 0.4,
+        q1: 1e8,
+        c1: 20.0,
+        q2: 5e7,
+        c2: 150.0,
+        c: 0.01,
+        m: 0.9,
+        t_melt: 1800.0,
+        t_room: 293.0,
+        specific_heat: 452.0,
+        rate0: 1.0,
+        taylor_quinney: 0.9,
+    };
+    add(shock, Strength::ModifiedJohnsonCook(modified), Failure::CockcroftLatham { work: 2e7 });
+    let dislocations = mechanics::strength::ZerilliArmstrong {
+        shear,
+        c0: 65e6,
+        c1: 1033e6,
+        c2: 200e6,
+        c3: 0.00698,
+        c4: 0.000_415,
+        c5: 266e6,
+        n: 0.289,
+        t_room: 294.0,
+        specific_heat: 452.0,
+        rate0: 1.0,
+        taylor_quinney: 0.9,
+    };
+    add(shock, Strength::ZerilliArmstrong(dislocations), Failure::None);
+    let pressed = mechanics::strength::SteinbergGuinan {
+        shear,
+        yield_stress: 2e8,
+        yield_limit: 6e8,
+        beta: 36.0,
+        n: 0.45,
+        initial_strain: 0.01,
+        pressure_factor: 2.83e-11,
+        yield_pressure_factor: 4e-11,
+        temperature_factor: 8e-4,
+        t_melt: 1500.0,
+        melt_gamma: 2.02,
+        melt_a: 1.5,
+        t_room: 300.0,
+        specific_heat: 452.0,
+        tension: 5e8,
+    };
+    add(shock, Strength::SteinbergGuinan(pressed), Failure::None);
     let ceramic = mechanics::strength::JohnsonHolmquist {
         shear,
         a: 0.93,
@@ -117,6 +168,66 @@ pub fn all_laws() -> Vec<Material> {
         d2: 0.8,
     };
     add(polynomial, Strength::JohnsonHolmquist(ceramic), Failure::None);
+    let segments = mechanics::strength::SegmentedCeramic {
+        shear,
+        strength1: 4e8,
+        pressure1: 2e8,
+        strength2: 8e8,
+        pressure2: 8e8,
+        c: 0.009,
+        rate0: 1.0,
+        tension: 2e8,
+        alpha: 0.4,
+        failed_limit: 1e8,
+        fracture_strain: 0.002,
+        fracture_pressure: 1e9,
+        beta: 1.0,
+    };
+    add(polynomial, Strength::SegmentedCeramic(segments), Failure::None);
+    // Stiff as steel, so that it crushes, locks and breaks in the motions of the tests.
+    let concrete = mechanics::strength::HolmquistJohnsonCook {
+        shear,
+        a: 0.79,
+        b: 1.6,
+        n: 0.61,
+        c: 0.007,
+        rate0: 1.0,
+        compressive_strength: 2e8,
+        strength_limit: 7.0,
+        tension: 1e8,
+        crush_pressure: 1.64e8,
+        crush_compression: 0.001,
+        lock_pressure: 5e8,
+        lock_compression: 0.005,
+        k1: 200e9,
+        k2: 0.0,
+        k3: 0.0,
+        d1: 0.04,
+        d2: 1.0,
+        least_strain: 0.01,
+    };
+    add(linear, Strength::HolmquistJohnsonCook(concrete), Failure::None);
+    let porous = mechanics::material::Porous {
+        solid_density: 8200.0,
+        c0: 4569.0,
+        s: 1.49,
+        gamma: 2.17,
+        porous_speed: 3500.0,
+        crush_pressure: 2e8,
+        compaction_pressure: 8e8,
+        n: 2.0,
+        tension: 4e8,
+    };
+    let points = mechanics::material::Points::through;
+    let table = mechanics::material::Tabulated {
+        gamma: 1.7,
+        pressure: points(&[[-0.1, -12e9], [-0.002, -0.32e9], [0.0, 0.0], [0.002, 0.3e9], [0.1, 20e9]]),
+        factor: points(&[[-0.01, 1.1], [0.01, 0.9]]),
+    };
+    add(Eos::Tabulated(table), von_mises(None), Failure::None);
+    add(Eos::Porous(porous), von_mises(None), Failure::None);
+    add(Eos::Porous(porous), Strength::Hydro, Failure::None);
+    add(Eos::Porous(porous), johnson_cook(), Failure::None);
     let rubber = mechanics::strength::MooneyRivlin { a: 25e9, b: 15e9 };
     add(linear, Strength::MooneyRivlin(rubber), Failure::None);
     let stretches = mechanics::strength::Ogden {
@@ -280,12 +391,12 @@ pub fn stirred(material: &Material, cells: [u32; 3], seed: u64) -> Piece {
             // Some are not lit yet, some burn, some have burnt.
             set(field::TIME_TO_LIGHT, 1e-5 * draws.next());
         }
-        use Strength::{Elastic, Hydro, JohnsonCook};
+        use Strength::{Elastic, Hydro};
         if !matches!(material.strength, Hydro | Elastic { .. }) && !material.is_gas() {
             // Some are virgin and cold.
             let strain = draws.next().max(0.0);
             set(field::PLASTIC_STRAIN, strain);
-            if matches!(material.strength, JohnsonCook { .. }) {
+            if material.initial_temperature() > 0.0 {
                 set(field::TEMPERATURE, 300.0 + 800.0 * strain);
             }
         }

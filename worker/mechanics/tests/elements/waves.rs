@@ -57,6 +57,51 @@ impl Column {
     }
 }
 
+/// A piston drives a porous metal: behind the shock it has the pressure, the density and the energy of the conservation laws, without pores.
+#[test]
+fn a_strong_shock_compacts_a_porous_metal_to_its_hugoniot() {
+    let law = mechanics::material::Porous {
+        solid_density: 2785.0,
+        c0: 5328.0,
+        s: 1.338,
+        gamma: 2.0,
+        porous_speed: 1500.0,
+        crush_pressure: 0.05e9,
+        compaction_pressure: 0.5e9,
+        n: 2.0,
+        tension: 1e30,
+    };
+    let (density, distension, piston) = (2785.0 / 1.5, 1.5, 1000.0);
+    let porous = material(density, Eos::Porous(law), Strength::Hydro);
+    // The volume behind the shock, by halves: p = rho0 up^2 / (1 - v) on the Hugoniot of the porous metal.
+    let hugoniot = |v: f64| {
+        let eta = 1.0 - distension * v;
+        let cold = 2785.0 * 5328.0 * 5328.0 * eta / (1.0 - 1.338 * eta).powi(2) * (1.0 - eta);
+        cold / (1.0 - distension * (1.0 - v))
+    };
+    let (mut low, mut high) = (0.52, 1.0 / distension);
+    for _ in 0..100 {
+        let v = 0.5 * (low + high);
+        if hugoniot(v) > density * piston * piston / (1.0 - v) { low = v } else { high = v }
+    }
+    let (v, p) = (low, hugoniot(low));
+    let cells = 160;
+    let mut column = Column::new(&grid(&porous, [1, 1, cells], 0.001, 0.0, 1), &porous, 1e6);
+    let shock = piston / (1.0 - v);
+    while column.time < 0.8 * 0.001 * f64::from(cells) / shock {
+        column.cycle(piston, None);
+    }
+    let mean = |value: &dyn Fn(usize) -> f64| (40..90).map(value).sum::<f64>() / 50.0;
+    let of = |field: usize| mean(&|e| column.block.field(e, field));
+    let close = |what: &str, found: f64, wanted: f64| {
+        println!("porous shock: {what} {found:.6e}, conservation laws {wanted:.6e}");
+        assert!((found / wanted - 1.0).abs() < 0.01, "{what}: {found} {wanted}");
+    };
+    close("pressure", of(field::PRESSURE), p);
+    close("relative volume", of(field::RELATIVE_VOLUME), v);
+    close("energy", of(field::ENERGY), 0.5 * p * (1.0 - v));
+}
+
 /// Density at `x` after `t` = 0.2 of Sod's tube with its membrane at 0.5, gamma 1.4: published plateau values and the
 /// similarity solution of the fan.
 fn sod(x: f64) -> f64 {

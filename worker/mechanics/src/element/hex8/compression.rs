@@ -74,7 +74,12 @@ impl<L: Lane> Compressed<L> {
             let left = view.state::<L>(slot, field::TIME_TO_LIGHT) - dt;
             burn = laws.eos.burn(left, relative_volume, initial_volume);
         }
-        let mut line = laws.eos.line(relative_volume, burn.burnt);
+        let mut line = if S::REMEMBERS {
+            let line = laws.eos.line(relative_volume * memory.stretch, burn.burnt);
+            line.of_porous(memory.distension, memory.stretch)
+        } else {
+            laws.eos.line(relative_volume, burn.burnt)
+        };
         if S::REMEMBERS {
             line.a = line.a + memory.added_pressure;
         }

@@ -31,7 +31,7 @@ use crate::{
         field::{DAMAGE, PLASTIC_STRAIN, SXX, SXY, SYY, SYZ, SZX, TEMPERATURE},
         sparse,
     },
-    strength::{AnyRemembering, AnyStrength},
+    strength::AnyStrength,
 };
 
 /// Points of an element: one lane set.
@@ -71,7 +71,7 @@ impl fmt::Display for Unfit {
 pub fn check(material: &Material) -> Result<(), Unfit> {
     if material.shear() <= 0.0 {
         Err(Unfit::Fluid)
-    } else if AnyRemembering::of(material).is_some() {
+    } else if material.remembers() {
         Err(Unfit::Remembers)
     } else {
         Ok(())

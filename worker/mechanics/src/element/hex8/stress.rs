@@ -130,6 +130,7 @@ impl<L: Lane> Stressed<L> {
                     energy,
                     density: L::splat(laws.density) / relative_volume,
                     relative_volume,
+                    relative_volume_before: view.state(slot, field::RELATIVE_VOLUME),
                     gradient: *gradient,
                     spin,
                     rate,

@@ -1,0 +1,195 @@
+//! `*MAT_` of metals whose yield stress depends on rate and temperature.
+
+use mechanics::{
+    material::{Eos, Failure, Strength},
+    strength::{ModifiedJohnsonCook, SteinbergGuinan, ZerilliArmstrong},
+};
+
+use super::{COLD, COLD_HEAT, Law, not_negative};
+use crate::{
+    keyword::{erosion::Limits, fields::Fields},
+    log::Log,
+    table::Range,
+};
+
+/// A field that asks for more than the law has.
+fn refuse(f: &Fields<'_>, i: usize, expected: &str, advice: &str) {
+    if f.real(i, 0.0) != 0.0 {
+        f.fault(i, expected, advice);
+    }
+}
+
+/// `*MAT_MODIFIED_JOHNSON_COOK`: five cards and one of critical values, with the moduli of the first.
+pub(super) fn modified_johnson_cook(
+    f: &[Fields<'_>; 8],
+    moduli: Option<(f64, f64)>,
+    limits: &mut Limits,
+) -> Option<Law> {
+    refuse(&f[0], 4, "no damage in the yield stress", "leave BETA blank");
+    refuse(&f[0], 7, "no thermal expansion", "leave ALPHA blank");
+    refuse(
+        &f[1],
+        4,
+        "the law of Johnson and Cook",
+        "leave FLAG1 blank, or take *MAT_MODIFIED_ZERILLI_ARMSTRONG",
+    );
+    let share = f[0].within(5, 0.0, Range::Within(-f64::MIN_POSITIVE, 1.0, "a number from 0 to 1"));
+    let heat = f[0].real(6, 0.0);
+    let [rate0, a] = [f[1].positive(0, "E0DOT"), f[2].positive(0, "A")];
+    let (t_room, t_melt) = (f[1].real(1, 0.0), f[1].real(2, 0.0));
+    let (n, m) = (f[2].real(2, 0.0), f[2].real(4, 0.0));
+    let is_warmed = share > 0.0 && heat > 0.0 && m > 0.0;
+    if is_warmed && !(0.0 < t_room && t_room < t_melt) {
+        f[1].fault(2, "a melting temperature above room temperature, both in K", "correct TR or TM");
+        return None;
+    }
+    let start = f[1].real(3, 0.0);
+    if start != 0.0 && start != t_room {
+        f[1].fault(3, "room temperature at the start", "give T0 as TR");
+    }
+    // Temperatures and stresses that no element comes to stand for none.
+    let critical = f[5].real(0, 0.0);
+    if is_warmed && critical != 0.0 && critical < t_melt {
+        f[5].fault(0, "no temperature at which elements leave", "leave TC blank, or give TM or more");
+    }
+    if let (Some(a), shear) = (a, f[5].real(1, 0.0))
+        && shear != 0.0
+        && shear < 100.0 * a
+    {
+        f[5].fault(1, "no shear stress at which elements leave", "leave TAUC blank");
+    }
+    let mut failure = Failure::None;
+    if f[1].real(5, 0.0) == 0.0 {
+        if let Some(i) = (2..7).find(|i| f[4].real(*i, 0.0) != 0.0) {
+            f[4].fault(i, "the fracture criterion of Cockcroft and Latham", "give FLAG2 1 and WC");
+        }
+    } else {
+        let work = f[4].positive(1, "WC")?;
+        failure = Failure::CockcroftLatham { work };
+        limits.by_failure(f[4].origin(1, "WC"));
+    }
+    let (young, poisson) = moduli?;
+    let law = ModifiedJohnsonCook {
+        shear: young / (2.0 * (1.0 + poisson)),
+        a: a?,
+        b: not_negative(&f[2], 1),
+        n: if n > 0.0 { n } else { 1.0 },
+        q1: not_negative(&f[3], 0),
+        c1: not_negative(&f[3], 1),
+        q2: not_negative(&f[3], 2),
+        c2: not_negative(&f[3], 3),
+        c: not_negative(&f[2], 3),
+        m: if is_warmed { m } else { 1.0 },
+        t_melt: if is_warmed { t_melt } else { COLD[1] },
+        t_room: if is_warmed { t_room } else { COLD[0] },
+        specific_heat: if is_warmed { heat } else { COLD_HEAT },
+        rate0: rate0?,
+        taylor_quinney: if is_warmed { share } else { 0.0 },
+    };
+    let eos = Eos::Linear { bulk: young / (3.0 * (1.0 - 2.0 * poisson)) };
+    Some(Law::Whole { strength: Strength::ModifiedJohnsonCook(law), eos, failure, given: "E and PR" })
+}
+
+/// From here on a cut-off stands for none.
+const NEVER: f64 = 1e15;
+
+/// `*MAT_MODIFIED_ZERILLI_ARMSTRONG`: four cards.
+pub(super) fn zerilli_armstrong(f: &[Fields<'_>; 8], limits: &mut Limits, log: &Log<'_>) -> Option<Law> {
+    let [shear, rate0, t_room] = [(2, "G"), (3, "E0"), (5, "TROOM")].map(|(i, what)| f[0].positive(i, what));
+    let cut_off = f[0].real(6, 0.0);
+    if cut_off != 0.0 && cut_off.abs() < NEVER {
+        f[0].fault(6, "no pressure cut-off", "leave PC blank, or give -1e30");
+    }
+    if f[1].real(7, 0.0) != 0.0 {
+        log.warn(f[1].place(7), "VP: the rate of the whole deviatoric strain is used, as with VP 0");
+    }
+    limits.read_failure_strain(&f[1], 6, "EFAIL");
+    if !matches!(f[2].real(0, 1.0), 0.0 | 1.0) {
+        f[2].fault(0, "hardening that does not depend on temperature", "give B1 1 and leave B2 and B3 blank");
+    }
+    for i in [1, 2] {
+        refuse(&f[2], i, "hardening that does not depend on temperature", "leave B2 and B3 blank");
+    }
+    for i in 4..7 {
+        refuse(&f[2], i, "a constant heat capacity", "leave G2 to G4 blank");
+    }
+    let [c1, c2, c3, c4, c5, c6] = [0, 1, 2, 3, 4, 5].map(|i| not_negative(&f[1], i));
+    let n = not_negative(&f[0], 4);
+    let is_body_centred = n > 0.0;
+    if !is_body_centred && !matches!(f[3].real(0, 0.5), 0.0 | 0.5) {
+        f[3].fault(0, "the root of the plastic strain", "leave M blank");
+    }
+    let heat = f[2].real(3, 0.0);
+    let law = ZerilliArmstrong {
+        shear: shear?,
+        c0: if is_body_centred { c1 + c6 } else { c1 + c5 },
+        c1: if is_body_centred { c2 } else { 0.0 },
+        c2: if is_body_centred { 0.0 } else { c2 },
+        c3,
+        c4,
+        c5: if is_body_centred { c5 } else { 0.0 },
+        n: if is_body_centred { n } else { 1.0 },
+        t_room: t_room?,
+        specific_heat: if heat > 0.0 { heat } else { COLD_HEAT },
+        rate0: rate0?,
+        taylor_quinney: if heat > 0.0 { 1.0 } else { 0.0 },
+    };
+    let strength = Strength::ZerilliArmstrong(law);
+    if let Some(expected) = strength.fault() {
+        f[1].fault(0, expected, "give C1 or C2");
+        return None;
+    }
+    Some(Law::Strength(strength))
+}
+
+/// `*MAT_STEINBERG`: three cards, and one of coefficients of the cold energy.
+pub(super) fn steinberg_guinan(f: &[Fields<'_>; 8], density: Option<f64>) -> Option<Law> {
+    let [shear, yield_stress, yield_limit] =
+        [(2, "G0"), (3, "SIGO"), (7, "SIGM")].map(|(i, what)| f[0].positive(i, what));
+    refuse(&f[1], 3, "no softening by energy before the melt", "leave F blank");
+    let t_melt = f[1].positive(5, "TMO");
+    let Some(gas_constant) = Some(f[2].real(2, 0.0)).filter(|r| *r > 0.0) else {
+        f[2].fault(
+            2,
+            "the heat capacity 3 R' per volume",
+            "give RP, the gas constant per volume, in place of A",
+        );
+        return None;
+    };
+    // The cold energy is that of the equation of state.
+    for (card, i) in [(2, 6), (2, 7)].into_iter().chain((0..8).map(|i| (3, i))) {
+        refuse(&f[card], i, "the cold energy of the equation of state", "leave EC0 to EC9 blank");
+    }
+    let cut_off = f[2].real(0, 0.0);
+    let tension = if cut_off == 0.0 || cut_off.abs() >= NEVER { 1e30 } else { -cut_off };
+    if tension < 0.0 {
+        f[2].fault(0, "a pressure cut-off below 0", "give it as a negative pressure");
+        return None;
+    }
+    if tension < NEVER && f[2].real(1, 0.0) != 1.0 {
+        f[2].fault(1, "a cut-off of the pressure alone", "give SPALL 1, or PC -1e30");
+    }
+    let law = SteinbergGuinan {
+        shear: shear?,
+        yield_stress: yield_stress?,
+        yield_limit: yield_limit?,
+        beta: not_negative(&f[0], 4),
+        n: not_negative(&f[0], 5),
+        initial_strain: not_negative(&f[0], 6),
+        pressure_factor: not_negative(&f[1], 0),
+        yield_pressure_factor: not_negative(&f[1], 1),
+        temperature_factor: not_negative(&f[1], 2),
+        t_melt: t_melt?,
+        melt_gamma: not_negative(&f[1], 6),
+        melt_a: not_negative(&f[1], 7),
+        t_room: 300.0,
+        specific_heat: 3.0 * gas_constant / density?,
+        tension,
+    };
+    let strength = Strength::SteinbergGuinan(law);
+    if let Some(expected) = strength.fault() {
+        f[0].fault(7, expected, "correct TMO or SIGM");
+        return None;
+    }
+    Some(Law::Strength(strength))
+}
