@@ -123,8 +123,15 @@ fn keywords_that_matter_are_honoured_or_refused() {
         let more = format!("*CONTROL_SHELL\n20.0,2,-1,{istupd}\n");
         good(&cube_of("*KEYWORD", shells, "*ELEMENT_SHELL\n1,1,1,2,3,4\n", &more))
     };
-    assert!(warned(&sheet(0), "ISTUPD: the thickness of shells follows their strain"));
-    assert!(!warned(&sheet(1), "ISTUPD"));
+    let thins = |reading: &Reading| reading.model.mesh.parts[0].section().map(|section| section.thins);
+    for (istupd, expected) in [(0, false), (1, true), (2, false), (3, true), (4, true)] {
+        assert_eq!(thins(&sheet(istupd)), Some(expected), "ISTUPD {istupd}");
+        assert_eq!(warned(&sheet(istupd), "ISTUPD"), istupd == 4);
+    }
+    // Theirs is 0 where no card says anything.
+    let silent =
+        good(&cube_of("*KEYWORD", "*SECTION_SHELL\n1,2\n0.5\n", "*ELEMENT_SHELL\n1,1,1,2,3,4\n", ""));
+    assert_eq!(thins(&silent), Some(false));
 }
 
 #[test]

@@ -126,8 +126,8 @@ pub(super) struct ControlCards {
     pub(super) hourglass: Option<(Place, i64, f64)>,
     /// Whether nodes without elements stay in the run.
     pub(super) freed_nodes: Option<(Place, bool)>,
-    /// The card of `*CONTROL_SHELL` by which shells keep their thickness.
-    pub(super) rigid_thickness: Option<Place>,
+    /// Whether the thickness of shells follows their strains.
+    pub(super) shells_thin: bool,
     pub(super) period: Option<(Place, f64)>,
     pub(super) sections: Vec<SectionCard>,
     /// Nodes and sets of nodes whose motion is to be written.
@@ -225,10 +225,17 @@ impl ControlCards {
                 "Lagrangian mechanics",
                 "take the keyword out if the problem does without it",
             ),
-            "CONTROL_SHELL" => match f.integer(3) {
-                1 | 4 => log.ignore(block.at, "CONTROL_SHELL"),
-                _ => self.rigid_thickness = Some(card.at),
-            },
+            "CONTROL_SHELL" => {
+                let update = f.integer(3);
+                // 2 is of thick shells alone.
+                self.shells_thin = !matches!(update, 0 | 2);
+                if update == 4 {
+                    log.warn(
+                        card.at,
+                        "ISTUPD 4: elastic strains change the thickness of shells too, as with 1",
+                    );
+                }
+            }
             "CONTROL_SOLUTION" => {
                 if f.integer(0) != 0 {
                     f.fault(0, "SOLN 0, mechanics alone", "take it out if the problem does without heat");

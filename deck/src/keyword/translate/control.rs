@@ -23,9 +23,6 @@ pub(super) fn write(t: &mut Translation<'_>, units: Option<&str>) {
     let name = unit::choose(units, problem.units.as_ref(), materials, log);
     t.deck.units = SETS.into_iter().find(|set| set.name == name).unwrap_or(SETS[0]);
     let given = &problem.control;
-    if let Some(at) = given.rigid_thickness.filter(|_| !t.turns.is_empty()) {
-        log.warn(at, "ISTUPD: the thickness of shells follows their strain, as with ISTUPD 1");
-    }
     let Some((at, end)) = given.end_time else {
         log.fault(start, "a deck without an end time", "*CONTROL_TERMINATION with ENDTIM", "add it");
         return;

@@ -66,7 +66,12 @@ pub(super) fn write(t: &mut Translation<'_>) {
                 let rule =
                     if shell.lobatto { Rule::Lobatto(shell.points) } else { Rule::Gauss(shell.points) };
                 let thickness = t.number(at, "a thickness of", *thickness);
-                Kind::Shells(mesh::Section { thickness, rule, thins: true, breaks: None })
+                Kind::Shells(mesh::Section {
+                    thickness,
+                    rule,
+                    thins: problem.control.shells_thin,
+                    breaks: None,
+                })
             }
             (None, Some((_, Section::Truss(area)))) => {
                 Kind::Trusses { area: t.number(at, "an area of", *area) }
