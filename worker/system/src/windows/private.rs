@@ -1,7 +1,7 @@
 //! Files that are their owner's alone: keys, tokens, and what a master keeps.
 //!
-//! A file has a list of who may do what. A closed one names its owner, the system and the machine's administrators, and takes
-//! over nothing from its folder.
+//! A file has a list of who may do what. A closed one names its owner alone, and takes over nothing from its
+//! folder; the administrators of the machine can take it over all the same.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -108,8 +108,7 @@ impl Drop for Descriptor {
 /// Replaces the list of a file or folder; `handed_on` says to whom it goes on.
 fn allow_owner_only(path: &Path, handed_on: &str) -> io::Result<()> {
     let own = identity::own()?;
-    let list: String = [own.as_str(), "SY", "BA"].map(|user| format!("(A;{handed_on};FA;;;{user})")).concat();
-    let text: Vec<u16> = format!("D:P{list}").encode_utf16().chain([0]).collect();
+    let text: Vec<u16> = format!("D:P(A;{handed_on};FA;;;{own})").encode_utf16().chain([0]).collect();
     let mut descriptor = Descriptor(ptr::null_mut());
     let (mut present, mut dacl, mut default) = (0, ptr::null_mut(), 0);
     let path = wide(path)?;
@@ -220,7 +219,7 @@ mod tests {
         }
         let own = identity::own().expect("a user");
         let list = readers(&path).expect("a list");
-        assert!(list.contains(&own) && list.len() <= 3, "{list:?}");
+        assert!(list == [own], "{list:?}");
         assert!(open_to_others(&folder.path().join("none")).is_err());
     }
 }
