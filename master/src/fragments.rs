@@ -147,7 +147,7 @@ fn fragments(mesh: &Mesh, bodies: &[Body], state: &GlobalState) -> HashMap<usize
         mesh.parts.iter().zip(&offsets).flat_map(|(part, &offset)| {
             (0..part.n_elements())
                 .filter(move |local| !state.is_eroded(offset + local))
-                .map(move |local| (part, offset + local, part.corners(local)))
+                .map(move |local| (part, offset + local, part.nodes_of(local)))
         })
     };
     let mut roots: Vec<u32> = (0..mesh.n_nodes() as u32).collect();
@@ -155,16 +155,16 @@ fn fragments(mesh: &Mesh, bodies: &[Body], state: &GlobalState) -> HashMap<usize
     for &node in bodies.iter().flat_map(|body| &body.nodes) {
         bound[node as usize] = true;
     }
-    for (part, _, corners) in living() {
-        for &node in &corners[1..] {
-            join(&mut roots, corners[0], node);
+    for (part, _, nodes) in living() {
+        for &node in &nodes[1..] {
+            join(&mut roots, nodes[0], node);
         }
-        bound[corners[0] as usize] |= part.n_corners() < 8;
+        bound[nodes[0] as usize] |= part.n_corners() < 8;
     }
     let mut found: HashMap<u32, Fragment> = HashMap::new();
-    for (_, element, corners) in living() {
+    for (_, element, nodes) in living() {
         let fragment = found
-            .entry(root(&mut roots, corners[0]))
+            .entry(root(&mut roots, nodes[0]))
             .or_insert_with(|| Fragment { first: element, ..Fragment::default() });
         fragment.n_elements += 1;
         fragment.internal += state.initial_volume[element] * state.elements[field::ENERGY][element];

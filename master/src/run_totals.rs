@@ -15,8 +15,10 @@ use serde::{Deserialize, Serialize};
 use crate::results::history::{GaugeRow, HistoryRow, HolderRow, PartEnergy};
 
 mod bodies;
+mod gauges;
 
 pub use bodies::{BodyError, PartScale};
+pub use gauges::{Dead, Gauges};
 
 /// Energies of contact between two parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -95,6 +97,8 @@ pub struct RunTotals {
     pub released: Option<PairEnergies>,
     /// Rigid bodies as the last vote had them.
     pub bodies: Vec<rigid::State>,
+    /// What is left of the elements that gauges read.
+    pub gauges: Gauges,
     pub last: HistoryRow,
 }
 
@@ -190,6 +194,7 @@ impl RunTotals {
             contacts: Vec::new(),
             released: None,
             bodies: Vec::new(),
+            gauges: Gauges::of(model),
             last: HistoryRow::default(),
         }
     }
@@ -324,8 +329,10 @@ impl RunTotals {
         for &element in &vote.eroded {
             let part = offsets.partition_point(|&first| first <= element as usize) - 1;
             let Some(of_part) = model.mesh.parts.get(part) else { continue };
-            let volume = of_part.volume_of(element as usize - offsets[part], &model.mesh.positions);
+            let local = element as usize - offsets[part];
+            let volume = of_part.volume_of(local, &model.mesh.positions);
             self.eroded_mass += model.setup.materials[of_part.material as usize].density * volume;
+            self.gauges.book(model, element, &of_part.nodes_of(local), (self.last.cycle, self.last.time));
         }
         self.eroded_elements += vote.eroded.len() as u64;
         self.last.eroded_elements = self.eroded_elements;

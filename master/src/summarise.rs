@@ -11,10 +11,11 @@ use crate::{
     event::Outcome,
     job::Job,
     results::{
+        Units,
         history::PartEnergy,
-        summary::{Energies, NamedBody, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
+        summary::{DeadGauge, Energies, NamedBody, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
     },
-    run_totals::{PairSums, RunTotals},
+    run_totals::{Dead, PairSums, RunTotals},
 };
 
 /// Counts of the surface, taken before the run.
@@ -61,6 +62,7 @@ pub fn summarise(
     let per = |value: f64, by: f64| if by > 0.0 { value / by } else { 0.0 };
     let run_cycles = outcome.cycles_run as f64;
     let units = &outcome.census;
+    let dead = dead_gauges(model, run_totals);
     let parts = named_parts(model, run_totals, outcome.state.as_ref());
     Summary {
         title: model.title.clone(),
@@ -125,8 +127,10 @@ pub fn summarise(
         warnings: hourglass_warnings(&model.mesh.parts, &parts, run_totals.eroded, run_totals.scale())
             .into_iter()
             .chain(outcome.runaways.iter().map(ToString::to_string))
+            .chain(dead.iter().map(|gauge| dead_gauge_warning(gauge, Units::named(&model.units).time)))
             .chain(outcome.differences.iter().map(ToString::to_string))
             .collect(),
+        dead_gauges: dead,
         digest: outcome.digest.clone(),
         input: None,
     }
@@ -162,6 +166,27 @@ fn named_parts(model: &Model, run_totals: &RunTotals, state: Option<&GlobalState
         external: e.external,
     };
     model.mesh.parts.iter().zip(&run_totals.last.parts).enumerate().map(of).collect()
+}
+
+/// Gauges that have lost their last element, by name.
+fn dead_gauges(model: &Model, run_totals: &RunTotals) -> Vec<DeadGauge> {
+    let output = &model.output;
+    let at_nodes = output.gauges.iter().map(|gauge| &gauge.name);
+    let names: Vec<&String> = at_nodes.chain(output.element_gauges.iter().map(|gauge| &gauge.name)).collect();
+    let dead = run_totals.gauges.dead.iter();
+    let named = |dead: &Dead| {
+        let name = (*names.get(dead.gauge as usize)?).clone();
+        Some(DeadGauge { name, cycle: dead.cycle, time: dead.time })
+    };
+    dead.filter_map(named).collect()
+}
+
+/// What a reader of its curve should know.
+fn dead_gauge_warning(gauge: &DeadGauge, unit: &str) -> String {
+    let DeadGauge { name, cycle, time } = gauge;
+    format!(
+        "gauge \"{name}\": the last element at it has eroded in cycle {cycle}, at {time:.4e} {unit}; what it reads after that is debris, so end its curve there"
+    )
 }
 
 /// Share of the internal energy of a part above which its hourglass energy is told.

@@ -6,7 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use deck::Model;
+use deck::{
+    Model,
+    model::{ElementGauge, Gauge},
+};
 use mechanics::{
     erosion::SURFACE_LAG,
     mesh::{CORNERS, FACES},
@@ -63,6 +66,50 @@ fn a_punch_that_erodes_a_plate_has_the_same_bits_on_any_crew() {
 }
 
 /// Whether sorts that are done at the same time end in the order of their positions depends on threads alone.
+#[test]
+fn a_gauge_says_when_its_last_element_has_eroded() {
+    let mut model = punch(true);
+    let alone = solved(&model, Workers::default());
+    // Of each node of elements: how many there are, how many have eroded, and when the last one did.
+    let mut nodes = vec![(0, 0, 0); model.mesh.n_nodes()];
+    let mut lost = None;
+    for (part, first) in model.mesh.parts.iter().zip(model.mesh.element_offsets()) {
+        for e in 0..part.n_elements() {
+            let cycle = alone.state.eroded[first + e];
+            let mut corners = part.corners(e).to_vec();
+            corners.sort_unstable();
+            corners.dedup();
+            for node in corners {
+                let (n, eroded, last) = &mut nodes[node as usize];
+                *n += 1;
+                if cycle != ALIVE {
+                    *eroded += 1;
+                    *last = cycle.max(*last);
+                }
+            }
+            if cycle != ALIVE {
+                lost.get_or_insert((first + e, cycle));
+            }
+        }
+    }
+    let bare = (0..nodes.len()).filter(|&node| nodes[node].0 > 0 && nodes[node].1 == nodes[node].0);
+    let gone = bare.max_by_key(|&node| nodes[node].0).expect("a node without elements");
+    let torn =
+        nodes.iter().position(|(n, eroded, _)| *eroded > 0 && eroded < n).expect("a node that lost some");
+    let (element, cycle) = lost.expect("an element has eroded");
+    let gauge = |name: &str, node: usize| Gauge { name: name.to_owned(), node: node as u32 };
+    model.output.gauges = vec![gauge("torn", torn), gauge("gone", gone)];
+    model.output.element_gauges = vec![ElementGauge { name: "inside".to_owned(), element: element as u32 }];
+    for workers in [1, 3] {
+        let run = solved(&model, Workers::of(workers));
+        assert_eq!(run.outcome.digest, alone.outcome.digest);
+        let mut dead: Vec<(u32, u64)> =
+            run.outcome.run_totals.gauges.dead.iter().map(|dead| (dead.gauge, dead.cycle)).collect();
+        dead.sort_unstable();
+        assert_eq!(dead, [(1, nodes[gone].2), (2, cycle)]);
+    }
+}
+
 #[test]
 fn sorts_that_end_in_any_order_change_no_bit() {
     for retain_inertia in [true, false] {

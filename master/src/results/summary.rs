@@ -89,6 +89,9 @@ pub struct Summary {
     /// What makes the results doubtful, and what to do about it.
     #[serde(default)]
     pub warnings: Vec<String>,
+    /// Gauges whose last element has eroded.
+    #[serde(default)]
+    pub dead_gauges: Vec<DeadGauge>,
     /// Hash of the final state (hexadecimal).
     pub digest: String,
     /// What it was computed from; none where no folder was written.
@@ -175,6 +178,17 @@ pub struct NamedPart {
     /// Elements of it that have eroded.
     #[serde(default)]
     pub eroded_elements: u64,
+}
+
+/// A gauge that has lost its last element: rows after this one are no signal of the body.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DeadGauge {
+    /// Its name in the deck.
+    pub name: String,
+    /// The cycle at whose start that left.
+    pub cycle: u64,
+    /// When that was (time).
+    pub time: f64,
 }
 
 /// A body: parts that share nodes or have touched, and nothing else has touched them.
