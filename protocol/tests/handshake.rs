@@ -120,7 +120,7 @@ fn frames_that_are_no_greeting_are_refused() {
     let (_, mut frame) = Client::new(&hello()).expect("a good greeting");
     frame.payload.push(0);
     let reason = refusal(policy(), &frame);
-    assert_eq!(reason, "hello: message of 55 bytes in a payload of 56");
+    assert_eq!(reason, "hello: message of 63 bytes in a payload of 64");
     for length in 0..frame.payload.len() - 1 {
         let cut = Frame::new(frame.header, frame.payload[..length].to_vec());
         assert!(refusal(policy(), &cut).starts_with("hello: control message: "), "{length} bytes");

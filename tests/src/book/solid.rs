@@ -45,7 +45,7 @@ pub(super) fn the_copper_bar_of_tetrahedra_ends_as_that_of_hexahedra_of_their_sp
     let solved = run(cut(copper_bar_deck([2, 2, 18], HELD), |_| true));
     let tetrahedra = shape(&solved);
     for (name, i) in [("length", 0), ("radius of the foot", 1)] {
-        let figure = format!("taylor copper, tetrahedra: {name} over that of hexahedra");
+        let figure = format!("taylor copper, tetrahedra over hexahedra @ {name}");
         figures.add(&figure, tetrahedra[i] / hexahedra[i]);
     }
     figures.add("taylor copper, tetrahedra: length (mm)", tetrahedra[0]);

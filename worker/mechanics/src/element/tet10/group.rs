@@ -36,7 +36,7 @@ pub(crate) struct Tetrahedra {
     lists: Vec<[[u32; SET]; NODES]>,
     /// By point, one array per number of [`BY_POINT`]; those of history variables that the material does not have are empty.
     points: [[Vec<f64>; BY_POINT]; POINTS],
-    /// By point, energy and pressure of the element as a law with history variables sees them; empty of others.
+    /// By point, energy and pressure of the element as a law that remembers sees them; empty until one computes.
     shown: [[Vec<f64>; 2]; POINTS],
 }
 
@@ -74,9 +74,7 @@ impl Tetrahedra {
                 points[point][number][solids.slot(element)] = value;
             }
         }
-        let n_shown = if n_history > 0 { n_slots } else { 0 };
-        let shown = std::array::from_fn(|_| std::array::from_fn(|_| vec![0.0; n_shown]));
-        Self { solids, lists, points, shown }
+        Self { solids, lists, points, shown: Default::default() }
     }
 
     fn own(&self) -> Vec<Vec<f64>> {
@@ -224,10 +222,7 @@ impl Group for Tetrahedra {
         if let Some(strength) = AnyRemembering::of(material) {
             let (n_columns, n_variables) = (self.solids.history().len(), material.history().len());
             assert!(n_columns == n_variables, "{n_columns} columns for {n_variables} history variables");
-            assert!(
-                self.shown.iter().flatten().all(|values| values.len() == n_sets * SET),
-                "a law without history"
-            );
+            self.shown.iter_mut().flatten().for_each(|values| values.resize(n_sets * SET, 0.0));
             let laws = Laws { density, eos, strength, failure: Unfailing, hourglass };
             return self.pass(nodes, laws, call, vote);
         }
