@@ -21,12 +21,12 @@ fn struck_plate() -> Model {
         name = "target"
         material = "AL_2024_T351"
         fracture = true
-        erosion = { geometric_strain = 0.2 }
+        erosion = { geometric_strain = 0.05 }
         box = { origin = [0, 0, 0], size = [8, 8, 2], cells = [4, 4, 1] }
         [[part]]
         name = "projectile"
         material = "STEEL_1006"
-        velocity = [0.02, 0.01, -0.15]
+        velocity = [0.02, 0.01, -0.06]
         box = { origin = [1.3, 0.7, 2.2], size = [4, 4, 2], cells = [2, 2, 1] }
         rotate = { axis = [1, 2, 0], degrees = 2, point = [4, 4, 2.2] }
         translate = [0, 0, 0.2]

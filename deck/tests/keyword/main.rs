@@ -134,7 +134,7 @@ fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
     let part = &reading.model.mesh.parts[0];
     assert_eq!(
         part.section(),
-        Some(Section { thickness: 2.0, rule: Rule::Lobatto(5), thins: true, breaks: None })
+        Some(Section { thickness: 2.0, rule: Rule::Lobatto(5), thins: false, breaks: None })
     );
     assert_eq!(part.corners(1)[..4], [3, 2, 4, 4]);
     assert_eq!((reading.model.spin[2], reading.model.velocity[2]), ([0.0, 0.0, 3.0], [-30.0, 30.0, 0.0]));
@@ -152,7 +152,7 @@ fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
     let model = read(&own).unwrap_or_else(|f| panic!("{}", lines(&f)));
     assert_eq!(
         model.mesh.parts[0].section(),
-        Some(Section { thickness: 2.0, rule: Rule::Gauss(2), thins: true, breaks: None })
+        Some(Section { thickness: 2.0, rule: Rule::Gauss(2), thins: false, breaks: None })
     );
 }
 

@@ -34,7 +34,9 @@ use crate::{
     law::MAX_HISTORY,
     material::Material,
     mesh::Spacing,
-    state::field::{DAMAGE, PLASTIC_STRAIN, SXX, SXY, SYY, SYZ, SZX, TEMPERATURE},
+    state::field::{
+        DAMAGE, ENERGY, PLASTIC_STRAIN, PRESSURE, RELATIVE_VOLUME, SXX, SXY, SYY, SYZ, SZX, TEMPERATURE,
+    },
 };
 use geometry::Shape;
 
@@ -85,6 +87,9 @@ pub(crate) const POINTS: usize = 4;
 
 /// The fields that each point has, indices into [`crate::state::FIELDS`].
 pub(crate) const OF_POINT: [usize; 8] = [SXX, SYY, SXY, SYZ, SZX, PLASTIC_STRAIN, TEMPERATURE, DAMAGE];
+
+/// The fields of the element that a law that remembers sees at each point.
+pub(crate) const SHOWN: [usize; 3] = [ENERGY, PRESSURE, RELATIVE_VOLUME];
 
 /// What a point keeps: [`OF_POINT`], the stress by its own rate of volume (tension positive), and the history variables of its law.
 pub(crate) const BY_POINT: usize = OF_POINT.len() + 1 + MAX_HISTORY;

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::{BY_POINT, N_OWN, NODES, OF_POINT, POINTS, SWELLING, kernel, leaving::Leaving};
+use super::{BY_POINT, N_OWN, NODES, OF_POINT, POINTS, SHOWN, SWELLING, kernel, leaving::Leaving};
 use crate::{
     element::{
         ElementVote, Step,
@@ -23,7 +23,7 @@ use crate::{
     spin::Turning,
     state::{
         N_FIELDS,
-        field::{ENERGY, PRESSURE, VISCOSITY},
+        field::{PRESSURE, VISCOSITY},
         sparse,
     },
     strength::{AnyRemembering, AnyStrength, StrengthLaw},
@@ -36,8 +36,8 @@ pub(crate) struct Tetrahedra {
     lists: Vec<[[u32; SET]; NODES]>,
     /// By point, one array per number of [`BY_POINT`]; those of history variables that the material does not have are empty.
     points: [[Vec<f64>; BY_POINT]; POINTS],
-    /// By point, energy and pressure of the element as a law that remembers sees them; empty until one computes.
-    shown: [[Vec<f64>; 2]; POINTS],
+    /// By point, [`SHOWN`] of the element as a law that remembers sees them; empty until one computes.
+    shown: [[Vec<f64>; SHOWN.len()]; POINTS],
 }
 
 impl Tetrahedra {
@@ -111,7 +111,7 @@ impl Tetrahedra {
             for (field, array) in OF_POINT.into_iter().zip(of_point) {
                 fields[field] = array;
             }
-            for (field, array) in [ENERGY, PRESSURE].into_iter().zip(shown) {
+            for (field, array) in SHOWN.into_iter().zip(shown) {
                 fields[field] = array;
             }
             BySlot {

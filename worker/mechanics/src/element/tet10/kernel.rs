@@ -2,7 +2,7 @@
 //! the other. Energy, pressure and viscosity of the element are the steps of the hexahedron of one point.
 
 use super::{
-    NODES, POINTS, SHARES, SWELLING,
+    NODES, POINTS, SHARES, SHOWN, SWELLING,
     geometry::{Shape, no_tensor},
 };
 use crate::{
@@ -154,7 +154,7 @@ pub(super) unsafe fn slots<L: Lane, S: StrengthLaw, F: FailureLaw>(
     let mut failed = L::mask(u32::MAX);
     let mut upright = L::both(zero.less(volume_at_mid), zero.less(six_volumes));
     let mut temperature = zero;
-    let mut memory = Memory::none();
+    let mut memory = Memory { distension: zero, stretch: zero, ..Memory::none() };
     let mut check = zero;
     let mut g = 0;
     while g < POINTS {
@@ -168,10 +168,12 @@ pub(super) unsafe fn slots<L: Lane, S: StrengthLaw, F: FailureLaw>(
         };
         upright = L::both(upright, L::both(zero.less(points_at_mid[g]), zero.less(points_at_end[g])));
         if S::REMEMBERS {
-            let energy = arrays.elements.state::<L>(slot, field::ENERGY);
-            let pressure = arrays.elements.state::<L>(slot, field::PRESSURE);
-            arrays.points[g].set_state(slot, field::ENERGY, energy, alive);
-            arrays.points[g].set_state(slot, field::PRESSURE, pressure, alive);
+            let mut shown = 0;
+            while shown < SHOWN.len() {
+                let value = arrays.elements.state::<L>(slot, SHOWN[shown]);
+                arrays.points[g].set_state(slot, SHOWN[shown], value, alive);
+                shown += 1;
+            }
         }
         let size = [relative_volume, length];
         let stressed =
@@ -190,6 +192,8 @@ pub(super) unsafe fn slots<L: Lane, S: StrengthLaw, F: FailureLaw>(
             let of_point = &stressed.memory;
             memory.added_pressure = quarter.mul_add(of_point.added_pressure, memory.added_pressure);
             memory.least_pressure = quarter.mul_add(of_point.least_pressure, memory.least_pressure);
+            memory.distension = quarter.mul_add(of_point.distension, memory.distension);
+            memory.stretch = quarter.mul_add(of_point.stretch, memory.stretch);
             memory.added_stiffness = memory.added_stiffness.max(of_point.added_stiffness);
         }
         points[g] = Point {
