@@ -6,7 +6,7 @@
 //! width, on a strained plate of 27,000 elements. On request the same cycles on one thread and on two in turn.
 //!
 //! `cargo bench -p mechanics --bench kernels`; after `--` a word chooses: `cycles`, `kernels`, `threads`, `quiet`, or a number of
-//! elements. `quiet` compares builds on a machine that others use: of each chunk of sets the least over many cycles; names of lane
+//! elements; `assumed` beside it gives solids assumed strains, the default of decks, in place of viscous control. `quiet` compares builds on a machine that others use: of each chunk of sets the least over many cycles; names of lane
 //! widths after it choose columns. `4000000` is on request only, for its memory.
 
 #![expect(clippy::disallowed_methods, reason = "bodies of measurements, whose digests nobody compares")]
@@ -18,6 +18,7 @@ use mechanics::{
     cycle::{self, Domain, Interval, Meter, Plan, Subdomain},
     element::{
         ElementVote, Step, hex8,
+        hourglass::{Hourglass, N_FORCES},
         shell4::{Rule, ShellStep, Shells},
     },
     exact::Quantum,
@@ -36,6 +37,15 @@ mod laws;
 
 /// Elements along each index.
 const CELLS: [u32; 3] = [30, 30, 30];
+
+/// Hourglass control of solids: viscous, or assumed strains where the command line has the word `assumed`.
+fn control() -> Hourglass {
+    if std::env::args().any(|word| word == "assumed") {
+        Hourglass::ASSUMED_STRAIN
+    } else {
+        Hourglass::VISCOUS
+    }
+}
 
 fn plate(material: &Material, explicit: bool) -> Piece {
     let [ni, nj, nk] = CELLS;
@@ -57,7 +67,7 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         topology: Topology::Structured { cells: CELLS },
         nodes: (0..positions.len() as u32).collect(),
         element_ids: (0..n_elements as u32).collect(),
-        hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
+        hourglass: control(),
     };
     let mesh = Mesh { positions, node_ids: part.nodes.clone(), parts: vec![part], lumped: Vec::new() };
     let hexahedra: Vec<[u32; 8]> = (0..n_elements).map(|e| mesh.parts[0].corners(e)).collect();
@@ -94,8 +104,8 @@ fn plate(material: &Material, explicit: bool) -> Piece {
         history: Vec::new(),
         contact: Vec::new(),
         shells: mechanics::state::ShellState::default(),
-        own: Vec::new(),
-        hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
+        own: vec![vec![0.0; n_elements]; if control().is_elastic() { N_FORCES } else { 0 }],
+        hourglass: control(),
     }
 }
 
@@ -213,7 +223,7 @@ fn plates(
             topology: Topology::Structured { cells },
             nodes: (0..plane * (layers + 1)).collect(),
             element_ids: (0..n_elements).collect(),
-            hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
+            hourglass: control(),
         };
         if kind != Kind::Structured {
             let mut order: Vec<u32> = (0..n_elements).collect();
@@ -238,7 +248,7 @@ fn plates(
             },
             nodes: (0..plane).collect(),
             element_ids: (0..side * side).collect(),
-            hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
+            hourglass: Hourglass::VISCOUS,
         }
     };
     let parts = match kind {

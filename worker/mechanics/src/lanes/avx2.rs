@@ -8,10 +8,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{
-    Lane,
-    dispatch::{Apart, apart_on_avx2},
-};
+use super::{Lane, dispatch::Apart};
 
 /// Four f64 in a register.
 #[derive(Clone, Copy)]
@@ -247,6 +244,6 @@ impl Lane for Avx2 {
     #[inline(always)]
     fn apart<T: Apart>(task: T) {
         // SAFETY: the machine has the instructions, see the head of the file.
-        unsafe { apart_on_avx2(task) }
+        unsafe { task.run_on_avx2() }
     }
 }

@@ -8,11 +8,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{
-    Lane,
-    avx2::four,
-    dispatch::{Apart, apart_on_avx512},
-};
+use super::{Lane, avx2::four, dispatch::Apart};
 
 /// Eight f64 in a register.
 #[derive(Clone, Copy)]
@@ -245,6 +241,6 @@ impl Lane for Avx512 {
     #[inline(always)]
     fn apart<T: Apart>(task: T) {
         // SAFETY: the machine has the instructions, see the head of the file.
-        unsafe { apart_on_avx512(task) }
+        unsafe { task.run_on_avx512() }
     }
 }

@@ -33,16 +33,16 @@ impl Width {
         match self {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the machine has the width.
-            Width::Avx2 => unsafe { on_avx2(task) },
+            Width::Avx2 => unsafe { task.on_avx2() },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
-            Width::Avx512 => unsafe { on_avx512(task) },
+            Width::Avx512 => unsafe { task.on_avx512() },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the machine has FMA.
-            Width::Scalar if is_x86_feature_detected!("fma") => unsafe { on_scalar_with_fma(task) },
+            Width::Scalar if is_x86_feature_detected!("fma") => unsafe { task.on_scalar_with_fma() },
             #[cfg(target_arch = "aarch64")]
             Width::Neon => task.run::<Twice<Neon>>(),
-            _ => task.run::<Scalar>(),
+            _ => task.on_scalar(),
         }
     }
 
@@ -51,94 +51,100 @@ impl Width {
     /// # Panics
     /// If this is [`Width::Scalar`] or the machine lacks it.
     pub(crate) fn run_wide<T: Task>(self, task: T) -> T::Output {
-        assert!(self != Width::Scalar && self.available(), "lane width {self} is not on this machine");
+        assert!(self.available(), "lane width {self} is not on this machine");
         match self {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the machine has the width.
-            Width::Avx512 => unsafe { on_avx512(task) },
+            Width::Avx2 => unsafe { task.on_avx2() },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Width::Avx512 => unsafe { task.on_avx512() },
             #[cfg(target_arch = "aarch64")]
             Width::Neon => task.run::<Twice<Neon>>(),
-            _ => self.run_avx2(task),
+            _ => panic!("a task for wide lanes alone"),
         }
     }
+}
 
-    /// [`Width::run`] of a task that is compiled for [`Width::Avx2`] alone, which this is.
+/// The functions that have the target features of a width. They are methods of the task, not free, because the compiler puts a method into
+/// the code unit of the module of its type: all kernels in one unit would be compiled one after the other and in twice the memory.
+trait Entry: Task + Sized {
+    /// Without the feature a fused product is a call into the library, with the same bits.
     ///
-    /// # Panics
-    /// If this is another width or the machine lacks it.
-    pub(crate) fn run_avx2<T: Task>(self, task: T) -> T::Output {
-        assert!(self == Width::Avx2 && self.available(), "lane width {self} is not on this machine");
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: the machine has the width.
-        return unsafe { on_avx2(task) };
-        #[cfg(not(target_arch = "x86_64"))]
-        return task.run::<Scalar>();
+    /// # Safety
+    /// The machine has FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "fma")]
+    unsafe fn on_scalar_with_fma(self) -> Self::Output {
+        self.run::<Scalar>()
+    }
+
+    /// Whatever the machine has.
+    #[inline(never)]
+    fn on_scalar(self) -> Self::Output {
+        self.run::<Scalar>()
+    }
+
+    /// # Safety
+    /// The machine has [`Width::Avx2`].
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    unsafe fn on_avx2(self) -> Self::Output {
+        if Self::PAIRED { self.run::<Twice<Avx2>>() } else { self.run::<Avx2>() }
+    }
+
+    /// # Safety
+    /// The machine has [`Width::Avx512`].
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+    unsafe fn on_avx512(self) -> Self::Output {
+        self.run::<Avx512>()
     }
 }
 
-/// Without the feature a fused product is a call into the library, with the same bits.
-///
-/// # Safety
-/// The machine has FMA.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "fma")]
-unsafe fn on_scalar_with_fma<T: Task>(task: T) -> T::Output {
-    task.run::<Scalar>()
-}
-
-/// # Safety
-/// The machine has [`Width::Avx2`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn on_avx2<T: Task>(task: T) -> T::Output {
-    if T::PAIRED { task.run::<Twice<Avx2>>() } else { task.run::<Avx2>() }
-}
-
-/// # Safety
-/// The machine has [`Width::Avx512`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-unsafe fn on_avx512<T: Task>(task: T) -> T::Output {
-    task.run::<Avx512>()
-}
+impl<T: Task> Entry for T {}
 
 /// A part of a calculation on lanes that is a function of its own, called by [`Lane::apart`]: a law that is long and stands in many
 /// kernels is then compiled once for each width. Arguments and answers go through memory, so it does the work of a whole set. [`Apart::run`]
 /// is to be `#[inline(always)]`, as that of a [`Task`].
-pub trait Apart {
+pub trait Apart: Sized {
     /// Does the work; the task holds references to what it changes.
     fn run(self);
-}
 
-/// [`Apart::run`] of lanes that need no instructions of their own.
-#[inline(never)]
-pub(super) fn apart_plain<T: Apart>(task: T) {
-    task.run();
-}
+    /// [`Apart::run`] of lanes that need no instructions of their own.
+    #[doc(hidden)]
+    #[inline(never)]
+    fn run_plain(self) {
+        self.run();
+    }
 
-/// # Safety
-/// The machine has FMA.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "fma")]
-#[inline(never)]
-pub(super) unsafe fn apart_on_fma<T: Apart>(task: T) {
-    task.run();
-}
+    /// # Safety
+    /// The machine has FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    #[target_feature(enable = "fma")]
+    #[inline(never)]
+    unsafe fn run_on_fma(self) {
+        self.run();
+    }
 
-/// # Safety
-/// The machine has [`Width::Avx2`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-#[inline(never)]
-pub(super) unsafe fn apart_on_avx2<T: Apart>(task: T) {
-    task.run();
-}
+    /// # Safety
+    /// The machine has [`Width::Avx2`].
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    #[target_feature(enable = "avx2,fma")]
+    #[inline(never)]
+    unsafe fn run_on_avx2(self) {
+        self.run();
+    }
 
-/// # Safety
-/// The machine has [`Width::Avx512`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-#[inline(never)]
-pub(super) unsafe fn apart_on_avx512<T: Apart>(task: T) {
-    task.run();
+    /// # Safety
+    /// The machine has [`Width::Avx512`].
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+    #[inline(never)]
+    unsafe fn run_on_avx512(self) {
+        self.run();
+    }
 }

@@ -5,10 +5,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{
-    Lane,
-    dispatch::{Apart, apart_plain},
-};
+use super::{Lane, dispatch::Apart};
 
 /// Two f64 in a register.
 #[derive(Clone, Copy)]
@@ -222,6 +219,6 @@ impl Lane for Neon {
 
     #[inline(always)]
     fn apart<T: Apart>(task: T) {
-        apart_plain(task);
+        task.run_plain();
     }
 }

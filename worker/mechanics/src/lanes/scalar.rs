@@ -2,12 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-#[cfg(target_arch = "x86_64")]
-use super::dispatch::apart_on_fma;
-use super::{
-    Lane,
-    dispatch::{Apart, apart_plain},
-};
+use super::{Lane, dispatch::Apart};
 
 /// One f64.
 #[derive(Clone, Copy, Debug)]
@@ -193,8 +188,8 @@ impl Lane for Scalar {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("fma") {
             // SAFETY: the machine has FMA.
-            return unsafe { apart_on_fma(task) };
+            return unsafe { task.run_on_fma() };
         }
-        apart_plain(task);
+        task.run_plain();
     }
 }

@@ -40,34 +40,6 @@ impl<L: Lane, S: StrengthLaw> dispatch::Apart for Remember<'_, L, S> {
     }
 }
 
-struct Flow<'a, L, S> {
-    law: &'a S,
-    strain: L,
-    factor: L,
-    flow: &'a mut (L, L),
-}
-
-impl<L: Lane, S: StrengthLaw> dispatch::Apart for Flow<'_, L, S> {
-    #[inline(always)]
-    fn run(self) {
-        *self.flow = self.law.flow(self.strain, self.factor);
-    }
-}
-
-struct Factor<'a, L, S> {
-    law: &'a S,
-    rate: L,
-    temperature: L,
-    factor: &'a mut L,
-}
-
-impl<L: Lane, S: StrengthLaw> dispatch::Apart for Factor<'_, L, S> {
-    #[inline(always)]
-    fn run(self) {
-        *self.factor = self.law.factor(self.rate, self.temperature);
-    }
-}
-
 /// What a called function changes lies in memory for as long as it lives, so each call has copies of its own, and the kernel's stay in
 /// registers.
 impl<S: StrengthLaw> StrengthLaw for Apart<S> {
@@ -95,16 +67,12 @@ impl<S: StrengthLaw> StrengthLaw for Apart<S> {
 
     #[inline(always)]
     fn flow<L: Lane>(&self, strain: L, factor: L) -> (L, L) {
-        let mut flow = (strain, factor);
-        L::apart(Flow { law: &self.0, strain, factor, flow: &mut flow });
-        flow
+        self.0.flow(strain, factor)
     }
 
     #[inline(always)]
     fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
-        let mut factor = rate;
-        L::apart(Factor { law: &self.0, rate, temperature, factor: &mut factor });
-        factor
+        self.0.factor(rate, temperature)
     }
 
     #[inline(always)]

@@ -1,8 +1,9 @@
-//! The laws with history variables, or that see pressure and energy ([`StrengthLaw::remember`]). They have a kernel of their own, so that the other one does not become slower.
+//! The laws with history variables, or that see pressure and energy ([`StrengthLaw::remember`]). They have a kernel of their own, so that the
+//! other one does not become slower, and it calls all of them as one function ([`super::apart`]).
 
 use super::{
     Around, Deviator, History, Memory, MooneyRivlin, Ogden, Strength, StrengthLaw, Viscoelastic,
-    apart::Apart, crushable_foam::Crushable, holmquist_johnson_cook::Concrete, johnson_holmquist::Ceramic,
+    crushable_foam::Crushable, holmquist_johnson_cook::Concrete, johnson_holmquist::Ceramic,
     low_density_foam::LowDensity, porous::PorousSolid, segmented_ceramic::Segmented, soil_foam::Soil,
     steinberg_guinan::Metal,
 };
@@ -21,10 +22,10 @@ pub(crate) enum AnyRemembering {
     CrushableFoam(Crushable),
     LowDensityFoam(LowDensity),
     SoilFoam(Soil),
-    Porous(Apart<PorousSolid>),
-    HolmquistJohnsonCook(Apart<Concrete>),
-    SteinbergGuinan(Apart<Metal>),
-    SegmentedCeramic(Apart<Segmented>),
+    Porous(PorousSolid),
+    HolmquistJohnsonCook(Concrete),
+    SteinbergGuinan(Metal),
+    SegmentedCeramic(Segmented),
 }
 
 /// The laws by their names: the one list that calls go by.
@@ -50,7 +51,7 @@ impl AnyRemembering {
     /// That of a material, made ready; none if its law has no history variables.
     pub fn of(material: &Material) -> Option<Self> {
         match &material.eos {
-            Eos::Porous(law) => Some(Self::Porous(Apart(PorousSolid::new(law, material)))),
+            Eos::Porous(law) => Some(Self::Porous(PorousSolid::new(law, material))),
             _ if material.is_gas() => None,
             _ => Self::of_strength(material),
         }
@@ -68,14 +69,10 @@ impl AnyRemembering {
             Strength::CrushableFoam(law, curve) => Some(Self::CrushableFoam(Crushable::new(&law, &curve))),
             Strength::LowDensityFoam(law, curve) => Some(Self::LowDensityFoam(LowDensity::new(&law, &curve))),
             Strength::SoilFoam(law, curve) => Some(Self::SoilFoam(Soil::new(&law, &curve))),
-            Strength::HolmquistJohnsonCook(law) => {
-                Some(Self::HolmquistJohnsonCook(Apart(Concrete::new(&law))))
-            }
-            Strength::SteinbergGuinan(law) => {
-                Some(Self::SteinbergGuinan(Apart(Metal::new(&law, material.density))))
-            }
+            Strength::HolmquistJohnsonCook(law) => Some(Self::HolmquistJohnsonCook(Concrete::new(&law))),
+            Strength::SteinbergGuinan(law) => Some(Self::SteinbergGuinan(Metal::new(&law, material.density))),
             Strength::SegmentedCeramic(law) => {
-                Some(Self::SegmentedCeramic(Apart(Segmented::new(&law, material.bulk()))))
+                Some(Self::SegmentedCeramic(Segmented::new(&law, material.bulk())))
             }
             _ => None,
         }

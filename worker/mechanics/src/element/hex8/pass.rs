@@ -13,7 +13,7 @@ use crate::{
     eos::{AnyEos, EquationOfState},
     failure::{AnyFailure, FailureLaw, Unfailing},
     lanes::{Lane, SET, Width, dispatch::Task},
-    strength::{AnyRemembering, AnyStrength, StrengthLaw},
+    strength::{AnyRemembering, AnyStrength, StrengthLaw, apart::Apart},
 };
 
 /// Computes the elements of `sets`: forces into `view.nodes`, new state, votes.
@@ -41,6 +41,7 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vo
     let (n_columns, n_variables) = (view.slots.history.len(), material.history().len());
     assert!(n_columns == n_variables, "{n_columns} columns for {n_variables} history variables");
     if let Some(strength) = AnyRemembering::of(material) {
+        let strength = Apart(strength);
         let laws = Laws { density, eos: AnyEos::of(material), strength, failure: Unfailing, hourglass };
         return width.run(Pass { view, laws, step, sets, vote });
     }
@@ -48,26 +49,20 @@ pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vo
         (AnyEos::of(material), AnyStrength::of(material), AnyFailure::of(material));
     // Copies of their own for the commonest of each kind, where they pay: see benches/TRIED.md.
     macro_rules! alone {
-        ($run:ident, $eos:expr, $strength:expr) => {{
+        ($eos:expr, $strength:expr) => {{
             let laws = Laws { density, eos: $eos, strength: $strength, failure: Unfailing, hourglass };
-            return width.$run(Pass { view, laws, step, sets, vote });
+            return width.run_wide(Pass { view, laws, step, sets, vote });
         }};
     }
     if !elastic && matches!(failure, AnyFailure::Unfailing(_)) {
         match (width, eos, strength) {
             (Width::Scalar, ..) => {}
             (_, AnyEos::Shock(eos), AnyStrength::JohnsonCook(strength)) if strength.by_energy == 0.0 => {
-                alone!(run_wide, eos, strength)
+                alone!(eos, strength)
             }
-            (_, AnyEos::Shock(eos), AnyStrength::VonMises(strength)) => alone!(run_wide, eos, strength),
-            (_, AnyEos::Linear(eos), AnyStrength::Elastic(strength)) => alone!(run_wide, eos, strength),
-            (Width::Avx2, AnyEos::Linear(eos), AnyStrength::Hydro(strength)) => {
-                alone!(run_avx2, eos, strength)
-            }
-            (_, AnyEos::Jwl(eos), AnyStrength::Hydro(strength)) => alone!(run_wide, eos, strength),
-            (_, AnyEos::Polynomial(eos), AnyStrength::Tabulated(strength)) => {
-                alone!(run_wide, eos, strength)
-            }
+            (_, AnyEos::Shock(eos), AnyStrength::VonMises(strength)) => alone!(eos, strength),
+            (_, AnyEos::Linear(eos), AnyStrength::Elastic(strength)) => alone!(eos, strength),
+            (_, AnyEos::Jwl(eos), AnyStrength::Hydro(strength)) => alone!(eos, strength),
             _ => {}
         }
     }

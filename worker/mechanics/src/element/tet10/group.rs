@@ -26,7 +26,7 @@ use crate::{
         field::{PRESSURE, VISCOSITY},
         sparse,
     },
-    strength::{AnyRemembering, AnyStrength, StrengthLaw},
+    strength::{AnyRemembering, AnyStrength, StrengthLaw, apart::Apart},
 };
 
 /// Composite tetrahedra of a block.
@@ -223,7 +223,7 @@ impl Group for Tetrahedra {
             let (n_columns, n_variables) = (self.solids.history().len(), material.history().len());
             assert!(n_columns == n_variables, "{n_columns} columns for {n_variables} history variables");
             self.shown.iter_mut().flatten().for_each(|values| values.resize(n_sets * SET, 0.0));
-            let laws = Laws { density, eos, strength, failure: Unfailing, hourglass };
+            let laws = Laws { density, eos, strength: Apart(strength), failure: Unfailing, hourglass };
             return self.pass(nodes, laws, call, vote);
         }
         let (strength, failure) = (AnyStrength::of(material), AnyFailure::of(material));
