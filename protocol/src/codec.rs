@@ -25,9 +25,10 @@ pub const OPEN_STREAMS: usize = 16;
 ///
 /// # Errors
 /// What the writer refused.
-pub fn encode_into<T: Serialize>(value: &T, into: &mut impl std::io::Write) -> Result<()> {
+pub fn encode_into<T: Serialize>(value: &T, into: &mut dyn std::io::Write) -> Result<()> {
     let config = bincode::config::standard().with_little_endian().with_fixed_int_encoding();
-    let written = bincode::serde::encode_into_std_write(value, into, config);
+    let mut into = into;
+    let written = bincode::serde::encode_into_std_write(value, &mut into, config);
     written.map(|_| ()).map_err(|error| Error::Message(error.to_string()))
 }
 
@@ -49,17 +50,29 @@ pub fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>> {
 /// # Errors
 /// As there, but for a length over the limit.
 pub fn measure<T: Serialize>(value: &T) -> Result<u64> {
-    let config = bincode::config::standard().with_little_endian().with_fixed_int_encoding();
-    let mut writer = bincode::enc::write::SizeWriter::default();
-    bincode::serde::encode_into_writer(value, &mut writer, config)
-        .map_err(|error| Error::Message(error.to_string()))?;
-    Ok(writer.bytes_written as u64)
+    let mut length = Length(0);
+    encode_into(value, &mut length)?;
+    Ok(length.0)
+}
+
+/// Counts bytes and keeps none.
+struct Length(u64);
+
+impl std::io::Write for Length {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0 += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }
 
 /// The value whose bytes are all of `bytes`, which may be at most `limit` (and [`MESSAGE_LIMIT`]) long.
 ///
-/// A length inside the message can make it allocate at most the next of 64 KiB, 1 MiB, 32 MiB and 1 GiB
-/// above the message's own size.
+/// A length inside a message of at most 1 MiB can make it allocate at most 1 MiB, in a longer one 1 GiB. Each such limit compiles
+/// all messages once more, so there are two.
 ///
 /// # Errors
 /// [`Error::TooLong`] over the limit, [`Error::Message`] when the bytes are no such value,
@@ -67,9 +80,7 @@ pub fn measure<T: Serialize>(value: &T) -> Result<u64> {
 pub fn decode<T: DeserializeOwned>(bytes: &[u8], limit: usize) -> Result<T> {
     bounded("message", bytes.len(), limit.min(MESSAGE_LIMIT))?;
     let (value, used) = match bytes.len() {
-        0..=0x1_0000 => decode_within::<T, 0x1_0000>(bytes),
-        0x1_0001..=0x10_0000 => decode_within::<T, 0x10_0000>(bytes),
-        0x10_0001..=0x200_0000 => decode_within::<T, 0x200_0000>(bytes),
+        0..=0x10_0000 => decode_within::<T, 0x10_0000>(bytes),
         _ => decode_within::<T, MESSAGE_LIMIT>(bytes),
     }?;
     if used != bytes.len() {
