@@ -287,7 +287,7 @@ fn row(
             let [id, ends @ ..] =
                 numbers::<3>(&if is_turned { words[..3].join(" ") } else { line.to_string() })?;
             let found = &mut mesh.bodies[*body];
-            if is_turned != !found.across.is_empty() && !found.trusses.is_empty() {
+            if is_turned == found.across.is_empty() && !found.trusses.is_empty() {
                 return Err(("a direction across as the elements before have or not".to_string(), MIXED));
             }
             if is_turned {
