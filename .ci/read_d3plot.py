@@ -3,7 +3,7 @@
     python .ci/read_d3plot.py FOLDER...
 
 Checked, in single precision: as many states, of the same times; positions, velocities, numbers of nodes and elements, corners and parts; titles of
-parts; stress and plastic strain of solids and their history variables; plastic strain and thickness of shells, and of their stress what does
+parts; stress and plastic strain of solids and their history variables; forces and moments of beams; plastic strain and thickness of shells, and of their stress what does
 not depend on axes; which elements are deleted.
 """
 
@@ -91,8 +91,6 @@ def check_folder(folder):
             deleted += int((~alive).sum())
             at = f"state {index}, {name}s"
             same(f"{at}: alive", arrays[ALIVE[kind]][index] > 0, alive)
-            if kind == 2:
-                continue
 
             def values(field):
                 of_grid = grid.cell_data[field]
@@ -100,6 +98,17 @@ def check_folder(folder):
                 full[alive] = of_grid[place[alive]]
                 return full
 
+            if kind == 2:
+                if "beam_force" in grid.cell_data:
+                    force, moment = values("beam_force"), values("beam_moment")
+                    for what, due in [
+                        (ArrayType.element_beam_axial_force, force[:, 0]),
+                        (ArrayType.element_beam_shear_force, force[:, 1:]),
+                        (ArrayType.element_beam_bending_moment, moment[:, 1:]),
+                        (ArrayType.element_beam_torsion_moment, moment[:, 0]),
+                    ]:
+                        same(f"{at}: {what}", arrays[what][index], due)
+                continue
             prefix = f"element_{name}_"
             strain = arrays[getattr(ArrayType, prefix + "effective_plastic_strain")][index][:, 0]
             same(f"{at}: plastic_strain", strain, values("plastic_strain"))

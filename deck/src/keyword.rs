@@ -7,6 +7,7 @@
 //! Checks and the model are then those of any deck. Nothing is passed over in silence: what is read and not honoured is a
 //! fault where it would change what is computed, else a warning.
 
+mod beam;
 mod blast;
 mod cards;
 mod condition;

@@ -59,6 +59,8 @@ pub struct Body {
     pub shells: Vec<(u32, [u32; 4])>,
     /// Number and ends of each truss. A body has elements of one kind.
     pub trusses: Vec<(u32, [u32; 2])>,
+    /// Of each truss a direction that a beam there has across it, or none of any.
+    pub across: Vec<[f64; 3]>,
 }
 
 impl Body {

@@ -155,7 +155,7 @@ fn measure(model: &Model, index: usize) -> Measured {
         let (v, longest) = (part.volume_of(e, &mesh.positions), longest_edge(&x));
         let thinnest = match &part.topology {
             Topology::Shells { section, .. } => v / (section.thickness * longest),
-            Topology::Trusses { .. } => longest,
+            Topology::Trusses { .. } | Topology::Beams { .. } => longest,
             // A third of the least height: a node stands half-way up.
             Topology::Tetrahedra { .. } => v / largest_side(&x),
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
@@ -197,7 +197,7 @@ fn measure(model: &Model, index: usize) -> Measured {
     let n = part.n_elements().max(1) as f64;
     this.cell = match &part.topology {
         Topology::Shells { .. } => (area / n).sqrt(),
-        Topology::Trusses { .. } => this.least_cell,
+        Topology::Trusses { .. } | Topology::Beams { .. } => this.least_cell,
         Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
             libm::cbrt(volume / n)
         }

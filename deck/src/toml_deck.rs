@@ -3,6 +3,7 @@
 //! It looks at syntax (faults of which end the reading: nothing after them can be trusted), at keys, and at each value by
 //! itself. What values have to do with each other is looked at in `make`.
 
+mod beam;
 mod condition;
 mod contact;
 mod entry;

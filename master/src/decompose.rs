@@ -129,7 +129,8 @@ impl Living {
                 | Topology::EightPoint { .. }
                 | Topology::Tetrahedra { .. }
                 | Topology::Shells { .. }
-                | Topology::Trusses { .. } => Part::List(alive.to_vec()),
+                | Topology::Trusses { .. }
+                | Topology::Beams { .. } => Part::List(alive.to_vec()),
                 Topology::Structured { cells } => {
                     let [ni, nj, nk] = cells.map(|n| n as usize);
                     let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
@@ -229,7 +230,8 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec
             | Topology::EightPoint { .. }
             | Topology::Tetrahedra { .. }
             | Topology::Shells { .. }
-            | Topology::Trusses { .. } => {
+            | Topology::Trusses { .. }
+            | Topology::Beams { .. } => {
                 let n_elements = mesh_part.n_elements();
                 let centres: Vec<[f64; 3]> = (0..n_elements)
                     .map(|e| {

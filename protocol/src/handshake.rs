@@ -23,7 +23,8 @@ use std::fmt;
 /// votes the work of each wall and support, and what nodes lost at walls,
 /// and readings of element gauges with history variables behind them; requests to remove a job;
 /// memory of workers in [`Hello`]; the strain at which layers of shells break in assignments; the part of a job that is computed twice; cross-sections in assignments
-/// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans.
+/// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans;
+/// beams in assignments.
 pub const VERSION: u16 = 9;
 
 /// Most characters of a host's name.

@@ -7,6 +7,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "closed forms are computed with the platform's functions")]
 
+mod beam;
 mod contact;
 mod element;
 mod erosion;
@@ -109,6 +110,11 @@ macro_rules! each_case_of_the_book {
             shell: the_cylinder_is_pinched_as_published quick;
             shell: the_hemisphere_opens_as_published long;
             shell: a_cantilever_of_shells_bends_as_a_beam quick;
+            beam: a_cantilever_of_beams_bends_as_timoshenko_says quick;
+            beam: a_cantilever_of_beams_rings_as_timoshenko_says quick;
+            beam: a_pressed_column_loses_its_stiffness_at_eulers_load quick;
+            beam: a_cantilever_of_beams_turns_in_a_plastic_hinge quick;
+            beam: a_free_frame_that_turns_keeps_its_energy quick;
             shell: a_square_plate_sags_under_pressure quick;
             shell: a_strip_of_shells_rings_as_a_beam quick;
             shell: a_square_plate_rings_at_its_frequencies quick;

@@ -2,6 +2,7 @@
 //!
 //! `cargo test --release -p tests --test suite -- --nocapture` prints every figure of the book.
 
+mod beams;
 mod bits;
 mod bodies;
 mod book;
@@ -26,6 +27,7 @@ mod trusses;
 #[test]
 fn every_row_of_the_reference_is_computed_by_a_case() {
     let book = [
+        include_str!("../src/book/beam.rs"),
         include_str!("../src/book/element.rs"),
         include_str!("../src/book/hexahedron.rs"),
         include_str!("../src/book/modes.rs"),

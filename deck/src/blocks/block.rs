@@ -42,11 +42,15 @@ impl Block {
     /// right hand.
     pub(crate) fn rotate(&mut self, point: [f64; 3], axis: [f64; 3], degrees: f64) {
         let [cosine, sine] = cosine_and_sine(degrees);
-        for p in &mut self.positions {
-            let r = sub(*p, point);
+        let turned = |r: [f64; 3]| {
             let parallel = scaled(axis, dot(axis, r) * (1.0 - cosine));
-            let turned = add(add(scaled(r, cosine), scaled(cross(axis, r), sine)), parallel);
-            *p = add(turned, point);
+            add(add(scaled(r, cosine), scaled(cross(axis, r), sine)), parallel)
+        };
+        for p in &mut self.positions {
+            *p = add(turned(sub(*p, point)), point);
+        }
+        if let Topology::Beams { across, .. } = &mut self.topology {
+            across.iter_mut().for_each(|across| *across = turned(*across));
         }
     }
 

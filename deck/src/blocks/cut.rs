@@ -84,6 +84,14 @@ impl Block {
                 quads.retain(|_| stays());
                 quads.iter_mut().for_each(|corners| *corners = corners.each_ref().map(renumbered));
             }
+            Topology::Beams { bars, across, .. } => {
+                let keep: Vec<bool> = bars.iter().map(|_| stays()).collect();
+                let mut kept = keep.iter();
+                bars.retain(|_| *kept.next().expect("one for each"));
+                let mut kept = keep.iter();
+                across.retain(|_| *kept.next().expect("one for each"));
+                bars.iter_mut().for_each(|ends| *ends = ends.each_ref().map(renumbered));
+            }
             Topology::Trusses { bars, .. } => {
                 bars.retain(|_| stays());
                 bars.iter_mut().for_each(|ends| *ends = ends.each_ref().map(renumbered));
@@ -108,7 +116,7 @@ impl Block {
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra.len(),
             Topology::Tetrahedra { tetrahedra } => tetrahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
-            Topology::Trusses { bars, .. } => bars.len(),
+            Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => bars.len(),
         }
     }
 
@@ -125,7 +133,9 @@ impl Block {
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra[e],
             Topology::Tetrahedra { tetrahedra } => tet10::collapsed(&tetrahedra[e]),
             Topology::Shells { quads, .. } => std::array::from_fn(|c| quads[e][c % 4]),
-            Topology::Trusses { bars, .. } => std::array::from_fn(|c| bars[e][c % 2]),
+            Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => {
+                std::array::from_fn(|c| bars[e][c % 2])
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{
     cards::Block,
-    fields::{Context, EIGHTS},
+    fields::{Context, EIGHTS, TENS},
     problem::{Beam, Node, Problem, Shell, Solid},
 };
 
@@ -113,10 +113,28 @@ pub(super) fn read_shells(problem: &mut Problem, block: &Block<'_>, context: &Co
     }
 }
 
-/// `*ELEMENT_BEAM`, whose third node and releases mean nothing to a truss.
-pub(super) fn read_beams(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
-    for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
+/// `*ELEMENT_BEAM`, with a card of a direction where the keyword says so; third node and releases mean nothing to a truss.
+pub(super) fn read_beams(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>, oriented: bool) {
+    let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
+    while let Some(card) = cards.next() {
         let f = context.fields(card, block.width, &EIGHTS);
-        problem.beams.push(Beam { id: f.id(0), part: f.id(1), nodes: [f.id(2), f.id(3)], at: card.at });
+        let released = (5..9).find(|&i| f.integer(i) != 0).map(|i| f.reference(i, "release").origin);
+        let mut across = None;
+        if oriented {
+            let Some(second) = cards.next() else {
+                f.fault(0, "a second card with the direction", "complete the element");
+                return;
+            };
+            across = Some(context.fields(second, block.width, &TENS).vector(0));
+        }
+        problem.beams.push(Beam {
+            id: f.id(0),
+            part: f.id(1),
+            nodes: [f.id(2), f.id(3)],
+            third: f.id(4),
+            across,
+            released,
+            at: card.at,
+        });
     }
 }

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+use mechanics::element::beam2::BeamSection;
+
 use super::{
     blast::Blasts,
     condition::Conditions,
@@ -43,11 +45,17 @@ pub(super) struct Shell {
     pub(super) at: Place,
 }
 
-/// A truss, of `*ELEMENT_BEAM`.
+/// A truss or beam, of `*ELEMENT_BEAM`.
 pub(super) struct Beam {
     pub(super) id: u32,
     pub(super) part: u32,
     pub(super) nodes: [u32; 2],
+    /// The node towards which its axis s points; 0 where any axis serves.
+    pub(super) third: u32,
+    /// A direction of that axis, which goes before the node.
+    pub(super) across: Option<[f64; 3]>,
+    /// Where it says that an end is released.
+    pub(super) released: Option<Origin>,
     pub(super) at: Place,
 }
 
@@ -70,6 +78,7 @@ pub(super) enum Section {
     Shell(ShellSection),
     /// Of a truss: its area.
     Truss(f64),
+    Beam(BeamSection),
 }
 
 /// `*SECTION_SHELL`.

@@ -1,4 +1,4 @@
-//! `*PART`, `*SECTION_` and `*HOURGLASS`.
+//! `*PART`, `*SECTION_` of solids and shells, and `*HOURGLASS`.
 
 use super::{
     cards::{Block, Card},
@@ -118,36 +118,6 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
         });
         let section = ShellSection { thickness, points: points as u32, lobatto };
         problem.sections.insert(f.id(0), (card.at, Section::Shell(section)));
-    }
-}
-
-/// `*SECTION_BEAM` of trusses.
-pub(super) fn read_beam_sections(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
-    let mut cards = block.cards.iter();
-    while let Some(card) = cards.next() {
-        let f = context.fields(card, block.width, &TENS);
-        if f.integer(1) != 3 {
-            f.fault(
-                1,
-                "ELFORM 3: beams are computed as trusses alone",
-                "take the truss, or shells or solids",
-            );
-        }
-        let Some(second) = cards.next() else {
-            f.fault(0, "a second card with the area", "complete the section");
-            return;
-        };
-        let g = context.fields(second, block.width, &TENS);
-        let area = g.real(0, 0.0);
-        if !(area.is_finite() && area > 0.0) {
-            g.fault(0, "an area above 0", "give A");
-        }
-        for (i, what) in [(1, "RAMPT"), (2, "STRESS")] {
-            if g.real(i, 0.0) != 0.0 {
-                g.fault(i, "0: trusses start without stress", format!("leave {what} blank"));
-            }
-        }
-        problem.sections.insert(f.id(0), (card.at, Section::Truss(area)));
     }
 }
 

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::{
+    beam,
     blast::Blasts,
     cards::{Block, Lines},
     condition::Conditions,
@@ -134,14 +135,15 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "NODE" => mesh::read_nodes(problem, block, context),
         "ELEMENT_SOLID" => mesh::read_solids(problem, block, context),
         "ELEMENT_SHELL" => mesh::read_shells(problem, block, context, false),
-        "ELEMENT_BEAM" => mesh::read_beams(problem, block, context),
+        "ELEMENT_BEAM" => mesh::read_beams(problem, block, context, false),
+        "ELEMENT_BEAM_ORIENTATION" => mesh::read_beams(problem, block, context, true),
         "ELEMENT_SHELL_THICKNESS" => mesh::read_shells(problem, block, context, true),
         "PART" => property::read_parts(problem, block, context, false),
         "PART_CONTACT" => property::read_parts(problem, block, context, true),
         "PART_INERTIA" => inertia::read(problem, block, context),
         "SECTION_SOLID" => property::read_solid_sections(problem, block, context),
         "SECTION_SHELL" => property::read_shell_sections(problem, block, context),
-        "SECTION_BEAM" => property::read_beam_sections(problem, block, context),
+        "SECTION_BEAM" => beam::read_sections(problem, block, context),
         "HOURGLASS" => property::read_hourglass(problem, block, context),
         "DEFINE_CURVE" => define::read_curve(problem, block, context),
         "DEFINE_VECTOR" => {}

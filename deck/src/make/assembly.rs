@@ -309,7 +309,7 @@ fn owned<'a>(
             | Topology::Tetrahedra { .. },
         ) => 0,
         Some(Topology::Shells { .. }) => 1,
-        Some(Topology::Trusses { .. }) => 2,
+        Some(Topology::Trusses { .. } | Topology::Beams { .. }) => 2,
     };
     let elements = &mut elements[kind];
     for (ids, places, owner, what) in [

@@ -92,6 +92,13 @@ pub(super) fn make(
         if let Some(Topology::Shells { section, .. }) = block.as_mut().map(|block| &mut block.topology) {
             section.breaks = erosion.and_then(|criteria| criteria.plastic_strain);
         }
+        if let Some(Topology::Beams { section, .. }) = block.as_mut().map(|block| &mut block.topology) {
+            section.breaks = erosion.and_then(|criteria| criteria.plastic_strain);
+            if of_material.is_some_and(|m| matches!(m.strength, Strength::Elastic { .. })) {
+                // An elastic beam knows its forces without.
+                section.fibres = None;
+            }
+        }
         drafts.push(PartDraft {
             name,
             at,
@@ -154,10 +161,10 @@ fn hourglass_of(part: &Part, material: Option<&Material>, of_deck: Hourglass, lo
 fn criteria(given: &Erosion, kind: Kind, material: Option<&Material>, log: &Log<'_>) -> Criteria {
     match kind {
         Kind::Solids => {}
-        Kind::Shells(_) => check_shells(given, log),
+        Kind::Shells(_) | Kind::Beams { .. } => check_shells(given, log),
         Kind::Trusses { .. } => log.fault_of(
             given.origin,
-            "solids or shells: trusses do not erode",
+            "solids, shells or beams: trusses do not erode",
             log.say("remove erosion", "leave the limit blank"),
         ),
     }
@@ -206,10 +213,12 @@ fn criteria(given: &Erosion, kind: Kind, material: Option<&Material>, log: &Log<
     criteria
 }
 
-/// Shells erode by the plastic strain of their layers, which is to be given, and by nothing else.
+/// Shells erode by the plastic strain of their layers and beams by that of their fibres, which is to be given, and by nothing else.
 fn check_shells(given: &Erosion, log: &Log<'_>) {
-    let (expected, advice) =
-        ("plastic_strain: shells erode by that of their layers alone", "give plastic_strain");
+    let (expected, advice) = (
+        "plastic_strain: shells and beams erode by that of their layers and fibres alone",
+        "give plastic_strain",
+    );
     let others = given.limits.iter().filter(|(criterion, _)| *criterion != Criterion::PlasticStrain);
     let origins = others.map(|(_, limit)| limit.origin);
     let origins = origins.chain(given.failure.as_ref().filter(|on| on.value).map(|on| on.origin));
@@ -304,7 +313,7 @@ fn body_of(
     };
     let mesh = mesh.as_ref()?;
     let name = body.map_or(part.name.as_str(), |body| &body.value);
-    let holds = |body: &Body| body.kind() == part.kind.elements() && body.elements().next().is_some();
+    let holds = |body: &Body| body.kind() == part.kind.of_body() && body.elements().next().is_some();
     let of_kind = || mesh.file.bodies.iter().enumerate().filter(|(_, body)| holds(body));
     let called = mesh.file.bodies_called(name).find(|(_, found)| holds(found));
     if called.is_none()
@@ -313,7 +322,7 @@ fn body_of(
     {
         let (expected, advice) = match other.kind() {
             "shells" => ("their thickness", "add shell = { thickness = ... } to the part"),
-            _ => ("their cross-section", "add truss = { area = ... } to the part"),
+            _ => ("their cross-section", "add truss = { area = ... } or beam = { ... } to the part"),
         };
         let read = format!("the {} of body \"{name}\" in part \"{}\"", other.kind(), part.name);
         log.fault(at.at, read, expected, advice);
@@ -327,7 +336,7 @@ fn body_of(
         if of_kind().count() > LISTED {
             names.push("...".to_string());
         }
-        let what = part.kind.elements();
+        let what = part.kind.of_body();
         let listed = if names.is_empty() { "it has none".to_string() } else { names.join(", ") };
         log.fault_of(
             body.unwrap_or(file).origin,
@@ -375,7 +384,11 @@ fn body_of(
     }
     let corners: Vec<u32> = found.corners().map(|id| local[&id]).collect();
     let topology = if found.tetrahedra.is_empty() {
-        part.kind.topology(corners.chunks(part.kind.n_corners()))
+        let mut topology = part.kind.topology(corners.chunks(part.kind.n_corners()));
+        if let (Topology::Beams { across, .. }, false) = (&mut topology, found.across.is_empty()) {
+            across.clone_from(&found.across);
+        }
+        topology
     } else {
         let tetrahedra = found.tetrahedra.iter().map(|(_, nodes)| nodes.map(|id| local[&id])).collect();
         Topology::Tetrahedra { tetrahedra }

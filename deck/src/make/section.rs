@@ -143,7 +143,7 @@ fn listed(
             }
         }
     }
-    for (what, missing) in ["a solid", "a shell", "a truss"].into_iter().zip(&missing) {
+    for (what, missing) in ["a solid", "a shell", "a truss or a beam"].into_iter().zip(&missing) {
         for origin in missing.values() {
             log.fault_of(*origin, format!("the number of {what}"), "list elements of the mesh");
         }

@@ -2,7 +2,7 @@
 
 use mechanics::{
     contact::Settings,
-    element::{tet10, truss2},
+    element::{beam2, tet10, truss2},
     material::{Failure, Material},
     mesh::Topology,
 };
@@ -10,7 +10,7 @@ use mechanics::{
 use super::{assembly::Assembly, part::PartDraft, surface::Face, zones};
 use crate::{
     fault::short,
-    geometry::{EDGES, norm, sub, worst_corner},
+    geometry::{EDGES, cross, norm, sub, worst_corner},
     log::Log,
     typed::mesh::Numbers,
 };
@@ -42,7 +42,7 @@ pub(super) fn check(
     }
 }
 
-/// Reports shells and trusses of a section or a material that cannot be computed.
+/// Reports shells, trusses and beams of a section or a material that cannot be computed.
 fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], log: &Log<'_>) {
     for (part, draft) in assembly.mesh.parts.iter().zip(parts) {
         let material = draft.material.and_then(|index| materials.get(index as usize));
@@ -66,6 +66,24 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
             Topology::Shells { section, .. } => {
                 ("shells", section.check(material).map_err(|e| e.to_string()))
             }
+            Topology::Beams { bars, section, across } => {
+                let e = (0..bars.len()).find(|&e| is_unturned(part, e, across[e], section, assembly));
+                if let Some(e) = e {
+                    log.fault(
+                        draft.numbers.as_ref().map_or(draft.at, |own| own.element_places.of(e)),
+                        format!(
+                            "beam {} of part \"{}\" without a direction across it",
+                            part.element_ids[e], part.name
+                        ),
+                        "one, as its section is not alike about both axes",
+                        log.say(
+                            "give across = [x, y, z] in beam = { ... }",
+                            "give the third node of *ELEMENT_BEAM, off the line of the beam",
+                        ),
+                    );
+                }
+                ("beams", beam2::check(section, material).map_err(|e| e.to_string()))
+            }
             Topology::Trusses { area, .. } => {
                 ("trusses", truss2::check(*area, material).map_err(|e| e.to_string()))
             }
@@ -88,6 +106,21 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
             Ok(()) => {}
         }
     }
+}
+
+/// Whether a beam whose section has a wide and a narrow side is not told how it stands.
+fn is_unturned(
+    part: &mechanics::mesh::Part,
+    e: usize,
+    across: [f64; 3],
+    section: &beam2::BeamSection,
+    assembly: &Assembly,
+) -> bool {
+    let [a, b, ..] = part.corners(e).map(|node| assembly.mesh.positions[node as usize]);
+    let along = sub(b, a);
+    let is_across = norm(cross(along, across)) > 1e-6 * norm(along) * norm(across);
+    let alike = |[one, other]: [f64; 2]| (one - other).abs() <= 1e-9 * one.abs();
+    !(is_across || alike(section.inertia) && alike(section.shear))
 }
 
 /// Reports elements whose volume is not positive; true where there is none.

@@ -24,7 +24,7 @@
 //! ```
 //!
 //! A solid names eight nodes, or ten of a tetrahedron with nodes on its edges, as all solids of its body do. A triangle among shells names
-//! its last node twice. Bodies of one file share the nodes that they both name.
+//! its last node twice. Behind the nodes of a truss may stand x, y and z of a direction across the beam that a deck makes of it. Bodies of one file share the nodes that they both name.
 
 use std::{collections::BTreeSet, fmt::Write as _};
 
@@ -61,9 +61,15 @@ impl MeshFile {
         };
         for body in &self.bodies {
             let _ = writeln!(text, "{} {} \"{}\"", body.kind(), body.elements().count(), body.name);
-            for (id, nodes) in body.elements() {
+            for (n, (id, nodes)) in body.elements().enumerate() {
                 let numbers: Vec<u32> = std::iter::once(id).chain(nodes.iter().copied()).collect();
-                row(&mut text, &numbers);
+                match body.across.get(n) {
+                    Some([x, y, z]) => {
+                        let words: Vec<String> = numbers.iter().map(u32::to_string).collect();
+                        let _ = writeln!(text, "{} {x:?} {y:?} {z:?}", words.join(" "));
+                    }
+                    None => row(&mut text, &numbers),
+                }
             }
         }
         for (name, nodes) in &self.sets {
@@ -276,7 +282,19 @@ fn row(
             mesh.bodies[*body].shells.push((id, corners));
         }
         Section::Trusses(body) => {
-            let [id, ends @ ..] = numbers::<3>(line)?;
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let is_turned = words.len() == 6;
+            let [id, ends @ ..] =
+                numbers::<3>(&if is_turned { words[..3].join(" ") } else { line.to_string() })?;
+            let found = &mut mesh.bodies[*body];
+            if is_turned == found.across.is_empty() && !found.trusses.is_empty() {
+                return Err(("a direction across as the elements before have or not".to_string(), MIXED));
+            }
+            if is_turned {
+                let (_, across) = place(&[words[0], words[3], words[4], words[5]].join(" "))
+                    .ok_or_else(|| ("number, two nodes, x y z".to_string(), "correct the line"))?;
+                found.across.push(across);
+            }
             if !elements[2].insert(id) {
                 return Err((format!("an element number other than {id}"), "renumber one"));
             }

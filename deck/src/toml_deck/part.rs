@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use mechanics::{element::shell4::Rule, mesh::Section};
 
 use super::{
+    beam,
     entry::{face_names, text},
     hourglass, shape,
 };
@@ -55,18 +56,21 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
             .and_then(|v| read_choice(v, &name));
         let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
         let erosion = table.get("erosion").and_then(|v| read_erosion(v, &name));
-        let (shell, truss) = (table.get("shell"), table.get("truss"));
-        let kind = match (shell, truss) {
-            (None, None) => Some(Kind::Solids),
-            (Some(value), None) => read_section(value, &name).map(Kind::Shells),
-            (None, Some(value)) => read_truss(value, &name),
-            (Some(_), Some(value)) => {
-                let advice = "remove one; a part has elements of one kind";
-                value.fault("either shell or truss", advice);
+        let (shell, truss, beam) = (table.get("shell"), table.get("truss"), table.get("beam"));
+        let kind = match (shell, truss, beam) {
+            (None, None, None) => Some(Kind::Solids),
+            (Some(value), None, None) => read_section(value, &name).map(Kind::Shells),
+            (None, Some(value), None) => read_truss(value, &name),
+            (None, None, Some(value)) => beam::read(value, &name),
+            (_, Some(value), _) | (_, _, Some(value)) => {
+                let advice = "remove the others; a part has elements of one kind";
+                value.fault("one of shell, truss and beam", advice);
                 None
             }
         };
-        let given = shell.map(|value| (Word::Shell, value)).or(truss.map(|value| (Word::Truss, value)));
+        let given = shell.map(|value| (Word::Shell, value));
+        let given =
+            given.or(truss.map(|value| (Word::Truss, value))).or(beam.map(|value| (Word::Beam, value)));
         let eight_points = table.get("points").and_then(read_points);
         let hourglass = table
             .get("hourglass")
@@ -154,6 +158,7 @@ fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
 enum Word {
     Shell,
     Truss,
+    Beam,
 }
 
 /// `truss = { area }`.
@@ -195,8 +200,11 @@ fn read_mesh(
         Some((Word::Shell, shell)) if !of_shells && kind != "mesh" => {
             shell.fault("no shell: solids fill this block", "remove it, or take plate, prism or mesh");
         }
-        Some((Word::Truss, truss)) if kind != "mesh" => {
-            truss.fault("no truss: another kind of element fills this block", "remove it, or take mesh");
+        Some((Word::Truss | Word::Beam, bar)) if kind != "mesh" => {
+            bar.fault(
+                "no truss or beam: another kind of element fills this block",
+                "remove it, or take mesh",
+            );
         }
         _ => {}
     }
@@ -245,7 +253,7 @@ fn read_mesh(
     source.map(|source| PartMesh { at, title, source })
 }
 
-/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`, of shells `[id, n1 ... n4]`, of trusses `[id, n1, n2]`.
+/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`, of shells `[id, n1 ... n4]`, of trusses and beams `[id, n1, n2]`.
 fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
     let max = u64::from(MAX_ID);
     let nodes = table.require("nodes", "a list of [id, x, y, z]").and_then(|v| v.items());
@@ -279,7 +287,9 @@ fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
         let numbers = match kind {
             Kind::Solids => element.integers::<9>("[id, n1, ..., n8]", 1, max).map(|n| n.to_vec()),
             Kind::Shells(_) => element.integers::<5>("[id, n1, n2, n3, n4]", 1, max).map(|n| n.to_vec()),
-            Kind::Trusses { .. } => element.integers::<3>("[id, n1, n2]", 1, max).map(|n| n.to_vec()),
+            Kind::Trusses { .. } | Kind::Beams { .. } => {
+                element.integers::<3>("[id, n1, n2]", 1, max).map(|n| n.to_vec())
+            }
         };
         let Some(numbers) = numbers else { continue };
         let id = numbers[0] as u32;
@@ -315,7 +325,7 @@ fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
                 Kind::Shells(_) => {
                     ("four different nodes", "list each corner once; triangles come in mesh files")
                 }
-                Kind::Trusses { .. } => ("two different nodes", "list both ends"),
+                Kind::Trusses { .. } | Kind::Beams { .. } => ("two different nodes", "list both ends"),
             };
             element.fault(expected, advice);
         }

@@ -1,7 +1,7 @@
 //! Materials of a deck, and its parts.
 
 use mechanics::{
-    element::hourglass::Hourglass,
+    element::{beam2::BeamSection, hourglass::Hourglass},
     erosion::Criteria,
     material::Material,
     mesh::{Section, Topology},
@@ -40,6 +40,11 @@ pub(crate) enum Kind {
         /// Area of the cross-section.
         area: f64,
     },
+    Beams {
+        section: BeamSection,
+        /// A direction whose part across a beam is its axis `e2`, of elements without one of their own; of no length where any serves.
+        across: [f64; 3],
+    },
 }
 
 impl Kind {
@@ -49,6 +54,15 @@ impl Kind {
             Self::Solids => "solids",
             Self::Shells(_) => "shells",
             Self::Trusses { .. } => "trusses",
+            Self::Beams { .. } => "beams",
+        }
+    }
+
+    /// The word of bodies of mesh files with such elements ([`Body::kind`](crate::mesh_file::Body::kind)).
+    pub(crate) fn of_body(self) -> &'static str {
+        match self {
+            Self::Beams { .. } => "trusses",
+            _ => self.elements(),
         }
     }
 
@@ -57,7 +71,7 @@ impl Kind {
         match self {
             Self::Solids => 8,
             Self::Shells(_) => 4,
-            Self::Trusses { .. } => 2,
+            Self::Trusses { .. } | Self::Beams { .. } => 2,
         }
     }
 
@@ -68,7 +82,7 @@ impl Kind {
                 (&[4, 5, 6, 8], "eight, or six, five or four of a wedge, a pyramid or a tetrahedron")
             }
             Self::Shells(_) => (&[3, 4], "four, or three of a triangle"),
-            Self::Trusses { .. } => (&[2], "two"),
+            Self::Trusses { .. } | Self::Beams { .. } => (&[2], "two"),
         }
     }
 
@@ -81,6 +95,10 @@ impl Kind {
             Self::Solids => Topology::Explicit { hexahedra: fixed(elements) },
             Self::Shells(section) => Topology::Shells { quads: fixed(elements), section },
             Self::Trusses { area } => Topology::Trusses { bars: fixed(elements), area },
+            Self::Beams { section, across } => {
+                let bars: Vec<[u32; 2]> = fixed(elements);
+                Topology::Beams { across: vec![across; bars.len()], bars, section }
+            }
         }
     }
 }

@@ -1,7 +1,11 @@
 //! Materials and parts with their meshes.
 
 use mechanics::{
-    element::{hourglass::Hourglass, shell4::Rule},
+    element::{
+        beam2::{self, BeamSection},
+        hourglass::Hourglass,
+        shell4::Rule,
+    },
     material::Material,
     mesh::{Section, Topology},
 };
@@ -84,6 +88,9 @@ fn write_part(text: &mut Text, part: &Part) {
     if part.velocity != [0.0; 3] {
         text.key("velocity", vector(part.velocity));
     }
+    if let Kind::Beams { section, across } = &part.kind {
+        text.key("beam", beam(section, *across));
+    }
     if let Kind::Trusses { area } = part.kind {
         text.key("truss", table(&[("area", format!("{area:?}"))]));
     }
@@ -135,6 +142,30 @@ fn write_part(text: &mut Text, part: &Part) {
     }
 }
 
+/// The section of beams and how they stand.
+fn beam(section: &BeamSection, across: [f64; 3]) -> String {
+    let BeamSection { area, inertia, torsion, shear, fibres, .. } = section;
+    let mut keys: Keys = match fibres {
+        Some((shape, points)) => {
+            let (key, value) = match shape {
+                beam2::Shape::Rectangle(sides) => ("rectangle", numbers(sides)),
+                beam2::Shape::Round([outer, 0.0]) => ("round", format!("{outer:?}")),
+                beam2::Shape::Round(diameters) => ("tube", numbers(diameters)),
+            };
+            vec![(key, value), ("points", points.to_string())]
+        }
+        None => {
+            let area_and_torsion = plain(&[("area", *area), ("torsion", *torsion)]);
+            area_and_torsion.into_iter().chain([("inertia", numbers(inertia))]).collect()
+        }
+    };
+    keys.push(("shear_area", numbers(shear)));
+    if across != [0.0; 3] {
+        keys.push(("across", vector(across)));
+    }
+    table(&keys)
+}
+
 fn write_erosion(text: &mut Text, erosion: &Erosion) {
     let limits = erosion.limits.iter();
     let mut keys: Keys = limits.map(|(criterion, x)| (criterion.key(), format!("{:?}", x.value))).collect();
@@ -179,7 +210,9 @@ fn explicit(own: &Explicit) -> String {
         Topology::Shells { quads, .. } => {
             list(quads.iter().zip(numbers).map(|(corners, id)| element(id, corners)))
         }
-        Topology::Trusses { bars, .. } => list(bars.iter().zip(numbers).map(|(ends, id)| element(id, ends))),
+        Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => {
+            list(bars.iter().zip(numbers).map(|(ends, id)| element(id, ends)))
+        }
         // No reader makes a grid of explicit elements.
         Topology::Structured { .. } => list(std::iter::empty()),
     };

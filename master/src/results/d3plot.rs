@@ -97,7 +97,12 @@ struct Content {
     history: Vec<String>,
     /// Shells have their thickness as the history variable behind these.
     thickness: bool,
+    /// Whether there are beams, whose forces and moments [`BEAM`] words are.
+    beams: bool,
 }
+
+/// Words of a beam in a state: axial force, two shear forces, two bending moments, torque.
+const BEAM: usize = 6;
 
 impl Content {
     fn of(first: &Piece, elements: &Elements) -> Self {
@@ -119,12 +124,18 @@ impl Content {
             plastic_strain: has("CellData", "plastic_strain"),
             history: history.map(|heading| heading.name.clone()).collect(),
             thickness: has("CellData", "thickness"),
+            beams: has("CellData", "beam_force"),
         }
     }
 
     /// Variables of a solid in a state.
     fn of_solid(&self) -> usize {
         6 * usize::from(self.stress) + usize::from(self.plastic_strain) + self.history.len()
+    }
+
+    /// Variables of a beam or truss in a state.
+    fn of_beam(&self) -> usize {
+        BEAM * usize::from(self.beams)
     }
 
     /// Variables of a shell in a state: of its one layer.

@@ -19,7 +19,8 @@ pub fn unit_of(field: &str, units: &Units) -> String {
         "temperature" => "K".to_owned(),
         "density" => format!("{mass}/{length}3"),
         "energy" => (*specific).to_owned(),
-        "contact_force" => (*force).to_owned(),
+        "contact_force" | "beam_force" => (*force).to_owned(),
+        "beam_moment" => format!("{force}*{length}"),
         "mass" => (*mass).to_owned(),
         "time_to_light" => (*time).to_owned(),
         _ => String::new(),
@@ -64,6 +65,8 @@ mod tests {
             ("stress_xy", "GPa"),
             ("density", "kg/mm3"),
             ("temperature", "K"),
+            ("beam_force", "kN"),
+            ("beam_moment", "kN*mm"),
             ("plastic_strain", ""),
             ("part", ""),
         ] {

@@ -12,8 +12,8 @@ pub mod read;
 
 use deck::model::{Model, Output};
 use mechanics::{
-    element::{shell4, tet10},
-    mesh::Nodes,
+    element::{beam2, shell4, tet10},
+    mesh::{Nodes, Topology},
     state::{GlobalState, PartHistory, field},
 };
 
@@ -50,8 +50,8 @@ const ON_REQUEST: [&str; 10] = [
     "viscosity",
 ];
 
-/// Arrays that are written wherever they exist: the worker, and what shells have.
-const ALWAYS: [&str; 3] = ["worker", "thickness", "von_mises_max"];
+/// Arrays that are written wherever they exist: the worker, and what shells and beams have.
+const ALWAYS: [&str; 5] = ["worker", "thickness", "von_mises_max", "beam_force", "beam_moment"];
 
 /// Which fields a state file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -437,7 +437,7 @@ fn data_arrays<'a>(
         ]
         .map(|(name, index)| Array::f64(name, n_elements, move |e| [state.elements[index][e]])),
     );
-    if !state.shells.inertia.is_empty() {
+    if mesh.parts.iter().any(|part| part.section().is_some()) {
         let thickness =
             move |e| if elements.n_corners(e) == 4 { state.own[shell4::THICKNESS][e] } else { 0.0 };
         cell.push(Array::f64("thickness", n_elements, move |e| [thickness(e)]));
@@ -448,6 +448,27 @@ fn data_arrays<'a>(
             let layers = state.own[shell4::ELEMENT..].chunks_exact(shell4::LAYER);
             let largest = |layer: &[Vec<f64>]| plane_von_mises([0, 1, 2, 3, 4].map(|i| layer[i][e]));
             [layers.map(largest).fold(0.0, f64::max)]
+        }));
+    }
+    if mesh.parts.iter().any(|part| matches!(part.topology, Topology::Beams { .. })) {
+        let of_beam = move |e: usize| {
+            let (part, local) = elements.locate(e);
+            let part = &mesh.parts[part];
+            let Topology::Beams { .. } = part.topology else { return None };
+            let [a, b, ..] = part.corners(local).map(|n| state.x[n as usize]);
+            let length = (0..3).map(|i| (b[i] - a[i]) * (b[i] - a[i])).sum::<f64>().sqrt();
+            Some((length, [0, 1, 2, 3, 4, 5].map(|i| state.own[beam2::AXIAL + i][e])))
+        };
+        cell.push(Array::f64("beam_force", n_elements, move |e| {
+            of_beam(e).map_or([0.0; 3], |(length, [axial, _, ya, yb, za, zb])| {
+                [axial, -(za + zb) / length, (ya + yb) / length]
+            })
+        }));
+        // Of both ends that which is larger.
+        let larger = |one: f64, other: f64| if one.abs() >= other.abs() { -one } else { other };
+        cell.push(Array::f64("beam_moment", n_elements, move |e| {
+            of_beam(e)
+                .map_or([0.0; 3], |(_, [_, torque, ya, yb, za, zb])| [torque, larger(ya, yb), larger(za, zb)])
         }));
     }
     for name in variables(elements.model) {

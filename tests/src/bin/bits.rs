@@ -262,7 +262,7 @@ const WHOLE: u64 = 1_000_000;
 
 /// Every deck of `deck/examples`, the cycle at which its run ends, and what has happened by then. An explosive burns from the
 /// first cycle on.
-const EXAMPLES: [(&str, u64, Event); 18] = [
+const EXAMPLES: [(&str, u64, Event); 19] = [
     ("ball-on-shell.k", WHOLE, Event::Contact),
     ("ball-tears-sheet.toml", 400, Event::Erosion),
     ("bar-on-wall.k", WHOLE, Event::None),
@@ -278,6 +278,7 @@ const EXAMPLES: [(&str, u64, Event); 18] = [
     ("punch-through-plate.k", WHOLE, Event::Erosion),
     ("rod-through-plate.toml", 1000, Event::Erosion),
     ("self-contact.toml", WHOLE, Event::Contact),
+    ("table-on-tubes.toml", 2000, Event::Contact),
     ("taylor-copper.toml", 3000, Event::None),
     ("tube-crush.toml", WHOLE, Event::Contact),
     ("two-bars.toml", WHOLE, Event::Contact),

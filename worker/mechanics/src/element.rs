@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::exact::Quantum;
 
+pub mod beam2;
 pub(crate) mod group;
 pub mod hex8;
 pub mod hourglass;

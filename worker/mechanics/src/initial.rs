@@ -5,7 +5,7 @@ use crate::{
     burn::lighting_time,
     constraint::{Circle, Constraint, MAX_WALLS},
     contact::{Extent, Settings},
-    element::{hex8::eight_points, shell4, tet10},
+    element::{beam2, hex8::eight_points, shell4, tet10},
     exact::{Quanta, Quantum},
     load::{Drive, SurfaceKind},
     material::Material,
@@ -110,7 +110,7 @@ pub fn state(
     Ok(state)
 }
 
-/// Gives nodes of shells their rotation rates at the start, about the axes about which they may turn; `given` is by node,
+/// Gives nodes of shells and beams their rotation rates at the start, about the axes about which they may turn; `given` is by node,
 /// or empty.
 pub fn spin(state: &mut GlobalState, constraints: &[Constraint], given: &[[f64; 3]]) {
     for (n, (spin, given)) in state.shells.spin.iter_mut().zip(given).enumerate() {
@@ -121,18 +121,31 @@ pub fn spin(state: &mut GlobalState, constraints: &[Constraint], given: &[[f64; 
     }
 }
 
-/// The state of shells at time zero. A node has the rotational inertia of a quarter of each of its elements, about any axis:
-/// `mass max(h^2 / 12, A / 8)`, so that bending and transverse shear never ask for a smaller step than the membrane.
+/// The state of shells and beams at time zero. A node has the rotational inertia of a quarter of each of its elements, about any axis:
+/// `mass max(h^2 / 12, A / 8)`, so that bending and transverse shear never ask for a smaller step than the membrane; of beams it has the polar one of half of each.
 fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
-    if mesh.parts.iter().all(|part| part.section().is_none()) {
+    if !mesh.parts.iter().any(Part::turns_nodes) {
         return;
     }
     let n_elements = mesh.n_elements();
     let mut inertia_of = vec![0.0; n_elements];
     let fields = &mut state.own;
     for (part, first) in mesh.parts.iter().zip(mesh.element_offsets()) {
-        let Some(section) = part.section() else { continue };
         let material = &setup.materials[part.material as usize];
+        if let Topology::Beams { section, across, .. } = &part.topology {
+            for (local, across) in across.iter().enumerate() {
+                let [a, b, ..] = part.corners(local).map(|n| mesh.positions[n as usize]);
+                let e = first + local;
+                for (field, axis) in fields.iter_mut().zip(beam2::axis(a, b, *across)) {
+                    field[e] = axis;
+                }
+                for fibre in fields[beam2::ELEMENT..section.n_fields()].chunks_mut(beam2::FIBRE) {
+                    fibre[beam2::TEMPERATURE][e] = material.initial_temperature();
+                }
+                inertia_of[e] = material.density * state.initial_volume[e] * section.polar();
+            }
+        }
+        let Some(section) = part.section() else { continue };
         for e in first..first + part.n_elements() {
             fields[shell4::THICKNESS][e] = section.thickness;
             for layer in fields[shell4::ELEMENT..section.n_fields()].chunks_mut(shell4::LAYER) {
@@ -148,12 +161,12 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
     let quantum = Quantum::for_reference(largest, 50);
     let mut inertia = vec![0.0; mesh.n_nodes()];
     for (part, first) in mesh.parts.iter().zip(mesh.element_offsets()) {
-        if part.section().is_none() {
+        if !part.turns_nodes() {
             continue;
         }
         for e in 0..part.n_elements() {
             let eighth = quantum.round(inertia_of[first + e] * 0.125);
-            // A shell has each corner twice.
+            // A shell has each corner twice, a beam each end four times.
             for n in part.corners(e) {
                 inertia[n as usize] += eighth;
             }
@@ -239,6 +252,10 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
                     (area.sqrt() * section.thickness * strength).max(area * pressure)
                 }
                 Topology::Trusses { area, .. } => area * strength,
+                Topology::Beams { section, .. } => {
+                    arm = arm.max(part.volume(&x) / section.area);
+                    section.area * strength
+                }
             });
             stored += (1e-3 * material.bulk()).max(material.initial_energy()) * state.initial_volume[index];
             index += 1;

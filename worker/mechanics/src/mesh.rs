@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::element::{
+    beam2::BeamSection,
     hex8::{self, eight_points},
     hourglass::{Hourglass, N_FORCES},
     shell4::{self, Rule},
@@ -76,6 +77,13 @@ pub enum Topology {
     },
     /// Composite tetrahedra: ten indices into [`Part::nodes`] each, in the order of [`tet10`].
     Tetrahedra { tetrahedra: Vec<[u32; tet10::NODES]> },
+    /// Two-node beams of one section: two indices into [`Part::nodes`] each.
+    Beams {
+        bars: Vec<[u32; 2]>,
+        section: BeamSection,
+        /// By element a vector whose part across the beam is its axis `e2` at the start; of no length where any serves.
+        across: Vec<[f64; 3]>,
+    },
 }
 
 /// The nodes of an element, as many as its kind has.
@@ -169,12 +177,12 @@ impl Part {
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra.len(),
             Topology::Tetrahedra { tetrahedra } => tetrahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
-            Topology::Trusses { bars, .. } => bars.len(),
+            Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => bars.len(),
         }
     }
 
     /// Corners of element `e` of this part as global node indices. A shell is a hexahedron without height: its four
-    /// corners twice, so that its first two faces are its lower and its upper side and the others vanish. A truss has no face: each of its
+    /// corners twice, so that its first two faces are its lower and its upper side and the others vanish. A truss or beam has no face: each of its
     /// two nodes stands for the four corners of an end. A tetrahedron is the hexahedron that collapses to its four corners.
     pub fn corners(&self, e: usize) -> [u32; 8] {
         match &self.topology {
@@ -186,7 +194,9 @@ impl Part {
                 tet10::collapsed(&tetrahedra[e]).map(|local| self.nodes[local as usize])
             }
             Topology::Shells { quads, .. } => twice(quads[e]).map(|local| self.nodes[local as usize]),
-            Topology::Trusses { bars, .. } => spread(bars[e]).map(|local| self.nodes[local as usize]),
+            Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => {
+                spread(bars[e]).map(|local| self.nodes[local as usize])
+            }
         }
     }
 
@@ -237,7 +247,7 @@ impl Part {
 
     /// Whether its elements turn the nodes that they have.
     pub fn turns_nodes(&self) -> bool {
-        self.section().is_some()
+        matches!(self.topology, Topology::Shells { .. } | Topology::Beams { .. })
     }
 
     /// Thickness of its elements, of a kind that has a thickness and no height (length).
@@ -251,7 +261,7 @@ impl Part {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => 8,
             Topology::Tetrahedra { .. } => tet10::NODES,
             Topology::Shells { .. } => 4,
-            Topology::Trusses { .. } => 2,
+            Topology::Trusses { .. } | Topology::Beams { .. } => 2,
         }
     }
 
@@ -264,7 +274,7 @@ impl Part {
             }
             Topology::Tetrahedra { .. } => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15],
             Topology::Shells { .. } => &[UPPER],
-            Topology::Trusses { .. } => &[],
+            Topology::Trusses { .. } | Topology::Beams { .. } => &[],
         }
     }
 
@@ -278,6 +288,7 @@ impl Part {
             Topology::EightPoint { .. } => eight_points::N_OWN,
             Topology::Tetrahedra { .. } => tet10::N_OWN,
             Topology::Shells { section, .. } => section.n_fields(),
+            Topology::Beams { section, .. } => section.n_fields(),
         }
     }
 
@@ -301,6 +312,7 @@ impl Part {
             | Topology::Tetrahedra { .. } => hex8::volume(x),
             Topology::Shells { section, .. } => quad_area(&[x[0], x[1], x[2], x[3]]) * section.thickness,
             Topology::Trusses { area, .. } => distance(x[0], x[1]) * area,
+            Topology::Beams { section, .. } => distance(x[0], x[1]) * section.area,
         }
     }
 }
@@ -360,7 +372,7 @@ pub fn twice([a, b, c, d]: [u32; 4]) -> [u32; 8] {
     [a, b, c, d, a, b, c, d]
 }
 
-/// The nodes of a truss as the corners of a hexahedron: an end each.
+/// The nodes of a truss or beam as the corners of a hexahedron: an end each.
 pub fn spread([a, b]: [u32; 2]) -> [u32; 8] {
     [a, b, b, a, a, b, b, a]
 }

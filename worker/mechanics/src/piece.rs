@@ -43,12 +43,12 @@ pub struct Piece {
     pub erosion: Option<PieceErosion>,
     /// What contact keeps of each local node, by number; no array where it keeps nothing.
     pub contact: Vec<Vec<f64>>,
-    /// What nodes of shells have beside that; empty of solids.
+    /// What nodes of shells and beams have beside that; empty of solids.
     pub shells: ShellState,
     /// What elements of this kind have beside [`Piece::fields`], one array per number: of shells six hourglass forces, thickness,
     /// internal energy, energy of hourglass control, then for each point through the thickness, from below, stress xx, yy,
     /// xy, yz, zx in the frame of the element, plastic strain, temperature; of solids with elastic hourglass control its
-    /// forces, x, y, z of each mode; of other solids nothing.
+    /// forces, x, y, z of each mode; of beams see [`beam2`](crate::element::beam2); of other solids nothing.
     pub own: Vec<Vec<f64>>,
     /// Hourglass control of solids.
     pub hourglass: Hourglass,
@@ -188,15 +188,20 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             let (bars, nodes) = by_first_use(bars, list);
             (Topology::Trusses { bars, area: *area }, nodes, list.clone())
         }
+        (Topology::Beams { bars, section, across }, Region::List(list)) => {
+            let (bars, nodes) = by_first_use(bars, list);
+            let across = list.iter().map(|&e| across[e as usize]).collect();
+            (Topology::Beams { bars, section: *section, across }, nodes, list.clone())
+        }
         (topology, region) => {
             panic!("region {region:?} does not fit part `{}` ({topology:?})", mesh_part.name)
         }
     };
     let nodes: Vec<u32> = local_nodes.iter().map(|&n| mesh_part.nodes[n as usize]).collect();
     let elements: Vec<u32> = local_elements.iter().map(|&e| e + offset as u32).collect();
-    let shells = match mesh_part.section() {
-        None => ShellState::default(),
-        Some(_) => ShellState {
+    let shells = match mesh_part.turns_nodes() {
+        false => ShellState::default(),
+        true => ShellState {
             spin: nodes.iter().map(|&n| state.shells.spin[n as usize]).collect(),
             inertia: nodes.iter().map(|&n| state.shells.inertia[n as usize]).collect(),
         },

@@ -103,7 +103,7 @@ pub struct GlobalState {
     pub strain: Vec<f64>,
     /// What contact keeps of each node, by number ([`crate::contact::History`]); no array where it keeps nothing.
     pub contact: Vec<Vec<f64>>,
-    /// What nodes of shells have beside that; empty arrays in a run without shells.
+    /// What nodes of shells and beams have beside that; empty arrays in a run without either.
     pub shells: ShellState,
     /// What elements have beside [`GlobalState::elements`], see [`crate::piece::Piece::own`]: as many arrays as the kind that has most.
     pub own: Vec<Vec<f64>>,
@@ -122,12 +122,12 @@ pub struct PartHistory {
     pub columns: Vec<Vec<f64>>,
 }
 
-/// What nodes of shells have beside the state of other nodes.
+/// What nodes of shells and beams have beside the state of other nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShellState {
-    /// Rotation rate `w_{n-1/2}` by node (1/time); zero at nodes without shells.
+    /// Rotation rate `w_{n-1/2}` by node (1/time); zero at nodes without them.
     pub spin: Vec<[f64; 3]>,
-    /// Rotational inertia about any axis by node (mass times length squared); zero at nodes without shells.
+    /// Rotational inertia about any axis by node (mass times length squared); zero at nodes without them.
     pub inertia: Vec<f64>,
 }
 

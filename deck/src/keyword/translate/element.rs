@@ -127,7 +127,7 @@ fn check_section(t: &mut Translation<'_>, id: u32, body: &Body) {
             let goes_with = match section {
                 Section::Solid { .. } => "solids",
                 Section::Shell(_) => "shells",
-                Section::Truss(_) => "trusses",
+                Section::Truss(_) | Section::Beam(_) => "trusses",
             };
             if !body.solids.is_empty() && !body.tetrahedra.is_empty() {
                 let read = format!("part {id} with solids of eight and of ten nodes");
@@ -232,14 +232,14 @@ fn read_shells(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BT
     parts
 }
 
-/// Trusses by part, and the parts that have any.
+/// Trusses and beams by part, and the parts that have any.
 fn read_beams(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTreeSet<u32> {
     let (problem, log) = (t.problem, t.log);
     let mut parts = BTreeSet::new();
     let mut seen: HashMap<u32, Place> = HashMap::with_capacity(problem.beams.len());
     let mut missing = BTreeSet::new();
     for beam in &problem.beams {
-        let Beam { id, part, nodes, at } = *beam;
+        let Beam { id, part, nodes, at, .. } = *beam;
         parts.insert(part);
         if let Some(first) = seen.insert(id, at) {
             let expected = format!("a number other than {id}, which {} has", log.line(first, at));
@@ -264,7 +264,24 @@ fn read_beams(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTr
             continue;
         }
         t.used.extend(nodes);
+        let section = problem.sections.get(&problem.parts[&part].section.value);
+        let is_beam = matches!(section, Some((_, Section::Beam(_))));
+        let third = if is_beam && beam.third != 0 { problem.position(beam.third) } else { None };
+        if is_beam {
+            t.turns.extend(nodes);
+            if beam.third != 0 && third.is_none() {
+                let read = format!("beam {id} with node {} for its direction", beam.third);
+                log.fault(at, read, "a node of the deck", "add the node");
+            }
+            if let Some(origin) = beam.released {
+                log.fault_of(origin, "ends that are not released", "leave RT and RR blank");
+            }
+        }
         let found = bodies.entry(part).or_insert_with(|| Found::of(part));
+        if is_beam {
+            let towards = beam.across.or(third.map(|third| sub(third, a)));
+            found.body.across.push(towards.unwrap_or_default());
+        }
         found.body.trusses.push((id, nodes));
         found.places.push(at);
     }

@@ -53,7 +53,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
     let names: Vec<(u32, String)> = t.names.iter().map(|(id, name)| (*id, name.clone())).collect();
     for (body, (id, name)) in names.into_iter().enumerate() {
         let nodes: BTreeSet<u32> = t.mesh.bodies[body].corners().collect();
-        if !t.mesh.bodies[body].shells.is_empty() {
+        if !t.mesh.bodies[body].shells.is_empty() || !t.mesh.bodies[body].across.is_empty() {
             turning.extend(nodes.iter().filter(|node| spin.contains_key(node)));
         }
         let part = &problem.parts[&id];
@@ -76,6 +76,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
             (None, Some((_, Section::Truss(area)))) => {
                 Kind::Trusses { area: t.number(at, "an area of", *area) }
             }
+            (None, Some((_, Section::Beam(section)))) => Kind::Beams { section: *section, across: [0.0; 3] },
             _ => Kind::Solids,
         };
         let source = Source::Body {

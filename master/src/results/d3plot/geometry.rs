@@ -96,6 +96,7 @@ fn control(n_nodes: usize, elements: &Elements, content: &Content) -> Words {
         (27, content.of_solid() as i32),
         (28, size(&elements.trusses)),
         (29, parts_of(&elements.trusses)),
+        (30, content.of_beam() as i32),
         (31, size(&elements.shells)),
         (32, parts_of(&elements.shells)),
         (33, if has_shells { content.of_shell() as i32 } else { 0 }),

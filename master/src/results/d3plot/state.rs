@@ -32,7 +32,7 @@ pub(super) fn words(
     let strain = wanted(content.plastic_strain, "plastic_strain")?;
     let history = content.history.iter().map(|name| of(name)).collect::<Result<Vec<_>, _>>()?;
     let thickness = wanted(content.thickness, "thickness")?;
-    let mut element = |cell: usize, is_shell: bool| {
+    let element = |words: &mut Words, cell: usize, is_shell: bool| {
         let Some(here) = found[cell] else {
             let n = if is_shell { content.of_shell() } else { content.of_solid() };
             return (0..n).for_each(|_| words.real(0.0));
@@ -48,8 +48,17 @@ pub(super) fn words(
         history.iter().for_each(|values| words.real(values[here]));
         thickness.iter().filter(|_| is_shell).for_each(|values| words.real(values[here]));
     };
-    elements.solids.cells.iter().for_each(|&cell| element(cell, false));
-    elements.shells.cells.iter().for_each(|&cell| element(cell, true));
+    elements.solids.cells.iter().for_each(|&cell| element(&mut words, cell, false));
+    if content.beams {
+        let [forces, moments] = [of("beam_force")?, of("beam_moment")?];
+        for &cell in &elements.trusses.cells {
+            let here =
+                |values: &[f64]| found[cell].map_or([0.0; 3], |at| [0, 1, 2].map(|i| values[3 * at + i]));
+            let ([axial, y, z], [torque, my, mz]) = (here(&forces), here(&moments));
+            [axial, y, z, my, mz, torque].into_iter().for_each(|word| words.real(word));
+        }
+    }
+    elements.shells.cells.iter().for_each(|&cell| element(&mut words, cell, true));
     let mut alive = |kind: &OfKind| {
         kind.cells.iter().for_each(|&cell| words.real(if found[cell].is_some() { 1.0 } else { 0.0 }));
     };

@@ -1,6 +1,7 @@
 //! The kinds of elements that there are ([`group`](super::group)). A new one is an arm here.
 
 use super::{
+    beam2::group::Beams,
     group::Group,
     hex8::{eight_points::EightPoints, group::Solids},
     shell4::Core,
@@ -32,6 +33,13 @@ pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, 
             let material = materials.get(piece.material as usize).expect("trusses need their material");
             let bars = bars.clone();
             (Box::new(Trusses::of(piece, bars, material)), None)
+        }
+        Topology::Beams { bars, section, .. } => {
+            let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);
+            let material = materials.get(piece.material as usize).expect("beams need their material");
+            let (bars, section) = (bars.clone(), *section);
+            let beams = Beams::of(piece, bars, &section, material);
+            (Box::new(beams), Some(Turning::new(&spin, inertia)))
         }
     }
 }

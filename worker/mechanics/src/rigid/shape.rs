@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use super::{Body, Pull, State, cross, dot, full};
 use crate::{
     constraint::{Circle, Constraint},
-    element::{hex8, tet10},
+    element::{beam2, hex8, tet10},
     exact::Quantum,
     initial::largest_face,
     load::{Drive, Loads},
@@ -228,6 +228,7 @@ fn least_height(part: &Part, x: &[[f64; 3]; 8]) -> f64 {
         | Topology::EightPoint { .. }
         | Topology::Tetrahedra { .. } => return hex8::volume(x) / largest_face(x),
         Topology::Trusses { area, .. } => return part.volume(x) / area,
+        Topology::Beams { section, .. } => return part.volume(x) / section.area,
         Topology::Shells { .. } => {}
     }
     let corners = [x[0], x[1], x[2], x[3]];
@@ -308,6 +309,22 @@ impl Moments {
             }
             Topology::Shells { section, .. } => {
                 self.add_shell(&[x[0], x[1], x[2], x[3]], mass, section.thickness);
+            }
+            // Gauss's two points give the second moments of a line, four about each those of the section.
+            Topology::Beams { section, across, .. } => {
+                let e2 = beam2::axis(x[0], x[1], across[e]);
+                let along = minus(x[1], x[0]);
+                let length = dot(along, along).sqrt();
+                let e3 = cross(along, e2).map(|c| c / length);
+                let [about_e2, about_e3] =
+                    section.inertia.map(|inertia| (2.0 * inertia / section.area).sqrt());
+                for (axis, radius) in [(e2, about_e3), (e3, about_e2)] {
+                    for (side, end) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+                        let r = 0.5 * (1.0 + end / 3.0_f64.sqrt());
+                        let at = |a: usize| x[0][a] + r * along[a] + side * radius * axis[a];
+                        self.add(0.125 * mass, std::array::from_fn(at));
+                    }
+                }
             }
             // Gauss's two points give the second moments of a line.
             Topology::Trusses { .. } => [-1.0, 1.0].iter().for_each(|side| {

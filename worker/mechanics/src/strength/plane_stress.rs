@@ -66,6 +66,11 @@ impl PlaneLaw {
         Ok(PlaneLaw { young, poisson: young / (2.0 * shear) - 1.0, strength })
     }
 
+    /// Whether it yields at all.
+    pub fn yields(&self) -> bool {
+        self.strength.plastic()
+    }
+
     /// Shear modulus.
     pub fn shear(&self) -> f64 {
         0.5 * self.young / (1.0 + self.poisson)

@@ -65,7 +65,9 @@ impl Solids {
                 let hexahedra: Vec<_> = tetrahedra.iter().map(tet10::collapsed).collect();
                 explicit(&hexahedra, in_runs(&hexahedra), n_nodes)
             }
-            Topology::Shells { .. } | Topology::Trusses { .. } => panic!("no hexahedra"),
+            Topology::Shells { .. } | Topology::Trusses { .. } | Topology::Beams { .. } => {
+                panic!("no hexahedra")
+            }
         };
         assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
         let n_slots = match &layout {
