@@ -228,6 +228,18 @@ pub fn all_laws() -> Vec<Material> {
     add(Eos::Porous(porous), von_mises(None), Failure::None);
     add(Eos::Porous(porous), Strength::Hydro, Failure::None);
     add(Eos::Porous(porous), johnson_cook(), Failure::None);
+    let vapour = mechanics::material::Tillotson {
+        a: 0.5,
+        b: 1.5,
+        bulk: 128e9,
+        quadratic: 105e9,
+        energy0: 9.5e6,
+        incipient_energy: 1e3,
+        complete_energy: 5e3,
+        alpha: 5.0,
+        beta: 5.0,
+    };
+    add(Eos::Tillotson(vapour), johnson_cook(), Failure::Hydrostatic { tension: 1e9, heals: false });
     let rubber = mechanics::strength::MooneyRivlin { a: 25e9, b: 15e9 };
     add(linear, Strength::MooneyRivlin(rubber), Failure::None);
     let stretches = mechanics::strength::Ogden {
