@@ -165,7 +165,7 @@ impl Units {
                     t1: stress(t1),
                     t2: stress(t2),
                 },
-                Eos::Porous(_) | Eos::Tabulated(_) => {
+                Eos::Porous(_) | Eos::Tabulated(_) | Eos::Tillotson(_) => {
                     material.eos.converted(&|unit, x| scale(x, self.power(unit)))
                 }
                 Eos::IdealGas { gamma, energy } => {

@@ -4,8 +4,8 @@ use deck::{Model, bundle};
 use mechanics::{
     material::{Eos, Failure, Material, Strength},
     strength::{
-        CrushableFoam, HolmquistJohnsonCook, LowDensityFoam, ModifiedJohnsonCook, MooneyRivlin, Ogden,
-        SoilFoam, SteinbergGuinan, Viscoelastic, ZerilliArmstrong,
+        CrushableFoam, HolmquistJohnsonCook, Honeycomb, LowDensityFoam, ModifiedJohnsonCook, MooneyRivlin,
+        Ogden, Orthotropic, SoilFoam, SteinbergGuinan, Viscoelastic, ZerilliArmstrong,
     },
 };
 
@@ -233,6 +233,117 @@ fn concrete_has_its_constants_and_leaves_by_fs() {
     assert_eq!((limits("").plastic_strain, limits("").tension), (None, Some(4.0)));
     assert!(fault(&card("0.1", "-1")).contains("no failure by the damaged strength"));
     assert!(fault(&card("0.0005", "1")).contains("a lock point beyond the crush point"));
+}
+
+/// The constants of the cards below, elastic.
+const LAMINATE: Orthotropic = Orthotropic {
+    young_a: 140_000.0,
+    young_b: 10_000.0,
+    young_c: 9000.0,
+    poisson_ba: 0.02,
+    poisson_ca: 0.015,
+    poisson_cb: 0.4,
+    modulus_ab: 5000.0,
+    modulus_bc: 3000.0,
+    modulus_ca: 4000.0,
+    ax: 1.0,
+    ay: 1.0,
+    az: 0.0,
+    dx: 0.0,
+    dy: 1.0,
+    dz: 0.0,
+    tension_a: 1e30,
+    compression_a: 1e30,
+    tension_b: 1e30,
+    compression_b: 1e30,
+    shear_ab: 1e30,
+    tension_c: 1e30,
+    shear_bc: 1e30,
+    shear_ca: 1e30,
+    failed_bulk: 0.0,
+};
+
+#[test]
+fn an_orthotropic_material_has_its_moduli_and_axes() {
+    let card = |aopt: &str, rest: &str| {
+        format!(
+            "*MAT_ORTHOTROPIC_ELASTIC\n1,1.6e-9,140000,10000,9000,0.02,0.015,0.4\n\
+             5000,3000,4000,{aopt}{rest}\n,,,1,1,0\n,,,0,1,0\n"
+        )
+    };
+    let found = material(&card("2", ""));
+    assert_eq!(found.strength, Strength::Orthotropic(LAMINATE));
+    assert_eq!(Some(found.eos), found.strength.bulk().map(|bulk| Eos::Linear { bulk }));
+    assert_eq!(material(&card("2", "").replace("ORTHOTROPIC_ELASTIC", "002")), found);
+    assert!(fault(&card("0", "")).contains("AOPT 2"));
+    assert!(fault(&card("2", ",0.1,0.1")).contains("no frequency damping"));
+    assert!(fault(&card("2", "").replace("0.02", "0.9")).contains("no strain gives energy away"));
+    assert!(fault(&card("2", "").replace(",,,0,1,0", ",,,2,2,0")).contains("not parallel"));
+}
+
+#[test]
+fn a_composite_has_its_strengths() {
+    let card = |rest: &str| {
+        format!(
+            "*MAT_COMPOSITE_DAMAGE\n1,1.6e-9,140000,10000,9000,0.02,0.015,0.4\n5000,3000,4000,8000,2\n\
+             ,,,1,1,0\n,,,0,1,0\n80,2000,50,200,{rest}\n"
+        )
+    };
+    let law = Orthotropic {
+        tension_a: 2000.0,
+        tension_b: 50.0,
+        compression_b: 200.0,
+        shear_ab: 80.0,
+        tension_c: 40.0,
+        shear_bc: 60.0,
+        failed_bulk: 8000.0,
+        ..LAMINATE
+    };
+    let found = material(&card(",40,60"));
+    assert_eq!(found.strength, Strength::Orthotropic(law));
+    assert_eq!(material(&card(",40,60").replace("COMPOSITE_DAMAGE", "022")), found);
+    assert!(fault(&card("0.1")).contains("ALPH"));
+}
+
+#[test]
+fn a_honeycomb_has_one_curve_for_all_stresses() {
+    let card = |curves: &str, more: &str| {
+        format!(
+            "*DEFINE_CURVE\n9\n0.0,1.0\n0.7,1.2\n0.8,9.0\n*MAT_HONEYCOMB\n1,5e-11,70000,0.33,240,0.15\n{curves}\n\
+             1000,300,200,400,100,200,2\n,,,1,0,0\n0,1,0{more}\n"
+        )
+    };
+    let found = material(&card("9", ""));
+    let Strength::Honeycomb(law, curve) = found.strength else { panic!("{found:?}") };
+    let wanted = Honeycomb {
+        young: 70_000.0,
+        poisson: 0.33,
+        yield_stress: 240.0,
+        solid_volume: 0.15,
+        young_a: 1000.0,
+        young_b: 300.0,
+        young_c: 200.0,
+        modulus_ab: 400.0,
+        modulus_bc: 100.0,
+        modulus_ca: 200.0,
+        factor_b: 1.0,
+        factor_c: 1.0,
+        factor_ab: 1.0,
+        factor_bc: 1.0,
+        factor_ca: 1.0,
+        ax: 1.0,
+        ay: 0.0,
+        az: 0.0,
+        dx: 0.0,
+        dy: 1.0,
+        dz: 0.0,
+    };
+    assert_eq!(law, wanted);
+    assert_eq!((curve.strain[1], curve.stress[2]), (0.7, 9.0));
+    assert_eq!(material(&card("9,9,9,9", "").replace("HONEYCOMB", "026")), found);
+    assert!(fault(&card("9,8", "")).contains("the curve of LCA for all stresses"));
+    assert!(fault(&card("9", ",0.5")).contains("no TSEF"));
+    assert!(fault(&card("9", "").replace("0.15", "1.5")).contains("solid_volume"));
 }
 
 #[test]

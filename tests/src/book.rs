@@ -73,6 +73,7 @@ macro_rules! each_case_of_the_book {
             wave: bars_of_forty_cells_ring_at_their_frequencies quick;
             wave: short_waves_are_slow_by_what_central_differences_say quick;
             wave: symmetric_impacts_reach_the_hugoniot quick;
+            wave: symmetric_impacts_at_six_kilometres_a_second_reach_tillotsons_hugoniot quick;
             wave: impacts_of_two_materials_match_their_impedances quick;
             wave: an_elastic_precursor_of_the_elastic_limit_runs_ahead_at_the_longitudinal_speed quick;
             gas: sods_tube_has_its_plateaus_and_its_shock_in_place quick;

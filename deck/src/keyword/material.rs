@@ -1,6 +1,7 @@
 //! `*MAT_` and `*EOS_`: constants of a deck.
 
 mod brittle;
+mod composite;
 mod foam;
 mod metal;
 mod rubber;
@@ -109,8 +110,9 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 19] = [
+const NUMBERS: [(&str, &str); 22] = [
     ("MAT_001", "MAT_ELASTIC"),
+    ("MAT_002", "MAT_ORTHOTROPIC_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
     ("MAT_005", "MAT_SOIL_AND_FOAM"),
     ("MAT_006", "MAT_VISCOELASTIC"),
@@ -118,7 +120,9 @@ const NUMBERS: [(&str, &str); 19] = [
     ("MAT_011", "MAT_STEINBERG"),
     ("MAT_015", "MAT_JOHNSON_COOK"),
     ("MAT_020", "MAT_RIGID"),
+    ("MAT_022", "MAT_COMPOSITE_DAMAGE"),
     ("MAT_024", "MAT_PIECEWISE_LINEAR_PLASTICITY"),
+    ("MAT_026", "MAT_HONEYCOMB"),
     ("MAT_027", "MAT_MOONEY-RIVLIN_RUBBER"),
     ("MAT_057", "MAT_LOW_DENSITY_FOAM"),
     ("MAT_063", "MAT_CRUSHABLE_FOAM"),
@@ -268,6 +272,14 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
         "MAT_JOHNSON_HOLMQUIST_CONCRETE" => {
             needs_moduli = false;
             (None, brittle::concrete(&f, &mut limits, log))
+        }
+        "MAT_ORTHOTROPIC_ELASTIC" | "MAT_COMPOSITE_DAMAGE" => {
+            needs_moduli = false;
+            (None, composite::orthotropic(&f, word == "MAT_COMPOSITE_DAMAGE"))
+        }
+        "MAT_HONEYCOMB" => {
+            needs_moduli = false;
+            (None, composite::honeycomb(&f, log))
         }
         "MAT_VISCOELASTIC" => {
             needs_moduli = false;

@@ -135,6 +135,7 @@ const SPEED: Measure = Measure::of(VELOCITY);
 const KELVIN: Measure = Measure { unit: Unit::NONE, kelvin: 1 };
 const PER_KELVIN: Measure = Measure { unit: Unit::NONE, kelvin: -1 };
 const HEAT: Measure = Measure { unit: SPECIFIC, kelvin: -1 };
+const ENERGY: Measure = Measure::of(SPECIFIC);
 
 /// The law with what it says of itself.
 fn law(role: Role, written: Written, units: &Units) -> Law {
@@ -170,7 +171,7 @@ struct About {
 const SHEAR: (&str, Measure, &str) = ("shear", STRESS, "shear modulus");
 
 /// The laws that materials of the library have.
-const LAWS: [About; 18] = [
+const LAWS: [About; 20] = [
     About {
         role: Role::Eos,
         kind: "linear",
@@ -223,6 +224,22 @@ const LAWS: [About; 18] = [
             ("energy", STRESS, "energy per volume that detonation releases"),
             ("detonation", SPEED, "speed of the detonation"),
             ("cj_pressure", STRESS, "pressure of the detonation (Chapman-Jouguet)"),
+        ],
+    },
+    About {
+        role: Role::Eos,
+        kind: "tillotson",
+        formula: "p = (a + b/w) E/v + A mu + B mu^2, w = 1 + E v^2/E0; stretched and above complete_energy a E/v + (b E/(v w) + A mu exp(-beta (v - 1))) exp(-alpha (v - 1)^2), between both energies a line",
+        constants: &[
+            ("a", NONE, "share of the energy that is pressure in a vapour"),
+            ("b", NONE, "what is besides where it is cold"),
+            ("bulk", STRESS, "A: bulk modulus"),
+            ("quadratic", STRESS, "B: factor of mu^2"),
+            ("energy0", ENERGY, "E0 over the density, from which on b matters less"),
+            ("incipient_energy", ENERGY, "energy of incipient vaporisation"),
+            ("complete_energy", ENERGY, "energy of complete vaporisation"),
+            ("alpha", NONE, "how fast what is cold thins out by volume"),
+            ("beta", NONE, "how fast the cold pressure does besides"),
         ],
     },
     About { role: Role::Strength, kind: "hydro", formula: "no strength", constants: &[] },
@@ -314,6 +331,37 @@ const LAWS: [About; 18] = [
             ("t_room", KELVIN, "temperature at the start"),
             ("specific_heat", HEAT, "energy that warms a unit of mass by 1 K"),
             ("tension", STRESS, "mean tension that it bears"),
+        ],
+    },
+    About {
+        role: Role::Strength,
+        kind: "orthotropic",
+        formula: "elastic along axes that turn with the element, until fibres (a), matrix (b) or layers (c) come to their strengths",
+        constants: &[
+            ("young_a", STRESS, "Young's modulus along the fibres"),
+            ("young_b", STRESS, "Young's modulus along b"),
+            ("young_c", STRESS, "Young's modulus along c, across the layers"),
+            ("poisson_ba", NONE, "minus the strain along a of a stress along b, over that along b"),
+            ("poisson_ca", NONE, "the same along a of a stress along c"),
+            ("poisson_cb", NONE, "the same along b of a stress along c"),
+            ("modulus_ab", STRESS, "shear modulus of the plane ab"),
+            ("modulus_bc", STRESS, "shear modulus of the plane bc"),
+            ("modulus_ca", STRESS, "shear modulus of the plane ca"),
+            ("ax", NONE, "axis a at the start, x"),
+            ("ay", NONE, "axis a at the start, y"),
+            ("az", NONE, "axis a at the start, z"),
+            ("dx", NONE, "vector in the plane ab, x"),
+            ("dy", NONE, "vector in the plane ab, y"),
+            ("dz", NONE, "vector in the plane ab, z"),
+            ("tension_a", STRESS, "strength of fibres in tension"),
+            ("compression_a", STRESS, "strength of fibres in compression"),
+            ("tension_b", STRESS, "strength of the matrix in tension"),
+            ("compression_b", STRESS, "strength of the matrix in compression"),
+            ("shear_ab", STRESS, "strength of the matrix in shear"),
+            ("tension_c", STRESS, "strength between layers in tension"),
+            ("shear_bc", STRESS, "strength between layers in shear across the fibres"),
+            ("shear_ca", STRESS, "strength between layers in shear along the fibres"),
+            ("failed_bulk", STRESS, "bulk modulus of what has failed"),
         ],
     },
     About {

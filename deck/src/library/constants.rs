@@ -39,7 +39,7 @@ pub(crate) fn of_eos(eos: Eos) -> Written {
             factors: law.factor.points().collect(),
             ..Written::new(Tabulated::NAME, &[("gamma", law.gamma)])
         },
-        Eos::Porous(_) => {
+        Eos::Porous(_) | Eos::Tillotson(_) => {
             let (kind, constants) = eos.declared().expect("a law that declares its constants");
             Written::new(kind, &constants)
         }

@@ -262,11 +262,12 @@ const WHOLE: u64 = 1_000_000;
 
 /// Every deck of `deck/examples`, the cycle at which its run ends, and what has happened by then. An explosive burns from the
 /// first cycle on.
-const EXAMPLES: [(&str, u64, Event); 19] = [
+const EXAMPLES: [(&str, u64, Event); 21] = [
     ("ball-on-shell.k", WHOLE, Event::Contact),
     ("ball-tears-sheet.toml", 400, Event::Erosion),
     ("bar-on-wall.k", WHOLE, Event::None),
     ("block-on-plate.k", WHOLE, Event::Contact),
+    ("composite-panel.toml", 600, Event::Erosion),
     ("explosive-on-plate.toml", WHOLE, Event::Contact),
     ("fragment-on-water-box.toml", 300, Event::Contact),
     ("girder-crush.toml", 4000, Event::Contact),
@@ -278,6 +279,7 @@ const EXAMPLES: [(&str, u64, Event); 19] = [
     ("punch-through-plate.k", WHOLE, Event::Erosion),
     ("rod-through-plate.toml", 1000, Event::Erosion),
     ("self-contact.toml", WHOLE, Event::Contact),
+    ("sphere-6-km-s.toml", 400, Event::Erosion),
     ("table-on-tubes.toml", 2000, Event::Contact),
     ("taylor-copper.toml", 3000, Event::None),
     ("tube-crush.toml", WHOLE, Event::Contact),

@@ -285,14 +285,19 @@ struct Collision {
 }
 
 fn collide(flyer: [f64; 4], target: [f64; 4], velocity: f64) -> Collision {
-    let (first, second) = (shocked(flyer, HYDRO), shocked(target, HYDRO));
+    // About how fast the shocks are, to know when to stop; nothing is compared with it.
+    let side = |m: [f64; 4]| (shocked(m, HYDRO), m[0], m[1] + m[2] * 0.5 * velocity);
+    collide_of(side(flyer), side(target), velocity)
+}
+
+/// Material, density and about the shock speed of each side.
+fn collide_of(flyer: (String, f64, f64), target: (String, f64, f64), velocity: f64) -> Collision {
+    let ((first, flyer_density, flyer_speed), (second, target_density, target_speed)) = (flyer, target);
     let parts = [
         Bar { name: "flyer", from: -0.1, length: 0.1, cells: 100, velocity, material: &first },
         Bar { name: "target", from: 0.0, length: 0.1, cells: 100, velocity: 0.0, material: &second },
     ];
-    // About how fast the shocks are, to know when to stop; nothing is compared with it.
-    let speed = |m: [f64; 4]| m[1] + m[2] * 0.5 * velocity;
-    let end = 0.08 / speed(flyer).max(speed(target));
+    let end = 0.08 / flyer_speed.max(target_speed);
     let more = "[[join]]\nparts = \"all\"\n[[boundary]]\ntype = \"fixed\"\naxes = \"yz\"\n\
                 [[gauge]]\nname = \"near\"\npart = \"target\"\npoint = [0.02, 0, 0]\n\
                 [[gauge]]\nname = \"far\"\npart = \"target\"\npoint = [0.05, 0, 0]\n\
@@ -301,8 +306,8 @@ fn collide(flyer: [f64; 4], target: [f64; 4], velocity: f64) -> Collision {
     let solved = run(model(&bars(end, "", &parts, more)));
     Collision {
         solved,
-        density: [flyer[0], target[0]],
-        fronts: [-end * speed(flyer) * 0.9, end * speed(target) * 0.9],
+        density: [flyer_density, target_density],
+        fronts: [-end * flyer_speed * 0.9, end * target_speed * 0.9],
     }
 }
 
@@ -375,6 +380,26 @@ pub(super) fn symmetric_impacts_reach_the_hugoniot(figures: &mut Figures) {
             figures.add(&format!("symmetric impact @ {at}, density"), hit.density(1));
             figures.add("shock overshoot", hit.overshoot(1));
         }
+    }
+}
+
+/// Tillotson metals of the library, without their strength.
+pub(super) fn symmetric_impacts_at_six_kilometres_a_second_reach_tillotsons_hugoniot(figures: &mut Figures) {
+    for (name, constants, speed) in [
+        ("aluminium", [2700.0, 1.63, 75.2e9, 65e9, 5e6, 3e6, 13.9e6], 9500.0),
+        ("iron", [7860.0, 1.5, 128e9, 105e9, 9.5e6, 2.44e6, 10.2e6], 8400.0),
+    ] {
+        let [density, b, bulk, quadratic, energy0, incipient, complete] = constants;
+        let material = format!(
+            "{{ density = {density}, eos = {{ type = \"tillotson\", a = 0.5, b = {b}, bulk = {bulk:e}, \
+             quadratic = {quadratic:e}, energy0 = {energy0:e}, incipient_energy = {incipient:e}, \
+             complete_energy = {complete:e}, alpha = 5, beta = 5 }}, strength = {HYDRO} }}"
+        );
+        let hit = collide_of((material.clone(), density, speed), (material, density, speed), 6000.0);
+        let at = format!("Tillotson {name}, 6000 m/s");
+        figures.add(&format!("symmetric impact @ {at}, pressure"), hit.pressure(1));
+        figures.add(&format!("symmetric impact @ {at}, shock"), hit.shock(1, 6000.0));
+        figures.add(&format!("symmetric impact @ {at}, density"), hit.density(1));
     }
 }
 

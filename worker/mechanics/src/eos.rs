@@ -1,7 +1,7 @@
 //! Equations of state on lanes: pressure as a line in the internal energy.
 //!
 //! Every law here has the form `p = a(v) + b(v) E`, with v the volume and E the internal energy, both per
-//! initial volume. The energy equation of a cycle is then solved in closed form, and one formula gives the
+//! initial volume; one that is no line in the energy gives its tangent. The energy equation of a cycle is then solved in closed form, and one formula gives the
 //! isentropic stiffness of all of them. A law that burns is given the fraction that has burnt; the others leave it
 //! unread. A new law is a file like its neighbours here: constants, [`EquationOfState`], tests of points and slopes.
 
@@ -17,11 +17,14 @@ pub(crate) mod polynomial;
 pub(crate) mod porous;
 pub(crate) mod shock;
 pub(crate) mod tabulated;
+pub(crate) mod tillotson;
 
 pub use porous::Porous;
 pub use tabulated::{MAX_POINTS, Points, Tabulated};
+pub use tillotson::Tillotson;
 pub(crate) use {
     ideal_gas::IdealGas, jwl::Jwl, linear::Linear, polynomial::Polynomial, shock::Shock, tabulated::ByPoints,
+    tillotson::Vapour,
 };
 
 /// A law of pressure.
@@ -37,6 +40,12 @@ pub(crate) trait EquationOfState: Copy {
 
     /// The line and its slope at relative volumes `v > 0`, with the burnt fraction `burnt`.
     fn line<L: Lane>(&self, v: L, burnt: L) -> Line<L>;
+
+    /// The same about an energy per initial volume: of a law that is no line in the energy, its tangent there.
+    #[inline(always)]
+    fn line_about<L: Lane>(&self, v: L, burnt: L, _energy: L) -> Line<L> {
+        self.line(v, burnt)
+    }
 
     /// Least bulk stiffness used for the sound speed (stress), where tension has softened the law.
     fn least_stiffness<L: Lane>(&self, burnt: L) -> L;
@@ -58,6 +67,7 @@ pub(crate) enum AnyEos {
     IdealGas(IdealGas),
     Jwl(Jwl),
     Tabulated(ByPoints),
+    Tillotson(Vapour),
 }
 
 impl AnyEos {
@@ -70,6 +80,7 @@ impl AnyEos {
                 Self::Polynomial(Polynomial { a: [a1, a2, a3], b: [b0, b1], t: [t1, t2] })
             }
             Eos::Tabulated(law) => Self::Tabulated(ByPoints::new(&law)),
+            Eos::Tillotson(law) => Self::Tillotson(Vapour::new(&law, material.density)),
             // The solid: its elements have a kernel that brings its line to their distension, see `strength/porous.rs`.
             Eos::Porous(law) => Self::Shock(law.solid()),
             Eos::IdealGas { gamma, .. } => Self::IdealGas(IdealGas { gamma }),
@@ -105,6 +116,15 @@ impl EquationOfState for AnyEos {
             Self::IdealGas(law) => law.line(v, burnt),
             Self::Jwl(law) => law.line(v, burnt),
             Self::Tabulated(law) => law.line(v, burnt),
+            Self::Tillotson(law) => law.line(v, burnt),
+        }
+    }
+
+    #[inline(always)]
+    fn line_about<L: Lane>(&self, v: L, burnt: L, energy: L) -> Line<L> {
+        match self {
+            Self::Tillotson(law) => law.line_about(v, burnt, energy),
+            _ => self.line(v, burnt),
         }
     }
 
@@ -117,6 +137,7 @@ impl EquationOfState for AnyEos {
             Self::IdealGas(law) => law.least_stiffness(burnt),
             Self::Jwl(law) => law.least_stiffness(burnt),
             Self::Tabulated(law) => law.least_stiffness(burnt),
+            Self::Tillotson(law) => law.least_stiffness(burnt),
         }
     }
 

@@ -8,7 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
-pub use crate::eos::{MAX_POINTS, Points, Porous, Tabulated};
+pub use crate::eos::{MAX_POINTS, Points, Porous, Tabulated, Tillotson};
 pub use crate::strength::{CowperSymonds, Hardening, Heat, MAX_HARDENING, Strength};
 use crate::{
     law::{Declaration, Unit, Variable},
@@ -70,6 +70,8 @@ pub enum Eos {
     Tabulated(Tabulated),
     /// A porous solid that is compacted.
     Porous(Porous),
+    /// A solid and the vapour that it expands to.
+    Tillotson(Tillotson),
     /// `p = (gamma - 1) rho e`.
     IdealGas {
         /// Ratio of specific heats.
@@ -137,16 +139,24 @@ pub enum Failure {
 
 impl Eos {
     /// The laws that declare their constants.
-    pub const DECLARED: &'static [Declaration<Eos>] = &[Declaration {
-        name: Porous::NAME,
-        constants: Porous::CONSTANTS,
-        of: |values| Eos::Porous(Porous::of(values)),
-    }];
+    pub const DECLARED: &'static [Declaration<Eos>] = &[
+        Declaration {
+            name: Porous::NAME,
+            constants: Porous::CONSTANTS,
+            of: |values| Eos::Porous(Porous::of(values)),
+        },
+        Declaration {
+            name: Tillotson::NAME,
+            constants: Tillotson::CONSTANTS,
+            of: |values| Eos::Tillotson(Tillotson::of(values)),
+        },
+    ];
 
     /// The name and the constants by key of a law that declares them.
     pub fn declared(&self) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
         match self {
             Eos::Porous(law) => Some((Porous::NAME, law.constants())),
+            Eos::Tillotson(law) => Some((Tillotson::NAME, law.constants())),
             _ => None,
         }
     }
@@ -155,6 +165,7 @@ impl Eos {
     pub fn converted(self, convert: &dyn Fn(Unit, f64) -> f64) -> Self {
         match self {
             Eos::Porous(law) => Eos::Porous(law.converted(convert)),
+            Eos::Tillotson(law) => Eos::Tillotson(law.converted(convert)),
             Eos::Tabulated(mut law) => {
                 law.pressure.value = law.pressure.value.map(|stress| convert(Unit::STRESS, stress));
                 Eos::Tabulated(law)
@@ -167,6 +178,7 @@ impl Eos {
     pub fn fault(&self, density: f64) -> Option<&'static str> {
         match self {
             Eos::Porous(law) => law.fault(density),
+            Eos::Tillotson(law) => law.fault(),
             Eos::Tabulated(law) => law.fault(),
             _ => None,
         }
@@ -214,6 +226,7 @@ impl Material {
             Eos::Shock { c0, .. } => self.density * c0 * c0,
             Eos::Polynomial { a1, .. } => a1,
             Eos::Tabulated(law) => law.bulk(),
+            Eos::Tillotson(law) => law.bulk,
             Eos::Porous(law) => self.density * law.porous_speed * law.porous_speed,
             Eos::IdealGas { gamma, .. } => gamma * self.initial_pressure(),
             Eos::Jwl { detonation, .. } => self.density * detonation * detonation,
@@ -226,7 +239,7 @@ impl Material {
             Eos::IdealGas { energy, .. } => self.density * energy,
             Eos::Jwl { energy, .. } => energy,
             Eos::Linear { .. } | Eos::Shock { .. } | Eos::Polynomial { .. } => 0.0,
-            Eos::Tabulated(_) | Eos::Porous(_) => 0.0,
+            Eos::Tabulated(_) | Eos::Porous(_) | Eos::Tillotson(_) => 0.0,
         }
     }
 

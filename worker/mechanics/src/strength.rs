@@ -21,12 +21,15 @@ pub(crate) mod curve;
 pub(crate) mod elastic;
 pub(crate) mod finite_strain;
 pub(crate) mod holmquist_johnson_cook;
+pub(crate) mod honeycomb;
 pub(crate) mod johnson_cook;
 pub(crate) mod johnson_holmquist;
 pub(crate) mod low_density_foam;
+pub(crate) mod material_axes;
 pub(crate) mod modified_johnson_cook;
 pub(crate) mod mooney_rivlin;
 pub(crate) mod ogden;
+pub(crate) mod orthotropic;
 pub(crate) mod plane_stress;
 pub(crate) mod porous;
 pub(crate) mod principal;
@@ -45,12 +48,14 @@ pub use cowper_symonds::CowperSymonds;
 pub use crushable_foam::CrushableFoam;
 pub use curve::{Hardening, MAX_HARDENING};
 pub use holmquist_johnson_cook::HolmquistJohnsonCook;
+pub use honeycomb::Honeycomb;
 pub use johnson_cook::Heat;
 pub use johnson_holmquist::JohnsonHolmquist;
 pub use low_density_foam::LowDensityFoam;
 pub use modified_johnson_cook::ModifiedJohnsonCook;
 pub use mooney_rivlin::MooneyRivlin;
 pub use ogden::Ogden;
+pub use orthotropic::Orthotropic;
 pub use segmented_ceramic::SegmentedCeramic;
 pub use soil_foam::SoilFoam;
 pub use steinberg_guinan::SteinbergGuinan;
@@ -384,6 +389,8 @@ pub enum Strength {
     SegmentedCeramic(SegmentedCeramic),
     /// Concrete, with damage and a curve of crushing.
     HolmquistJohnsonCook(HolmquistJohnsonCook),
+    /// Composites: orthotropic, with failure of fibres, matrix and layers.
+    Orthotropic(Orthotropic),
     /// Rubber by the invariants of its stretch.
     MooneyRivlin(MooneyRivlin),
     /// Rubber by its principal stretches.
@@ -396,6 +403,8 @@ pub enum Strength {
     LowDensityFoam(LowDensityFoam, Hardening),
     /// Soil and concrete-like foam, with its pressure by logarithmic compression.
     SoilFoam(SoilFoam, Hardening),
+    /// Honeycomb, with its crush stress along its first axis by loss of volume.
+    Honeycomb(Honeycomb, Hardening),
 }
 
 /// The laws that declare their constants, by their names in [`Strength`]: the one list that declarations go by.
@@ -458,8 +467,8 @@ macro_rules! declared_laws {
 }
 
 declared_laws!(
-    Voce, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, MooneyRivlin, Ogden, Viscoelastic;
-    CrushableFoam, LowDensityFoam, SoilFoam,
+    Voce, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, Orthotropic, MooneyRivlin, Ogden, Viscoelastic;
+    CrushableFoam, LowDensityFoam, SoilFoam, Honeycomb,
 );
 
 impl Strength {
@@ -475,14 +484,16 @@ impl Strength {
             Strength::CrushableFoam(..) => CrushableFoam::HISTORY,
             Strength::LowDensityFoam(..) => LowDensityFoam::HISTORY,
             Strength::SoilFoam(..) => SoilFoam::HISTORY,
+            Strength::Honeycomb(..) => Honeycomb::HISTORY,
+            Strength::Orthotropic(_) => Orthotropic::HISTORY,
             _ => &[],
         }
     }
 
     /// Whether the law damages its elements itself.
     pub fn damages(&self) -> bool {
-        use Strength::{HolmquistJohnsonCook, JohnsonHolmquist, SegmentedCeramic};
-        matches!(self, JohnsonHolmquist(_) | SegmentedCeramic(_) | HolmquistJohnsonCook(_))
+        use Strength::{HolmquistJohnsonCook, JohnsonHolmquist, Orthotropic, SegmentedCeramic};
+        matches!(self, JohnsonHolmquist(_) | SegmentedCeramic(_) | HolmquistJohnsonCook(_) | Orthotropic(_))
     }
 
     /// What the constants would have to be, where each is within its bounds and together they make no law.
@@ -496,6 +507,8 @@ impl Strength {
             Strength::Ogden(law) => law.fault(),
             Strength::Viscoelastic(law) => law.fault(),
             Strength::SoilFoam(law, curve) => law.fault(curve),
+            Strength::Orthotropic(law) => law.fault(),
+            Strength::Honeycomb(law, _) => law.fault(),
             _ => None,
         }
     }
@@ -507,6 +520,8 @@ impl Strength {
             Strength::CrushableFoam(law, _) => Some(law.bulk()),
             Strength::LowDensityFoam(law, _) => Some(law.bulk()),
             Strength::SoilFoam(law, _) => Some(law.unloading),
+            Strength::Orthotropic(law) => Some(law.bulk()),
+            Strength::Honeycomb(law, _) => Some(law.bulk()),
             _ => None,
         }
     }

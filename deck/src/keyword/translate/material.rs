@@ -83,7 +83,7 @@ fn make(t: &Translation<'_>, card: &MaterialCard, part: &PartCard, name: String)
                 );
             }
             // Told with the strength.
-            (Clash::Failure | Clash::Damage | Clash::Porous, _) => {}
+            (Clash::Failure | Clash::Damage | Clash::Porous | Clash::Vapour, _) => {}
         }
     }
     Some(material)

@@ -88,6 +88,8 @@ impl AnyStrength {
             Strength::CrushableFoam(law, _) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::LowDensityFoam(law, _) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::SoilFoam(law, _) => Self::Elastic(Elastic { shear: law.shear }),
+            Strength::Honeycomb(law, _) => Self::Elastic(Elastic { shear: law.shear() }),
+            Strength::Orthotropic(law) => Self::Elastic(Elastic { shear: law.shear() }),
         }
     }
 }

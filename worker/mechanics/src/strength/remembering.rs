@@ -3,9 +3,9 @@
 
 use super::{
     Around, Deviator, History, Memory, MooneyRivlin, Ogden, Strength, StrengthLaw, Viscoelastic,
-    crushable_foam::Crushable, holmquist_johnson_cook::Concrete, johnson_holmquist::Ceramic,
-    low_density_foam::LowDensity, porous::PorousSolid, segmented_ceramic::Segmented, soil_foam::Soil,
-    steinberg_guinan::Metal,
+    crushable_foam::Crushable, holmquist_johnson_cook::Concrete, honeycomb::Cells,
+    johnson_holmquist::Ceramic, low_density_foam::LowDensity, orthotropic::Laminate, porous::PorousSolid,
+    segmented_ceramic::Segmented, soil_foam::Soil, steinberg_guinan::Metal,
 };
 use crate::{
     lanes::Lane,
@@ -13,6 +13,7 @@ use crate::{
 };
 
 /// Any of them, chosen by the material: the choice is one branch for a lane set, the same for the whole block.
+#[expect(clippy::large_enum_variant, reason = "one for a block; its curves stand in place")]
 #[derive(Clone, Copy)]
 pub(crate) enum AnyRemembering {
     JohnsonHolmquist(Ceramic),
@@ -26,6 +27,8 @@ pub(crate) enum AnyRemembering {
     HolmquistJohnsonCook(Concrete),
     SteinbergGuinan(Metal),
     SegmentedCeramic(Segmented),
+    Orthotropic(Laminate),
+    Honeycomb(Cells),
 }
 
 /// The laws by their names: the one list that calls go by.
@@ -43,6 +46,8 @@ macro_rules! of_any {
             AnyRemembering::HolmquistJohnsonCook($law) => $call,
             AnyRemembering::SteinbergGuinan($law) => $call,
             AnyRemembering::SegmentedCeramic($law) => $call,
+            AnyRemembering::Orthotropic($law) => $call,
+            AnyRemembering::Honeycomb($law) => $call,
         }
     };
 }
@@ -74,6 +79,8 @@ impl AnyRemembering {
             Strength::SegmentedCeramic(law) => {
                 Some(Self::SegmentedCeramic(Segmented::new(&law, material.bulk())))
             }
+            Strength::Orthotropic(law) => Some(Self::Orthotropic(Laminate::new(&law))),
+            Strength::Honeycomb(law, curve) => Some(Self::Honeycomb(Cells::new(&law, &curve))),
             _ => None,
         }
     }

@@ -228,6 +228,28 @@ pub fn all_laws() -> Vec<Material> {
     add(Eos::Porous(porous), von_mises(None), Failure::None);
     add(Eos::Porous(porous), Strength::Hydro, Failure::None);
     add(Eos::Porous(porous), johnson_cook(), Failure::None);
+    let vapour = mechanics::material::Tillotson {
+        a: 0.5,
+        b: 1.5,
+        bulk: 128e9,
+        quadratic: 105e9,
+        energy0: 9.5e6,
+        incipient_energy: 1e3,
+        complete_energy: 5e3,
+        alpha: 5.0,
+        beta: 5.0,
+    };
+    add(Eos::Tillotson(vapour), johnson_cook(), Failure::Hydrostatic { tension: 1e9, heals: false });
+    let laminate = laminate();
+    add(
+        Eos::Linear { bulk: Strength::Orthotropic(laminate).bulk().expect("it makes the pressure") },
+        Strength::Orthotropic(laminate),
+        Failure::None,
+    );
+    let cells = honeycomb();
+    let crush = Hardening::through(&[[0.0, 1e8], [0.5, 3e8]]);
+    let solid = cells.young / (3.0 * (1.0 - 2.0 * cells.poisson));
+    add(Eos::Linear { bulk: solid }, Strength::Honeycomb(cells, crush), Failure::None);
     let rubber = mechanics::strength::MooneyRivlin { a: 25e9, b: 15e9 };
     add(linear, Strength::MooneyRivlin(rubber), Failure::None);
     let stretches = mechanics::strength::Ogden {
@@ -512,4 +534,61 @@ pub fn force(block: &Block, node: usize) -> [f64; 3] {
 /// Largest magnitude of a force component over the nodes.
 pub fn largest_force(block: &Block) -> f64 {
     block.f.iter().flatten().fold(0.0, |largest: f64, f| largest.max(f.abs()))
+}
+
+/// A composite with axes askew, whose strengths are soon reached.
+fn laminate() -> mechanics::strength::Orthotropic {
+    mechanics::strength::Orthotropic {
+        young_a: 200e9,
+        young_b: 120e9,
+        young_c: 100e9,
+        poisson_ba: 0.2,
+        poisson_ca: 0.15,
+        poisson_cb: 0.3,
+        modulus_ab: 50e9,
+        modulus_bc: 40e9,
+        modulus_ca: 45e9,
+        ax: 1.0,
+        ay: 0.5,
+        az: -0.2,
+        dx: 0.1,
+        dy: 1.0,
+        dz: 0.3,
+        tension_a: 8e8,
+        compression_a: 6e8,
+        tension_b: 2e8,
+        compression_b: 5e8,
+        shear_ab: 2e8,
+        tension_c: 1.5e8,
+        shear_bc: 2e8,
+        shear_ca: 2e8,
+        failed_bulk: 80e9,
+    }
+}
+
+/// A stiff honeycomb that is crushed here and there.
+fn honeycomb() -> mechanics::strength::Honeycomb {
+    mechanics::strength::Honeycomb {
+        young: 200e9,
+        poisson: 0.3,
+        yield_stress: 4e8,
+        solid_volume: 0.4,
+        young_a: 150e9,
+        young_b: 120e9,
+        young_c: 100e9,
+        modulus_ab: 50e9,
+        modulus_bc: 40e9,
+        modulus_ca: 45e9,
+        factor_b: 0.8,
+        factor_c: 0.7,
+        factor_ab: 0.5,
+        factor_bc: 0.4,
+        factor_ca: 0.3,
+        ax: 1.0,
+        ay: 0.5,
+        az: -0.2,
+        dx: 0.1,
+        dy: 1.0,
+        dz: 0.3,
+    }
 }

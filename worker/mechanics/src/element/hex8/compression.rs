@@ -74,16 +74,16 @@ impl<L: Lane> Compressed<L> {
             let left = view.state::<L>(slot, field::TIME_TO_LIGHT) - dt;
             burn = laws.eos.burn(left, relative_volume, initial_volume);
         }
+        let energy = pressure_before.neg_mul_add(volume_change, energy_before);
         let mut line = if S::REMEMBERS {
-            let line = laws.eos.line(relative_volume * memory.stretch, burn.burnt);
+            let line = laws.eos.line_about(relative_volume * memory.stretch, burn.burnt, energy);
             line.of_porous(memory.distension, memory.stretch)
         } else {
-            laws.eos.line(relative_volume, burn.burnt)
+            laws.eos.line_about(relative_volume, burn.burnt, energy)
         };
         if S::REMEMBERS {
             line.a = line.a + memory.added_pressure;
         }
-        let energy = pressure_before.neg_mul_add(volume_change, energy_before);
         let bulk = line
             .stiffness(relative_volume, line.pressure(energy), energy)
             .max(laws.eos.least_stiffness(burn.burnt));

@@ -123,7 +123,7 @@ impl<L: Lane> Stressed<L> {
                 memory.damage = damage;
                 let [relative_volume, length] = size;
                 let energy = view.state(slot, field::ENERGY);
-                let line = laws.eos.line(relative_volume, one);
+                let line = laws.eos.line_about(relative_volume, one, energy);
                 let around = Around {
                     pressure: line.pressure(energy),
                     pressure_before: view.state(slot, field::PRESSURE),
