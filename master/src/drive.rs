@@ -404,9 +404,7 @@ impl Driver {
     /// Whether the workers at work have memory for the whole job without one of them. The system would end those that have none.
     fn check_memory(&self, without: usize) -> Result<(), Error> {
         match footprint::shortage(self.job.n_elements() as u64, None, &self.bearers(without)) {
-            Some(needs) => {
-                Err(Error::Memory { lost: self.worker_links[without].spec.name.clone(), needs })
-            }
+            Some(needs) => Err(Error::Memory { lost: self.worker_links[without].spec.name.clone(), needs }),
             None => Ok(()),
         }
     }

@@ -144,7 +144,8 @@ fn a_job_whose_remaining_workers_have_no_memory_for_it_waits_for_others_with_the
     cluster.worker_with("small", "1", &["--memory", "0.035"]);
     cluster.worker("large", "1");
     let deck = small();
-    let job = ["submit", "--wait", "--json", "--cycles", CYCLES, "--min-workers", "2", "--snapshot-every", "0.2"];
+    let job =
+        ["submit", "--wait", "--json", "--cycles", CYCLES, "--min-workers", "2", "--snapshot-every", "0.2"];
     let mut waiting =
         Process::start("submit", &mut cluster.command("client", &[&job[..], &[&deck]].concat()));
     cluster.wait_until_running(1);

@@ -38,8 +38,8 @@ use worker::{
 };
 
 use disk::Disk;
-use memory::Small;
 pub use flips::Flip;
+use memory::Small;
 pub use plot::{Bug, Fault, Plot, Stage};
 
 use crate::{bits::Fingerprint, solve::Solved};

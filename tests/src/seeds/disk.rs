@@ -78,22 +78,12 @@ impl Disk {
     /// What the real disk refused.
     pub(super) fn take(&mut self, action: Action) -> Result<(), String> {
         match action {
-            Action::Row(row) => {
-                if !self.refuses_results() {
-                    self.rows.push(*row);
-                }
-            }
-            Action::State(state) => {
-                if !self.refuses_results() {
-                    self.states.push(*state);
-                }
-            }
-            // Where it has no room the run goes on with the older ones.
-            Action::Snapshot(snapshot) | Action::Checkpoint { snapshot, .. } => {
-                if self.refusal().is_none() {
-                    self.put(&snapshot)?;
-                }
-            }
+            Action::Row(_) | Action::State(_) if self.refuses_results() => {}
+            Action::Row(row) => self.rows.push(*row),
+            Action::State(state) => self.states.push(*state),
+            // The run goes on with the older ones.
+            Action::Snapshot(_) | Action::Checkpoint { .. } if self.refusal().is_some() => {}
+            Action::Snapshot(snapshot) | Action::Checkpoint { snapshot, .. } => self.put(&snapshot)?,
             Action::Rewind { rows, cycle } => {
                 self.rows.truncate(rows);
                 self.states.retain(|state| state.cycle <= cycle);

@@ -5,7 +5,7 @@ use master::{
     footprint::{self, Bearer},
 };
 
-use super::{Bug, Play, What, Weather, spec};
+use super::{Bug, Play, Weather, What, spec};
 
 /// Processes that may be ended by their systems for what the master deals them.
 const STARVED: u64 = 4;
