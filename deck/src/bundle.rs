@@ -2,6 +2,8 @@
 //!
 //! A deck of one file and no options is its own text. Any other starts with the line `#bolide-bundle 1`; then come
 //! lines `units NAME`, `case NUMBER`, `parameter NAME VALUE`, `title WORDS`, `perturb AMPLITUDE SEED`, and for each file, the deck first, `file BYTES NAME` with its text below.
+//! A file from outside the folder of the deck is announced by `outside` instead of `file`. Who reads a deck of somebody else may not want
+//! that file shown, so no fault or warning quotes it.
 
 use std::collections::BTreeSet;
 
@@ -11,11 +13,14 @@ use crate::{
     fault::{Fault, Faults},
     include::{beside, includes},
     limits::MAX_TITLE,
+    log::Warning,
     parameters::{MAX_PARAMETERS, Parameters, is_parameter, substituted_if_possible},
     perturb::Perturbation,
 };
 
 const FIRST: &str = "#bolide-bundle 1";
+/// What is told in place of words of a file outside the deck's folder.
+const CONCEALED: &str = "a line that is not shown, for its file stands outside the deck's folder";
 
 /// Most files of a deck.
 pub const MAX_FILES: usize = 1_000;
@@ -61,12 +66,14 @@ impl Kind {
 pub(crate) struct Bundle<'a> {
     pub(crate) options: Options,
     pub(crate) files: Vec<(&'a str, &'a str)>,
+    /// Names of files that stand outside the deck's folder.
+    pub(crate) outside: Vec<&'a str>,
 }
 
 impl<'a> Bundle<'a> {
     /// Takes a text apart. A text that is no bundle is a deck without other files.
     pub(crate) fn of(text: &'a str, name: &'a str) -> Result<Self, Vec<Fault>> {
-        let mut bundle = Self { options: Options::default(), files: Vec::new() };
+        let mut bundle = Self { options: Options::default(), files: Vec::new(), outside: Vec::new() };
         if Kind::of(text) != Kind::Bundle {
             bundle.files.push((name, text));
             return Ok(bundle);
@@ -106,7 +113,7 @@ impl<'a> Bundle<'a> {
                 "perturb" => {
                     bundle.options.perturbation = Some(perturbation(rest).ok_or_else(|| broken(start))?);
                 }
-                "file" => {
+                "file" | "outside" => {
                     let (bytes, name) = rest.split_once(' ').ok_or_else(|| broken(start))?;
                     let bytes: usize = bytes.parse().map_err(|_| broken(start))?;
                     let end = at.checked_add(bytes).ok_or_else(|| broken(start))?;
@@ -115,6 +122,9 @@ impl<'a> Bundle<'a> {
                         return Err(broken(start));
                     }
                     bundle.files.push((name, body));
+                    if word == "outside" {
+                        bundle.outside.push(name);
+                    }
                     at = end;
                 }
                 _ => return Err(broken(start)),
@@ -126,10 +136,32 @@ impl<'a> Bundle<'a> {
         Ok(bundle)
     }
 
+    /// Faults without the words that they quote of files outside the deck's folder.
+    pub(crate) fn conceal(&self, mut faults: Vec<Fault>) -> Vec<Fault> {
+        for fault in faults.iter_mut().filter(|fault| self.outside.contains(&fault.file.as_str())) {
+            fault.read = CONCEALED.to_string();
+        }
+        faults
+    }
+
+    /// The same of a warning.
+    pub(crate) fn conceal_words(&self, warning: &mut Warning) {
+        if self.outside.contains(&warning.file.as_str()) {
+            warning.words = format!("{CONCEALED}, and it is not done as it says");
+        }
+    }
+
     /// The text of a file by its name.
     pub(crate) fn file(&self, name: &str) -> Option<usize> {
         self.files.iter().position(|(known, _)| *known == name)
     }
+}
+
+/// The text of a file that a deck refers to.
+pub struct Opened {
+    pub text: String,
+    /// It stands outside the folder of the deck.
+    pub is_outside: bool,
 }
 
 /// A deck with every file that it refers to, ready for [`crate::read`]. `open` gives the text of a file by the path
@@ -143,7 +175,22 @@ pub fn gather(
     options: &Options,
     open: &mut dyn FnMut(&str) -> Option<String>,
 ) -> Result<String, String> {
+    let mut open = |path: &str| open(path).map(|text| Opened { text, is_outside: false });
+    gather_from(path, text, options, &mut open)
+}
+
+/// As [`gather`], where `open` tells which files stand outside the folder of the deck.
+///
+/// # Errors
+/// As [`gather`].
+pub fn gather_from(
+    path: &str,
+    text: String,
+    options: &Options,
+    open: &mut dyn FnMut(&str) -> Option<Opened>,
+) -> Result<String, String> {
     let mut files = vec![(path.to_string(), text)];
+    let mut outside: BTreeSet<String> = BTreeSet::new();
     let mut tried: BTreeSet<String> = BTreeSet::from([path.to_string()]);
     let mut folders: Vec<String> = Vec::new();
     let mut bytes = files[0].1.len();
@@ -166,7 +213,10 @@ pub fn gather(
                 if !tried.insert(candidate.clone()) {
                     continue;
                 }
-                let Some(text) = open(&candidate) else { continue };
+                let Some(Opened { text, is_outside }) = open(&candidate) else { continue };
+                if is_outside {
+                    outside.insert(candidate.clone());
+                }
                 bytes += text.len();
                 if files.len() == MAX_FILES || bytes > MAX_BYTES {
                     return Err(format!(
@@ -199,7 +249,8 @@ pub fn gather(
         packed += &format!("perturb {nodes:?} {seed}\n");
     }
     for (name, text) in &files {
-        packed += &format!("file {} {}\n{text}\n", text.len(), name.replace('\n', " "));
+        let word = if outside.contains(name) { "outside" } else { "file" };
+        packed += &format!("{word} {} {}\n{text}\n", text.len(), name.replace('\n', " "));
     }
     Ok(packed)
 }

@@ -73,17 +73,23 @@ pub fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     read_whole(text, file_name).map(|reading| reading.model)
 }
 
-/// As [`read`], for a deck that may ask for no more elements than this: who reads it has no memory for more.
+/// What bounds the reading of a deck that somebody else brings.
+pub struct Bounds<'a> {
+    /// Most elements that it may ask for: who reads it has no memory for more.
+    pub elements: u64,
+    /// Whether nobody waits for the deck any more. It is asked between the stages of reading, for each part, mesh file and block of cards.
+    pub is_given_up: &'a dyn Fn() -> bool,
+}
+
+/// Nothing but what bounds every deck.
+const UNBOUNDED: Bounds<'static> = Bounds { elements: MAX_ELEMENTS, is_given_up: &|| false };
+
+/// As [`read`], within bounds.
 ///
 /// # Errors
-/// As [`read`].
-pub fn read_at_most(text: &str, file_name: &str, most_elements: u64) -> Result<Model, Vec<Fault>> {
-    let bundle = deck_of(text, file_name)?;
-    let reading = match Kind::of(bundle.files[0].1) {
-        Kind::Keyword => read_keyword(&bundle, MESH, most_elements).map(|whole| whole.reading),
-        _ => read_toml(&bundle, most_elements),
-    };
-    reading.map(|reading| reading.model)
+/// As [`read`]; a deck that is given up has one fault.
+pub fn read_within(text: &str, file_name: &str, bounds: &Bounds<'_>) -> Result<Model, Vec<Fault>> {
+    read_with(text, file_name, bounds).map(|reading| reading.model)
 }
 
 /// As [`read`], with the warnings.
@@ -91,11 +97,18 @@ pub fn read_at_most(text: &str, file_name: &str, most_elements: u64) -> Result<M
 /// # Errors
 /// As [`read`].
 pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
+    read_with(text, file_name, &UNBOUNDED)
+}
+
+fn read_with(text: &str, file_name: &str, bounds: &Bounds<'_>) -> Result<Reading, Vec<Fault>> {
     let bundle = deck_of(text, file_name)?;
-    match Kind::of(bundle.files[0].1) {
-        Kind::Keyword => read_keyword(&bundle, MESH, MAX_ELEMENTS).map(|whole| whole.reading),
-        _ => read_toml(&bundle, MAX_ELEMENTS),
-    }
+    let reading = match Kind::of(bundle.files[0].1) {
+        Kind::Keyword => read_keyword(&bundle, MESH, bounds).map(|whole| whole.reading),
+        _ => read_toml(&bundle, bounds),
+    };
+    let mut reading = reading.map_err(|faults| bundle.conceal(faults))?;
+    reading.warnings.iter_mut().for_each(|warning| bundle.conceal_words(warning));
+    Ok(reading)
 }
 
 /// The files of a deck; a mesh of another program is none.
@@ -116,7 +129,7 @@ fn deck_of<'a>(text: &'a str, file_name: &'a str) -> Result<Bundle<'a>, Vec<Faul
 const MESH: &str = "keyword.mesh";
 
 /// Reads and checks a TOML deck with its mesh files.
-fn read_toml(bundle: &Bundle<'_>, most_elements: u64) -> Result<Reading, Vec<Fault>> {
+fn read_toml(bundle: &Bundle<'_>, bounds: &Bounds<'_>) -> Result<Reading, Vec<Fault>> {
     let (name, text) = bundle.files[0];
     let given = &bundle.options.parameters;
     let substituted;
@@ -130,7 +143,7 @@ fn read_toml(bundle: &Bundle<'_>, most_elements: u64) -> Result<Reading, Vec<Fau
     };
     let mut files = bundle.files.clone();
     files[0].1 = text;
-    let log = Log::toml(&files).with_most_elements(most_elements);
+    let log = Log::toml(&files).within(bounds);
     let deck = toml_deck::read(text, &log);
     let mut meshes = mesh_file::read_all(bundle, deck.as_ref(), &log);
     let model = deck.as_ref().and_then(|deck| make::model(deck, &meshes.by_name, &log));
@@ -156,9 +169,9 @@ struct WholeKeyword {
 fn read_keyword(
     bundle: &Bundle<'_>,
     mesh_name: &str,
-    most_elements: u64,
+    bounds: &Bounds<'_>,
 ) -> Result<WholeKeyword, Vec<Fault>> {
-    let log = Log::keyword(&bundle.files).with_most_elements(most_elements);
+    let log = Log::keyword(&bundle.files).within(bounds);
     let (deck, mesh) = keyword::read(bundle, mesh_name, &log);
     let meshes = Meshes::from([(mesh_name.to_string(), Some(mesh))]);
     let model = make::model(&deck, &meshes, &log);
@@ -192,6 +205,11 @@ fn conclude(
             };
             let cells = deck.map_or_else(Vec::new, |deck| deck.parts.iter().map(cells).collect());
             Ok(Reading { model, warnings: log.into_lists().1, cells })
+        }
+        _ if log.is_given_up() => {
+            let faults = Faults::new(bundle.files[0].0, "");
+            faults.add(0, "a deck that is given up", "a caller who waits for it", "send it again");
+            Err(faults.into_list())
         }
         _ => {
             assert!(log.count() > 0, "a deck was refused without a fault");
@@ -232,7 +250,9 @@ pub fn convert(text: &str, file_name: &str, mesh_name: &str) -> Result<Converted
         );
         return Err(faults.into_list());
     }
-    let WholeKeyword { reading, deck, mesh } = read_keyword(&bundle, mesh_name, MAX_ELEMENTS)?;
+    let whole = read_keyword(&bundle, mesh_name, &UNBOUNDED).map_err(|faults| bundle.conceal(faults))?;
+    let WholeKeyword { mut reading, deck, mesh } = whole;
+    reading.warnings.iter_mut().for_each(|warning| bundle.conceal_words(warning));
     Ok(Converted { deck: write::text(&deck), mesh: mesh.text(), warnings: reading.warnings })
 }
 
@@ -261,7 +281,9 @@ pub fn start_from_mesh(text: &str, file_name: &str, mesh_name: &str) -> Result<S
         faults.add(0, read, format!("one of {UNIT_NAMES}"), "choose one of them");
         return Err(faults.into_list());
     };
-    let mesh_file::Found { mesh, mut warnings, .. } = mesh_file::read(&bundle, 0)?;
+    let found = mesh_file::read(&bundle, 0).map_err(|faults| bundle.conceal(faults))?;
+    let mesh_file::Found { mesh, mut warnings, .. } = found;
+    warnings.iter_mut().for_each(|warning| bundle.conceal_words(warning));
     if asked.is_none() {
         let words = format!("a mesh does not say its units, {} is assumed; give --units", units.name);
         warnings.push(Warning { file: name.to_string(), line: 1, words });

@@ -3,6 +3,7 @@
 use std::{cell::RefCell, collections::BTreeMap, fmt};
 
 use crate::{
+    Bounds,
     fault::{Fault, Faults, MAX_FAULTS, once_for_one_cause},
     limits::MAX_ELEMENTS,
     place::{Origin, Place},
@@ -43,6 +44,8 @@ pub(crate) struct Log<'a> {
     ignored: RefCell<BTreeMap<String, Place>>,
     /// Most elements that the deck may ask for.
     most_elements: u64,
+    /// Whether nobody waits for the deck any more.
+    is_given_up: Option<&'a dyn Fn() -> bool>,
 }
 
 impl<'a> Log<'a> {
@@ -64,6 +67,7 @@ impl<'a> Log<'a> {
             warnings: RefCell::new(Vec::new()),
             ignored: RefCell::new(BTreeMap::new()),
             most_elements: MAX_ELEMENTS,
+            is_given_up: None,
         }
     }
 
@@ -160,10 +164,16 @@ impl<'a> Log<'a> {
         self.most_elements
     }
 
-    /// Has the deck ask for no more elements, nor for more than any deck may.
-    pub(crate) fn with_most_elements(mut self, most: u64) -> Self {
-        self.most_elements = most.min(MAX_ELEMENTS);
+    /// Has the deck ask for no more elements, nor for more than any deck may, and somebody say when it is given up.
+    pub(crate) fn within(mut self, bounds: &Bounds<'a>) -> Self {
+        self.most_elements = bounds.elements.min(MAX_ELEMENTS);
+        self.is_given_up = Some(bounds.is_given_up);
         self
+    }
+
+    /// Whether nobody waits for the deck any more: then what was read of it is of no use.
+    pub(crate) fn is_given_up(&self) -> bool {
+        self.is_given_up.is_some_and(|is_given_up| is_given_up())
     }
 
     pub(crate) fn warn(&self, at: Place, words: impl Into<String>) {

@@ -45,18 +45,27 @@ use crate::{
 use material::Materials;
 use names::{Curves, Names};
 
-/// Checks a deck and makes its model; none where it has no control. The model is not to be used after a fault.
+/// Checks a deck and makes its model; none where it has no control, or nobody waits for it. The model is not to be used after a fault.
 pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model> {
     let mut materials = Materials::of(deck, log);
     let hourglass = deck.control.as_ref().and_then(|control| control.hourglass).unwrap_or_default();
     let mut parts = part::make((&deck.parts, hourglass), &mut materials, meshes, log);
+    if log.is_given_up() {
+        return None;
+    }
     let materials = materials.list;
     let names = Names::of(&deck.parts, log);
     placement::resolve(deck, &mut parts, &names, &materials, meshes, log);
+    if log.is_given_up() {
+        return None;
+    }
     symmetry::cut(deck, &mut parts, log);
     let parts = parts;
     let joins = assembly::joins(&deck.joins, &names, log);
-    let mut assembly = assembly::assemble(&parts, &joins, &materials, meshes, log);
+    let mut assembly = assembly::assemble(&parts, &joins, &materials, meshes, log)?;
+    if log.is_given_up() {
+        return None;
+    }
     let curves = Curves::of(&deck.curves, log);
     let rigid = rigid::drafts(&deck.rigid, &names, &curves, &assembly, log);
     let clamps = clamp::boundaries(&deck.parts, &parts, log);
@@ -64,10 +73,16 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let supports: Vec<_> = deck.boundaries.iter().chain(&intended).collect();
     let mut conditions = boundary::make((deck, &supports), &names, curves, &parts, &assembly, log);
     assembly.mesh.lumped = load::lumped(deck, &names, &parts, &assembly, log);
+    if log.is_given_up() {
+        return None;
+    }
     let bodies = rigid::make(&rigid, &materials, &mut assembly, &mut conditions, log);
     let contact = deck.contact.as_ref().and_then(|contact| {
         contact::make(contact, &names, &mut assembly, &materials, &conditions, &rigid, log)
     });
+    if log.is_given_up() {
+        return None;
+    }
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = deck.control.as_ref().map(|given| {
         let control = control::make(given, log);
@@ -77,6 +92,9 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let output = output::make(deck, &names, &assembly, &bodies, log);
     let detonations = burn::make(deck, &materials, &parts, log);
     let faces = contact.as_ref().map(|contact| (&contact.settings, contact.faces.as_slice()));
+    if log.is_given_up() {
+        return None;
+    }
     spans::check(&parts, &assembly, faces, &materials, log);
 
     for (part, draft) in assembly.mesh.parts.iter_mut().zip(&parts) {
@@ -96,6 +114,9 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         for (component, prescribed) in velocity[node].iter_mut().zip(prescribed) {
             *component = prescribed.unwrap_or(*component);
         }
+    }
+    if log.is_given_up() {
+        return None;
     }
     let control = control?;
     let settings = contact.map(|contact| {

@@ -178,7 +178,7 @@ pub(crate) type Read = Result<Found, Vec<Fault>>;
 /// # Errors
 /// Its faults, each with its line.
 pub fn parse(text: &str, file_name: &str) -> Result<MeshFile, Vec<Fault>> {
-    let bundle = Bundle { options: Default::default(), files: vec![(file_name, text)] };
+    let bundle = Bundle { options: Default::default(), files: vec![(file_name, text)], outside: Vec::new() };
     read(&bundle, 0).map(|found| found.mesh)
 }
 
@@ -210,7 +210,8 @@ pub(crate) fn read(bundle: &Bundle<'_>, file: usize) -> Read {
         Format::Keyword => {
             let mut files = bundle.files.clone();
             files.swap(0, file);
-            let mut found = keyword::read_mesh(&Bundle { options: Default::default(), files })?;
+            let mut found =
+                keyword::read_mesh(&Bundle { options: Default::default(), files, outside: Vec::new() })?;
             for place in found.places.iter_mut().flatten() {
                 if let Place::Card { file: of, .. } = place {
                     *of = match usize::from(*of) {

@@ -1,6 +1,6 @@
 // Curves over an axis, drawn when data or size change.
 
-import { number } from '/lists.js';
+import { number } from './lists.js';
 
 export const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 

@@ -1,10 +1,10 @@
 // The page: hears the overview as a stream, asks for the chosen job's sheet and surfaces, hands both to what draws.
 
-import * as files from '/files.js';
-import * as lists from '/lists.js';
-import * as curves from '/curves.js';
-import * as timeline from '/timeline.js';
-import { Bodies, ramp, unpack } from '/bodies.js';
+import * as files from './files.js';
+import * as lists from './lists.js';
+import * as curves from './curves.js';
+import * as timeline from './timeline.js';
+import { Bodies, ramp, unpack } from './bodies.js';
 
 const $ = id => document.getElementById(id);
 const SERIES = [
@@ -38,7 +38,7 @@ function link(words, lost) {
 }
 
 function listen() {
-  const stream = new EventSource('/api/events');
+  const stream = new EventSource('api/events');
   stream.addEventListener('overview', event => {
     page.overview = JSON.parse(event.data);
     link('live', false);
@@ -123,7 +123,7 @@ async function sheet() {
   const final = now.state !== 'running';
   page.asking = true;
   try {
-    const sheet = await (await ask(`/api/jobs/${number}/sheet`)).json();
+    const sheet = await (await ask(`api/jobs/${number}/sheet`)).json();
     if (number !== page.chosen) return;
     sheet.final = final;
     page.sheet = sheet;
@@ -222,7 +222,7 @@ async function surface() {
   let kept = page.surfaces.get(state.cycle);
   if (!kept) {
     try {
-      kept = unpack(await (await ask(`/api/jobs/${number}/surface/${index}`)).arrayBuffer());
+      kept = unpack(await (await ask(`api/jobs/${number}/surface/${index}`)).arrayBuffer());
     } catch (error) {
       $('at').textContent = error.message;
       return;
@@ -251,8 +251,8 @@ async function submit(coming) {
     const { name, text } = deck;
     const query = new URLSearchParams({ name, min_workers: $('min-workers').value || '1' });
     if ($('cycles').value) query.set('cycles', $('cycles').value);
-    const { job } = await (await ask(`/api/jobs?${query}`, { method: 'POST', body: text })).json();
-    page.overview = await (await ask('/api/overview')).json();
+    const { job } = await (await ask(`api/jobs?${query}`, { method: 'POST', body: text })).json();
+    page.overview = await (await ask('api/overview')).json();
     choose(job);
     if (innerWidth < 860) $('job').scrollIntoView();
   } catch (error) {
@@ -314,7 +314,7 @@ function start() {
     }
     calm();
     try {
-      await ask(`/api/jobs/${page.chosen}/cancel`, { method: 'POST' });
+      await ask(`api/jobs/${page.chosen}/cancel`, { method: 'POST' });
     } catch (error) {
       lists.say($('faults'), error.message);
     }

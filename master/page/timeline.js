@@ -1,6 +1,6 @@
 // The space-time diagram: a row for each host, time to the right, phases as bars, cycles as ticks.
 
-import { colour, prepare } from '/curves.js';
+import { colour, prepare } from './curves.js';
 
 const ROW = 22;
 

@@ -330,6 +330,7 @@ impl Acceptor {
                 let worker_link = WorkerLink {
                     spec: WorkerSpec { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
                     address: address.clone(),
+                    memory: hello.memory,
                     certificate,
                     peer: peer_address(&address, hello.peer_port),
                     incarnation,

@@ -1,9 +1,12 @@
 //! Decks from files: gathered with all that they refer to, read and checked.
 
-use std::{fmt, path::Path};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
 
 use deck::{
-    bundle::{self, Options as Reading},
+    bundle::{self, Opened, Options as Reading},
     model::Model,
     physics,
 };
@@ -65,18 +68,30 @@ pub fn gather_deck(path: &Path, options: &Reading) -> Result<String, Error> {
         }
         Err(error) => return Err(Error::File { name, why: error.to_string() }),
     };
-    let mut open =
-        |path: &str| read_in_any_case(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    bundle::gather(&name, text, options, &mut open).map_err(Error::Bundle)
+    let folder = folder_of(path);
+    let mut open = |path: &str| {
+        let (found, bytes) = read_in_any_case(path)?;
+        let is_outside = !folder
+            .as_ref()
+            .is_some_and(|folder| std::fs::canonicalize(&found).is_ok_and(|found| found.starts_with(folder)));
+        Some(Opened { text: String::from_utf8_lossy(&bytes).into_owned(), is_outside })
+    };
+    bundle::gather_from(&name, text, options, &mut open).map_err(Error::Bundle)
 }
 
-/// The bytes of a file that a deck refers to. Decks from machines that do not tell capitals from small letters name files in
+/// The folder of a deck, links followed as far as the deck itself.
+fn folder_of(deck: &Path) -> Option<PathBuf> {
+    let folder = deck.parent().filter(|folder| !folder.as_os_str().is_empty());
+    std::fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()
+}
+
+/// A file that a deck refers to, with its bytes. Decks from machines that do not tell capitals from small letters name files in
 /// either: where no file has the name, the only one that differs from it in case is taken.
-fn read_in_any_case(path: &str) -> Option<Vec<u8>> {
-    if let Ok(bytes) = std::fs::read(path) {
-        return Some(bytes);
-    }
+fn read_in_any_case(path: &str) -> Option<(PathBuf, Vec<u8>)> {
     let path = Path::new(path);
+    if let Ok(bytes) = std::fs::read(path) {
+        return Some((path.to_owned(), bytes));
+    }
     let wanted = path.file_name()?.to_str()?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
@@ -85,7 +100,8 @@ fn read_in_any_case(path: &str) -> Option<Vec<u8>> {
     };
     let mut found = entries.flatten().filter(same);
     let only = found.next().filter(|_| found.next().is_none())?;
-    std::fs::read(only.path()).ok()
+    let path = only.path();
+    std::fs::read(&path).ok().map(|bytes| (path, bytes))
 }
 
 /// Why a deck cannot be used.

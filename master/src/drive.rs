@@ -28,6 +28,7 @@ use tracing::warn;
 use crate::{
     embedded::{Sink, Traffic, timed_sort},
     event::{Action, Event, Outcome, WorkerSpec},
+    footprint::{self, Bearer},
     job::Job,
     pace::{Pace, Waiting},
     peers,
@@ -65,6 +66,8 @@ pub struct WorkerLink {
     pub spec: WorkerSpec,
     /// Where it calls from.
     pub address: String,
+    /// Memory that its process may take (bytes), as it said when it called; 0 if it does not say.
+    pub memory: u64,
     /// The certificate that it showed, in words.
     pub certificate: Option<String>,
     /// Where it takes other workers, if it does.
@@ -78,6 +81,11 @@ pub struct WorkerLink {
 }
 
 impl WorkerLink {
+    /// What it can take of a job.
+    pub(crate) fn bearer(&self) -> Bearer<'_> {
+        Bearer { name: &self.spec.name, speed: self.spec.speed, memory: self.memory }
+    }
+
     /// Queues a message to it.
     pub(crate) fn send(&self, place: Place, message: &ToWorker) -> protocol::Result<()> {
         let packed = wire::pack_to_worker(message)?;
@@ -264,6 +272,8 @@ pub enum Error {
     Sink(String),
     /// Workers were lost again and again, and the job came no further.
     Deaths { deaths: usize, cycle: u64, last: String },
+    /// Workers were lost, and what they leave does not fit into the memory of the others.
+    Memory { lost: String, needs: String },
 }
 
 impl From<String> for Error {
@@ -280,6 +290,9 @@ impl std::fmt::Display for Error {
                 f,
                 "{deaths} workers were lost and the job came no further than cycle {cycle}; the last one: {last}; look at their memory, then `bolide resume`"
             ),
+            Self::Memory { lost, needs } => {
+                write!(f, "the job waits for workers, since without {lost} it needs {needs}")
+            }
         }
     }
 }
@@ -383,8 +396,42 @@ impl Driver {
     fn lose(&mut self, worker: usize, why: String, sink: &mut dyn Sink) -> Result<(), Error> {
         if self.job.at_work().contains(&worker) && !self.ends {
             self.deaths.count(&why)?;
+            self.check_memory(worker)?;
         }
         self.apply(Event::Lost(worker, why), sink)
+    }
+
+    /// Whether the workers at work have memory for the whole job without one of them. The system would end those that have none.
+    fn check_memory(&self, without: usize) -> Result<(), Error> {
+        match footprint::shortage(self.job.n_elements() as u64, None, &self.bearers(without)) {
+            Some(needs) => Err(Error::Memory { lost: self.worker_links[without].spec.name.clone(), needs }),
+            None => Ok(()),
+        }
+    }
+
+    /// The workers at work without one of them.
+    fn bearers(&self, without: usize) -> Vec<Bearer<'_>> {
+        let left = self.job.at_work().iter().filter(|&&worker| worker != without);
+        left.map(|&worker| self.worker_links[worker].bearer()).collect()
+    }
+
+    /// Takes a worker in that has memory for its share of the job; another one stays idle until the job is over.
+    fn take_in(&mut self, worker_link: WorkerLink, sink: &mut dyn Sink) -> Result<(), Error> {
+        let spec = worker_link.spec.clone();
+        let mut bearers = self.bearers(usize::MAX);
+        let is_alone = bearers.is_empty();
+        bearers.push(worker_link.bearer());
+        match footprint::shortage(self.job.n_elements() as u64, None, &bearers) {
+            Some(needs) if is_alone => Err(Error::Memory { lost: "those that were lost".to_owned(), needs }),
+            Some(needs) => {
+                warn!("worker {} is not taken into the job, which would need {needs}", spec.name);
+                Ok(())
+            }
+            None => {
+                self.worker_link(worker_link);
+                self.apply(Event::Joined(spec), sink)
+            }
+        }
     }
 
     fn run(&mut self, first: Vec<Action>, sink: &mut dyn Sink, stop: &AtomicBool) -> Result<Outcome, Error> {
@@ -437,11 +484,7 @@ impl Driver {
                     self.sorting = self.sorting.saturating_sub(1);
                     self.apply(Event::Sorted(sorted), sink)?;
                 }
-                Input::Joined(worker_link) => {
-                    let spec = worker_link.spec.clone();
-                    self.worker_link(worker_link);
-                    self.apply(Event::Joined(spec), sink)?;
-                }
+                Input::Joined(worker_link) => self.take_in(worker_link, sink)?,
                 Input::Wake => self.look_for_late(sink)?,
                 Input::Suspend => {
                     self.ends = true;

@@ -26,6 +26,11 @@ pub struct Bearer<'a> {
     pub memory: u64,
 }
 
+/// What a share of so many elements takes of its worker, at its peak (bytes).
+pub const fn of_share(elements: u64) -> u64 {
+    OF_SHARE.saturating_add(elements.saturating_mul(OF_ELEMENT_OF_WORKER))
+}
+
 /// What a job of so many elements takes of its master, at its peak (bytes).
 pub const fn of_job(elements: u64) -> u64 {
     OF_JOB.saturating_add(elements.saturating_mul(OF_ELEMENT))
@@ -54,7 +59,7 @@ fn shortage_of_worker(elements: u64, workers: &[Bearer<'_>]) -> Option<String> {
     let all: f64 = workers.iter().map(|worker| worker.speed).sum();
     workers.iter().filter(|worker| worker.memory > 0).find_map(|worker| {
         let share = (elements as f64 * worker.speed / all).ceil() as u64;
-        let needed = OF_SHARE.saturating_add(share.saturating_mul(OF_ELEMENT_OF_WORKER));
+        let needed = of_share(share);
         (needed > worker.memory).then(|| {
             format!(
                 "memory: {:.1} GB on worker {} for its {share} of {elements} elements, {:.1} GB were available when it called; \

@@ -29,8 +29,6 @@ pub struct Host {
     /// Relative speed.
     pub speed: f64,
     pub threads: u32,
-    /// Memory that it may take (bytes), as it said when it called; 0 if it does not say.
-    pub memory: u64,
     /// Lane set.
     pub lanes: String,
     /// Where it called from.
@@ -101,7 +99,6 @@ impl Hosts {
                 name: hello.name.clone(),
                 speed: hello.speed,
                 threads: hello.threads,
-                memory: hello.memory,
                 lanes: hello.lanes.clone(),
                 address: address.to_owned(),
                 nonce: hello.nonce,

@@ -117,9 +117,12 @@ pub async fn serve(place: Place, api_state: ApiState) {
 }
 
 fn router(api_state: ApiState) -> Router {
-    Router::new()
-        .merge(assets::routes())
-        .nest("/api", api::routes())
+    // Programs use the plain paths, with the token in a header; browsers those below the page's own.
+    let page = || Router::new().merge(assets::routes()).nest("/api", api::routes());
+    let path = api_state.guard.path();
+    page()
+        .nest(path.trim_end_matches('/'), page())
+        .route(path, axum::routing::get(assets::page))
         .route("/metrics", axum::routing::get(metrics::text))
         .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
         .layer(middleware::from_fn_with_state(api_state.clone(), check_request))
@@ -135,7 +138,7 @@ async fn check_request(State(api_state): State<ApiState>, request: Request, next
         Ok(()) => match (token_in_address(&request), guard.pass(request.headers())) {
             (Some(guess), _) if guard.is_token(&guess) => {
                 // The token leaves the address bar, and the history with it.
-                let mut answer = Redirect::to("/").into_response();
+                let mut answer = Redirect::to(guard.path()).into_response();
                 if let Ok(cookie) = HeaderValue::from_str(&guard.set_cookie()) {
                     answer.headers_mut().insert(header::SET_COOKIE, cookie);
                 }

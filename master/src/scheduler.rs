@@ -492,15 +492,9 @@ impl Scheduler {
             let what = format!("{}; tried again within {} s", pause.why, pause.seconds);
             return waiting.iter().for_each(|entry| self.wait_for(entry.id, what.clone()));
         }
-        let idle: Vec<(&WorkerLink, u64)> = self
-            .hosts
-            .idle()
-            .filter_map(|host| Some((self.worker_links.get(&host.incarnation)?, host.memory)))
-            .collect();
-        let bearers: Vec<Bearer<'_>> = idle
-            .iter()
-            .map(|(link, memory)| Bearer { name: &link.spec.name, speed: link.spec.speed, memory: *memory })
-            .collect();
+        let idle = self.hosts.idle().filter_map(|host| self.worker_links.get(&host.incarnation));
+        let idle: Vec<&WorkerLink> = idle.collect();
+        let bearers: Vec<Bearer<'_>> = idle.iter().map(|link| link.bearer()).collect();
         let running: Vec<u32> = self.running.keys().copied().collect();
         let available = footprint::available();
         let allotments = allotment::among(&waiting, &running, &bearers, self.started.elapsed(), available);
@@ -508,7 +502,7 @@ impl Scheduler {
             self.wait_for(job, what);
         }
         if let Some(job) = allotments.starts {
-            let worker_links = idle.into_iter().map(|(worker_link, _)| worker_link.clone()).collect();
+            let worker_links = idle.into_iter().cloned().collect();
             self.start(job, worker_links);
         }
     }

@@ -73,6 +73,8 @@ enum Failure {
     Job(String),
     /// It is held: workers die of it.
     Held(String),
+    /// Its workers have no memory for it without one that was lost; it waits for others.
+    Waits(String),
     /// This host is short of room, files or memory; the job waits for them.
     Shortage(String),
 }
@@ -88,12 +90,13 @@ impl From<drive::Error> for Failure {
         match error {
             drive::Error::Sink(reason) => reason.into(),
             drive::Error::Deaths { .. } => Self::Held(error.to_string()),
+            drive::Error::Memory { .. } => Self::Waits(error.to_string()),
         }
     }
 }
 
 /// Whether a reason ends in an error by which the system says that it has none left of something.
-fn is_shortage(reason: &str) -> bool {
+pub fn is_shortage(reason: &str) -> bool {
     system::files::SHORTAGES.iter().any(|number| reason.contains(&format!("(os error {number})")))
 }
 
@@ -108,6 +111,11 @@ pub fn serve(order: &Order) -> (Change, Ended) {
     });
     result.unwrap_or_else(|failure| {
         let (change, reason) = match failure {
+            // The queue says what it waits for, and lets others pass.
+            Failure::Waits(reason) => {
+                warn!(job = order.number, "{reason}");
+                return (Change::Suspend, Ended::default());
+            }
             Failure::Job(reason) => (Change::Fail, reason),
             Failure::Held(reason) => (Change::Hold, format!("held: {reason}")),
             Failure::Shortage(reason) => (Change::Suspend, reason),

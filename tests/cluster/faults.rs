@@ -46,6 +46,42 @@ fn a_bad_deck_comes_back_with_every_fault_at_its_place() {
     assert_eq!(cluster.json(&["jobs"]), serde_json::json!([]));
 }
 
+/// A deck of somebody else may name any file of whoever reads it, also by a link.
+#[cfg(unix)]
+#[test]
+fn no_word_of_a_file_outside_the_folder_of_a_deck_is_printed() {
+    let cluster = Cluster::start(BOLIDE, false);
+    let lab = cluster.folder().join("lab");
+    std::fs::create_dir(&lab).expect("room");
+    let write = |name: &str, text: &str| std::fs::write(lab.join(name), text).expect("room");
+    write("../secret", "user me password hunter2\n*hunter2\nhunter2\n");
+    write("beside.k", "*NODE\nquoted1,x\n");
+    std::os::unix::fs::symlink("../secret", lab.join("link.k")).expect("a link");
+    let absolute = cluster.folder().join("secret").display().to_string();
+    let head = "title = \"x\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"a\"\nmaterial = \"LEAD\"\n";
+    write("mesh.toml", &format!("{head}mesh = {{ file = \"{absolute}\", body = \"b\" }}\n"));
+    for (number, include) in ["../secret", &absolute, "link.k"].iter().enumerate() {
+        write(&format!("{number}.k"), &format!("*KEYWORD\n*INCLUDE\n{include}\n*INCLUDE\nbeside.k\n*END\n"));
+    }
+    for deck in ["0.k", "1.k", "2.k", "mesh.toml"] {
+        let path = lab.join(deck).display().to_string();
+        let submitted = cluster.client(&["submit", &path]);
+        let checked = said(Command::new(BOLIDE).args(["check", &path]));
+        for said in [submitted, checked] {
+            assert_eq!(said.code, Some(1), "{said:?}");
+            let words = format!("{}{}", said.out, said.err).to_lowercase();
+            assert!(!words.contains("hunter2") && !words.contains("password"), "{deck}: {said:?}");
+            assert!(words.contains("its file stands outside the deck's folder"), "{deck}: {said:?}");
+            assert!(
+                deck == "mesh.toml" || words.contains("quoted1"),
+                "{deck}: its own files are quoted: {said:?}"
+            );
+        }
+    }
+    let log = cluster.master.text();
+    assert!(!log.to_lowercase().contains("hunter2"), "{log}");
+}
+
 #[test]
 fn a_master_without_certificates_listens_on_loopback_only() {
     let refused = said(Command::new(BOLIDE).args(["master", "--listen", "0.0.0.0:0"]));

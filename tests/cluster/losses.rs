@@ -136,3 +136,32 @@ fn a_job_that_waits_for_a_worker_can_be_cancelled() {
     assert_ne!(waiting.wait().code(), Some(0));
     assert_eq!(cluster.job(1)["state"], "cancelled");
 }
+
+/// 3,456 elements take 35.6 MB of a worker, half of them 34.6 MB.
+#[test]
+fn a_job_whose_remaining_workers_have_no_memory_for_it_waits_for_others_with_the_numbers() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker_with("small", "1", &["--memory", "0.035"]);
+    cluster.worker("large", "1");
+    let deck = small();
+    let job =
+        ["submit", "--wait", "--json", "--cycles", CYCLES, "--min-workers", "2", "--snapshot-every", "0.2"];
+    let mut waiting =
+        Process::start("submit", &mut cluster.command("client", &[&job[..], &[&deck]].concat()));
+    cluster.wait_until_running(1);
+    wait_for_cycle(&cluster, 800);
+    cluster.kill_worker("large");
+    cluster.master.wait_for("the job waits for workers, since without large it needs memory: ");
+    let words = "on worker small for its 3456 of 3456 elements";
+    until(
+        || format!("the job to wait; {}", cluster.job(1)),
+        || {
+            let job = cluster.job(1);
+            let waits = job["waits_for"].as_str()?;
+            (job["state"] == "queued" && waits.starts_with("memory: ") && waits.contains(words)).then_some(())
+        },
+    );
+    cluster.worker("new", "1");
+    let summary = same_as_undisturbed(&cluster, &mut waiting);
+    assert_eq!(summary["workers"], 2, "{summary}");
+}

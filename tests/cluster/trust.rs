@@ -257,3 +257,50 @@ fn two_hundred_connections_of_silence_and_garbage_cost_bounded_memory_and_no_bit
     }
     assert!(cluster.master.is_alive());
 }
+
+/// Sends a request of a browser to the page; gives its answer.
+fn get(address: &str, path: &str, more: &str) -> String {
+    let mut asking = TcpStream::connect(address).expect("it is taken");
+    let request = format!("GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n{more}\r\n");
+    asking.write_all(request.as_bytes()).expect("it is read");
+    asking.set_read_timeout(Some(Duration::from_secs(60))).expect("a limit");
+    let mut answer = Vec::new();
+    asking.read_to_end(&mut answer).expect("an answer");
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+/// Browsers send a cookie to every port of an address, so that a server of another user on this PC would get one that goes with `/`.
+#[test]
+fn the_cookie_of_the_page_goes_with_a_random_path_alone_and_the_page_works_below_it() {
+    let cluster = Cluster::start_with(BOLIDE, false, &["--http", "127.0.0.1:0"], None);
+    let line = cluster.master.wait_for("page: http://");
+    let (address, query) =
+        line.trim_start_matches("page: http://").split_once('/').expect("an address and a token");
+    let token = query.trim_start_matches("?token=");
+
+    let opened = get(address, &format!("/{query}"), "");
+    let header = |name: &str| {
+        let line = opened.lines().find(|line| line.to_lowercase().starts_with(&format!("{name}: ")));
+        line.unwrap_or_else(|| panic!("no {name} in {opened}"))[name.len() + 2..].to_owned()
+    };
+    let (path, cookie) = (header("location"), header("set-cookie"));
+    assert!(path.len() == 34 && path.starts_with('/') && path.ends_with('/'), "{path}");
+    assert!(cookie.contains(&format!("; Path={path};")), "{cookie}");
+    assert!(!path.contains(token), "the path does not tell the token");
+
+    let cookie = format!("Cookie: {}\r\n", cookie.split(';').next().expect("a name and a value"));
+    let page = get(address, &path, &cookie);
+    assert!(page.starts_with("HTTP/1.1 200"), "{page}");
+    // Whatever the page asks for stands below its path, where the cookie goes with it.
+    for attribute in ["href=\"/", "src=\"/"] {
+        assert!(!page.contains(attribute), "{page}");
+    }
+    for name in ["main.js", "lists.js", "style.css", "icon.svg", "api/overview"] {
+        let answer = get(address, &format!("{path}{name}"), &cookie);
+        assert!(answer.starts_with("HTTP/1.1 200"), "{name}: {answer}");
+        assert!(!answer.contains("'/api/") && !answer.contains("from '/"), "{name}: {answer}");
+    }
+    assert!(get(address, &path, "").starts_with("HTTP/1.1 401"), "the path alone opens nothing");
+    let bearer = format!("Authorization: Bearer {token}\r\n");
+    assert!(get(address, "/api/overview", &bearer).starts_with("HTTP/1.1 200"), "programs need no path");
+}

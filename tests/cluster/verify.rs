@@ -1,10 +1,10 @@
-//! A results folder that is computed again: equal, or one flipped bit is named with its place.
+//! What is computed again: results folders, where one flipped bit is named with its place, and intervals of a run with a liar at work.
 
 use std::{fs, path::Path, process::Command};
 
-use tests::cluster::{Said, said};
+use tests::cluster::{Cluster, Said, said};
 
-use crate::{BOLIDE, small};
+use crate::{BOLIDE, digest_of, run, small};
 
 /// With the deck that the folder holds.
 fn verify(results: &Path, arguments: &[&str]) -> Said {
@@ -138,4 +138,38 @@ fn a_folder_of_a_run_with_another_end_or_without_its_last_files_is_told_from_a_d
     fs::write(out.join("results.pvd"), lines.join("\n")).expect("room");
     let found = verify(&out, &["--end-time", "50"]);
     assert_eq!(found.code, Some(1), "{found:?}");
+}
+
+/// Each lie is of the kinetic energy of one cycle, in another interval; all intervals are computed by two workers.
+#[test]
+fn a_worker_that_lies_three_times_is_dismissed_by_name_and_the_run_has_the_bits_of_an_undisturbed_one() {
+    let undisturbed = digest_of(&run(&["--cycles", "400"]));
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker("a", "1");
+    cluster.worker("b", "1");
+    cluster.worker_that_fails("liar", "lie:100,lie:200,lie:300");
+    let deck = small();
+    let job = ["submit", "--wait", "--cycles", "400", "--min-workers", "3", "--snapshot-cycles", "50"];
+    let ended = cluster.client(&[&job[..], &["--verify", "1", &deck]].concat());
+    assert_eq!(ended.code, Some(0), "{ended:?}\n{}", cluster.master.text());
+    let summary = cluster.json(&["watch"]);
+    assert_eq!(digest_of(&summary), undisturbed, "{summary}");
+
+    let warnings = summary["warnings"].as_array().expect("a list");
+    let named = |cycle: u64| {
+        let words = format!("it differs first in cycle {cycle}, on liar: test the memory there");
+        warnings.iter().filter(|warning| warning.as_str().is_some_and(|text| text.contains(&words))).count()
+    };
+    assert_eq!([100, 200, 300].map(named), [1; 3], "{summary}");
+    let losses = summary["losses"].as_array().expect("a list");
+    assert_eq!((losses.len(), &losses[0]["worker"]), (1, &"liar".into()), "{summary}");
+    let why = losses[0]["why"].as_str().expect("a reason");
+    assert!(why.starts_with("3 computations of intervals that others computed otherwise name it"), "{why}");
+    // It leaves behind the interval that two computations agree on: nothing is computed anew for it.
+    assert_eq!(losses[0]["cycle"], losses[0]["back_to"], "{summary}");
+    assert!(losses[0]["cycle"].as_u64() > Some(300), "{summary}");
+    assert_eq!(summary["workers"], 2, "its work went to the others: {summary}");
+    cluster.master.wait_for("worker liar at ");
+    // It is kept out as long as this master lives.
+    cluster.process_mut("liar").wait_for("name it; test its memory, or keep it out");
 }

@@ -3,14 +3,15 @@
 //! Real sessions, real computation, packed messages, in a [`World`]; time, links, crashes and the disk are of this file. Frames of cycles
 //! overtake long control messages, links delay each message by what they like, hosts are slow, crash and come back, pairs
 //! of workers lose their links, masters restart from the last snapshot or leave and are followed by another, processors err
-//! by one unit in the last place, bits flip in memory ([`flips`]), in stored files and in frames, tasks never end, clocks jump, and the
-//! [`disk`] is full or loses power.
+//! by one unit in the last place, bits flip in memory ([`flips`]), in stored files and in frames, tasks never end, clocks jump, the
+//! [`disk`] is full or loses power, descriptors run out, and machines have no [`memory`] for what is dealt to them.
 //! Whatever happens, the run must come to its end with the rows, energies and digest of the undisturbed one. A seed that
 //! does not is a bug, and the seed is all it takes to see it again.
 
 mod befall;
 mod disk;
 pub mod flips;
+mod memory;
 mod plot;
 
 use std::{
@@ -38,6 +39,7 @@ use worker::{
 
 use disk::Disk;
 pub use flips::Flip;
+use memory::Small;
 pub use plot::{Bug, Fault, Plot, Stage};
 
 use crate::{bits::Fingerprint, solve::Solved};
@@ -132,6 +134,10 @@ struct Process {
     spoilt: bool,
     /// What befalls its memory after its next task.
     flip: Option<Flip>,
+    /// Elements of the share that it was dealt last.
+    load: u64,
+    /// Its memory, where others have taken most of it.
+    small: Option<Small>,
     /// Its tasks never end.
     stuck: bool,
     /// The bit that flips in the next frame of a cycle that it sends to the master.
@@ -152,6 +158,8 @@ impl Process {
             slow: 1,
             spoilt: false,
             flip: None,
+            load: 0,
+            small: None,
             stuck: false,
             garbled: None,
             up: Lane::default(),
@@ -174,6 +182,10 @@ struct Weather {
     life: u64,
     hosts: Vec<Process>,
     disk: Disk,
+    /// The memory of the machine on which a process starts next.
+    small: Option<Small>,
+    /// Processes that their systems have ended for what they were dealt.
+    starved: u64,
     /// Bits that have flipped, by host.
     flipped: Vec<(usize, Target)>,
 }
@@ -220,6 +232,12 @@ impl Surroundings for Weather {
     }
 
     fn compute(&mut self, _: &Sessions, host: usize, task: Task) -> Result<(), Error> {
+        if let Task::Load { assign, .. } = &task {
+            let pieces = assign.subdomains.iter().flat_map(|subdomain| &subdomain.pieces);
+            if self.starves(host, pieces.map(|piece| piece.elements.len() as u64).sum()) {
+                return Ok(());
+            }
+        }
         let Process { machine, spoilt, slow, flip, .. } = &mut self.hosts[host];
         let outcome = machine.run(task);
         if *spoilt && matches!(outcome, session::Outcome::Computed) {
@@ -302,6 +320,8 @@ pub fn play(model: &Arc<Model>, options: &SessionOptions, seed: u64, plot: Plot)
         life: 0,
         hosts: Vec::new(),
         disk: Disk::new(plot.bug),
+        small: None,
+        starved: 0,
         flipped: Vec::new(),
     };
     let mut play = Play {
@@ -365,6 +385,10 @@ impl Play {
                 None => self.nothing_left()?,
             }
             self.settle();
+            let failure = self.world.surroundings.disk.failure.take();
+            if let Some(why) = failure.or_else(|| self.starvation()) {
+                return Err(format!("the job failed: {why}"));
+            }
         }
         let mut outcome = self.outcome.take().ok_or("no outcome")?;
         if let Some(failure) = outcome.failure.take() {
@@ -409,9 +433,19 @@ impl Play {
             What::Sorted(..) | What::Timer(_) => {}
             What::Missed(host, why) => self.miss(host, why)?,
             What::Comes => {
-                if self.world.sessions.job.as_ref().is_some_and(|job| !job.is_over()) {
+                let Weather { disk, draws, now, small, .. } = &mut self.world.surroundings;
+                if disk.files > 0 {
+                    // Nobody takes the call; it calls again.
+                    disk.files -= 1;
+                    let again = *now + 10 * draws.delay();
+                    self.world.surroundings.put(again, What::Comes);
+                } else if self.world.sessions.job.as_ref().is_some_and(|job| !job.is_over()) {
+                    let small = small.take();
                     let host = self.come();
-                    self.world.join(host, spec(host))?;
+                    self.world.surroundings.hosts[host].small = small;
+                    if !self.lacks_memory(None, Some(host)) {
+                        self.world.join(host, spec(host))?;
+                    }
                 }
             }
             What::MasterReturns if self.world.sessions.job.is_none() => {
@@ -463,6 +497,11 @@ impl Play {
     fn miss(&mut self, host: usize, why: &str) -> Result<(), String> {
         let Some(member) = self.world.sessions.part(host) else { return Ok(()) };
         self.world.surroundings.hosts[host].alive = false;
+        if self.lacks_memory(Some(host), None) {
+            // The job goes back into the queue, until there are workers that can take it.
+            self.without_master();
+            return Ok(());
+        }
         Ok(self.world.apply(Event::Lost(member, why.to_owned()))?)
     }
 

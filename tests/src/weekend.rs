@@ -21,7 +21,7 @@ use serde_json::Value;
 
 use crate::{
     cluster::{Cluster, Said, make_certificates, repository, said},
-    faults::disks::Disk,
+    faults::{disks::Disk, masters::clock_library},
     seeds::Draws,
 };
 use acts::Act;
@@ -38,6 +38,8 @@ const LAST_JOBS: Duration = Duration::from_secs(600);
 const CLIENT_SECONDS: &str = "60";
 /// Room of the spool.
 const SPOOL: &str = "200m";
+/// File of a clock's folder by which it is wrong.
+const JUMP: &str = "jump";
 /// What jobs that are over may take of it (GB).
 const KEPT: &str = "0.05";
 
@@ -114,6 +116,10 @@ pub struct Weekend {
     disk: Option<Disk>,
     /// Until when the disk is full.
     full_until: Option<Instant>,
+    /// A folder with the master's wall clock; none where it cannot be made.
+    clock: Option<tempfile::TempDir>,
+    /// Until when that clock is wrong.
+    wrong_until: Option<Instant>,
     begun: Instant,
 }
 
@@ -131,7 +137,14 @@ impl Weekend {
         fs::create_dir(&spool).map_err(|e| format!("{}: {e}", spool.display()))?;
         let disk = Disk::mount(&spool, SPOOL);
         let flags = ["--http", "127.0.0.1:0", "--keep-gb", KEPT];
-        let cluster = Cluster::start_in(bolide, folder, true, &flags, None, &[]);
+        let clock = clock_library();
+        let paths = clock.as_ref().map(|clock| ["clock.so", JUMP].map(|name| clock.path().join(name)));
+        let paths = paths.map(|paths| paths.map(|path| path.display().to_string()));
+        let variables = match &paths {
+            Some([library, jump]) => vec![("LD_PRELOAD", library.as_str()), ("BOLIDE_CLOCK_FILE", jump)],
+            None => Vec::new(),
+        };
+        let cluster = Cluster::start_in(bolide, folder, true, &flags, None, &variables);
         let crew = Crew::start(&cluster);
         Ok(Self {
             cluster,
@@ -147,6 +160,8 @@ impl Weekend {
             curves: Curves::default(),
             disk,
             full_until: None,
+            clock,
+            wrong_until: None,
             begun: Instant::now(),
         })
     }
@@ -179,6 +194,7 @@ impl Weekend {
     /// Nothing goes wrong any more, and nobody waits for what never comes.
     fn calm(&mut self) {
         self.free_disk();
+        self.set_clock_right();
         self.crew.wake_all();
         self.crowd_limit = 0;
     }
@@ -188,6 +204,9 @@ impl Weekend {
         self.revive();
         if self.full_until.is_some_and(|until| Instant::now() >= until) {
             self.free_disk();
+        }
+        if self.wrong_until.is_some_and(|until| Instant::now() >= until) {
+            self.set_clock_right();
         }
         let status = self.status();
         for job in &status {
@@ -216,17 +235,26 @@ impl Weekend {
 
     fn revive(&mut self) {
         if !self.cluster.master.is_alive() {
-            // A disk without room keeps no master from starting for long: somebody makes some.
+            // Neither a disk without room nor a wrong clock keeps a master from starting for long: somebody sees to that.
             self.free_disk();
+            self.set_clock_right();
             self.cluster.restart_master();
         }
-        self.crew.revive(&self.cluster);
+        self.seen.wrong.extend(self.crew.revive(&self.cluster));
     }
 
     fn free_disk(&mut self) {
         if self.full_until.take().is_some() {
             // It was never written where the disk was full already.
             let _ = fs::remove_file(self.ballast());
+        }
+    }
+
+    fn set_clock_right(&mut self) {
+        if self.wrong_until.take().is_some()
+            && let Some(clock) = &self.clock
+        {
+            let _ = fs::remove_file(clock.path().join(JUMP));
         }
     }
 

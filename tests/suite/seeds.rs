@@ -28,9 +28,10 @@ fn a_master_that_hears_messages_of_epochs_that_are_over_is_found() {
 }
 
 #[test]
-fn each_planted_bug_of_disks_frames_and_stuck_tasks_is_found() {
+fn each_planted_bug_of_disks_frames_stuck_tasks_and_shortages_is_found() {
     let stage = Stage::new();
-    for bug in [Bug::Trusting, Bug::Unsynced, Bug::Careless, Bug::Deaf, Bug::Patient] {
+    for bug in [Bug::Trusting, Bug::Unsynced, Bug::Careless, Bug::Deaf, Bug::Patient, Bug::Hasty, Bug::Greedy]
+    {
         let found = (0..400).find_map(|seed| stage.play(seed, Some(bug)).err());
         let found = found.unwrap_or_else(|| panic!("no seed of 400 shows {bug:?}"));
         assert!(found.starts_with("seed "), "{found}");

@@ -244,13 +244,14 @@ async fn join(
 /// Whether dialling again would meet the same.
 fn is_final(error: &Error) -> bool {
     match error {
+        // A clock that jumps, here or there, comes back. The master may refuse the date that TLS has let pass a moment before.
+        Error::Refused { reason } if is_of_clocks(reason) => false,
         Error::Refused { .. }
         | Error::Certificate(_)
         | Error::Address { .. }
         | Error::Message(_)
         | Error::Magic { .. }
         | Error::FrameVersion { .. } => true,
-        // A clock that jumps, here or there, comes back.
         Error::Io { kind: std::io::ErrorKind::InvalidData, why, .. } if is_of_clocks(why) => false,
         // What TLS refuses.
         Error::Io { kind: std::io::ErrorKind::InvalidData, .. } => true,

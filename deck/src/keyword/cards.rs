@@ -362,7 +362,8 @@ mod tests {
     use crate::bundle::Options;
 
     fn blocks(files: &[(&'static str, &'static str)], case: Option<u32>) -> (Vec<String>, Vec<String>) {
-        let bundle = Bundle { options: Options { case, ..Options::default() }, files: files.to_vec() };
+        let options = Options { case, ..Options::default() };
+        let bundle = Bundle { options, files: files.to_vec(), outside: Vec::new() };
         let log = Log::keyword(&bundle.files);
         let lines = read(&bundle, &log);
         let words = lines

@@ -43,6 +43,9 @@ pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
         define::read_vectors(&mut problem, block, &context);
     });
     for block in &mut blocks {
+        if log.is_given_up() {
+            break;
+        }
         while block.cards.last().is_some_and(|card| card.text.trim().is_empty()) {
             block.cards.pop();
         }

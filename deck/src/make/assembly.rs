@@ -68,11 +68,13 @@ impl Assembly {
         let Self { mesh, volumes, .. } = self;
         volumes.clear();
         for part in &mesh.parts {
-            for e in 0..part.n_elements() {
-                volumes.push(part.volume_of(e, &mesh.positions));
-            }
+            volumes.extend(volumes_of(part, &mesh.positions));
         }
     }
+}
+
+fn volumes_of(part: &Part, positions: &[[f64; 3]]) -> impl Iterator<Item = f64> {
+    (0..part.n_elements()).map(move |e| part.volume_of(e, positions))
 }
 
 /// The joins of a deck, by the index of their parts.
@@ -94,18 +96,21 @@ pub(super) fn joins(joins: &[contact::Join], names: &Names<'_>, log: &Log<'_>) -
     list
 }
 
-/// One mesh of all parts.
+/// One mesh of all parts; none where nobody waits for it any more.
 pub(super) fn assemble(
     drafts: &[PartDraft],
     joins: &[Join],
     materials: &[Material],
     meshes: &Meshes,
     log: &Log<'_>,
-) -> Assembly {
+) -> Option<Assembly> {
     let mut mesh = number(drafts, log);
     let mut smallest_edge = Vec::new();
     let mut largest_edge = Vec::new();
     for part in &mesh.parts {
+        if log.is_given_up() {
+            return None;
+        }
         let (low, high) = edges(&mesh.positions, part);
         smallest_edge.push(low);
         largest_edge.push(high);
@@ -128,19 +133,32 @@ pub(super) fn assemble(
         sets: BTreeMap::new(),
         segments: BTreeMap::new(),
     };
+    if log.is_given_up() {
+        return None;
+    }
     share(&mesh, drafts, &mut assembly.joined);
     if !joins.is_empty() {
         merge(&mut mesh, joins, &mut assembly, log);
     }
-    assembly.faces = drafts.iter().zip(&mesh.parts).map(|(draft, part)| global_faces(draft, part)).collect();
+    for (draft, part) in drafts.iter().zip(&mesh.parts) {
+        if log.is_given_up() {
+            return None;
+        }
+        assembly.faces.push(global_faces(draft, part));
+    }
     assembly.mesh = mesh;
-    assembly.measure_volumes();
+    for part in &assembly.mesh.parts {
+        if log.is_given_up() {
+            return None;
+        }
+        assembly.volumes.extend(volumes_of(part, &assembly.mesh.positions));
+    }
     velocities(&mut assembly, materials);
     let used = drafts.iter().filter_map(|d| d.numbers.as_ref()?.mesh.as_ref());
     for mesh in used.collect::<BTreeSet<_>>().into_iter().filter_map(|name| meshes.get(name)?.as_ref()) {
         take_over(&mesh.file, &mut assembly);
     }
-    assembly
+    Some(assembly)
 }
 
 /// Pairs of parts of one file that name the same node, into `joined`.

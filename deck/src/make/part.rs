@@ -54,6 +54,9 @@ pub(super) fn make(
     let mut first: BTreeMap<&str, Place> = BTreeMap::new();
     let mut budget = Budget { nodes: MAX_NODES, elements: log.most_elements() };
     for part in parts {
+        if log.is_given_up() {
+            break;
+        }
         let other = first.get(part.name.as_str()).copied();
         if let Some(named) = part.named {
             if let Some(other) = other {

@@ -124,7 +124,7 @@ fn default_gap(
     let quiet = log.quiet();
     let names = Names::of(&deck.parts, &quiet);
     let joins = assembly::joins(&deck.joins, &names, &quiet);
-    let assembly = assembly::assemble(parts, &joins, materials, meshes, &quiet);
+    let assembly = assembly::assemble(parts, &joins, materials, meshes, &quiet)?;
     let curves = Curves::of(&deck.curves, &quiet);
     let rigid = rigid::drafts(&deck.rigid, &names, &curves, &assembly, &quiet);
     contact::gap_to_come(given, &names, &assembly, &rigid, &quiet)

@@ -128,6 +128,9 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
     let offsets = assembly.mesh.element_offsets();
     let mut fit = true;
     for (p, (part, draft)) in assembly.mesh.parts.iter().zip(parts).enumerate() {
+        if log.is_given_up() {
+            return false;
+        }
         let volumes = &assembly.volumes[offsets[p]..offsets[p + 1]];
         let bad: Vec<usize> = (0..volumes.len())
             .filter(|&e| {

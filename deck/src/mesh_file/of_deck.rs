@@ -64,6 +64,9 @@ pub(crate) fn read_all(bundle: &Bundle<'_>, deck: Option<&Deck>, log: &Log<'_>) 
             Source::Body { composite, .. } => composite,
             _ => None,
         });
+        if log.is_given_up() {
+            break;
+        }
         let Some(index) = bundle.file(&beside(bundle.files[0].0, &file.value)) else { continue };
         let mut mesh = match read(bundle, index) {
             Ok(found) => {

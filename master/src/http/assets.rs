@@ -18,6 +18,12 @@ const FILES: [(&str, &str, &str); 9] = [
 ];
 const JS: &str = "text/javascript; charset=utf-8";
 
+/// The page itself.
+pub async fn page() -> impl axum::response::IntoResponse {
+    let (_, kind, text) = FILES[0];
+    ([(header::CONTENT_TYPE, kind)], text)
+}
+
 pub fn routes() -> Router<ApiState> {
     FILES.iter().fold(Router::new(), |router, &(path, kind, text)| {
         router.route(path, get(move || async move { ([(header::CONTENT_TYPE, kind)], text) }))

@@ -1,6 +1,8 @@
 //! GUARD: who may ask. A token always, a `Host` that no foreign name can stand for, an `Origin` that is our own.
 //!
-//! The token comes as `Authorization: Bearer TOKEN`, or in the cookie that the printed address sets. A page elsewhere can
+//! The token comes as `Authorization: Bearer TOKEN`, or in the cookie that the printed address sets. Browsers send cookies to every port of
+//! an address, so that of another user's server on this machine too; therefore the page stands below a random name, and the cookie goes with
+//! that name only. A page elsewhere can
 //! make a browser call us, but not read the answer, not send the cookie (`SameSite=Strict`), and not under our own name
 //! by a name server of its own, since only addresses, `localhost` and this machine's name pass as `Host`.
 
@@ -18,6 +20,8 @@ pub struct Guard {
     token: String,
     /// Name of the cookie: cookies do not know ports.
     cookie: String,
+    /// Path of the page, `/NAME/`, with which alone the cookie goes. The token leads to the name, and the name not to the token.
+    path: String,
     loopback: bool,
     scheme: &'static str,
     name: String,
@@ -62,16 +66,24 @@ impl Guard {
             None => make(&path)?,
         };
         let scheme = if tls { "https" } else { "http" };
-        Ok(Self { token, cookie: format!("bolide-{port}"), loopback, scheme, name })
+        let hash = blake3::derive_key("bolide 2026 name of the page's path", token.as_bytes());
+        let path = format!("/{}/", protocol::token::hex(&hash[..16]));
+        Ok(Self { token, cookie: format!("bolide-{port}"), path, loopback, scheme, name })
     }
 
     pub fn token(&self) -> &str {
         &self.token
     }
 
+    /// Path of the page: `/NAME/`.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
     pub fn set_cookie(&self) -> String {
         let secure = if self.scheme == "https" { "; Secure" } else { "" };
-        format!("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age=31536000{secure}", self.cookie, self.token)
+        let Self { cookie, token, path, .. } = self;
+        format!("{cookie}={token}; HttpOnly; SameSite=Strict; Path={path}; Max-Age=31536000{secure}")
     }
 
     /// Whether this is the token; takes as long for any guess.
@@ -159,6 +171,19 @@ mod tests {
     }
 
     #[test]
+    fn the_cookie_goes_with_a_name_that_nobody_guesses() {
+        let [folder, other] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+        let of = |folder: &Path| Guard::new(folder, 7, true, false, "lab".into()).expect("a token");
+        let (guard, other) = (of(folder.path()), of(other.path()));
+        let name = guard.path().trim_matches('/');
+        assert!(name.len() == 32 && name.bytes().all(|byte| byte.is_ascii_hexdigit()), "{name}");
+        assert_ne!(guard.path(), other.path());
+        assert_ne!(name, guard.token());
+        let cookie = guard.set_cookie();
+        assert!(cookie.contains(&format!("; Path=/{name}/;")), "{cookie}");
+    }
+
+    #[test]
     fn a_request_needs_the_token_our_host_and_no_foreign_origin() {
         let folder = tempfile::tempdir().expect("a folder");
         let guard = Guard::new(folder.path(), 7, true, false, "lab".into()).expect("a token");
@@ -183,5 +208,6 @@ mod tests {
         }
         let again = Guard::new(folder.path(), 7, true, false, "lab".into()).expect("a token");
         assert!(again.is_token(&token), "a restarted master keeps its token");
+        assert_eq!(again.path(), guard.path(), "and the address of its page");
     }
 }

@@ -5,7 +5,8 @@
 //! the seeds must find: `unfenced`, it hears messages of epochs that are over; `narrow`, it compares of two computations of an interval
 //! rows of the history and nothing else; `trusting`, it looks at no checksum of a stored file; `unsynced`, it stores a snapshot before the
 //! states that this counts on are durable; `careless`, it goes on where the disk has no room for results; `deaf`, it looks at no checksum of a
-//! frame; `patient`, it never gives up a worker that computes nothing.
+//! frame; `patient`, it never gives up a worker that computes nothing; `hasty`, a job fails of descriptors that its
+//! host does not have; `greedy`, it asks for nobody's memory once a job runs.
 
 use std::{process::ExitCode, time::Instant};
 

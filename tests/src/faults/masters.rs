@@ -83,17 +83,17 @@ pub fn cases() -> Vec<Case> {
                     ..Seen::default()
                 };
             };
-            let back = library.path().join("back");
+            let jump = library.path().join("jump");
             let (preload, file) =
-                (library.path().join("clock.so").display().to_string(), back.display().to_string());
-            let variables = [("LD_PRELOAD", preload.as_str()), ("BOLIDE_CLOCK_BACK", file.as_str())];
+                (library.path().join("clock.so").display().to_string(), jump.display().to_string());
+            let variables = [("LD_PRELOAD", preload.as_str()), ("BOLIDE_CLOCK_FILE", file.as_str())];
             let mut cluster = scene.cluster(&[], None, &variables);
             for name in ["a", "b", "c"] {
                 cluster.worker(name, "1");
             }
             let running = scene.submit(cluster);
             running.wait_for_cycle(scene.instant(430 + k));
-            fs::write(&back, "").expect("room");
+            fs::write(&jump, "-3600").expect("room");
             let summary = scene.end(&running);
             assert_eq!(summary["losses"], serde_json::json!([]));
             Seen { cycles_lost: Some(0), note: "no decision reads it".into(), ..Seen::default() }
@@ -156,26 +156,32 @@ fn damage(running: &Running, harm: impl Fn(&mut Vec<u8>)) {
     fs::write(&newest, bytes).expect("room");
 }
 
-/// A library whose wall clock is an hour late once the file `BOLIDE_CLOCK_BACK` is there, and always by
+/// A library whose wall clock is ahead by the seconds in the file `BOLIDE_CLOCK_FILE`, as long as there is one, and always by
 /// `BOLIDE_CLOCK_SHIFT` (s).
 const CLOCK: &str = r#"
 #define _GNU_SOURCE
+#include <fcntl.h>
 #include <stdlib.h>
 #include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
 int clock_gettime(clockid_t id, struct timespec *t) {
     int result = (int)syscall(SYS_clock_gettime, id, t);
-    const char *file = getenv("BOLIDE_CLOCK_BACK");
+    const char *name = getenv("BOLIDE_CLOCK_FILE");
     const char *shift = getenv("BOLIDE_CLOCK_SHIFT");
-    if (id == CLOCK_REALTIME && file && access(file, F_OK) == 0) t->tv_sec -= 3600;
+    int file = id == CLOCK_REALTIME && name ? open(name, O_RDONLY | O_CLOEXEC) : -1;
+    if (file >= 0) {
+        char seconds[32] = "";
+        if (read(file, seconds, sizeof seconds - 1) > 0) t->tv_sec += atol(seconds);
+        close(file);
+    }
     if (id == CLOCK_REALTIME && shift) t->tv_sec += atol(shift);
     return result;
 }
 "#;
 
 /// A folder with `clock.so` in it; none where there is no C compiler.
-pub(super) fn clock_library() -> Option<tempfile::TempDir> {
+pub(crate) fn clock_library() -> Option<tempfile::TempDir> {
     let folder = tempfile::tempdir().expect("a folder");
     let (source, library) = (folder.path().join("clock.c"), folder.path().join("clock.so"));
     fs::write(&source, CLOCK).expect("room");

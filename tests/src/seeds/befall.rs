@@ -7,7 +7,7 @@ use master::{
 };
 use protocol::message::ToMaster;
 
-use super::{Bug, Fault, Play, Process, What};
+use super::{Bug, Fault, Play, Process, What, memory::Small};
 
 impl Play {
     pub(super) fn befall(&mut self, fault: Fault) -> Result<(), String> {
@@ -69,6 +69,13 @@ impl Play {
                 }
             }
             Fault::Full { writes } => weather.disk.full = writes,
+            Fault::Files { writes } => weather.disk.files = writes,
+            Fault::Memory { host } => {
+                if let Some(host) = pick(host).filter(|&host| weather.hosts[host].load > 0) {
+                    weather.small = Some(Small::beside(weather.hosts[host].load));
+                    weather.end(host);
+                }
+            }
             Fault::Rot => {
                 weather.disk.rot(&mut weather.draws);
                 self.without_master();

@@ -1,16 +1,18 @@
 //! The disk of one seed: rows and states of the results, and a real store of snapshots in a folder of its own.
 //!
-//! It can be full, flip a bit of a stored file, and lose the last rename when its machine loses power. What the master must not do about that
+//! It can be full, or the master have no descriptor left for a file; it can flip a bit of a stored file, and lose the last rename when its
+//! machine loses power. What the master must not do about that
 //! can be planted.
 
 use std::{
-    fs,
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use master::{
     event::Action,
-    results::history::HistoryRow,
+    results::{self, history::HistoryRow},
+    service::is_shortage,
     snapshot::{
         Snapshot,
         file::CHUNK,
@@ -26,6 +28,11 @@ const HEADER: usize = 24;
 /// Bytes of a checksum.
 const SUM: usize = 32;
 
+/// What the system says where the disk has no room.
+const NO_ROOM: i32 = if cfg!(windows) { 112 } else { 28 };
+/// The same where a process has no descriptor left.
+const NO_FILES: i32 = if cfg!(windows) { 4 } else { 24 };
+
 /// What was written to the disk.
 pub(super) struct Disk {
     pub(super) rows: Vec<HistoryRow>,
@@ -39,8 +46,12 @@ pub(super) struct Disk {
     synced: usize,
     /// Writes that it has no room for.
     pub(super) full: u64,
+    /// Files that the master cannot open, and callers that it cannot take.
+    pub(super) files: u64,
     /// A state or row found no room: the job cannot go on before there is some.
     pub(super) is_short: bool,
+    /// Why the job has failed.
+    pub(super) failure: Option<String>,
     bug: Option<Bug>,
 }
 
@@ -54,7 +65,9 @@ impl Disk {
             before: Vec::new(),
             synced: 0,
             full: 0,
+            files: 0,
             is_short: false,
+            failure: None,
             bug,
         }
     }
@@ -65,14 +78,11 @@ impl Disk {
     /// What the real disk refused.
     pub(super) fn take(&mut self, action: Action) -> Result<(), String> {
         match action {
-            Action::Row(_) | Action::State(_) if self.has_no_room() => {
-                // Planted: what is not written is not missed.
-                self.is_short = self.bug != Some(Bug::Careless);
-            }
+            Action::Row(_) | Action::State(_) if self.refuses_results() => {}
             Action::Row(row) => self.rows.push(*row),
             Action::State(state) => self.states.push(*state),
             // The run goes on with the older ones.
-            Action::Snapshot(_) | Action::Checkpoint { .. } if self.has_no_room() => {}
+            Action::Snapshot(_) | Action::Checkpoint { .. } if self.refusal().is_some() => {}
             Action::Snapshot(snapshot) | Action::Checkpoint { snapshot, .. } => self.put(&snapshot)?,
             Action::Rewind { rows, cycle } => {
                 self.rows.truncate(rows);
@@ -83,10 +93,29 @@ impl Disk {
         Ok(())
     }
 
-    fn has_no_room(&mut self) -> bool {
-        let has_none = self.full > 0;
-        self.full = self.full.saturating_sub(1);
-        has_none
+    /// What the system says to the next write, if it refuses it.
+    fn refusal(&mut self) -> Option<i32> {
+        let (count, number) =
+            if self.files > 0 { (&mut self.files, NO_FILES) } else { (&mut self.full, NO_ROOM) };
+        let refuses = *count > 0;
+        *count = count.saturating_sub(1);
+        refuses.then_some(number)
+    }
+
+    /// Whether a row or state is not written; then the job waits or has failed, by what the master makes of the system's words.
+    fn refuses_results(&mut self) -> bool {
+        let Some(number) = self.refusal() else { return false };
+        let source = io::Error::from_raw_os_error(number);
+        let reason = results::Error::Io { action: "write", path: "results".into(), source }.to_string();
+        match self.bug {
+            // Planted: what is not written is not missed.
+            Some(Bug::Careless) => {}
+            // Planted: a lack of descriptors is the job's own fault.
+            Some(Bug::Hasty) if number == NO_FILES => self.failure = Some(reason),
+            _ if is_shortage(&reason) => self.is_short = true,
+            _ => self.failure = Some(reason),
+        }
+        true
     }
 
     fn put(&mut self, snapshot: &Snapshot) -> Result<(), String> {
@@ -115,7 +144,8 @@ impl Disk {
     /// # Errors
     /// If the folder cannot be read.
     pub(super) fn newest(&mut self) -> Result<Option<Snapshot>, String> {
-        self.is_short = false;
+        // Another process, with descriptors of its own.
+        (self.is_short, self.files) = (false, 0);
         self.store = None;
         let Some(path) = self.path() else { return Ok(None) };
         if self.bug == Some(Bug::Trusting)

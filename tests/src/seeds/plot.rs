@@ -45,6 +45,13 @@ pub enum Fault {
         /// How many: rows, states and snapshots.
         writes: u64,
     },
+    /// The master has no descriptor left: it opens no file and takes no caller.
+    Files {
+        /// How many of both fail.
+        writes: u64,
+    },
+    /// Others take the memory of a host's machine: its process is ended, and one that starts there again has no memory for its share.
+    Memory { host: u64 },
     /// A bit flips in a stored file, and the master is gone, so that the next one reads it.
     Rot,
     /// The master's machine loses power before the last rename of a snapshot was durable.
@@ -93,11 +100,15 @@ pub enum Bug {
     Deaf,
     /// It never gives up a worker whose link lives.
     Patient,
+    /// A job fails of descriptors that its host does not have.
+    Hasty,
+    /// Once a job runs it asks for nobody's memory.
+    Greedy,
 }
 
 impl Bug {
     /// Each with its name on the command line.
-    pub const ALL: [(&str, Self); 7] = [
+    pub const ALL: [(&str, Self); 9] = [
         ("unfenced", Self::Unfenced),
         ("narrow", Self::Narrow),
         ("trusting", Self::Trusting),
@@ -105,6 +116,8 @@ impl Bug {
         ("careless", Self::Careless),
         ("deaf", Self::Deaf),
         ("patient", Self::Patient),
+        ("hasty", Self::Hasty),
+        ("greedy", Self::Greedy),
     ];
 }
 
@@ -235,7 +248,7 @@ impl Stage {
                 // In one case of three close behind the one before: in its rollback.
                 at = if draws.below(3) == 0 { at + draws.below(40) } else { draws.below(length) };
                 let (host, other) = (draws.below(64), draws.below(64));
-                let fault = match draws.below(26) {
+                let fault = match draws.below(29) {
                     0..=3 => Fault::Crash { host, returns: true },
                     4 | 5 => Fault::Crash { host, returns: false },
                     6 => Fault::Cut { host, long: false },
@@ -252,6 +265,8 @@ impl Stage {
                     21 => Fault::PowerLoss,
                     22 => Fault::Stick { host },
                     23 | 24 => Fault::Garble { host, bit: draws.below(1 << 20) as u32 },
+                    25 => Fault::Files { writes: 1 + other },
+                    26 | 27 => Fault::Memory { host },
                     _ => Fault::Clock { ahead: host < 32 },
                 };
                 (at, fault)

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::Weekend;
+use super::{JUMP, Weekend};
 
 /// Kinds of decks that only acts submit: the last ones of the list.
 pub(super) const SPECIAL: usize = 2;
@@ -16,6 +16,8 @@ pub(super) const SPECIAL: usize = 2;
 const POISON: usize = 4;
 /// Index of the deck that wants more workers than there are.
 pub(super) const CROWD: usize = 5;
+/// By so much the clock is wrong (s).
+const JUMPS: [i64; 6] = [3_600, -3_600, 86_400, -86_400, 4 * 365 * 86_400, -4 * 365 * 86_400];
 /// Callers that say nothing.
 const IDLE: usize = 300;
 
@@ -33,6 +35,8 @@ pub enum Act {
     LeaveMaster,
     /// No room on the disk of the spool for 4 s.
     FullDisk,
+    /// The wall clock of the master is wrong for 4 s: by an hour, a day or four years, ahead or back.
+    ClockJump,
     /// One bit of a record, deck or snapshot; then the master is killed.
     FlipInFile,
     /// 300 connections that say nothing, to the master and its page.
@@ -50,7 +54,7 @@ pub enum Act {
 }
 
 impl Act {
-    const ALL: [Self; 16] = [
+    const ALL: [Self; 17] = [
         Self::KillWorker,
         Self::KillTwoWorkers,
         Self::KillMaster,
@@ -59,6 +63,7 @@ impl Act {
         Self::LeaveWorker,
         Self::LeaveMaster,
         Self::FullDisk,
+        Self::ClockJump,
         Self::FlipInFile,
         Self::IdleSockets,
         Self::Garbage,
@@ -80,6 +85,7 @@ impl Act {
             Self::LeaveWorker => "SIGTERM to a worker",
             Self::LeaveMaster => "SIGTERM to the master",
             Self::FullDisk => "full disk of the spool, 4 s",
+            Self::ClockJump => "the master's wall clock jumps, and back after 4 s",
             Self::FlipInFile => "a bit of a record, deck or snapshot flips; kill -9 of the master",
             Self::IdleSockets => "300 callers that say nothing",
             Self::Garbage => "garbage at both ports",
@@ -130,6 +136,7 @@ impl Weekend {
                 self.revive();
             }
             Act::FullDisk => return self.fill_disk(),
+            Act::ClockJump => return self.jump_clock(number),
             Act::FlipInFile => return self.flip_in_file(),
             Act::IdleSockets => self.idle_sockets(),
             Act::Garbage => {
@@ -171,6 +178,17 @@ impl Weekend {
         let block = vec![0; 1 << 16];
         // Until there is no room.
         while file.write_all(&block).is_ok() {}
+        true
+    }
+
+    /// Sets the master's wall clock wrong, under which certificates are not yet valid or have expired.
+    fn jump_clock(&mut self, number: u64) -> bool {
+        let Some(clock) = self.clock.as_ref().filter(|_| self.wrong_until.is_none()) else { return false };
+        let seconds = JUMPS[number as usize % JUMPS.len()];
+        if let Err(error) = fs::write(clock.path().join(JUMP), seconds.to_string()) {
+            self.seen.wrong.push(format!("the clock: {error}"));
+        }
+        self.wrong_until = Some(Instant::now() + Duration::from_secs(4));
         true
     }
 

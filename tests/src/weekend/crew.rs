@@ -40,11 +40,17 @@ impl Crew {
         Self { workers, guests: Vec::new(), n_guests: 0 }
     }
 
-    /// Starts those that have died, lets those go on that were stopped long enough, and ends guests.
-    pub(super) fn revive(&mut self, cluster: &Cluster) {
+    /// Starts those that have died, lets those go on that were stopped long enough, and ends guests. Gives what may not be: a worker that a
+    /// wrong clock has ended for good.
+    pub(super) fn revive(&mut self, cluster: &Cluster) -> Vec<String> {
         let now = Instant::now();
+        let mut wrong = Vec::new();
         for worker in &mut self.workers {
             if !worker.process.is_alive() {
+                let text = worker.process.text();
+                if worker.process.wait().code() == Some(1) && text.contains("expired") {
+                    wrong.push(format!("worker {} ended by itself: {text}", worker.name));
+                }
                 (worker.process, worker.stopped) = (start(cluster, worker.name), None);
             } else if worker.stopped.is_some_and(|until| now >= until) {
                 worker.process.signal("CONT");
@@ -52,6 +58,7 @@ impl Crew {
             }
         }
         self.guests.retain(|guest| now < guest.until);
+        wrong
     }
 
     pub(super) fn wake_all(&mut self) {
