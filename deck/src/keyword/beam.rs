@@ -21,7 +21,8 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
             return;
         };
         let g = context.fields(second, block.width, &TENS);
-        let section = match f.integer(1) {
+        let form = f.integer(1);
+        let section = match form {
             form @ (0 | 1 | 4 | 5) => of_shape(&f, &g, (form == 5, context), card),
             2 => of_moments(&g).map(Section::Beam),
             3 => truss(&g),
@@ -35,7 +36,11 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
             }
         };
         // One that could not be read is known, so that its parts say nothing of it.
-        problem.sections.insert(f.id(0), (card.at, section.unwrap_or(Section::Truss(1.0))));
+        let unread = || match form {
+            3 => Section::Truss(1.0),
+            _ => Section::Beam(Shape::Rectangle([1.0; 2]).section(POINTS)),
+        };
+        problem.sections.insert(f.id(0), (card.at, section.unwrap_or_else(unread)));
     }
 }
 
