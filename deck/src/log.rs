@@ -176,6 +176,11 @@ impl<'a> Log<'a> {
         self.is_given_up.is_some_and(|is_given_up| is_given_up())
     }
 
+    /// None where nobody waits for the deck any more, for functions that go no further then.
+    pub(crate) fn wanted(&self) -> Option<()> {
+        (!self.is_given_up()).then_some(())
+    }
+
     pub(crate) fn warn(&self, at: Place, words: impl Into<String>) {
         let warning = (at.at_column(1), words.into());
         let mut warnings = self.warnings.borrow_mut();

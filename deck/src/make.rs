@@ -50,22 +50,16 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let mut materials = Materials::of(deck, log);
     let hourglass = deck.control.as_ref().and_then(|control| control.hourglass).unwrap_or_default();
     let mut parts = part::make((&deck.parts, hourglass), &mut materials, meshes, log);
-    if log.is_given_up() {
-        return None;
-    }
+    log.wanted()?;
     let materials = materials.list;
     let names = Names::of(&deck.parts, log);
     placement::resolve(deck, &mut parts, &names, &materials, meshes, log);
-    if log.is_given_up() {
-        return None;
-    }
+    log.wanted()?;
     symmetry::cut(deck, &mut parts, log);
     let parts = parts;
     let joins = assembly::joins(&deck.joins, &names, log);
     let mut assembly = assembly::assemble(&parts, &joins, &materials, meshes, log)?;
-    if log.is_given_up() {
-        return None;
-    }
+    log.wanted()?;
     let curves = Curves::of(&deck.curves, log);
     let rigid = rigid::drafts(&deck.rigid, &names, &curves, &assembly, log);
     let clamps = clamp::boundaries(&deck.parts, &parts, log);
@@ -73,16 +67,12 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let supports: Vec<_> = deck.boundaries.iter().chain(&intended).collect();
     let mut conditions = boundary::make((deck, &supports), &names, curves, &parts, &assembly, log);
     assembly.mesh.lumped = load::lumped(deck, &names, &parts, &assembly, log);
-    if log.is_given_up() {
-        return None;
-    }
+    log.wanted()?;
     let bodies = rigid::make(&rigid, &materials, &mut assembly, &mut conditions, log);
     let contact = deck.contact.as_ref().and_then(|contact| {
         contact::make(contact, &names, &mut assembly, &materials, &conditions, &rigid, log)
     });
-    if log.is_given_up() {
-        return None;
-    }
+    log.wanted()?;
     let settings = contact.as_ref().map(|contact| &contact.settings);
     let control = deck.control.as_ref().map(|given| {
         let control = control::make(given, log);
@@ -92,9 +82,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let output = output::make(deck, &names, &assembly, &bodies, log);
     let detonations = burn::make(deck, &materials, &parts, log);
     let faces = contact.as_ref().map(|contact| (&contact.settings, contact.faces.as_slice()));
-    if log.is_given_up() {
-        return None;
-    }
+    log.wanted()?;
     spans::check(&parts, &assembly, faces, &materials, log);
 
     for (part, draft) in assembly.mesh.parts.iter_mut().zip(&parts) {
@@ -115,9 +103,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
             *component = prescribed.unwrap_or(*component);
         }
     }
-    if log.is_given_up() {
-        return None;
-    }
+    log.wanted()?;
     let control = control?;
     let settings = contact.map(|contact| {
         let settings = contact.settings;

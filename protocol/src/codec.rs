@@ -25,9 +25,8 @@ pub const OPEN_STREAMS: usize = 16;
 ///
 /// # Errors
 /// What the writer refused.
-pub fn encode_into<T: Serialize>(value: &T, into: &mut dyn std::io::Write) -> Result<()> {
+pub fn encode_into<T: Serialize>(value: &T, mut into: &mut dyn std::io::Write) -> Result<()> {
     let config = bincode::config::standard().with_little_endian().with_fixed_int_encoding();
-    let mut into = into;
     let written = bincode::serde::encode_into_std_write(value, &mut into, config);
     written.map(|_| ()).map_err(|error| Error::Message(error.to_string()))
 }

@@ -1,15 +1,12 @@
 //! `*SECTION_BEAM` of trusses and beams.
 
-use mechanics::element::beam2::{BeamSection, Shape};
+use mechanics::element::beam2::{BeamSection, Shape, USUAL_POINTS};
 
 use super::{
     cards::{Block, Card},
     fields::{Context, Fields, TENS},
     problem::{Problem, Section},
 };
-
-/// Fibres across a section.
-const POINTS: u32 = 6;
 
 /// `*SECTION_BEAM`.
 pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
@@ -38,7 +35,7 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
         // One that could not be read is known, so that its parts say nothing of it.
         let unread = || match form {
             3 => Section::Truss(1.0),
-            _ => Section::Beam(Shape::Rectangle([1.0; 2]).section(POINTS)),
+            _ => Section::Beam(Shape::Rectangle([1.0; 2]).section(USUAL_POINTS)),
         };
         problem.sections.insert(f.id(0), (card.at, section.unwrap_or_else(unread)));
     }
@@ -135,12 +132,12 @@ fn of_shape(
         f.fault(3, "a rule of points that is built in", "leave QR blank");
         return None;
     }
-    let mut section = shape.section(POINTS);
+    let mut section = shape.section(USUAL_POINTS);
     let factor = f.real(2, 1.0);
     section.shear = [factor.max(0.0) * section.area; 2];
     context.log.warn(
         card.at,
-        format!("beams whose material yields have {POINTS} points across the section, at both ends and in the middle"),
+        format!("beams whose material yields have {USUAL_POINTS} points across the section, at both ends and in the middle"),
     );
     Some(Section::Beam(section))
 }

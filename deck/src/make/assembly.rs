@@ -108,9 +108,7 @@ pub(super) fn assemble(
     let mut smallest_edge = Vec::new();
     let mut largest_edge = Vec::new();
     for part in &mesh.parts {
-        if log.is_given_up() {
-            return None;
-        }
+        log.wanted()?;
         let (low, high) = edges(&mesh.positions, part);
         smallest_edge.push(low);
         largest_edge.push(high);
@@ -133,24 +131,18 @@ pub(super) fn assemble(
         sets: BTreeMap::new(),
         segments: BTreeMap::new(),
     };
-    if log.is_given_up() {
-        return None;
-    }
+    log.wanted()?;
     share(&mesh, drafts, &mut assembly.joined);
     if !joins.is_empty() {
         merge(&mut mesh, joins, &mut assembly, log);
     }
     for (draft, part) in drafts.iter().zip(&mesh.parts) {
-        if log.is_given_up() {
-            return None;
-        }
+        log.wanted()?;
         assembly.faces.push(global_faces(draft, part));
     }
     assembly.mesh = mesh;
     for part in &assembly.mesh.parts {
-        if log.is_given_up() {
-            return None;
-        }
+        log.wanted()?;
         assembly.volumes.extend(volumes_of(part, &assembly.mesh.positions));
     }
     velocities(&mut assembly, materials);

@@ -164,7 +164,7 @@ fn hourglass_of(part: &Part, material: Option<&Material>, of_deck: Hourglass, lo
 fn criteria(given: &Erosion, kind: Kind, material: Option<&Material>, log: &Log<'_>) -> Criteria {
     match kind {
         Kind::Solids => {}
-        Kind::Shells(_) | Kind::Beams { .. } => check_shells(given, log),
+        Kind::Shells(_) | Kind::Beams { .. } => check_layers(given, log),
         Kind::Trusses { .. } => log.fault_of(
             given.origin,
             "solids, shells or beams: trusses do not erode",
@@ -217,7 +217,7 @@ fn criteria(given: &Erosion, kind: Kind, material: Option<&Material>, log: &Log<
 }
 
 /// Shells erode by the plastic strain of their layers and beams by that of their fibres, which is to be given, and by nothing else.
-fn check_shells(given: &Erosion, log: &Log<'_>) {
+fn check_layers(given: &Erosion, log: &Log<'_>) {
     let (expected, advice) = (
         "plastic_strain: shells and beams erode by that of their layers and fibres alone",
         "give plastic_strain",

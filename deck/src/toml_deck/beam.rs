@@ -1,27 +1,22 @@
 //! `beam = { ... }` of a part: the section of beams and how they stand.
 
-use mechanics::element::beam2::{BeamSection, Shape};
+use mechanics::element::beam2::{BeamSection, Shape, USUAL_POINTS};
 
 use crate::{
     table::{Range, Table, Value},
     typed::part::Kind,
 };
 
-/// Fibres across a section where the deck does not say.
-const POINTS: u64 = 6;
-
 /// `beam = { rectangle, round, tube, or area, inertia and torsion; points, shear_area, across }`.
 pub(super) fn read(value: Value<'_>, name: &str) -> Option<Kind> {
     let table = value.table(format!("beam of \"{name}\""))?;
     let section = read_section(&value, &table);
-    let shear = table
-        .get("shear_area")
-        .map(|v| v.numbers::<2>("two areas", Range::NotNegative).map(|shear| (shear, v)));
+    let shear = table.get("shear_area").map(|v| v.numbers::<2>("two areas", Range::NotNegative));
     let across = table.get("across").map_or(Some([0.0; 3]), |v| v.vector());
     table.finish();
     let mut section = section?;
     if let Some(given) = shear {
-        (section.shear, _) = given?;
+        section.shear = given?;
     }
     Some(Kind::Beams { section, across: across? })
 }
@@ -50,7 +45,7 @@ fn read_section(value: &Value<'_>, table: &Table<'_>) -> Option<BeamSection> {
         });
     }
     let points = match table.get("points") {
-        None => Some(POINTS),
+        None => Some(u64::from(USUAL_POINTS)),
         Some(points) => points.integer(2, 10).filter(|count| {
             let is_even = count % 2 == 0;
             if !is_even {

@@ -17,11 +17,13 @@
 //! torsion is exact and the rotation of cross-sections in bending somewhat heavy; the limit of the time step is that of
 //! the fastest of the six motions with it. The elements are few and their arithmetic is short, so they are computed one at a time.
 
+use crate::rigid::dot;
+
 mod fibre;
 pub(crate) mod group;
 mod section;
 
-pub use section::{BeamError, BeamSection, Shape, check};
+pub use section::{BeamError, BeamSection, Shape, USUAL_POINTS, check};
 
 /// State of an element beside its fibres: the axis `e2`, axial force, torque, the moments of the first and of the second end about
 /// `e2`, likewise about `e3`, internal energy.
@@ -63,14 +65,6 @@ pub fn axis(a: [f64; 3], b: [f64; 3], across: [f64; 3]) -> [f64; 3] {
     of_length_1(normal(unit))
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 fn scaled(a: [f64; 3], by: f64) -> [f64; 3] {
     a.map(|a| a * by)
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

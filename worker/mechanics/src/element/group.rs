@@ -8,7 +8,12 @@ use std::ops::Range;
 
 use super::{ElementVote, Step, layout::Layout, place::Nodal};
 use crate::{
-    erosion::criteria::Criteria, flip::Target, lanes::Width, material::Material, mesh::Nodes, spin::Turning,
+    erosion::criteria::Criteria,
+    flip::Target,
+    lanes::{SET, Width},
+    material::Material,
+    mesh::Nodes,
+    spin::Turning,
     state::N_FIELDS,
 };
 
@@ -45,6 +50,19 @@ pub(crate) struct Scanned<'a> {
     pub alive: &'a [u8],
     /// One array per entry of [`crate::state::FIELDS`], by slot.
     pub fields: [&'a [f64]; N_FIELDS],
+}
+
+/// [`Group::alive`] of so many elements that sit one after the other and all take part.
+pub(crate) fn all_alive(n_elements: usize) -> Vec<u8> {
+    (0..n_elements.div_ceil(SET))
+        .map(|set| (0..SET).map(|i| u8::from(set * SET + i < n_elements) << i).sum())
+        .collect()
+}
+
+/// The slots of `sets` whose elements take part.
+pub(crate) fn living(alive: &[u8], sets: &[Range<u32>]) -> impl Iterator<Item = usize> {
+    let slots = sets.iter().flat_map(|range| range.start as usize * SET..range.end as usize * SET);
+    slots.filter(|slot| alive[slot / SET] >> (slot % SET) & 1 == 1)
 }
 
 /// The elements of a block. Elements are by local index, nodes by the local index of the block.

@@ -4,11 +4,11 @@
 //! `V / V0 = 1 + (1 - 2 nu) sigma / E`, and its section is `V / L`. The strain of a step is `2 (L - L') / (L + L')`, the logarithmic
 //! strain to third order. The elements are few and their arithmetic is short, so they are computed one at a time.
 
-use std::{fmt, ops::Range};
+use std::{fmt, mem::take};
 
 use super::{
     ElementVote, Fault, Step,
-    group::{Call, ElementArrays, Group},
+    group::{Call, ElementArrays, Group, all_alive, living},
     place::Nodal,
 };
 use crate::{
@@ -85,14 +85,11 @@ impl Trusses {
     /// # Panics
     /// If the material has no strength.
     pub fn of(piece: &mut Piece, bars: Vec<[u32; 2]>, material: &Material) -> Self {
-        let n_elements = bars.len();
         Self {
             n_nodes: piece.nodes.len(),
-            fields: std::mem::take(&mut piece.fields),
-            initial_volume: std::mem::take(&mut piece.initial_volume),
-            alive: (0..n_elements.div_ceil(SET))
-                .map(|set| (0..SET).map(|i| u8::from(set * SET + i < n_elements) << i).sum())
-                .collect(),
+            fields: take(&mut piece.fields),
+            initial_volume: take(&mut piece.initial_volume),
+            alive: all_alive(bars.len()),
             elements: piece.elements.clone(),
             density: material.density,
             law: PlaneLaw::of(material).expect("the deck has checked the material"),
@@ -236,13 +233,11 @@ impl Group for Trusses {
         call: &Call<'_>,
         vote: &mut ElementVote,
     ) {
-        for &Range { start, end } in call.sets {
-            for e in start as usize * SET..(end as usize * SET).min(self.bars.len()) {
-                if self.alive[e / SET] >> (e % SET) & 1 == 1 {
-                    self.one(e, &mut nodes, call.step, vote);
-                }
-            }
+        let alive = take(&mut self.alive);
+        for e in living(&alive, call.sets) {
+            self.one(e, &mut nodes, call.step, vote);
         }
+        self.alive = alive;
     }
 
     fn element(&self, element: usize, _x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {

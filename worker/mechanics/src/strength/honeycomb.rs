@@ -199,11 +199,7 @@ impl StrengthLaw for Cells {
             stress[i] = L::select(is_solid, solid[i], grown.min(bound).max(-bound));
             i += 1;
         }
-        let (mean, deviator) = axes.stress(stress);
-        memory.least_pressure = L::splat(-f64::MAX);
-        memory.added_pressure = -mean - around.pressure;
-        // A pass that prepares a run leaves the stress to the bit.
-        deviator.or(zero.less(around.dt), &trial)
+        axes.answer(stress, &trial, around, memory)
     }
 }
 

@@ -4,11 +4,12 @@
 //! turn of an element since then as a unit quaternion, four history variables. The spin of a step turns it as it turns the stress (Hughes
 //! and Winget 1980), so a stress that goes round with its element has the same components along the axes.
 
-use super::{Around, Deviator, finite_strain::Symmetric};
+use super::{Around, Deviator, Memory, finite_strain::Symmetric};
 use crate::{
     element::vector::{Tensor, Vector},
     lanes::Lane,
     law::{Unit, Variable},
+    rigid::{cross, dot},
 };
 
 /// The columns of a law that keeps the turn, first among its history variables.
@@ -21,11 +22,8 @@ const fn column(name: &'static str, initial: f64) -> Variable {
 
 /// The axes at the start by the vectors a and d; none where they span no plane.
 pub(super) fn at_start(a: [f64; 3], d: [f64; 3]) -> Option<[[f64; 3]; 3]> {
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
     let unit = |v: [f64; 3], least: f64| {
-        let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        let length = dot(v, v).sqrt();
         (length > least && length.is_finite()).then(|| v.map(|x| x / length))
     };
     let a = unit(a, 0.0)?;
@@ -122,9 +120,25 @@ impl<L: Lane> Axes<L> {
         strain
     }
 
+    /// What a law answers that makes the whole stress, by its components along the axes after the step. A pass that prepares a run leaves the
+    /// stress to the bit.
+    #[inline(always)]
+    pub fn answer(
+        &self,
+        stress: [L; 6],
+        trial: &Deviator<L>,
+        around: &Around<L>,
+        memory: &mut Memory<L>,
+    ) -> Deviator<L> {
+        let (mean, deviator) = self.stress(stress);
+        memory.least_pressure = L::splat(-f64::MAX);
+        memory.added_pressure = -mean - around.pressure;
+        deviator.or(L::splat(0.0).less(around.dt), trial)
+    }
+
     /// The mean of a stress with these components along the axes after the step, and its deviator.
     #[inline(always)]
-    pub fn stress(&self, [aa, bb, cc, ab, bc, ca]: [L; 6]) -> (L, Deviator<L>) {
+    fn stress(&self, [aa, bb, cc, ab, bc, ca]: [L; 6]) -> (L, Deviator<L>) {
         let mean = (aa + bb + cc) * L::splat(1.0 / 3.0);
         let [a, b, c] = &self.after;
         // What the stress does to each axis.

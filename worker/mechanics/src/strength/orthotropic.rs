@@ -125,7 +125,7 @@ impl Orthotropic {
     pub(crate) fn fault(&self) -> Option<&'static str> {
         if self.normal().is_none() {
             return Some(
-                "Poisson's ratios with which no strain gives energy away: ratio_ba^2 below young_b/young_a, and so on",
+                "Poisson's ratios with which no strain gives energy away: poisson_ba^2 below young_b/young_a, and so on",
             );
         }
         self.axes().is_none().then_some("axes a and d that are not parallel and not of no length")
@@ -257,11 +257,7 @@ impl StrengthLaw for Laminate {
         memory.variables[LAYERS] = or(is_one(peeled), layers);
         memory.damage = memory.variables[FIBRES];
 
-        let (mean, deviator) = axes.stress(stress);
-        memory.least_pressure = L::splat(-f64::MAX);
-        memory.added_pressure = -mean - around.pressure;
-        // A pass that prepares a run leaves the stress to the bit.
-        deviator.or(moves, &trial)
+        axes.answer(stress, &trial, around, memory)
     }
 }
 

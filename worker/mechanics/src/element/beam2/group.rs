@@ -1,15 +1,15 @@
 //! The beams of a block, one at a time.
 
-use std::ops::Range;
+use std::{mem::take, ops::Range};
 
 use super::{
-    AXIAL, ELEMENT, ENERGY, FIBRE, PLASTIC_STRAIN, STATIONS, TEMPERATURE, cross, dot, fibre::Fibre, scaled,
+    AXIAL, ELEMENT, ENERGY, FIBRE, PLASTIC_STRAIN, STATIONS, TEMPERATURE, fibre::Fibre, scaled,
     section::BeamSection,
 };
 use crate::{
     element::{
         ElementVote, Fault, Step,
-        group::{Call, ElementArrays, Group},
+        group::{Call, ElementArrays, Group, all_alive, living},
         place::Nodal,
     },
     erosion::criteria::Criteria,
@@ -18,6 +18,7 @@ use crate::{
     material::Material,
     mesh::spread,
     piece::Piece,
+    rigid::{cross, dot},
     spin::Turning,
     state::{N_FIELDS, field},
     strength::plane_stress::PlaneLaw,
@@ -84,17 +85,14 @@ impl Beams {
     /// # Panics
     /// If beams cannot be of the material.
     pub fn of(piece: &mut Piece, bars: Vec<[u32; 2]>, section: &BeamSection, material: &Material) -> Self {
-        let n_elements = bars.len();
-        let own = std::mem::take(&mut piece.own);
+        let own = take(&mut piece.own);
         assert!(own.len() == section.n_fields(), "{} arrays of beams", own.len());
         let law = PlaneLaw::of(material).expect("the deck has checked the material");
         Self {
             n_nodes: piece.nodes.len(),
             own,
-            initial_volume: std::mem::take(&mut piece.initial_volume),
-            alive: (0..n_elements.div_ceil(SET))
-                .map(|set| (0..SET).map(|i| u8::from(set * SET + i < n_elements) << i).sum())
-                .collect(),
+            initial_volume: take(&mut piece.initial_volume),
+            alive: all_alive(bars.len()),
             elements: piece.elements.clone(),
             density: material.density,
             section: *section,
@@ -366,13 +364,11 @@ impl Group for Beams {
         vote: &mut ElementVote,
     ) {
         let turning = turning.expect("a block of beams was built with rotations");
-        for &Range { start, end } in call.sets {
-            for e in start as usize * SET..(end as usize * SET).min(self.bars.len()) {
-                if self.alive[e / SET] >> (e % SET) & 1 == 1 {
-                    self.one(e, &mut nodes, turning, call.step, vote);
-                }
-            }
+        let alive = take(&mut self.alive);
+        for e in living(&alive, call.sets) {
+            self.one(e, &mut nodes, turning, call.step, vote);
         }
+        self.alive = alive;
     }
 
     fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
@@ -412,18 +408,10 @@ impl Group for Beams {
         if self.fibres.is_empty() {
             return Vec::new();
         }
-        let n_elements = self.bars.len();
-        let slots = sets.iter().flat_map(|range| {
-            (range.start as usize * SET..(range.end as usize * SET).min(n_elements)).map(|slot| slot as u32)
-        });
-        slots
-            .filter(|&slot| {
-                let e = slot as usize;
-                let takes_part = self.alive[e / SET] >> (e % SET) & 1 == 1;
-                let parted = |station| self.strains(e, station).all(|strain| strain >= limit);
-                takes_part && (0..STATIONS.len()).any(parted)
-            })
-            .collect()
+        let has_parted = |&e: &usize| {
+            (0..STATIONS.len()).any(|station| self.strains(e, station).all(|strain| strain >= limit))
+        };
+        living(&self.alive, sets).filter(has_parted).map(|slot| slot as u32).collect()
     }
 
     fn first_stress(&mut self) -> Option<&mut f64> {

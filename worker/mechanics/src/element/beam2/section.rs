@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 use super::{ELEMENT, FIBRE, STATIONS};
 use crate::{material::Material, strength::plane_stress::PlaneLaw};
 
+/// Fibres across a section where a deck does not say.
+pub const USUAL_POINTS: u32 = 6;
+
 /// The shape of a cross-section, about its centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Shape {

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     element::{
         ElementVote,
-        group::{Call, ElementArrays, Group},
+        group::{Call, ElementArrays, Group, living},
         place::Nodal,
     },
     erosion::criteria::Criteria,
@@ -316,14 +316,8 @@ impl Group for Core {
             return Vec::new();
         };
         let strains = || self.layers.iter().skip(PLASTIC_STRAIN).step_by(kernel::LAYER);
-        let slots = sets.iter().flat_map(|range| range.start * SET as u32..range.end * SET as u32);
-        slots
-            .filter(|&slot| {
-                let slot = slot as usize;
-                let takes_part = self.alive[slot / SET] >> (slot % SET) & 1 == 1;
-                takes_part && strains().all(|strain| strain[slot] >= limit)
-            })
-            .collect()
+        let has_broken = |&slot: &usize| strains().all(|strain| strain[slot] >= limit);
+        living(&self.alive, sets).filter(has_broken).map(|slot| slot as u32).collect()
     }
 
     fn take_out(&mut self, slot: usize) -> (u32, f64) {
