@@ -9,7 +9,8 @@
 //! Stress lives in the frame of `geometry`, which turns with the material. Hourglass control is of stiffness type:
 //! membrane and bending patterns with the stiffness of bending in the plane and of the plate, the pattern of
 //! deflection and the twist of rotations in the plane with that of transverse shear scaled by `h^2 / A`. All are blind
-//! to rigid motion and to constant strain, curvature and twist.
+//! to rigid motion and to constant strain, curvature and twist. A small viscous part (`DAMPING` in `kernel`) keeps a shaken sheet
+//! from gaining energy.
 //!
 //! The elements stand in `block::Core`, which a block of a cycle holds as its group; [`Shells`] is a core with nodes of its own.
 

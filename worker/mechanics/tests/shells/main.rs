@@ -223,6 +223,36 @@ fn laws() -> [Strength; 3] {
     [Strength::Elastic { shear }, von_mises, johnson_cook]
 }
 
+/// A square that opens to its trapezoid elastically and closes while it is stretched and yields, ten times over.
+#[test]
+fn hourglass_control_gives_back_no_more_than_it_has_taken() {
+    let (x, corners) = grid(1, 1, |s, t| [0.1 * s, 0.1 * t, 0.0]);
+    let [_, von_mises, _] = laws();
+    let mut steel = material(2e11, 0.3, 7800.0);
+    steel.strength = von_mises;
+    let mut shells = Shells::new(&x, &corners, 0.005, Rule::Gauss(2), &steel).expect("a sound section");
+    let dt = 1e-6;
+    let mut least: f64 = 0.0;
+    let mut most: f64 = 0.0;
+    for cycle in 0..2000 {
+        let opens = cycle % 200 < 100;
+        for node in 0..4 {
+            let [right, upper] = [node % 2 == 1, node / 2 == 1];
+            let trapezoid = if right == upper { 0.2 } else { -0.2 };
+            let stretch = if right { 2.0 } else { 0.0 };
+            let v = if opens { trapezoid } else { stretch - trapezoid };
+            set(&mut shells.v, node, [v, 0.0, 0.0]);
+        }
+        advance(&mut shells, dt);
+        shells.compute(&step(dt, 1e8), Width::best());
+        least = least.min(shells.hourglass_energy(0));
+        most = most.max(shells.hourglass_energy(0));
+    }
+    assert!(shells.plastic_strain(0, 0) > 0.01, "it has to yield: {}", shells.plastic_strain(0, 0));
+    // The stiffness itself changes by 2 % as the element is stretched.
+    assert!(most > 0.0 && least > -0.02 * most, "hourglass energy from {least} to {most}");
+}
+
 #[test]
 fn every_lane_width_gives_the_same_bits() {
     for strength in laws() {

@@ -221,6 +221,7 @@ impl Core {
             points: &self.points,
             thinning: self.thinning,
             breaks: self.breaks,
+            second_moment: self.points.iter().map(|(height, weight)| 0.25 * weight * height * height).sum(),
             dt: step.dt,
             force_magic: step.force_quantum.magic(),
             moment_magic: step.moment_quantum.magic(),
