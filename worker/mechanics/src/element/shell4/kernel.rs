@@ -340,9 +340,10 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
     while pattern < 6 {
         let (old, rate) = (state[pattern], rates[pattern]);
         let rise = stiffness[pattern] * rate;
-        // A force that falls does so by the whole stiffness: more softly it would give back more than it has taken.
-        let share = L::select(zero.less(old * rate), share, one);
-        let new = (share * dt).mul_add(rise, old);
+        // A force falls by the whole stiffness, as it would else give back more than it has taken; what it rises by is soft.
+        let whole = dt.mul_add(rise, old);
+        let fallen = old.min(whole).max(old.max(whole).min(zero));
+        let new = share.mul_add(whole - fallen, fallen);
         hourglass_power = (half * (new + old)).mul_add(rate, hourglass_power);
         hourglass_damped = (lag * rise).mul_add(rate, hourglass_damped);
         state[pattern] = new;
