@@ -8,8 +8,9 @@
 
 use serde::{Deserialize, Serialize};
 
-pub use crate::eos::{MAX_POINTS, Points, Porous, Tabulated, Tillotson};
 use crate::law::{Declaration, Unit};
+
+pub use crate::eos::{MAX_POINTS, Points, Porous, Tabulated, Tillotson};
 pub use crate::strength::{CowperSymonds, Hardening, Heat, MAX_HARDENING, Strength};
 
 /// One material: constants in the deck's consistent units.
