@@ -106,12 +106,12 @@ impl StrengthLaw for Dislocations {
         (stress, slope)
     }
 
-    /// The exponential.
     #[inline(always)]
     fn least_flow<L: Lane>(&self, _strain: L, _temperature: L) -> L {
         L::splat(self.law.c0)
     }
 
+    /// The exponential.
     #[inline(always)]
     fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
         let log = ln((rate * L::splat(self.inverse_rate0)).max(L::splat(LEAST_RATE)));
