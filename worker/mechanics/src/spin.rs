@@ -1,10 +1,11 @@
 //! Rotation of nodes, where a kind of elements turns them: `w_{n+1/2} = w_{n-1/2} + m/I (dt_{n-1} + dt_n)/2`.
 //!
 //! As for the rest of a node, every block that has a copy does this with the same total moment and inertia and gets the
-//! same bits; the booked copy alone counts. Nodes are few beside the work of their elements, so this is plain code.
+//! same bits; the booked copy alone counts. Nodes go in sets of eight on lanes.
 
 use crate::{
-    lanes::SET,
+    exact::rounded,
+    lanes::{Lane, SET, Width, dispatch::Task},
     nodes::{Advance, NodeSet},
     work::Work,
 };
@@ -43,44 +44,195 @@ impl Turning {
 
 /// Advances the rotation rates of the nodes of a block and clears the moments; gives the kinetic energy of rotation
 /// `sum 1/2 I w_{n-1/2} . w_{n+1/2}` of the booked nodes, and the work that relaxation does on them. What clamps a
-/// node does no work: it does not turn.
+/// node does no work: it does not turn. The result does not depend on `width`.
+///
+/// # Panics
+/// If an array is shorter than the sets or the machine lacks the width.
 pub(crate) fn advance(
     advance: &Advance<'_>,
     turning: &mut Turning,
     constraint: &[u16],
     sets: &[NodeSet],
+    width: Width,
 ) -> (f64, Work) {
-    let half_steps = 0.5 * (advance.dt_previous + advance.dt);
-    let middle = 0.5f64.mul_add(advance.dt, advance.time);
-    let relaxation = advance.loads.relaxation.filter(|r| advance.time < r.until);
-    let loss = relaxation.map_or(0.0, |r| 1.0 - r.factor);
-    let energy = advance.quanta.energy;
-    let (mut kinetic, mut external) = (0.0, Work::default());
-    for (i, &held) in constraint.iter().enumerate() {
-        let clamped = advance.constraints[held as usize].clamped_at(middle);
-        let inertia = turning.inertia[i];
-        let scale = half_steps / inertia;
-        let (mut product, mut work) = (0.0, Work::default());
-        for axis in 0..3 {
-            let old = turning.w[axis][i];
-            let mut new = turning.m[axis][i].mul_add(scale, old);
-            if loss > 0.0 {
-                let change = -loss * old;
-                new += change;
-                work.merge(Work { before: 0.5 * change * old, after: 0.5 * change * new });
+    let n = sets.len() * SET;
+    let lengths = turning.w.iter().chain(&turning.m).map(Vec::len);
+    let shortest = lengths.min().unwrap_or(0).min(turning.inertia.len());
+    assert!(shortest >= n, "rotations of {shortest} nodes, {n} in sets");
+    width.run(Turn { advance, turning, constraint, sets })
+}
+
+/// The step of the rotation rates of nodes whose arrays have been checked.
+struct Turn<'a, 'n> {
+    advance: &'a Advance<'a>,
+    turning: &'n mut Turning,
+    constraint: &'a [u16],
+    sets: &'a [NodeSet],
+}
+
+/// Sums over the booked nodes of each lane.
+#[derive(Clone, Copy)]
+struct Sums<L> {
+    kinetic: L,
+    /// Work of relaxation before and after `t_n`.
+    work: [L; 2],
+}
+
+impl Task for Turn<'_, '_> {
+    type Output = (f64, Work);
+
+    #[inline(always)]
+    fn run<L: Lane>(mut self) -> (f64, Work) {
+        let relaxation = self.advance.loads.relaxation.filter(|r| self.advance.time < r.until);
+        let loss = relaxation.map_or(0.0, |r| 1.0 - r.factor);
+        let zero = L::splat(0.0);
+        let mut sums = Sums { kinetic: zero, work: [zero; 2] };
+        for index in 0..self.sets.len() {
+            let set = self.sets[index];
+            let clamped = if set.held == 0 { [0; 3] } else { self.clamped(index, set.held) };
+            let mut lane = 0;
+            while lane < SET {
+                let held = [clamped[0] >> lane, clamped[1] >> lane, clamped[2] >> lane];
+                // SAFETY: the arrays hold all sets, as [`advance`] has found.
+                unsafe { self.lanes(index * SET + lane, set.booked >> lane, held, loss, &mut sums) };
+                lane += L::N;
             }
-            if clamped >> axis & 1 == 1 {
-                new = 0.0;
-            }
-            turning.w[axis][i] = new;
-            turning.m[axis][i] = 0.0;
-            product = old.mul_add(if advance.dt_previous == 0.0 { old } else { new }, product);
         }
-        if sets[i / SET].booked >> (i % SET) & 1 == 1 {
-            kinetic += energy.round(0.5 * inertia * product);
-            let [before, after] = [work.before, work.after].map(|half| energy.round(inertia * half));
-            external.merge(Work { before, after });
+        let (kinetic, work) = (sums.kinetic.to_array(), [sums.work[0].to_array(), sums.work[1].to_array()]);
+        let [before, after] = [work[0].iter().sum(), work[1].iter().sum()];
+        (kinetic.iter().sum(), Work { before, after })
+    }
+}
+
+impl Turn<'_, '_> {
+    /// The nodes of a set that do not turn about each axis.
+    fn clamped(&self, index: usize, held: u8) -> [u8; 3] {
+        let middle = 0.5f64.mul_add(self.advance.dt, self.advance.time);
+        let mut by_axis = [0; 3];
+        for lane in (0..SET).filter(|lane| held >> lane & 1 == 1) {
+            let constraint = self.constraint[index * SET + lane];
+            let clamped = self.advance.constraints[constraint as usize].clamped_at(middle);
+            for (axis, nodes) in by_axis.iter_mut().enumerate() {
+                *nodes |= (clamped >> axis & 1) << lane;
+            }
+        }
+        by_axis
+    }
+
+    /// The nodes `at..at + N`.
+    ///
+    /// # Safety
+    /// The arrays hold them.
+    #[inline(always)]
+    unsafe fn lanes<L: Lane>(
+        &mut self,
+        at: usize,
+        booked: u8,
+        clamped: [u8; 3],
+        loss: f64,
+        sums: &mut Sums<L>,
+    ) {
+        let (zero, half, energy) =
+            (L::splat(0.0), L::splat(0.5), L::splat(self.advance.quanta.energy.magic()));
+        let half_steps = L::splat(0.5 * (self.advance.dt_previous + self.advance.dt));
+        // SAFETY: the caller's promise.
+        let inertia = unsafe { L::load(&self.turning.inertia, at) };
+        let scale = half_steps / inertia;
+        let (mut product, mut before, mut after) = (zero, zero, zero);
+        let mut axis = 0;
+        while axis < 3 {
+            let (w, m) = (&mut self.turning.w[axis], &mut self.turning.m[axis]);
+            // SAFETY: the caller's promise.
+            let (old, moment) = unsafe { (L::load(w, at), L::load(m, at)) };
+            let mut new = moment.mul_add(scale, old);
+            if loss > 0.0 {
+                let change = L::splat(-loss) * old;
+                new = new + change;
+                before = before + half * change * old;
+                after = after + half * change * new;
+            }
+            new = L::select(L::mask(u32::from(clamped[axis])), zero, new);
+            // SAFETY: as above.
+            unsafe {
+                new.store(w, at);
+                zero.store(m, at);
+            }
+            product = old.mul_add(if self.advance.dt_previous == 0.0 { old } else { new }, product);
+            axis += 1;
+        }
+        let booked = L::mask(u32::from(booked));
+        let kinetic = rounded(half * inertia * product, energy);
+        sums.kinetic = sums.kinetic + L::select(booked, kinetic, zero);
+        if loss > 0.0 {
+            let [earlier, later] = [rounded(inertia * before, energy), rounded(inertia * after, energy)];
+            sums.work[0] = sums.work[0] + L::select(booked, earlier, zero);
+            sums.work[1] = sums.work[1] + L::select(booked, later, zero);
         }
     }
-    (kinetic, external)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        constraint::Constraint,
+        exact::{Quanta, Quantum},
+        load::{Loads, Relaxation},
+    };
+
+    #[test]
+    fn every_width_turns_nodes_by_the_equation_and_books_the_same() {
+        let n = 21;
+        let spin: Vec<[f64; 3]> = (0..n).map(|i| [0.3, -1.7, 2.9].map(|a| a * f64::from(i + 1))).collect();
+        let moment = |axis: usize, node: usize| (1.0 + axis as f64) * (7.0 - node as f64);
+        let inertia: Vec<f64> = (1..=n).map(|i| 0.01 * f64::from(i)).collect();
+        let constraint: Vec<u16> = (0..n).map(|i| u16::from(i % 5 == 2)).collect();
+        let mut sets = NodeSet::all(&constraint);
+        sets.iter_mut().for_each(|set| set.booked = 0b0101_1011);
+        let constraints = [Constraint::default(), Constraint { clamped: 0b101, ..Constraint::default() }];
+        let quantum = Quantum::for_reference(1e3, 42);
+        for factor in [None, Some(0.9)] {
+            let relaxation = factor.map(|factor| Relaxation { factor, until: 1.0 });
+            let advance = Advance {
+                dt_previous: 1e-4,
+                dt: 3e-4,
+                time: 0.0,
+                constraints: &constraints,
+                walls: &[],
+                poses: &[],
+                loads: &Loads { relaxation, ..Loads::default() },
+                quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
+            };
+            let run = |width: Width| {
+                let mut turning = Turning::new(&spin, inertia.clone());
+                for (axis, m) in turning.m.iter_mut().enumerate() {
+                    (0..n as usize).for_each(|node| m[node] = moment(axis, node));
+                }
+                let said = super::advance(&advance, &mut turning, &constraint, &sets, width);
+                assert!(turning.m.iter().flatten().all(|&m| m == 0.0));
+                (turning.w, said)
+            };
+            let (w, (kinetic, work)) = run(Width::Scalar);
+            let (mut energy, mut done) = (0.0, 0.0);
+            for node in 0..n as usize {
+                let kept = factor.unwrap_or(1.0);
+                let booked = 0b0101_1011 >> (node % SET) & 1 == 1;
+                for axis in 0..3 {
+                    let old = spin[node][axis];
+                    let free = kept * old + moment(axis, node) / inertia[node] * 2e-4;
+                    let new = if constraint[node] == 1 && axis != 1 { 0.0 } else { free };
+                    assert!((w[axis][node] - new).abs() < 1e-12 * (1.0 + new.abs()), "{node} {axis}");
+                    if booked {
+                        energy += 0.5 * inertia[node] * old * new;
+                        done += 0.5 * inertia[node] * (kept - 1.0) * old * (old + free);
+                    }
+                }
+            }
+            assert!((kinetic / energy - 1.0).abs() < 1e-9, "{kinetic}, not {energy}");
+            assert!((work.whole() - done).abs() <= 1e-9 * done.abs(), "{work:?}, not {done}");
+            for width in Width::ALL.into_iter().filter(|width| width.available()) {
+                assert_eq!(run(width), (w.clone(), (kinetic, work)), "{width}");
+            }
+        }
+    }
 }

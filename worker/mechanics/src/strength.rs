@@ -275,6 +275,13 @@ pub(crate) trait StrengthLaw: Copy {
         (L::splat(f64::MAX), L::splat(0.0))
     }
 
+    /// A stress that the yield stress of [`StrengthLaw::flow`] is not below at any rate, cheap to find; zero if the law knows none. Where no
+    /// lane is above it, rate and hardening need not be known.
+    #[inline(always)]
+    fn least_flow<L: Lane>(&self, _strain: L, _temperature: L) -> L {
+        L::splat(0.0)
+    }
+
     /// The factor of rate and temperature on the yield stress of [`StrengthLaw::flow`].
     #[inline(always)]
     fn factor<L: Lane>(&self, _rate: L, _temperature: L) -> L {

@@ -126,7 +126,7 @@ impl HeldBlock {
         };
         self.booked = advance.run(&mut nodes, width);
         if let Some(turning) = &mut block.turning {
-            let (kinetic, external) = spin::advance(advance, turning, &block.constraint, &self.sets);
+            let (kinetic, external) = spin::advance(advance, turning, &block.constraint, &self.sets, width);
             self.booked.kinetic += kinetic;
             self.booked.external.merge(external);
         }

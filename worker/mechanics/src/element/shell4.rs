@@ -17,12 +17,14 @@
 pub mod block;
 mod geometry;
 mod kernel;
+mod layers;
 
 use serde::{Deserialize, Serialize};
 
 pub(crate) use block::Core;
 pub use block::{SectionError, ShellStep, Shells};
-pub use kernel::{ELEMENT, LAYER, THICKNESS};
+pub use kernel::{ELEMENT, THICKNESS};
+pub use layers::LAYER;
 
 /// Points through the thickness: heights by half the thickness and weights that add up to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -121,6 +121,11 @@ impl StrengthLaw for AnyStrength {
     }
 
     #[inline(always)]
+    fn least_flow<L: Lane>(&self, strain: L, temperature: L) -> L {
+        of_any!(self, law => law.least_flow(strain, temperature))
+    }
+
+    #[inline(always)]
     fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
         of_any!(self, law => law.factor(rate, temperature))
     }

@@ -71,6 +71,11 @@ impl<S: StrengthLaw> StrengthLaw for Apart<S> {
     }
 
     #[inline(always)]
+    fn least_flow<L: Lane>(&self, strain: L, temperature: L) -> L {
+        self.0.least_flow(strain, temperature)
+    }
+
+    #[inline(always)]
     fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
         self.0.factor(rate, temperature)
     }

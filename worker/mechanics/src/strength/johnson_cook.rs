@@ -84,6 +84,14 @@ impl JohnsonCook {
     }
 }
 
+/// What `1 - hot^m` is not below, for `hot` from 0 to 1: without a power.
+#[inline(always)]
+pub(super) fn least_left<L: Lane>(hot: L, m: f64) -> L {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    // The same for all elements of the material.
+    if m < 1.0 { L::select(zero.less(hot), zero, one) } else { one - hot }
+}
+
 impl StrengthLaw for JohnsonCook {
     #[inline(always)]
     fn thermal(&self) -> bool {
@@ -101,17 +109,19 @@ impl StrengthLaw for JohnsonCook {
     fn flow<L: Lane>(&self, strain: L, factor: L) -> (L, L) {
         let grown = self.hardening(strain);
         // The slope is infinite at zero; a floor keeps the first step finite.
-        let slope = L::splat(self.n) * grown / strain.max(L::splat(1e-9));
+        let slope = L::splat(self.n) * grown / strain.max(L::splat(LEAST_STRAIN));
         ((L::splat(self.a) + grown) * factor, slope * factor)
     }
 
     #[inline(always)]
-    fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
-        let one = L::splat(1.0);
-        let logarithm = ln((rate * L::splat(self.inverse_rate0)).max(one));
+    fn least_flow<L: Lane>(&self, _strain: L, temperature: L) -> L {
         let hot = (temperature - L::splat(self.t_room)) * L::splat(self.inverse_range);
-        let hot = hot.max(L::splat(0.0)).min(one);
-        L::splat(self.c).mul_add(logarithm, one) * (one - pow(hot, L::splat(self.m)))
+        L::splat(self.a) * least_left(hot.max(L::splat(0.0)).min(L::splat(1.0)), self.m)
+    }
+
+    #[inline(always)]
+    fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
+        self.softening(rate, temperature)
     }
 
     #[inline(always)]

@@ -7,6 +7,7 @@
 
 use super::{
     Deviator, History, Strain, StrengthLaw,
+    johnson_cook::least_left,
     tangent::{LEAST_STRAIN, Tangent},
 };
 use crate::{
@@ -121,6 +122,12 @@ impl StrengthLaw for ModifiedCook {
     }
 
     #[inline(always)]
+    fn least_flow<L: Lane>(&self, _strain: L, temperature: L) -> L {
+        let hot = (temperature - L::splat(self.law.t_room)) * L::splat(self.inverse_range);
+        L::splat(self.law.a) * least_left(hot.max(L::splat(0.0)).min(L::splat(1.0)), self.law.m)
+    }
+
+    #[inline(always)]
     fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let law = &self.law;
@@ -172,7 +179,7 @@ mod tests {
         lanes::scalar::Scalar,
         material::{Eos, Failure, Material},
         state::field,
-        strength::plane_stress::{Layer, Plane, PlaneLaw},
+        strength::plane_stress::{Layer, Plane, PlaneLaw, sheared},
     };
 
     const LAW: ModifiedJohnsonCook = ModifiedJohnsonCook {
@@ -307,7 +314,7 @@ mod tests {
             let trial = overshoot * LAW.a;
             let stress = Plane { xx: zero, yy: zero, xy: Scalar(trial / 3f64.sqrt()), yz: zero, zx: zero };
             let mut layer = Layer { stress, plastic_strain: zero, temperature: Scalar(293.0) };
-            assert!(law.update(&mut layer, Scalar(100.0)));
+            assert!(law.update(&mut layer, &sheared(100.0)));
             let (strain, stress) = (layer.plastic_strain.0, layer.stress.xy.0 * 3f64.sqrt());
             let wanted = published(strain, 100.0, 293.0);
             assert!((stress / wanted - 1.0).abs() < 1e-8, "{overshoot}: {stress} {wanted}");

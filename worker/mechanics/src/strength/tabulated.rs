@@ -56,6 +56,12 @@ impl StrengthLaw for Tabulated {
         (stress * factor, slope * factor)
     }
 
+    /// The first of the table, which never descends.
+    #[inline(always)]
+    fn least_flow<L: Lane>(&self, _strain: L, _temperature: L) -> L {
+        L::splat(self.points[0][1])
+    }
+
     #[inline(always)]
     fn factor<L: Lane>(&self, rate: L, _temperature: L) -> L {
         self.rate.at(rate)

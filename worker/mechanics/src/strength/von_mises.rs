@@ -28,6 +28,12 @@ impl StrengthLaw for VonMises {
         (stress * factor, L::splat(self.hardening) * factor)
     }
 
+    /// That at no rate.
+    #[inline(always)]
+    fn least_flow<L: Lane>(&self, strain: L, _temperature: L) -> L {
+        L::splat(self.hardening).mul_add(strain, L::splat(self.yield_stress)).max(L::splat(0.0))
+    }
+
     #[inline(always)]
     fn factor<L: Lane>(&self, rate: L, _temperature: L) -> L {
         self.rate.at(rate)

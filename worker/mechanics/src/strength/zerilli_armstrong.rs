@@ -106,6 +106,11 @@ impl StrengthLaw for Dislocations {
         (stress, slope)
     }
 
+    #[inline(always)]
+    fn least_flow<L: Lane>(&self, _strain: L, _temperature: L) -> L {
+        L::splat(self.law.c0)
+    }
+
     /// The exponential.
     #[inline(always)]
     fn factor<L: Lane>(&self, rate: L, temperature: L) -> L {
@@ -153,7 +158,7 @@ mod tests {
         lanes::scalar::Scalar,
         material::{Eos, Failure, Material},
         state::field,
-        strength::plane_stress::{Layer, Plane, PlaneLaw},
+        strength::plane_stress::{Layer, Plane, PlaneLaw, sheared},
     };
 
     /// OFHC copper and Armco iron of the paper.
@@ -268,7 +273,7 @@ mod tests {
             let trial = 2.0 * published(0.05, 100.0, 294.0);
             let stress = Plane { xx: zero, yy: zero, xy: Scalar(trial / 3f64.sqrt()), yz: zero, zx: zero };
             let mut layer = Layer { stress, plastic_strain: Scalar(0.05), temperature: Scalar(294.0) };
-            assert!(plane.update(&mut layer, Scalar(100.0)));
+            assert!(plane.update(&mut layer, &sheared(100.0)));
             let (strain, stress) = (layer.plastic_strain.0, layer.stress.xy.0 * 3f64.sqrt());
             assert!((stress / published(strain, 100.0, 294.0) - 1.0).abs() < 1e-8, "{stress}");
             let elastic = (trial - stress) / (3.0 * law.shear);

@@ -3,8 +3,8 @@
 use std::{fmt, ops::Range};
 
 use super::{
-    Rule,
-    kernel::{self, PLASTIC_STRAIN},
+    Rule, kernel,
+    layers::{LAYER, PLASTIC_STRAIN, TEMPERATURE},
 };
 use crate::{
     element::{
@@ -87,8 +87,7 @@ pub(crate) struct Core {
     /// Area times thickness at the start.
     initial_volume: Vec<f64>,
     corners: [Vec<u32>; 4],
-    state: Vec<Vec<f64>>,
-    layers: Vec<Vec<f64>>,
+    state: State,
     element_mass: Vec<f64>,
     alive: Vec<u8>,
     elements: Vec<u32>,
@@ -98,6 +97,47 @@ pub(crate) struct Core {
     /// Plastic strain at which a layer breaks.
     breaks: Option<f64>,
     law: PlaneLaw,
+}
+
+/// Numbers of the elements by slot. What a lane set has lies together, field after field: a cycle goes through memory once.
+struct State {
+    n_fields: usize,
+    values: Vec<f64>,
+}
+
+impl State {
+    /// Of these fields by element, of which `of_slot` is the one in a slot.
+    fn new(fields: &[Vec<f64>], n_slots: usize, of_slot: impl Fn(usize) -> usize) -> Self {
+        let mut state = Self { n_fields: fields.len(), values: vec![0.0; fields.len() * n_slots] };
+        for (field, values) in fields.iter().enumerate() {
+            for slot in 0..n_slots {
+                let place = state.place(field, slot);
+                state.values[place] = values[of_slot(slot)];
+            }
+        }
+        state
+    }
+
+    fn place(&self, field: usize, slot: usize) -> usize {
+        (slot / SET * self.n_fields + field) * SET + slot % SET
+    }
+
+    fn at(&self, field: usize, slot: usize) -> f64 {
+        self.values[self.place(field, slot)]
+    }
+
+    /// The numbers of each set: of the elements, and of their layers.
+    fn sets_mut(&mut self) -> impl Iterator<Item = [&mut [f64]; 2]> {
+        self.values.chunks_mut(self.n_fields * SET).map(|set| {
+            let (own, layers) = set.split_at_mut(kernel::ELEMENT * SET);
+            [own, layers]
+        })
+    }
+}
+
+/// The first field of a layer.
+fn layer_field(point: usize) -> usize {
+    kernel::ELEMENT + point * LAYER
 }
 
 /// Whether shells can be built of this: the points through the thickness and the law of the layers.
@@ -151,14 +191,12 @@ impl Core {
         // Phantoms stand on the first element.
         let of_slot = |slot: usize| if slot < n_elements { slot } else { 0 };
         let by_slot = |array: &[f64]| -> Vec<f64> { (0..n_slots).map(|slot| array[of_slot(slot)]).collect() };
-        let (own, layers) = fields.split_at(kernel::ELEMENT);
         Ok(Core {
             n_nodes,
             n_elements,
             initial_volume: volume.to_vec(),
             corners: std::array::from_fn(|i| (0..n_slots).map(|slot| quads[of_slot(slot)][i]).collect()),
-            state: own.iter().map(|field| by_slot(field)).collect(),
-            layers: layers.iter().map(|field| by_slot(field)).collect(),
+            state: State::new(fields, n_slots, of_slot),
             element_mass: by_slot(&volume.iter().map(|v| material.density * v).collect::<Vec<f64>>()),
             alive: (0..n_slots / SET)
                 .map(|set| (0..SET).map(|i| u8::from(set * SET + i < n_elements) << i).sum())
@@ -177,7 +215,7 @@ impl Core {
         let corners = self.corners.each_ref().map(|of_slot| of_slot[element] as usize);
         let area = quad_area(&corners.map(|n| std::array::from_fn(|axis| x[axis][n])));
         let volume = self.initial_volume[element];
-        let layer = |point: usize, i: usize| self.layers[point * kernel::LAYER + i][element];
+        let layer = |point: usize, i: usize| self.state.at(layer_field(point) + i, element);
         let mean = |i: usize| (0..self.points.len()).map(|p| self.points[p].1 * layer(p, i)).sum::<f64>();
         let most = |i: usize| (0..self.points.len()).map(|p| layer(p, i)).fold(f64::MIN, f64::max);
         let (xx, yy) = (mean(0), mean(1));
@@ -187,10 +225,10 @@ impl Core {
         fields[field::SYY] = yy + pressure;
         (fields[field::SXY], fields[field::SYZ], fields[field::SZX]) = (mean(2), mean(3), mean(4));
         fields[field::PRESSURE] = pressure;
-        fields[field::ENERGY] = self.state[kernel::INTERNAL][element] / volume;
+        fields[field::ENERGY] = self.state.at(kernel::INTERNAL, element) / volume;
         fields[field::PLASTIC_STRAIN] = most(PLASTIC_STRAIN);
-        fields[field::TEMPERATURE] = most(6);
-        fields[field::RELATIVE_VOLUME] = area * self.state[kernel::THICKNESS][element] / volume;
+        fields[field::TEMPERATURE] = most(TEMPERATURE);
+        fields[field::RELATIVE_VOLUME] = area * self.state.at(kernel::THICKNESS, element) / volume;
         fields
     }
 
@@ -235,8 +273,7 @@ impl Core {
             w: turning.w.each_ref().map(Vec::as_slice),
             f: nodes.f,
             m: turning.m.each_mut().map(Vec::as_mut_slice),
-            state: &mut self.state,
-            layers: &mut self.layers,
+            state: &mut self.state.values,
             mass: &self.element_mass,
             alive: &self.alive,
             elements: &self.elements,
@@ -292,11 +329,12 @@ impl Group for Core {
 
     fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays {
         let all: Vec<_> = (0..self.n_elements).map(|e| self.summary(e, x)).collect();
-        let own = self.state.iter().chain(&self.layers);
         ElementArrays {
             initial_volume: self.initial_volume.clone(),
             fields: std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect()),
-            own: own.map(|field| field[..self.n_elements].to_vec()).collect(),
+            own: (0..self.state.n_fields)
+                .map(|field| (0..self.n_elements).map(|e| self.state.at(field, e)).collect())
+                .collect(),
             history: Vec::new(),
         }
     }
@@ -306,8 +344,8 @@ impl Group for Core {
     }
 
     fn visit(&self, visit: &mut dyn FnMut(f64)) {
-        for field in self.state.iter().chain(&self.layers) {
-            field[..self.n_elements].iter().for_each(|&value| visit(value));
+        for field in 0..self.state.n_fields {
+            (0..self.n_elements).for_each(|element| visit(self.state.at(field, element)));
         }
     }
 
@@ -316,25 +354,27 @@ impl Group for Core {
         let Some(limit) = self.breaks.filter(|_| criteria.plastic_strain.is_some()) else {
             return Vec::new();
         };
-        let strains = || self.layers.iter().skip(PLASTIC_STRAIN).step_by(kernel::LAYER);
-        let has_broken = |&slot: &usize| strains().all(|strain| strain[slot] >= limit);
+        let has_broken = |&slot: &usize| {
+            let strain = |point: usize| self.state.at(layer_field(point) + PLASTIC_STRAIN, slot);
+            (0..self.points.len()).all(|point| strain(point) >= limit)
+        };
         living(&self.alive, sets).filter(has_broken).map(|slot| slot as u32).collect()
     }
 
     fn take_out(&mut self, slot: usize) -> (u32, f64) {
         self.alive[slot / SET] &= !(1 << (slot % SET));
-        (self.elements[slot], self.state[kernel::INTERNAL][slot])
+        (self.elements[slot], self.state.at(kernel::INTERNAL, slot))
     }
 
     fn first_stress(&mut self) -> Option<&mut f64> {
-        self.layers.first_mut().and_then(|layer| layer.first_mut())
+        self.state.values.get_mut(layer_field(0) * SET)
     }
 
     fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {
         match target {
             Target::Constants => vec![&mut self.initial_volume, &mut self.element_mass],
-            Target::Elements => self.state.iter_mut().map(Vec::as_mut_slice).collect(),
-            Target::Layers => self.layers.iter_mut().map(Vec::as_mut_slice).collect(),
+            Target::Elements => self.state.sets_mut().map(|[own, _]| own).collect(),
+            Target::Layers => self.state.sets_mut().map(|[_, layers]| layers).collect(),
             _ => Vec::new(),
         }
     }
@@ -378,8 +418,8 @@ impl Shells {
         let mut inertia = vec![0.0; n_nodes];
         let mut fields = vec![vec![0.0; n_elements]; section.n_fields()];
         fields[kernel::THICKNESS].fill(thickness);
-        for layer in fields[kernel::ELEMENT..].chunks_mut(kernel::LAYER) {
-            layer[kernel::LAYER - 1].fill(material.initial_temperature());
+        for layer in fields[kernel::ELEMENT..].chunks_mut(LAYER) {
+            layer[TEMPERATURE].fill(material.initial_temperature());
         }
         let mut masses = vec![0.0; n_padded];
         masses[n_nodes..].fill(1.0);
@@ -415,22 +455,22 @@ impl Shells {
 
     /// Thickness of an element now (length).
     pub fn thickness(&self, element: usize) -> f64 {
-        self.core.state[kernel::THICKNESS][element]
+        self.core.state.at(kernel::THICKNESS, element)
     }
 
     /// Energy that hourglass control has taken from an element since the start.
     pub fn hourglass_energy(&self, element: usize) -> f64 {
-        self.core.state[kernel::HOURGLASS][element]
+        self.core.state.at(kernel::HOURGLASS, element)
     }
 
     /// Stress of a layer in the frame of its element, xx, yy, xy, yz, zx, counted from below.
     pub fn stress(&self, element: usize, layer: usize) -> [f64; 5] {
-        std::array::from_fn(|i| self.core.layers[layer * kernel::LAYER + i][element])
+        std::array::from_fn(|i| self.core.state.at(layer_field(layer) + i, element))
     }
 
     /// Effective plastic strain of a layer.
     pub fn plastic_strain(&self, element: usize, layer: usize) -> f64 {
-        self.core.layers[layer * kernel::LAYER + PLASTIC_STRAIN][element]
+        self.core.state.at(layer_field(layer) + PLASTIC_STRAIN, element)
     }
 
     /// Sets forces and moments to zero, adds those of all elements at `x_n`, brings their state from `n-1` to `n` and

@@ -2,18 +2,17 @@
 
 use std::ops::Range;
 
-use super::geometry::{Geometry, dot};
+use super::{
+    geometry::{Geometry, Opposed, dot},
+    layers::{self, LAYER, Resultants, Strains, hooke, scaled, sum},
+};
 use crate::{
     element::{ElementVote, Fault, vector::Vector},
     exact,
     lanes::{Lane, SET, dispatch::Task},
-    strength::plane_stress::{Layer, Plane, PlaneLaw},
+    strength::plane_stress::PlaneLaw,
 };
 
-/// State of a layer: stress xx, yy, xy, yz, zx, plastic strain, temperature.
-pub const LAYER: usize = 7;
-/// Index of the plastic strain in the state of a layer.
-pub(super) const PLASTIC_STRAIN: usize = 5;
 /// State of an element beside its layers: hourglass forces of membrane x and y, bending about x and y, deflection and
 /// twist; thickness; internal energy; hourglass energy.
 pub const ELEMENT: usize = 9;
@@ -40,10 +39,8 @@ pub(super) struct View<'a> {
     pub w: [&'a [f64]; 3],
     pub f: [&'a mut [f64]; 3],
     pub m: [&'a mut [f64]; 3],
-    /// `ELEMENT` arrays by slot.
-    pub state: &'a mut [Vec<f64>],
-    /// `LAYER` arrays by slot for each point.
-    pub layers: &'a mut [Vec<f64>],
+    /// By lane set: `ELEMENT` fields, then `LAYER` for each point.
+    pub state: &'a mut [f64],
     pub mass: &'a [f64],
     pub alive: &'a [u8],
     pub elements: &'a [u32],
@@ -151,6 +148,7 @@ unsafe fn gather<L: Lane>(view: &View<'_>, from: &[&[f64]; 3], slot: usize) -> [
 #[inline(always)]
 unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vote: &mut ElementVote) {
     let (zero, one, half, quarter) = (L::splat(0.0), L::splat(1.0), L::splat(0.5), L::splat(0.25));
+    let minus = L::splat(-1.0);
     let dt = L::splat(c.dt);
     // SAFETY: slots and corners are inside, says the caller.
     let (x, v, w, mass) = unsafe {
@@ -162,11 +160,14 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         )
     };
     let alive = L::mask(u32::from(view.alive[slot / SET]) >> (slot % SET));
+    let lane = slot % SET;
+    let n_numbers = (ELEMENT + c.points.len() * LAYER) * SET;
+    let (own, of_layers) = view.state[slot / SET * n_numbers..][..n_numbers].split_at_mut(ELEMENT * SET);
     let mut state = [zero; ELEMENT];
     let mut i = 0;
     while i < ELEMENT {
         // SAFETY: slots are inside.
-        state[i] = unsafe { L::load(&view.state[i], slot) };
+        state[i] = unsafe { L::load(own, i * SET + lane) };
         i += 1;
     }
     let h = state[THICKNESS];
@@ -179,29 +180,29 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         i += 1;
     }
     let g = Geometry::of(&mid);
-    let [e1, e2, e3] = g.e;
-    let (mut vx, mut vy, mut vz) = ([zero; 4], [zero; 4], [zero; 4]);
-    let (mut wx, mut wy) = ([zero; 4], [zero; 4]);
+    let ([vx, vy, vz], [warp_x, warp_y, warp_z]) = opposed_in(&g.e, &v);
+    let [wx, wy, wz] = corners_in(&g.e, &w);
     // In-plane velocity of the fibers, w x p.
     let (mut sx, mut sy) = ([zero; 4], [zero; 4]);
     let mut i = 0;
     while i < 4 {
-        (vx[i], vy[i], vz[i]) = (e1.dot(&v[i]), e2.dot(&v[i]), e3.dot(&v[i]));
-        (wx[i], wy[i]) = (e1.dot(&w[i]), e2.dot(&w[i]));
-        let wz = e3.dot(&w[i]);
-        sx[i] = wz.neg_mul_add(g.py[i], wy[i]);
-        sy[i] = wz.mul_add(g.px[i], -wx[i]);
+        sx[i] = wz[i].neg_mul_add(g.py[i], wy[i]);
+        sy[i] = wz[i].mul_add(g.px[i], -wx[i]);
         i += 1;
     }
-    let membrane = (dot(&g.bx, &vx), dot(&g.by, &vy), dot(&g.by, &vx) + dot(&g.bx, &vy));
-    let curvature = (
+    let (mean_sx, mean_sy) =
+        (quarter * ((sx[0] + sx[1]) + (sx[2] + sx[3])), quarter * ((sy[0] + sy[1]) + (sy[2] + sy[3])));
+    let (warp_wx, warp_wy) =
+        (quarter * ((wx[0] - wx[1]) + (wx[2] - wx[3])), quarter * ((wy[0] - wy[1]) + (wy[2] - wy[3])));
+    let (sx, sy, wx, wy) = (opposed(&sx), opposed(&sy), opposed(&wx), opposed(&wy));
+    let membrane = [dot(&g.bx, &vx), dot(&g.by, &vy), dot(&g.by, &vx) + dot(&g.bx, &vy)];
+    let curvature = [
         dot(&g.cx, &vx) + dot(&g.bx, &sx),
         dot(&g.cy, &vy) + dot(&g.by, &sy),
         (dot(&g.cy, &vx) + dot(&g.cx, &vy)) + (dot(&g.by, &sx) + dot(&g.bx, &sy)),
-    );
+    ];
     let (tilt_x, tilt_y) = (dot(&g.bx, &vz), dot(&g.by, &vz));
-    let shear_x = quarter.mul_add((sx[0] + sx[1]) + (sx[2] + sx[3]), tilt_x);
-    let shear_y = quarter.mul_add((sy[0] + sy[1]) + (sy[2] + sy[3]), tilt_y);
+    let (shear_x, shear_y) = (mean_sx + tilt_x, mean_sy + tilt_y);
     let (bend_xx, bend_yy) = (-dot(&g.bx, &wy), dot(&g.by, &wx));
     let (turn_x, turn_y) = (dot(&g.bx, &wx), dot(&g.by, &wy));
     let twist = half * (turn_x - turn_y);
@@ -211,112 +212,42 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         [sum(&g.curved[0], &curvatures), sum(&g.curved[1], &curvatures), sum(&g.curved[2], &curvatures)];
     let (shear_x, shear_y) = (shear_x - bent[1], shear_y - bent[2]);
     let rates = [
-        g.gz.mul_add(tilt_x, dot(&g.gamma, &vx)),
-        g.gz.mul_add(tilt_y, dot(&g.gamma, &vy)),
-        dot(&g.gamma, &wx),
-        dot(&g.gamma, &wy),
-        dot(&g.gamma, &vz) - bent[0],
+        g.gz.mul_add(tilt_x, warp_x - dot(&g.lean, &vx)),
+        g.gz.mul_add(tilt_y, warp_y - dot(&g.lean, &vy)),
+        warp_wx - dot(&g.lean, &wx),
+        warp_wy - dot(&g.lean, &wy),
+        (warp_z - dot(&g.lean, &vz)) - bent[0],
         turn_x + turn_y,
     ];
 
-    // 2. Stress of the layers in plane stress, thinning, energy.
+    // 2. Stress of the layers, thinning, energy.
     let (young, poisson, g_modulus) = (c.law.young, c.law.poisson, c.law.shear());
     let plate = young / (1.0 - poisson * poisson);
     let (stiff, coupled) = (L::splat(plate), L::splat(plate * poisson));
     let (shear, transverse) = (L::splat(g_modulus), L::splat(SHEAR * g_modulus));
-    let (mut n_xx, mut n_yy, mut n_xy) = (zero, zero, zero);
-    let (mut m_xx, mut m_yy, mut m_xy) = (zero, zero, zero);
-    let (mut q_x, mut q_y) = (zero, zero);
-    let (mut power, mut thinning, mut elastic) = (zero, zero, zero);
-    let mut point = 0;
-    while point < c.points.len() {
-        let (height, weight) = c.points[point];
-        let z = L::splat(0.5 * height) * h;
-        let weight = L::splat(weight);
-        let dxx = z.mul_add(curvature.0, membrane.0);
-        let dyy = z.mul_add(curvature.1, membrane.1);
-        let dxy = z.mul_add(curvature.2, membrane.2);
-        let mut old = [zero; LAYER];
-        let mut i = 0;
-        while i < LAYER {
-            // SAFETY: slots are inside.
-            old[i] = unsafe { L::load(&view.layers[point * LAYER + i], slot) };
-            i += 1;
-        }
-        let mut layer = Layer {
-            stress: Plane {
-                xx: dt.mul_add(stiff.mul_add(dxx, coupled * dyy), old[0]),
-                yy: dt.mul_add(stiff.mul_add(dyy, coupled * dxx), old[1]),
-                xy: dt.mul_add(shear * dxy, old[2]),
-                yz: dt.mul_add(transverse * shear_y, old[3]),
-                zx: dt.mul_add(transverse * shear_x, old[4]),
-            },
-            plastic_strain: old[5],
-            temperature: old[6],
-        };
-        // Effective rate of an incompressible layer.
-        let rate = dxx.mul_add(dxx, dyy.mul_add(dyy, dxx * dyy));
-        let rate = (quarter * dxy).mul_add(dxy, rate);
-        let rate = (L::splat(4.0 / 3.0) * rate).sqrt();
-        let mut yields = c.law.update(&mut layer, rate);
-        let mut s = layer.stress;
-        if let Some(limit) = c.breaks {
-            let broken = L::splat(limit).less_equal(layer.plastic_strain);
-            yields = L::either(yields, broken);
-            let left = L::select(broken, zero, one);
-            s = Plane { xx: s.xx * left, yy: s.yy * left, xy: s.xy * left, yz: s.yz * left, zx: s.zx * left };
-        }
-        elastic = elastic + L::select(yields, zero, weight);
-        // The layer's strain across the thickness: elastic part by Hooke, plastic part keeps the volume.
-        let rise = (s.xx - old[0]) + (s.yy - old[1]);
-        let stretched = dt * (dxx + dyy);
-        thinning =
-            weight.mul_add(L::splat((1.0 - 2.0 * poisson) / young).mul_add(rise, -stretched), thinning);
-        let work = (s.xx + old[0]).mul_add(
-            dxx,
-            (s.yy + old[1]).mul_add(
-                dyy,
-                (s.xy + old[2]).mul_add(dxy, (s.yz + old[3]).mul_add(shear_y, (s.zx + old[4]) * shear_x)),
-            ),
-        );
-        power = (half * weight).mul_add(work, power);
-        (n_xx, n_yy) = (weight.mul_add(s.xx, n_xx), weight.mul_add(s.yy, n_yy));
-        (n_xy, q_x) = (weight.mul_add(s.xy, n_xy), weight.mul_add(s.zx, q_x));
-        q_y = weight.mul_add(s.yz, q_y);
-        let moment = weight * z;
-        (m_xx, m_yy) = (moment.mul_add(s.xx, m_xx), moment.mul_add(s.yy, m_yy));
-        m_xy = moment.mul_add(s.xy, m_xy);
-        let new = [s.xx, s.yy, s.xy, s.yz, s.zx, layer.plastic_strain, layer.temperature];
-        let mut i = 0;
-        while i < LAYER {
-            // SAFETY: slots are inside.
-            unsafe {
-                L::select(alive, new[i], old[i]).store(&mut view.layers[point * LAYER + i], slot);
-            }
-            i += 1;
-        }
-        point += 1;
-    }
+    let strains = Strains { membrane, curvature, shear: [shear_y, shear_x] };
+    let growth = Strains {
+        membrane: hooke(stiff, coupled, shear, &membrane),
+        curvature: hooke(stiff, coupled, shear, &curvature),
+        shear: [transverse * shear_y, transverse * shear_x],
+    };
+    // SAFETY: slots are inside.
+    let (before, after, elastic) = unsafe { layers::update(of_layers, c, lane, alive, h, &strains, &growth) };
+    let power = half * before.plus(&after).power(&strains);
+    // Strain across the thickness: its elastic part by Hooke, its plastic part keeps the volume.
+    let rise = (after.n[0] - before.n[0]) + (after.n[1] - before.n[1]);
+    let thinning = L::splat((1.0 - 2.0 * poisson) / young).mul_add(rise, -(dt * (membrane[0] + membrane[1])));
 
     // 3. Viscous stress of the section.
     let lag = L::splat(DAMPING) * dt;
-    let viscous = |rates: (L, L, L)| {
-        (
-            lag * stiff.mul_add(rates.0, coupled * rates.1),
-            lag * stiff.mul_add(rates.1, coupled * rates.0),
-            lag * shear * rates.2,
-        )
-    };
     let squares = L::splat(c.second_moment) * h * h;
-    let (n, m) = (viscous(membrane), viscous(curvature));
-    let m = (squares * m.0, squares * m.1, squares * m.2);
-    let q = (lag * transverse * shear_x, lag * transverse * shear_y);
-    (n_xx, n_yy, n_xy) = (n_xx + n.0, n_yy + n.1, n_xy + n.2);
-    (m_xx, m_yy, m_xy) = (m_xx + m.0, m_yy + m.1, m_xy + m.2);
-    (q_x, q_y) = (q_x + q.0, q_y + q.1);
-    let damped = q.0.mul_add(shear_x, q.1 * shear_y);
-    let damped = damped + sum(&[n.0, n.1, n.2], &[membrane.0, membrane.1, membrane.2]);
-    let damped = damped + sum(&[m.0, m.1, m.2], &[curvature.0, curvature.1, curvature.2]);
+    let viscous = Resultants {
+        n: scaled(lag, &growth.membrane),
+        m: scaled(lag * squares, &growth.curvature),
+        q: [lag * growth.shear[0], lag * growth.shear[1]],
+    };
+    let damped = viscous.power(&strains);
+    let Resultants { n: [n_xx, n_yy, n_xy], m: [m_xx, m_yy, m_xy], q: [q_y, q_x] } = after.plus(&viscous);
 
     // 4. Hourglass forces grow with their patterns, more softly where layers yield.
     let (bxx, byy, largest) = g.squares();
@@ -329,7 +260,7 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         membrane_k * byy,
         bending_k * byy,
         bending_k * bxx,
-        L::splat(8.0 / 3.0) * shear_k / g.area,
+        L::splat(8.0 / 3.0) * shear_k * g.inverse_area,
         L::splat(1.0 / 24.0) * shear_k * g.area,
     ];
     let share = elastic.max(L::splat(SOFT));
@@ -373,85 +304,88 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         bent[i] = volume.mul_add(sheared, hq * g.curved[0][i]);
         i += 1;
     }
-    let force_magic = L::splat(c.force_magic);
-    let moment_magic = L::splat(c.moment_magic);
-    let mut forces = [Vector { x: zero, y: zero, z: zero }; 4];
-    let mut moments = forces;
+    // Parts of opposite sign in opposite corners, by component in the frame.
+    let (mut fx, mut fy, mut fz) = ([zero; 2], [zero; 2], [zero; 2]);
+    let (mut tx, mut ty, mut mx, mut my) = ([zero; 2], [zero; 2], [zero; 2], [zero; 2]);
     let mut i = 0;
-    while i < 4 {
-        let (bx, by, cx, cy, gamma) = (g.bx[i], g.by[i], g.cx[i], g.cy[i], g.gamma[i]);
-        let fx = n_xx.mul_add(bx, n_xy.mul_add(by, m_xx.mul_add(cx, m_xy * cy)));
-        let fy = n_yy.mul_add(by, n_xy.mul_add(bx, m_yy.mul_add(cy, m_xy * cx)));
-        let fz = q_x.mul_add(bx, q_y * by);
-        let fx = volume.mul_add(fx, hx * gamma);
-        let fy = volume.mul_add(fy, hy * gamma);
-        let tilted = g.gz * hx.mul_add(bx, hy * by);
-        let fz = volume.mul_add(fz, hq.mul_add(gamma, tilted));
-        let tx = volume * m_xx.mul_add(bx, m_xy.mul_add(by, quarter * q_x));
-        let ty = volume * m_yy.mul_add(by, m_xy.mul_add(bx, quarter * q_y));
+    while i < 2 {
+        let (bx, by, cx, cy, lean) = (g.bx[i], g.by[i], g.cx[i], g.cy[i], g.lean[i]);
+        let stretching = n_xx.mul_add(bx, n_xy.mul_add(by, m_xx.mul_add(cx, m_xy * cy)));
+        fx[i] = volume.mul_add(stretching, -(hx * lean));
+        let stretching = n_yy.mul_add(by, n_xy.mul_add(bx, m_yy.mul_add(cy, m_xy * cx)));
+        fy[i] = volume.mul_add(stretching, -(hy * lean));
+        let tilted = g.gz.mul_add(hx.mul_add(bx, hy * by), -(hq * lean));
+        fz[i] = volume.mul_add(q_x.mul_add(bx, q_y * by), tilted);
+        tx[i] = volume * m_xx.mul_add(bx, m_xy * by);
+        ty[i] = volume * m_yy.mul_add(by, m_xy * bx);
         let about_x = half * bent[1].mul_add(bx, bent[2] * by);
         let about_y = half * bent[1].mul_add(by, bent[0] * bx);
-        let mx = hwx.mul_add(gamma, ht.mul_add(bx, -(ty + about_x)));
-        let my = hwy.mul_add(gamma, ht.mul_add(by, tx + about_y));
-        let mz = g.px[i].mul_add(ty, -(g.py[i] * tx));
-        // What the element resists with acts on the nodes the other way.
-        let (fx, fy, fz) = (-fx, -fy, -fz);
-        let (mx, my, mz) = (-mx, -my, -mz);
-        forces[i] = e1.mul_add(fx, &e2.mul_add(fy, &e3.scaled(fz)));
-        moments[i] = e1.mul_add(mx, &e2.mul_add(my, &e3.scaled(mz)));
+        mx[i] = ht.mul_add(bx, -hwx.mul_add(lean, ty[i] + about_x));
+        my[i] = ht.mul_add(by, hwy.neg_mul_add(lean, tx[i] + about_y));
+        i += 1;
+    }
+    let share = quarter * volume;
+    let (even_x, even_y) = (share * q_x, share * q_y);
+    let (tx, ty) = (at_corners(&tx, even_x, even_x), at_corners(&ty, even_y, even_y));
+    let (hwx, hwy) = (quarter * hwx, quarter * hwy);
+    let mx = at_corners(&mx, hwx - even_y, -(hwx + even_y));
+    let my = at_corners(&my, even_x + hwy, even_x - hwy);
+    // In space; what the element resists with acts on the nodes the other way.
+    let (back1, back2, back3) = (e1.scaled(minus), e2.scaled(minus), e3.scaled(minus));
+    let mut part = [Vector { x: zero, y: zero, z: zero }; 2];
+    let mut i = 0;
+    while i < 2 {
+        part[i] = back1.mul_add(fx[i], &back2.mul_add(fy[i], &back3.scaled(fz[i])));
+        i += 1;
+    }
+    let pattern = back1.mul_add(hx, &back2.mul_add(hy, &back3.scaled(hq))).scaled(quarter);
+    let mut forces = [
+        at_corners(&[part[0].x, part[1].x], pattern.x, -pattern.x),
+        at_corners(&[part[0].y, part[1].y], pattern.y, -pattern.y),
+        at_corners(&[part[0].z, part[1].z], pattern.z, -pattern.z),
+    ];
+    let mut moments = [[zero; 4]; 3];
+    let mut i = 0;
+    while i < 4 {
+        let mz = g.px[i].mul_add(ty[i], -(g.py[i] * tx[i]));
+        let m = back1.mul_add(mx[i], &back2.mul_add(my[i], &back3.scaled(mz)));
+        (moments[0][i], moments[1][i], moments[2][i]) = (m.x, m.y, m.z);
         i += 1;
     }
 
     // 6. Rounding, scatter, votes.
+    let (force_magic, moment_magic) = (L::splat(c.force_magic), L::splat(c.moment_magic));
     let mut bound = zero;
-    let mut i = 0;
-    while i < 4 {
-        let f = forces[i];
-        let f = [f.x, f.y, f.z];
-        let m = [moments[i].x, moments[i].y, moments[i].z];
-        let (mut rounded, mut turned) = ([zero; 3], [zero; 3]);
-        let mut axis = 0;
-        while axis < 3 {
-            let f = L::select(computed, f[axis], zero);
+    let mut turning = zero;
+    let mut axis = 0;
+    while axis < 3 {
+        let mut i = 0;
+        while i < 4 {
+            let f = L::select(computed, forces[axis][i], zero);
             bound = bound.max_magnitude(f);
-            rounded[axis] = exact::rounded(f, force_magic);
-            let m = L::select(computed, m[axis], zero);
-            bound = bound.max_magnitude(m * L::splat(c.inverse_arm));
-            turned[axis] = exact::rounded(m, moment_magic);
-            axis += 1;
+            forces[axis][i] = exact::rounded(f, force_magic);
+            let m = L::select(computed, moments[axis][i], zero);
+            turning = turning.max_magnitude(m);
+            moments[axis][i] = exact::rounded(m, moment_magic);
+            i += 1;
         }
-        forces[i] = Vector { x: rounded[0], y: rounded[1], z: rounded[2] };
-        moments[i] = Vector { x: turned[0], y: turned[1], z: turned[2] };
-        i += 1;
+        // The last corner takes what the others leave: forces of an element add to exactly zero.
+        let f = &mut forces[axis];
+        f[3] = -(f[0] + (f[1] + f[2]));
+        axis += 1;
     }
-    // The last corner takes what the others leave: forces of an element add to exactly zero.
-    let minus = L::splat(-1.0);
-    let rest = forces[0].mul_add(one, &forces[1].mul_add(one, &forces[2]));
-    forces[3] = rest.scaled(minus);
-    let mut i = 0;
-    while i < 4 {
-        let (f, m) = (forces[i], moments[i]);
-        let f = [f.x.to_array(), f.y.to_array(), f.z.to_array()];
-        let m = [m.x.to_array(), m.y.to_array(), m.z.to_array()];
-        let mut lane = 0;
-        while lane < L::N {
-            let node = view.corners[i][slot + lane] as usize;
-            let mut axis = 0;
-            while axis < 3 {
-                view.f[axis][node] += f[axis][lane];
-                view.m[axis][node] += m[axis][lane];
-                axis += 1;
-            }
-            lane += 1;
-        }
-        i += 1;
+    let bound = bound.max_magnitude(turning * L::splat(c.inverse_arm));
+    // SAFETY: handed on from the caller.
+    unsafe {
+        scatter(&mut view.f, view.corners, slot, &forces);
+        scatter(&mut view.m, view.corners, slot, &moments);
     }
     let mut i = 0;
     while i < ELEMENT {
         // SAFETY: slots are inside.
         unsafe {
-            let old = L::load(&view.state[i], slot);
-            L::select(alive, state[i], old).store(&mut view.state[i], slot);
+            let old = L::load(own, i * SET + lane);
+            L::select(alive, state[i], old).store(own, i * SET + lane);
         }
         i += 1;
     }
@@ -482,8 +416,76 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
     }
 }
 
-/// Sum of products of three.
+/// Components of a vector of each corner along the axes.
 #[inline(always)]
-fn sum<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
-    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
+fn corners_in<L: Lane>(e: &[Vector<L>; 3], v: &[Vector<L>; 4]) -> [[L; 4]; 3] {
+    let mut along = [[L::splat(0.0); 4]; 3];
+    let mut axis = 0;
+    while axis < 3 {
+        let mut i = 0;
+        while i < 4 {
+            along[axis][i] = e[axis].dot(&v[i]);
+            i += 1;
+        }
+        axis += 1;
+    }
+    along
+}
+
+/// Components along the axes of what the vectors of corners 0 and 1 have more than those of 2 and 3, and of a quarter of their sum with
+/// the signs of the hourglass.
+#[inline(always)]
+fn opposed_in<L: Lane>(e: &[Vector<L>; 3], v: &[Vector<L>; 4]) -> ([Opposed<L>; 3], [L; 3]) {
+    let (zero, one, minus) = (L::splat(0.0), L::splat(1.0), L::splat(-1.0));
+    let (first, second) = (v[2].mul_add(minus, &v[0]), v[3].mul_add(minus, &v[1]));
+    let pattern = v[1].mul_add(minus, &v[0]).mul_add(one, &v[3].mul_add(minus, &v[2]));
+    let pattern = pattern.scaled(L::splat(0.25));
+    let (mut opposed, mut along) = ([[zero; 2]; 3], [zero; 3]);
+    let mut axis = 0;
+    while axis < 3 {
+        opposed[axis] = [e[axis].dot(&first), e[axis].dot(&second)];
+        along[axis] = e[axis].dot(&pattern);
+        axis += 1;
+    }
+    (opposed, along)
+}
+
+/// What corners 0 and 1 have more than 2 and 3.
+#[inline(always)]
+fn opposed<L: Lane>(a: &[L; 4]) -> Opposed<L> {
+    [a[0] - a[2], a[1] - a[3]]
+}
+
+/// By corner what is of opposite sign in opposite corners, with what corners 0 and 2, and 1 and 3, have beside it.
+#[inline(always)]
+fn at_corners<L: Lane>(opposed: &Opposed<L>, even: L, odd: L) -> [L; 4] {
+    [even + opposed[0], odd + opposed[1], even - opposed[0], odd - opposed[1]]
+}
+
+/// Adds vectors by axis and corner to those of the nodes.
+///
+/// # Safety
+/// As [`compute`].
+#[inline(always)]
+unsafe fn scatter<L: Lane>(to: &mut [&mut [f64]; 3], corners: &[Vec<u32>; 4], slot: usize, of: &[[L; 4]; 3]) {
+    // Slices of its own, which need not be loaded again after each store.
+    let [x, y, z] = to;
+    let (x, y, z) = (&mut **x, &mut **y, &mut **z);
+    let mut i = 0;
+    while i < 4 {
+        let nodes = &corners[i][slot..slot + L::N];
+        let (of_x, of_y, of_z) = (of[0][i].to_array(), of[1][i].to_array(), of[2][i].to_array());
+        let mut lane = 0;
+        while lane < L::N {
+            let node = nodes[lane] as usize;
+            // SAFETY: corners are inside the node arrays.
+            unsafe {
+                *x.get_unchecked_mut(node) += of_x[lane];
+                *y.get_unchecked_mut(node) += of_y[lane];
+                *z.get_unchecked_mut(node) += of_z[lane];
+            }
+            lane += 1;
+        }
+        i += 1;
+    }
 }
