@@ -60,6 +60,7 @@ pub fn tie(surface: &Surface, found: &[OnFace]) -> Vec<Tie> {
                 weights: on.weights,
                 stiffness: force::stiffness(surface.node_share[n], surface.node_stiffness[n], face.stiffness),
                 load: [0.0; 5],
+                bond: None,
             }
         })
         .collect();
