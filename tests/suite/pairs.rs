@@ -81,7 +81,7 @@ fn ties_that_break_on_a_part_that_erodes_have_the_same_bits() {
     let model = model(
         &bonded_text().replace("name = \"below\"", "name = \"below\"\nerosion = { plastic_strain = 0.02 }"),
     );
-    let settings = setup.contact.clone().expect("contact");
+    let settings = model.setup.contact.clone().expect("contact");
     let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
     let broken = settings.n_broken(&alone.state.contact).expect("ties that can break");
     println!("{broken} ties broken, {} elements eroded", alone.state.n_eroded());
