@@ -32,7 +32,7 @@ use worker::{
     peers::Peers,
 };
 
-const PLATES: &str = include_str!("../../deck/examples/plates-free-slip.toml");
+const PLATES: &str = include_str!("../../../deck/examples/plates-free-slip.toml");
 /// The longest that a run over links may take.
 const DEADLINE: Duration = Duration::from_secs(120);
 

@@ -2,9 +2,15 @@
 //! lines, and no change of a deck makes the reader panic.
 
 mod beams;
-#[path = "../damage/mod.rs"]
-mod damage;
+mod blast;
+mod contact;
+mod faults;
+mod hourglass;
+mod laws;
 mod mutations;
+mod records;
+mod rigid;
+mod spans;
 
 use std::{fs, path::Path};
 

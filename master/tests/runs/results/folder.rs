@@ -83,7 +83,7 @@ fn write_that_does_not_fit_loses_nothing_that_was_written_before() {
     let run = std::process::Command::new("bash")
         .args([
             "-c",
-            "trap '' XFSZ; ulimit -f 12; exec \"$0\" --exact --ignored folder::body_under_a_file_size_limit",
+            "trap '' XFSZ; ulimit -f 12; exec \"$0\" --exact --ignored results::folder::body_under_a_file_size_limit",
         ])
         .arg(std::env::current_exe().expect("a test runs from a file"))
         .output()

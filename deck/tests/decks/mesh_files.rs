@@ -1,14 +1,13 @@
 //! Meshes of other programs: the same body in every format is the same model, what a reader cannot take is refused at its line, and
 //! damaged files end in faults.
 
-mod damage;
-
-use damage::{Stream, is_read};
 use deck::{
     bundle::{self, Options},
     mesh_file::{self, Body, MeshFile},
     model::Model,
 };
+
+use crate::damage::{Stream, is_read};
 
 const GMSH: &str = include_str!("meshes/body.msh");
 const ABAQUS: &str = include_str!("meshes/body.inp");

@@ -75,7 +75,7 @@ fn a_time_step_under_its_floor_ends_the_run_with_what_holds_it_down() {
 
 #[test]
 fn an_energy_error_above_the_limit_of_the_deck_ends_the_run_with_the_part() {
-    let bars = include_str!("../../deck/examples/two-bars.toml");
+    let bars = include_str!("../../../deck/examples/two-bars.toml");
     let limited = bars.replace("end_time = 80e-6", "end_time = 80e-6\nenergy_error = 1e-7");
     assert_ne!(bars, limited);
     fails_with(&limited, &["energy error ", "at most 1e-7", "gained most", "control.energy_error"]);

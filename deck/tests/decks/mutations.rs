@@ -1,10 +1,8 @@
 //! Whatever is done to a deck, reading it ends with a model or with faults, never with a panic.
 
-mod damage;
-
 use std::fs;
 
-use damage::{Stream, is_read};
+use crate::damage::{Stream, is_read};
 
 /// Values put in the place of a number. None makes a mesh that is large but allowed.
 const VALUES: [&str; 16] = [
