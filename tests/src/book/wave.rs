@@ -194,7 +194,8 @@ pub(super) fn a_tied_end_flies_off_with_what_it_traps_of_a_pulse(figures: &mut F
     let hit = |strength: f64| {
         run(tied_end(28e-6, &format!("tensile_strength = {:e}", strength * pulse), ["", ""], 10.0))
     };
-    let solved = hit(0.8);
+    // The weaker the tie, the less of the front of the tension it passes on before it breaks.
+    let solved = hit(0.2);
     let [head, middle, end] = [0, 1, 2].map(|part| solved.part_velocity(part)[0]);
     figures.add("spall: nodes that let go", broken(&solved).unwrap_or_default() as f64);
     figures.add("spall: velocity of the end", end);

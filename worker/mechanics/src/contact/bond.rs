@@ -168,7 +168,7 @@ pub fn strengthen(
 }
 
 /// Area vector of a face: along its normal, as long as its area.
-fn area_of(x: &[[f64; 3]], face: &Face) -> [f64; 3] {
+pub(super) fn area_of(x: &[[f64; 3]], face: &Face) -> [f64; 3] {
     across(face.nodes.map(|n| x[n as usize])).map(|a| 0.5 * a)
 }
 
@@ -184,7 +184,7 @@ fn across([p, q, r, s]: [[f64; 3]; 4]) -> [f64; 3] {
 }
 
 #[inline(always)]
-fn unit(vector: [f64; 3]) -> [f64; 3] {
+pub(super) fn unit(vector: [f64; 3]) -> [f64; 3] {
     let size = dot(vector, vector).sqrt();
     if size > 0.0 { vector.map(|a| a / size) } else { [0.0; 3] }
 }
