@@ -51,8 +51,10 @@ fn bonded() -> Model {
 }
 
 fn bonded_text() -> String {
-    let text = STUCK_AND_TIED
-        .replace("faces = \"below\"", "faces = \"below\"\ntensile_strength = 1.2e-2\nshear_strength = 1.2e-2");
+    let text = STUCK_AND_TIED.replace(
+        "faces = \"below\"",
+        "faces = \"below\"\ntensile_strength = 1.2e-2\nshear_strength = 1.2e-2",
+    );
     text.replace("end_cycle = 260", "end_cycle = 200")
 }
 

@@ -187,6 +187,14 @@ fn tied_end(end: f64, strength: &str, [meets, rest]: [&str; 2], velocity: f64) -
     model(&bars(end, "", &parts, &(tie + rest)))
 }
 
+/// Gives the head a velocity along an axis that rises to 10 m/s and falls again, and takes viscosity, which would damp it, away.
+fn smooth(model: &mut Model, axis: usize) {
+    (model.setup.control.linear_viscosity, model.setup.control.quadratic_viscosity) = (0.0, 0.0);
+    for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
+        v[axis] = if x[0] < 0.02 { 10.0 * (PI * x[0] / 0.02).sin().powi(2) } else { 0.0 };
+    }
+}
+
 pub(super) fn a_tied_end_flies_off_with_what_it_traps_of_a_pulse(figures: &mut Figures) {
     // A pulse of 40 mm comes back from the free end in tension. At the tie it meets its own second half; when that has passed, at 20 us, the end
     // has half of the momentum.
@@ -201,7 +209,12 @@ pub(super) fn a_tied_end_flies_off_with_what_it_traps_of_a_pulse(figures: &mut F
     figures.add("spall: velocity of the end", end);
     figures.add("spall: velocity of the rest", 0.25f64.mul_add(head, 0.75 * middle));
     figures.add("spall: energy error", solved.rows.last().expect("rows").error.abs());
-    let breaks = |strength: f64| broken(&hit(strength)) == Some(4);
+    // A rectangular pulse overshoots; of a smooth one the second half comes back to the tie alone, with the same stress.
+    let breaks = |strength: f64| {
+        let mut model = tied_end(28e-6, &format!("tensile_strength = {:e}", strength * pulse), ["", ""], 0.0);
+        smooth(&mut model, 0);
+        broken(&run(model)) == Some(4)
+    };
     figures
         .add("spall: strength that just breaks over the stress of the pulse", threshold([0.5, 1.5], breaks));
 }
@@ -213,9 +226,7 @@ pub(super) fn a_tie_breaks_in_shear_at_the_stress_of_the_wave(figures: &mut Figu
     let hit = |strength: f64| {
         let held = ["default_interacts = false", "[[boundary]]\ntype = \"fixed\"\naxes = \"xz\"\n"];
         let mut model = tied_end(0.075 / fast, &format!("shear_strength = {:e}", strength * peak), held, 0.0);
-        for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
-            v[1] = if x[0] < 0.02 { 10.0 * (PI * x[0] / 0.02).sin().powi(2) } else { 0.0 };
-        }
+        smooth(&mut model, 1);
         run(model)
     };
     let breaks = |strength: f64| broken(&hit(strength)) == Some(4);
