@@ -47,7 +47,9 @@ use typed::{
 
 pub use fault::{Fault, MAX_FAULTS};
 pub use keyword::UNIT_NAMES;
-pub use limits::{MAX_CONTACT_PARTS, MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT, MAX_TITLE};
+pub use limits::{
+    Bounds, MAX_CONTACT_PARTS, MAX_ELEMENTS, MAX_ENTRIES, MAX_NODES, MAX_PARTS, MAX_TEXT, MAX_TITLE,
+};
 pub use log::Warning;
 pub use model::Model;
 pub use table::{MAX_NAME, MAX_NUMBER};
@@ -71,14 +73,6 @@ pub struct Reading {
 /// Every fault of the deck, ordered by place, at most [`MAX_FAULTS`]. Faults of syntax hide all others.
 pub fn read(text: &str, file_name: &str) -> Result<Model, Vec<Fault>> {
     read_whole(text, file_name).map(|reading| reading.model)
-}
-
-/// What bounds the reading of a deck that somebody else brings.
-pub struct Bounds<'a> {
-    /// Most elements that it may ask for: who reads it has no memory for more.
-    pub elements: u64,
-    /// Whether nobody waits for the deck any more. It is asked between the stages of reading, for each part, mesh file and block of cards.
-    pub is_given_up: &'a dyn Fn() -> bool,
 }
 
 /// Nothing but what bounds every deck.

@@ -20,3 +20,11 @@ pub(crate) const MAX_SECTIONS: usize = 64;
 /// Greatest node or element number a deck may give; generated numbers go on above.
 pub(crate) const MAX_ID: u32 = 2_000_000_000;
 pub(crate) const MAX_CURVE_POINTS: usize = 100_000;
+
+/// What bounds the reading of a deck that somebody else brings.
+pub struct Bounds<'a> {
+    /// Most elements that it may ask for: who reads it has no memory for more.
+    pub elements: u64,
+    /// Whether nobody waits for the deck any more. It is asked between the stages of reading, for each part, mesh file and block of cards.
+    pub is_given_up: &'a dyn Fn() -> bool,
+}

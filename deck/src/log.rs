@@ -3,9 +3,8 @@
 use std::{cell::RefCell, collections::BTreeMap, fmt};
 
 use crate::{
-    Bounds,
     fault::{Fault, Faults, MAX_FAULTS, once_for_one_cause},
-    limits::MAX_ELEMENTS,
+    limits::{Bounds, MAX_ELEMENTS},
     place::{Origin, Place},
 };
 

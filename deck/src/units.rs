@@ -8,7 +8,18 @@ use mechanics::{
     material::{CowperSymonds, Eos, Failure, Material, Strength},
 };
 
-use crate::library::card::Measure;
+/// What a constant measures: powers of length, mass and time, and whether it is per kelvin or in kelvin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Measure {
+    pub(crate) unit: Unit,
+    pub(crate) kelvin: i32,
+}
+
+impl Measure {
+    pub(crate) const fn of(unit: Unit) -> Self {
+        Self { unit, kelvin: 0 }
+    }
+}
 
 /// A consistent set: one deck unit is ten to this power of the SI unit, where the library is converted to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

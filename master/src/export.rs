@@ -5,7 +5,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Args, builder::PossibleValuesParser};
 use deck::model::FORMAT_NAMES;
 
-use crate::results::format::{self, Written};
+use crate::results::{format::Written, formats};
 
 /// Flags of `export`.
 #[derive(Args, Clone, Debug)]
@@ -22,7 +22,7 @@ pub struct ExportArgs {
 /// # Errors
 /// Files that cannot be read or written.
 pub fn run(args: &ExportArgs) -> Result<ExitCode, String> {
-    for written in format::write_all(&args.results, &args.format).map_err(|e| e.to_string())? {
+    for written in formats::write_all(&args.results, &args.format).map_err(|e| e.to_string())? {
         println!("{}", line(&written));
     }
     Ok(ExitCode::SUCCESS)

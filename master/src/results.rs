@@ -20,6 +20,7 @@ use std::{
 pub mod d3plot;
 pub mod field_unit;
 pub mod format;
+pub mod formats;
 pub mod hdf5;
 pub mod history;
 pub mod report;
@@ -261,7 +262,7 @@ fn is_written_by_a_run(name: &str) -> bool {
     let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".tmp")).unwrap_or(name);
     [PVD, CONTACT_PVD, HISTORY, SUMMARY, REPORT, TRACE, INPUT, SUMS].contains(&stem)
         || is_of_a_state(stem)
-        || format::FORMATS.iter().any(|format| format.writes(stem))
+        || formats::FORMATS.iter().any(|format| format.writes(stem))
 }
 
 /// Whether a file of this name is a state or its contact surface.

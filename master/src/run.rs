@@ -23,7 +23,7 @@ use crate::{
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     processes::Processes,
-    results::{self, Folder, Summary, format, report, trace},
+    results::{self, Folder, Summary, formats, report, trace},
     shell::quoted,
     snapshot::{
         self, Snapshot,
@@ -223,7 +223,7 @@ pub fn conclude(
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
-        for written in format::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
+        for written in formats::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
             info!("{}", export::line(&written));
         }
         output.seal()?;

@@ -30,7 +30,7 @@ use crate::{
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
     queue::Change,
-    results::{self, Folder, Summary, TRACE, format, report, trace},
+    results::{self, Folder, Summary, TRACE, formats, report, trace},
     snapshot::{Snapshot, keeper::Keeper, store::Store},
     summarise::{SurfaceCensus, summarise},
 };
@@ -234,7 +234,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
         report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
-        for written in format::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
+        for written in formats::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
             info!(job = order.number, "{}", export::line(&written));
         }
         if order.options.trace {

@@ -184,7 +184,7 @@ impl Tied {
         }
         if of_nodes {
             // Exponents of both forces, 2 where they are blank.
-            for i in [2, 3].into_iter().filter(|&i| ![0.0, 2.0].contains(&f.real(i, 0.0))) {
+            if let Some(i) = [2, 3].into_iter().find(|&i| ![0.0, 2.0].contains(&f.real(i, 0.0))) {
                 f.fault(i, "an exponent of 2", "leave it blank, and give forces that fit it");
                 return None;
             }

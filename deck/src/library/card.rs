@@ -11,7 +11,11 @@ use super::{
     constants::{Written, of_eos, of_failure, of_strength},
     entries, find,
 };
-use crate::{fault::nearest, units::Units, write};
+use crate::{
+    fault::nearest,
+    units::{Measure, Units},
+    write,
+};
 
 /// A material of the library in a set of units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -109,19 +113,6 @@ enum Role {
     Eos,
     Strength,
     Failure,
-}
-
-/// What a constant measures: powers of length, mass and time, and whether it is per kelvin or in kelvin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Measure {
-    pub(crate) unit: Unit,
-    pub(crate) kelvin: i32,
-}
-
-impl Measure {
-    pub(crate) const fn of(unit: Unit) -> Self {
-        Self { unit, kelvin: 0 }
-    }
 }
 
 const DENSITY: Unit = Unit { length: -3, mass: 1, time: 0 };

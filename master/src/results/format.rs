@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    Error, d3plot, vtkhdf,
+    Error,
     vtu::read::{self, Piece},
 };
 
@@ -37,14 +37,6 @@ pub struct Written {
     pub path: PathBuf,
     /// What a reader of the format should know, in a sentence; may be empty.
     pub note: String,
-}
-
-/// All formats, in the order of [`deck::model::FORMAT_NAMES`].
-pub static FORMATS: [&dyn Format; 2] = [&vtkhdf::VtkHdf, &d3plot::D3plot];
-
-/// The format of a name.
-pub fn named(name: &str) -> Option<&'static dyn Format> {
-    FORMATS.into_iter().find(|format| format.name() == name)
 }
 
 /// The states of a results folder, in the order of time. There is at least one.
@@ -87,27 +79,5 @@ impl States {
     /// An error about the file of a state.
     pub(super) fn malformed(&self, index: usize, what: impl Into<String>) -> Error {
         Error::Malformed { path: self.files[index].clone(), line: 1, what: what.into() }
-    }
-}
-
-/// Writes the states of a folder in formats of these names, which must be those of formats.
-///
-/// # Errors
-/// Those of [`Format::write`].
-pub fn write_all(folder: &Path, names: &[String]) -> Result<Vec<Written>, Error> {
-    if names.is_empty() {
-        return Ok(Vec::new());
-    }
-    let states = States::of(folder)?;
-    names.iter().filter_map(|name| named(name)).map(|format| format.write(&states)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn formats_have_the_names_that_decks_know() {
-        assert_eq!(FORMATS.map(Format::name), deck::model::FORMAT_NAMES);
     }
 }

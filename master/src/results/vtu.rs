@@ -7,10 +7,12 @@
 use std::{collections::BTreeSet, io, io::Write, path::Path};
 
 mod appended;
+mod array;
 pub mod field_data;
+mod fields;
 pub mod read;
 
-use deck::model::{Model, Output};
+use deck::model::Model;
 use mechanics::{
     element::{beam2, shell4, tet10},
     mesh::{Nodes, Topology},
@@ -18,180 +20,25 @@ use mechanics::{
 };
 
 use super::{
-    Error, FIELD_NAMES, Folder, PVD, field_unit, format, state_name,
+    Error, Folder, PVD, field_unit, state_name,
     surface::Probe,
     von_mises::{plane_von_mises, von_mises},
     write_whole,
 };
 use appended::Appended;
+pub(super) use array::Array;
+pub use fields::Fields;
 
 /// Cell type of the eight-node hexahedron.
 const VTK_HEXAHEDRON: u8 = 12;
 
-/// Cell type of the four-node quadrilateral: shells.
+/// Cell types of trusses and beams, of shells, and of tetrahedra of ten nodes.
 const VTK_LINE: u8 = 3;
 const VTK_QUAD: u8 = 9;
 const VTK_QUADRATIC_TETRA: u8 = 24;
 
-/// Fields whose numbers identify rather than measure: written whatever the deck selects.
-const IDENTITY: [&str; 4] = ["node_id", "element_id", "part", "material"];
-
-/// Fields that follow from others or never change: written only if the deck names them.
-const ON_REQUEST: [&str; 10] = [
-    "stress",
-    "relative_volume",
-    "stress_xx",
-    "stress_yy",
-    "stress_xy",
-    "stress_yz",
-    "stress_zx",
-    "mass",
-    "time_to_light",
-    "viscosity",
-];
-
 /// Arrays that are written wherever they exist: the worker, and what shells and beams have.
 const ALWAYS: [&str; 5] = ["worker", "thickness", "von_mises_max", "beam_force", "beam_moment"];
-
-/// Which fields a state file holds.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fields {
-    /// One flag per entry of [`FIELD_NAMES`].
-    selected: [bool; FIELD_NAMES.len()],
-}
-
-impl Fields {
-    /// The fields of a deck, and those that its formats need.
-    ///
-    /// # Errors
-    /// [`Error::UnknownField`].
-    pub fn of(output: &Output) -> Result<Self, Error> {
-        let mut fields = Self::select(&output.fields)?;
-        for format in output.formats.iter().filter_map(|name| format::named(name)) {
-            fields.add(format.fields());
-        }
-        Ok(fields)
-    }
-
-    /// Adds those that a format needs and a state has, whose run was asked for that format beside its deck.
-    pub fn add_those_of(&mut self, written: &read::Piece) {
-        let has = |name: &str| written.headings.iter().any(|heading| heading.name == name);
-        for format in format::FORMATS {
-            if format.fields().iter().all(|name| has(name)) {
-                self.add(format.fields());
-            }
-        }
-    }
-
-    fn add(&mut self, names: &[&str]) {
-        for (known, selected) in FIELD_NAMES.iter().zip(&mut self.selected) {
-            *selected |= names.contains(known);
-        }
-    }
-
-    /// The fields of `output.fields`; an empty list selects all but the relative volume,
-    /// the components of stress, the nodal mass and the time until the detonation arrives.
-    ///
-    /// # Errors
-    /// [`Error::UnknownField`].
-    pub fn select(names: &[String]) -> Result<Self, Error> {
-        if let Some(name) = names.iter().find(|name| !FIELD_NAMES.contains(&name.as_str())) {
-            return Err(Error::UnknownField { name: name.clone() });
-        }
-        let selected = FIELD_NAMES.map(|known| {
-            IDENTITY.contains(&known)
-                || names.iter().any(|name| name == known)
-                || names.is_empty() && !ON_REQUEST.contains(&known)
-        });
-        Ok(Self { selected })
-    }
-
-    /// Whether the field of this name is written.
-    fn contains(&self, name: &str) -> bool {
-        FIELD_NAMES.iter().zip(self.selected).any(|(known, selected)| selected && *known == name)
-    }
-}
-
-/// Puts the little-endian components of one tuple into a buffer.
-type Put<'a> = Box<dyn Fn(usize, &mut Vec<u8>) + 'a>;
-
-/// One array of the file: its description and where its numbers come from.
-pub(super) struct Array<'a> {
-    name: &'static str,
-    /// VTK's name of the type.
-    kind: &'static str,
-    /// Bytes per component.
-    width: usize,
-    /// Components per tuple.
-    components: usize,
-    tuples: usize,
-    /// Whether the components are told to the reader; otherwise the array is one long list.
-    grouped: bool,
-    put: Put<'a>,
-}
-
-impl<'a> Array<'a> {
-    pub(super) fn f64<const N: usize>(
-        name: &'static str,
-        tuples: usize,
-        of: impl Fn(usize) -> [f64; N] + 'a,
-    ) -> Self {
-        let put: Put =
-            Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
-        Self { name, kind: "Float64", width: 8, components: N, tuples, grouped: true, put }
-    }
-
-    /// A list of indices, `N` per tuple; VTK refuses grouped ones.
-    pub(super) fn i64<const N: usize>(
-        name: &'static str,
-        tuples: usize,
-        of: impl Fn(usize) -> [i64; N] + 'a,
-    ) -> Self {
-        let put: Put =
-            Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
-        Self { name, kind: "Int64", width: 8, components: N, tuples, grouped: false, put }
-    }
-
-    pub(super) fn u32(name: &'static str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
-        let put: Put = Box::new(move |i, out| out.extend_from_slice(&of(i).to_le_bytes()));
-        Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
-    }
-
-    /// The tuples of some elements alone.
-    fn only(self, kept: &'a [usize]) -> Self {
-        let put = self.put;
-        Self { tuples: kept.len(), put: Box::new(move |i, out| put(kept[i], out)), ..self }
-    }
-
-    /// Size of the numbers, without the header that precedes them.
-    fn n_bytes(&self) -> u64 {
-        self.tuples as u64 * self.components as u64 * self.width as u64
-    }
-
-    /// The element that announces the array, which starts `offset` bytes into the appended data, with its unit.
-    fn describe(&self, out: &mut impl Write, offset: u64, unit: &str) -> io::Result<()> {
-        write!(out, r#"        <DataArray type="{}" Name="{}""#, self.kind, self.name)?;
-        if self.grouped && self.components != 1 {
-            write!(out, r#" NumberOfComponents="{}""#, self.components)?;
-        }
-        if self.components == 6 {
-            for (index, name) in ["XX", "YY", "ZZ", "XY", "YZ", "XZ"].iter().enumerate() {
-                write!(out, r#" ComponentName{index}="{name}""#)?;
-            }
-        }
-        write!(out, r#" format="appended" offset="{offset}""#)?;
-        if unit.is_empty() {
-            return writeln!(out, "/>");
-        }
-        writeln!(out, ">")?;
-        // The key by which VTK keeps the unit of an array.
-        writeln!(
-            out,
-            r#"          <InformationKey name="UNITS_LABEL" location="vtkDataArray">{unit}</InformationKey>"#
-        )?;
-        writeln!(out, "        </DataArray>")
-    }
-}
 
 /// Where the elements of a model are: part and material by global element index.
 struct Elements<'a> {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     load::{Curve, Drive, Span},
-    rigid::{cross, turn, turned},
+    vectors::{cross, turn, turned},
 };
 
 /// What acts on a node alone: prescribed velocities, walls, forces. A node's constraint is the same on every holder.

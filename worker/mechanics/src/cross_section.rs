@@ -16,8 +16,8 @@ use crate::{
     lanes::{SET, Width},
     material::Material,
     mesh::Nodes,
-    rigid::cross,
     setup::Control,
+    vectors::cross,
 };
 
 /// Elements that are cut, and which of their corners are ahead of the cut.

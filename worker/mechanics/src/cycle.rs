@@ -11,6 +11,7 @@ mod deal;
 mod ghosts;
 mod held_block;
 mod image;
+mod meter;
 mod plan;
 mod report;
 mod sharing;
@@ -38,6 +39,7 @@ pub use assembly::Subdomain;
 use bodies::{Bodies, Held};
 use ghosts::Ghosts;
 use held_block::{HeldBlock, Order};
+pub use meter::Meter;
 pub use plan::{Ghost, Neighbour, Plan};
 use sharing::{Exchange, Groups, Holders, Numbers};
 use touch::HeldContact;
@@ -76,25 +78,6 @@ pub fn step(
     domain.elements(Sets::Interior, now.dt_previous, meter);
     let totals = exchange(domain, partials);
     domain.integrate(&totals, now.dt_previous, now.dt, free_walls, meter)
-}
-
-/// Measures the work of compute threads; the physics knows no clock of its own.
-pub trait Meter: Sync {
-    /// A mark on the calling thread.
-    fn start(&self) -> u64;
-    /// Books what the calling thread did since the mark.
-    fn stop(&self, mark: u64, contact: bool);
-    /// The calling thread dealt work to all threads since the mark, and did its part of it: what else it does is serial.
-    fn dealt(&self, _mark: u64) {}
-    /// Threads of the pool that have something else to do now, such as a sort: work is dealt to the others.
-    fn beside(&self) -> usize {
-        0
-    }
-    /// Both, of a thread that is the only one.
-    fn stop_dealt(&self, mark: u64, contact: bool) {
-        self.stop(mark, contact);
-        self.dealt(mark);
-    }
 }
 
 /// Which element sets a pass computes.

@@ -21,8 +21,8 @@ use crate::{
     element::{Step, group::Scanned, modes::modes_of},
     lanes::{Width, scalar::Scalar},
     material::Material,
-    rigid::{cross, dot},
     state::{ALIVE, field},
+    vectors::{cross, dot},
 };
 
 pub(crate) mod criteria;

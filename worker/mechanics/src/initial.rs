@@ -5,14 +5,15 @@ use crate::{
     burn::lighting_time,
     constraint::{Circle, Constraint, MAX_WALLS},
     contact::{Extent, Settings},
-    element::{beam2, hex8::eight_points, shell4, tet10},
+    element::{beam2, hex8::points, shell4, tet10},
     exact::{Quanta, Quantum},
     load::{Drive, SurfaceKind},
     material::Material,
     mesh::{FACES, Mesh, Part, Topology},
-    rigid::{Body, cross, dot},
+    rigid::Body,
     setup::Setup,
     state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field},
+    vectors::{cross, dot},
     wall::{Motion, RigidWall},
 };
 
@@ -72,7 +73,7 @@ pub fn state(
             state.initial_volume.push(v);
             state.elements[field::TEMPERATURE][index] = material.initial_temperature();
             if let Topology::EightPoint { .. } = part.topology {
-                for of_point in &mut state.own[eight_points::TEMPERATURES] {
+                for of_point in &mut state.own[points::TEMPERATURES] {
                     of_point[index] = material.initial_temperature();
                 }
             }

@@ -12,6 +12,7 @@ use std::{
     str::FromStr,
 };
 
+pub(crate) mod apart;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -113,7 +114,7 @@ pub trait Lane:
     fn shifted_up(self) -> (Self, f64);
 
     /// Does a part of a kernel in a function of its own, which has the instructions of these lanes.
-    fn apart<T: dispatch::Apart>(task: T);
+    fn apart<T: apart::Apart>(task: T);
 
     /// The lanes in order, zeros behind them.
     #[inline(always)]

@@ -50,6 +50,7 @@ pub mod setup;
 pub(crate) mod spin;
 pub mod state;
 pub mod strength;
+mod vectors;
 pub mod vote;
 pub mod wall;
 pub mod work;

@@ -2,11 +2,8 @@
 
 use deck::bundle::Options;
 
-use super::{
-    cube,
-    damage::{Stream, is_read},
-    folder, gathered,
-};
+use super::{cube, folder, gathered};
+use crate::damage::{Stream, is_read};
 
 /// A deck with a few changes: words, columns, lines.
 fn mutated(text: &str, stream: &mut Stream) -> String {

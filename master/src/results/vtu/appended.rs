@@ -11,7 +11,7 @@ use std::{io, io::Write};
 
 use miniz_oxide::{deflate::compress_to_vec_zlib, inflate::decompress_to_vec_zlib_with_limit};
 
-use super::Array;
+use super::array::Array;
 
 /// Bytes of numbers in a block.
 const BLOCK: usize = 1 << 18;

@@ -6,7 +6,8 @@ use std::fs;
 use master::results::{
     Folder,
     d3plot::D3plot,
-    format::{Format, States, named, write_all},
+    format::{Format, States},
+    formats::{named, write_all},
     vtkhdf,
     vtu::{
         Fields, Series,

@@ -17,7 +17,7 @@
 //! torsion is exact and the rotation of cross-sections in bending somewhat heavy; the limit of the time step is that of
 //! the fastest of the six motions with it. The elements are few and their arithmetic is short, so they are computed one at a time.
 
-use crate::rigid::dot;
+use crate::vectors::dot;
 
 mod fibre;
 pub(crate) mod group;

@@ -11,6 +11,7 @@ mod end;
 pub(crate) mod group;
 mod leaving;
 mod pass;
+pub(crate) mod points;
 pub(super) mod stress;
 mod view;
 

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{EquationOfState, Line};
-use crate::lanes::{Lane, dispatch::Apart, functions::ln};
+use crate::lanes::{Lane, apart::Apart, functions::ln};
 
 /// Most points of a [`Points`].
 pub const MAX_POINTS: usize = 10;

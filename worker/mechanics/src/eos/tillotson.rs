@@ -13,7 +13,7 @@
 
 use super::{EquationOfState, Line};
 use crate::{
-    lanes::{Lane, dispatch::Apart, functions::exp},
+    lanes::{Lane, apart::Apart, functions::exp},
     law::declared,
 };
 

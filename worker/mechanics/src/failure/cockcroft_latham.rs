@@ -5,7 +5,7 @@
 
 use super::{FailureLaw, Loading};
 use crate::{
-    lanes::{Lane, dispatch::Apart},
+    lanes::{Lane, apart::Apart},
     strength::greatest_principal,
 };
 

@@ -8,7 +8,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{Lane, dispatch::Apart};
+use super::{Lane, apart::Apart};
 
 /// Four f64 in a register.
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{Lane, avx2::four, dispatch::Apart};
+use super::{Lane, apart::Apart, avx2::four};
 
 /// Eight f64 in a register.
 #[derive(Clone, Copy)]

@@ -5,7 +5,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{Lane, dispatch::Apart};
+use super::{Lane, apart::Apart};
 
 /// Two f64 in a register.
 #[derive(Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::{Lane, dispatch::Apart};
+use super::{Lane, apart::Apart};
 
 /// One f64.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::{Lane, dispatch::Apart};
+use super::{Lane, apart::Apart};
 
 /// The lanes of one register and, behind them, those of another.
 #[derive(Clone, Copy)]

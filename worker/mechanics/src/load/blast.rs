@@ -18,7 +18,7 @@ use crate::{
         functions::{cbrt, exp, ln},
         scalar::Scalar,
     },
-    rigid::dot,
+    vectors::dot,
 };
 use tables::{AIR_BURST, SURFACE_BURST};
 

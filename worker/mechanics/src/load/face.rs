@@ -10,8 +10,8 @@ use crate::{
     exact::Quantum,
     material::Material,
     mesh::FACES,
-    rigid::{cross, dot},
     setup::Control,
+    vectors::{cross, dot},
     work::Work,
 };
 

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Body, Pull, State, cross, dot, full};
+use super::{Body, Pull, State, full};
 use crate::{
     constraint::{Circle, Constraint},
     element::{beam2, hex8, tet10},
@@ -16,6 +16,7 @@ use crate::{
     load::{Drive, Loads},
     material::Material,
     mesh::{CORNERS, Mesh, Part, Topology, quad_area},
+    vectors::{cross, dot},
 };
 
 /// What a deck says of a body.

@@ -1,7 +1,7 @@
 //! A law of which each kernel calls the update and does not hold it: long laws stand once for each width, see [`Lane::apart`].
 
 use super::{Around, Deviator, History, Memory, Strain, StrengthLaw};
-use crate::lanes::{Lane, dispatch};
+use crate::lanes::{self, Lane};
 
 /// The law, called.
 #[derive(Clone, Copy)]
@@ -16,7 +16,7 @@ struct Update<'a, L: Lane, S> {
     stress: &'a mut Deviator<L>,
 }
 
-impl<L: Lane, S: StrengthLaw> dispatch::Apart for Update<'_, L, S> {
+impl<L: Lane, S: StrengthLaw> lanes::apart::Apart for Update<'_, L, S> {
     #[inline(always)]
     fn run(self) {
         *self.stress = self.law.update(self.trial, self.strain, self.history, self.active);
@@ -33,7 +33,7 @@ struct Remember<'a, L: Lane, S> {
     stress: &'a mut Deviator<L>,
 }
 
-impl<L: Lane, S: StrengthLaw> dispatch::Apart for Remember<'_, L, S> {
+impl<L: Lane, S: StrengthLaw> lanes::apart::Apart for Remember<'_, L, S> {
     #[inline(always)]
     fn run(self) {
         *self.stress = self.law.remember(self.trial, &self.around, self.history, self.memory, self.active);

@@ -9,7 +9,7 @@ use crate::{
     element::vector::{Tensor, Vector},
     lanes::Lane,
     law::{Unit, Variable},
-    rigid::{cross, dot},
+    vectors::{cross, dot},
 };
 
 /// The columns of a law that keeps the turn, first among its history variables.

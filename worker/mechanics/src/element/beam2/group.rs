@@ -18,10 +18,10 @@ use crate::{
     material::Material,
     mesh::spread,
     piece::Piece,
-    rigid::{cross, dot},
     spin::Turning,
     state::{N_FIELDS, field},
     strength::plane_stress::PlaneLaw,
+    vectors::{cross, dot},
 };
 
 /// The beams of a block; arrays are by local element.

@@ -11,7 +11,11 @@ mod kernel;
 
 use std::{fmt, ops::Range};
 
-use super::{BySlot, Laws, group::Solids};
+use super::{
+    BySlot, Laws,
+    group::Solids,
+    points::{N_OWN, OF_POINT, POINTS},
+};
 use crate::{
     element::{
         ElementVote, Step,
@@ -26,25 +30,9 @@ use crate::{
     material::Material,
     piece::Piece,
     spin::Turning,
-    state::{
-        N_FIELDS,
-        field::{DAMAGE, PLASTIC_STRAIN, SXX, SXY, SYY, SYZ, SZX, TEMPERATURE},
-        sparse,
-    },
+    state::{N_FIELDS, sparse},
     strength::AnyStrength,
 };
-
-/// Points of an element: one lane set.
-const POINTS: usize = SET;
-
-/// The fields that each point has, indices into [`crate::state::FIELDS`].
-const OF_POINT: [usize; 8] = [SXX, SYY, SXY, SYZ, SZX, PLASTIC_STRAIN, TEMPERATURE, DAMAGE];
-
-/// Number of arrays that such elements have of their own ([`crate::piece::Piece::own`]): field by field, those of the points.
-pub(crate) const N_OWN: usize = OF_POINT.len() * POINTS;
-
-/// The arrays among them of the temperatures.
-pub(crate) const TEMPERATURES: Range<usize> = 6 * POINTS..7 * POINTS;
 
 /// Why elements of eight points cannot be of a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
