@@ -6,7 +6,7 @@ mod condition;
 mod part;
 mod value;
 
-use mechanics::material::Material;
+use mechanics::{contact::Limit, material::Material};
 
 use crate::typed::{
     Control, Cut, Deck, Gauge, Kind, Output, Section, Spot,
@@ -120,6 +120,13 @@ fn write_contact(text: &mut Text, contact: &Contact) {
         text.key("nodes", list(tie.nodes.iter().map(|part| quoted(&part.value))));
         text.key("faces", list(tie.faces.iter().map(|part| quoted(&part.value))));
         text.key("tolerance", format!("{:?}", tie.tolerance));
+        for (limit, kind) in tie.limits.iter().zip(["tensile", "shear"]) {
+            match limit {
+                Some(Limit::Stress(stress)) => text.key(&format!("{kind}_strength"), format!("{stress:?}")),
+                Some(Limit::Force(force)) => text.key(&format!("{kind}_force"), format!("{force:?}")),
+                None => {}
+            }
+        }
     }
 }
 

@@ -118,6 +118,9 @@ pub fn summarise(
             parts: parts.clone(),
             contacts: run_totals.contacts.iter().map(|pair| named_pair(model, pair)).collect(),
         },
+        broken_ties: outcome.state.as_ref().and_then(|state| {
+            model.setup.contact.as_ref().and_then(|settings| settings.n_broken(&state.contact))
+        }),
         momentum_error: run_totals.momentum_error(),
         worst_courant: run_totals.worst_courant,
         worst_gap_travel: run_totals.worst_gap_travel,

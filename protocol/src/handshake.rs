@@ -19,7 +19,7 @@ use std::fmt;
 /// 7: in votes what springs hold on a surface that ends.
 /// 8: a submitted job has no route where the master is to choose it; votes have the external work of a cycle before and after
 /// its time.
-/// 9: trusses, numbers of supports and hourglass control of pieces in assignments; nodes tied to faces in assignments and plans; in
+/// 9: trusses, numbers of supports and hourglass control of pieces in assignments; nodes tied to faces in assignments and plans, and what they bear; in
 /// votes the work of each wall and support, and what nodes lost at walls,
 /// and readings of element gauges with history variables behind them; requests to remove a job;
 /// memory of workers in [`Hello`]; the strain at which layers of shells break in assignments; the part of a job that is computed twice; cross-sections in assignments

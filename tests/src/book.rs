@@ -69,6 +69,8 @@ macro_rules! each_case_of_the_book {
             wave: a_free_end_doubles_the_velocity_and_turns_the_stress quick;
             wave: a_pulse_at_a_joint_of_two_materials_is_split_by_their_impedances quick;
             wave: a_pulse_at_a_tied_joint_is_split_as_at_a_joined_one quick;
+            wave: a_tied_end_flies_off_with_what_it_traps_of_a_pulse quick;
+            wave: a_tie_breaks_in_shear_at_the_stress_of_the_wave quick;
             wave: a_bar_that_hardens_linearly_has_an_elastic_and_a_plastic_front quick;
             wave: bars_of_forty_cells_ring_at_their_frequencies quick;
             wave: short_waves_are_slow_by_what_central_differences_say quick;

@@ -1,11 +1,13 @@
 //! `*CONTACT_`: which parts meet.
 
+use mechanics::contact::Limit;
+
 use super::{
     cards::Block,
     condition::all_along,
     fields::{Context, Fields, TENS},
 };
-use crate::place::Place;
+use crate::{place::Place, table::Range};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Side {
@@ -51,8 +53,17 @@ pub(super) struct ContactCard {
     pub(super) decay: Option<(f64, f64)>,
     /// Whether it follows the surface that erosion leaves.
     pub(super) erodes: bool,
-    /// Whether nodes of the first are tied to faces of the second.
-    pub(super) tied: bool,
+    /// Where nodes of the first are tied to faces of the second.
+    pub(super) tied: Option<Tied>,
+}
+
+/// What becomes of tied nodes.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Tied {
+    /// Of pull and shear, where the tie breaks by them.
+    pub(super) limits: [Option<Limit>; 2],
+    /// Whether its parts meet once it has broken.
+    pub(super) then_meets: bool,
 }
 
 impl ContactCard {
@@ -86,7 +97,12 @@ impl ContactCard {
             | "ERODING_SURFACE_TO_SURFACE"
             | "ERODING_NODES_TO_SURFACE"
             | "TIED_NODES_TO_SURFACE"
-            | "TIED_SURFACE_TO_SURFACE" => false,
+            | "TIED_SURFACE_TO_SURFACE"
+            | "TIEBREAK_NODES_ONLY"
+            | "TIEBREAK_NODES_TO_SURFACE"
+            | "TIEBREAK_SURFACE_TO_SURFACE"
+            | "AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK"
+            | "AUTOMATIC_ONE_WAY_SURFACE_TO_SURFACE_TIEBREAK" => false,
             _ => {
                 log.fault(
                     block.at,
@@ -97,7 +113,7 @@ impl ContactCard {
                 return None;
             }
         };
-        if !["AUTOMATIC", "ERODING", "TIED"].iter().any(|kind| word.starts_with(kind)) {
+        if !["AUTOMATIC", "ERODING", "TIE"].iter().any(|kind| word.starts_with(kind)) {
             let words = format!("*CONTACT_{word} as *CONTACT_AUTOMATIC_{word}: faces meet from both sides");
             log.warn(block.at, words);
         }
@@ -128,7 +144,13 @@ impl ContactCard {
         }
         let second = if single { None } else { Some(side(1)?) };
         let decay = (decay != 0.0 && fixed != moving).then_some((moving, decay));
-        let tied = word.starts_with("TIED");
+        let tied = if word.contains("TIEBREAK") {
+            // The card of a tiebreak is its fourth.
+            let card = block.card(extra + 3);
+            Some(Tied::read(&context.fields(&card, block.width, &TENS), &word)?)
+        } else {
+            word.starts_with("TIED").then(Tied::default)
+        };
         Some(Self { at: f.at, first: side(0)?, second, friction: fixed, decay, erodes, tied })
     }
 
@@ -147,6 +169,43 @@ impl ContactCard {
         }
         let second = if f.id(1) == 0 { None } else { Some(Side::read(&f, 1, false)?) };
         let first = Side::read(&f, 0, true)?;
-        Some(Self { at: f.at, first, second, friction: 0.0, decay: None, erodes: false, tied: false })
+        Some(Self { at: f.at, first, second, friction: 0.0, decay: None, erodes: false, tied: None })
+    }
+}
+
+impl Tied {
+    /// Reads at what ties of a tiebreak contact break; none after a fault.
+    fn read(f: &Fields<'_>, word: &str) -> Option<Self> {
+        let of_nodes = word.starts_with("TIEBREAK_NODES");
+        let first = usize::from(word.starts_with("AUTOMATIC"));
+        if first == 1 && f.integer(0) != 2 {
+            f.fault(0, "OPTION 2: nodes that start in contact are tied until they break", "use OPTION 2");
+            return None;
+        }
+        if of_nodes {
+            // Exponents of both forces, 2 where they are blank.
+            if let Some(i) = [2, 3].into_iter().find(|&i| ![0.0, 2.0].contains(&f.real(i, 0.0))) {
+                f.fault(i, "an exponent of 2", "leave it blank, and give forces that fit it");
+                return None;
+            }
+        } else if first == 0 && f.id(2) != 0 {
+            f.fault(2, "no curve by which the tie weakens", "leave TBLCID blank");
+            return None;
+        }
+        let limit = |i: usize| {
+            let value = f.within(i, 0.0, Range::NotNegative);
+            let limit = if of_nodes { Limit::Force(value) } else { Limit::Stress(value) };
+            (value > 0.0).then_some(limit)
+        };
+        let limits = [limit(first), limit(first + 1)];
+        if limits == [None, None] {
+            f.fault(
+                first,
+                "a strength of the tie above 0",
+                "give one, or use a TIED contact, which does not break",
+            );
+            return None;
+        }
+        Some(Self { limits, then_meets: word != "TIEBREAK_NODES_ONLY" })
     }
 }

@@ -85,7 +85,11 @@ pub(super) fn make(
     let most = smallest.map(|face| widest_fit(assembly, &interacts, face));
     let gap = match (contact.gap, smallest.zip(most)) {
         (Gap::Fit, Some((face, most))) => {
-            let clearance = clearance(assembly, &interacts, &faces, most);
+            let mut from_apart = interacts.clone();
+            for [a, b] in tied.iter().map(|tied| tied.parts) {
+                (from_apart[a * n + b], from_apart[b * n + a]) = (false, false);
+            }
+            let clearance = clearance(assembly, &from_apart, &faces, most);
             Some(clearance.map_or(most, |d| (FIT_SHARE * d).clamp(FIT_LEAST * face, most)))
         }
         (Gap::Fit, None) => None,
@@ -123,6 +127,7 @@ pub(super) fn make(
         friction_velocity,
         ignores_initial: contact.ignores_initial,
         edges: contact.edges,
+        ties_break: ties.iter().any(|tie| tie.bond.is_some()),
         ties,
         // The rest is known with the parts.
         ..Settings::default()
@@ -158,10 +163,10 @@ fn meetings(contact: &Contact, names: &Names<'_>, rigid: &[RigidDraft<'_>], log:
             interacts[a as usize * n + b as usize] = false;
         }
     }
-    // Parts that are tied hold each other already.
+    // Parts that are tied hold each other already, for ever or until the tie breaks.
     let is_rigid = |part: usize| rigid::parts_of(rigid).any(|parts| parts.contains(&(part as u32)));
     let tied = tie::tied(&contact.ties, names, &is_rigid, log);
-    for [a, b] in tied.iter().map(|tied| tied.parts) {
+    for [a, b] in tied.iter().filter(|tied| tied.limits == [None, None]).map(|tied| tied.parts) {
         (interacts[a * n + b], interacts[b * n + a]) = (false, false);
     }
     Meetings { interacts, frictions, kinetic, tied }

@@ -1,9 +1,9 @@
 //! Nodes of one part that are tied to faces of another.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use mechanics::{
-    contact::{OnFace, Settings, Surface, Tie, on_faces, tie},
+    contact::{Limit, OnFace, Settings, Surface, Tie, on_faces, strengthen, tie},
     material::Material,
 };
 
@@ -15,6 +15,8 @@ pub(super) struct Tied {
     /// The part whose nodes are tied, and the part to whose faces.
     pub(super) parts: [usize; 2],
     tolerance: f64,
+    /// Of pull and shear, where it breaks.
+    pub(super) limits: [Option<Limit>; 2],
     /// The entry that ties them, by its index.
     entry: usize,
 }
@@ -42,7 +44,12 @@ pub(super) fn tied(
                     let expected = format!("a pair of parts that {line} does not tie");
                     log.fault_of(of_faces.origin, expected, "remove one of the two");
                 } else {
-                    list.push(Tied { parts: [a, b], tolerance: given.tolerance, entry });
+                    list.push(Tied {
+                        parts: [a, b],
+                        tolerance: given.tolerance,
+                        limits: given.limits,
+                        entry,
+                    });
                 }
             }
         }
@@ -69,6 +76,7 @@ pub(super) fn make(
     }
     let whole = Surface::new(&assembly.mesh, materials, &|_| true);
     let mut all: Vec<OnFace> = Vec::new();
+    let mut limits: BTreeMap<u32, [Option<Limit>; 2]> = BTreeMap::new();
     for (entry, given) in ties.iter().enumerate() {
         let mut found = Vec::new();
         let mut farthest = 0.0_f64;
@@ -89,6 +97,7 @@ pub(super) fn make(
                 log.say("move the parts together, or raise tolerance", "move the parts together"),
             );
         }
+        limits.extend(found.iter().map(|on| (on.node, given.limits)));
         all.extend(found);
     }
     all.sort_by_key(|on| on.node);
@@ -99,7 +108,15 @@ pub(super) fn make(
         assembly.mesh.positions[whole.nodes[on.node as usize] as usize] = on.at;
     }
     assembly.measure_volumes();
-    tie(&whole, &all)
+    let mut ties = tie(&whole, &all);
+    let x = on_surface(&whole, assembly);
+    strengthen(&mut ties, &whole, &x, &all, &|on| limits.get(&on.node).copied().unwrap_or([None; 2]));
+    ties
+}
+
+/// Positions by surface node.
+fn on_surface(whole: &Surface, assembly: &Assembly) -> Vec<[f64; 3]> {
+    whole.nodes.iter().map(|&n| assembly.mesh.positions[n as usize]).collect()
 }
 
 /// How far a tied node may be from its face.
@@ -121,8 +138,7 @@ fn of_pair(tied: &Tied, distance: f64, whole: &Surface, assembly: &Assembly) -> 
     let mut settings = Settings { gap: distance, ..Settings::default() };
     settings.interacts = vec![false; n_parts * n_parts];
     (settings.interacts[a * n_parts + b], settings.interacts[b * n_parts + a]) = (true, true);
-    let x: Vec<[f64; 3]> = whole.nodes.iter().map(|&n| assembly.mesh.positions[n as usize]).collect();
-    on_faces(&surface, &x, &settings, [a as u32, b as u32])
+    on_faces(&surface, &on_surface(whole, assembly), &settings, [a as u32, b as u32])
 }
 
 /// Whether each node is tied once, and none is a corner of a face to which others are tied; reports the first that is not.

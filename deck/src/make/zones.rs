@@ -36,7 +36,7 @@ pub(super) fn overlaps(
     log: &Log<'_>,
 ) {
     let gap = settings.gap;
-    let found = worst_of_pairs(assembly, &settings.interacts, faces, gap);
+    let found = worst_of_pairs(assembly, &settings.meet_from_apart(), faces, gap);
     for ((a, b), worst) in found {
         let line = log.line(parts[a].at, parts[b].at);
         let id = assembly.mesh.node_ids[worst.node as usize];

@@ -1,5 +1,7 @@
 //! `[contact]` and `[[join]]`.
 
+use mechanics::contact::Limit;
+
 use super::entry::{parts, text};
 use crate::{
     limits::MAX_ENTRIES,
@@ -101,12 +103,27 @@ fn read_ties(table: &Table<'_>) -> Vec<Tie> {
         });
         let range = Range::Within(0.0, 0.1, "a number above 0 and at most 0.1");
         let tolerance = tie.number_or("tolerance", TOLERANCE, range);
+        let limits = [("tensile_strength", "tensile_force"), ("shear_strength", "shear_force")]
+            .map(|keys| limit(&tie, keys));
         tie.finish();
         if let (Some(nodes), Some(faces)) = (nodes, faces) {
-            ties.push(Tie { at, nodes, faces, tolerance });
+            ties.push(Tie { at, nodes, faces, tolerance, limits });
         }
     }
     ties
+}
+
+/// At what a tie breaks, by stress or by force of a node.
+fn limit(tie: &Table<'_>, (stress, force): (&'static str, &'static str)) -> Option<Limit> {
+    match (tie.get(stress), tie.get(force)) {
+        (Some(_), Some(second)) => {
+            second.fault(&format!("one of {stress} and {force}"), "remove one of the two");
+            None
+        }
+        (Some(value), None) => value.number(Range::Positive).map(Limit::Stress),
+        (None, Some(value)) => value.number(Range::Positive).map(Limit::Force),
+        (None, None) => None,
+    }
 }
 
 /// A name, or a list of names.

@@ -1,5 +1,7 @@
 //! Which parts meet, and which are one body.
 
+use mechanics::contact::Limit;
+
 use super::condition::Parts;
 use crate::place::{Origin, Place, Placed};
 
@@ -46,6 +48,8 @@ pub(crate) struct Tie {
     pub(crate) faces: Vec<Placed<String>>,
     /// Greatest distance of a tied node from its face, over the smallest edge of both parts.
     pub(crate) tolerance: f64,
+    /// Of pull and shear, where it breaks by them.
+    pub(crate) limits: [Option<Limit>; 2],
 }
 
 /// How thick contact is.

@@ -493,8 +493,9 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
         ),
         (
             "*CONTACT_TIEBREAK_SURFACE_TO_SURFACE\n\n",
-            "a.k:22:1: read *CONTACT_TIEBREAK_SURFACE_TO_SURFACE; expected a contact",
+            "a.k:22:1: read a blank field; expected a strength of the tie above 0",
         ),
+        ("*CONTACT_DRAWBEAD\n\n", "a.k:22:1: read *CONTACT_DRAWBEAD; expected a contact"),
         ("*ELEMENT_SOLID\n2,1,1,2,3,4,8,7,6,5\n", "a.k:23:1: read element 2 with volume"),
         (
             "*ELEMENT_SOLID\n2,1,1,2,3,4,5,6,7,99\n",

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use deck::model::Model;
 use mechanics::{
-    contact::{Exclusions, Surface, initial_edges, initial_pairs},
+    contact::{Exclusions, Settings, Surface, initial_edges, initial_pairs},
     exact::Quanta,
     initial,
     state::GlobalState,
@@ -77,31 +77,52 @@ impl Touching {
         let at_start: Vec<[f64; 3]> =
             surface.nodes.iter().map(|&node| model.mesh.positions[node as usize]).collect();
         let inside = initial_pairs(&surface, &at_start, settings);
-        let exclusions = if settings.ignores_initial {
+        let inside = without_bonds(&surface, inside, settings);
+        let exclusions = if settings.ignores_initial || settings.ties_break {
             Exclusions::around(&surface, &inside)
         } else {
-            refuse_overlap(model, &surface, &inside, settings.gap)?;
             Exclusions::new(&surface, &inside)
         };
+        if !settings.ignores_initial {
+            refuse_overlap(model, &surface, &inside, settings)?;
+        }
         let crossing = if settings.edges { initial_edges(&surface, &at_start, settings) } else { Vec::new() };
         if !settings.ignores_initial {
-            refuse_crossing(model, &surface, &crossing, settings.gap)?;
+            refuse_crossing(model, &surface, &crossing, settings)?;
         }
         let exclusions = Arc::new(exclusions.with_edges(&surface, &crossing));
         Ok(Some(Self { surface: Arc::new(surface), exclusions }))
     }
 }
 
-/// The external gap: nodes of one part may not start inside the zone of another.
+/// Pairs that start in contact without those of a node and the part to whose faces it is tied, which meet once the tie has broken. Other
+/// nodes of parts that ties hold on each other pass the faces that they start near.
+fn without_bonds(
+    surface: &Surface,
+    inside: Vec<(u32, u32, f64)>,
+    settings: &Settings,
+) -> Vec<(u32, u32, f64)> {
+    if !settings.ties_break {
+        return inside;
+    }
+    let bonded = |&(node, face, _): &(u32, u32, f64)| {
+        settings.bonded_to(surface.nodes[node as usize]) == Some(surface.faces[face as usize].part)
+    };
+    inside.into_iter().filter(|pair| !bonded(pair)).collect()
+}
+
+/// The external gap: nodes of one part may not start inside the zone of another, unless a tie holds the two.
 fn refuse_overlap(
     model: &Model,
     surface: &Surface,
     inside: &[(u32, u32, f64)],
-    gap: f64,
+    settings: &Settings,
 ) -> Result<(), Error> {
-    let foreign = inside
-        .iter()
-        .find(|(node, face, _)| surface.node_part[*node as usize] != surface.faces[*face as usize].part);
+    let (gap, from_apart) = (settings.gap, settings.meet_from_apart());
+    let foreign = inside.iter().find(|(node, face, _)| {
+        let (a, b) = (surface.node_part[*node as usize], surface.faces[*face as usize].part);
+        a != b && from_apart[a as usize * settings.n_parts() + b as usize]
+    });
     let Some(&(node, face, distance)) = foreign else { return Ok(()) };
     let part = |index: u32| model.mesh.parts[index as usize].name.clone();
     let parts = [part(surface.node_part[node as usize]), part(surface.faces[face as usize].part)];
@@ -114,11 +135,14 @@ fn refuse_crossing(
     model: &Model,
     surface: &Surface,
     crossing: &[([u32; 2], f64)],
-    gap: f64,
+    settings: &Settings,
 ) -> Result<(), Error> {
+    let (gap, from_apart) = (settings.gap, settings.meet_from_apart());
     let edges = |pair: [u32; 2]| pair.map(|edge| &surface.edges[edge as usize]);
     let mut foreign = crossing.iter().map(|&(pair, distance)| (edges(pair), distance));
-    let Some((near, distance)) = foreign.find(|([a, b], _)| a.part != b.part) else {
+    let Some((near, distance)) = foreign.find(|([a, b], _)| {
+        a.part != b.part && from_apart[a.part as usize * settings.n_parts() + b.part as usize]
+    }) else {
         return Ok(());
     };
     let id = |n: u32| model.mesh.node_ids[surface.nodes[n as usize] as usize];

@@ -74,6 +74,9 @@ pub struct Summary {
     pub eroded_mass: f64,
     /// Energy that left with them, with nodes that were dropped, and with springs of contact on surfaces that have ended.
     pub eroded_energy: f64,
+    /// Ties that have let go, of those that can break; none where none can.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub broken_ties: Option<u64>,
     /// Change of momentum over the largest initial momentum of a part; 0 if all were at rest.
     pub momentum_error: f64,
     /// Largest time step over the true Courant limit; below 1 is stable.
@@ -381,6 +384,14 @@ impl Summary {
                 significant(self.eroded_energy),
                 grouped(self.eroded_elements),
                 significant(self.eroded_mass)
+            )?;
+        }
+        if let Some(broken) = self.broken_ties {
+            writeln!(
+                out,
+                "             {:<10} {:>14}   have let go of their faces",
+                "ties",
+                grouped(broken)
             )?;
         }
         writeln!(

@@ -9,6 +9,7 @@ use crate::{
     solve::{Solved, crossing, example, mean, model, run, run_with_states},
 };
 
+use deck::Model;
 use mechanics::state::{GlobalState, field};
 
 /// Stress along x.
@@ -157,6 +158,84 @@ pub(super) fn a_pulse_at_a_tied_joint_is_split_as_at_a_joined_one(figures: &mut 
         figures.add(&format!("tied impedance @ {name}, transmitted"), through);
         figures.add(&format!("tied impedance @ {name}, reflected"), back);
     }
+}
+
+/// Strength over the stress that comes at which a tie just breaks, between `low` and `high`: where `breaks` says that it does, it is less.
+fn threshold([mut low, mut high]: [f64; 2], breaks: impl Fn(f64) -> bool) -> f64 {
+    assert!(breaks(low) && !breaks(high), "the tie breaks at {low} and not at {high}");
+    while high - low > 1e-3 {
+        let middle = 0.5 * (low + high);
+        *(if breaks(middle) { &mut low } else { &mut high }) = middle;
+    }
+    low
+}
+
+fn broken(solved: &Solved) -> Option<u64> {
+    solved.model.setup.contact.as_ref()?.n_broken(&solved.state.contact)
+}
+
+/// A bar of which the last centimetre is tied to the rest, and breaks off at this strength: `tensile_strength = 1e8`.
+fn tied_end(end: f64, strength: &str, [meets, rest]: [&str; 2], velocity: f64) -> Model {
+    let parts = [
+        Bar { name: "head", from: 0.0, length: 0.02, cells: 80, velocity, material: BAR },
+        Bar { name: "middle", from: 0.02, length: 0.06, cells: 240, velocity: 0.0, material: BAR },
+        Bar { name: "end", from: 0.08, length: 0.01, cells: 40, velocity: 0.0, material: BAR },
+    ];
+    let tie = format!(
+        "[[join]]\nparts = [\"head\", \"middle\"]\n[contact]\n{meets}\n[[contact.tie]]\nnodes = \"end\"\nfaces = \"middle\"\n{strength}\n"
+    );
+    model(&bars(end, "", &parts, &(tie + rest)))
+}
+
+/// Gives the head a velocity along an axis that rises to 10 m/s and falls again, and takes viscosity, which would damp it, away.
+fn smooth(model: &mut Model, axis: usize) {
+    (model.setup.control.linear_viscosity, model.setup.control.quadratic_viscosity) = (0.0, 0.0);
+    for (v, x) in model.velocity.iter_mut().zip(&model.mesh.positions) {
+        v[axis] = if x[0] < 0.02 { 10.0 * (PI * x[0] / 0.02).sin().powi(2) } else { 0.0 };
+    }
+}
+
+pub(super) fn a_tied_end_flies_off_with_what_it_traps_of_a_pulse(figures: &mut Figures) {
+    // A pulse of 40 mm comes back from the free end in tension. At the tie it meets its own second half; when that has passed, at 20 us, the end
+    // has half of the momentum.
+    let pulse = 8000.0 * 5000.0 * 5.0;
+    let hit = |strength: f64| {
+        run(tied_end(28e-6, &format!("tensile_strength = {:e}", strength * pulse), ["", ""], 10.0))
+    };
+    // The weaker the tie, the less of the front of the tension it passes on before it breaks.
+    let solved = hit(0.2);
+    let [head, middle, end] = [0, 1, 2].map(|part| solved.part_velocity(part)[0]);
+    figures.add("spall: nodes that let go", broken(&solved).unwrap_or_default() as f64);
+    figures.add("spall: velocity of the end", end);
+    figures.add("spall: velocity of the rest", 0.25f64.mul_add(head, 0.75 * middle));
+    figures.add("spall: energy error", solved.rows.last().expect("rows").error.abs());
+    // A rectangular pulse overshoots; of a smooth one the second half comes back to the tie alone, with the same stress.
+    let breaks = |strength: f64| {
+        let mut model = tied_end(28e-6, &format!("tensile_strength = {:e}", strength * pulse), ["", ""], 0.0);
+        smooth(&mut model, 0);
+        broken(&run(model)) == Some(4)
+    };
+    figures
+        .add("spall: strength that just breaks over the stress of the pulse", threshold([0.5, 1.5], breaks));
+}
+
+pub(super) fn a_tie_breaks_in_shear_at_the_stress_of_the_wave(figures: &mut Figures) {
+    // Held along x and z the bars carry shear waves alone, here smooth ones: half of the velocity goes either way.
+    let fast = (100e9_f64 / 8000.0).sqrt();
+    let peak = 8000.0 * fast * 5.0;
+    let hit = |strength: f64| {
+        let held = ["default_interacts = false", "[[boundary]]\ntype = \"fixed\"\naxes = \"xz\"\n"];
+        let mut model = tied_end(0.075 / fast, &format!("shear_strength = {:e}", strength * peak), held, 0.0);
+        smooth(&mut model, 1);
+        run(model)
+    };
+    let breaks = |strength: f64| broken(&hit(strength)) == Some(4);
+    figures.add(
+        "shear of a tie: strength that just breaks over the stress of the wave",
+        threshold([0.5, 1.5], breaks),
+    );
+    let solved = hit(0.5);
+    figures.add("shear of a tie: energy error", solved.rows.last().expect("rows").error.abs());
 }
 
 /// Parts of the stress of a pulse that pass the joint of two bars and that come back from it.

@@ -21,6 +21,7 @@
 use serde::{Deserialize, Serialize};
 
 mod batch;
+mod bond;
 mod boxes;
 pub mod cycle;
 pub mod edges;
@@ -48,6 +49,7 @@ pub mod work_unit;
 pub mod zone;
 
 pub use batch::{Batch, BatchFace, BatchNode, BatchUnit, Listed};
+pub use bond::{Bond, Limit, strengthen};
 pub use cycle::Contact;
 pub use edges::{BatchEdge, BatchEdges, Edge, initial_edges};
 pub use force::ContactVote;
@@ -103,6 +105,8 @@ pub struct Settings {
     pub edges: bool,
     /// Nodes tied to faces, by node.
     pub ties: Vec<Tie>,
+    /// Whether any of them can break.
+    pub ties_break: bool,
     /// Whether any part erodes, so that faces come out with nodes in their zone.
     pub erodes: bool,
 }

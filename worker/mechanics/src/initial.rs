@@ -46,6 +46,9 @@ pub fn state(
         own: vec![vec![0.0; n_elements]; mesh.parts.iter().map(Part::n_own).max().unwrap_or(0)],
         history: Vec::new(),
     };
+    if let Some(settings) = &setup.contact {
+        settings.bind(&mut state.contact);
+    }
     let mut mass_of = Vec::with_capacity(n_elements);
     for (p, part) in (0..).zip(&mesh.parts) {
         let material = &setup.materials[part.material as usize];

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{part::first_erosion, state::Translation};
 use crate::{
-    keyword::contact::{ContactCard, Side},
+    keyword::contact::{ContactCard, Side, Tied},
     limits::MAX_CONTACT_FORCES,
     place::{Origin, Place, Placed},
     typed::{
@@ -20,9 +20,11 @@ pub(super) fn write(t: &mut Translation<'_>) {
     let mut pairs: BTreeMap<(u32, u32), &ContactCard> = BTreeMap::new();
     let mut ties = Vec::new();
     for contact in &problem.contacts {
-        if contact.tied {
-            ties.extend(tie_of(contact, t));
-            continue;
+        if let Some(tied) = contact.tied {
+            ties.extend(tie_of(contact, tied, t));
+            if !tied.then_meets {
+                continue;
+            }
         }
         for (a, b) in pairs_of(contact, t) {
             let known = t.names.contains_key(&a) && t.names.contains_key(&b);
@@ -82,7 +84,7 @@ fn the_decay(pairs: &BTreeMap<(u32, u32), &ContactCard>, t: &Translation<'_>) ->
 const TIED_WITHIN: f64 = 0.05;
 
 /// The tie of a card whose parts have elements; parts on both sides are left to the second.
-fn tie_of(contact: &ContactCard, t: &Translation<'_>) -> Option<Tie> {
+fn tie_of(contact: &ContactCard, tied: Tied, t: &Translation<'_>) -> Option<Tie> {
     let faces = parts_of(contact, contact.second?, t);
     let nodes: Vec<u32> =
         parts_of(contact, contact.first, t).into_iter().filter(|part| !faces.contains(part)).collect();
@@ -92,7 +94,7 @@ fn tie_of(contact: &ContactCard, t: &Translation<'_>) -> Option<Tie> {
     };
     let (nodes, faces) = (named(nodes), named(faces));
     let empty = nodes.is_empty() || faces.is_empty();
-    (!empty).then_some(Tie { at: contact.at, nodes, faces, tolerance: TIED_WITHIN })
+    (!empty).then_some(Tie { at: contact.at, nodes, faces, tolerance: TIED_WITHIN, limits: tied.limits })
 }
 
 /// Of a deck with contact: LS-DYNA drops freed nodes unless ENMASS keeps them.

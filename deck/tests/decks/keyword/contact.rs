@@ -1,4 +1,4 @@
-//! Contact in keyword decks: ties, and friction that falls with the velocity.
+//! Contact in keyword decks: ties, those that break, and friction that falls with the velocity.
 
 use deck::Model;
 
@@ -40,6 +40,41 @@ fn tied_contact_ties_the_nodes_of_the_first_side_to_faces_of_the_second() {
         faults.iter().any(|fault| fault.to_string().contains("none of which lies on a face")),
         "{faults:?}"
     );
+}
+
+#[test]
+fn tiebreak_contact_ties_until_its_strength_and_meets_then() {
+    // Corners of a face of 5 by 5.
+    let quarter = 25.0 / 4.0;
+    for (keyword, card, pull, shear, meets) in [
+        ("TIEBREAK_NODES_TO_SURFACE", "60.0,80.0", 60.0, 80.0, true),
+        ("TIEBREAK_NODES_ONLY", "60.0,0.0,2,2", 60.0, f64::INFINITY, false),
+        ("TIEBREAK_SURFACE_TO_SURFACE", "4.0,8.0", 4.0 * quarter, 8.0 * quarter, true),
+        ("AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK_ID\n1,glue", "2,4.0,8.0", 4.0 * quarter, 8.0 * quarter, true),
+        ("AUTOMATIC_ONE_WAY_SURFACE_TO_SURFACE_TIEBREAK", "2,4.0", 4.0 * quarter, f64::INFINITY, true),
+    ] {
+        let model = good(0.0, &format!("*CONTACT_{keyword}\n2,1,3,3\n0.2,0.2\n\n{card}\n"));
+        let settings = model.setup.contact.expect("they are tied");
+        assert!(settings.ties_break && settings.ties.len() == 4, "{keyword}");
+        for tie in &settings.ties {
+            let bond = tie.bond.expect("it breaks");
+            assert!((bond.pull - pull).abs() < 1e-12 * pull, "{keyword}: {bond:?}");
+            assert!(bond.shear == shear || (bond.shear - shear).abs() < 1e-12 * shear, "{keyword}: {bond:?}");
+        }
+        assert_eq!(settings.interacts, [false, meets, meets, false], "{keyword}");
+        assert!(!meets || settings.friction[1] == 0.2, "{keyword}");
+    }
+    for (keyword, card, expected) in [
+        ("AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK", "6,4.0,8.0", "OPTION 2"),
+        ("TIEBREAK_NODES_TO_SURFACE", "60.0,80.0,1.5,2.0", "an exponent of 2"),
+        ("TIEBREAK_SURFACE_TO_SURFACE", "4.0,8.0,7", "no curve by which the tie weakens"),
+        ("TIEBREAK_SURFACE_TO_SURFACE", "0.0,0.0", "a strength of the tie above 0"),
+        ("TIEBREAK_NODES_ONLY", "-1.0,2.0", "0"),
+    ] {
+        let faults = deck::read(&deck_of(0.0, &format!("*CONTACT_{keyword}\n2,1,3,3\n\n\n{card}\n")), "a.k");
+        let faults = faults.expect_err(keyword);
+        assert!(faults.iter().any(|fault| fault.to_string().contains(expected)), "{keyword}: {faults:?}");
+    }
 }
 
 #[test]

@@ -13,15 +13,24 @@ const EXPOSED: usize = 2;
 /// Numbers where friction sticks: elongation of the spring, by axis.
 const STICKS: usize = 3;
 
+/// Numbers where ties break: 1 while the tie of the node holds, offset of its depth in the zone of the part to which it is tied (see
+/// [`bond`](super::bond)).
+const BOND: usize = 2;
+
 impl Settings {
     /// Numbers that contact keeps by node.
     pub fn n_history(&self) -> usize {
-        self.first_of_stick() + if self.any_sticks() { STICKS } else { 0 }
+        self.first_of_bond() + if self.ties_break { BOND } else { 0 }
     }
 
     /// Whether friction sticks anywhere.
     pub fn any_sticks(&self) -> bool {
         self.sticks && self.friction.iter().any(|&coefficient| coefficient > 0.0)
+    }
+
+    /// Where the numbers of ties that break begin among those of a node.
+    pub(super) fn first_of_bond(&self) -> usize {
+        self.first_of_stick() + if self.any_sticks() { STICKS } else { 0 }
     }
 
     /// Where the numbers of friction begin among those of a node.

@@ -30,6 +30,7 @@ use super::{
         lanes::{Closest, Rest, nearest},
     },
 };
+use bonded::Bonded;
 use exposed::CameOut;
 
 use crate::{
@@ -65,6 +66,8 @@ pub(super) struct NodeFace {
     watch: Watch,
     /// Where parts erode, what came out last.
     came_out: CameOut,
+    /// Nodes that ties hold until they break.
+    bonded: Bonded,
     /// Whether friction sticks.
     sticks: bool,
     work: Work,
@@ -131,6 +134,7 @@ impl NodeFace {
             width,
             watch: Watch::default(),
             came_out: CameOut::default(),
+            bonded: Bonded::of(batch, settings),
             sticks: settings.any_sticks(),
             work: Work::default(),
         };
@@ -217,6 +221,9 @@ impl NodeFace {
             (0..3).for_each(|a| near.direction[a][i] = direction[a]);
         }
         near.depth[n..].fill(0.0);
+        if !self.bonded.is_empty() {
+            self.take_bonded(n, work, cycle.history);
+        }
         if self.settings.erodes {
             self.take_offsets(n, work, cycle.history);
         }
@@ -483,6 +490,7 @@ fn against(v: &[Vec<f64>; 3], node: usize, corners: &[u32; 4], weights: &[f64; 4
     relative
 }
 
+mod bonded;
 mod exposed;
 mod stick;
 #[cfg(test)]

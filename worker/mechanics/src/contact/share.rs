@@ -33,7 +33,10 @@ pub(crate) struct Share {
 pub(crate) struct Cut {
     units: Vec<Range<usize>>,
     edges: Vec<Range<usize>>,
-    ties: Vec<Range<usize>>,
+    /// Ties of each.
+    ties: Vec<Vec<u32>>,
+    /// By node of the batch the share that computes it.
+    owners: Vec<u32>,
 }
 
 impl Cut {
@@ -58,7 +61,24 @@ impl Cut {
             units.push(first..end);
             first = end;
         }
-        Self { units, edges: even(batch.listed.edges.pairs.len()), ties: even(batch.listed.ties.nodes.len()) }
+        let mut owners = vec![NONE; batch.nodes.len()];
+        for (share, units) in (0..).zip(&units) {
+            for &node in batch.units[units.clone()].iter().flat_map(|unit| &unit.nodes) {
+                owners[node as usize] = share;
+            }
+        }
+        // What is kept of a node is left by one share: that of its units has its tie too.
+        let mut ties = vec![Vec::new(); n];
+        let n_ties = batch.listed.ties.nodes.len();
+        for (tie, &[node, ..]) in batch.listed.ties.nodes.iter().enumerate() {
+            let owner = &mut owners[node as usize];
+            if *owner == NONE {
+                *owner = (n * tie / n_ties) as u32;
+            }
+            ties[*owner as usize].push(tie as u32);
+        }
+        owners.iter_mut().filter(|owner| **owner == NONE).for_each(|owner| *owner = 0);
+        Self { units, edges: even(batch.listed.edges.pairs.len()), ties, owners }
     }
 
     /// Number of shares.
@@ -66,16 +86,10 @@ impl Cut {
         self.units.len()
     }
 
-    /// By node of the batch the share that has it in a unit, which knows all faces that it may meet; 0 for nodes of none,
-    /// which that share need not have.
-    pub(crate) fn owners(&self, batch: &Batch) -> Vec<u32> {
-        let mut owners = vec![0; batch.nodes.len()];
-        for (share, units) in (0..).zip(&self.units) {
-            for &node in batch.units[units.clone()].iter().flat_map(|unit| &unit.nodes) {
-                owners[node as usize] = share;
-            }
-        }
-        owners
+    /// By node of the batch the share that has it in a unit, which knows all faces that it may meet, or as a tied node; 0 for nodes
+    /// of none, which that share need not have.
+    pub(crate) fn owners(&self) -> &[u32] {
+        &self.owners
     }
 
     /// One of the shares.
@@ -83,7 +97,7 @@ impl Cut {
         let units = &batch.units[self.units[share].clone()];
         let Listed { edges, ties, exposed } = &batch.listed;
         let pairs = &edges.pairs[self.edges[share].clone()];
-        let ties = &ties.nodes[self.ties[share].clone()];
+        let ties: Vec<[u32; 5]> = self.ties[share].iter().map(|&tie| ties.nodes[tie as usize]).collect();
 
         let mut faces = Indices::new(batch.faces.len());
         let mut edge_indices = Indices::new(edges.edges.len());

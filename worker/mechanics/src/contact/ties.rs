@@ -6,15 +6,17 @@
 //! let go when its face erodes. The force lies on the line of both points and goes to the corners by the shape functions, the node gets
 //! exactly minus what the corners get: momentum is conserved to the bit, angular momentum to rounding.
 //!
+//! A tie that can break ([`bond`](super::bond)) acts as long as the history of its node says that it holds.
+//!
 //! Ties are static data of the deck: which they are, their stiffness, and what bounds their frequency. By the row sums of
 //! `M^-1 K`, of springs whose shares `w` at a node of mass m add up to `sum k w`, no frequency is above `2 sum k w / m`.
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Settings,
+    Bond, Settings,
     batch::Batch,
-    force,
+    bond, force,
     pair::{Books, Cycle, Kind, Pairs},
     surface::Surface,
     work_unit::WorkUnit,
@@ -42,6 +44,8 @@ pub struct Tie {
     pub stiffness: f64,
     /// By the node and the four corners: stiffness of all ties there by its share in them (force per length).
     pub load: [f64; 5],
+    /// What it bears, where it can break.
+    pub bond: Option<Bond>,
 }
 
 impl Tie {
@@ -108,30 +112,42 @@ struct Spring {
     weights: [f64; 4],
     stiffness: f64,
     parts: [u32; 2],
+    bond: Option<Bond>,
+    /// Greatest squared frequency at its nodes, made comparable with that of other springs of contact.
+    frequency2: f64,
 }
 
 /// The ties of one batch.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ties {
     springs: Vec<Spring>,
-    /// Of all, made comparable with that of other springs of contact.
+    /// Of those that cannot break.
     frequency2: f64,
+    /// Whether some can.
+    any_break: bool,
+    /// Where the number of a node is that says whether its tie holds.
+    holds_at: usize,
 }
 
 impl Ties {
     /// Those of a batch, which must be sound, with the deck's constants.
     pub(super) fn new(batch: &Batch, settings: &Settings) -> Self {
-        let mut ties = Self::default();
+        let mut ties = Self { holds_at: settings.first_of_bond(), ..Self::default() };
         for &nodes in &batch.listed.ties.nodes {
             let global = batch.nodes[nodes[0] as usize].global;
             let Ok(at) = settings.ties.binary_search_by_key(&global, |tie| tie.node) else { continue };
-            let Tie { weights, stiffness, parts, load, .. } = settings.ties[at];
+            let Tie { weights, stiffness, parts, load, bond, .. } = settings.ties[at];
             let nodes = nodes.map(|n| n as usize);
-            ties.springs.push(Spring { nodes, weights, stiffness, parts });
+            let mut greatest = 0.0_f64;
             for (node, load) in nodes.into_iter().zip(load) {
                 let frequency2 = 2.0 * load / batch.nodes[node].mass;
                 let comparable = (force::OMEGA_DT / OMEGA_DT).powi(2) * frequency2;
-                ties.frequency2 = ties.frequency2.max(comparable);
+                greatest = greatest.max(comparable);
+            }
+            ties.springs.push(Spring { nodes, weights, stiffness, parts, bond, frequency2: greatest });
+            ties.any_break |= bond.is_some();
+            if bond.is_none() {
+                ties.frequency2 = ties.frequency2.max(greatest);
             }
         }
         ties
@@ -148,21 +164,33 @@ impl Pairs for Ties {
     }
 
     fn reads_velocities(&self) -> bool {
-        false
+        self.any_break
     }
 
     #[inline(always)]
     fn forces(&mut self, cycle: &mut Cycle<'_>, Books { vote, by_pair }: &mut Books<'_>) -> f64 {
-        for Spring { nodes: [node, corners @ ..], weights, stiffness, parts } in &self.springs {
+        let mut frequency2 = self.frequency2;
+        for spring in &self.springs {
+            let Spring { nodes: [node, corners @ ..], weights, stiffness, parts, .. } = spring;
+            let apart = spring.apart(cycle.x);
+            if let Some(bond) = &spring.bond {
+                let holds = cycle.history.before(*node).get(self.holds_at);
+                if holds.is_none_or(|holds| *holds == 0.0) {
+                    continue;
+                }
+                if bond.breaks(apart.map(|along| stiffness * along), spring.normal(cycle.x)) {
+                    let taken = cycle.energy_quantum.round(spring.freed(apart, cycle));
+                    vote.friction += taken;
+                    by_pair.energies.add(parts[0], parts[1], 0.0, taken);
+                    continue;
+                }
+                cycle.history.after_mut(*node)[self.holds_at] = 1.0;
+                frequency2 = frequency2.max(spring.frequency2);
+            }
             let (mut square, mut on_node) = (0.0, [0.0; 3]);
             for a in 0..3 {
-                let x = &cycle.x[a];
-                let mut apart = x[*node];
-                for i in 0..4 {
-                    apart = (-weights[i]).mul_add(x[corners[i]], apart);
-                }
-                square = apart.mul_add(apart, square);
-                let force = stiffness * apart;
+                square = apart[a].mul_add(apart[a], square);
+                let force = stiffness * apart[a];
                 let f = &mut cycle.f[a];
                 let mut sum = 0.0;
                 for i in 0..4 {
@@ -183,6 +211,40 @@ impl Pairs for Ties {
                 tally.add((parts[0], parts[1]), on_node);
             }
         }
-        self.frequency2
+        frequency2
+    }
+}
+
+impl Spring {
+    /// The node less the point of the face that holds it, of positions or velocities.
+    #[inline(always)]
+    fn apart(&self, of: &[Vec<f64>; 3]) -> [f64; 3] {
+        let [node, corners @ ..] = self.nodes;
+        let mut apart = [0.0; 3];
+        for (a, x) in of.iter().enumerate() {
+            apart[a] = x[node];
+            for (corner, weight) in corners.iter().zip(self.weights) {
+                apart[a] = (-weight).mul_add(x[*corner], apart[a]);
+            }
+        }
+        apart
+    }
+
+    /// Unit normal of the face.
+    #[inline(always)]
+    fn normal(&self, x: &[Vec<f64>; 3]) -> [f64; 3] {
+        let [_, corners @ ..] = self.nodes;
+        bond::normal(corners.map(|corner| [x[0][corner], x[1][corner], x[2][corner]]))
+    }
+
+    /// Energy that it takes out of the run where it breaks at this elongation: what it held in the cycle before, less the work that its
+    /// force of then does in half of the step, `k u_before . u / 2`.
+    fn freed(&self, apart: [f64; 3], cycle: &Cycle<'_>) -> f64 {
+        let velocity = self.apart(cycle.v);
+        let mut product = 0.0;
+        for a in 0..3 {
+            product = (-cycle.dt).mul_add(velocity[a], apart[a]).mul_add(apart[a], product);
+        }
+        0.5 * self.stiffness * product
     }
 }

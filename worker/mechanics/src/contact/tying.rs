@@ -2,7 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::{Settings, force, initial_pairs::initial_pairs, surface::Surface, ties::Tie, zone::Frame};
+use super::{
+    Settings, bond, force,
+    initial_pairs::initial_pairs,
+    surface::Surface,
+    ties::Tie,
+    zone::{Frame, dot},
+};
 
 /// A node on a face: surface indices, shape functions, the point and the distance from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,12 +33,20 @@ pub fn on_faces(
     settings: &Settings,
     [nodes, faces]: [u32; 2],
 ) -> Vec<OnFace> {
+    let outward = outward(surface, x);
+    let against = |node: u32, face: u32| {
+        dot(outward[node as usize], bond::unit(bond::area_of(x, &surface.faces[face as usize])))
+    };
     let mut nearest: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
     for (node, face, distance) in initial_pairs(surface, x, settings) {
         let of = (surface.node_part[node as usize], surface.faces[face as usize].part);
         if of == (nodes, faces) {
             let best = nearest.entry(node).or_insert((distance, face));
-            if distance < best.0 {
+            let (even, own) = (EVEN * settings.gap, outward[node as usize]);
+            // On the rim of a body several faces are as near: the one that looks at the node's own is meant.
+            let faces_it =
+                || against(node, face) < EVEN.mul_add(-dot(own, own).sqrt(), against(node, best.1));
+            if distance < best.0 - even || (distance < best.0 + even && faces_it()) {
                 *best = (distance, face);
             }
         }
@@ -45,6 +59,21 @@ pub fn on_faces(
         OnFace { node, face, weights, at, distance }
     };
     nearest.into_iter().map(place).collect()
+}
+
+/// Distances, over the gap, and areas, over that of a node, that differ by less are equal.
+const EVEN: f64 = 1e-6;
+
+/// Sum of the area vectors of the faces around each node.
+fn outward(surface: &Surface, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut outward = vec![[0.0; 3]; surface.nodes.len()];
+    for face in &surface.faces {
+        let area = bond::area_of(x, face);
+        for n in face.nodes {
+            (0..3).for_each(|a| outward[n as usize][a] += area[a]);
+        }
+    }
+    outward
 }
 
 /// The ties of nodes on faces, by node. Stiffness is the harmonic mean of both sides' `K A^2 / V`, of which the node takes its share.
@@ -60,6 +89,7 @@ pub fn tie(surface: &Surface, found: &[OnFace]) -> Vec<Tie> {
                 weights: on.weights,
                 stiffness: force::stiffness(surface.node_share[n], surface.node_stiffness[n], face.stiffness),
                 load: [0.0; 5],
+                bond: None,
             }
         })
         .collect();

@@ -205,7 +205,7 @@ impl Domain {
         taken.resize_with(cut.len(), || None);
         deal(taken.iter_mut().enumerate(), meter, true, |(i, taken)| *taken = Some(take(i)));
         let taken = taken.into_iter().flatten().collect::<Result<Vec<_>, String>>()?;
-        let places = Places::new(taken.iter().map(|(_, nodes)| &nodes[..]), &cut.owners(batch));
+        let places = Places::new(taken.iter().map(|(_, nodes)| &nodes[..]), cut.owners());
         self.contact = taken.into_iter().map(|(held, _)| held).collect();
         self.watch_contacts();
         Ok(places)

@@ -2,7 +2,8 @@
 
 use mechanics::{
     contact::{
-        Batch, Contact, ContactVote, Exclusions, Kind, Settings, Surface, Tie, WorkUnit, on_faces, sort, tie,
+        Batch, Contact, ContactVote, Exclusions, Kind, Limit, Settings, Surface, Tie, WorkUnit, on_faces,
+        sort, strengthen, tie,
     },
     exact::Quantum,
     lanes::Width,
@@ -32,6 +33,84 @@ fn only_ties(mesh: &Mesh) -> Settings {
     let mut settings = Settings { ties: tied(mesh), ..settings(2, 0.1, 1.0) };
     settings.interacts.fill(false);
     settings
+}
+
+/// The same, of ties that break at these.
+fn bonded(mesh: &Mesh, limits: [Option<Limit>; 2]) -> Settings {
+    let surface = Surface::new(mesh, &materials(), &|_| true);
+    let x = on_surface(&surface, &mesh.positions);
+    let mut near = Settings { gap: 1e-3, ..Settings::default() };
+    near.interacts = vec![false, true, true, false];
+    let found = on_faces(&surface, &x, &near, [1, 0]);
+    let mut ties = tie(&surface, &found);
+    strengthen(&mut ties, &surface, &x, &found, &|_| limits);
+    let mut settings = Settings { ties, ties_break: true, ..settings(2, 0.1, 1.0) };
+    settings.interacts.fill(false);
+    settings
+}
+
+#[test]
+fn what_a_tie_bears_is_its_strength_on_the_area_behind_its_node() {
+    let mesh = stacked();
+    let ties = bonded(&mesh, [Some(Limit::Stress(2.0)), Some(Limit::Force(5.0))]).ties;
+    let mut areas: Vec<f64> = ties.iter().map(|tie| tie.bond.expect("it breaks").pull / 2.0).collect();
+    areas.sort_by(f64::total_cmp);
+    // Four corners, twelve nodes on edges, nine inside, of faces of 0.36.
+    for (area, expected) in areas.iter().zip([[0.09; 4].as_slice(), &[0.18; 12], &[0.36; 9]].concat()) {
+        assert!((area - expected).abs() < 1e-12, "{areas:?}");
+    }
+    assert!(ties.iter().all(|tie| tie.bond.is_some_and(|bond| bond.shear == 5.0 && bond.side == 1.0)));
+    let pulled = bonded(&mesh, [Some(Limit::Force(5.0)), None]).ties;
+    assert!(pulled.iter().all(|tie| tie.bond.is_some_and(|bond| bond.shear == f64::INFINITY)));
+    assert!(bonded(&mesh, [None, None]).ties.iter().all(|tie| tie.bond.is_none()));
+}
+
+#[test]
+fn a_tie_breaks_above_its_strength_and_never_holds_again() {
+    let mesh = stacked();
+    let settings = bonded(&mesh, [Some(Limit::Force(0.01)), Some(Limit::Force(0.02))]);
+    let mut world = World::new(&mesh, settings, &|_| true);
+    let Tie { node, stiffness, .. } = world.settings.ties[12];
+    let n = world.index(node);
+    let start = [0, 1, 2].map(|a| world.x[a][n]);
+    // Before anything is known of it a node is free.
+    assert_eq!(world.forces(0.0).energy, 0.0);
+    let all: Vec<usize> = world.settings.ties.iter().map(|tie| world.index(tie.node)).collect();
+    let hold = |world: &mut World| {
+        all.iter().for_each(|&n| world.contact.history.before_mut(n)[0] = 1.0);
+    };
+    hold(&mut world);
+    for (way, strength) in [([0.0, 0.0, 1.0], 0.01), ([0.6, -0.8, 0.0], 0.02)] {
+        for (share, holds) in [(0.999, true), (1.001, false)] {
+            hold(&mut world);
+            let by = share * strength / stiffness;
+            world.place(n, [0, 1, 2].map(|a| by.mul_add(way[a], start[a])));
+            // It came half of the way in the last step.
+            let dt = 0.1;
+            (0..3).for_each(|a| world.v[a][n] = 0.5 * by * way[a] / dt);
+            let vote = world.forces(dt);
+            let held = 0.5 * stiffness * by * by;
+            let (energy, friction) = if holds { (held, 0.0) } else { (0.0, 0.5 * held) };
+            assert!(
+                (vote.energy - energy).abs() < 1e-12 && (vote.friction - friction).abs() < 1e-12,
+                "{vote:?}"
+            );
+            assert_eq!(world.contact.history.after(n)[0], f64::from(u8::from(holds)));
+            let force = world.force_on(n);
+            for a in 0..3 {
+                let expected = if holds { -share * strength * way[a] } else { 0.0 };
+                assert!((force[a] - expected).abs() < 1e-9, "{force:?}");
+            }
+        }
+    }
+    // Pressed it holds, whatever the force; broken it stays.
+    hold(&mut world);
+    world.place(n, [start[0], start[1], start[2] - 100.0 * 0.01 / stiffness]);
+    assert!(world.forces(0.0).energy > 0.0);
+    world.contact.history.before_mut(n)[0] = 0.0;
+    world.place(n, [start[0], start[1], start[2] + 0.5 * 0.01 / stiffness]);
+    let vote = world.forces(0.0);
+    assert!(vote.energy < 1e-20 && vote.friction == 0.0 && world.force_on(n) == [0.0; 3], "{vote:?}");
 }
 
 #[test]
