@@ -51,7 +51,7 @@ pub(super) struct HeldBlock {
 }
 
 /// What a set of a kind of elements that turns its nodes costs, in sets of one that does not.
-const TURNING: u64 = 8;
+const TURNING: u64 = 2;
 
 impl HeldBlock {
     /// Positions as of now of the sets with nodes on the surface.
