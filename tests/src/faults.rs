@@ -2,7 +2,7 @@
 //!
 //! A [`Scene`] is a benchmark and the run of it that nothing happens to. A [`Case`] is a fault: it starts a cluster of a
 //! master and three workers, waits for an instant of its job, does harm, and waits for the end, whose files must be those
-//! of the undisturbed run to the byte. The lists are in [`workers`], [`masters`], [`links`], [`disks`]; [`trust`] is where
+//! of the undisturbed run to the byte. The lists are in [`workers`], [`masters`], [`links`], [`disks`], [`stuck`], [`doors`]; [`trust`] is where
 //! certificates and tokens have theirs.
 
 use std::{
@@ -20,6 +20,7 @@ use crate::{
 };
 
 pub mod disks;
+pub mod doors;
 pub mod links;
 pub mod masters;
 pub mod stuck;
@@ -73,8 +74,15 @@ pub struct Row {
 
 /// All faults, in the order of the table.
 pub fn cases() -> Vec<Case> {
-    let lists =
-        [workers::cases(), masters::cases(), links::cases(), disks::cases(), stuck::cases(), trust::cases()];
+    let lists = [
+        workers::cases(),
+        masters::cases(),
+        links::cases(),
+        disks::cases(),
+        stuck::cases(),
+        doors::cases(),
+        trust::cases(),
+    ];
     lists.into_iter().flatten().collect()
 }
 
