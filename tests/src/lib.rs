@@ -16,6 +16,7 @@ pub mod cluster;
 pub mod failpoint;
 pub mod faults;
 pub mod fuzz;
+pub mod instructions;
 pub mod left;
 pub mod proxy;
 pub mod seeds;

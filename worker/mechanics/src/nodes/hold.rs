@@ -19,6 +19,7 @@ impl Advance<'_> {
         let mut external = Work::default();
         let half_steps = 0.5 * (self.dt_previous + self.dt);
         let curves = &self.loads.curves;
+        let mut same: Option<(u16, [Option<f64>; 3])> = None;
         for lane in (0..SET).filter(|lane| set.held >> lane & 1 == 1) {
             let i = at + lane;
             let old = [nodes.v[0][i], nodes.v[1][i], nodes.v[2][i]];
@@ -26,7 +27,9 @@ impl Advance<'_> {
             let mut new = free;
             let mass = nodes.mass[i];
             let booked = set.booked >> lane & 1 == 1;
-            let held = &self.constraints[nodes.constraint[i] as usize];
+            let constraint = nodes.constraint[i];
+            let held = &self.constraints[constraint as usize];
+            let mut is_held = held.forces != 0;
             let mut forces = held.forces;
             while forces != 0 {
                 let load = &self.loads.forces[forces.trailing_zeros() as usize];
@@ -38,9 +41,15 @@ impl Advance<'_> {
                 forces &= forces - 1;
             }
             let x = [nodes.x[0][i], nodes.x[1][i], nodes.x[2][i]];
-            let prescribed = held.prescribed(curves, x, 0.5f64.mul_add(self.dt, self.time), self.dt);
+            // Neighbours have the same velocities, as long as no circle has them depend on the place.
+            let prescribed = match same {
+                Some((of, velocities)) if of == constraint => velocities,
+                _ => held.prescribed(curves, x, 0.5f64.mul_add(self.dt, self.time), self.dt),
+            };
+            same = held.circle.is_none().then_some((constraint, prescribed));
             for axis in 0..3 {
                 let Some(velocity) = prescribed[axis] else { continue };
+                is_held = true;
                 let before = new[axis];
                 new[axis] = velocity;
                 if let Some(support) = held.supports[axis].checked_sub(1).filter(|_| booked) {
@@ -54,13 +63,20 @@ impl Advance<'_> {
             while walls != 0 {
                 let w = walls.trailing_zeros() as usize;
                 let before = new;
-                if self.walls[w].stop(&self.poses[w], x, &mut new, self.dt) && booked {
+                walls &= walls - 1;
+                if !self.walls[w].stop(&self.poses[w], x, &mut new, self.dt) {
+                    continue;
+                }
+                is_held = true;
+                if booked {
                     self.struck(&mut nodes.walls[w], &self.poses[w], mass, [old, before, new]);
                     if let Motion::Free { mass: own, .. } = self.walls[w].motion {
                         nodes.walls[w].touched += touched_quantum(own).round(mass);
                     }
                 }
-                walls &= walls - 1;
+            }
+            if !is_held {
+                continue;
             }
             if booked && new != free {
                 let with = |v: [f64; 3]| {
