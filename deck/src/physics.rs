@@ -11,6 +11,7 @@ use mechanics::{
     initial::closing_speeds,
     mesh::{CORNERS, Part, Topology},
 };
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::{
@@ -148,36 +149,11 @@ fn measure(model: &Model, index: usize) -> Measured {
         flattest: (0.0, 0),
         step: f64::INFINITY,
     };
-    let (mut volume, mut area) = (0.0, 0.0);
-    for e in 0..part.n_elements() {
-        let corners = part.corners(e);
-        let x = corners.map(|n| mesh.positions[n as usize]);
-        let (v, longest) = (part.volume_of(e, &mesh.positions), longest_edge(&x));
-        let thinnest = match &part.topology {
-            Topology::Shells { section, .. } => v / (section.thickness * longest),
-            Topology::Trusses { .. } | Topology::Beams { .. } => longest,
-            // A third of the least height: a node stands half-way up.
-            Topology::Tetrahedra { .. } => v / largest_side(&x),
-            Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
-                thinnest_way(&x)
-            }
-        };
-        volume += v;
-        area += part.thickness().map_or(0.0, |thickness| v / thickness);
-        this.least_cell = this.least_cell.min(thinnest);
-        let height = if let Topology::Tetrahedra { .. } = part.topology { 3.0 * thinnest } else { thinnest };
-        if longest / height > this.flattest.0 {
-            this.flattest = (longest / height, e);
-        }
-        for (x, n) in x.iter().zip(corners) {
-            for axis in 0..3 {
-                this.centre[axis] += 0.125 * v * x[axis];
-                this.velocity[axis] += 0.125 * v * model.velocity[n as usize][axis];
-            }
-        }
-    }
-    this.centre = scaled(this.centre, 1.0 / volume);
-    this.velocity = scaled(this.velocity, 1.0 / volume);
+    let all = Sums::all(model, part);
+    let (volume, area) = (all.volume, all.area);
+    (this.least_cell, this.flattest) = (all.least_cell, all.flattest);
+    this.centre = scaled(all.centre, 1.0 / volume);
+    this.velocity = scaled(all.velocity, 1.0 / volume);
     this.mass = material.density * volume;
     for &n in &part.nodes {
         let (x, v) = (mesh.positions[n as usize], model.velocity[n as usize]);
@@ -213,6 +189,89 @@ fn measure(model: &Model, index: usize) -> Measured {
     this
 }
 
+/// Elements whose sums one thread makes: the sums of a part do not depend on how many threads there are.
+const AT_A_TIME: usize = 4096;
+
+/// What the elements of a part come to.
+struct Sums {
+    volume: f64,
+    area: f64,
+    least_cell: f64,
+    flattest: (f64, usize),
+    /// Of volume times position and times velocity.
+    centre: [f64; 3],
+    velocity: [f64; 3],
+}
+
+impl Sums {
+    const NONE: Self = Self {
+        volume: 0.0,
+        area: 0.0,
+        least_cell: f64::INFINITY,
+        flattest: (0.0, 0),
+        centre: [0.0; 3],
+        velocity: [0.0; 3],
+    };
+
+    /// Those of all elements.
+    fn all(model: &Model, part: &Part) -> Self {
+        let volumes = part.volumes(&model.mesh.positions);
+        let sums: Vec<Self> = volumes
+            .par_chunks(AT_A_TIME)
+            .enumerate()
+            .map(|(chunk, volumes)| Self::some(model, part, chunk * AT_A_TIME, volumes))
+            .collect();
+        let mut all = Self::NONE;
+        for sums in sums {
+            all.volume += sums.volume;
+            all.area += sums.area;
+            all.least_cell = all.least_cell.min(sums.least_cell);
+            if sums.flattest.0 > all.flattest.0 {
+                all.flattest = sums.flattest;
+            }
+            for axis in 0..3 {
+                all.centre[axis] += sums.centre[axis];
+                all.velocity[axis] += sums.velocity[axis];
+            }
+        }
+        all
+    }
+
+    /// Those of the elements from `first` on with these volumes.
+    fn some(model: &Model, part: &Part, first: usize, volumes: &[f64]) -> Self {
+        let mut sums = Self::NONE;
+        for (e, &v) in (first..).zip(volumes) {
+            let corners = part.corners(e);
+            let x = corners.map(|n| model.mesh.positions[n as usize]);
+            let longest = longest_edge(&x);
+            let thinnest = match &part.topology {
+                Topology::Shells { section, .. } => v / (section.thickness * longest),
+                Topology::Trusses { .. } | Topology::Beams { .. } => longest,
+                // A third of the least height: a node stands half-way up.
+                Topology::Tetrahedra { .. } => v / largest_side(&x),
+                Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
+                    thinnest_way(&x)
+                }
+            };
+            sums.volume += v;
+            sums.area += part.thickness().map_or(0.0, |thickness| v / thickness);
+            sums.least_cell = sums.least_cell.min(thinnest);
+            let height =
+                if let Topology::Tetrahedra { .. } = part.topology { 3.0 * thinnest } else { thinnest };
+            if longest / height > sums.flattest.0 {
+                sums.flattest = (longest / height, e);
+            }
+            for (x, n) in x.iter().zip(corners) {
+                for axis in 0..3 {
+                    sums.centre[axis] += 0.125 * v * x[axis];
+                    sums.velocity[axis] += 0.125 * v * model.velocity[n as usize][axis];
+                }
+            }
+        }
+        sums
+    }
+}
+
 /// Area of the largest side of the tetrahedron that a hexahedron collapses to.
 fn largest_side(x: &[[f64; 3]; 8]) -> f64 {
     let [a, b, c, d] = [0, 1, 2, 4].map(|corner| x[corner]);
@@ -221,7 +280,11 @@ fn largest_side(x: &[[f64; 3]; 8]) -> f64 {
 }
 
 fn longest_edge(x: &[[f64; 3]; 8]) -> f64 {
-    EDGES.iter().map(|&[a, b]| norm(sub(x[b], x[a]))).fold(0.0, f64::max)
+    let square = |&[a, b]: &[usize; 2]| {
+        let along = sub(x[b], x[a]);
+        dot(along, along)
+    };
+    EDGES.iter().map(square).fold(0.0, f64::max).sqrt()
 }
 
 /// The thinnest way through a hexahedron, as the time step sees it: twice the least singular value of the Jacobian in its middle.
@@ -237,6 +300,9 @@ fn thinnest_way(x: &[[f64; 3]; 8]) -> f64 {
 
 /// The least eigenvalue of a symmetric matrix xx, yy, zz, xy, yz, zx: the trigonometric solution of its cubic.
 fn least_eigenvalue([xx, yy, zz, xy, yz, zx]: [f64; 6]) -> f64 {
+    if [xy, yz, zx] == [0.0; 3] {
+        return xx.min(yy).min(zz);
+    }
     let mean = (xx + yy + zz) / 3.0;
     let (a, b, c) = (xx - mean, yy - mean, zz - mean);
     let square = (a * a + b * b + c * c + 2.0 * (xy * xy + yz * yz + zx * zx)) / 6.0;

@@ -144,7 +144,8 @@ impl Job {
         self.epoch.sorts.exchange_at(cycle).ok().map(|exchange| exchange.hash)
     }
 
-    fn model(&self) -> &Model {
+    /// The model, with walls bound to their nodes.
+    pub fn model(&self) -> &Arc<Model> {
         &self.problem.model
     }
 
@@ -315,7 +316,7 @@ impl Job {
         let (problem, walls) = (&self.problem, &self.account.walls);
         let Step { dt, time, quantum } = self.epoch.schedule.first_step(start.time, &control, || {
             if let Some(fault) = vote.fault {
-                return Err(Error::Element(element_fault(problem, &start.initial_volume, fault, 0)));
+                return Err(Error::Element(element_fault(problem, fault, 0)));
             }
             let (dt, _, _) = allowed(&problem.model, walls, vote);
             Ok(first_share(vote) * dt)
@@ -481,8 +482,7 @@ impl Job {
     /// Books the vote of a cycle, where its step is still known.
     fn book(&mut self, cycle: u64, vote: &Vote, actions: &mut Vec<Action>) {
         if let Some(step) = self.epoch.schedule.step(cycle) {
-            let volumes = &self.checkpoints.newest().state.initial_volume;
-            self.account.book((&self.problem, volumes), (cycle, step), vote, actions);
+            self.account.book(&self.problem, (cycle, step), vote, actions);
         }
     }
 

@@ -61,15 +61,16 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         pin.apply()?;
     }
     let asked = &args.job;
+    let cores = worker::processors::cores();
+    let threads = args.threads.map_or(cores, |t| t as usize);
+    // The start takes no more threads than the run; a pool that a process has already stays.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     let text = gather_deck(&args.deck, &args.reading.options())?;
     let mut model = read_gathered(&text, &args.deck.display().to_string())?;
     bring_end_forward(&mut model, asked)?;
     let others: Vec<_> = args.format.iter().filter(|name| !model.output.formats.contains(name)).collect();
     model.output.formats.extend(others.into_iter().cloned().collect::<Vec<_>>());
-    let model = Arc::new(model);
     let n = args.workers.map_or(args.speeds.len().max(1), |n| n as usize);
-    let cores = worker::processors::cores();
-    let threads = args.threads.map_or(cores, |t| t as usize);
     let specs: Vec<WorkerSpec> = speeds_for(n, &args.speeds)?
         .into_iter()
         .enumerate()
@@ -100,7 +101,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         resume.as_ref().filter(|_| in_place).map(|snapshot| (snapshot.states.clone(), snapshot.sums.clone()));
     // Without contact the surface is found for its census alone, before there are states beside it.
     let bare = model.setup.contact.is_none().then(|| SurfaceCensus::without_contact(&model));
-    let (mut job, first) = Job::new(Arc::clone(&model), &specs, options, resume)?;
+    let (mut job, first) = Job::new(Arc::new(model), &specs, options, resume)?;
+    job.forget_start();
+    let model = Arc::clone(job.model());
     let census = bare.unwrap_or_else(|| SurfaceCensus::of(&job, &model));
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     output.keep_input(&text, asked.end_time)?;

@@ -1,17 +1,17 @@
 //! Putting the parts together: one numbering, joins, volumes, masses, velocities.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use mechanics::{
     element::tet10,
     material::Material,
     mesh::{Mesh, Part, Topology},
 };
+use rayon::prelude::*;
 
-use super::{names::Names, part::PartDraft};
+use super::{merge::merge, names::Names, node_ids::NodeIds, part::PartDraft};
 use crate::{
-    fault::short,
-    geometry::{EDGES, dot, norm, sub},
+    geometry::{EDGES, dot, sub},
     log::Log,
     mesh_file::MeshFile,
     place::Place,
@@ -23,10 +23,10 @@ use crate::{
 
 /// Parts whose coincident nodes become one.
 pub(super) struct Join {
-    at: Place,
-    parts: Vec<usize>,
+    pub(super) at: Place,
+    pub(super) parts: Vec<usize>,
     /// Greatest distance of nodes that merge, over the smallest edge of the joined parts.
-    tolerance: f64,
+    pub(super) tolerance: f64,
 }
 
 /// The mesh of all parts and what was measured on the way.
@@ -51,7 +51,7 @@ pub(super) struct Assembly {
     /// Pairs of parts that share nodes, lower index first.
     pub(super) joined: Vec<(usize, usize)>,
     /// The global node of each user's number.
-    pub(super) node_of_id: BTreeMap<u32, u32>,
+    pub(super) node_of_id: NodeIds,
     /// The initial velocity each part was given.
     pub(super) part_velocity: Vec<[f64; 3]>,
     /// Two corners of the box around the velocities that mesh files give, where they give any.
@@ -68,13 +68,9 @@ impl Assembly {
         let Self { mesh, volumes, .. } = self;
         volumes.clear();
         for part in &mesh.parts {
-            volumes.extend(volumes_of(part, &mesh.positions));
+            volumes.extend(part.volumes(&mesh.positions));
         }
     }
-}
-
-fn volumes_of(part: &Part, positions: &[[f64; 3]]) -> impl Iterator<Item = f64> {
-    (0..part.n_elements()).map(move |e| part.volume_of(e, positions))
 }
 
 /// The joins of a deck, by the index of their parts.
@@ -113,7 +109,7 @@ pub(super) fn assemble(
         smallest_edge.push(low);
         largest_edge.push(high);
     }
-    let node_of_id = mesh.node_ids.iter().zip(0..).map(|(id, node)| (*id, node)).collect();
+    let node_of_id = NodeIds::of(&mesh.node_ids);
     let mut assembly = Assembly {
         mesh: Mesh::default(),
         velocity: Vec::new(),
@@ -143,7 +139,7 @@ pub(super) fn assemble(
     assembly.mesh = mesh;
     for part in &assembly.mesh.parts {
         log.wanted()?;
-        assembly.volumes.extend(volumes_of(part, &assembly.mesh.positions));
+        assembly.volumes.extend(part.volumes(&assembly.mesh.positions));
     }
     velocities(&mut assembly, materials);
     let used = drafts.iter().filter_map(|d| d.numbers.as_ref()?.mesh.as_ref());
@@ -186,26 +182,26 @@ fn take_over(mesh: &MeshFile, assembly: &mut Assembly) {
     let node_of_id = &assembly.node_of_id;
     for (name, ids) in &mesh.sets {
         let set = assembly.sets.entry(name.clone()).or_default();
-        set.extend(ids.iter().filter_map(|id| node_of_id.get(id)));
+        set.extend(ids.iter().filter_map(|id| node_of_id.get(*id)));
         set.sort_unstable();
         set.dedup();
     }
     for (name, faces) in &mesh.segments {
         let known = |face: &[u32; 4]| {
-            let nodes = face.map(|id| node_of_id.get(&id).copied());
+            let nodes = face.map(|id| node_of_id.get(id));
             nodes.iter().all(Option::is_some).then(|| nodes.map(Option::unwrap_or_default))
         };
         assembly.segments.entry(name.clone()).or_default().extend(faces.iter().filter_map(known));
     }
     for (id, spin) in &mesh.spins {
-        if let Some(node) = node_of_id.get(id) {
+        if let Some(node) = node_of_id.get(*id) {
             assembly.spin.resize(assembly.velocity.len(), [0.0; 3]);
-            assembly.spin[*node as usize] = *spin;
+            assembly.spin[node as usize] = *spin;
         }
     }
     for (id, velocity) in &mesh.velocities {
-        if let Some(node) = node_of_id.get(id) {
-            assembly.velocity[*node as usize] = *velocity;
+        if let Some(node) = node_of_id.get(*id) {
+            assembly.velocity[node as usize] = *velocity;
             if assembly.file_velocities.is_empty() {
                 assembly.file_velocities = vec![*velocity; 2];
             }
@@ -345,162 +341,34 @@ fn owned<'a>(
 
 /// Smallest and largest edge of a part.
 fn edges(positions: &[[f64; 3]], part: &Part) -> (f64, f64) {
-    let (mut low, mut high) = (f64::INFINITY, 0.0f64);
-    for e in 0..part.n_elements() {
+    // Squares, of which one root is drawn at the end.
+    let of_element = |e: usize| {
+        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+        let mut see = |a: u32, b: u32| {
+            let along = sub(positions[a as usize], positions[b as usize]);
+            let square = dot(along, along);
+            (low, high) = (low.min(square), high.max(square));
+        };
         if let Topology::Tetrahedra { .. } = part.topology {
             let nodes = part.nodes_of(e);
             for (edge, [a, b]) in tet10::EDGES.into_iter().enumerate() {
                 for end in [a, b] {
-                    let ends = [nodes[4 + edge], nodes[end]].map(|node| positions[node as usize]);
-                    let long = norm(sub(ends[0], ends[1]));
-                    low = low.min(long);
-                    high = high.max(long);
+                    see(nodes[4 + edge], nodes[end]);
                 }
             }
-            continue;
-        }
-        let corners = part.corners(e);
-        for [a, b] in EDGES.into_iter().filter(|[a, b]| corners[*a] != corners[*b]) {
-            let long = norm(sub(positions[corners[a] as usize], positions[corners[b] as usize]));
-            low = low.min(long);
-            high = high.max(long);
-        }
-    }
-    (low, high)
-}
-
-/// Merges coincident nodes of joined parts: a merged node keeps the lowest index, the others close up.
-fn merge(mesh: &mut Mesh, joins: &[Join], assembly: &mut Assembly, log: &Log<'_>) {
-    let n_nodes = mesh.n_nodes();
-    let mut part_of = vec![0u32; n_nodes];
-    for (p, part) in mesh.parts.iter().enumerate() {
-        for node in &part.nodes {
-            part_of[*node as usize] = p as u32;
-        }
-    }
-    // Each node points to one of lower or equal index; following them ends at the node that stays.
-    let mut root: Vec<u32> = (0..n_nodes as u32).collect();
-    for join in joins {
-        let edge = join.parts.iter().map(|&p| assembly.smallest_edge[p]).fold(f64::INFINITY, f64::min);
-        let tolerance = join.tolerance * edge;
-        let empty = join.parts.iter().any(|&p| mesh.parts[p].nodes.is_empty());
-        if !tolerance.is_finite() || tolerance <= 0.0 || empty {
-            continue;
-        }
-        let merged = merge_pairs(mesh, join, tolerance, &part_of, &mut root);
-        if merged == 0 {
-            let names: Vec<String> =
-                join.parts.iter().map(|&p| format!("\"{}\"", mesh.parts[p].name)).collect();
-            log.fault(
-                join.at,
-                format!("a join of parts {} that share no nodes", names.join(", ")),
-                format!("coincident nodes within {}", short(tolerance)),
-                "move or mesh the parts so that nodes coincide, or raise the tolerance",
-            );
-        }
-    }
-    for node in 0..n_nodes as u32 {
-        root[node as usize] = find(&root, node);
-    }
-    assembly.collapsed = collapsed(mesh, &root, &part_of, joins, log);
-    // Close up the numbering.
-    let mut new = vec![0u32; n_nodes];
-    let mut kept = 0;
-    for node in 0..n_nodes {
-        if root[node] == node as u32 {
-            new[node] = kept;
-            mesh.positions[kept as usize] = mesh.positions[node];
-            mesh.node_ids[kept as usize] = mesh.node_ids[node];
-            kept += 1;
-        }
-    }
-    mesh.positions.truncate(kept as usize);
-    mesh.node_ids.truncate(kept as usize);
-    for node in 0..n_nodes {
-        new[node] = new[root[node] as usize];
-        if root[node] != node as u32 {
-            let (a, b) = (part_of[root[node] as usize] as usize, part_of[node] as usize);
-            assembly.joined.push((a.min(b), a.max(b)));
-        }
-    }
-    for part in &mut mesh.parts {
-        for node in &mut part.nodes {
-            *node = new[*node as usize];
-        }
-    }
-    for node in assembly.node_of_id.values_mut() {
-        *node = new[*node as usize];
-    }
-    assembly.joined.sort_unstable();
-    assembly.joined.dedup();
-}
-
-/// The node that `node` is merged into so far.
-fn find(root: &[u32], mut node: u32) -> u32 {
-    while root[node as usize] != node {
-        node = root[node as usize];
-    }
-    node
-}
-
-/// Unites every pair of nodes of different parts of a join within `tolerance`; the number of pairs. The
-/// result does not depend on the order in which pairs are met.
-fn merge_pairs(mesh: &Mesh, join: &Join, tolerance: f64, part_of: &[u32], root: &mut [u32]) -> usize {
-    let cell = |p: [f64; 3]| p.map(|x| (x / (2.0 * tolerance)).floor() as i64);
-    let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-    let mut merged = 0;
-    for &p in &join.parts {
-        let part = &mesh.parts[p];
-        for &node in &part.nodes {
-            let x = mesh.positions[node as usize];
-            // The cells that the ball around the node touches: one or two along each axis.
-            let low = cell(x.map(|c| c - tolerance));
-            let high = cell(x.map(|c| c + tolerance));
-            for i in low[0]..=high[0] {
-                for j in low[1]..=high[1] {
-                    for k in low[2]..=high[2] {
-                        for &other in cells.get(&[i, j, k]).map_or(&[][..], Vec::as_slice) {
-                            let near = norm(sub(mesh.positions[other as usize], x)) <= tolerance;
-                            if near && part_of[other as usize] != part_of[node as usize] {
-                                let (a, b) = (find(root, node), find(root, other));
-                                root[a.max(b) as usize] = a.min(b);
-                                merged += 1;
-                            }
-                        }
-                    }
-                }
+        } else {
+            let corners = part.corners(e);
+            for [a, b] in EDGES.into_iter().filter(|[a, b]| corners[*a] != corners[*b]) {
+                see(corners[a], corners[b]);
             }
         }
-        for &node in &part.nodes {
-            cells.entry(cell(mesh.positions[node as usize])).or_default().push(node);
-        }
-    }
-    merged
-}
-
-/// Reports parts of which a join merges two nodes of their own; true where there is one.
-fn collapsed(mesh: &Mesh, root: &[u32], part_of: &[u32], joins: &[Join], log: &Log<'_>) -> bool {
-    let mut last: HashMap<(u32, u32), u32> = HashMap::new();
-    let mut reported = vec![false; mesh.parts.len()];
-    for node in 0..root.len() {
-        let part = part_of[node];
-        if let Some(other) = last.insert((root[node], part), node as u32)
-            && !std::mem::replace(&mut reported[part as usize], true)
-        {
-            let at =
-                joins.iter().find(|j| j.parts.contains(&(part as usize))).map_or(Place::text(0), |j| j.at);
-            log.fault(
-                at,
-                format!(
-                    "a join that merges nodes {} and {} of the same part \"{}\"",
-                    mesh.node_ids[other as usize], mesh.node_ids[node], mesh.parts[part as usize].name
-                ),
-                "at most one node of each part in one place",
-                "lower the tolerance",
-            );
-        }
-    }
-    reported.contains(&true)
+        (low, high)
+    };
+    let (low, high) = (0..part.n_elements())
+        .into_par_iter()
+        .map(of_element)
+        .reduce(|| (f64::INFINITY, 0.0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    (low.sqrt(), high.sqrt())
 }
 
 /// Named faces of a part by global node.

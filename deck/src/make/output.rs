@@ -108,7 +108,7 @@ impl Finder<'_> {
     fn find(&self, gauge: &typed::Gauge) -> Option<u32> {
         match (gauge.spot.as_ref()?, gauge.of) {
             (Spot::Number(id), Kind::Node) => {
-                let node = self.assembly.node_of_id.get(&id.value).copied();
+                let node = self.assembly.node_of_id.get(id.value);
                 if node.is_none() {
                     let advice = "choose a node of the mesh, or write point = [x, y, z]";
                     self.log.fault_of(id.origin, "the number of a node", advice);

@@ -66,8 +66,8 @@ pub(super) fn nodes(
         Region::Numbers(numbers) => {
             let mut nodes = Vec::new();
             for id in numbers {
-                match assembly.node_of_id.get(&id.value) {
-                    Some(node) => nodes.push(*node),
+                match assembly.node_of_id.get(id.value) {
+                    Some(node) => nodes.push(node),
                     None => log.fault_of(id.origin, "the number of a node", "list nodes of the mesh"),
                 }
             }

@@ -6,11 +6,12 @@ use mechanics::{
     material::{Failure, Material},
     mesh::Topology,
 };
+use rayon::prelude::*;
 
 use super::{assembly::Assembly, part::PartDraft, surface::Face, zones};
 use crate::{
     fault::short,
-    geometry::{EDGES, cross, norm, sub, worst_corner},
+    geometry::{EDGES, cross, dot, norm, sub, worst_corner},
     log::Log,
     typed::mesh::Numbers,
 };
@@ -133,9 +134,14 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
         }
         let volumes = &assembly.volumes[offsets[p]..offsets[p + 1]];
         let bad: Vec<usize> = (0..volumes.len())
+            .into_par_iter()
             .filter(|&e| {
                 let corners = part.corners(e).map(|node| assembly.mesh.positions[node as usize]);
-                let edge = EDGES.iter().map(|[a, b]| norm(sub(corners[*a], corners[*b]))).fold(0.0, f64::max);
+                let square = |[a, b]: &[usize; 2]| {
+                    let along = sub(corners[*a], corners[*b]);
+                    dot(along, along)
+                };
+                let edge = EDGES.iter().map(square).fold(0.0, f64::max).sqrt();
                 !(volumes[e] > FLAT * edge * edge * edge && volumes[e].is_finite())
             })
             .collect();

@@ -12,7 +12,7 @@ use mechanics::contact::Settings;
 use super::{assembly::Assembly, part::PartDraft, surface::Face};
 use crate::{
     fault::short,
-    geometry::{add, scaled, triangle_distance},
+    geometry::{add, norm, scaled, triangle_distance},
     log::Log,
 };
 
@@ -147,11 +147,16 @@ fn worst_node(nodes: &Surface<'_>, faces: &Surface<'_>, assembly: &Assembly, gap
     for face in faces.faces {
         let corners = face.nodes.map(position);
         let middle = scaled(add(add(corners[0], corners[1]), add(corners[2], corners[3])), 0.25);
+        let bounds = Bounds::of(&corners);
         for &c in columns.of_face(&corners, gap).iter() {
             let x = position(candidates[c as usize]);
+            // No triangle of the face is nearer than the box around it.
+            let may_be_nearer = bounds.least_distance(x) <= nearest[c as usize];
             for side in 0..4 {
                 let (p, q) = (corners[side], corners[(side + 1) % 4]);
-                nearest[c as usize] = nearest[c as usize].min(triangle_distance(x, p, q, middle));
+                if may_be_nearer {
+                    nearest[c as usize] = nearest[c as usize].min(triangle_distance(x, p, q, middle));
+                }
                 above[c as usize] += u32::from(crosses(columns.beside(x), p, q, middle));
             }
         }
@@ -164,6 +169,30 @@ fn worst_node(nodes: &Surface<'_>, faces: &Surface<'_>, assembly: &Assembly, gap
         .filter(|w| w.inside || w.distance < gap * (1.0 - ROUNDING))
         .min_by(|a, b| b.inside.cmp(&a.inside).then(a.distance.total_cmp(&b.distance)))?;
     Some(worst)
+}
+
+/// The box around a face.
+struct Bounds {
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+impl Bounds {
+    fn of(corners: &[[f64; 3]; 4]) -> Self {
+        let end = |axis: usize, pick: fn(f64, f64) -> f64| {
+            corners.iter().map(|corner| corner[axis]).reduce(pick).unwrap_or_default()
+        };
+        Self {
+            low: std::array::from_fn(|axis| end(axis, f64::min)),
+            high: std::array::from_fn(|axis| end(axis, f64::max)),
+        }
+    }
+
+    /// A little less than the distance of a point from the box, so that rounding does not count.
+    fn least_distance(&self, x: [f64; 3]) -> f64 {
+        let outside = |axis: usize| (self.low[axis] - x[axis]).max(x[axis] - self.high[axis]).max(0.0);
+        (1.0 - 1e-9) * norm([0, 1, 2].map(outside))
+    }
 }
 
 /// Whether the ray from `x` along +z crosses the triangle.

@@ -187,9 +187,11 @@ impl Checkpoints {
         self.last = self.newest.cycle();
     }
 
-    /// Keeps of the newest one only what never changes; gives that. For workers of which none can be lost.
-    pub(super) fn forget_state(&mut self) -> Arc<GlobalState> {
-        let state = Arc::new(self.newest.state.statics());
+    /// Keeps of the newest one only what never changes, and of that, without `sorts`, only lengths; gives it. For workers of which none
+    /// can be lost.
+    pub(super) fn forget_state(&mut self, sorts: bool) -> Arc<GlobalState> {
+        let state = &self.newest.state;
+        let state = Arc::new(if sorts { state.statics() } else { state.outline() });
         let continuation = self.newest.continuation.clone();
         self.newest = Arc::new(Checkpoint { state: Arc::clone(&state), continuation });
         state

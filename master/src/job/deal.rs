@@ -11,6 +11,7 @@ use mechanics::{
     vote::Watched,
 };
 use protocol::message::{Assign, ToWorker};
+use rayon::prelude::*;
 
 use super::{
     Ending, Job,
@@ -81,6 +82,16 @@ impl Job {
         Ok((job, actions))
     }
 
+    /// Lets go of what of the model only the start of a run needs: velocities, rotation rates and constraints by node. Of a model that
+    /// others have too, and where surfaces change, all stays.
+    pub fn forget_start(&mut self) {
+        let Problem { model, touching, .. } = &mut self.problem;
+        let surfaces_change = touching.is_some() && model.setup.erosion.is_on();
+        if let Some(model) = Arc::get_mut(model).filter(|_| !surfaces_change) {
+            (model.velocity, model.spin, model.constraint) = (Vec::new(), Vec::new(), Vec::new());
+        }
+    }
+
     /// From now on no state is kept to go back to: for a set of workers of which nobody can be lost, as it shares this process.
     pub fn keep_no_state(&mut self) {
         self.lean = true;
@@ -89,7 +100,7 @@ impl Job {
 
     /// Drops what only going back would need of the checkpoint that has been dealt out.
     pub(super) fn forget_state(&mut self) {
-        let statics = self.checkpoints.forget_state();
+        let statics = self.checkpoints.forget_state(self.problem.touching.is_some());
         self.epoch.sorts.forget_state(&statics);
     }
 
@@ -237,10 +248,12 @@ impl Division {
         let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
         let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
         for ((id, subdomain), regions) in layout.iter().enumerate().zip(blocks(layout, threads)) {
-            let pieces: Vec<Piece> =
-                regions.iter().map(|region| piece::cut(&model.mesh, state, subdomain.part, region)).collect();
-            let mut nodes: Vec<u32> = pieces.iter().flat_map(|p| p.nodes.iter().copied()).collect();
-            nodes.sort_unstable();
+            let cut = |region: &Region| piece::cut(&model.mesh, state, subdomain.part, region);
+            let pieces: Vec<Piece> = regions.par_iter().map(cut).collect();
+            let n_nodes = pieces.iter().map(|p| p.nodes.len()).sum();
+            let mut nodes = Vec::with_capacity(n_nodes);
+            pieces.iter().for_each(|p| nodes.extend_from_slice(&p.nodes));
+            nodes.par_sort_unstable();
             nodes.dedup();
             nodes_of.push(nodes);
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
@@ -257,8 +270,8 @@ impl Division {
                 .filter(|&node| node_owners.owner_subdomain[node as usize] != id)
                 .collect();
             if let Some(Touching { surface, .. }) = touching {
-                subdomain.surface =
-                    nodes.iter().copied().filter(|&node| surface.node_index(node).is_some()).collect();
+                let is_here = |node: &u32| nodes.binary_search(node).is_ok();
+                subdomain.surface = surface.nodes.iter().copied().filter(is_here).collect();
                 gather[place.worker].extend(
                     subdomain
                         .surface

@@ -1,6 +1,6 @@
 //! What a job computes, the same in all its epochs: the model with its walls bound, quanta of sums, the contact surface.
 
-use std::sync::Arc;
+use std::{io::BufWriter, sync::Arc};
 
 use deck::model::Model;
 use mechanics::{
@@ -45,9 +45,7 @@ impl Problem {
         initial::spin(&mut start, &setup.constraints, &model.spin);
         let quanta = initial::quanta(&model.mesh, &setup, &start);
         if setup != model.setup {
-            let mut with_walls = (*model).clone();
-            with_walls.setup = setup;
-            model = Arc::new(with_walls);
+            Arc::make_mut(&mut model).setup = setup;
         }
         let touching = Touching::of(&model)?;
         let sum = sum_of(&model)?;
@@ -62,10 +60,12 @@ fn sum_of(model: &Model) -> Result<[u8; 32], Error> {
     let mut setup = setup.clone();
     let control = &mut setup.control;
     (control.end_time, control.end_cycle, control.sort_lag, control.plan_interval) = (0.0, 0, 0, 0);
-    let mut hasher = blake3::Hasher::new();
+    // The hash takes many blocks at once, and single numbers slowly.
+    let mut hasher = BufWriter::with_capacity(1 << 16, blake3::Hasher::new());
     let release = env!("CARGO_PKG_VERSION");
     let whole = (release, title, units, mesh, velocity, spin, constraint, join_energy, setup);
     protocol::codec::encode_into(&whole, &mut hasher).map_err(|e| Error::Unencoded(e.to_string()))?;
+    let hasher = hasher.into_inner().map_err(|e| Error::Unencoded(e.to_string()))?;
     Ok(*hasher.finalize().as_bytes())
 }
 

@@ -64,10 +64,9 @@ impl Account {
     }
 
     /// Books the whole vote of a cycle, and stops the run where the physics went wrong.
-    /// `volumes` are those that elements began with.
     pub(super) fn book(
         &mut self,
-        (problem, volumes): (&Problem, &[f64]),
+        problem: &Problem,
         (cycle, step): (u64, Step),
         vote: &Vote,
         actions: &mut Vec<Action>,
@@ -84,7 +83,7 @@ impl Account {
             return;
         }
         self.failure = if let Some((element, volume)) = vote.fault {
-            Some(element_fault(problem, volumes, (element, volume), cycle))
+            Some(element_fault(problem, (element, volume), cycle))
         } else if vote.worst_depth >= DEEPEST {
             Some(contact_fault(problem, vote, cycle))
         } else if self.run_totals.worst_courant > 1.0 {
@@ -243,14 +242,22 @@ fn element_name(problem: &Problem, element: u32) -> String {
     element.to_string()
 }
 
-/// What an element without volume says; `volumes` are those that elements began with.
-pub(super) fn element_fault(
-    problem: &Problem,
-    volumes: &[f64],
-    (element, volume): (u32, f64),
-    cycle: u64,
-) -> String {
-    let was = volumes.get(element as usize).copied().unwrap_or(f64::NAN);
+/// The volume that an element begins with.
+fn first_volume(problem: &Problem, element: u32) -> f64 {
+    let mesh = &problem.model.mesh;
+    let mut left = element as usize;
+    for part in &mesh.parts {
+        if left < part.n_elements() {
+            return part.volume_of(left, &mesh.positions);
+        }
+        left -= part.n_elements();
+    }
+    f64::NAN
+}
+
+/// What an element without volume says.
+pub(super) fn element_fault(problem: &Problem, (element, volume): (u32, f64), cycle: u64) -> String {
+    let was = first_volume(problem, element);
     format!(
         "element {}: volume {volume:e} at cycle {cycle}, at first {was:e}; refine the mesh, soften the load or add an erosion strain",
         element_name(problem, element)

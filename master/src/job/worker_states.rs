@@ -70,7 +70,10 @@ impl WorkerStates {
         }
         let Some(collected) = self.collecting.remove(&cycle) else { return Ok(None) };
         let mut state = if before.is_static() { before.to_fill() } else { before.clone() };
-        for piece in collected.pieces {
+        for mut piece in collected.pieces {
+            if before.is_outline() {
+                piece::put_back_statics(&mut piece, &mut state).map_err(Error::Problem)?;
+            }
             piece::put_back(piece, &mut state).map_err(Error::Problem)?;
         }
         let ordered = self.ordered.remove(&cycle);

@@ -33,8 +33,6 @@ pub struct Block {
     pub material: u32,
     /// Global node index of each local node.
     pub nodes: Vec<u32>,
-    /// Global element index of each local element.
-    pub elements: Vec<u32>,
     /// Position `x_n` by axis.
     pub x: [Vec<f64>; 3],
     /// Velocity `v_{n-1/2}` by axis.
@@ -96,7 +94,6 @@ impl Block {
             hourglass: piece.hourglass,
             topology: piece.topology,
             nodes: piece.nodes,
-            elements: piece.elements,
             group,
         }
     }
@@ -111,7 +108,7 @@ impl Block {
             material: self.material,
             topology: self.topology.clone(),
             nodes: self.nodes.clone(),
-            elements: self.elements.clone(),
+            elements: self.globals().collect(),
             x: by_node(n, &self.x),
             v: by_node(n, &self.v),
             mass: self.mass[..n].to_vec(),
@@ -131,6 +128,7 @@ impl Block {
     pub fn into_piece(mut self) -> Piece {
         let n = self.nodes.len();
         drop(take(&mut self.f));
+        let elements = self.globals().collect();
         let ElementArrays { initial_volume, fields, own, history } = self.group.into_image(&self.x);
         self.mass.truncate(n);
         Piece {
@@ -142,7 +140,7 @@ impl Block {
             fields,
             topology: self.topology,
             nodes: self.nodes,
-            elements: self.elements,
+            elements,
             mass: self.mass,
             constraint: self.constraint,
             erosion: None,
@@ -152,6 +150,15 @@ impl Block {
             hourglass: self.hourglass,
             history,
         }
+    }
+
+    pub fn n_elements(&self) -> usize {
+        self.group.n_elements()
+    }
+
+    /// Global element index of each local element.
+    pub fn globals(&self) -> impl Iterator<Item = u32> {
+        (0..self.n_elements()).map(|element| self.group.global(self.slot(element)))
     }
 
     /// Number of slots, empty ones included.
@@ -266,7 +273,7 @@ impl Block {
     pub fn sets_touching(&self, marked: &[bool]) -> Vec<bool> {
         assert!(marked.len() == self.nodes.len(), "{} marks, {} nodes", marked.len(), self.nodes.len());
         let mut touching = vec![false; self.alive().len()];
-        for element in 0..self.elements.len() {
+        for element in 0..self.n_elements() {
             let touches = self.nodes_of(element).iter().any(|&node| marked[node as usize]);
             touching[self.slot(element) / SET] |= touches;
         }

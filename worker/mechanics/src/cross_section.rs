@@ -161,8 +161,8 @@ impl Cuts {
         let mut found: Vec<(u32, Nodes, Cut)> = Vec::new();
         for (index, section) in (0..).zip(sections) {
             let before = found.len();
-            for (local, element) in block.elements.iter().enumerate() {
-                let Ok(at) = section.elements.binary_search_by_key(element, |(element, _)| *element) else {
+            for (local, element) in block.globals().enumerate() {
+                let Ok(at) = section.elements.binary_search_by_key(&element, |(element, _)| *element) else {
                     continue;
                 };
                 let (corners, ahead, slot) =

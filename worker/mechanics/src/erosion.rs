@@ -126,7 +126,7 @@ impl Eroding {
             changed: false,
         };
         let Some(state) = state else { return eroding };
-        for (e, &cycle) in state.eroded.iter().enumerate().take(block.elements.len()) {
+        for (e, &cycle) in state.eroded.iter().enumerate().take(block.n_elements()) {
             let slot = block.slot(e);
             eroding.eroded[slot] = cycle;
             if cycle != ALIVE {
@@ -219,7 +219,7 @@ impl Eroding {
 
     /// The state, by local element, for a state.
     pub(crate) fn state(&self, block: &Block) -> PieceErosion {
-        let n = block.elements.len();
+        let n = block.n_elements();
         let strain = if self.strain.is_empty() { 0 } else { n };
         PieceErosion {
             eroded: (0..n).map(|e| self.eroded[block.slot(e)]).collect(),

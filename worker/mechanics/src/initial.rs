@@ -1,6 +1,8 @@
 //! The state a run starts from: masses by the shares of element masses that their nodes carry and those that a deck puts at nodes, elements at rest volume without deviatoric stress,
 //! gases at their pressure, explosives with the time until they are lit.
 
+use rayon::prelude::*;
+
 use crate::{
     burn::lighting_time,
     constraint::{Circle, Constraint, MAX_WALLS},
@@ -12,7 +14,7 @@ use crate::{
     mesh::{FACES, Mesh, Part, Topology},
     rigid::Body,
     setup::Setup,
-    state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field},
+    state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field, write_changed},
     vectors::{cross, dot},
     wall::{Motion, RigidWall},
 };
@@ -60,18 +62,28 @@ pub fn state(
                 variables.iter().map(|variable| vec![variable.initial; part.n_elements()]).collect();
             state.history.push(PartHistory { part: p, first: state.initial_volume.len() as u32, columns });
         }
-        for e in 0..part.n_elements() {
-            let corners = part.corners(e).map(|n| mesh.positions[n as usize]);
-            let v = part.volume_of(e, &mesh.positions);
+        let first = state.initial_volume.len();
+        state.initial_volume.extend(part.volumes(&mesh.positions));
+        let of_part = first..state.initial_volume.len();
+        for (e, &v) in state.initial_volume[of_part.clone()].iter().enumerate() {
             if v <= 0.0 || !v.is_finite() {
                 return Err(format!(
                     "element {} of part `{}`: volume {v:e}, must be positive",
                     part.element_ids[e], part.name
                 ));
             }
-            let index = state.initial_volume.len();
-            state.initial_volume.push(v);
-            state.elements[field::TEMPERATURE][index] = material.initial_temperature();
+            mass_of.push(density * v);
+        }
+        // Zeros stay unwritten.
+        for (field, value) in [
+            (field::TEMPERATURE, material.initial_temperature()),
+            (field::RELATIVE_VOLUME, 1.0),
+            (field::ENERGY, material.initial_energy()),
+            (field::PRESSURE, material.initial_pressure()),
+        ] {
+            state.elements[field][of_part.clone()].iter_mut().for_each(|place| write_changed(place, value));
+        }
+        for index in of_part {
             if let Topology::EightPoint { .. } = part.topology {
                 for of_point in &mut state.own[points::TEMPERATURES] {
                     of_point[index] = material.initial_temperature();
@@ -82,15 +94,12 @@ pub fn state(
                     array[index] = value;
                 }
             }
-            state.elements[field::RELATIVE_VOLUME][index] = 1.0;
-            state.elements[field::ENERGY][index] = material.initial_energy();
-            state.elements[field::PRESSURE][index] = material.initial_pressure();
             if let Some(speed) = material.detonation_speed() {
+                let corners = part.corners(index - first).map(|n| mesh.positions[n as usize]);
                 let centre = std::array::from_fn(|a| corners.iter().map(|x| x[a]).sum::<f64>() * 0.125);
                 state.elements[field::TIME_TO_LIGHT][index] =
                     lighting_time(&setup.detonations, centre, speed);
             }
-            mass_of.push(density * v);
         }
     }
     debug_assert_eq!(state.elements.len(), N_FIELDS);
@@ -242,25 +251,31 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         sound = sound.max((modulus / material.density).sqrt());
         driven2 = driven2.max(2.0 * material.initial_energy() / material.density);
         let strength = modulus.max(material.density * top_speed2).max(pressure);
-        for e in 0..part.n_elements() {
+        // Force and arm of an element.
+        let of_element = |e: usize| {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
-            force = force.max(match &part.topology {
+            match &part.topology {
                 Topology::Structured { .. }
                 | Topology::Explicit { .. }
                 | Topology::EightPoint { .. }
-                | Topology::Tetrahedra { .. } => largest_face(&x) * strength,
+                | Topology::Tetrahedra { .. } => [largest_face(&x) * strength, 0.0],
                 // A shell pulls with its section; only loads act on its face.
                 Topology::Shells { section, .. } => {
                     let area = largest_face(&x);
-                    arm = arm.max(area.sqrt());
-                    (area.sqrt() * section.thickness * strength).max(area * pressure)
+                    let force = (area.sqrt() * section.thickness * strength).max(area * pressure);
+                    [force, area.sqrt()]
                 }
-                Topology::Trusses { area, .. } => area * strength,
-                Topology::Beams { section, .. } => {
-                    arm = arm.max(part.volume(&x) / section.area);
-                    section.area * strength
-                }
-            });
+                Topology::Trusses { area, .. } => [area * strength, 0.0],
+                Topology::Beams { section, .. } => [section.area * strength, part.volume(&x) / section.area],
+            }
+        };
+        // Maxima have no order; the sum of energies has one.
+        let [of_part, longest] = (0..part.n_elements())
+            .into_par_iter()
+            .map(of_element)
+            .reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+        (force, arm) = (force.max(of_part), arm.max(longest));
+        for _ in 0..part.n_elements() {
             stored += (1e-3 * material.bulk()).max(material.initial_energy()) * state.initial_volume[index];
             index += 1;
         }
@@ -337,15 +352,16 @@ pub fn closing_steps(
         }
         let material = &materials[part.material as usize];
         let speed = ((material.bulk() + 4.0 / 3.0 * material.shear()) / material.density).sqrt();
-        let thinnest = (0..part.n_elements()).map(|e| {
+        let volumes = part.corner_volumes(&mesh.positions);
+        let thinnest = volumes.into_par_iter().enumerate().map(|(e, volume)| {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
             match part.section() {
                 // The height above the longest side, as if it were a parallelogram.
-                Some(section) => part.volume(&x) / (section.thickness * longest(&[x[0], x[1], x[2], x[3]])),
-                None => part.volume(&x) / largest_face(&x),
+                Some(section) => volume / (section.thickness * longest(&[x[0], x[1], x[2], x[3]])),
+                None => volume / largest_face(&x),
             }
         });
-        safety_factor * thinnest.fold(f64::INFINITY, f64::min) / speed
+        safety_factor * thinnest.reduce(|| f64::INFINITY, f64::min) / speed
     };
     let alone: Vec<f64> = (0..mesh.parts.len()).map(of_part).collect();
     (0..alone.len())

@@ -1,5 +1,6 @@
 //! What never changes in a run: parts, their index space or connectivity, and which nodes they share.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 mod sides;
@@ -265,6 +266,28 @@ impl Part {
                 tet10::volume(&tetrahedra[e].map(|local| x[self.nodes[local as usize] as usize]))
             }
             _ => self.volume(&self.corners(e).map(|n| x[n as usize])),
+        }
+    }
+
+    /// [`Part::volume_of`] of all elements, in their order; the threads of the pool share them.
+    pub fn volumes(&self, x: &[[f64; 3]]) -> Vec<f64> {
+        match &self.topology {
+            Topology::Tetrahedra { .. } => {
+                (0..self.n_elements()).into_par_iter().map(|e| self.volume_of(e, x)).collect()
+            }
+            _ => self.corner_volumes(x),
+        }
+    }
+
+    /// [`Part::volume`] of all elements, likewise.
+    pub(crate) fn corner_volumes(&self, x: &[[f64; 3]]) -> Vec<f64> {
+        let corners = |e: usize| self.corners(e).map(|n| x[n as usize]);
+        match &self.topology {
+            Topology::Structured { .. }
+            | Topology::Explicit { .. }
+            | Topology::EightPoint { .. }
+            | Topology::Tetrahedra { .. } => hex8::volumes(self.n_elements(), &corners),
+            _ => (0..self.n_elements()).into_par_iter().map(|e| self.volume(&corners(e))).collect(),
         }
     }
 

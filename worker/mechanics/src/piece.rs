@@ -276,6 +276,38 @@ fn as_rows_are(corners: Vec<[u32; 8]>, nodes: Vec<u32>) -> (Vec<[u32; 8]>, Vec<u
     (sorted, order.iter().map(|&local| nodes[local as usize]).collect())
 }
 
+/// Moves masses, constraints and volumes of a piece into a state that was made of a [`GlobalState::outline`].
+///
+/// # Errors
+/// If an index or a length of the piece does not fit the state; the state is then untouched.
+pub fn put_back_statics(piece: &mut Piece, state: &mut GlobalState) -> Result<(), String> {
+    let Piece { part, nodes, elements, mass, constraint, initial_volume, .. } = piece;
+    let lengths = [mass.len(), constraint.len(), initial_volume.len()];
+    if lengths != [nodes.len(), nodes.len(), elements.len()] {
+        return Err(format!(
+            "image of part {part}: {lengths:?} masses, constraints and volumes for its {} nodes and {} elements",
+            nodes.len(),
+            elements.len()
+        ));
+    }
+    let ends = [(&*nodes, state.mass.len()), (&*elements, state.initial_volume.len())];
+    for (indices, n) in ends {
+        if let Some(index) = indices.iter().find(|&&index| index as usize >= n) {
+            return Err(format!("image of part {part}: index {index}, the problem has {n}"));
+        }
+    }
+    for (&n, value) in nodes.iter().zip(std::mem::take(mass)) {
+        state.mass[n as usize] = value;
+    }
+    for (&n, value) in nodes.iter().zip(std::mem::take(constraint)) {
+        state.constraint[n as usize] = value;
+    }
+    for (&e, value) in elements.iter().zip(std::mem::take(initial_volume)) {
+        state.initial_volume[e as usize] = value;
+    }
+    Ok(())
+}
+
 /// Writes what a cycle changes of a piece back into the global state. Its arrays go one by one, so that there need not be
 /// room for all of both.
 ///

@@ -158,11 +158,22 @@ impl GlobalState {
     /// What of the state no cycle changes, with the time; the rest is empty.
     pub fn statics(&self) -> Self {
         Self {
-            cycle: self.cycle,
-            time: self.time,
             mass: self.mass.clone(),
             constraint: self.constraint.clone(),
             initial_volume: self.initial_volume.clone(),
+            ..self.outline()
+        }
+    }
+
+    /// [`GlobalState::statics`] without masses, constraints and volumes, which pieces bring back with them
+    /// ([`crate::piece::put_back`]): zeros, and so nearly without memory.
+    pub fn outline(&self) -> Self {
+        Self {
+            cycle: self.cycle,
+            time: self.time,
+            mass: vec![0.0; self.mass.len()],
+            constraint: vec![0; self.constraint.len()],
+            initial_volume: vec![0.0; self.initial_volume.len()],
             // Kept in length alone: the states of parts that do not erode have nothing of this.
             eroded: vec![ALIVE; self.eroded.len()],
             strain: vec![0.0; self.strain.len()],
@@ -173,6 +184,11 @@ impl GlobalState {
             history: self.history.iter().map(PartHistory::zeros).collect(),
             ..Self::default()
         }
+    }
+
+    /// Whether it is no more than [`GlobalState::outline`], or filled from that: volumes of elements are positive.
+    pub fn is_outline(&self) -> bool {
+        self.initial_volume.first() == Some(&0.0)
     }
 
     /// Whether it is no more than [`GlobalState::statics`].
@@ -195,7 +211,7 @@ impl GlobalState {
                 inertia: self.shells.inertia.clone(),
             },
             own: vec![vec![0.0; n_elements]; self.own.len()],
-            ..self.statics()
+            ..if self.is_outline() { self.outline() } else { self.statics() }
         }
     }
 }

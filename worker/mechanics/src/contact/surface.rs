@@ -8,12 +8,13 @@
 //! from the start, so that the nodes whose positions and votes travel stay the same; [`Surface::active`] says which of them
 //! can meet anything: those on faces, and those that have no element left.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::edges::{Edge, features::features};
 use crate::{
     material::Material,
-    mesh::{MAX_NODES, Mesh, Part},
+    mesh::{MAX_NODES, Mesh, Part, Topology},
 };
 
 /// Depth (gaps) within which the penalty stops a node at the closing speed of its part; the rest of 0.9 is for the bodies
@@ -118,7 +119,8 @@ impl Surface {
         erodes: &[bool],
         retain_inertia: bool,
     ) -> Self {
-        let mut outer = outer_sides(mesh, alive);
+        let alive: Vec<bool> = (0..mesh.n_elements() as u32).map(alive).collect();
+        let mut outer = outer_sides(mesh, &alive);
         outer.sort_unstable();
         let offsets = mesh.element_offsets();
         let mut index = vec![u32::MAX; mesh.n_nodes()];
@@ -157,18 +159,17 @@ impl Surface {
         let mut node_share = vec![0.0; nodes.len()];
         let mut count = vec![0_u32; nodes.len()];
         let mut around = vec![0.0; nodes.len()];
-        let freed = freed(mesh, alive, erodes, &nodes);
+        let freed = freed(mesh, &alive, erodes, &nodes);
         let active: Vec<bool> = (0..)
             .zip(&nodes)
             .map(|(i, &n)| on_faces[n as usize] == 0 || (retain_inertia && freed.get(i) == Some(&true)))
             .collect();
         for (p, part) in (0..).zip(&mesh.parts) {
             let bulk = materials[part.material as usize].bulk();
-            for e in 0..part.n_elements() {
+            let touches = |&e: &usize| part.nodes_of(e).iter().any(|&n| index[n as usize] != u32::MAX);
+            let touching: Vec<usize> = (0..part.n_elements()).into_par_iter().filter(touches).collect();
+            for e in touching {
                 let corners = part.nodes_of(e);
-                if corners.iter().all(|&n| index[n as usize] == u32::MAX) {
-                    continue;
-                }
                 let volume = part.volume_of(e, &mesh.positions);
                 let of_node = part.spacing().node * volume;
                 for (corner, n) in corners.iter().map(|&n| index[n as usize] as usize).enumerate() {
@@ -352,7 +353,7 @@ fn stiffness_of(part: &Part, bulk: f64, area: f64, volume: f64) -> f64 {
 }
 
 /// Whether each of `nodes` (ascending) is of parts that can erode and has no element that is alive; empty if no part can.
-fn freed(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, erodes: &[bool], nodes: &[u32]) -> Vec<bool> {
+fn freed(mesh: &Mesh, alive: &[bool], erodes: &[bool], nodes: &[u32]) -> Vec<bool> {
     if !erodes.contains(&true) {
         return Vec::new();
     }
@@ -360,7 +361,7 @@ fn freed(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, erodes: &[bool], nodes: &[u32
     let mut element = 0;
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
-            if alive(element) {
+            if alive[element] {
                 part.nodes_of(e).iter().for_each(|&n| held[n as usize] = true);
             }
             element += 1;
@@ -371,16 +372,18 @@ fn freed(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, erodes: &[bool], nodes: &[u32
 
 /// Element and side of every outer face, in no order. Sides are bucketed by their lowest node, so that each
 /// is compared with a few others only.
-fn outer_sides(mesh: &Mesh, alive: &dyn Fn(u32) -> bool) -> Vec<(u32, u32)> {
+fn outer_sides(mesh: &Mesh, alive: &[bool]) -> Vec<(u32, u32)> {
+    let shared = shared_nodes(mesh);
+    let candidates = candidates(mesh, alive, &shared);
     let mut starts = vec![0_u32; mesh.n_nodes() + 1];
-    for_each_side(mesh, alive, &mut |lowest, _| starts[lowest as usize + 1] += 1);
+    for_each_side(mesh, alive, (&candidates, &shared), &mut |lowest, _| starts[lowest as usize + 1] += 1);
     for i in 1..starts.len() {
         starts[i] += starts[i - 1];
     }
     let empty = Side { key: [0; 3], element: 0, side: 0 };
     let mut sides = vec![empty; starts[starts.len() - 1] as usize];
     let mut next = starts.clone();
-    for_each_side(mesh, alive, &mut |lowest, side| {
+    for_each_side(mesh, alive, (&candidates, &shared), &mut |lowest, side| {
         sides[next[lowest as usize] as usize] = side;
         next[lowest as usize] += 1;
     });
@@ -396,30 +399,89 @@ fn outer_sides(mesh: &Mesh, alive: &dyn Fn(u32) -> bool) -> Vec<(u32, u32)> {
     outer
 }
 
-/// Calls `visit` with the lowest node of every side of every element alive, and the rest of its key.
-fn for_each_side(mesh: &Mesh, alive: &dyn Fn(u32) -> bool, visit: &mut dyn FnMut(u32, Side)) {
-    let mut element = 0;
-    for part in &mesh.parts {
-        for e in 0..part.n_elements() {
-            if alive(element) {
-                let corners = part.nodes_of(e);
-                // A shell is one face, whose zone acts on both its sides.
-                for &side in part.sides() {
-                    let mut key = part.side(side).map(|c| corners[c]);
-                    key.sort_unstable();
-                    for i in 1..4 {
-                        if key[i] == key[i - 1] {
-                            key[i - 1] = u32::MAX;
-                        }
-                    }
-                    key.sort_unstable();
-                    if key[2] != u32::MAX {
-                        visit(key[0], Side { key: [key[1], key[2], key[3]], element, side: side as u32 });
+/// Whether each node is one of several parts, or has several places in the index space of one.
+fn shared_nodes(mesh: &Mesh) -> Vec<bool> {
+    let (mut seen, mut shared) = (vec![false; mesh.n_nodes()], vec![false; mesh.n_nodes()]);
+    for &node in mesh.parts.iter().flat_map(|part| &part.nodes) {
+        shared[node as usize] |= std::mem::replace(&mut seen[node as usize], true);
+    }
+    shared
+}
+
+/// Which sides of an element of an index space, as [`FACES`](crate::mesh::FACES) has them, another element of it has too, which is
+/// alive; `alive` is by element of the part.
+fn inside_of(cells: [u32; 3], e: usize, alive: &[bool]) -> [bool; 6] {
+    let [ni, nj, nk] = cells.map(|c| c as usize);
+    let [i, j, k] = [e % ni, e / ni % nj, e / ni / nj];
+    [
+        k > 0 && alive[e - ni * nj],
+        k + 1 < nk && alive[e + ni * nj],
+        j > 0 && alive[e - ni],
+        i + 1 < ni && alive[e + 1],
+        j + 1 < nj && alive[e + ni],
+        i > 0 && alive[e - 1],
+    ]
+}
+
+/// Which sides of an element of a part lie between it and its neighbours in an index space.
+fn inside(part: &Part, e: usize, alive: &[bool]) -> [bool; 6] {
+    match &part.topology {
+        Topology::Structured { cells } => inside_of(*cells, e, alive),
+        _ => [false; 6],
+    }
+}
+
+/// Elements of each part that are alive and may have a side outside.
+fn candidates(mesh: &Mesh, alive: &[bool], shared: &[bool]) -> Vec<Vec<u32>> {
+    let mut first = 0;
+    let of_part = |part: &Part| {
+        let alive = &alive[first..first + part.n_elements()];
+        first += part.n_elements();
+        let may = |&e: &u32| {
+            let e = e as usize;
+            alive[e]
+                && (inside(part, e, alive) != [true; 6]
+                    || part.nodes_of(e).iter().any(|&n| shared[n as usize]))
+        };
+        (0..alive.len() as u32).into_par_iter().filter(may).collect()
+    };
+    mesh.parts.iter().map(of_part).collect()
+}
+
+/// Calls `visit` with the lowest node of every side of the candidates that may be outside, and the rest of its key. Left out are
+/// sides between two elements of an index space: a third element could have such a side only if it shared its nodes.
+fn for_each_side(
+    mesh: &Mesh,
+    alive: &[bool],
+    (candidates, shared): (&[Vec<u32>], &[bool]),
+    visit: &mut dyn FnMut(u32, Side),
+) {
+    let mut first = 0;
+    for (part, candidates) in mesh.parts.iter().zip(candidates) {
+        let alive = &alive[first..first + part.n_elements()];
+        for &e in candidates {
+            let (element, e) = (first as u32 + e, e as usize);
+            let (inside, corners) = (inside(part, e, alive), part.nodes_of(e));
+            // A shell is one face, whose zone acts on both its sides.
+            for &side in part.sides() {
+                let between = inside.get(side) == Some(&true);
+                if between && !part.side(side).iter().any(|&c| shared[corners[c] as usize]) {
+                    continue;
+                }
+                let mut key = part.side(side).map(|c| corners[c]);
+                key.sort_unstable();
+                for i in 1..4 {
+                    if key[i] == key[i - 1] {
+                        key[i - 1] = u32::MAX;
                     }
                 }
+                key.sort_unstable();
+                if key[2] != u32::MAX {
+                    visit(key[0], Side { key: [key[1], key[2], key[3]], element, side: side as u32 });
+                }
             }
-            element += 1;
         }
+        first += part.n_elements();
     }
 }
 

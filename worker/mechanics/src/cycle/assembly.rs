@@ -104,18 +104,19 @@ impl Domain {
         for (n_pieces, (unowned, surface)) in n_pieces.into_iter().zip(borders) {
             let own = end as u32..(end + n_pieces) as u32;
             end += n_pieces;
-            let first_copy =
-                |node: u32| copy_index.get(node).iter().copied().find(|(block, _)| own.contains(block));
-            for held_block in own.clone() {
-                for local in 0..held_blocks[held_block as usize].block.nodes.len() as u32 {
-                    let node = held_blocks[held_block as usize].block.nodes[local as usize];
+            let first_copy = |node: u32| {
+                copy_index.get(node).as_slice().iter().copied().find(|(block, _)| own.contains(block))
+            };
+            let blocks = &mut held_blocks[own.start as usize..own.end as usize];
+            blocks.par_iter_mut().enumerate().for_each(|(index, held_block)| {
+                let index = own.start + index as u32;
+                for (local, &node) in (0..).zip(&held_block.block.nodes) {
                     let owned = unowned.binary_search(&node).is_err();
-                    if owned && first_copy(node) == Some((held_block, local)) {
-                        held_blocks[held_block as usize].sets[local as usize / SET].booked |=
-                            1 << (local as usize % SET);
+                    if owned && first_copy(node) == Some((index, local)) {
+                        held_block.sets[local as usize / SET].booked |= 1 << (local as usize % SET);
                     }
                 }
-            }
+            });
             for &node in &surface {
                 if let Some((held_block, local)) = first_copy(node) {
                     if unowned.binary_search(&node).is_err() {
@@ -133,8 +134,9 @@ impl Domain {
             .iter()
             .enumerate()
             .filter_map(|(g, node)| {
-                let &(held_block, local) =
-                    copy_index.get(*node).iter().find(|&&(r, l)| held_blocks[r as usize].is_booked(l))?;
+                let copies = copy_index.get(*node);
+                let is_booked = |&&(r, l): &&(u32, u32)| held_blocks[r as usize].is_booked(l);
+                let &(held_block, local) = copies.as_slice().iter().find(is_booked)?;
                 Some((g as u32, held_block, local))
             })
             .collect();
@@ -180,7 +182,7 @@ impl Domain {
             held_block.cuts = Cuts::of(&watched.sections, &held_block.block);
         }
         let place = |element: &u32| {
-            let found = |held_block: &HeldBlock| held_block.block.elements.iter().position(|e| e == element);
+            let found = |held_block: &HeldBlock| held_block.block.globals().position(|e| e == *element);
             let mut held_blocks = (0..).zip(&self.held_blocks);
             held_blocks.find_map(|(index, held_block)| found(held_block).map(|local| (index, local as u32)))
         };

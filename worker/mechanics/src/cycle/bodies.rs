@@ -64,7 +64,11 @@ impl Held {
             let mut copies = Vec::new();
             for (place, &node) in (0..).zip(&body.nodes) {
                 copies.extend(
-                    copy_index.get(node).iter().map(|&(held_block, local)| [held_block, local, place]),
+                    copy_index
+                        .get(node)
+                        .as_slice()
+                        .iter()
+                        .map(|&(held_block, local)| [held_block, local, place]),
                 );
             }
             let booked = |&[held_block, local, place]: &[u32; 3]| {

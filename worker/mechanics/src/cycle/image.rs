@@ -20,6 +20,7 @@ impl Domain {
             let (held_block, local) = *self
                 .copy_index
                 .get(*node)
+                .as_slice()
                 .first()
                 .ok_or_else(|| format!("node {node} to transfer is not held"))?;
             let HeldBlock { block, contact_history, .. } = &self.held_blocks[held_block as usize];

@@ -105,7 +105,9 @@ impl Domain {
             sets,
             exchanged: Vec::new(),
         };
-        if let Some(ghost) = plan.ghosts.iter().find(|ghost| !self.copy_index.get(ghost.node).is_empty()) {
+        if let Some(ghost) =
+            plan.ghosts.iter().find(|ghost| !self.copy_index.get(ghost.node).as_slice().is_empty())
+        {
             return Err(format!("ghost {} is held here, must be a node of other workers alone", ghost.node));
         }
         let ghost_of: HashMap<u32, u32> =
@@ -127,6 +129,7 @@ impl Domain {
         for (place, &node) in (0..).zip(&plan.exchange[..plan.exchange.len() - n_entries]) {
             exchanged.insert(node);
             let copies = self.copy_index.get(node);
+            let copies = copies.as_slice();
             let ghost = ghost_of.get(&node).copied();
             if copies.is_empty() && ghost.is_none() {
                 return Err(format!("node {node} of the exchange is neither held nor a ghost"));
@@ -216,7 +219,7 @@ impl Domain {
             contact_nodes.iter().enumerate().filter(|(_, node)| !exchanged.contains(&node.global))
         {
             let Some((share, in_share)) = places.own(i) else { continue };
-            for &(held_block, local) in self.copy_index.get(node.global) {
+            for &(held_block, local) in self.copy_index.get(node.global).as_slice() {
                 self.held_blocks[held_block as usize].shared.kept.push([local, share, in_share]);
             }
         }
@@ -226,7 +229,7 @@ impl Domain {
     /// earlier cycles too, which stand still already: what left with them was booked then, and nothing is booked here.
     fn drop_nodes(&mut self, nodes: &[u32]) {
         for &node in nodes {
-            for &(held_block, local) in self.copy_index.get(node) {
+            for &(held_block, local) in self.copy_index.get(node).as_slice() {
                 let held_block = &mut self.held_blocks[held_block as usize];
                 let booked = held_block.drop_node(local);
                 let (v, mass) = (&mut held_block.block.v, held_block.block.mass[local as usize]);
@@ -269,6 +272,7 @@ impl Domain {
         holders: &mut Vec<(u32, u32)>,
     ) {
         let copies = self.copy_index.get(node);
+        let copies = copies.as_slice();
         if copies.is_empty() || exchanged.contains(&node) {
             return;
         }

@@ -8,7 +8,7 @@ use crate::{lanes::SET, vote::Vote, wall::WallVote};
 impl Domain {
     /// Number of elements held.
     pub fn n_elements(&self) -> usize {
-        self.held_blocks.iter().map(|r| r.block.elements.len()).sum()
+        self.held_blocks.iter().map(|r| r.block.n_elements()).sum()
     }
 
     /// What it holds under the plan in force.

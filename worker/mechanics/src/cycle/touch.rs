@@ -229,7 +229,7 @@ impl Domain {
 
 /// Where the position of a global node is found: a block and a local node, or [`NONE`] and a ghost.
 fn source(copy_index: &CopyIndex, ghost: &impl Fn(u32) -> Option<u32>, node: u32) -> Option<(u32, u32)> {
-    copy_index.get(node).first().copied().or_else(|| Some((NONE, ghost(node)?)))
+    copy_index.get(node).as_slice().first().copied().or_else(|| Some((NONE, ghost(node)?)))
 }
 
 /// Positions of the nodes of a block, or of the ghosts.

@@ -76,6 +76,11 @@ pub(crate) trait Group: Send + Sync {
     /// The same, to mask elements while others of their sets are computed.
     fn alive_mut(&mut self) -> &mut [u8];
 
+    fn n_elements(&self) -> usize;
+
+    /// Global index of the element of a slot, which holds one.
+    fn global(&self, slot: usize) -> u32;
+
     fn slot(&self, element: usize) -> usize;
 
     /// Nodes of the corners of an element. A kind with fewer corners than a hexahedron names some of them twice.

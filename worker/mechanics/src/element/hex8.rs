@@ -14,6 +14,7 @@ mod pass;
 pub(crate) mod points;
 pub(super) mod stress;
 mod view;
+mod volumes;
 
 use super::{
     ElementVote, Fault, Step,
@@ -38,6 +39,7 @@ use end::End;
 use stress::Stressed;
 pub(super) use view::BySlot;
 use view::View;
+pub(crate) use volumes::volumes;
 
 /// Volume of a hexahedron with these corners, as the kernel computes it, to the bit.
 pub fn volume(corners: &[[f64; 3]; 8]) -> f64 {

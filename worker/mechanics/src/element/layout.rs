@@ -37,6 +37,87 @@ pub(crate) enum Along {
     K,
 }
 
+/// The slot of each local element.
+pub(crate) enum Slots {
+    /// Of an index space: slots follow the elements of a row, and rows and layers lie at fixed distances.
+    Rows {
+        /// Elements along I, J, K.
+        cells: [usize; 3],
+        /// Slots from a row to the next.
+        row: usize,
+        /// Slots from a layer to the next.
+        layer: usize,
+    },
+    /// By local element.
+    List(Vec<u32>),
+}
+
+impl Slots {
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Rows { cells, .. } => cells.iter().product(),
+            Self::List(slots) => slots.len(),
+        }
+    }
+
+    /// The slot of an element.
+    pub fn of(&self, element: usize) -> usize {
+        match self {
+            Self::Rows { cells: [ni, nj, _], row, layer } => {
+                element % ni + element / ni % nj * row + element / ni / nj * layer
+            }
+            Self::List(slots) => slots[element] as usize,
+        }
+    }
+
+    /// The slots of all elements in their order.
+    pub fn iter(&self) -> SlotsIter<'_> {
+        SlotsIter { slots: self, place: [0; 3], next: 0 }
+    }
+}
+
+/// [`Slots::iter`].
+pub(crate) struct SlotsIter<'a> {
+    slots: &'a Slots,
+    /// The next element, by I, J, K.
+    place: [usize; 3],
+    /// The same, by number.
+    next: usize,
+}
+
+impl Iterator for SlotsIter<'_> {
+    type Item = usize;
+
+    #[inline]
+    fn next(&mut self) -> Option<usize> {
+        let slot = match self.slots {
+            Slots::Rows { cells: [ni, nj, nk], row, layer } => {
+                let [i, j, k] = self.place;
+                if k == *nk {
+                    return None;
+                }
+                self.place = match (i + 1 < *ni, j + 1 < *nj) {
+                    (true, _) => [i + 1, j, k],
+                    (false, true) => [0, j + 1, k],
+                    (false, false) => [0, 0, k + 1],
+                };
+                i + j * row + k * layer
+            }
+            Slots::List(slots) => *slots.get(self.next)? as usize,
+        };
+        self.next += 1;
+        Some(slot)
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let left = self.slots.len() - self.next;
+        (left, Some(left))
+    }
+}
+
+impl ExactSizeIterator for SlotsIter<'_> {}
+
 impl Along {
     const ALL: [Self; 3] = [Self::I, Self::J, Self::K];
 
@@ -56,7 +137,7 @@ impl Along {
 }
 
 /// Layout of an index space, the slot of each element, and the length that node arrays need.
-pub(crate) fn structured([ni, nj, nk]: [usize; 3], n_nodes: usize) -> (Layout, Vec<u32>, usize) {
+pub(crate) fn structured([ni, nj, nk]: [usize; 3], n_nodes: usize) -> (Layout, Slots, usize) {
     let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
     assert!(n_nodes == plane * (nk + 1), "{n_nodes} nodes for {ni} x {nj} x {nk} elements");
     assert!(ni * nj * nk > 0, "{ni} x {nj} x {nk} elements");
@@ -65,17 +146,15 @@ pub(crate) fn structured([ni, nj, nk]: [usize; 3], n_nodes: usize) -> (Layout, V
     let anew = nj * by_row < running;
     let sets_per_layer = if anew { nj * by_row } else { running };
     let base_in_layer = |set: usize| if anew { set / by_row * row + set % by_row * SET } else { set * SET };
-    let slot_in_layer = |i: usize, j: usize| if anew { j * by_row * SET + i } else { j * row + i };
     let n_sets = nk * sets_per_layer;
     let base =
         (0..n_sets).map(|set| (set / sets_per_layer * plane + base_in_layer(set % sets_per_layer)) as u32);
     let base: Vec<u32> = base.collect();
-    let mut slots = Vec::with_capacity(ni * nj * nk);
-    for k in 0..nk {
-        for j in 0..nj {
-            slots.extend((0..ni).map(|i| (k * sets_per_layer * SET + slot_in_layer(i, j)) as u32));
-        }
-    }
+    let slots = Slots::Rows {
+        cells: [ni, nj, nk],
+        row: if anew { by_row * SET } else { row },
+        layer: sets_per_layer * SET,
+    };
     let last = base[n_sets - 1] as usize;
     (Layout::Structured { row, plane, base }, slots, last + plane + row + 1 + SET)
 }
@@ -120,7 +199,7 @@ pub(crate) fn explicit(
     hexahedra: &[[u32; 8]],
     (order, runs): (Vec<u32>, Vec<Option<Along>>),
     n_nodes: usize,
-) -> (Layout, Vec<u32>, usize) {
+) -> (Layout, Slots, usize) {
     assert!(!hexahedra.is_empty(), "a piece without elements");
     assert!(
         hexahedra.iter().flatten().all(|&node| (node as usize) < n_nodes),
@@ -143,12 +222,30 @@ pub(crate) fn explicit(
     for (slot, &element) in (0..).zip(&order) {
         slots[element as usize] = slot;
     }
-    (Layout::Explicit { sets, lists }, slots, n_nodes)
+    (Layout::Explicit { sets, lists }, Slots::List(slots), n_nodes)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slots_of_an_index_space_are_those_of_the_corners_0_of_its_elements() {
+        // Rows that fill their sets, that run on into the next, and that begin anew.
+        for cells in [[8, 3, 2], [3, 5, 2], [15, 2, 3], [9, 1, 1], [1, 1, 4]] {
+            let [ni, nj, nk]: [usize; 3] = cells;
+            let (row, plane) = (ni + 1, (ni + 1) * (nj + 1));
+            let (layout, slots, _) = structured(cells, plane * (nk + 1));
+            let Layout::Structured { base, .. } = layout else { panic!("an index space") };
+            let nodes = (0..nk).flat_map(|k| {
+                (0..nj).flat_map(move |j| (0..ni).map(move |i| (i + j * row + k * plane) as u32))
+            });
+            let found: Vec<u32> = slots.iter().map(|slot| base[slot / SET] + (slot % SET) as u32).collect();
+            assert_eq!(found, nodes.collect::<Vec<u32>>(), "{cells:?}");
+            assert_eq!((slots.iter().len(), slots.len()), (ni * nj * nk, ni * nj * nk));
+            assert!(slots.iter().enumerate().all(|(element, slot)| slots.of(element) == slot), "{cells:?}");
+        }
+    }
 
     #[test]
     fn rows_of_explicit_elements_are_runs_and_what_is_left_of_them_is_put_together() {

@@ -90,7 +90,7 @@ impl Trusses {
             fields: take(&mut piece.fields),
             initial_volume: take(&mut piece.initial_volume),
             alive: all_alive(bars.len()),
-            elements: piece.elements.clone(),
+            elements: take(&mut piece.elements),
             density: material.density,
             law: PlaneLaw::of(material).expect("the deck has checked the material"),
             bars,
@@ -216,6 +216,14 @@ impl Group for Trusses {
 
     fn alive_mut(&mut self) -> &mut [u8] {
         &mut self.alive
+    }
+
+    fn n_elements(&self) -> usize {
+        self.elements.len()
+    }
+
+    fn global(&self, slot: usize) -> u32 {
+        self.elements[slot]
     }
 
     fn slot(&self, element: usize) -> usize {

@@ -210,7 +210,7 @@ fn the_last_forces_of_elements_do_half_of_their_work_after_them() {
                     size += 0.5 * dt * (f * v).abs();
                 }
             }
-            let elements = 0..block.elements.len();
+            let elements = 0..block.n_elements();
             let half: f64 = elements.map(|e| block.half_work(block.slot(e), dt, &steel())).sum();
             assert!(work.abs() > 1e-3 * size, "{work} of {size}");
             // The damping beside elastic control is reckoned with the sound speed at rest.

@@ -45,9 +45,12 @@ pub(crate) struct FaceVote {
 
 /// The loaded faces of a block: those of elements that take part.
 pub(crate) fn faces_of(block: &Block, loads: &Loads, material: &Material) -> Vec<LoadedFace> {
-    let mut local: Vec<(u32, usize)> = block.elements.iter().copied().zip(0..).collect();
+    if loads.surfaces.is_empty() {
+        return Vec::new();
+    }
+    let mut local: Vec<(u32, u32)> = block.globals().zip(0..).collect();
     local.sort_unstable();
-    let find = |element: u32| local.binary_search_by_key(&element, |l| l.0).ok().map(|i| local[i].1);
+    let find = |element: u32| local.binary_search_by_key(&element, |l| l.0).ok().map(|i| local[i].1 as usize);
     let stiffness = material.bulk() + 4.0 / 3.0 * material.shear();
     let longitudinal = (stiffness / material.density).sqrt();
     let shear = (material.shear() / material.density).sqrt();

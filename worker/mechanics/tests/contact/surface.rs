@@ -51,11 +51,21 @@ fn whatever_elements_erode_the_surface_is_the_faces_that_one_living_element_has(
     for i in 0..16 {
         joined.parts[1].nodes[i] = 32 + i as u32;
     }
+    // An index space that closes to a ring, and one with another that stands on nodes inside it: sides of three elements.
+    let mut ring = block([4, 3, 2], 1.0);
+    for row in ring.parts[0].nodes.chunks_exact_mut(5) {
+        row[4] = row[0];
+    }
+    let mut within = block([3, 3, 2], 1.0);
+    add_block(&mut within, [3, 3, 1], [0.0, 0.0, 1.0], 1.0);
+    for i in 0..16 {
+        within.parts[1].nodes[i] = 16 + i as u32;
+    }
     let mut explicit = structured.clone();
     let hexahedra: Vec<[u32; 8]> =
         (0..explicit.parts[0].n_elements()).map(|e| explicit.parts[0].corners(e)).collect();
     explicit.parts[0].topology = Topology::Explicit { hexahedra };
-    for mesh in [structured, joined, explicit] {
+    for mesh in [structured, joined, ring, within, explicit] {
         let n: usize = mesh.parts.iter().map(Part::n_elements).sum();
         for round in 0..60 {
             let share = f64::from(round) / 59.0;

@@ -237,7 +237,7 @@ fn a_linear_motion_of_a_distorted_mesh_strains_all_points_alike_and_pulls_at_no_
         let scale = largest_force(&block);
         assert!(scale > 0.0);
         let size = first.iter().flatten().fold(0.0_f64, |most, s| most.max(s.abs()));
-        for element in 0..block.elements.len() {
+        for element in 0..block.n_elements() {
             for (row, expected) in stress(&block, element).iter().zip(&first) {
                 for (s, expected) in row.iter().zip(expected) {
                     assert!((s - expected).abs() < 1e-9 * size, "{s} {expected}, {material:?}");

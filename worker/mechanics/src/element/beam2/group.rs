@@ -93,7 +93,7 @@ impl Beams {
             own,
             initial_volume: take(&mut piece.initial_volume),
             alive: all_alive(bars.len()),
-            elements: piece.elements.clone(),
+            elements: take(&mut piece.elements),
             density: material.density,
             section: *section,
             // An elastic beam knows its forces without fibres.
@@ -346,6 +346,14 @@ impl Group for Beams {
 
     fn alive_mut(&mut self) -> &mut [u8] {
         &mut self.alive
+    }
+
+    fn n_elements(&self) -> usize {
+        self.elements.len()
+    }
+
+    fn global(&self, slot: usize) -> u32 {
+        self.elements[slot]
     }
 
     fn slot(&self, element: usize) -> usize {

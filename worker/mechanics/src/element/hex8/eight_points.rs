@@ -173,6 +173,14 @@ impl Group for EightPoints {
         self.solids.alive_mut()
     }
 
+    fn n_elements(&self) -> usize {
+        self.solids.n_elements()
+    }
+
+    fn global(&self, slot: usize) -> u32 {
+        self.solids.global(slot)
+    }
+
     fn slot(&self, element: usize) -> usize {
         self.solids.slot(element)
     }

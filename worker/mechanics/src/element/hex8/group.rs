@@ -11,7 +11,7 @@ use crate::{
         ElementVote,
         group::{Call, ElementArrays, Group, PHANTOM, Scanned},
         hourglass::{Amplitudes, Hourglass, N_FORCES},
-        layout::{Corners, Layout, explicit, in_runs, structured},
+        layout::{Corners, Layout, Slots, explicit, in_runs, structured},
         place::Nodal,
         tet10,
     },
@@ -31,8 +31,7 @@ use crate::{
 /// Hexahedra, laid out for the kernel. Arrays are by slot.
 pub(crate) struct Solids {
     layout: Layout,
-    /// Slot of each local element.
-    slots: Vec<u32>,
+    slots: Slots,
     fields: [Vec<f64>; N_FIELDS],
     control: Hourglass,
     /// Forces of elastic hourglass control; empty without it.
@@ -42,6 +41,7 @@ pub(crate) struct Solids {
     initial_volume: Vec<f64>,
     /// Bits of the slots of each set that hold elements.
     alive: Vec<u8>,
+    /// Global element index of each slot.
     slot_elements: Vec<u32>,
     /// Lowest global element index of each set.
     lowest: Vec<u32>,
@@ -76,14 +76,14 @@ impl Solids {
         };
         let by_slot = |values: Vec<f64>, phantom: f64| {
             let mut array = vec![phantom; n_slots];
-            for (&slot, value) in slots.iter().zip(values) {
-                write_changed(&mut array[slot as usize], value);
+            for (slot, value) in slots.iter().zip(values) {
+                write_changed(&mut array[slot], value);
             }
             array
         };
         let mut slot_elements = vec![PHANTOM; n_slots];
-        for (&slot, &element) in slots.iter().zip(&piece.elements) {
-            slot_elements[slot as usize] = element;
+        for (slot, element) in slots.iter().zip(take(&mut piece.elements)) {
+            slot_elements[slot] = element;
         }
         let own = take(&mut piece.own);
         let n_own = if piece.hourglass.is_elastic() { N_FORCES } else { 0 };
@@ -111,7 +111,7 @@ impl Solids {
     }
 
     fn by_element(&self, array: &[f64]) -> Vec<f64> {
-        sparse(self.slots.iter().map(|&slot| array[slot as usize]))
+        sparse(self.slots.iter().map(|slot| array[slot]))
     }
 
     /// Forces of elastic hourglass control by element; none without it.
@@ -123,10 +123,6 @@ impl Solids {
     /// A field of the element of a slot.
     pub fn field(&self, field: usize, slot: usize) -> f64 {
         self.fields[field][slot]
-    }
-
-    pub fn n_elements(&self) -> usize {
-        self.slots.len()
     }
 
     /// The layout beside the arrays by slot.
@@ -175,8 +171,16 @@ impl Group for Solids {
         &mut self.alive
     }
 
+    fn n_elements(&self) -> usize {
+        self.slots.len()
+    }
+
+    fn global(&self, slot: usize) -> u32 {
+        self.slot_elements[slot]
+    }
+
     fn slot(&self, element: usize) -> usize {
-        self.slots[element] as usize
+        self.slots.of(element)
     }
 
     fn corners(&self, element: usize) -> [u32; 8] {
@@ -253,7 +257,7 @@ impl Group for Solids {
     fn visit(&self, visit: &mut dyn FnMut(f64)) {
         let hourglass = self.hourglass.iter().filter(|array| !array.is_empty());
         for values in self.fields.iter().chain(hourglass).chain(&self.history) {
-            self.slots.iter().for_each(|&slot| visit(values[slot as usize]));
+            self.slots.iter().for_each(|slot| visit(values[slot]));
         }
     }
 
@@ -268,7 +272,7 @@ impl Group for Solids {
     }
 
     fn first_stress(&mut self) -> Option<&mut f64> {
-        self.slots.first().map(|&slot| &mut self.fields[PRESSURE][slot as usize])
+        self.slots.iter().next().map(|slot| &mut self.fields[PRESSURE][slot])
     }
 
     fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {

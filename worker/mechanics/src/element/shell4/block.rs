@@ -298,6 +298,14 @@ impl Group for Core {
         &mut self.alive
     }
 
+    fn n_elements(&self) -> usize {
+        self.n_elements
+    }
+
+    fn global(&self, slot: usize) -> u32 {
+        self.elements[slot]
+    }
+
     fn slot(&self, element: usize) -> usize {
         element
     }

@@ -192,6 +192,14 @@ impl Group for Tetrahedra {
         self.solids.alive_mut()
     }
 
+    fn n_elements(&self) -> usize {
+        self.solids.n_elements()
+    }
+
+    fn global(&self, slot: usize) -> u32 {
+        self.solids.global(slot)
+    }
+
     fn slot(&self, element: usize) -> usize {
         self.solids.slot(element)
     }
