@@ -4,7 +4,7 @@
 //! is [`allotment`]'s to say, which today gives all idle workers to one job at a time; nothing here counts on that.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::PathBuf,
     sync::{
         Arc, Mutex,
@@ -38,6 +38,8 @@ use crate::{
 
 mod allotment;
 pub mod retention;
+#[cfg(test)]
+mod tests;
 
 /// The longest that an ending master waits until the jobs under way are stored.
 const END_LIMIT: Duration = Duration::from_secs(60);
@@ -63,6 +65,8 @@ pub struct Scheduler {
     running: BTreeMap<u32, Running>,
     /// What the page shows; none without a page.
     board: Option<Arc<Board>>,
+    /// Jobs whose records on disk are older than what is here.
+    unwritten: BTreeSet<u32>,
     /// Set while this host is short of what a job needs.
     pause: Option<Pause>,
     /// What is kept of jobs that are over.
@@ -119,6 +123,7 @@ impl Scheduler {
             status: BTreeMap::new(),
             running: BTreeMap::new(),
             board,
+            unwritten: BTreeSet::new(),
             pause: None,
             limits: Limits::default(),
             looked: None,
@@ -169,7 +174,7 @@ impl Scheduler {
             elements,
         };
         self.queue.restore(entry);
-        let verdict = if interrupted && cancelled {
+        let verdict = if cancelled && matches!(state, State::Queued | State::Held) {
             Some((Change::Cancel, Ended::default()))
         } else if interrupted && starts.are_too_many(store::newest(&self.spool.snapshots(job))) {
             let failure = Some(format!(
@@ -228,6 +233,7 @@ impl Scheduler {
                 _ = look.tick() => self.start_next(),
                 _ = wake.tick() => {
                     self.wake();
+                    self.write_late();
                     self.remove_expired();
                 }
             }
@@ -425,18 +431,34 @@ impl Scheduler {
     }
 
     fn cancel(&mut self, job: u32) -> Result<String, Error> {
+        queue::after(self.queue.get(job).ok_or(queue::Error::Unknown(job))?.state, Change::Cancel)?;
+        // Who is told so finds it cancelled after a death of this master as well.
+        self.queue.set_cancelled(job, true);
+        if let Err(why) = self.record(job, self.ended(job)) {
+            self.queue.set_cancelled(job, false);
+            self.unwritten.insert(job);
+            return Err(Error::Disk { asked: format!("job {job} is not cancelled"), why });
+        }
         if let Some(stop) = self.running.get(&job).map(Running::stopper) {
-            // Who is told so finds it cancelled after a death of this master as well.
-            self.queue.set_cancelled(job, true);
-            if let Err(why) = self.record(job, None) {
-                self.queue.set_cancelled(job, false);
-                return Err(Error::Disk { asked: format!("job {job} is not cancelled"), why });
-            }
             stop();
             return Ok(format!("job {job} ends after its present cycle"));
         }
         self.change(job, Change::Cancel, Some(Ended::default()))?;
         Ok(format!("job {job} is cancelled"))
+    }
+
+    /// How a job ended that is over.
+    fn ended(&self, job: u32) -> Option<Ended> {
+        self.status.get(&job).and_then(|status| status.borrow().ended.clone())
+    }
+
+    /// Puts on disk what there was no room for.
+    fn write_late(&mut self) {
+        for job in std::mem::take(&mut self.unwritten) {
+            if self.record(job, self.ended(job)).is_err() {
+                self.unwritten.insert(job);
+            }
+        }
     }
 
     fn resume(&mut self, job: u32) -> Result<String, Error> {
@@ -466,7 +488,8 @@ impl Scheduler {
         let (state, forgotten) = self.queue.apply(job, change)?;
         let ended = ended.filter(|_| is_over(state));
         if let Err(why) = self.record(job, ended.clone()) {
-            warn!(job, "its record is not on disk: {why}");
+            warn!(job, "its record is not on disk yet: {why}");
+            self.unwritten.insert(job);
         }
         if let Some(status) = self.status.get(&job) {
             status.send_modify(|status| {
