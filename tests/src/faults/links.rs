@@ -9,7 +9,7 @@ use std::{
 use protocol::{
     codec,
     frame::{Frame, Header, Kind, encode_header},
-    handshake::{Hello, Role},
+    handshake::{Hello, Role, VERSION},
 };
 
 use super::{Case, LOST, Running, Scene, Seen, since, workers::close};
@@ -96,7 +96,8 @@ pub fn cases() -> Vec<Case> {
         case("oversize length, wrong version, garbage, at the door", 1, |scene, k| {
             let running = scene.begin(&[], None);
             running.wait_for_cycle(scene.instant(590 + k));
-            let hello = Hello { version: 9, ..Hello::new(Role::Worker, "old", 1.0, 1, "scalar", 1) };
+            let hello =
+                Hello { version: VERSION + 1, ..Hello::new(Role::Worker, "old", 1.0, 1, "scalar", 1) };
             let oversize = Header { length: u32::MAX, ..Header::new(Kind::Hello) };
             for bytes in [
                 frame(Header::new(Kind::Hello), codec::encode(&hello).expect("plain")),
@@ -105,7 +106,8 @@ pub fn cases() -> Vec<Case> {
             ] {
                 knock(&running.cluster.address, &bytes);
             }
-            for words in ["protocol version 9", "length 4294967295", "frame starts with [55, 55, 55, 55]"] {
+            let version = format!("protocol version {}", VERSION + 1);
+            for words in [&version, "length 4294967295", "frame starts with [55, 55, 55, 55]"] {
                 running.cluster.master.wait_for(words);
             }
             let summary = scene.end(&running);
