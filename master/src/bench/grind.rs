@@ -332,13 +332,13 @@ fn measured(rounds: u32, side: u32, lanes: Option<Width>) -> Result<Report, Stri
     })
 }
 
-/// What the time of an element is over that of the first, on a machine that does nothing else: two to three machines with AVX-512 and AVX2.
+/// What the time of an element is over that of the first on the machines of deploy/bench/README.md.
 const USUAL_OF_ELEMENTS: [&str; 7] =
     ["30-75 ns; avx2 55-105", "1.0-1.4", "0.85-0.95", "0.85-0.95", "0.5-0.6", "0.5-0.6", "1.3-1.6"];
 /// The same of a surface node in contact.
 const USUAL_OF_CONTACT: &str = "0.4-0.6";
 
-/// The report as a table: beside each figure what it is over the first, and what a machine reaches that does nothing else.
+/// The report as a table: beside each figure what it is over the first, and what that usually is.
 fn table(report: &Report) -> String {
     let elements = &report.elements;
     let first = elements.first().map_or(f64::NAN, |row| row.ns.least);
@@ -371,10 +371,10 @@ fn table(report: &Report) -> String {
     let mut share = |name: &str, percent: f64, usual: &str| {
         lines.push(format!("  {name:<50}{percent:>9.1}{:>17}   {usual}", ""));
     };
-    share("of a cycle of joined plates by one thread alone", joined, "at most 4");
-    share("of a cycle of plates in contact", touching, "at most 4");
+    share("of a cycle of joined plates by one thread alone", joined, "0.6-1.5");
+    share("of a cycle of plates in contact by one alone", touching, "2-3");
     if let Some(Spread { median, .. }) = report.two_threads {
-        share("two threads, of twice one (wall clock)", 100.0 * median, "at least 90");
+        share("two threads, of twice one (wall clock)", 100.0 * median, "60-95");
     }
     let speed = report.speed_of_a_thread;
     lines.push(format!("speed of a thread, as `worker --speed auto` says: {speed:.2}, where 1 is {SPEED_ONE} ns in the first row"));

@@ -29,17 +29,24 @@ fn queued(cancelled: bool) -> Record {
     }
 }
 
+/// Plays a test with a spool that has this record, on threads of the kind that a scheduler has.
+fn play(record: &Record, test: impl FnOnce(&Path)) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).build().expect("threads");
+    runtime.block_on(async {
+        Spool::open(folder.path()).expect("a spool").0.add(record, "a deck").expect("room");
+        test(folder.path());
+    });
+}
+
 fn state_on_disk(folder: &Path) -> State {
     Spool::open(folder).expect("a spool").1.jobs[0].0.state
 }
 
 #[test]
 fn a_cancel_is_on_disk_before_it_is_acknowledged() {
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).build().expect("threads");
-    runtime.block_on(async {
-        let folder = tempfile::tempdir().expect("a folder");
-        Spool::open(folder.path()).expect("a spool").0.add(&queued(false), "a deck").expect("room");
-        let mut owner = scheduler(folder.path());
+    play(&queued(false), |folder| {
+        let mut owner = scheduler(folder);
         let record = owner.spool.record(JOB);
         // No file can take the place of a folder with something in it.
         std::fs::remove_file(&record).expect("it was written");
@@ -54,17 +61,14 @@ fn a_cancel_is_on_disk_before_it_is_acknowledged() {
         assert!(owner.unwritten.is_empty());
         owner.cancel(JOB).expect("there is room");
         drop(owner);
-        assert_eq!(state_on_disk(folder.path()), State::Cancelled);
+        assert_eq!(state_on_disk(folder), State::Cancelled);
     });
 }
 
 #[test]
 fn a_job_that_was_to_be_cancelled_when_its_master_died_is_cancelled_by_the_next() {
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).build().expect("threads");
-    runtime.block_on(async {
-        let folder = tempfile::tempdir().expect("a folder");
-        Spool::open(folder.path()).expect("a spool").0.add(&queued(true), "a deck").expect("room");
-        drop(scheduler(folder.path()));
-        assert_eq!(state_on_disk(folder.path()), State::Cancelled);
+    play(&queued(true), |folder| {
+        drop(scheduler(folder));
+        assert_eq!(state_on_disk(folder), State::Cancelled);
     });
 }
