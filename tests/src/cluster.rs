@@ -9,6 +9,7 @@ use std::{
     path::{Path, PathBuf},
     process::{Child, Command, ExitStatus, Stdio},
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
@@ -46,6 +47,8 @@ pub struct Process {
     name: String,
     child: Child,
     printed: Arc<Printed>,
+    /// Threads that read what it prints; each ends when there is nothing more.
+    readers: [JoinHandle<()>; 2],
 }
 
 #[derive(Default)]
@@ -59,7 +62,7 @@ impl Printed {
         self.lines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn collect(self: &Arc<Self>, from: impl Read + Send + 'static) {
+    fn collect(self: &Arc<Self>, from: impl Read + Send + 'static) -> JoinHandle<()> {
         let printed = Arc::clone(self);
         std::thread::spawn(move || {
             for line in BufReader::new(from).lines() {
@@ -67,7 +70,7 @@ impl Printed {
                 printed.lines().push(line);
                 printed.more.notify_all();
             }
-        });
+        })
     }
 }
 
@@ -80,9 +83,11 @@ impl Process {
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().expect("the binary starts");
         let printed = Arc::new(Printed::default());
-        printed.collect(child.stdout.take().expect("piped"));
-        printed.collect(child.stderr.take().expect("piped"));
-        Self { name: name.to_owned(), child, printed }
+        let readers = [
+            printed.collect(child.stdout.take().expect("piped")),
+            printed.collect(child.stderr.take().expect("piped")),
+        ];
+        Self { name: name.to_owned(), child, printed, readers }
     }
 
     /// The first line with `words` in it, now or later.
@@ -150,7 +155,7 @@ impl Process {
         let _ = self.child.wait();
     }
 
-    /// Waits for its end.
+    /// Waits for its end, and until all that it has printed is read.
     ///
     /// # Panics
     /// At the deadline.
@@ -159,7 +164,10 @@ impl Process {
         let printed = Arc::clone(&self.printed);
         until(
             || format!("the end of {name}; it printed:\n{}", printed.lines().join("\n")),
-            || self.child.try_wait().ok().flatten(),
+            || {
+                let status = self.child.try_wait().ok().flatten()?;
+                self.readers.iter().all(JoinHandle::is_finished).then_some(status)
+            },
         )
     }
 }
