@@ -8,7 +8,7 @@ use mechanics::{
 use super::{assembly::Assembly, rigid::RigidDraft};
 use crate::{
     fault::{nearest, short},
-    geometry::{norm, sub},
+    geometry::{cross, dot, norm, scaled, sub, unit},
     log::Log,
     place::Placed,
     typed::condition,
@@ -112,18 +112,13 @@ fn find(
 
 /// Three axes at right angles, that of the joint first; none after a fault.
 fn axes(joint: &condition::Joint, log: &Log<'_>) -> Option<[[f64; 3]; 3]> {
-    let unit = |v: [f64; 3]| {
-        let size = norm(v);
-        v.map(|c| c / size)
-    };
     let first = match (joint.kind, joint.axis) {
         (Kind::Spherical | Kind::Fixed, _) => [1.0, 0.0, 0.0],
-        (_, axis) => unit(axis?),
+        (_, axis) => unit(axis?)?,
     };
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let across = match joint.kind {
         Kind::Universal => {
-            let second = unit(joint.second_axis?);
+            let second = unit(joint.second_axis?)?;
             let cosine = dot(first, second);
             if cosine.abs() > RIGHT {
                 log.fault(
@@ -142,13 +137,8 @@ fn axes(joint: &condition::Joint, log: &Log<'_>) -> Option<[[f64; 3]; 3]> {
             std::array::from_fn(|a| if a == flat { 1.0 } else { 0.0 })
         }
     };
-    let along = dot(first, across);
-    let second = unit(std::array::from_fn(|a| across[a] - along * first[a]));
-    let third = std::array::from_fn(|a| {
-        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-        first[b] * second[c] - first[c] * second[b]
-    });
-    Some([first, second, third])
+    let second = unit(sub(across, scaled(first, dot(first, across))))?;
+    Some([first, second, cross(first, second)])
 }
 
 /// Says so where bodies part at the start: the joint takes that motion away.

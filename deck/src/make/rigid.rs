@@ -53,6 +53,12 @@ pub(super) fn drafts<'d>(
         {
             log.fault_of(name.origin, "a name that no other [[rigid]] has", "choose another name");
         }
+        if let Some(name) = &rigid.name {
+            let part = assembly.mesh.parts.iter().position(|part| part.name == name.value);
+            if part.is_some_and(|part| !parts.contains(&(part as u32))) {
+                log.fault_of(name.origin, "a name that no part outside this body has", "choose another name");
+            }
+        }
         let of_both = |other: &&RigidDraft<'d>| parts.iter().any(|p| other.given.parts.contains(p));
         for other in drafts.iter().filter(of_both) {
             let line = log.line(other.rigid.at, rigid.at);
