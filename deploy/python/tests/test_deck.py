@@ -59,6 +59,21 @@ def test_every_shape_is_read_by_the_binary() -> None:
     assert forecast.end_time == pytest.approx(0.01)
 
 
+def test_rigid_bodies_swing_on_joints() -> None:
+    deck = bo.Deck("SI", end_time=1e-4)
+    upper = deck.box("upper", "STEEL_4340", size=(0.2, 0.02, 0.02), cells=[4, 1, 1])
+    lower = deck.box("lower", "STEEL_4340", origin=(0.21, 0, 0), size=(0.2, 0.02, 0.02), cells=[4, 1, 1])
+    deck.rigid(upper)
+    deck.rigid(lower, name="tip")
+    deck.joint("revolute", upper, point=(0, 0.01, 0.01), axis=(0, 1, 0), name="shoulder")
+    deck.joint("spherical", upper, "tip", point=(0.205, 0.01, 0.01))
+    deck.gravity((0, 0, -9.81))
+    result = deck.run(progress=False)
+    # The shoulder bears the weight of what does not fall freely: a share of both rods.
+    weight = 2 * 7830 * 0.2 * 0.02 * 0.02 * 9.81
+    assert 0 < -result.history["joint shoulder.fz"].iloc[-1] < weight
+
+
 def test_a_mesh_file_is_found_wherever_the_deck_is_written() -> None:
     Path("cube.mesh").write_text(
         "bolide mesh 1\nnodes 8\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n8 0 1 1\n"

@@ -481,6 +481,24 @@ class Deck:
             entry["normal"] = _vector(normal, "normal")
         self._add("wall", {**entry, **keys})
 
+    def rigid(self, *parts: Part | str, name: str | None = None, **keys: Any) -> None:
+        """Makes one rigid body of parts: `mass`, `velocity`, `spin`, `start_spin`, ... (keys of `[[rigid]]`)."""
+        names = [self._name_of(part) for part in parts] or None
+        self._add("rigid", {"name": name, "parts": names, **keys})
+
+    def joint(
+        self, type: str, *bodies: Part | str, point: Vector, axis: Vector | None = None, name: str | None = None, **keys: Any
+    ) -> None:
+        """Holds two rigid bodies together, or one to space: `"revolute"`, `"spherical"`, ... (`[[joint]]`)."""
+        entry = {
+            "name": name,
+            "type": type,
+            "bodies": [body.name if isinstance(body, Part) else body for body in bodies],
+            "point": _vector(point, "point"),
+            "axis": None if axis is None else _vector(axis, "axis"),
+        }
+        self._add("joint", {**entry, **keys})
+
     def boundary(self, type: str, *, parts: Sequence[Part | str] | None = None, **keys: Any) -> None:
         """A support or a prescribed motion (`[[boundary]]`)."""
         names = None if parts is None else [self._name_of(part) for part in parts]
