@@ -136,6 +136,8 @@ impl<'c> Fields<'c> {
         let value = if words.contains('&') {
             match parameter::evaluate(words, self.context.parameters) {
                 Ok(value) => Some(value),
+                // The deck is refused already; this value is only there to make no further faults.
+                Err(parameter::Error::Broken(_)) => return Some(1.0),
                 Err(why) => {
                     self.fault(i, "a parameter that is defined", why.to_string());
                     return None;

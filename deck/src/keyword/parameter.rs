@@ -19,6 +19,8 @@ pub(crate) enum Error {
     NoNumber(String),
     Sign(char),
     Unknown(String),
+    /// It has no value because of a fault that was reported.
+    Broken(String),
     Function(String, usize),
 }
 
@@ -32,6 +34,7 @@ impl fmt::Display for Error {
             Self::NoNumber(words) => write!(f, "{words} is no number"),
             Self::Sign(c) => write!(f, "remove \"{c}\""),
             Self::Unknown(name) => write!(f, "there is no parameter {name} before it"),
+            Self::Broken(name) => write!(f, "correct parameter {name}"),
             Self::Function(name, n) => write!(f, "there is no function {name} of {n} numbers"),
         }
     }
@@ -95,14 +98,26 @@ pub(super) fn read(
                 Ok(number) if number.is_finite() => {
                     known.insert(name, if kind == 'I' { number.trunc() } else { number });
                 }
-                Ok(number) => log.fault(
-                    card.at,
-                    format!("parameter {name} = {number}"),
-                    "a finite number",
-                    "correct it",
-                ),
-                Err(why) => {
-                    log.fault(card.at, log.quote(value), "a number or an expression", why.to_string())
+                faulty => {
+                    match faulty {
+                        Ok(number) => log.fault(
+                            card.at,
+                            format!("parameter {name} = {number}"),
+                            "a finite number",
+                            "correct it",
+                        ),
+                        Err(Error::Broken(_)) => {}
+                        Err(why) => {
+                            log.fault(
+                                card.at,
+                                log.quote(value),
+                                "a number or an expression",
+                                why.to_string(),
+                            );
+                        }
+                    }
+                    // What refers to it is no fault of its own.
+                    known.insert(name, f64::NAN);
                 }
             }
         }
@@ -231,6 +246,7 @@ impl Reader<'_> {
         if !self.take("(") {
             let value = self.known.get(&name).copied();
             return match (value, name.as_str()) {
+                (Some(value), _) if value.is_nan() => Err(Error::Broken(name)),
                 (Some(value), _) => Ok(value),
                 (None, "pi") => Ok(std::f64::consts::PI),
                 (None, _) => Err(Error::Unknown(name)),

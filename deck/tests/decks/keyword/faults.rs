@@ -271,3 +271,15 @@ fn faults_of_a_mesh_file_do_not_hide_those_of_its_deck() {
     assert!(found[0].starts_with("a.mesh:1:1: read no mesh; expected bolide mesh 1"), "{found:?}");
     assert!(found[1].starts_with("a.toml:4:13: read end_cycle = 0"), "{found:?}");
 }
+
+/// What refers to a parameter that has no value is no fault of its own.
+#[test]
+fn a_parameter_without_a_value_is_one_fault_whatever_refers_to_it() {
+    let text = "*KEYWORD\n*PARAMETER_EXPRESSION\nRtwice,2*missing\nRtend,twice+1\n*CONTROL_TERMINATION\n&tend\n*PART\ncube\n1,1,1\n\
+        *SECTION_SOLID\n1,1\n*MAT_ELASTIC\n1,7.85E-9,&tend,0.3\n*DEFINE_CURVE\n5\n0,1\n&tend,2\n*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n\
+        5,0,0,&twice\n6,1,0,1\n7,1,1,1\n8,0,1,1\n*ELEMENT_SOLID\n1,1,1,2,3,4,5,6,7,8\n*END\n";
+    let faults = deck::read(text, "a.k").expect_err("a fault");
+    let told: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("there is no parameter missing before it"), "{told:?}");
+}
