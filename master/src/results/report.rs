@@ -39,7 +39,7 @@ pub fn write(folder: &Folder, summary: &Summary, units: &str) -> Result<(), Erro
 fn page(history: &Table, summary: &Summary, units: &str) -> String {
     let Units { time, energy, length, stress, force, .. } = Units::named(units);
     let title = escaped(&summary.title);
-    let mut body = format!("<h1>{title}</h1>\n<pre>{}</pre>\n", lines(&summary.table(units)));
+    let mut body = format!("<h1>{title}</h1>\n<pre>{}</pre>\n", lines(&summary.table(units, true)));
     let at = history.column("time").unwrap_or_default();
     let curve = |name: &str| -> Option<Curve> {
         let values = history.column(name)?;

@@ -12,7 +12,11 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{Error, Folder, SUMMARY, Units, write_whole};
-use crate::incident::{Loss, Rebalance};
+use crate::{
+    incident::{Loss, Rebalance},
+    machine,
+    quality::Quality,
+};
 
 /// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no
 /// others.
@@ -95,11 +99,48 @@ pub struct Summary {
     /// Gauges whose last element has eroded.
     #[serde(default)]
     pub dead_gauges: Vec<DeadGauge>,
+    /// How far the numbers can be trusted.
+    #[serde(default)]
+    pub quality: Quality,
+    /// Planes of symmetry through the origin, by the axis across them.
+    #[serde(default)]
+    pub mirrors: [bool; 3],
+    /// Name of the deck's units.
+    #[serde(default)]
+    pub units: String,
+    /// Which program computed it from which deck, when and where.
+    #[serde(default)]
+    pub origin: Origin,
     /// Hash of the final state (hexadecimal).
     pub digest: String,
     /// What it was computed from; none where no folder was written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<Input>,
+}
+
+/// Where results come from.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Release of the program.
+    pub version: String,
+    /// When the run ended, UTC.
+    pub date: String,
+    /// File of the deck, as it was given.
+    pub deck: String,
+    /// The machine of the master, or of a run without one.
+    pub machine: String,
+}
+
+impl Origin {
+    /// Of a run of this deck that has just ended here.
+    pub fn of(deck: &str) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            date: machine::now(),
+            deck: deck.replace(char::is_control, " "),
+            machine: machine::words(),
+        }
+    }
 }
 
 /// What a run was computed from, so that it can be computed again.
@@ -156,8 +197,9 @@ pub struct WorkUnits {
     pub interactions: u64,
 }
 
-/// Parts that the table names of those that eroded.
+/// Parts that the table names of those that eroded, and of all.
 const NAMED_PARTS: usize = 4;
+const LISTED_PARTS: usize = 8;
 
 /// Energies of one part in the deck's unit of energy, sums over the run but for kinetic and internal.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -259,94 +301,68 @@ impl Summary {
         })
     }
 
-    /// The summary as an aligned table of a few lines, for a terminal. `units` is the deck's name of them.
-    pub fn table(&self, units: &str) -> String {
+    /// The summary as an aligned table for a terminal: results first, and with `all` the machinery behind them. `units` is the deck's
+    /// name of them.
+    pub fn table(&self, units: &str, all: bool) -> String {
         let mut table = String::new();
         // Writing into a string cannot fail.
-        let _ = self.print(&mut table, Units::named(units));
+        let _ = self.print(&mut table, Units::named(units), all);
         table
     }
 
-    fn print(&self, out: &mut String, Units { time, energy, .. }: Units) -> fmt::Result {
-        let Energies { kinetic, internal, hourglass, viscosity, contact, friction, external, error, .. } =
-            self.energies;
+    fn print(&self, out: &mut String, units: Units, all: bool) -> fmt::Result {
         writeln!(out, "{}", self.title.replace(char::is_control, " "))?;
-        writeln!(out, "  problem    {} elements, {} nodes", grouped(self.elements), grouped(self.nodes))?;
         writeln!(
             out,
-            "  surface    {} elements, {} faces, {} nodes",
-            grouped(self.surface_elements),
-            grouped(self.surface_faces),
-            grouped(self.surface_nodes)
-        )?;
-        writeln!(
-            out,
-            "  run        {} cycles to {} {time} in {:.2} s on {} with {}, {} lanes, route {}",
+            "  run        {} elements, {} cycles to {} {} in {:.2} s on {} with {}",
+            grouped(self.elements),
             grouped(self.cycles),
             significant(self.end_time),
+            units.time,
             self.wall_s,
             counted(self.workers, "worker"),
             counted(self.threads, "thread"),
-            self.lanes,
-            self.route
         )?;
+        self.print_quality(out)?;
+        self.print_energies(out, units)?;
+        self.print_parts(out, units)?;
         writeln!(
             out,
-            "  speed      {:.1} ns of thread time per element and cycle, {:.1} % of it in contact; imbalance {:.3}",
-            self.grind_ns,
-            100.0 * self.contact_share,
-            self.imbalance
+            "  momentum   {:<10} {:>14}   supports and walls included",
+            "change",
+            percent(self.momentum_error)
         )?;
-        writeln!(
-            out,
-            "  traffic    {} bytes per cycle, {} of them at the master; {} of {} pairs relayed",
-            grouped(self.bytes_per_cycle.round() as u64),
-            grouped(self.master_bytes_per_cycle.round() as u64),
-            grouped(self.relayed_pairs),
-            grouped(self.relayed_pairs + self.linked_pairs)
-        )?;
-        for Rebalance { cycle, imbalance_before, imbalance_after, .. } in &self.rebalances {
-            writeln!(
-                out,
-                "  balance    cycle {}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}",
-                grouped(*cycle)
-            )?;
+        self.print_incidents(out)?;
+        if all {
+            self.print_machinery(out)?;
         }
-        for Loss { worker, cycle, back_to, .. } in &self.losses {
-            writeln!(
-                out,
-                "  lost       {} in cycle {}, went on from cycle {}",
-                worker.replace(char::is_control, " "),
-                grouped(*cycle),
-                grouped(*back_to)
-            )?;
+        for warning in &self.warnings {
+            writeln!(out, "  warning    {}", warning.replace(char::is_control, " "))?;
         }
-        let WorkUnits {
-            count,
-            nodes_min,
-            nodes_mean,
-            nodes_max,
-            faces_min,
-            faces_mean,
-            faces_max,
-            interactions,
-        } = self.work_units;
-        if count > 0 {
-            writeln!(
-                out,
-                "  contact    {} sorts; {} work units of {nodes_min}-{nodes_max} nodes (mean {nodes_mean:.1}) and \
-                 {faces_min}-{faces_max} faces (mean {faces_mean:.1}), {} interactions",
-                grouped(self.sorts),
-                grouped(count),
-                grouped(interactions)
-            )?;
-            writeln!(
-                out,
-                "             worst penetration {:.3} gap, worst travel in one cycle {:.3} gap",
-                self.worst_penetration, self.worst_gap_travel
-            )?;
+        let Origin { version, date, deck, machine } = &self.origin;
+        if !version.is_empty() {
+            writeln!(out, "  origin     bolide {version}, {date}, {deck}, on {machine}")?;
         }
-        writeln!(out, "  time step  at most {:.4} of the Courant limit", self.worst_courant)?;
+        writeln!(out, "  digest     {}", self.digest)
+    }
+
+    /// The verdict, and what is not good with what to do about it.
+    fn print_quality(&self, out: &mut String) -> fmt::Result {
+        if self.quality.measures.is_empty() {
+            return Ok(());
+        }
+        writeln!(out, "  quality    {}", self.quality.words())?;
+        for measure in self.quality.doubts() {
+            let name = measure.name.replace(char::is_control, " ");
+            writeln!(out, "             {:<4} {name}: {}", measure.grade.name(), measure.words)?;
+            writeln!(out, "                  {}", measure.advice)?;
+        }
+        Ok(())
+    }
+
+    fn print_energies(&self, out: &mut String, Units { mass, energy, .. }: Units) -> fmt::Result {
+        let Energies { kinetic, internal, hourglass, viscosity, contact, friction, external, error, .. } =
+            self.energies;
         writeln!(out, "  energy     {:<10} {:>14} {energy}", "kinetic", significant(kinetic))?;
         for (name, value) in [
             ("internal", internal),
@@ -379,7 +395,7 @@ impl Summary {
             };
             writeln!(
                 out,
-                "             {:<10} {:>14}   {} elements{parts}, mass {}",
+                "             {:<10} {:>14}   {} elements{parts}, mass {} {mass}",
                 "eroded",
                 significant(self.eroded_energy),
                 grouped(self.eroded_elements),
@@ -407,17 +423,116 @@ impl Summary {
             }
             writeln!(out, "             {:<10} {:>14}   worst body: {names}", "of a body", percent(*error))?;
         }
+        Ok(())
+    }
+
+    /// Mass, mean velocity and energies of the first parts.
+    fn print_parts(&self, out: &mut String, Units { length, mass, time, energy, .. }: Units) -> fmt::Result {
+        let parts = &self.energies.parts;
+        let mut label = "parts";
+        for part in parts.iter().take(LISTED_PARTS) {
+            let name: String = part.name.chars().map(|c| if c.is_control() { ' ' } else { c }).take(20).collect();
+            let velocity = part.momentum.map(|p| {
+                let v = if part.mass > 0.0 { p / part.mass } else { 0.0 };
+                // What is left of a sum that cancels is no velocity.
+                label_of(v)
+            });
+            writeln!(
+                out,
+                "  {label:<10} {name}: {} {mass} at ({}) {length}/{time}, kinetic {} and internal {} {energy}",
+                significant(part.mass),
+                velocity.join(", "),
+                significant(part.kinetic),
+                significant(part.internal),
+            )?;
+            label = "";
+        }
+        if parts.len() > LISTED_PARTS {
+            writeln!(out, "             and {} more in summary.json", parts.len() - LISTED_PARTS)?;
+        }
+        Ok(())
+    }
+
+    /// Work that was dealt out anew, and workers that were lost.
+    fn print_incidents(&self, out: &mut String) -> fmt::Result {
+        for Rebalance { cycle, imbalance_before, imbalance_after, .. } in &self.rebalances {
+            writeln!(
+                out,
+                "  balance    cycle {}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}",
+                grouped(*cycle)
+            )?;
+        }
+        for Loss { worker, cycle, back_to, .. } in &self.losses {
+            writeln!(
+                out,
+                "  lost       {} in cycle {}, went on from cycle {}",
+                worker.replace(char::is_control, " "),
+                grouped(*cycle),
+                grouped(*back_to)
+            )?;
+        }
+        Ok(())
+    }
+
+    /// How it was computed.
+    fn print_machinery(&self, out: &mut String) -> fmt::Result {
+        writeln!(out, "  problem    {} elements, {} nodes", grouped(self.elements), grouped(self.nodes))?;
         writeln!(
             out,
-            "  momentum   {:<10} {:>14}   supports and walls included",
-            "change",
-            percent(self.momentum_error)
+            "  surface    {} elements, {} faces, {} nodes",
+            grouped(self.surface_elements),
+            grouped(self.surface_faces),
+            grouped(self.surface_nodes)
         )?;
-        for warning in &self.warnings {
-            writeln!(out, "  warning    {}", warning.replace(char::is_control, " "))?;
+        writeln!(
+            out,
+            "  speed      {:.1} ns of thread time per element and cycle, {:.1} % of it in contact; imbalance {:.3}",
+            self.grind_ns,
+            100.0 * self.contact_share,
+            self.imbalance
+        )?;
+        writeln!(
+            out,
+            "  traffic    {} bytes per cycle, {} of them at the master; {} of {} pairs relayed; {} lanes, route {}",
+            grouped(self.bytes_per_cycle.round() as u64),
+            grouped(self.master_bytes_per_cycle.round() as u64),
+            grouped(self.relayed_pairs),
+            grouped(self.relayed_pairs + self.linked_pairs),
+            self.lanes,
+            self.route
+        )?;
+        let WorkUnits {
+            count,
+            nodes_min,
+            nodes_mean,
+            nodes_max,
+            faces_min,
+            faces_mean,
+            faces_max,
+            interactions,
+        } = self.work_units;
+        if count > 0 {
+            writeln!(
+                out,
+                "  contact    {} sorts; {} work units of {nodes_min}-{nodes_max} nodes (mean {nodes_mean:.1}) and \
+                 {faces_min}-{faces_max} faces (mean {faces_mean:.1}), {} interactions",
+                grouped(self.sorts),
+                grouped(count),
+                grouped(interactions)
+            )?;
+            writeln!(
+                out,
+                "             worst penetration {:.3} gap, worst travel in one cycle {:.3} gap",
+                self.worst_penetration, self.worst_gap_travel
+            )?;
         }
-        writeln!(out, "  digest     {}", self.digest)
+        writeln!(out, "  time step  at most {:.4} of the Courant limit", self.worst_courant)
     }
+}
+
+/// A component of a velocity: four digits, and zero for what is left of a sum that cancels.
+fn label_of(v: f64) -> String {
+    if v.abs() < 1e-9 { "0".to_owned() } else { format!("{:.3e}", v).parse::<f64>().map_or_else(|_| "-".to_owned(), |v| format!("{v}")) }
 }
 
 /// `1 worker`, `4 workers`.
@@ -439,7 +554,7 @@ fn grouped(n: u64) -> String {
 }
 
 /// Six significant digits, with an exponent outside 0.001 to 1,000,000.
-pub(super) fn significant(x: f64) -> String {
+pub fn significant(x: f64) -> String {
     let magnitude = x.abs();
     if x == 0.0 {
         "0".to_owned()
@@ -480,9 +595,9 @@ mod tests {
     #[test]
     fn warnings_have_lines_of_their_own() {
         let warnings = vec!["part \"ball\": one\u{1b}".to_owned(), "two".to_owned()];
-        let table = Summary { warnings, ..Summary::default() }.table("SI");
+        let table = Summary { warnings, ..Summary::default() }.table("SI", true);
         assert!(table.contains("\n  warning    part \"ball\": one \n  warning    two\n  digest"), "{table}");
-        assert!(!Summary::default().table("SI").contains("warning"));
+        assert!(!Summary::default().table("SI", true).contains("warning"));
     }
 
     #[test]
