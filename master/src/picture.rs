@@ -22,6 +22,7 @@ use crate::{
     results::{
         HISTORY, SUMMARY, Summary, Units, contact_name,
         history::Table,
+        report::Picture,
         vtu::{
             self, Fields,
             field_data::PART_NAMES,
@@ -303,14 +304,55 @@ fn create(path: &Path) -> Result<BufWriter<File>, String> {
     File::create(path).map(BufWriter::new).map_err(|e| fault(&e))
 }
 
+/// Elements beyond which the pictures of a report would take longer than a reader likes to wait for.
+const MOST_IN_REPORTS: usize = 400_000;
+/// Their size (pixels).
+const IN_REPORTS: (u32, u32) = (900, 520);
+
+/// The pictures of a report: the first and the last state of a folder, by plastic strain where something has yielded and by speed
+/// elsewhere, mirrored at planes of symmetry. What cannot be drawn is left out, for the report has all numbers without it.
+pub fn of_report(folder: &Path, summary: &Summary) -> Vec<Picture> {
+    if summary.elements > MOST_IN_REPORTS as u64 {
+        return Vec::new();
+    }
+    let states = read::index(folder).unwrap_or_default();
+    let n = states.len();
+    let ends = if n > 1 { vec![0, n - 1] } else { (0..n).collect() };
+    let units = Units::named(&summary.units);
+    let draw = |at: usize| {
+        let shot = Shot { path: states[at].1.clone(), place: Some((at, n)) };
+        let piece = Piece::open(&shot.path).ok()?;
+        let skin_by = |field: &str| {
+            let mut skin = Skin::new(&piece, field, None, &[]).ok().filter(|skin| !skin.faces.is_empty())?;
+            (0..3).filter(|axis| summary.mirrors[*axis]).for_each(|axis| skin.mirror(axis));
+            Some((field.to_owned(), skin))
+        };
+        let yielded = skin_by(FIELD).filter(|(_, skin)| skin.range().1 > 0.0);
+        let (name, skin) = yielded.or_else(|| skin_by("velocity"))?;
+        let moment = legend::moment(&shot, &piece, units.time);
+        let field = legend::words(&name, &units);
+        let caption = format!("{field}, {moment}");
+        let legend = Legend { title: String::new(), field, moment, range: skin.range() };
+        let image = draw(&skin, &legend, View::best_for(None), IN_REPORTS, true);
+        let mut png = Vec::new();
+        encode(&mut png, &image).ok()?;
+        Some(Picture { caption, png })
+    };
+    ends.into_iter().filter_map(draw).collect()
+}
+
 /// Writes a PNG file.
 fn write(path: &Path, image: &Image) -> Result<(), String> {
-    let fault = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
-    let mut encoder = png::Encoder::new(create(path)?, image.width, image.height);
+    encode(create(path)?, image).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// An image as PNG into any writer.
+fn encode(out: impl std::io::Write, image: &Image) -> Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(out, image.width, image.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::High);
-    let mut writer = encoder.write_header().map_err(|e| fault(&e))?;
-    writer.write_image_data(&image.bytes()).map_err(|e| fault(&e))?;
-    writer.finish().map_err(|e| fault(&e))
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&image.bytes())?;
+    writer.finish()
 }

@@ -420,4 +420,18 @@ mod tests {
         let found = locks(&part(vec![whole, [0, 1, 2, 2, 4, 4, 4, 4]])).expect("one of two");
         assert_eq!((found.value, found.grade), (0.5, Grade::Look));
     }
+
+    #[test]
+    fn shells_that_have_turned_against_each_other_are_told_and_flat_ones_are_not() {
+        let deck = "title = \"sheet\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"sheet\"\nmaterial = \"LEAD\"\n\
+            shell = { thickness = 0.01 }\nplate = { origin = [0, 0, 0], side_i = [4, 0, 0], side_j = [0, 1, 0], cells = [4, 1] }\n";
+        let model = deck::read(deck, "sheet.toml").expect("no fault");
+        let mut state = crate::picture::starting_state(&model);
+        assert_eq!(folds(&model, 0, &state), None);
+        // The half beyond the middle stands up.
+        state.x.iter_mut().filter(|x| x[0] > 2.0).for_each(|x| *x = [2.0, x[1], x[0] - 2.0]);
+        let found = folds(&model, 0, &state).expect("a fold");
+        assert_eq!((found.value, found.grade), (1.0 / 3.0, Grade::Look));
+        assert!(found.words.contains("the sharpest by 90"), "{}", found.words);
+    }
 }

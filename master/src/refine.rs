@@ -19,15 +19,20 @@ use crate::{
 /// Gauges whose readings are compared without being asked for, and parts likewise.
 const GAUGES: usize = 4;
 const PARTS: usize = 4;
-/// Change of a measure below which the mesh is called fine enough for it.
+/// Change of a measure, over the greatest of its kind, below which the mesh is called fine enough for it.
 const SETTLED: f64 = 0.02;
 
 /// What both runs are asked for.
 struct Compared {
     name: String,
     unit: String,
+    /// Whether a change of it says that the mesh is too coarse.
+    is_judged: bool,
     values: [f64; 2],
 }
+
+/// The unit of what is counted.
+const COUNT: &str = "1";
 
 /// Runs the deck twice and prints the comparison. The finer run goes beside the first, into `FOLDER-refined-FACTOR`.
 ///
@@ -86,9 +91,11 @@ fn compare(model: &Model, folders: [&PathBuf; 2], formulas: &[(String, Formula)]
     let speed = format!("{length}/{time}");
     let mut compared = Vec::new();
     let mut add = |name: String, unit: &str, of: &dyn Fn(&(Summary, Table)) -> f64| {
-        compared.push(Compared { name, unit: unit.to_owned(), values: [of(&runs[0]), of(&runs[1])] });
+        // More elements, and less hourglass energy, are what a finer mesh is for.
+        let is_judged = ![COUNT, "%"].contains(&unit);
+        compared.push(Compared { name, unit: unit.to_owned(), is_judged, values: [of(&runs[0]), of(&runs[1])] });
     };
-    add("elements".to_owned(), "", &|(s, _)| s.elements as f64);
+    add("elements".to_owned(), COUNT, &|(s, _)| s.elements as f64);
     add("kinetic energy".to_owned(), energy, &|(s, _)| s.energies.kinetic);
     add("internal energy".to_owned(), energy, &|(s, _)| s.energies.internal);
     add("hourglass over internal energy".to_owned(), "%", &|(s, _)| {
@@ -127,7 +134,7 @@ fn compare(model: &Model, folders: [&PathBuf; 2], formulas: &[(String, Formula)]
         };
         let both = |why| format!("--measure {text:?}: {why}");
         let values = [value(&runs[0]).map_err(both)?, value(&runs[1]).map_err(both)?];
-        compared.push(Compared { name: text.clone(), unit: String::new(), values });
+        compared.push(Compared { name: text.clone(), unit: String::new(), is_judged: true, values });
     }
     Ok(compared)
 }
@@ -136,33 +143,37 @@ fn compare(model: &Model, folders: [&PathBuf; 2], formulas: &[(String, Formula)]
 fn table(compared: &[Compared], factor: u32, fine: &Path) -> String {
     let names: Vec<String> = compared
         .iter()
-        .map(|one| if one.unit.is_empty() { one.name.clone() } else { format!("{} ({})", one.name, one.unit) })
+        .map(|one| if one.unit.is_empty() || one.unit == COUNT { one.name.clone() } else { format!("{} ({})", one.name, one.unit) })
         .map(|name| name.replace(char::is_control, " "))
         .collect();
     let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
     let mut text = format!("\n{:width$}  {:>12}  {:>12}  change\n", "trend", "as it is", format!("{factor} x finer"));
-    let mut unsettled = Vec::new();
-    for (name, Compared { name: bare, values: [coarse, fine], .. }) in names.iter().zip(compared) {
+    let (mut judged, mut unsettled) = (0, 0);
+    for (name, Compared { unit, is_judged, values: [coarse, fine], .. }) in names.iter().zip(compared) {
         let change = if *coarse != 0.0 { (fine - coarse) / coarse.abs() } else { f64::NAN };
-        let change_words = match (bare.as_str(), coarse == fine) {
-            ("elements", _) => String::new(),
-            (_, true) => "none".to_owned(),
-            _ if change.is_finite() => format!("{:+.1} %", 100.0 * change),
-            _ => "from zero".to_owned(),
+        // Of a small share of the energy, or of a body that hardly moves any more, a large change is no large one.
+        let of_kind = compared.iter().filter(|one| !unit.is_empty() && one.unit == *unit);
+        let scale = of_kind.flat_map(|one| one.values).chain([*coarse]).fold(0.0_f64, |most, v| most.max(v.abs()));
+        let settles = (fine - coarse).abs() <= SETTLED * scale;
+        let words = match coarse == fine {
+            true => "none".to_owned(),
+            false if change.is_finite() => format!("{:+.1} %", 100.0 * change),
+            false => "from zero".to_owned(),
         };
-        let line = format!("{name:width$}  {:>12}  {:>12}  {change_words}", significant(*coarse), significant(*fine));
+        let mark = if *is_judged && !settles { "  *" } else { "" };
+        let words = if unit == COUNT { String::new() } else { format!("{words}{mark}") };
+        let tell = |value: f64| if unit == COUNT { format!("{value}") } else { significant(value) };
+        let line = format!("{name:width$}  {:>12}  {:>12}  {words}", tell(*coarse), tell(*fine));
         let _ = writeln!(text, "{}", line.trim_end());
-        if bare != "elements" && !(change.abs() <= SETTLED || coarse == fine) {
-            unsettled.push(bare.as_str());
-        }
+        judged += usize::from(*is_judged);
+        unsettled += usize::from(*is_judged && !settles);
     }
-    let verdict = if unsettled.is_empty() {
-        "all stay within 2 %: the mesh is fine enough for them".to_owned()
+    let verdict = if unsettled == 0 {
+        format!("all {judged} stay within 2 % of the greatest of their kind: the mesh is fine enough for them")
     } else {
         format!(
-            "{} of {} change by more than 2 %: for them the mesh of the deck is too coarse, or the finer one is as well",
-            unsettled.len(),
-            compared.len() - 1
+            "* {unsettled} of {judged} change by more than 2 % of the greatest of their kind: for them the mesh of the deck is too coarse, \
+             and perhaps the finer one too"
         )
     };
     let _ = writeln!(text, "{verdict}\nfiner results in {}", fine.display());
@@ -175,16 +186,26 @@ mod tests {
 
     #[test]
     fn what_changes_with_the_mesh_is_told_apart_from_what_stays() {
-        let of = |name: &str, values| Compared { name: name.to_owned(), unit: "J".to_owned(), values };
-        let table = table(
-            &[of("elements", [8.0, 64.0]), of("stays", [2.0, 2.01]), of("moves", [1.0, 1.5]), of("rests", [0.0; 2])],
-            2,
-            Path::new("results/x-refined-2"),
-        );
+        let of = |name: &str, unit: &str, values| Compared {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            is_judged: ![COUNT, "%"].contains(&unit),
+            values,
+        };
+        let all = [
+            of("elements", COUNT, [8.0, 64.0]),
+            of("stays", "J", [100.0, 101.0]),
+            of("small", "J", [1.0, 1.5]),
+            of("moves", "mm", [1.0, 1.5]),
+            of("rests", "mm", [0.0; 2]),
+            of("share", "%", [9.0, 2.0]),
+        ];
+        let table = table(&all, 2, Path::new("results/x-refined-2"));
         let lines: Vec<&str> = table.lines().collect();
-        assert!(lines[2].starts_with("elements (J)") && !lines[2].contains('%'), "{table}");
-        assert!(lines[3].ends_with("+0.5 %") && lines[4].ends_with("+50.0 %") && lines[5].ends_with("none"), "{table}");
-        assert!(lines[6].starts_with("1 of 3 change"), "{table}");
+        assert!(lines[2].starts_with("elements  ") && lines[2].ends_with(" 64"), "{table}");
+        assert!(lines[3].ends_with("+1.0 %") && lines[4].ends_with("+50.0 %"), "{table}");
+        assert!(lines[5].ends_with("+50.0 %  *") && lines[6].ends_with("none") && lines[7].ends_with("-77.8 %"), "{table}");
+        assert!(lines[8].starts_with("* 1 of 4 change"), "{table}");
         assert!(table.ends_with("finer results in results/x-refined-2\n"));
     }
 }

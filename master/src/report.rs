@@ -69,8 +69,11 @@ pub fn run(args: &ReportArgs) -> Result<ExitCode, String> {
         tokio::spawn(http::serve(place, api_state));
         println!("page: {page}");
         println!("Ctrl-C ends it");
-        if args.open {
-            open(&page)?;
+        if args.open
+            && let Err(why) = open(&page)
+        {
+            // It serves all the same.
+            eprintln!("{why}");
         }
         let stop = stop_on_interrupt("ending");
         while !stop.load(Ordering::Relaxed) {

@@ -22,6 +22,7 @@ use crate::{
     notify::notify,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
+    picture,
     processes::Processes,
     refine,
     results::{self, Folder, Summary, formats, report, summary::Origin, trace},
@@ -239,7 +240,8 @@ pub fn conclude(
     }
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
-        report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        let pictures = picture::of_report(folder.path(), &summary);
+        report::write(folder, &summary, &model.units, &pictures).map_err(|e| e.to_string())?;
         for written in formats::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
             info!("{}", export::line(&written));
         }

@@ -29,6 +29,7 @@ use crate::{
     notice::Notice,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
+    picture,
     queue::Change,
     results::{self, Folder, Summary, TRACE, formats, report, summary::Origin, trace},
     snapshot::{Snapshot, keeper::Keeper, store::Store},
@@ -235,7 +236,8 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     }
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
-        report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        let pictures = picture::of_report(folder.path(), &summary);
+        report::write(folder, &summary, &model.units, &pictures).map_err(|e| e.to_string())?;
         for written in formats::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
             info!(job = order.number, "{}", export::line(&written));
         }

@@ -35,8 +35,9 @@ const PIECE: usize = 256 << 10;
 const WAITING: usize = 4;
 /// Columns that are given at a time.
 const MOST_COLUMNS: usize = 64;
-/// What the report may load: the style in it.
-const REPORT_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'";
+/// What the report may load: the style and the pictures in it.
+const REPORT_POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'";
 
 /// Does what waits for the disk; an error is told as 404.
 ///
