@@ -177,7 +177,8 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     let mut command = Command::new(BOLIDE);
     command.args(["results", "1", "--master", &address, "--out"]).arg(&results);
     assert!(command.status().expect("bolide runs").success());
-    let bytes: Vec<u8> = fetched[1].as_array().expect("bytes").iter().map(|b| b.as_u64().expect("a byte") as u8).collect();
+    let bytes: Vec<u8> =
+        fetched[1].as_array().expect("bytes").iter().map(|b| b.as_u64().expect("a byte") as u8).collect();
     let file = results.join(fetched[0].as_str().expect("a name"));
     assert_eq!(bytes, std::fs::read(&file).expect("the command has fetched it"), "{}", file.display());
     // The archive holds the same files.
@@ -185,7 +186,8 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
         "(async () => { const bytes = await (await fetch(document.getElementById('all-files').href)).arrayBuffer(); \
          return [...new Uint8Array(bytes)]; })()",
     );
-    let archive: Vec<u8> = archive.as_array().expect("bytes").iter().map(|b| b.as_u64().expect("a byte") as u8).collect();
+    let archive: Vec<u8> =
+        archive.as_array().expect("bytes").iter().map(|b| b.as_u64().expect("a byte") as u8).collect();
     std::fs::write(folder.path().join("job.tar"), archive).expect("room");
     let unpacked = Command::new("tar").arg("-xf").arg("job.tar").current_dir(folder.path()).status();
     assert!(unpacked.expect("tar runs").success());
@@ -213,14 +215,17 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     browser.evaluate(
         "document.getElementById('deck-text').value = document.getElementById('deck-text').value.replace('-0.05', '-0.06')",
     );
-    browser.evaluate("document.getElementById('cycles').value = '40'; document.getElementById('run').click()");
+    browser
+        .evaluate("document.getElementById('cycles').value = '40'; document.getElementById('run').click()");
     let other = browser.wait_for(
         "document.getElementById('title').textContent.startsWith('job 2') && \
          document.querySelector('#facts .digest')?.textContent",
     );
     assert_ne!(other, digest, "another velocity");
     set(&mut browser, "beside", "1");
-    browser.wait_for("!document.getElementById('other').hidden && document.getElementById('other').dataset.cycle === '40'");
+    browser.wait_for(
+        "!document.getElementById('other').hidden && document.getElementById('other').dataset.cycle === '40'",
+    );
     browser.wait_for("document.getElementById('measured').innerText.includes('differs')");
     browser.wait_for("document.getElementById('history-legend').innerText.includes('job 1')");
 

@@ -99,11 +99,7 @@ pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
 ///
 /// # Errors
 /// As [`read_within`].
-pub fn read_whole_within(
-    text: &str,
-    file_name: &str,
-    bounds: &Bounds<'_>,
-) -> Result<Reading, Vec<Fault>> {
+pub fn read_whole_within(text: &str, file_name: &str, bounds: &Bounds<'_>) -> Result<Reading, Vec<Fault>> {
     read_with(text, file_name, bounds)
 }
 

@@ -70,15 +70,15 @@ mod tests {
         [[part]]\nname = \"box\"\nmaterial = \"LEAD\"\nbox = { origin = [0, 0, 0], size = [2, 1, 1], cells = [2, 1, 1] }\n\
         [[part]]\nname = \"ball\"\nmaterial = \"LEAD\"\nsphere = { centre = [1, 0.5, 2], radius = 0.5, cells = [1, 1] }\n";
 
-    fn read(text: &str, refine: Option<u32>) -> Result<crate::Reading, Vec<crate::Fault>> {
+    fn read(text: &str, refine: Option<u32>) -> Result<crate::model::Model, Vec<crate::Fault>> {
         let options = Options { refine, ..Options::default() };
         let text = gather("t.toml", text.to_string(), &options, &mut |_| None).expect("one file");
-        crate::read_whole(&text, "t.toml")
+        crate::read(&text, "t.toml")
     }
 
     #[test]
     fn a_refined_deck_has_all_cells_divided_and_a_smaller_gap() {
-        let [coarse, fine] = [None, Some(2)].map(|n| read(DECK, n).expect("no fault").model);
+        let [coarse, fine] = [None, Some(2)].map(|n| read(DECK, n).expect("no fault"));
         assert_eq!(coarse.mesh.parts[0].n_elements() * 8, fine.mesh.parts[0].n_elements());
         assert_eq!(coarse.mesh.parts[1].n_elements() * 8, fine.mesh.parts[1].n_elements());
         // The nodes of the brick stay where they are.
@@ -95,7 +95,7 @@ mod tests {
         let text = "title = \"t\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"m\"\nmaterial = \"LEAD\"\n\
             mesh = { nodes = [[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0], [5, 0, 0, 1], [6, 1, 0, 1], [7, 1, 1, 1], [8, 0, 1, 1]], elements = [[1, 1, 2, 3, 4, 5, 6, 7, 8]] }\n";
         read(text, None).expect("no fault");
-        let faults = read(text, Some(2)).err().expect("a fault");
+        let faults = read(text, Some(2)).expect_err("a fault");
         assert_eq!((faults.len(), faults[0].line), (1, 8), "{faults:?}");
         assert!(faults[0].advice.contains("--refine"), "{}", faults[0]);
     }

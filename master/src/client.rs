@@ -399,10 +399,12 @@ fn table(jobs: &[Status]) -> String {
             Some(summary) if job.time_unit.is_empty() => Units::named(&summary.units).time,
             _ => &job.time_unit,
         };
-        let reached = if job.cycle == 0 { "-".to_owned() } else { format!("{} {unit}", significant(job.time)) };
+        let reached =
+            if job.cycle == 0 { "-".to_owned() } else { format!("{} {unit}", significant(job.time)) };
         let took = summary.as_ref().map_or_else(|| "-".to_owned(), |summary| span(summary.wall_s));
         let over = summary.map(|summary| summary.origin.date).filter(|date| !date.is_empty());
-        let left = job.progress.split_once(", ").filter(|_| job.state == State::Running).map(|(left, _)| left);
+        let left =
+            job.progress.split_once(", ").filter(|_| job.state == State::Running).map(|(left, _)| left);
         let failure = job.ended.as_ref().and_then(|ended| ended.failure.clone());
         let waits = job.waits_for.as_ref().map(|what| format!("waits for {what}"));
         let note = waits.or(failure).unwrap_or_else(|| {
@@ -523,14 +525,18 @@ mod tests {
         running.progress = "12 min left, 34.0 %".to_owned();
         let mut done = Status::queued(2, "bar".to_owned());
         (done.state, done.cycle, done.time) = (State::Done, 40, 2.0);
-        let origin = crate::results::summary::Origin { date: "2026-11-25 16:40 UTC".to_owned(), ..Default::default() };
+        let origin =
+            crate::results::summary::Origin { date: "2026-11-25 16:40 UTC".to_owned(), ..Default::default() };
         let summary = Summary { units: "cm-g-us".to_owned(), wall_s: 250.0, origin, ..Summary::default() };
         let summary = serde_json::to_string(&summary).ok();
         done.ended = Some(protocol::request::Ended { summary, ..Default::default() });
         let table = table(&[running, done, Status::queued(3, "next".to_owned())]);
         let lines: Vec<&str> = table.lines().collect();
         assert!(lines[1].contains("0.0125000 ms") && lines[1].contains("12 min left"), "{table}");
-        assert!(lines[2].contains("2.00000 us") && lines[2].contains("4 min  2026-11-25 16:40 UTC"), "{table}");
+        assert!(
+            lines[2].contains("2.00000 us") && lines[2].contains("4 min  2026-11-25 16:40 UTC"),
+            "{table}"
+        );
         assert!(lines[3].contains("queued") && !table.contains('\x1b'), "{table}");
     }
 

@@ -8,7 +8,9 @@
 
 use std::{fmt::Write as _, net::SocketAddr, path::PathBuf};
 
-use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, builder::PossibleValuesParser};
+use clap::{
+    Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, builder::PossibleValuesParser,
+};
 use deck::{model::FORMAT_NAMES, refine::MAX_FACTOR};
 use protocol::{
     options::{self, ADVANCED, Balance, JobOptions, Route},
@@ -75,7 +77,9 @@ impl Cli {
             }
             list.push('\n');
         }
-        let template = format!("{{about}}\n\n{{usage-heading}} {{usage}}\n\n{list}{EXAMPLES}\n\n`bolide COMMAND --help` has the flags of a command.{{after-help}}\n");
+        let template = format!(
+            "{{about}}\n\n{{usage-heading}} {{usage}}\n\n{list}{EXAMPLES}\n\n`bolide COMMAND --help` has the flags of a command.{{after-help}}\n"
+        );
         command.help_template(template)
     }
 }

@@ -19,11 +19,7 @@ use deck::{
 use protocol::options;
 use tokio::sync::Semaphore;
 
-use crate::{
-    footprint,
-    http::surface,
-    picture::starting_state,
-};
+use crate::{footprint, http::surface, picture::starting_state};
 
 /// Longest name of a deck (bytes).
 const NAME_LIMIT: usize = 4096;
@@ -170,7 +166,7 @@ mod tests {
         let of_block = |given_up: &AtomicBool| read_until(given_up, "block.toml", BLOCK);
         assert_eq!(of_block(&given_up).map(|reading| reading.model.mesh.n_elements()).ok(), Some(8));
         drop(Waits(Arc::clone(&given_up)));
-        let faults = of_block(&given_up).err().expect("nobody waits for it");
+        let faults = of_block(&given_up).expect_err("nobody waits for it");
         assert_eq!(faults[0].read, "a deck that is given up");
 
         // Its turn comes back, whether its caller stays or goes.

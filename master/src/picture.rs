@@ -98,7 +98,8 @@ fn conclude(
 /// Whether a path names a deck and not results.
 fn is_deck(path: &Path) -> bool {
     let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
-    path.is_file() && ending.is_some_and(|ending| ["toml", "k", "key", "dyn", "bdl", "deck"].contains(&ending.as_str()))
+    path.is_file()
+        && ending.is_some_and(|ending| ["toml", "k", "key", "dyn", "bdl", "deck"].contains(&ending.as_str()))
 }
 
 /// Draws the bodies of a deck as a run would begin.
@@ -172,19 +173,32 @@ fn view_of(args: &PictureArgs) -> View {
 }
 
 /// What is seen of a state, mirrored where that is asked for.
-fn skin_of(args: &PictureArgs, about: &About, piece: &Piece, name: &str, path: &Path) -> Result<Skin, String> {
+fn skin_of(
+    args: &PictureArgs,
+    about: &About,
+    piece: &Piece,
+    name: &str,
+    path: &Path,
+) -> Result<Skin, String> {
     let parts = parts_of(&args.part, piece)?;
     let mut skin = Skin::new(piece, name, args.cut, &parts).map_err(|e| e.to_string())?;
     if skin.faces.is_empty() {
         return Err(format!(
             "{}: nothing to draw{}",
             path.display(),
-            if parts.is_empty() { "" } else { "; the field `part` of the states has the numbers of the parts" }
+            if parts.is_empty() {
+                ""
+            } else {
+                "; the field `part` of the states has the numbers of the parts"
+            }
         ));
     }
     if args.mirror {
         if about.mirrors == [false; 3] {
-            return Err(format!("{}: no plane of [symmetry] to mirror at; leave out --mirror", path.display()));
+            return Err(format!(
+                "{}: no plane of [symmetry] to mirror at; leave out --mirror",
+                path.display()
+            ));
         }
         (0..3).filter(|axis| about.mirrors[*axis]).for_each(|axis| skin.mirror(axis));
     }
@@ -196,9 +210,9 @@ fn parts_of(given: &[String], piece: &Piece) -> Result<Vec<u32>, String> {
     let names = piece.words(PART_NAMES);
     let number = |text: &String| {
         let named = names.iter().position(|name| name == text).map(|at| at as u32);
-        named.or_else(|| text.parse().ok()).ok_or_else(|| {
-            format!("--part {text}: no such part; there are {}", names.join(", "))
-        })
+        named
+            .or_else(|| text.parse().ok())
+            .ok_or_else(|| format!("--part {text}: no such part; there are {}", names.join(", ")))
     };
     given.iter().map(number).collect()
 }

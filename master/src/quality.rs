@@ -167,7 +167,13 @@ fn share(name: String, value: f64, [look, bad]: [f64; 2], of: &str, advice: &str
 
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
-    let digits = if percent.abs() < 0.1 { 3 } else if percent.abs() < 10.0 { 1 } else { 0 };
+    let digits = if percent.abs() < 0.1 {
+        3
+    } else if percent.abs() < 10.0 {
+        1
+    } else {
+        0
+    };
     format!("{percent:.digits$} %")
 }
 
@@ -203,7 +209,8 @@ fn hourglass(totals: &RunTotals, parts: &[NamedPart]) -> Vec<Measure> {
     if all <= 0.0 || totals.hourglass <= 0.0 {
         return Vec::new();
     }
-    let advice = "refine where it bends or is struck: bolide run DECK --refine 2 shows whether the answer stays";
+    let advice =
+        "refine where it bends or is struck: bolide run DECK --refine 2 shows whether the answer stays";
     let mut measures = vec![share(
         "hourglass energy".to_owned(),
         totals.hourglass / all,
@@ -228,7 +235,9 @@ fn depth(gaps: f64) -> Measure {
     let grade = Grade::of(gaps, look, bad);
     let advice = match grade {
         Grade::Good => "",
-        _ => "bodies pressed deep into the gap: refine where they meet, or give [contact] a larger `stiffness`",
+        _ => {
+            "bodies pressed deep into the gap: refine where they meet, or give [contact] a larger `stiffness`"
+        }
     };
     Measure {
         name: "worst depth of contact".to_owned(),
@@ -327,7 +336,9 @@ fn across(model: &Model, index: usize, state: &GlobalState) -> Option<Measure> {
         value: f64::from(thinnest),
         limit: f64::from(ACROSS),
         grade: Grade::Look,
-        words: format!("{thinnest} across its thinnest way, and it has yielded; {ACROSS} or more bend as they should"),
+        words: format!(
+            "{thinnest} across its thinnest way, and it has yielded; {ACROSS} or more bend as they should"
+        ),
         advice: "use more elements there, or shells".to_owned(),
     })
 }

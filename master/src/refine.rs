@@ -78,7 +78,11 @@ fn formulas(texts: &[String]) -> Result<Vec<(String, Formula)>, String> {
 }
 
 /// What two results folders of a deck came to.
-fn compare(model: &Model, folders: [&PathBuf; 2], formulas: &[(String, Formula)]) -> Result<Vec<Compared>, String> {
+fn compare(
+    model: &Model,
+    folders: [&PathBuf; 2],
+    formulas: &[(String, Formula)],
+) -> Result<Vec<Compared>, String> {
     let read = |folder: &PathBuf| -> Result<(Summary, Table), String> {
         let path = folder.join(SUMMARY);
         let fault = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
@@ -93,7 +97,12 @@ fn compare(model: &Model, folders: [&PathBuf; 2], formulas: &[(String, Formula)]
     let mut add = |name: String, unit: &str, of: &dyn Fn(&(Summary, Table)) -> f64| {
         // More elements, and less hourglass energy, are what a finer mesh is for.
         let is_judged = ![COUNT, "%"].contains(&unit);
-        compared.push(Compared { name, unit: unit.to_owned(), is_judged, values: [of(&runs[0]), of(&runs[1])] });
+        compared.push(Compared {
+            name,
+            unit: unit.to_owned(),
+            is_judged,
+            values: [of(&runs[0]), of(&runs[1])],
+        });
     };
     add("elements".to_owned(), COUNT, &|(s, _)| s.elements as f64);
     add("kinetic energy".to_owned(), energy, &|(s, _)| s.energies.kinetic);
@@ -118,12 +127,17 @@ fn compare(model: &Model, folders: [&PathBuf; 2], formulas: &[(String, Formula)]
             [("u", length, "displacement at the end"), ("v", speed.as_str(), "greatest speed")]
         {
             add(format!("{}: {words}", gauge.name), unit, &|(_, history)| {
-                let axes = ["x", "y", "z"].map(|axis| history.column(&format!("{}:{what}{axis}", gauge.name)));
+                let axes =
+                    ["x", "y", "z"].map(|axis| history.column(&format!("{}:{what}{axis}", gauge.name)));
                 let length = |row: usize| {
                     axes.iter().flatten().map(|column| column[row] * column[row]).sum::<f64>().sqrt()
                 };
                 let rows = 0..history.rows.len();
-                if what == "u" { rows.last().map_or(0.0, length) } else { rows.map(length).fold(0.0, f64::max) }
+                if what == "u" {
+                    rows.last().map_or(0.0, length)
+                } else {
+                    rows.map(length).fold(0.0, f64::max)
+                }
             });
         }
     }
@@ -143,17 +157,25 @@ fn compare(model: &Model, folders: [&PathBuf; 2], formulas: &[(String, Formula)]
 fn table(compared: &[Compared], factor: u32, fine: &Path) -> String {
     let names: Vec<String> = compared
         .iter()
-        .map(|one| if one.unit.is_empty() || one.unit == COUNT { one.name.clone() } else { format!("{} ({})", one.name, one.unit) })
+        .map(|one| {
+            if one.unit.is_empty() || one.unit == COUNT {
+                one.name.clone()
+            } else {
+                format!("{} ({})", one.name, one.unit)
+            }
+        })
         .map(|name| name.replace(char::is_control, " "))
         .collect();
     let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
-    let mut text = format!("\n{:width$}  {:>12}  {:>12}  change\n", "trend", "as it is", format!("{factor} x finer"));
+    let mut text =
+        format!("\n{:width$}  {:>12}  {:>12}  change\n", "trend", "as it is", format!("{factor} x finer"));
     let (mut judged, mut unsettled) = (0, 0);
     for (name, Compared { unit, is_judged, values: [coarse, fine], .. }) in names.iter().zip(compared) {
         let change = if *coarse != 0.0 { (fine - coarse) / coarse.abs() } else { f64::NAN };
         // Of a small share of the energy, or of a body that hardly moves any more, a large change is no large one.
         let of_kind = compared.iter().filter(|one| !unit.is_empty() && one.unit == *unit);
-        let scale = of_kind.flat_map(|one| one.values).chain([*coarse]).fold(0.0_f64, |most, v| most.max(v.abs()));
+        let scale =
+            of_kind.flat_map(|one| one.values).chain([*coarse]).fold(0.0_f64, |most, v| most.max(v.abs()));
         let settles = (fine - coarse).abs() <= SETTLED * scale;
         let words = match coarse == fine {
             true => "none".to_owned(),
@@ -169,7 +191,9 @@ fn table(compared: &[Compared], factor: u32, fine: &Path) -> String {
         unsettled += usize::from(*is_judged && !settles);
     }
     let verdict = if unsettled == 0 {
-        format!("all {judged} stay within 2 % of the greatest of their kind: the mesh is fine enough for them")
+        format!(
+            "all {judged} stay within 2 % of the greatest of their kind: the mesh is fine enough for them"
+        )
     } else {
         format!(
             "* {unsettled} of {judged} change by more than 2 % of the greatest of their kind: for them the mesh of the deck is too coarse, \
@@ -204,7 +228,10 @@ mod tests {
         let lines: Vec<&str> = table.lines().collect();
         assert!(lines[2].starts_with("elements  ") && lines[2].ends_with(" 64"), "{table}");
         assert!(lines[3].ends_with("+1.0 %") && lines[4].ends_with("+50.0 %"), "{table}");
-        assert!(lines[5].ends_with("+50.0 %  *") && lines[6].ends_with("none") && lines[7].ends_with("-77.8 %"), "{table}");
+        assert!(
+            lines[5].ends_with("+50.0 %  *") && lines[6].ends_with("none") && lines[7].ends_with("-77.8 %"),
+            "{table}"
+        );
         assert!(lines[8].starts_with("* 1 of 4 change"), "{table}");
         assert!(table.ends_with("finer results in results/x-refined-2\n"));
     }

@@ -7,8 +7,8 @@ use std::{
     net::{IpAddr, Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
     process::{Command, ExitCode, Stdio},
-    sync::atomic::Ordering,
     sync::Arc,
+    sync::atomic::Ordering,
     time::Duration,
 };
 
@@ -58,14 +58,20 @@ pub fn run(args: &ReportArgs) -> Result<ExitCode, String> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
     let runtime = runtime.map_err(|e| e.to_string())?;
     let result = runtime.block_on(async {
-        let place = http::Place::open(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), args.port), None).await?;
+        let place =
+            http::Place::open(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), args.port), None).await?;
         let address = place.address()?;
         let guard = Guard::passing(address.port(), host_name())?;
         let page = format!("http://{address}/?token={}", guard.token());
         let (notices, heard) = mpsc::channel(WAITING_NOTICES);
         tokio::spawn(serve(args.folders.clone(), heard));
-        let api_state =
-            ApiState { notices, board: Arc::new(Board::default()), join: String::new(), only_shows: true, guard };
+        let api_state = ApiState {
+            notices,
+            board: Arc::new(Board::default()),
+            join: String::new(),
+            only_shows: true,
+            guard,
+        };
         tokio::spawn(http::serve(place, api_state));
         println!("page: {page}");
         println!("Ctrl-C ends it");
@@ -102,7 +108,10 @@ async fn serve(folders: Vec<PathBuf>, mut heard: mpsc::Receiver<Notice>) {
     // Of each job its number from 1; watchers of one hear nothing more.
     let numbered = || (1..).zip(&folders);
     let find = |job: u32| {
-        numbered().find(|(number, _)| *number == job).map(|(_, folder)| folder).ok_or(Error::Queue(queue::Error::Unknown(job)))
+        numbered()
+            .find(|(number, _)| *number == job)
+            .map(|(_, folder)| folder)
+            .ok_or(Error::Queue(queue::Error::Unknown(job)))
     };
     // A caller that has gone needs no answer.
     while let Some(notice) = heard.recv().await {
@@ -137,7 +146,9 @@ async fn serve(folders: Vec<PathBuf>, mut heard: mpsc::Receiver<Notice>) {
 
 /// How the run of a folder stands, as its files say.
 fn status(job: u32, folder: &Path) -> Status {
-    let named = folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into_owned());
+    let named = folder
+        .file_name()
+        .map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into_owned());
     let summary = folder::summary(folder);
     let last = index(folder).ok().and_then(|states| states.last().map(|(time, _)| *time));
     let (title, cycle, time) = match &summary {

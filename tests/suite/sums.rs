@@ -100,8 +100,7 @@ fn energies_add_up_wherever_they_are_shown() {
         assert_eq!(points.len(), solved.rows.len(), "{}", path.display());
         for (point, row) in points.iter().zip(&solved.rows) {
             let number = |name: &str| point[name].as_f64().expect("a number");
-            let parts =
-                ["kinetic", "internal", "hourglass", "contact", "eroded", "wall_loss"].map(number);
+            let parts = ["kinetic", "internal", "hourglass", "contact", "eroded", "wall_loss"].map(number);
             adds_up(&parts, number("total"), 1e-6, "page of a folder");
             assert_eq!(number("time").to_bits(), row.time.to_bits(), "{}", path.display());
         }

@@ -273,7 +273,10 @@ mod tests {
             assert!(line.chars().count() <= 80, "{line}");
         }
         let job = plain.lines().find(|line| line.starts_with("3 ")).expect("the job");
-        assert!(job.contains("running") && job.contains("12 min") && job.contains("Sphere of steel on an alu"), "{job}");
+        assert!(
+            job.contains("running") && job.contains("12 min") && job.contains("Sphere of steel on an alu"),
+            "{job}"
+        );
         assert!(plain.contains("pc-in-the-room"), "{plain}");
     }
 

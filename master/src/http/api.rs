@@ -298,7 +298,8 @@ impl Shown {
             }
         };
         let hidden = self.hide.iter().flat_map(|list| list.split(',')).filter(|part| !part.is_empty());
-        let hidden = hidden.map(|part| part.parse().map_err(|_| wrong(format!("hide: {part:?} is no index"))));
+        let hidden =
+            hidden.map(|part| part.parse().map_err(|_| wrong(format!("hide: {part:?} is no index"))));
         Ok(View { slice, hidden: hidden.collect::<Result<_, _>>()? })
     }
 }

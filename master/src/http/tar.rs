@@ -14,7 +14,10 @@ const MOST: u64 = 1 << 33;
 /// If its name or the file is too long for such an archive.
 pub fn header(name: &str, bytes: u64) -> io::Result<Vec<u8>> {
     if name.len() > NAME || bytes >= MOST {
-        let why = format!("{name}: {bytes} bytes, and a name of {} bytes; an archive takes less than {MOST} and at most {NAME}", name.len());
+        let why = format!(
+            "{name}: {bytes} bytes, and a name of {} bytes; an archive takes less than {MOST} and at most {NAME}",
+            name.len()
+        );
         return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
     let mut block = vec![0; BLOCK];
@@ -54,7 +57,8 @@ mod tests {
     fn tar_lists_and_unpacks_what_was_packed() {
         let folder = tempfile::tempdir().expect("room");
         let mut archive = Vec::new();
-        let files = [("job-1/a.csv", vec![b'x'; 700]), ("job-1/b.csv", Vec::new()), ("job-1/c", vec![7; 512])];
+        let files =
+            [("job-1/a.csv", vec![b'x'; 700]), ("job-1/b.csv", Vec::new()), ("job-1/c", vec![7; 512])];
         for (name, text) in &files {
             archive.extend(header(name, text.len() as u64).expect("short"));
             archive.extend(text);
@@ -64,7 +68,8 @@ mod tests {
         assert_eq!(archive.len() % BLOCK, 0);
         let path = folder.path().join("all.tar");
         std::fs::write(&path, archive).expect("room");
-        let status = std::process::Command::new("tar").arg("-xf").arg(&path).arg("-C").arg(folder.path()).status();
+        let status =
+            std::process::Command::new("tar").arg("-xf").arg(&path).arg("-C").arg(folder.path()).status();
         // A machine without tar has nothing to compare with.
         let Ok(status) = status else { return println!("skipped: no tar on this machine") };
         assert!(status.success());

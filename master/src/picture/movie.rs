@@ -53,7 +53,8 @@ pub fn run(args: &PictureArgs, path: &Path) -> Result<ExitCode, String> {
     let about = About::of(&args.results);
     let states = read::index(&args.results).map_err(|e| e.to_string())?;
     let n = states.len();
-    let shots = || states.iter().enumerate().map(|(at, (_, path))| Shot { path: path.clone(), place: Some((at, n)) });
+    let shots =
+        || states.iter().enumerate().map(|(at, (_, path))| Shot { path: path.clone(), place: Some((at, n)) });
     let field = field_of(args, super::FIELD);
     // What all states take in; each is read again when it is drawn, since not all have room in memory.
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -112,7 +113,13 @@ enum Writer {
 }
 
 impl Film {
-    fn create(path: &Path, format: Format, (width, height): (u32, u32), n: usize, rate: u16) -> Result<Self, String> {
+    fn create(
+        path: &Path,
+        format: Format,
+        (width, height): (u32, u32),
+        n: usize,
+        rate: u16,
+    ) -> Result<Self, String> {
         let name = path.display().to_string();
         let fault = |e: &dyn std::fmt::Display| format!("{name}: {e}");
         let out = create(path)?;

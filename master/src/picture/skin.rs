@@ -339,7 +339,8 @@ mod tests {
                 .map(|p| p.map(f64::from))
                 .to_vec();
         let shapes = [(0, Cell::Solid([0, 1, 2, 3, 4, 5, 6, 7]))];
-        let face = |(_, corners): (usize, [u32; 4])| Face { corners, values: corners.map(f64::from), part: 0 };
+        let face =
+            |(_, corners): (usize, [u32; 4])| Face { corners, values: corners.map(f64::from), part: 0 };
         let faces: Vec<Face> = outside(8, shapes.into_iter()).into_iter().map(face).collect();
         let lines = lines(&points, &faces);
         Skin { points, faces, lines }
@@ -353,8 +354,9 @@ mod tests {
         // All faces look outward from the middle of the whole.
         for face in &skin.faces {
             let n = normal(&skin.points, face.corners);
-            let centre: [f64; 3] =
-                std::array::from_fn(|a| face.corners.iter().map(|&c| skin.points[c as usize][a]).sum::<f64>() / 4.0);
+            let centre: [f64; 3] = std::array::from_fn(|a| {
+                face.corners.iter().map(|&c| skin.points[c as usize][a]).sum::<f64>() / 4.0
+            });
             let out = [centre[0], centre[1] - 0.5, centre[2] - 0.5];
             assert!((0..3).map(|a| n[a] * out[a]).sum::<f64>() > 0.0, "{centre:?} looks along {n:?}");
         }

@@ -431,7 +431,8 @@ impl Summary {
         let parts = &self.energies.parts;
         let mut label = "parts";
         for part in parts.iter().take(LISTED_PARTS) {
-            let name: String = part.name.chars().map(|c| if c.is_control() { ' ' } else { c }).take(20).collect();
+            let name: String =
+                part.name.chars().map(|c| if c.is_control() { ' ' } else { c }).take(20).collect();
             let velocity = part.momentum.map(|p| {
                 let v = if part.mass > 0.0 { p / part.mass } else { 0.0 };
                 // What is left of a sum that cancels is no velocity.
@@ -532,7 +533,11 @@ impl Summary {
 
 /// A component of a velocity: four digits, and zero for what is left of a sum that cancels.
 fn label_of(v: f64) -> String {
-    if v.abs() < 1e-9 { "0".to_owned() } else { format!("{:.3e}", v).parse::<f64>().map_or_else(|_| "-".to_owned(), |v| format!("{v}")) }
+    if v.abs() < 1e-9 {
+        "0".to_owned()
+    } else {
+        format!("{:.3e}", v).parse::<f64>().map_or_else(|_| "-".to_owned(), |v| format!("{v}"))
+    }
 }
 
 /// `1 worker`, `4 workers`.

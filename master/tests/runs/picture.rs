@@ -251,7 +251,9 @@ fn a_deck_is_drawn_before_it_runs_mirrored_and_by_parts() {
     let folder = scratch("deck");
     fs::create_dir_all(&folder).expect("room");
     let deck = folder.join("quarter.toml");
-    let text = DECK.replace("[[part]]", "[symmetry]\nplanes = [\"x\"]\n[[part]]").replace("[0, 0, 0], size", "[-30, 0, 0], size")
+    let text = DECK
+        .replace("[[part]]", "[symmetry]\nplanes = [\"x\"]\n[[part]]")
+        .replace("[0, 0, 0], size", "[-30, 0, 0], size")
         + "[[part]]\nname = \"other\"\nmaterial = \"STEEL_4340\"\nbox = { origin = [0, 0, 40], size = [30, 40, 30], cells = [3, 4, 3] }\n";
     fs::write(&deck, text).expect("room");
     let out = folder.join("x.png");

@@ -591,5 +591,8 @@ fn table_for_people_fits_a_terminal_and_names_units() {
     assert!(!summary.table("SI", true).contains("work units"));
     // Unasked it tells results and not how they were computed.
     let short = summary.table("cm-g-us", false);
-    assert!(short.contains("Mbar*cm3") && !short.contains("0.431 gap") && !short.contains("traffic"), "{short}");
+    assert!(
+        short.contains("Mbar*cm3") && !short.contains("0.431 gap") && !short.contains("traffic"),
+        "{short}"
+    );
 }
