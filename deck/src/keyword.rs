@@ -18,6 +18,7 @@ mod erosion;
 mod explosive;
 mod fields;
 mod inertia;
+mod joint;
 mod material;
 mod members;
 mod mesh;

@@ -13,6 +13,7 @@ mod clamp;
 mod contact;
 mod control;
 mod erosion;
+mod joint;
 mod load;
 mod material;
 mod merge;
@@ -71,6 +72,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     assembly.mesh.lumped = load::lumped(deck, &names, &parts, &assembly, log);
     log.wanted()?;
     let bodies = rigid::make(&rigid, &materials, &mut assembly, &mut conditions, log);
+    let joints = joint::make(&deck.joints, &rigid, &bodies, &assembly, log);
     let contact = deck.contact.as_ref().and_then(|contact| {
         contact::make(contact, &names, &mut assembly, &materials, &conditions, &rigid, log)
     });
@@ -132,6 +134,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
             constraints: conditions.constraints,
             walls: conditions.walls,
             bodies,
+            joints,
             detonations,
             loads: conditions.loads,
             erosion,

@@ -80,6 +80,8 @@ pub struct Output {
     pub contact_forces: Vec<[u32; 2]>,
     /// Cross-sections whose force the history holds.
     pub sections: Vec<Section>,
+    /// Names of the joints, in the order of [`Setup::joints`]: their columns begin with `joint NAME`.
+    pub joints: Vec<String>,
     /// Gauges: histories at nodes.
     pub gauges: Vec<Gauge>,
     /// Histories of elements.
@@ -103,6 +105,7 @@ impl Default for Output {
             contact_surface: false,
             contact_forces: Vec::new(),
             sections: Vec::new(),
+            joints: Vec::new(),
             gauges: Vec::new(),
             element_gauges: Vec::new(),
             mirrors: [false; 3],

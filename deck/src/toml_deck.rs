@@ -8,6 +8,7 @@ mod condition;
 mod contact;
 mod entry;
 mod hourglass;
+pub(crate) mod joint;
 mod output;
 mod part;
 mod shape;
@@ -121,6 +122,7 @@ fn read_document(document: &DeTable<'_>, log: &Log<'_>) -> Deck {
     deck.symmetry = symmetry;
     deck.walls = condition::read_walls(&table);
     deck.rigid = condition::read_rigid(&table);
+    deck.joints = joint::read(&table);
     deck.masses = condition::read_masses(&table);
     deck.has_contact = table.has("contact");
     deck.contact = contact::read(&table);

@@ -17,7 +17,7 @@ use crate::{
     place::{Place, Placed},
     units::Units,
 };
-use condition::{Boundary, Curve, Gravity, Load, Lumped, Parts, Region, Relaxation, Rigid, Wall};
+use condition::{Boundary, Curve, Gravity, Joint, Load, Lumped, Parts, Region, Relaxation, Rigid, Wall};
 use contact::{Contact, Join};
 use part::{Own, Part};
 
@@ -35,6 +35,7 @@ pub(crate) struct Deck {
     pub(crate) symmetry: Option<Symmetry>,
     pub(crate) walls: Vec<Wall>,
     pub(crate) rigid: Vec<Rigid>,
+    pub(crate) joints: Vec<Joint>,
     pub(crate) masses: Vec<Lumped>,
     pub(crate) loads: Vec<Load>,
     pub(crate) gravity: Option<Gravity>,
@@ -64,6 +65,7 @@ impl Deck {
             symmetry: None,
             walls: Vec::new(),
             rigid: Vec::new(),
+            joints: Vec::new(),
             masses: Vec::new(),
             loads: Vec::new(),
             gravity: None,

@@ -266,6 +266,7 @@ impl RunTotals {
             contacts: vote.contacts.clone(),
             sections: vote.sections.clone(),
             holders: self.holders.iter().map(|(row, _)| *row).collect(),
+            joints: vote.joints.iter().map(|joint| [joint.force, joint.moment]).collect(),
         };
     }
 

@@ -25,7 +25,7 @@ use std::fmt;
 /// memory of workers in [`Hello`]; the strain at which layers of shells break in assignments; the part of a job that is computed twice; cross-sections in assignments
 /// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans;
 /// beams in assignments.
-pub const VERSION: u16 = 9;
+pub const VERSION: u16 = 10;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

@@ -18,6 +18,7 @@ mod friction;
 mod gas;
 mod girder;
 mod hexahedron;
+mod joint;
 mod law;
 mod load;
 mod modes;
@@ -151,6 +152,8 @@ macro_rules! each_case_of_the_book {
             rigid: a_free_top_precesses_after_euler quick;
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
             rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;
+            joint: a_double_pendulum_follows_lagranges_equations quick;
+            joint: a_rod_on_a_hinge_is_struck_at_and_off_its_centre_of_percussion quick;
             zone: points_about_a_face_have_their_region_distance_and_weights quick;
             zone: a_node_swept_over_joints_feels_one_steady_force quick;
             zone: every_pair_keeps_force_and_moment quick;

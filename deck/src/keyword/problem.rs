@@ -11,6 +11,7 @@ use super::{
     control::ControlCards,
     erosion::Limits,
     explosive::DetonationCard,
+    joint::JointCard,
     material::{EosCard, MaterialCard},
     rigid::RigidCards,
     set::Sets,
@@ -151,6 +152,7 @@ pub(super) struct Problem {
     pub(super) blasts: Blasts,
     pub(super) conditions: Conditions,
     pub(super) rigid: RigidCards,
+    pub(super) joints: Vec<JointCard>,
     pub(super) contacts: Vec<ContactCard>,
     /// Contacts whose forces the history is to hold.
     pub(super) transducers: Vec<ContactCard>,

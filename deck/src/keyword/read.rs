@@ -11,7 +11,7 @@ use super::{
     contact::ContactCard,
     define, erosion, explosive,
     fields::{Context, TENS},
-    inertia, material, mesh,
+    inertia, joint, material, mesh,
     problem::{Problem, UnitsCard},
     property,
     rigid::RigidCards,
@@ -169,6 +169,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
             problem.erosions.entry(id).or_default().merge(limits);
         }
         word if RigidCards::knows(word) => problem.rigid.read(block, &problem.vectors, context),
+        word if joint::knows(word) => joint::read(&mut problem.joints, block, context),
         word if word.starts_with("SET_") => problem.sets.read(block, context),
         word if word.starts_with("MAT_") => read_material(problem, block, context),
         word if word.starts_with("EOS_") => read_eos(problem, block, context),

@@ -7,6 +7,7 @@ mod control;
 mod element;
 mod explosive;
 mod hourglass;
+mod joint;
 mod material;
 mod motion;
 mod output;
@@ -37,6 +38,7 @@ pub(super) fn translate(
     material::write(&mut t);
     part::write(&mut t);
     rigid::write(&mut t);
+    joint::write(&mut t);
     condition::write_held(&mut t);
     condition::write_motions(&mut t);
     condition::write_forces(&mut t);

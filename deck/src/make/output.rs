@@ -2,7 +2,7 @@
 
 use mechanics::rigid::Body;
 
-use super::{assembly::Assembly, names::Names, section};
+use super::{assembly::Assembly, joint, names::Names, section};
 use crate::{
     fault::short,
     geometry::{norm, sub},
@@ -38,6 +38,7 @@ pub(super) fn make(
         contact_surface: surface.is_some(),
         contact_forces: contact_forces(deck, names, log),
         sections: section::make(deck, names, assembly, bodies, log),
+        joints: joint::names(&deck.joints, log),
         gauges: Vec::new(),
         element_gauges: Vec::new(),
         mirrors: planes,

@@ -19,6 +19,23 @@ pub(super) struct RigidDraft<'d> {
     given: shape::Given,
 }
 
+impl<'d> RigidDraft<'d> {
+    /// Its own name.
+    pub(super) fn name(&self) -> Option<&'d str> {
+        self.rigid.name.as_ref().map(|name| name.value.as_str())
+    }
+
+    /// Its parts, by index.
+    pub(super) fn parts(&self) -> &[u32] {
+        &self.given.parts
+    }
+
+    /// Whether it has this name, or this part.
+    pub(super) fn is(&self, name: &str, part: Option<usize>) -> bool {
+        self.name() == Some(name) || part.is_some_and(|part| self.given.parts.contains(&(part as u32)))
+    }
+}
+
 /// Resolves what the bodies are given; a part of two bodies is a fault.
 pub(super) fn drafts<'d>(
     list: &'d [Rigid],
@@ -31,6 +48,11 @@ pub(super) fn drafts<'d>(
     for rigid in list {
         let parts: Vec<u32> =
             names.several(&rigid.parts).unwrap_or_default().into_iter().map(|p| p as u32).collect();
+        if let Some(name) = &rigid.name
+            && drafts.iter().any(|other| other.name() == Some(&name.value))
+        {
+            log.fault_of(name.origin, "a name that no other [[rigid]] has", "choose another name");
+        }
         let of_both = |other: &&RigidDraft<'d>| parts.iter().any(|p| other.given.parts.contains(p));
         for other in drafts.iter().filter(of_both) {
             let line = log.line(other.rigid.at, rigid.at);

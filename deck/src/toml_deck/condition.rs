@@ -205,6 +205,7 @@ fn read_motion(table: &Table<'_>) -> Option<WallMotion> {
 pub(super) fn read_rigid(deck: &Table<'_>) -> Vec<Rigid> {
     let rigid = |table: Table<'_>| {
         let (at, title) = (table.place(), table.title.clone());
+        let name = table.get("name").and_then(|v| v.name().map(|name| v.placed(name)));
         // A body may be one of nodes alone.
         let nodes = table.get("nodes").and_then(nodes);
         let members = match table.get("parts") {
@@ -245,6 +246,7 @@ pub(super) fn read_rigid(deck: &Table<'_>) -> Vec<Rigid> {
         Rigid {
             at,
             title,
+            name,
             parts: members,
             nodes,
             mass,

@@ -1,6 +1,9 @@
 //! What holds, moves, stops and pushes bodies, and what makes them rigid.
 
-use mechanics::load::{Span, blast::Burst};
+use mechanics::{
+    joint,
+    load::{Span, blast::Burst},
+};
 
 use crate::place::{Origin, Place, Placed};
 
@@ -156,6 +159,8 @@ pub(crate) enum WallMotion {
 pub(crate) struct Rigid {
     pub(crate) at: Place,
     pub(crate) title: String,
+    /// By this joints speak of it, beside the names of its parts.
+    pub(crate) name: Option<Placed<String>>,
     /// None of a body of nodes alone.
     pub(crate) parts: Parts,
     pub(crate) nodes: Option<Region>,
@@ -166,6 +171,23 @@ pub(crate) struct Rigid {
     pub(crate) velocity: Components,
     pub(crate) spin: Components,
     pub(crate) circle: Option<Circle>,
+}
+
+/// A joint of two rigid bodies, or of one and space.
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    pub(crate) at: Place,
+    pub(crate) title: String,
+    /// Heads its columns in the history; its number does where it has none.
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) kind: joint::Kind,
+    /// One or two names, of bodies or of their parts; none is what could not be read.
+    pub(crate) bodies: Option<Vec<Placed<String>>>,
+    pub(crate) point: Option<[f64; 3]>,
+    /// Of any length above 0; kinds that turn about or slide along one need it.
+    pub(crate) axis: Option<[f64; 3]>,
+    /// That of the second body of a universal joint.
+    pub(crate) second_axis: Option<[f64; 3]>,
 }
 
 /// What pushes faces or nodes.

@@ -3,11 +3,14 @@
 use mechanics::load::{Span, blast::Burst};
 
 use super::value::{Text, circle, components, drive, list, names, numbers, quoted, span, table, vector};
-use crate::typed::{
-    Deck,
-    condition::{
-        Boundary, BoundaryKind, Components, Drive, Faces, Load, LoadKind, Parts, Region, Rigid, Wall,
-        WallMotion, WallShape,
+use crate::{
+    toml_deck::joint::KINDS,
+    typed::{
+        Deck,
+        condition::{
+            Boundary, BoundaryKind, Components, Drive, Faces, Joint, Load, LoadKind, Parts, Region, Rigid,
+            Wall, WallMotion, WallShape,
+        },
     },
 };
 
@@ -22,6 +25,7 @@ pub(super) fn write(text: &mut Text, deck: &Deck) {
         text.key("points", list(curve.points.iter().map(|point| numbers(point))));
     }
     deck.rigid.iter().for_each(|rigid| write_rigid(text, rigid));
+    deck.joints.iter().for_each(|joint| write_joint(text, joint));
     for lumped in &deck.masses {
         text.heading("[[mass]]");
         text.some("mass", lumped.mass);
@@ -45,6 +49,9 @@ pub(super) fn write(text: &mut Text, deck: &Deck) {
 
 fn write_rigid(text: &mut Text, rigid: &Rigid) {
     text.heading("[[rigid]]");
+    if let Some(name) = &rigid.name {
+        text.key("name", quoted(&name.value));
+    }
     if !matches!(&rigid.parts, Parts::Named(names) if names.is_empty()) {
         text.key("parts", names(&rigid.parts));
     }
@@ -65,6 +72,25 @@ fn write_rigid(text: &mut Text, rigid: &Rigid) {
     }
     if let Some(given) = &rigid.circle {
         text.key("rotation", table(&circle(given)));
+    }
+}
+
+fn write_joint(text: &mut Text, joint: &Joint) {
+    text.heading("[[joint]]");
+    if let Some(name) = &joint.name {
+        text.key("name", quoted(&name.value));
+    }
+    if let Some((kind, _)) = KINDS.iter().find(|(_, kind)| *kind == joint.kind) {
+        text.key("type", quoted(kind));
+    }
+    if let Some(bodies) = &joint.bodies {
+        text.key("bodies", list(bodies.iter().map(|name| quoted(&name.value))));
+    }
+    let vectors = [("point", joint.point), ("axis", joint.axis), ("second_axis", joint.second_axis)];
+    for (key, given) in vectors {
+        if let Some(given) = given {
+            text.key(key, vector(given));
+        }
     }
 }
 

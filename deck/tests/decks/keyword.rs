@@ -6,6 +6,7 @@ mod blast;
 mod contact;
 mod faults;
 mod hourglass;
+mod joints;
 mod laws;
 mod mutations;
 mod records;
@@ -509,7 +510,7 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
         ("*SECTION_SOLID\n2,24\n", "a.k:23:3: read 24; expected ELFORM 1"),
         ("*BOUNDARY_SPC_SET\n5,0,1,1,1\n", "a.k:23:1: read set 5; expected a set of nodes of the deck"),
         ("*LOAD_NODE_POINT\n1,5,1,1.0\n", "a.k:23:3: read 5; expected DOF 1, 2 or 3"),
-        ("*CONSTRAINED_JOINT_REVOLUTE\n1,2,3,4\n", "a.k:22:1: read *CONSTRAINED_JOINT_REVOLUTE"),
+        ("*CONSTRAINED_JOINT_GEARS\n1,2,3,4\n", "a.k:22:1: read *CONSTRAINED_JOINT_GEARS"),
         (
             "*SET_NODE_ADD\n1\n1\n*BOUNDARY_SPC_SET\n1,0,1\n",
             "a.k:23:1: read set 1; expected sets that do not hold themselves",

@@ -73,6 +73,7 @@ impl Checkpoint {
             || snapshot.state.initial_volume != start.initial_volume
             || snapshot.walls.len() != mechanics::wall::first_poses(&setup.walls).len()
             || snapshot.vote.bodies.len() != setup.bodies.len()
+            || snapshot.vote.joints.len() != setup.joints.len()
         {
             return Err(Error::AnotherProblem);
         }

@@ -21,6 +21,13 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64], n_parts: usize
         if vote.bodies.iter().any(|body| !body.is_finite()) {
             return Some("the state of a rigid body in its vote is no number".to_owned());
         }
+        let held = vote
+            .joints
+            .iter()
+            .flat_map(|joint| joint.force.into_iter().chain(joint.moment).chain([joint.apart]));
+        if !held.into_iter().all(f64::is_finite) {
+            return Some("the force of a joint in its vote is no number".to_owned());
+        }
         let energies = vote.parts.iter().flat_map(|p| [p.kinetic, p.internal, p.hourglass, p.viscosity]);
         let momentum = vote.parts.iter().flat_map(|p| p.momentum);
         let numbers = energies.chain(momentum).chain(vote.momentum).chain([

@@ -101,6 +101,7 @@ impl Account {
             stale(problem, vote, cycle)
                 .or_else(|| self.run_away(problem, cycle))
                 .or_else(|| self.body_runs_away(problem, cycle))
+                .or_else(|| came_apart(problem, vote, cycle))
         };
         if self.failure.is_some() && !written {
             self.row(actions);
@@ -190,6 +191,19 @@ impl Account {
         self.rows.push(Arc::new(self.run_totals.last.clone()));
         actions.push(Action::Row(Box::new(self.run_totals.last.clone())));
     }
+}
+
+/// The most by which the ends of a joint may be apart, over the reach of its bodies or in radians.
+const APART: f64 = 1e-3;
+
+/// Whether a joint did not hold.
+fn came_apart(problem: &Problem, vote: &Vote, cycle: u64) -> Option<String> {
+    let (joint, vote) = vote.joints.iter().enumerate().find(|(_, vote)| vote.apart > APART)?;
+    let name = problem.model.output.joints.get(joint).map_or("", String::as_str);
+    Some(format!(
+        "joint `{name}` is apart by {:e} of the reach of its bodies at cycle {cycle}, at most {APART:e}; what is prescribed of its bodies contradicts it, or they turn too far in a time step: correct their motion, or lower control.safety_factor",
+        vote.apart
+    ))
 }
 
 /// What a contact that is too deep says.

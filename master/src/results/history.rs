@@ -70,6 +70,8 @@ pub struct HistoryRow {
     pub sections: Vec<(u32, SectionVote)>,
     /// Walls and supports, see [`mechanics::setup::Setup::n_holders`].
     pub holders: Vec<HolderRow>,
+    /// Force and moment that each joint gives its second end.
+    pub joints: Vec<[[f64; 3]; 2]>,
 }
 
 /// What a wall or a support does to the bodies.
@@ -149,6 +151,7 @@ pub struct History {
     sections: Vec<[f64; 3]>,
     /// The walls and supports that rows speak of.
     holders: Vec<Holder>,
+    n_joints: usize,
     has_walls: bool,
     /// Whether anything can erode: then rows say what has.
     erodes: bool,
@@ -196,6 +199,7 @@ impl History {
             n_contacts: model.output.contact_forces.len() as u32,
             sections: model.output.sections.iter().map(|section| section.cut.origin).collect(),
             holders: holders(model),
+            n_joints: model.setup.joints.len(),
             has_walls: !model.setup.walls.is_empty(),
             erodes: model.setup.erosion.is_on(),
             row: String::new(),
@@ -291,6 +295,11 @@ impl History {
             let _ = write!(self.row, ",{x:?},{y:?},{z:?},{work:?}");
             if *is_wall {
                 let _ = write!(self.row, ",{loss:?}");
+            }
+        }
+        for joint in 0..self.n_joints {
+            for number in row.joints.get(joint).copied().unwrap_or_default().into_iter().flatten() {
+                let _ = write!(self.row, ",{number:?}");
             }
         }
         if self.erodes {
@@ -451,6 +460,11 @@ pub fn columns(model: &Model) -> Vec<String> {
         if is_wall {
             columns.push(format!("{name}:loss [{energy}]"));
         }
+    }
+    for name in &model.output.joints {
+        columns.extend(["fx", "fy", "fz"].iter().map(|axis| format!("joint {name}:{axis} [{force}]")));
+        columns
+            .extend(["mx", "my", "mz"].iter().map(|axis| format!("joint {name}:{axis} [{force}*{length}]")));
     }
     if model.setup.erosion.is_on() {
         columns.push("eroded elements".to_owned());

@@ -63,6 +63,13 @@ pub(super) fn joined(model: &Model) -> Vec<usize> {
             join(&mut roots, body.account as usize, part);
         }
     }
+    // Joints pass on energy that nobody books.
+    for joint in &model.setup.joints {
+        if let [Some(a), Some(b)] = joint.ends.map(|end| end.body) {
+            let [a, b] = [a, b].map(|body| model.setup.bodies[body as usize].account as usize);
+            join(&mut roots, a, b);
+        }
+    }
     (0..roots.len()).map(|p| root(&roots, p)).collect()
 }
 

@@ -120,6 +120,7 @@ fn plates(cells: u32) -> Model {
             constraints: vec![Constraint::default()],
             walls: Vec::new(),
             bodies: Vec::new(),
+            joints: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),
             erosion: Default::default(),
@@ -281,6 +282,7 @@ fn row(model: &Model, cycle: u64) -> HistoryRow {
             .collect(),
         sections: Vec::new(),
         holders: Vec::new(),
+        joints: Vec::new(),
     }
 }
 

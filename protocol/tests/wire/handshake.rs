@@ -1,7 +1,7 @@
 //! The greeting's bytes, and every reason to refuse one.
 
 use protocol::frame::{Frame, Header, Kind};
-use protocol::handshake::{Client, Hello, Policy, Role, Server, Verdict, Welcome, bye, reason};
+use protocol::handshake::{Client, Hello, Policy, Role, Server, VERSION, Verdict, Welcome, bye, reason};
 use protocol::{Error, codec, tls};
 
 fn hello() -> Hello {
@@ -39,7 +39,7 @@ fn greeting_has_its_golden_bytes() {
     let (_, frame) = Client::new(&hello()).expect("a good greeting");
     #[rustfmt::skip]
     let golden = [
-        9, 0,                                            // version
+        10, 0,                                           // version
         0, 0, 0, 0,                                      // worker
         4, 0, 0, 0, 0, 0, 0, 0, b'p', b'c', b'-', b'1',  // name
         0, 0, 0, 0, 0, 0, 0xf8, 0x3f,                    // speed 1.5
@@ -88,11 +88,14 @@ fn nobody_is_welcome_before_a_greeting() {
 
 #[test]
 fn another_version_is_refused_whatever_follows_it() {
-    let reason = "protocol version 10, this side speaks 9; install the same release on both";
-    assert_eq!(refused(|hello| hello.version = 10), reason);
-    assert_eq!(refusal(policy(), &Frame::new(Header::new(Kind::Hello), vec![10, 0, 0xff])), reason);
-    let error = Client::new(&Hello { version: 10, ..hello() }).expect_err("not ours");
-    assert_eq!(error, Error::Message(reason.into()));
+    let next = VERSION + 1;
+    let reason =
+        format!("protocol version {next}, this side speaks {VERSION}; install the same release on both");
+    assert_eq!(refused(|hello| hello.version = next), reason);
+    let garbage = vec![next as u8, 0, 0xff];
+    assert_eq!(refusal(policy(), &Frame::new(Header::new(Kind::Hello), garbage)), reason);
+    let error = Client::new(&Hello { version: next, ..hello() }).expect_err("not ours");
+    assert_eq!(error, Error::Message(reason));
 }
 
 #[test]

@@ -262,7 +262,7 @@ const WHOLE: u64 = 1_000_000;
 
 /// Every deck of `deck/examples`, the cycle at which its run ends, and what has happened by then. An explosive burns from the
 /// first cycle on.
-const EXAMPLES: [(&str, u64, Event); 21] = [
+const EXAMPLES: [(&str, u64, Event); 22] = [
     ("ball-on-shell.k", WHOLE, Event::Contact),
     ("ball-tears-sheet.toml", 400, Event::Erosion),
     ("bar-on-wall.k", WHOLE, Event::None),
@@ -271,6 +271,7 @@ const EXAMPLES: [(&str, u64, Event); 21] = [
     ("explosive-on-plate.toml", WHOLE, Event::Contact),
     ("fragment-on-water-box.toml", 300, Event::Contact),
     ("girder-crush.toml", 4000, Event::Contact),
+    ("pendulum-hammer.toml", 3000, Event::Contact),
     ("pipe-whip.k", WHOLE, Event::Contact),
     ("plates-64k-free-slip.toml", 60, Event::Contact),
     ("plates-64k-joined.toml", 60, Event::None),

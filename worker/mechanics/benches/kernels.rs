@@ -299,6 +299,7 @@ fn plates(
         constraints: vec![Constraint::default()],
         walls: Vec::new(),
         bodies: Vec::new(),
+        joints: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),
         erosion: Default::default(),

@@ -27,6 +27,7 @@ use crate::{
     cross_section,
     element::{ElementVote, Step},
     exact::{Quanta, Quantum},
+    joint::{JointVote, Mechanism},
     lanes::Width,
     load::face,
     nodes::{Advance, share_before},
@@ -123,6 +124,8 @@ pub struct Domain {
     /// Whether any element touches a node of the exchange.
     has_border: bool,
     bodies: Vec<Held>,
+    mechanism: Mechanism,
+    joint_votes: Vec<JointVote>,
     /// Pushes on bodies travel: there are other workers.
     sends_pushes: bool,
     copy_index: CopyIndex,

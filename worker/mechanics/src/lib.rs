@@ -37,6 +37,7 @@ mod failure;
 pub mod flip;
 mod fused;
 pub mod initial;
+pub mod joint;
 pub mod lanes;
 pub mod law;
 pub mod load;

@@ -275,6 +275,7 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
         loads: Loads::default(),
         erosion: Erosion::default(),
         bodies: Vec::new(),
+        joints: Vec::new(),
     };
     let (force, energy) = (Quantum::for_reference(3e7, 42), Quantum::for_reference(1e6, 42));
     let quanta = Quanta { force, energy, momentum: energy, arm: 1.0 };

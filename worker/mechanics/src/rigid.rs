@@ -200,11 +200,54 @@ pub struct Booked {
     pub momentum: [f64; 3],
 }
 
+/// What gives a body a push at once: momentum, and angular momentum about its centre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Impulse {
+    pub linear: [f64; 3],
+    pub angular: [f64; 3],
+}
+
+impl Impulse {
+    /// Adds a multiple of another.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        for a in 0..3 {
+            self.linear[a] += factor * other.linear[a];
+            self.angular[a] += factor * other.angular[a];
+        }
+    }
+
+    /// The work that it does on a motion, with the other as linear and angular velocity.
+    pub fn dot(&self, other: &Self) -> f64 {
+        dot(self.linear, other.linear) + dot(self.angular, other.angular)
+    }
+}
+
+/// How a body that no joint holds would move at `n + 1/2`.
+#[derive(Clone, Copy, Debug)]
+pub struct Free {
+    /// Velocity and angular momentum by what pushes its nodes alone.
+    pushed: [f64; 3],
+    twisted: [f64; 3],
+    /// The same with nodal forces, gravity and relaxation.
+    velocity: [f64; 3],
+    momentum: [f64; 3],
+}
+
+/// What of the motion of a body is prescribed in a step.
+struct Prescribed {
+    velocity: [Option<f64>; 3],
+    spin: [Option<f64>; 3],
+}
+
 impl Advance<'_> {
-    /// Moves a body from `t_n` to `t_{n+1}`.
-    pub fn run(&self, body: &Body, push: &Push, state: &mut State) -> Booked {
-        let half_steps = 0.5 * (self.dt_previous + self.dt);
-        let middle = 0.5 * self.dt + self.time;
+    /// The mean of this step and the one before (time).
+    pub fn half_steps(&self) -> f64 {
+        0.5 * (self.dt_previous + self.dt)
+    }
+
+    /// What a push, loads and the past make of a body.
+    pub fn free(&self, body: &Body, push: &Push, state: &State) -> Free {
+        let half_steps = self.half_steps();
         let curves = &self.loads.curves;
         let force_quantum = self.quanta.force.value();
         let torque_quantum = force_quantum * body.length.value();
@@ -214,25 +257,22 @@ impl Advance<'_> {
         let twisted: [f64; 3] =
             std::array::from_fn(|a| state.momentum[a] + push.torque[a] as f64 * torque_quantum * half_steps);
         let (mut velocity, mut momentum) = (pushed, twisted);
-        for &(node, load) in &body.forces {
-            let load = &self.loads.forces[load as usize];
-            let scale = half_steps * load.drive.at(curves, self.time);
-            let impulse = load.force.map(|f| f * scale);
-            let moment = cross(turned(&state.attitude, body.places[node as usize]), impulse);
+        let mut give = |impulse: [f64; 3], place: [f64; 3]| {
+            let moment = cross(turned(&state.attitude, place), impulse);
             for a in 0..3 {
                 velocity[a] += impulse[a] / body.mass;
                 momentum[a] += moment[a];
             }
+        };
+        for &(node, load) in &body.forces {
+            let load = &self.loads.forces[load as usize];
+            let scale = half_steps * load.drive.at(curves, self.time);
+            give(load.force.map(|f| f * scale), body.places[node as usize]);
         }
         for pull in &body.pulls {
             let load = &self.loads.forces[pull.load as usize];
             let scale = half_steps * load.drive.at(curves, self.time) * pull.mass;
-            let impulse = load.force.map(|f| f * scale);
-            let moment = cross(turned(&state.attitude, pull.place), impulse);
-            for a in 0..3 {
-                velocity[a] += impulse[a] / body.mass;
-                momentum[a] += moment[a];
-            }
+            give(load.force.map(|f| f * scale), pull.place);
         }
         if let Some(gravity) = self.loads.gravity {
             let scale = half_steps * gravity.drive.at(curves, self.time);
@@ -245,41 +285,76 @@ impl Advance<'_> {
                 momentum[a] -= loss * state.momentum[a];
             }
         }
-        let mut prescribed = body.spin.map(|drive| drive?.prescribed(curves, middle));
+        Free { pushed, twisted, velocity, momentum }
+    }
+
+    fn prescribed(&self, body: &Body, state: &State) -> Prescribed {
+        let curves = &self.loads.curves;
+        let middle = 0.5 * self.dt + self.time;
+        let mut spin = body.spin.map(|drive| drive?.prescribed(curves, middle));
         let motion = Constraint { velocity: body.velocity, circle: body.circle, ..Constraint::default() };
-        let led = motion.prescribed(curves, state.centre, middle, self.dt);
-        for (component, led) in velocity.iter_mut().zip(led) {
-            *component = led.unwrap_or(*component);
-        }
         if let Some(Circle { axis, rate, .. }) = body.circle {
             let axis = usize::from(axis);
-            prescribed[axis] = rate.prescribed(curves, middle).or(prescribed[axis]);
+            spin[axis] = rate.prescribed(curves, middle).or(spin[axis]);
         }
-        let (spin, momentum) = body.spin_of(&state.attitude, momentum, prescribed, state.spin, self.dt);
-        let old = *state;
-        state.velocity = velocity;
-        state.momentum = momentum;
-        state.spin = spin;
-        state.attitude = turn(&old.attitude, spin, self.dt);
-        (0..3).for_each(|a| state.centre[a] += velocity[a] * self.dt);
+        Prescribed { velocity: motion.prescribed(curves, state.centre, middle, self.dt), spin }
+    }
+
+    /// Where a body is at `t_{n+1}` after joints gave it an impulse.
+    pub fn moved(&self, body: &Body, free: &Free, impulse: &Impulse, state: &State) -> State {
+        let prescribed = self.prescribed(body, state);
+        let velocity: [f64; 3] = std::array::from_fn(|a| {
+            prescribed.velocity[a].unwrap_or(free.velocity[a] + impulse.linear[a] / body.mass)
+        });
+        let momentum = std::array::from_fn(|a| free.momentum[a] + impulse.angular[a]);
+        let (spin, momentum) = body.spin_of(&state.attitude, momentum, prescribed.spin, state.spin, self.dt);
+        State {
+            centre: std::array::from_fn(|a| state.centre[a] + velocity[a] * self.dt),
+            velocity,
+            attitude: turn(&state.attitude, spin, self.dt),
+            momentum,
+            spin,
+        }
+    }
+
+    /// The velocities that an impulse adds at `t_n`: none along and about axes whose motion is prescribed.
+    pub fn answer(&self, body: &Body, state: &State, impulse: &Impulse) -> Impulse {
+        let prescribed = self.prescribed(body, state);
+        let linear = std::array::from_fn(|a| match prescribed.velocity[a] {
+            Some(_) => 0.0,
+            None => impulse.linear[a] / body.mass,
+        });
+        let (mut rows, mut right) = (body.inertia_at(&state.attitude), impulse.angular);
+        for axis in (0..3).filter(|&axis| prescribed.spin[axis].is_some()) {
+            rows[axis] = std::array::from_fn(|b| if b == axis { 1.0 } else { 0.0 });
+            right[axis] = 0.0;
+        }
+        Impulse { linear, angular: solve(rows, right) }
+    }
+
+    /// What a body says of its step from `old` to `new`. What joints gave it is booked nowhere: they give as much to the other body.
+    pub fn booked(&self, body: &Body, free: &Free, impulse: &Impulse, old: &State, new: &State) -> Booked {
         let Quanta { energy, momentum: of_momentum, .. } = self.quanta;
+        let (velocity, momentum) = (new.velocity, new.momentum);
         let [translation, rotation] = if self.dt_previous == 0.0 {
             [dot(old.velocity, old.velocity), dot(old.spin, old.momentum)]
         } else {
-            [dot(old.velocity, velocity), 0.5 * (dot(old.spin, momentum) + dot(spin, old.momentum))]
+            [dot(old.velocity, velocity), 0.5 * (dot(old.spin, momentum) + dot(new.spin, old.momentum))]
         };
         let kinetic = 0.5 * body.mass.mul_add(translation, rotation);
         let share = share_before(self.dt_previous, self.dt);
         let carried = |a: usize| body.mass * (velocity[a] - old.velocity[a]).mul_add(share, old.velocity[a]);
         let work = |with_velocity: [f64; 3], with_spin: [f64; 3]| {
-            let along = |a: usize| body.mass * (velocity[a] - pushed[a]) * with_velocity[a];
-            let about = |a: usize| (momentum[a] - twisted[a]) * with_spin[a];
+            let along = |a: usize| {
+                let pushed = free.pushed[a] + impulse.linear[a] / body.mass;
+                body.mass * (velocity[a] - pushed) * with_velocity[a]
+            };
+            let about = |a: usize| (momentum[a] - (free.twisted[a] + impulse.angular[a])) * with_spin[a];
             energy.round((0..3).map(|a| 0.5 * (along(a) + about(a))).sum())
         };
-        let external = Work { before: work(old.velocity, old.spin), after: work(velocity, spin) };
         Booked {
             kinetic: energy.round(kinetic),
-            external,
+            external: Work { before: work(old.velocity, old.spin), after: work(velocity, new.spin) },
             momentum: [0, 1, 2].map(|a| of_momentum.round(carried(a))),
         }
     }
@@ -289,6 +364,11 @@ impl Advance<'_> {
 const ROUNDS: usize = 30;
 
 impl Body {
+    /// At least the longest arm of its nodes, and less than four times that (length).
+    pub fn reach(&self) -> f64 {
+        self.length.value() * (1_u64 << 50) as f64
+    }
+
     /// Angular velocity and momentum in the middle of a step. Of both, one is given for each axis: `prescribed`, or
     /// `momentum`; the search begins at `guess`.
     fn spin_of(

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    burn::Detonation, constraint::Constraint, contact, erosion::Erosion, load::Loads, material::Material,
-    rigid::Body, wall::RigidWall,
+    burn::Detonation, constraint::Constraint, contact, erosion::Erosion, joint::Joint, load::Loads,
+    material::Material, rigid::Body, wall::RigidWall,
 };
 
 /// The rules of a run. Equal on every worker.
@@ -21,6 +21,8 @@ pub struct Setup {
     pub walls: Vec<RigidWall>,
     /// Rigid bodies.
     pub bodies: Vec<Body>,
+    /// What holds them together.
+    pub joints: Vec<Joint>,
     /// Where explosives are lit.
     pub detonations: Vec<Detonation>,
     /// Curves, forces, gravity, loads on faces, relaxation.

@@ -9,6 +9,7 @@ use crate::{
     contact::{ContactVote, Extent, PairEnergies, PairVote},
     cross_section::{CrossSection, SectionVote},
     element::ElementVote,
+    joint::JointVote,
     rigid,
     wall::WallVote,
     work::Work,
@@ -55,6 +56,8 @@ pub struct Vote {
     pub walls: Vec<WallVote>,
     /// States of the rigid bodies after the cycle; the same from every worker.
     pub bodies: Vec<rigid::State>,
+    /// What the joints say; the same from every worker.
+    pub joints: Vec<JointVote>,
     /// Displacement extents of surface nodes since the sorted positions, by part.
     pub extents: Vec<Extent>,
     /// Position and velocity of gauge nodes at `t_n`: gauge index, then x, y, z, vx, vy, vz.
@@ -153,6 +156,7 @@ impl Vote {
             parts: vec![PartVote::default(); n_parts],
             walls: Vec::new(),
             bodies: Vec::new(),
+            joints: Vec::new(),
             extents: vec![Extent::NONE; n_parts],
             gauges: Vec::new(),
             element_gauges: Vec::new(),
@@ -200,6 +204,7 @@ impl Vote {
         self.add_walls(&other.walls);
         if self.bodies.is_empty() {
             self.bodies.clone_from(&other.bodies);
+            self.joints.clone_from(&other.joints);
         }
         self.gauges.extend_from_slice(&other.gauges);
         self.gauges.sort_by_key(|g| g.0);

@@ -10,7 +10,7 @@ use crate::{
     keyword::{
         condition::Way,
         material::Law,
-        rigid::{BodyNodes, Members},
+        rigid::{BodyNodes, Members, NodalBody},
     },
     place::Place,
     typed::condition::{Circle, Components, Drive, Parts, Region, Rigid, made},
@@ -171,6 +171,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
         t.deck.rigid.push(Rigid {
             at,
             title: format!("the rigid body of part {lead}"),
+            name: None,
             parts: Parts::Named(parts.iter().map(|id| made(t.names[id].clone(), at)).collect()),
             nodes,
             mass: inertia.map(|(mass, _)| mass),
@@ -201,14 +202,12 @@ pub(super) fn write(t: &mut Translation<'_>) {
                 format!("{} nodes of the body have no element: they are left out", set.len() - nodes.len());
             log.warn(given.at, words);
         }
-        let title = match given.nodes {
-            BodyNodes::Set(_) => format!("the nodal rigid body {}", given.id),
-            BodyNodes::Pair([a, b]) => format!("the spot weld of nodes {a} and {b}"),
-        };
+        let title = title_of(given);
         let ([velocity, spin], circle) = led(t, (&mut motions, given.id), given.held, &title);
         let nodes = Some(Region::Set(t.set(&title, nodes, given.at)));
         t.deck.rigid.push(Rigid {
             at: given.at,
+            name: Some(made(title.clone(), given.at)),
             title,
             parts: Parts::Named(Vec::new()),
             nodes,
@@ -219,6 +218,14 @@ pub(super) fn write(t: &mut Translation<'_>) {
             spin,
             circle,
         });
+    }
+}
+
+/// What a body of nodes is called.
+pub(super) fn title_of(given: &NodalBody) -> String {
+    match given.nodes {
+        BodyNodes::Set(_) => format!("the nodal rigid body {}", given.id),
+        BodyNodes::Pair([a, b]) => format!("the spot weld of nodes {a} and {b}"),
     }
 }
 

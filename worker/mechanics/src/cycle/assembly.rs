@@ -19,6 +19,7 @@ use crate::{
     element::ElementVote,
     erosion::Eroding,
     exact::Quanta,
+    joint::Mechanism,
     lanes::{SET, Width},
     load::face::{self, FaceVote},
     nodes::{Booked, NodeSet},
@@ -141,6 +142,7 @@ impl Domain {
             })
             .collect();
         let bodies = Held::all(&setup, &copy_index, &mut held_blocks);
+        let mechanism = Mechanism::of(&setup.joints, bodies.len());
         Self {
             vote: Vote::empty(n_parts),
             cycle,
@@ -162,6 +164,8 @@ impl Domain {
             groups: Groups::default(),
             has_border: false,
             bodies,
+            mechanism,
+            joint_votes: Vec::new(),
             sends_pushes: false,
             copy_index,
             gather,

@@ -17,9 +17,10 @@ use crate::{
     block::Block,
     copy_index::CopyIndex,
     exact::Quantum,
+    joint::Moving,
     lanes::SET,
     nodes,
-    rigid::{self, Body, Booked, ENTRIES, PUSH, Push, State},
+    rigid::{self, Body, Booked, ENTRIES, Free, PUSH, Push, State},
     setup::Setup,
     spin::Turning,
     vote::Vote,
@@ -177,14 +178,24 @@ impl Domain {
         let stride = self.stride();
         let (time, loads, quanta) = (self.time, &self.setup.loads, self.quanta);
         let advance = rigid::Advance { dt_previous, dt, time, loads, quanta };
-        for (b, (held, body)) in self.bodies.iter_mut().zip(&self.setup.bodies).enumerate() {
-            if self.sends_pushes {
+        let bodies = &self.setup.bodies;
+        if self.sends_pushes {
+            for (b, held) in self.bodies.iter_mut().enumerate() {
                 let first = ENTRIES as usize * b * stride;
                 held.push = Push::unpack(&std::array::from_fn::<f64, PUSH, _>(|i| {
                     totals[first + i / 3 * stride + i % 3]
                 }));
             }
-            held.booked = advance.run(body, &held.push, &mut held.state);
+        }
+        let states: Vec<State> = self.bodies.iter().map(|held| held.state).collect();
+        let free = |(held, body): (&Held, &Body)| advance.free(body, &held.push, &held.state);
+        let free: Vec<Free> = self.bodies.iter().zip(bodies).map(free).collect();
+        let moving = Moving { advance: &advance, bodies, states: &states, free: &free };
+        let (impulses, votes) = self.mechanism.hold(&self.setup.joints, &moving);
+        self.joint_votes = votes;
+        for (b, held) in self.bodies.iter_mut().enumerate() {
+            held.state = advance.moved(&bodies[b], &free[b], &impulses[b], &states[b]);
+            held.booked = advance.booked(&bodies[b], &free[b], &impulses[b], &states[b], &held.state);
             if dt_previous == 0.0 {
                 held.booked.external.put_off();
             }
@@ -193,6 +204,7 @@ impl Domain {
 
     /// What the bodies say of a cycle.
     pub(super) fn vote_on_bodies(&self, vote: &mut Vote) {
+        vote.joints.clone_from(&self.joint_votes);
         for (held, body) in self.bodies.iter().zip(&self.setup.bodies) {
             vote.bodies.push(held.state);
             if let Some((limit, element)) = body.courant
