@@ -25,7 +25,7 @@ deck = "study-deck.toml"
 name = "velocity"
 values = [100, 200]
 [[measure]]
-name = "kinetic"
+name = "left"
 of = "kinetic"
 """
 STAYS = ("master", "worker", "report")
@@ -60,10 +60,11 @@ def main():
     try:
         for words in commands():
             words = [named.get(word, word) for word in words]
-            if words[0] in ("run", "submit") and "--resume" not in words:
-                words += ["--cycles", "60"] if words[0] == "submit" else ["--cycles", "60", "--force"]
             if "--resume" in words:
                 interrupt(folder)
+                words += ["--cycles", "3000"]
+            elif words[0] in ("run", "submit"):
+                words += ["--cycles", "60"] if words[0] == "submit" else ["--cycles", "60", "--force"]
             print("bolide", shlex.join(words), flush=True)
             if words[0] in STAYS:
                 process = subprocess.Popen([BOLIDE, *words], cwd=folder, stdout=subprocess.PIPE, text=True)
@@ -89,7 +90,7 @@ def interrupt(folder):
     run = subprocess.Popen(
         [BOLIDE, "run", f"{DECK}.toml", "--force"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
-    time.sleep(1.5)
+    time.sleep(1)
     run.send_signal(signal.SIGINT)
     _, told = run.communicate(timeout=60)
     assert run.returncode == 130 and "--resume" in told, f"exit code {run.returncode}: {told}"
