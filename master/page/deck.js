@@ -63,7 +63,7 @@ async function look(found) {
   $('forecast').textContent = [
     `${elements.toLocaleString('en')} elements, to ${lists.number(end * 1e3, 3)} ms`,
     step && `first step ${lists.number(step * 1e9, 3)} ns, ${cycles.toLocaleString('en')} cycles`,
-    takes != null && `${lists.seconds(takes)} on one thread`, `${lists.bytes(memory)} of memory`,
+    takes != null && `${takes < 1 ? 'less than 1 s' : lists.seconds(takes)} on one thread`, `${lists.bytes(memory)} of memory`,
   ].filter(Boolean).join('; ');
   lists.table($('deck-parts'), parts.map(part => [part.name, part.material, part.elements.toLocaleString('en'), lists.number(part.mass_kg, 4), lists.number(part.speed_m_s, 4), lists.number(part.least_cell_m * 1e3, 3)]));
   const text = deck.texts.get(deck.name);

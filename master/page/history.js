@@ -33,9 +33,12 @@ function quantities(columns) {
 
 let drawn = null;
 let busy = false;
+/// What was asked for while the last answer was on its way.
+let next = null;
 
 export function open() {
   drawn = null;
+  next = null;
   $('quantity').replaceChildren();
   $('no-history').hidden = true;
 }
@@ -57,7 +60,10 @@ function fill(found) {
 
 /// Asks for the chosen quantity of a job and of the one beside it, and draws it.
 export async function update(job, beside) {
-  if (busy) return;
+  if (busy) {
+    next = [job, beside];
+    return;
+  }
   busy = true;
   try {
     const runs = await Promise.all([job, beside].filter(Boolean).map(async number => {
@@ -83,6 +89,11 @@ export async function update(job, beside) {
     $('no-history').hidden = false;
   } finally {
     busy = false;
+  }
+  if (next) {
+    const asked = next;
+    next = null;
+    await update(...asked);
   }
 }
 

@@ -124,10 +124,10 @@ export function faults(box, name, list, texts) {
   box.focus();
 }
 
-/// A table of text: rows of cells, of which all but the first are numbers.
+/// A table of text: rows of cells. What begins like a number, and every heading above such, stands at the right.
 export function table(body, rows, kind = 'td') {
   body.replaceChildren(...rows.map(cells => element('tr', {}, ...cells.map((cell, i) => {
-    const made = element(kind, { textContent: cell, className: i ? 'n' : '' });
+    const made = element(kind, { textContent: cell, className: i && (kind === 'th' || /^[-–\d]/.test(cell)) ? 'n' : '' });
     if (kind === 'th') made.setAttribute('scope', 'col');
     return made;
   }))));

@@ -127,7 +127,7 @@ async function sheet() {
     job();
     panels();
     const due = final || page.ticks++ % HISTORY_EVERY === 0;
-    await Promise.all([bodies(), due && history.update(number, page.beside?.job), final && ended()]);
+    await Promise.all([bodies(), due && history.update(number, page.beside?.job), due && outcome.files(number), final && ended()]);
   } catch (error) {
     if (number !== page.chosen) return;
     $('unkept').hidden = false;
@@ -140,10 +140,8 @@ async function sheet() {
 
 const bodies = () => view.update({ job: page.chosen, sheet: page.sheet }, page.beside);
 
-/// What is there once a job is over, and its files.
-async function ended() {
-  await Promise.all([outcome.draw(page.chosen, page.beside?.job, page.sheet), outcome.files(page.chosen)]);
-}
+/// What is there once a job is over.
+const ended = () => outcome.draw(page.chosen, page.beside?.job, page.sheet);
 
 function panels() {
   const { workers, phases } = page.sheet;

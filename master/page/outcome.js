@@ -88,5 +88,11 @@ export async function files(number) {
     const total = lists.bytes(states.reduce((sum, file) => sum + file.bytes, 0));
     made.push(lists.element('li', {}, lists.element('details', {}, lists.element('summary', { textContent: `${states.length} files of states, ${total}` }), inside)));
   }
+  // Rebuilding would close what is open and take the focus away.
+  const now = list.map(({ name, bytes }) => `${number}/${name}/${bytes}`).join();
+  if (parent.dataset.list === now) return;
+  parent.dataset.list = now;
+  const open = parent.querySelector('details')?.open;
   parent.replaceChildren(...made);
+  if (open && parent.querySelector('details')) parent.querySelector('details').open = true;
 }
