@@ -26,7 +26,7 @@ use crate::{
 };
 pub use crate::{client::Until, reading::ReadingArgs};
 
-/// Simulates impacts: bodies that strike, crush, penetrate or explode, on one PC or on several
+/// Simulates impacts: bodies that strike, crush, penetrate or explode
 #[derive(Debug, Parser)]
 #[command(name = "bolide", version, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Cli {
