@@ -131,7 +131,7 @@ pub enum Command {
         #[command(subcommand)]
         what: Certs,
     },
-    /// Write a commented deck of a usual problem; without a name list them
+    /// Write a commented deck of a usual problem, or list them
     Init {
         /// Which
         name: Option<String>,

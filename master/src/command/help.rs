@@ -26,9 +26,9 @@ const GROUPS: [(&str, &[&str]); 5] = [
 
 /// The first commands of somebody new.
 const EXAMPLES: &str = "Examples:
-  bolide init taylor-bar                 # writes taylor-bar.toml, a deck to start from
-  bolide check taylor-bar.toml           # what is wrong with it, and what a run takes
-  bolide run taylor-bar.toml             # runs it on this PC
+  bolide init taylor-bar           # writes taylor-bar.toml, to start from
+  bolide check taylor-bar.toml     # what is wrong with it, what a run takes
+  bolide run taylor-bar.toml       # runs it on this PC
   bolide report results/taylor-bar --open";
 
 pub(super) const RUN_EXAMPLES: &str = "Examples:
