@@ -110,7 +110,7 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 22] = [
+const NUMBERS: [(&str, &str); 23] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_002", "MAT_ORTHOTROPIC_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
@@ -133,6 +133,7 @@ const NUMBERS: [(&str, &str); 22] = [
     ("MAT_107", "MAT_MODIFIED_JOHNSON_COOK"),
     ("MAT_110", "MAT_JOHNSON_HOLMQUIST_CERAMICS"),
     ("MAT_111", "MAT_JOHNSON_HOLMQUIST_CONCRETE"),
+    ("MAT_272", "MAT_RHT"),
 ];
 
 /// Temperatures (K) and specific heat of a material that is not warmed: whatever the units, it stays cold.
@@ -272,6 +273,10 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
         "MAT_JOHNSON_HOLMQUIST_CONCRETE" => {
             needs_moduli = false;
             (None, brittle::concrete(&f, &mut limits, log))
+        }
+        "MAT_RHT" => {
+            needs_moduli = false;
+            (None, brittle::rht(&f, &mut limits, log))
         }
         "MAT_ORTHOTROPIC_ELASTIC" | "MAT_COMPOSITE_DAMAGE" => {
             needs_moduli = false;

@@ -162,7 +162,7 @@ struct About {
 const SHEAR: (&str, Measure, &str) = ("shear", STRESS, "shear modulus");
 
 /// The laws that materials of the library have.
-const LAWS: [About; 20] = [
+const LAWS: [About; 21] = [
     About {
         role: Role::Eos,
         kind: "linear",
@@ -322,6 +322,42 @@ const LAWS: [About; 20] = [
             ("t_room", KELVIN, "temperature at the start"),
             ("specific_heat", HEAT, "energy that warms a unit of mass by 1 K"),
             ("tension", STRESS, "mean tension that it bears"),
+        ],
+    },
+    About {
+        role: Role::Strength,
+        kind: "riedel-hiermaier-thoma",
+        formula: "strength = compressive_strength (1 - D) s(P*) R + D residual_a P*^residual_n, s through uniaxial compression, shear and tension; the pressure collapses pores from crush_pressure to compaction_pressure",
+        constants: &[
+            SHEAR,
+            ("compressive_strength", STRESS, "uniaxial compressive strength at rest"),
+            ("tension", NONE, "tensile strength, over compressive_strength"),
+            ("shear_strength", NONE, "strength in shear, over compressive_strength"),
+            ("a", NONE, "factor of the failure surface"),
+            ("n", NONE, "exponent of the failure surface"),
+            ("q0", NONE, "tensile over compressive meridian"),
+            ("b", NONE, "how that grows with P*"),
+            ("rate0", RATE, "rate in compression up to which the strength stays"),
+            ("tension_rate0", RATE, "the same in tension"),
+            ("beta", NONE, "exponent of the rate in compression"),
+            ("tension_beta", NONE, "exponent of the rate in tension"),
+            ("elastic_compression", NONE, "elastic limit over the strength in compression"),
+            ("elastic_tension", NONE, "the same in tension"),
+            ("hardening", NONE, "hardening shear modulus over shear"),
+            ("d1", NONE, "strain to fracture where P* above that of tearing is 1"),
+            ("d2", NONE, "its exponent"),
+            ("least_strain", NONE, "least strain to fracture"),
+            ("residual_a", NONE, "factor of the residual surface"),
+            ("residual_n", NONE, "its exponent"),
+            ("distension", NONE, "density without pores over density"),
+            ("crush_pressure", STRESS, "pressure at which pores begin to collapse"),
+            ("compaction_pressure", STRESS, "pressure at which all have collapsed"),
+            ("pore_exponent", NONE, "exponent of the distension"),
+            ("a1", STRESS, "bulk modulus without pores"),
+            ("a2", STRESS, "factor of the square"),
+            ("a3", STRESS, "factor of the cube"),
+            ("b0", NONE, "factor of the energy"),
+            ("b1", NONE, "that times the compression"),
         ],
     },
     About {

@@ -262,12 +262,13 @@ const WHOLE: u64 = 1_000_000;
 
 /// Every deck of `deck/examples`, the cycle at which its run ends, and what has happened by then. An explosive burns from the
 /// first cycle on.
-const EXAMPLES: [(&str, u64, Event); 22] = [
+const EXAMPLES: [(&str, u64, Event); 23] = [
     ("ball-on-shell.k", WHOLE, Event::Contact),
     ("ball-tears-sheet.toml", 400, Event::Erosion),
     ("bar-on-wall.k", WHOLE, Event::None),
     ("block-on-plate.k", WHOLE, Event::Contact),
     ("composite-panel.toml", 600, Event::Erosion),
+    ("concrete-crater.toml", 800, Event::Contact),
     ("explosive-on-plate.toml", WHOLE, Event::Contact),
     ("fragment-on-water-box.toml", 300, Event::Contact),
     ("girder-crush.toml", 4000, Event::Contact),

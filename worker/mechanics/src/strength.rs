@@ -35,6 +35,7 @@ pub(crate) mod plane_stress;
 pub(crate) mod porous;
 pub(crate) mod principal;
 pub(crate) mod remembering;
+pub(crate) mod riedel_hiermaier_thoma;
 pub(crate) mod segmented_ceramic;
 pub(crate) mod soil_foam;
 pub(crate) mod steinberg_guinan;
@@ -57,6 +58,7 @@ pub use modified_johnson_cook::ModifiedJohnsonCook;
 pub use mooney_rivlin::MooneyRivlin;
 pub use ogden::Ogden;
 pub use orthotropic::Orthotropic;
+pub use riedel_hiermaier_thoma::RiedelHiermaierThoma;
 pub use segmented_ceramic::SegmentedCeramic;
 pub use soil_foam::SoilFoam;
 pub use steinberg_guinan::SteinbergGuinan;
@@ -397,6 +399,8 @@ pub enum Strength {
     SegmentedCeramic(SegmentedCeramic),
     /// Concrete, with damage and a curve of crushing.
     HolmquistJohnsonCook(HolmquistJohnsonCook),
+    /// Concrete, with an elastic, a failure and a residual surface and pores that collapse.
+    RiedelHiermaierThoma(RiedelHiermaierThoma),
     /// Composites: orthotropic, with failure of fibres, matrix and layers.
     Orthotropic(Orthotropic),
     /// Rubber by the invariants of its stretch.
@@ -475,7 +479,7 @@ macro_rules! declared_laws {
 }
 
 declared_laws!(
-    Voce, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, Orthotropic, MooneyRivlin, Ogden, Viscoelastic;
+    Voce, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, RiedelHiermaierThoma, Orthotropic, MooneyRivlin, Ogden, Viscoelastic;
     CrushableFoam, LowDensityFoam, SoilFoam, Honeycomb,
 );
 
@@ -486,6 +490,7 @@ impl Strength {
             Strength::JohnsonHolmquist(_) => JohnsonHolmquist::HISTORY,
             Strength::SegmentedCeramic(_) => SegmentedCeramic::HISTORY,
             Strength::HolmquistJohnsonCook(_) => HolmquistJohnsonCook::HISTORY,
+            Strength::RiedelHiermaierThoma(_) => RiedelHiermaierThoma::HISTORY,
             Strength::MooneyRivlin(_) => MooneyRivlin::HISTORY,
             Strength::Ogden(_) => Ogden::HISTORY,
             Strength::Viscoelastic(_) => Viscoelastic::HISTORY,
@@ -500,8 +505,17 @@ impl Strength {
 
     /// Whether the law damages its elements itself.
     pub fn damages(&self) -> bool {
-        use Strength::{HolmquistJohnsonCook, JohnsonHolmquist, Orthotropic, SegmentedCeramic};
-        matches!(self, JohnsonHolmquist(_) | SegmentedCeramic(_) | HolmquistJohnsonCook(_) | Orthotropic(_))
+        use Strength::{
+            HolmquistJohnsonCook, JohnsonHolmquist, Orthotropic, RiedelHiermaierThoma, SegmentedCeramic,
+        };
+        matches!(
+            self,
+            JohnsonHolmquist(_)
+                | SegmentedCeramic(_)
+                | HolmquistJohnsonCook(_)
+                | RiedelHiermaierThoma(_)
+                | Orthotropic(_)
+        )
     }
 
     /// What the constants would have to be, where each is within its bounds and together they make no law.
@@ -512,6 +526,7 @@ impl Strength {
             Strength::SteinbergGuinan(law) => law.fault(),
             Strength::SegmentedCeramic(law) => law.fault(),
             Strength::HolmquistJohnsonCook(law) => law.fault(),
+            Strength::RiedelHiermaierThoma(law) => law.fault(),
             Strength::Ogden(law) => law.fault(),
             Strength::Viscoelastic(law) => law.fault(),
             Strength::SoilFoam(law, curve) => law.fault(curve),
@@ -525,6 +540,7 @@ impl Strength {
     pub fn bulk(&self) -> Option<f64> {
         match self {
             Strength::HolmquistJohnsonCook(law) => Some(law.bulk()),
+            Strength::RiedelHiermaierThoma(law) => Some(law.bulk()),
             Strength::CrushableFoam(law, _) => Some(law.bulk()),
             Strength::LowDensityFoam(law, _) => Some(law.bulk()),
             Strength::SoilFoam(law, _) => Some(law.unloading),

@@ -2,7 +2,7 @@
 
 use mechanics::{
     material::{Eos, Failure, Strength},
-    strength::{HolmquistJohnsonCook, JohnsonHolmquist},
+    strength::{HolmquistJohnsonCook, JohnsonHolmquist, RiedelHiermaierThoma},
 };
 
 use super::{Law, not_negative};
@@ -112,4 +112,84 @@ pub(super) fn concrete(f: &[Fields<'_>; 8], limits: &mut Limits, log: &Log<'_>) 
     }
     let eos = Eos::Linear { bulk: strength.bulk()? };
     Some(Law::Whole { strength, eos, failure: Failure::None, given: "PC, UC, PL, UL and K1 to K3" })
+}
+
+/// Beyond this a rate is never.
+const NEVER: f64 = 1e15;
+
+/// Five cards of `*MAT_RHT`.
+pub(super) fn rht(f: &[Fields<'_>; 8], limits: &mut Limits, log: &Log<'_>) -> Option<Law> {
+    let shear = f[0].positive(2, "SHEAR");
+    let [a, n, compressive_strength, shear_strength, tension, q0] =
+        [(0, "A"), (1, "N"), (2, "FC"), (3, "FS*"), (4, "FT*"), (5, "Q0")]
+            .map(|(i, what)| f[1].positive(i, what));
+    let [rate0, tension_rate0] = [(0, "E0C"), (1, "E0T")].map(|(i, what)| f[2].positive(i, what));
+    let [hardening, d2, least_strain, residual_n] =
+        [(2, "XI"), (4, "D2"), (5, "EPM"), (7, "NF")].map(|(i, what)| f[3].positive(i, what));
+    let [a1, crush_pressure, compaction_pressure, pore_exponent, distension] =
+        [(1, "A1"), (4, "PEL"), (5, "PCO"), (6, "NP"), (7, "ALPHA0")].map(|(i, what)| f[4].positive(i, what));
+    for (i, name) in [(2, "EC"), (3, "ET")] {
+        if (f64::MIN_POSITIVE..NEVER).contains(&f[2].real(i, 0.0)) {
+            f[2].fault(
+                i,
+                format!("{name} beyond any rate: one power of the rate"),
+                "leave it blank or give 3e25",
+            );
+        }
+    }
+    if let Some(a1) = a1
+        && ![0.0, a1].contains(&f[0].real(7, 0.0))
+    {
+        f[0].fault(7, "T1 that is A1", "correct it");
+    }
+    if f[1].real(7, 0.0) != 0.0 {
+        f[1].fault(7, "T2 0", "leave it blank");
+    }
+    if f[2].real(6, 0.0) > 0.0 {
+        log.warn(f[2].place(6), "PTF: plastic flow does not follow the pressure here");
+    }
+    if f[4].real(0, 0.0) != 0.0 {
+        f[4].fault(0, "GAMMA 0: the energy by B0 and B1", "leave it blank, and give B0 and B1");
+    }
+    limits.read_failure_strain(&f[0], 4, "EPSF");
+    let elastic =
+        [0, 1].map(|i| f[3].within(i, 1.0, Range::Within(0.0, 1.0, "a number above 0 and at most 1")));
+    let law = RiedelHiermaierThoma {
+        shear: shear?,
+        compressive_strength: compressive_strength?,
+        tension: tension?,
+        shear_strength: shear_strength?,
+        a: a?,
+        n: n?,
+        q0: q0?,
+        b: not_negative(&f[1], 6),
+        rate0: rate0?,
+        tension_rate0: tension_rate0?,
+        beta: not_negative(&f[2], 4),
+        tension_beta: not_negative(&f[2], 5),
+        elastic_compression: elastic[0],
+        elastic_tension: elastic[1],
+        hardening: hardening?,
+        d1: not_negative(&f[3], 3),
+        d2: d2?,
+        least_strain: least_strain?,
+        residual_a: not_negative(&f[3], 6),
+        residual_n: residual_n?,
+        distension: distension?,
+        crush_pressure: crush_pressure?,
+        compaction_pressure: compaction_pressure?,
+        pore_exponent: pore_exponent?,
+        a1: a1?,
+        a2: not_negative(&f[4], 2),
+        a3: not_negative(&f[4], 3),
+        b0: not_negative(&f[0], 5),
+        b1: not_negative(&f[0], 6),
+    };
+    let strength = Strength::RiedelHiermaierThoma(law);
+    if let Some(expected) = strength.fault() {
+        f[1].fault(5, expected, "correct Q0, FS*, FT*, ALPHA0, PEL or PCO");
+        return None;
+    }
+    let eos = Eos::Linear { bulk: strength.bulk()? };
+    Some(Law::Whole { strength, eos, failure: Failure::None, given: "A1 to A3, PEL, PCO and ALPHA0" })
 }

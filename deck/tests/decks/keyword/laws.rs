@@ -5,7 +5,7 @@ use mechanics::{
     material::{Eos, Failure, Material, Strength},
     strength::{
         CrushableFoam, HolmquistJohnsonCook, Honeycomb, LowDensityFoam, ModifiedJohnsonCook, MooneyRivlin,
-        Ogden, Orthotropic, SoilFoam, SteinbergGuinan, Viscoelastic, ZerilliArmstrong,
+        Ogden, Orthotropic, RiedelHiermaierThoma, SoilFoam, SteinbergGuinan, Viscoelastic, ZerilliArmstrong,
     },
 };
 
@@ -233,6 +233,61 @@ fn concrete_has_its_constants_and_leaves_by_fs() {
     assert_eq!((limits("").plastic_strain, limits("").tension), (None, Some(4.0)));
     assert!(fault(&card("0.1", "-1")).contains("no failure by the damaged strength"));
     assert!(fault(&card("0.0005", "1")).contains("a lock point beyond the crush point"));
+}
+
+#[test]
+fn concrete_of_five_cards_has_its_constants() {
+    let card = |epsf: &str, ec: &str, t1: &str, q0: &str| {
+        format!(
+            "*MAT_RHT\n1,2.314e-9,16700,1,{epsf},1.22,1.22,{t1}\n1.6,0.61,35,0.18,0.1,{q0},0.0105,0\n\
+             3e-5,3e-6,{ec},3e25,0.032,0.036,0.001\n0.53,0.7,0.5,0.04,1,0.01,1.6,0.61\n\
+             0,35270,39580,9040,23.3,6000,3,1.1884\n"
+        )
+    };
+    let concrete = material(&card("2.0", "3e25", "35270", "0.6805"));
+    let law = RiedelHiermaierThoma {
+        shear: 16700.0,
+        compressive_strength: 35.0,
+        tension: 0.1,
+        shear_strength: 0.18,
+        a: 1.6,
+        n: 0.61,
+        q0: 0.6805,
+        b: 0.0105,
+        rate0: 3e-5,
+        tension_rate0: 3e-6,
+        beta: 0.032,
+        tension_beta: 0.036,
+        elastic_compression: 0.53,
+        elastic_tension: 0.7,
+        hardening: 0.5,
+        d1: 0.04,
+        d2: 1.0,
+        least_strain: 0.01,
+        residual_a: 1.6,
+        residual_n: 0.61,
+        distension: 1.1884,
+        crush_pressure: 23.3,
+        compaction_pressure: 6000.0,
+        pore_exponent: 3.0,
+        a1: 35270.0,
+        a2: 39580.0,
+        a3: 9040.0,
+        b0: 1.22,
+        b1: 1.22,
+    };
+    assert_eq!(concrete.strength, Strength::RiedelHiermaierThoma(law));
+    assert_eq!(concrete.eos, Eos::Linear { bulk: 35270.0 / 1.1884 });
+    assert_eq!(material(&card("2.0", "", "0", "0.6805").replace("MAT_RHT", "MAT_272")), concrete);
+    let deck = cube(&card("2.0", "3e25", "0", "0.6805"), "");
+    assert_eq!(read(&deck).setup.erosion.parts[0].expect("limits").plastic_strain, Some(2.0));
+    for (wrong, expected) in [
+        (card("2.0", "100", "0", "0.6805"), "EC beyond any rate"),
+        (card("2.0", "3e25", "30000", "0.6805"), "T1 that is A1"),
+        (card("2.0", "3e25", "0", "0.4"), "a q0 above 0.5"),
+    ] {
+        assert!(fault(&wrong).contains(expected), "{expected}: {}", fault(&wrong));
+    }
 }
 
 /// The constants of the cards below, elastic.

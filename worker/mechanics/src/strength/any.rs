@@ -82,6 +82,7 @@ impl AnyStrength {
             Strength::SteinbergGuinan(law) => Self::Elastic(Elastic { shear: law.shear }),
             Strength::SegmentedCeramic(law) => Self::Elastic(Elastic { shear: law.shear }),
             Strength::HolmquistJohnsonCook(law) => Self::Elastic(Elastic { shear: law.shear }),
+            Strength::RiedelHiermaierThoma(law) => Self::Elastic(Elastic { shear: law.shear }),
             Strength::MooneyRivlin(law) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::Ogden(law) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::Viscoelastic(law) => Self::Elastic(Elastic { shear: law.shear }),

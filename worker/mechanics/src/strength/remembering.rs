@@ -5,7 +5,7 @@ use super::{
     Around, Deviator, History, Memory, MooneyRivlin, Ogden, Strength, StrengthLaw, Viscoelastic,
     crushable_foam::Crushable, holmquist_johnson_cook::Concrete, honeycomb::Cells,
     johnson_holmquist::Ceramic, low_density_foam::LowDensity, orthotropic::Laminate, porous::PorousSolid,
-    segmented_ceramic::Segmented, soil_foam::Soil, steinberg_guinan::Metal,
+    riedel_hiermaier_thoma, segmented_ceramic::Segmented, soil_foam::Soil, steinberg_guinan::Metal,
 };
 use crate::{
     lanes::Lane,
@@ -25,6 +25,7 @@ pub(crate) enum AnyRemembering {
     SoilFoam(Soil),
     Porous(PorousSolid),
     HolmquistJohnsonCook(Concrete),
+    RiedelHiermaierThoma(riedel_hiermaier_thoma::Concrete),
     SteinbergGuinan(Metal),
     SegmentedCeramic(Segmented),
     Orthotropic(Laminate),
@@ -44,6 +45,7 @@ macro_rules! of_any {
             AnyRemembering::SoilFoam($law) => $call,
             AnyRemembering::Porous($law) => $call,
             AnyRemembering::HolmquistJohnsonCook($law) => $call,
+            AnyRemembering::RiedelHiermaierThoma($law) => $call,
             AnyRemembering::SteinbergGuinan($law) => $call,
             AnyRemembering::SegmentedCeramic($law) => $call,
             AnyRemembering::Orthotropic($law) => $call,
@@ -75,6 +77,9 @@ impl AnyRemembering {
             Strength::LowDensityFoam(law, curve) => Some(Self::LowDensityFoam(LowDensity::new(&law, &curve))),
             Strength::SoilFoam(law, curve) => Some(Self::SoilFoam(Soil::new(&law, &curve))),
             Strength::HolmquistJohnsonCook(law) => Some(Self::HolmquistJohnsonCook(Concrete::new(&law))),
+            Strength::RiedelHiermaierThoma(law) => {
+                Some(Self::RiedelHiermaierThoma(riedel_hiermaier_thoma::Concrete::new(&law)))
+            }
             Strength::SteinbergGuinan(law) => Some(Self::SteinbergGuinan(Metal::new(&law, material.density))),
             Strength::SegmentedCeramic(law) => {
                 Some(Self::SegmentedCeramic(Segmented::new(&law, material.bulk())))

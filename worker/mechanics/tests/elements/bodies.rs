@@ -207,6 +207,39 @@ pub fn all_laws() -> Vec<Material> {
         least_strain: 0.01,
     };
     add(linear, Strength::HolmquistJohnsonCook(concrete), Failure::None);
+    // Of the stiffness of the others, with few pores, so that it crushes and breaks in the motions of the tests.
+    let rht = mechanics::strength::RiedelHiermaierThoma {
+        shear,
+        compressive_strength: 4e8,
+        tension: 0.1,
+        shear_strength: 0.18,
+        a: 1.6,
+        n: 0.61,
+        q0: 0.6805,
+        b: 0.0105,
+        rate0: 3e-5,
+        tension_rate0: 3e-6,
+        beta: 0.032,
+        tension_beta: 0.036,
+        elastic_compression: 0.53,
+        elastic_tension: 0.7,
+        hardening: 0.5,
+        d1: 0.04,
+        d2: 1.0,
+        least_strain: 0.01,
+        residual_a: 1.6,
+        residual_n: 0.61,
+        distension: 1.02,
+        crush_pressure: 1e8,
+        compaction_pressure: 2e9,
+        pore_exponent: 3.0,
+        a1: 1.02 * 164e9,
+        a2: 0.0,
+        a3: 0.0,
+        b0: 1.0,
+        b1: 1.0,
+    };
+    add(linear, Strength::RiedelHiermaierThoma(rht), Failure::None);
     let porous = mechanics::material::Porous {
         solid_density: 8200.0,
         c0: 4569.0,
