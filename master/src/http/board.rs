@@ -324,8 +324,11 @@ impl JobView {
         let spans = || self.workers.values().filter_map(|w| w.report.as_ref()).flat_map(|r| &r.spans);
         let start = spans().map(|span| span.start_ns).min().unwrap_or(0);
         let workers: Vec<_> = self.workers.iter().map(|(name, worker)| worker.json(name, start)).collect();
-        let states: Vec<_> =
-            self.states.iter().map(|s| serde_json::json!({ "key": s.cycle, "time": s.time })).collect();
+        let states: Vec<_> = self
+            .states
+            .iter()
+            .map(|s| serde_json::json!({ "key": s.cycle, "cycle": s.cycle, "time": s.time }))
+            .collect();
         let parts = self.skin.parts();
         serde_json::json!({
             "brief": self.brief,
