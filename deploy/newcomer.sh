@@ -80,10 +80,8 @@ without_chance() {
         -e 's/^    [0-9-]+T[0-9:.]+Z +/    TIME /' \
         -e 's/10\.77\.0\.2:[0-9]+ announced=[0-9]+/10.77.0.2:PORT announced=PORT/' \
         -e 's/incarnation=[0-9]+/incarnation=N/' \
-        -e 's/in [0-9.]+ s on 1 worker with [0-9]+ threads?, [a-z0-9]+ lanes/in SECONDS on 1 worker/' \
-        -e 's/[0-9.]+ ns of thread time/NS of thread time/' \
-        -e 's/[0-9.]+ % of it in contact/SHARE of it in contact/' \
-        -e 's/[0-9,]+ bytes per cycle, [0-9,]+ of them/BYTES per cycle, BYTES of them/' \
+        -e 's/in [0-9.]+ s on 1 worker with [0-9]+ threads?/in SECONDS on 1 worker/' \
+        -e 's/^( *origin +bolide [0-9.]+), .*/\1/' \
         -e '/^    job 1 running( .*)?$/d'
 }
 

@@ -1,4 +1,5 @@
-//! The page in a real browser: drop a deck, see it run, turn the model, read the digest.
+//! The page in a real browser: drop a deck, see what it describes, run it, turn and cut the model, fetch results, run again, compare; and
+//! the same page of `bolide report`, without a master.
 
 use std::process::Command;
 
@@ -8,6 +9,23 @@ use tests::{
 };
 
 const BOLIDE: &str = env!("CARGO_BIN_EXE_bolide");
+
+/// Waits for the deck that was dropped to be shown, and runs it.
+fn run_it(browser: &mut Browser, name: &str) {
+    browser.wait_for(&format!(
+        "!document.getElementById('deck').hidden && document.getElementById('h-deck').textContent.startsWith('{name}')"
+    ));
+    browser.evaluate("document.getElementById('run').click()");
+}
+
+/// Gives a control of the page a value, as a user does.
+fn set(browser: &mut Browser, id: &str, value: &str) {
+    browser.evaluate(&format!(
+        "(() => {{ const c = document.getElementById('{id}'); if (c.type === 'checkbox') c.checked = {value} === 'true'; \
+         else c.value = {value}; c.dispatchEvent(new Event('input')); c.dispatchEvent(new Event('change')); }})()",
+        value = serde_json::json!(value)
+    ));
+}
 
 /// What a drop of files does, by their names and texts.
 fn drop_files(files: &[(&str, &str)]) -> String {
@@ -79,6 +97,15 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     // A good one runs as soon as there are workers.
     browser.evaluate("document.getElementById('cycles').value = '40'");
     browser.evaluate(&drop_files(&[("plates-small.toml", &deck)]));
+    // Before it is submitted it says what it describes, and is drawn.
+    browser.wait_for("document.getElementById('deck-bodies').dataset.faces > 1000");
+    let forecast = browser.evaluate("document.getElementById('deck').innerText");
+    let forecast = forecast.as_str().expect("text");
+    for words in ["no fault", "3,456 elements", "projectile", "STEEL", "first step"] {
+        assert!(forecast.contains(words), "{words} in {forecast}");
+    }
+    assert_eq!(browser.evaluate("document.querySelectorAll('#jobs li').length"), 0);
+    run_it(&mut browser, "plates-small.toml");
     browser.wait_for("document.getElementById('facts').innerText.includes('queued')");
     // One click on Cancel asks, and ends nothing.
     browser.evaluate("document.getElementById('cancel').click()");
@@ -109,14 +136,104 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
          return new Set(new Uint32Array(t.getImageData(0, 0, d.width, d.height).data.buffer)).size })()";
     assert!(browser.evaluate(colours).as_u64().expect("a number") > 20, "bodies are drawn in many colours");
 
-    // No wider than a small screen.
+    // The address is that of the job: opened anew it shows the same one.
+    let address_of_job = browser.evaluate("location.href");
+    let address_of_job = address_of_job.as_str().expect("an address").to_owned();
+    assert!(address_of_job.ends_with("/jobs/1"), "{address_of_job}");
+    browser.call("Page.navigate", serde_json::json!({ "url": address_of_job }));
+    browser.wait_for("document.getElementById('title')?.textContent.startsWith('job 1:')");
+    browser.wait_for("document.getElementById('bodies').dataset.cycle === '40'");
+
+    // A cut takes faces away and opens others, a part can go, and the bar has field and unit.
+    let faces = "Number(document.getElementById('bodies').dataset.faces)";
+    let whole = browser.evaluate(faces).as_u64().expect("a number");
+    // Two boxes: 24 x 12 x 8 and 24 x 12 x 4 cells.
+    assert_eq!(whole, 2 * (24 * 12 + 24 * 8 + 12 * 8) + 2 * (24 * 12 + 24 * 4 + 12 * 4));
+    set(&mut browser, "field", "pressure");
+    assert_eq!(browser.wait_for("document.getElementById('what').textContent"), "pressure (Mbar)");
+    set(&mut browser, "cut", "x");
+    let half = 2 * (12 * 12 + 12 * 8 + 12 * 8) + 2 * (12 * 12 + 12 * 4 + 12 * 4);
+    browser.wait_for(&format!("{faces} === {half}"));
+    browser.evaluate("document.querySelector('#parts input').click()");
+    let plate = 2 * (12 * 12 + 12 * 4 + 12 * 4);
+    browser.wait_for(&format!("{faces} === {plate}"));
+    browser.evaluate("document.querySelector('#parts input').click()");
+    set(&mut browser, "cut", "");
+    browser.wait_for(&format!("{faces} === {whole}"));
+    set(&mut browser, "map", "heat");
+    set(&mut browser, "edges", "false");
+
+    // Verdict, curves of gauges and parts, and files.
+    browser.wait_for("document.getElementById('measures').innerText.includes('energy error')");
+    set(&mut browser, "quantity", "kinetic");
+    browser.wait_for("document.getElementById('history-legend').innerText.includes('projectile')");
+    browser.wait_for("document.querySelectorAll('#files a').length > 5");
+    let fetched = browser.evaluate(
+        "(async () => { const link = [...document.querySelectorAll('#files a')].find(a => a.textContent === 'state-000001.vtu' || \
+         a.textContent === 'history.csv'); const bytes = await (await fetch(link.href)).arrayBuffer(); \
+         return [link.textContent, [...new Uint8Array(bytes)]]; })()",
+    );
+    let results = folder.path().join("fetched");
+    let mut command = Command::new(BOLIDE);
+    command.args(["results", "1", "--master", &address, "--out"]).arg(&results);
+    assert!(command.status().expect("bolide runs").success());
+    let bytes: Vec<u8> =
+        fetched[1].as_array().expect("bytes").iter().map(|b| b.as_u64().expect("a byte") as u8).collect();
+    let file = results.join(fetched[0].as_str().expect("a name"));
+    assert_eq!(bytes, std::fs::read(&file).expect("the command has fetched it"), "{}", file.display());
+    // The archive holds the same files.
+    let archive = browser.evaluate(
+        "(async () => { const bytes = await (await fetch(document.getElementById('all-files').href)).arrayBuffer(); \
+         return [...new Uint8Array(bytes)]; })()",
+    );
+    let archive: Vec<u8> =
+        archive.as_array().expect("bytes").iter().map(|b| b.as_u64().expect("a byte") as u8).collect();
+    std::fs::write(folder.path().join("job.tar"), archive).expect("room");
+    let unpacked = Command::new("tar").arg("-xf").arg("job.tar").current_dir(folder.path()).status();
+    assert!(unpacked.expect("tar runs").success());
+    for entry in std::fs::read_dir(&results).expect("results") {
+        let path = entry.expect("an entry").path();
+        let other = folder.path().join("job-1").join(path.file_name().expect("a name"));
+        assert_eq!(std::fs::read(&path).ok(), std::fs::read(&other).ok(), "{}", path.display());
+    }
+
+    // No wider than a small screen, on which the job comes first.
     browser.picture(400, 900, true);
     assert_eq!(browser.evaluate("document.documentElement.scrollWidth"), 400);
+    browser.picture(1280, 900, false);
+
+    // Everything that can be used has a name that is read aloud.
+    let nameless = browser.evaluate(
+        "[...document.querySelectorAll('button, input, select, textarea, a, canvas[role]')].filter(e => !e.ariaLabel && \
+         !e.getAttribute('aria-label') && !e.labels?.length && !e.textContent.trim() && !e.closest('label')).map(e => e.id)",
+    );
+    assert_eq!(nameless, serde_json::json!([]));
+
+    // Again, with another velocity, and both beside each other.
+    browser.evaluate("document.getElementById('again').click()");
+    browser.wait_for("!document.getElementById('deck').hidden && document.getElementById('deck-text').value");
+    browser.evaluate(
+        "document.getElementById('deck-text').value = document.getElementById('deck-text').value.replace('-0.05', '-0.06')",
+    );
+    browser
+        .evaluate("document.getElementById('cycles').value = '40'; document.getElementById('run').click()");
+    let other = browser.wait_for(
+        "document.getElementById('title').textContent.startsWith('job 2') && \
+         document.querySelector('#facts .digest')?.textContent",
+    );
+    assert_ne!(other, digest, "another velocity");
+    set(&mut browser, "beside", "1");
+    browser.wait_for(
+        "!document.getElementById('other').hidden && document.getElementById('other').dataset.cycle === '40'",
+    );
+    browser.wait_for("document.getElementById('measured').innerText.includes('differs')");
+    browser.wait_for("document.getElementById('history-legend').innerText.includes('job 1')");
 
     // The keyword deck with its mesh is one problem, and has the digest of its files.
     browser.evaluate(&drop_files(&[("block-on-plate-mesh.k", &mesh), ("block-on-plate.k", &block)]));
+    run_it(&mut browser, "block-on-plate.k");
     let both = browser.wait_for(
-        "document.getElementById('title').textContent.startsWith('job 2') && \
+        "document.getElementById('title').textContent.startsWith('job 3') && \
          document.querySelector('#facts .digest')?.textContent",
     );
     let keyword = repository("deck/examples/block-on-plate.k").display().to_string();
@@ -128,4 +245,54 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     let run = said(Command::new(BOLIDE).args(["run", &deck, "--cycles", "40", "--no-output", "--json"]));
     let summary: serde_json::Value = serde_json::from_str(&run.out).expect("a summary");
     assert_eq!(digest, summary["digest"]);
+}
+
+#[test]
+fn a_report_shows_results_without_a_master_mirrored_and_beside_each_other() {
+    let Some(program) = browser::find() else {
+        assert!(std::env::var_os("CI").is_none(), "CI has a browser: .ci/run installs it");
+        println!("skipped: no chromium on this machine");
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let bar = repository("deck/examples/taylor-copper.toml").display().to_string();
+    let deck = std::fs::read_to_string(&bar).expect("an example");
+    // A quarter of a bar, by intent.
+    let quarter = folder.path().join("quarter.toml");
+    let text = "title = \"quarter\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = 0.002\n[symmetry]\nplanes = [\"x\", \"y\"]\n\
+        [[part]]\nname = \"bar\"\nmaterial = \"COPPER_TAYLOR_BENCHMARK\"\nvelocity = [0, 0, -227]\n\
+        box = { origin = [-3, -3, 0], size = [6, 6, 12], cells = [6, 6, 12] }\n[[wall]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n";
+    std::fs::write(&quarter, text).expect("room");
+    assert!(deck.contains("COPPER_TAYLOR_BENCHMARK"));
+    let mut folders = Vec::new();
+    for (name, deck) in [("bar", &bar), ("quarter", &quarter.display().to_string())] {
+        let out = folder.path().join(name);
+        let run = said(Command::new(BOLIDE).args(["run", deck, "--cycles", "60", "--out"]).arg(&out));
+        assert!(run.out.contains("quality    "), "{}", run.out);
+        folders.push(out);
+    }
+    let mut command = Command::new(BOLIDE);
+    let report = Process::start("report", command.arg("report").args(&folders));
+    let page = report.wait_for("page: http://").trim_start_matches("page: ").to_owned();
+    let mut browser = Browser::start(&program, &folder.path().join("profile"));
+    browser.call("Page.navigate", serde_json::json!({ "url": page }));
+    browser.wait_for("document.getElementById('title')?.textContent.startsWith('job 2: quarter')");
+    // Three mirror images stand around the quarter.
+    browser.wait_for("document.getElementById('bodies').dataset.images === '4'");
+    set(&mut browser, "mirror", "false");
+    assert_eq!(browser.evaluate("document.getElementById('bodies').dataset.images"), "1");
+    assert_eq!(browser.evaluate("document.getElementById('submit-box').hidden"), true);
+    browser.wait_for("document.getElementById('measures').innerText.includes('energy error')");
+    set(&mut browser, "beside", "1");
+    browser.wait_for("document.getElementById('measured').innerText.includes('differs')");
+    browser.wait_for("Number(document.getElementById('other').dataset.faces) > 100");
+    let refused = browser.evaluate(
+        "fetch('../api/jobs?name=x.toml', { method: 'POST', body: '[control]' }).then(answer => answer.status)",
+    );
+    assert_eq!(refused, 422, "a deck with faults");
+    // The report of the folder opens in the page, with its style and without scripts.
+    let styled = browser.evaluate(
+        "fetch('../api/jobs/1/files/report.html').then(answer => answer.headers.get('content-security-policy'))",
+    );
+    assert!(styled.as_str().is_some_and(|policy| policy.starts_with("default-src 'none'; ")), "{styled}");
 }

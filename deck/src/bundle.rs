@@ -1,7 +1,7 @@
 //! A deck and the files that it refers to, as one text: what is sent to a master, and what [`crate::read`] takes.
 //!
 //! A deck of one file and no options is its own text. Any other starts with the line `#bolide-bundle 1`; then come
-//! lines `units NAME`, `case NUMBER`, `parameter NAME VALUE`, `title WORDS`, `perturb AMPLITUDE SEED`, and for each file, the deck first, `file BYTES NAME` with its text below.
+//! lines `units NAME`, `case NUMBER`, `parameter NAME VALUE`, `title WORDS`, `perturb AMPLITUDE SEED`, `refine FACTOR`, and for each file, the deck first, `file BYTES NAME` with its text below.
 //! A file from outside the folder of the deck is announced by `outside` instead of `file`. Who reads a deck of somebody else may not want
 //! that file shown, so no fault or warning quotes it.
 
@@ -16,6 +16,7 @@ use crate::{
     log::Warning,
     parameters::{MAX_PARAMETERS, Parameters, is_parameter, substituted_if_possible},
     perturb::Perturbation,
+    refine::MAX_FACTOR,
 };
 
 const FIRST: &str = "#bolide-bundle 1";
@@ -40,6 +41,8 @@ pub struct Options {
     pub title: Option<String>,
     /// How the nodes are moved once the mesh is made.
     pub perturbation: Option<Perturbation>,
+    /// How many times as many cells blocks have along every direction; none for as many as the deck says.
+    pub refine: Option<u32>,
 }
 
 /// The kinds of text that are a deck.
@@ -112,6 +115,10 @@ impl<'a> Bundle<'a> {
                 }
                 "perturb" => {
                     bundle.options.perturbation = Some(perturbation(rest).ok_or_else(|| broken(start))?);
+                }
+                "refine" => {
+                    let factor = rest.parse().ok().filter(|factor| (2..=MAX_FACTOR).contains(factor));
+                    bundle.options.refine = Some(factor.ok_or_else(|| broken(start))?);
                 }
                 "file" | "outside" => {
                     let (bytes, name) = rest.split_once(' ').ok_or_else(|| broken(start))?;
@@ -248,6 +255,9 @@ pub fn gather_from(
     if let Some(Perturbation { nodes, seed }) = options.perturbation {
         packed += &format!("perturb {nodes:?} {seed}\n");
     }
+    if let Some(factor) = options.refine {
+        packed += &format!("refine {factor}\n");
+    }
     for (name, text) in &files {
         let word = if outside.contains(name) { "outside" } else { "file" };
         packed += &format!("{word} {} {}\n{text}\n", text.len(), name.replace('\n', " "));
@@ -304,6 +314,7 @@ mod tests {
             parameters: Parameters::from([("t".to_string(), 0.1), ("v".to_string(), -3e300)]),
             title: Some("one of many".to_string()),
             perturbation: Some(Perturbation { nodes: 1e-9, seed: u64::MAX }),
+            refine: Some(3),
         };
         let packed = gather(texts[0].0, texts[0].1.to_string(), &options, &mut |path| {
             asked.push(path.to_string());

@@ -27,6 +27,7 @@ pub mod parameters;
 pub mod perturb;
 pub mod physics;
 mod place;
+pub mod refine;
 pub mod schema;
 pub mod starters;
 pub mod table;
@@ -94,6 +95,14 @@ pub fn read_whole(text: &str, file_name: &str) -> Result<Reading, Vec<Fault>> {
     read_with(text, file_name, &UNBOUNDED)
 }
 
+/// As [`read_within`], with the warnings.
+///
+/// # Errors
+/// As [`read_within`].
+pub fn read_whole_within(text: &str, file_name: &str, bounds: &Bounds<'_>) -> Result<Reading, Vec<Fault>> {
+    read_with(text, file_name, bounds)
+}
+
 fn read_with(text: &str, file_name: &str, bounds: &Bounds<'_>) -> Result<Reading, Vec<Fault>> {
     let bundle = deck_of(text, file_name)?;
     let reading = match Kind::of(bundle.files[0].1) {
@@ -138,7 +147,10 @@ fn read_toml(bundle: &Bundle<'_>, bounds: &Bounds<'_>) -> Result<Reading, Vec<Fa
     let mut files = bundle.files.clone();
     files[0].1 = text;
     let log = Log::toml(&files).within(bounds);
-    let deck = toml_deck::read(text, &log);
+    let mut deck = toml_deck::read(text, &log);
+    if let (Some(deck), Some(factor)) = (&mut deck, bundle.options.refine) {
+        refine::refine(deck, factor, &log);
+    }
     let mut meshes = mesh_file::read_all(bundle, deck.as_ref(), &log);
     let model = deck.as_ref().and_then(|deck| make::model(deck, &meshes.by_name, &log));
     let reading = conclude(model, deck.as_ref(), log, bundle);
@@ -166,7 +178,10 @@ fn read_keyword(
     bounds: &Bounds<'_>,
 ) -> Result<WholeKeyword, Vec<Fault>> {
     let log = Log::keyword(&bundle.files).within(bounds);
-    let (deck, mesh) = keyword::read(bundle, mesh_name, &log);
+    let (mut deck, mesh) = keyword::read(bundle, mesh_name, &log);
+    if let Some(factor) = bundle.options.refine {
+        refine::refine(&mut deck, factor, &log);
+    }
     let meshes = Meshes::from([(mesh_name.to_string(), Some(mesh))]);
     let model = make::model(&deck, &meshes, &log);
     let mesh = meshes.into_values().flatten().next().map(|mesh| mesh.file).unwrap_or_default();

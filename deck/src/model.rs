@@ -86,6 +86,8 @@ pub struct Output {
     pub gauges: Vec<Gauge>,
     /// Histories of elements.
     pub element_gauges: Vec<ElementGauge>,
+    /// Planes of symmetry through the origin, by the axis across them: where pictures show the whole body, its mirror image is added.
+    pub mirrors: [bool; 3],
 }
 
 impl Default for Output {
@@ -106,6 +108,7 @@ impl Default for Output {
             joints: Vec::new(),
             gauges: Vec::new(),
             element_gauges: Vec::new(),
+            mirrors: [false; 3],
         }
     }
 }

@@ -1,6 +1,6 @@
 // Curves over an axis, drawn when data or size change.
 
-import { number } from './lists.js';
+import { element, number } from './lists.js';
 
 export const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -25,7 +25,7 @@ function ticks(low, high, count) {
   return list;
 }
 
-// series: [{ name, colour, dash, y: [...] }] over x: [...]
+// series: [{ name, colour, dash, y: [...], x: [...] }], those without an x of their own over x: [...]; null is a gap.
 export function draw(canvas, { x, series, xName, yName, floor }) {
   const { context: c, width, height } = prepare(canvas);
   const soft = colour('--soft');
@@ -35,14 +35,15 @@ export function draw(canvas, { x, series, xName, yName, floor }) {
     return;
   }
   let [low, high] = floor ?? [0, 0];
-  for (const { y } of series) for (const v of y) { low = Math.min(low, v); high = Math.max(high, v); }
+  for (const { y } of series) for (const v of y) if (v !== null) { low = Math.min(low, v); high = Math.max(high, v); }
   if (!(high > low)) high = low + 1;
   high += (high - low) * 0.04;
   const rows = ticks(low, high, Math.max(2, height / 45));
   const labels = rows.map(t => number(t, 3));
   const left = Math.max(...labels.map(l => c.measureText(l).width)) + 10;
   const [top, right, bottom] = [16, width - 8, height - 20];
-  const [first, last] = [x[0], x[x.length - 1]];
+  const axes = series.map(s => s.x ?? x).filter(list => list.length);
+  const [first, last] = [Math.min(...axes.map(list => list[0])), Math.max(...axes.map(list => list.at(-1)))];
   const px = v => left + (v - first) / (last - first || 1) * (right - left);
   const py = v => bottom - (v - low) / (high - low) * (bottom - top);
   c.lineWidth = 1;
@@ -69,12 +70,34 @@ export function draw(canvas, { x, series, xName, yName, floor }) {
   c.fillText(yName, left, 9);
   c.lineWidth = 1.7;
   c.lineJoin = 'round';
-  for (const { y, colour: stroke, dash } of series) {
+  for (const { x: own = x, y, colour: stroke, dash } of series) {
     c.strokeStyle = colour(stroke);
     c.setLineDash(dash ?? []);
     c.beginPath();
-    y.forEach((v, i) => i ? c.lineTo(px(x[i]), py(v)) : c.moveTo(px(x[i]), py(v)));
+    let on = false;
+    y.forEach((v, i) => {
+      if (v !== null) on ? c.lineTo(px(own[i]), py(v)) : c.moveTo(px(own[i]), py(v));
+      on = v !== null;
+    });
     c.stroke();
   }
   c.setLineDash([]);
+}
+
+/// Entries of a legend: `{ colour, dash, words }` each.
+export function legend(parent, entries) {
+  if (parent.children.length !== entries.length || [...parent.children].some((item, i) => item.dataset.look !== `${entries[i].colour} ${entries[i].dash}`)) {
+    parent.replaceChildren(...entries.map(({ colour: stroke, dash }) => {
+      const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+      const line = document.createElementNS('http://www.w3.org/2000/svg', 'line');
+      for (const [key, value] of Object.entries({ x1: 0, x2: 22, y1: 4, y2: 4, 'stroke-width': 2, 'stroke-dasharray': (dash ?? []).join(' ') })) line.setAttribute(key, value);
+      line.style.stroke = `var(${stroke})`;
+      svg.append(line);
+      svg.setAttribute('aria-hidden', 'true');
+      const item = element('li', {}, svg, element('span'));
+      item.dataset.look = `${stroke} ${dash}`;
+      return item;
+    }));
+  }
+  entries.forEach(({ words }, i) => { if (parent.children[i].lastChild.textContent !== words) parent.children[i].lastChild.textContent = words; });
 }

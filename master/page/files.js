@@ -57,14 +57,44 @@ function seen(path, deck) {
   return [...from.map(() => '..'), ...to].join('/');
 }
 
+const HEAD = '#bolide-bundle 1\n';
+const bytes = words => new TextEncoder().encode(words).length;
+
+/// Texts by name, the deck first, as one text. `options` are lines that a deck needs beside its files.
+function joined(texts, options) {
+  if (texts.size === 1 && !options.length) return [...texts.values()][0];
+  const pieces = [...texts].map(([path, words]) => `file ${bytes(words)} ${path}\n${words}\n`);
+  return `${HEAD}${options.map(line => `${line}\n`).join('')}${pieces.join('')}`;
+}
+
 /// The deck's name, the text to send, and the text of each file by its name there.
 export function bundle(files) {
   const deck = files.length === 1 ? files[0] : deckOf(files);
   const named = [deck, ...files.filter(file => file !== deck)].map(file => [seen(file.path, deck.path), file.text]);
   const texts = new Map(named);
-  const [[name, text]] = named;
-  if (named.length === 1) return { name, text, texts };
-  const bytes = words => new TextEncoder().encode(words).length;
-  const pieces = named.map(([path, words]) => `file ${bytes(words)} ${path}\n${words}\n`);
-  return { name, text: `#bolide-bundle 1\n${pieces.join('')}`, texts };
+  return { name: named[0][0], text: joined(texts, []), texts, options: [] };
+}
+
+/// A text that was sent once, as `bundle` made it or `bolide submit`; `name` is that of a deck of one file.
+export function opened(name, text) {
+  if (!text.startsWith(HEAD)) return { name, text, texts: new Map([[name, text]]), options: [] };
+  const all = new TextEncoder().encode(text), texts = new Map(), options = [];
+  const decoder = new TextDecoder();
+  let at = HEAD.length;
+  while (at < all.length) {
+    const end = all.indexOf(10, at), line = decoder.decode(all.subarray(at, end < 0 ? all.length : end)).trim();
+    at = end < 0 ? all.length : end + 1;
+    const [, length, path] = line.match(/^(?:file|outside) (\d+) (.*)$/) ?? [];
+    if (path !== undefined) {
+      texts.set(path, decoder.decode(all.subarray(at, at + Number(length))));
+      at += Number(length);
+    } else if (line) options.push(line);
+  }
+  return { name: [...texts.keys()][0], text, texts, options };
+}
+
+/// A deck with another text in place of its own, the files that it names as they were.
+export function changed({ name, texts, options }, text) {
+  const now = new Map([...texts].map(([path, words]) => [path, path === name ? text : words]));
+  return { name, text: joined(now, options), texts: now, options };
 }

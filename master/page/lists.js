@@ -44,9 +44,15 @@ function set(target, property, value) {
   if (target[property] !== value) target[property] = value;
 }
 
-export function jobs(parent, list, chosen, choose) {
+/// Jobs, the newest first; each is a link to its address, which a click follows within the page.
+export function jobs(parent, list, chosen, choose, href) {
   keyed(parent, [...list].reverse(), job => job.job, job => {
-    const button = element('button', { type: 'button', onclick: () => choose(job.job) },
+    const follow = event => {
+      if (event.ctrlKey || event.metaKey || event.shiftKey) return;
+      event.preventDefault();
+      choose(job.job);
+    };
+    const button = element('a', { href: href(job.job), className: 'job', onclick: follow },
       element('span', { className: 'top' }, element('b'), element('span')),
       element('span', { className: 'name' }),
       element('progress', { max: 1, 'aria-hidden': 'true' }));
@@ -63,7 +69,8 @@ export function jobs(parent, list, chosen, choose) {
     set(button.children[1], 'title', job.title);
     set(button.children[2], 'hidden', !running);
     set(button.children[2], 'value', job.brief?.share ?? 0);
-    button.setAttribute('aria-pressed', String(job.job === chosen));
+    if (job.job === chosen) button.setAttribute('aria-current', 'page');
+    else button.removeAttribute('aria-current');
   });
 }
 
@@ -115,6 +122,22 @@ export function faults(box, name, list, texts) {
   box.replaceChildren(element('h4', { textContent: title }), element('ol', {}, ...items));
   box.hidden = false;
   box.focus();
+}
+
+/// A table of text: rows of cells. What begins like a number, and every heading above such, stands at the right.
+export function table(body, rows, kind = 'td') {
+  body.replaceChildren(...rows.map(cells => element('tr', {}, ...cells.map((cell, i) => {
+    const made = element(kind, { textContent: cell, className: i && (kind === 'th' || /^[-–\d]/.test(cell)) ? 'n' : '' });
+    if (kind === 'th') made.setAttribute('scope', 'col');
+    return made;
+  }))));
+}
+
+export function bytes(n) {
+  if (n < 1e3) return `${n} B`;
+  if (n < 1e6) return `${(n / 1e3).toFixed(1)} kB`;
+  if (n < 1e9) return `${(n / 1e6).toFixed(1)} MB`;
+  return `${(n / 1e9).toFixed(2)} GB`;
 }
 
 export function say(box, words) {

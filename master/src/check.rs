@@ -10,7 +10,10 @@ use deck::{
 };
 use serde::Serialize;
 
-use crate::deck_file::{Error, gather_deck, warn};
+use crate::{
+    deck_file::{Error, gather_deck, warn},
+    output,
+};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -111,13 +114,7 @@ fn digits(x: f64) -> String {
 
 /// A time that a person waits for.
 fn span(seconds: f64) -> String {
-    match seconds {
-        s if s < 1.0 => "less than 1 s".to_owned(),
-        s if s < 120.0 => format!("{s:.0} s"),
-        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
-        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
-        s => format!("{:.1} days", s / 86_400.0),
-    }
+    if seconds < 1.0 { "less than 1 s".to_owned() } else { output::span(seconds) }
 }
 
 fn size(bytes: u64) -> String {

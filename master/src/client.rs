@@ -1,7 +1,7 @@
 //! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel`, `resume` and `results`, the other end of the [`client_requests`](crate::client_requests).
 
 use std::{
-    io::Write,
+    io::{IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
     time::{Duration, Instant},
@@ -25,7 +25,8 @@ use crate::{
     deck_file::{self, doubt, gather_deck, warn},
     machine::host_name,
     notify::notify,
-    results::{Folder, create_anew},
+    output::span,
+    results::{Folder, Summary, Units, create_anew, summary::significant},
     shell::quoted,
 };
 
@@ -170,15 +171,13 @@ impl Client {
     /// Follows a job to its end; reports go to standard error.
     fn follow(&mut self, job: Option<u32>, until: Option<Until>, quiet: bool) -> Result<Status, String> {
         let mut reply = self.ask(&Request::Watch { job })?;
-        let mut last = String::new();
+        let mut line = Line::new();
         loop {
             let Reply::Status(status) = reply else { return Err(surprise()) };
             self.following = Some(status.job);
-            let line = line_of(&status);
-            if !quiet && line != last {
-                eprintln!("{line}");
+            if !quiet {
+                line.show(&line_of(&status), status.state);
             }
-            last = line;
             if status.ended.is_some() || until.is_some_and(|until| until.is_met_by(status.state)) {
                 return Ok(*status);
             }
@@ -195,6 +194,53 @@ impl Drop for Client {
 
 fn surprise() -> String {
     "the master answered something else; install the same release on both".to_owned()
+}
+
+/// How a followed job stands, on standard error: one line that stays in a terminal, and elsewhere one now and then.
+struct Line {
+    stays: bool,
+    last: String,
+    state: Option<State>,
+    at: Instant,
+}
+
+/// Between two lines where none stays.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+impl Line {
+    fn new() -> Self {
+        Self { stays: std::io::stderr().is_terminal(), last: String::new(), state: None, at: Instant::now() }
+    }
+
+    fn show(&mut self, line: &str, state: State) {
+        // What comes from others may hold letters that a terminal obeys.
+        let line = line.replace(char::is_control, " ");
+        if line == self.last {
+            return;
+        }
+        if self.stays {
+            // Without wrapping, so that a narrow terminal has one line too.
+            eprint!("\r\x1b[?7l{line}\x1b[K\x1b[?7h");
+        } else if self.is_due(state, Instant::now()) {
+            eprintln!("{line}");
+            self.at = Instant::now();
+        }
+        self.state = Some(state);
+        self.last = line;
+    }
+
+    /// Whether a line is told where none stays: of each state the first, and later ones at times.
+    fn is_due(&self, state: State, now: Instant) -> bool {
+        self.state != Some(state) || now.duration_since(self.at) >= LINE_EVERY
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        if self.stays && !self.last.is_empty() {
+            eprintln!();
+        }
+    }
 }
 
 /// One line on how a job stands.
@@ -336,23 +382,47 @@ pub fn jobs(at: &ClientArgs) -> Result<ExitCode, String> {
         println!("{}", serde_json::Value::from_iter(jobs.iter().map(as_json)));
         return Ok(ExitCode::SUCCESS);
     }
-    println!("{:>5}  {:<10} {:>9} {:>12}  {:<40} note", "job", "state", "cycle", "time", "title");
+    print!("{}", table(&jobs));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Jobs as a table: what each reached, how long it took or has left, and when it was over.
+fn table(jobs: &[Status]) -> String {
+    let mut table = format!(
+        "{:>5}  {:<9} {:>9} {:>14} {:>9}  {:<20}  {:<32}  note\n",
+        "job", "state", "cycle", "reached", "took", "over", "title"
+    );
     for job in jobs {
-        let failure = job.ended.and_then(|ended| ended.failure);
-        let note = job.waits_for.map(|what| format!("waits for {what}")).or(failure).unwrap_or_else(|| {
-            let shares = job.shares.iter().map(|s| format!("{} {}", s.host, s.elements));
+        let summary = job.ended.as_ref().and_then(|ended| ended.summary.as_deref());
+        let summary: Option<Summary> = summary.and_then(|text| serde_json::from_str(text).ok());
+        let unit = match &summary {
+            Some(summary) if job.time_unit.is_empty() => Units::named(&summary.units).time,
+            _ => &job.time_unit,
+        };
+        let reached =
+            if job.cycle == 0 { "-".to_owned() } else { format!("{} {unit}", significant(job.time)) };
+        let took = summary.as_ref().map_or_else(|| "-".to_owned(), |summary| span(summary.wall_s));
+        let over = summary.map(|summary| summary.origin.date).filter(|date| !date.is_empty());
+        let left =
+            job.progress.split_once(", ").filter(|_| job.state == State::Running).map(|(left, _)| left);
+        let failure = job.ended.as_ref().and_then(|ended| ended.failure.clone());
+        let waits = job.waits_for.as_ref().map(|what| format!("waits for {what}"));
+        let note = waits.or(failure).unwrap_or_else(|| {
+            let shares = job.shares.iter().map(|s| format!("{} elements on {}", s.elements, s.host));
             shares.collect::<Vec<_>>().join(", ")
         });
-        let title: String = job.title.chars().take(40).collect();
-        println!(
-            "{:>5}  {:<10} {:>9} {:>12.5e}  {title:<40} {note}",
+        let title: String = job.title.chars().take(32).collect();
+        let line = format!(
+            "{:>5}  {:<9} {:>9} {reached:>14} {took:>9}  {:<20}  {title:<32}  {note}",
             job.job,
             job.state.name(),
             job.cycle,
-            job.time
+            over.as_deref().or(left).unwrap_or("-"),
         );
+        table.push_str(line.replace(char::is_control, " ").trim_end());
+        table.push('\n');
     }
-    Ok(ExitCode::SUCCESS)
+    table
 }
 
 /// `bolide hosts`.
@@ -445,6 +515,38 @@ mod tests {
         status.ended = Some(protocol::request::Ended { summary, ..Default::default() });
         assert_eq!(as_json(&status)["ended"]["summary"]["cycles"], 40);
         assert_eq!(as_json(&status)["job"], 3);
+    }
+
+    #[test]
+    fn jobs_have_units_and_times_and_no_letters_that_a_terminal_obeys() {
+        let mut running = Status::queued(1, "plates\x1b[2J".to_owned());
+        running.state = State::Running;
+        (running.cycle, running.time, running.time_unit) = (120, 0.0125, "ms".to_owned());
+        running.progress = "12 min left, 34.0 %".to_owned();
+        let mut done = Status::queued(2, "bar".to_owned());
+        (done.state, done.cycle, done.time) = (State::Done, 40, 2.0);
+        let origin =
+            crate::results::summary::Origin { date: "2026-11-25 16:40 UTC".to_owned(), ..Default::default() };
+        let summary = Summary { units: "cm-g-us".to_owned(), wall_s: 250.0, origin, ..Summary::default() };
+        let summary = serde_json::to_string(&summary).ok();
+        done.ended = Some(protocol::request::Ended { summary, ..Default::default() });
+        let table = table(&[running, done, Status::queued(3, "next".to_owned())]);
+        let lines: Vec<&str> = table.lines().collect();
+        assert!(lines[1].contains("0.0125000 ms") && lines[1].contains("12 min left"), "{table}");
+        assert!(
+            lines[2].contains("2.00000 us") && lines[2].contains("4 min  2026-11-25 16:40 UTC"),
+            "{table}"
+        );
+        assert!(lines[3].contains("queued") && !table.contains('\x1b'), "{table}");
+    }
+
+    #[test]
+    fn a_line_that_does_not_stay_is_told_of_each_state_and_at_times() {
+        let mut line = Line { stays: false, last: String::new(), state: None, at: Instant::now() };
+        assert!(line.is_due(State::Queued, line.at));
+        line.show("job 1 queued", State::Queued);
+        assert!(!line.is_due(State::Queued, line.at + LINE_EVERY / 2));
+        assert!(line.is_due(State::Running, line.at) && line.is_due(State::Queued, line.at + LINE_EVERY));
     }
 
     #[test]

@@ -237,7 +237,7 @@ impl ClientRequests<'_> {
 
 /// Why a request is not answered as it asks.
 #[derive(Debug)]
-enum Refusal {
+pub enum Refusal {
     Scheduler(notice::Error),
     Deck(desk::Error),
     /// The name stands for no file of results.
@@ -284,7 +284,10 @@ async fn blocking<T: Send + 'static>(
 }
 
 /// The results files of a folder with their lengths, by name.
-fn list(folder: &Path) -> std::result::Result<Vec<(String, u64)>, Refusal> {
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn list(folder: &Path) -> std::result::Result<Vec<(String, u64)>, Refusal> {
     let fault = |e: std::io::Error| Refusal::File(folder.to_owned(), e);
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(fault)? {

@@ -9,26 +9,26 @@
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, builder::PossibleValuesParser};
-use deck::model::FORMAT_NAMES;
+use deck::{model::FORMAT_NAMES, refine::MAX_FACTOR};
 use protocol::{
-    options::{self, Balance, JobOptions, Route},
+    options::{self, ADVANCED, Balance, JobOptions, Route},
     shape::Rate,
 };
 use worker::processors::Processors;
 
+mod help;
+
+use help::{EXIT_CODES, PICTURE_EXAMPLES, RUN_EXAMPLES, SUBMIT_EXAMPLES};
+
 use crate::{
     bench::grind::Speed, certs::arguments::Certs, export::ExportArgs, picture::arguments::PictureArgs,
-    study::arguments::StudyArgs, verify::arguments::VerifyArgs,
+    report::ReportArgs, study::arguments::StudyArgs, verify::arguments::VerifyArgs,
 };
 pub use crate::{client::Until, reading::ReadingArgs};
 
-/// What the process ends with, as `--help` says it.
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 a fault, which is printed (deck, disk, physics, peer); 2 wrong flags; 130 \
-stopped by Ctrl-C, or the followed job was cancelled (1 with --until done). The log goes to standard error, BOLIDE_LOG=debug for more.";
-
-/// Explicit Lagrangian impact simulation on whatever PCs a lab has.
+/// Simulates impacts: bodies that strike, crush, penetrate or explode
 #[derive(Debug, Parser)]
-#[command(name = "bolide", version, about, max_term_width = 100, after_help = EXIT_CODES)]
+#[command(name = "bolide", version, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -39,10 +39,11 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a deck here: master and workers in one process
+    #[command(after_help = RUN_EXAMPLES)]
     Run(RunArgs),
-    /// Run a deck with many values of its parameters: a table, a ballistic limit, a threshold, a minimum
+    /// Run a deck with many values: tables, ballistic limits, thresholds
     Study(StudyArgs),
-    /// Predict how long a deck or the benchmark tables take on an emulated cluster
+    /// Predict how long a deck takes on an emulated cluster
     Simulate(SimulateArgs),
     /// Listen for workers and clients, and run the jobs of the queue
     Master(MasterArgs),
@@ -51,6 +52,7 @@ pub enum Command {
     /// Start workers over ssh, on the hosts of a file
     Add(AddArgs),
     /// Put a deck into a master's queue
+    #[command(after_help = SUBMIT_EXAMPLES)]
     Submit(SubmitArgs),
     /// Follow a job until it ends, then print its summary
     Watch {
@@ -83,7 +85,7 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Put a failed job back into the queue, to resume from its last checkpoint
+    /// Put a failed job back into the queue, at its last checkpoint
     Resume {
         /// The job
         job: u32,
@@ -113,7 +115,7 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Measure the speed of this machine: elements, contact, sorts, messages, and its --speed
+    /// Measure the speed of this machine, and of its messages
     #[command(args_conflicts_with_subcommands = true)]
     Bench {
         /// What to measure instead
@@ -129,16 +131,16 @@ pub enum Command {
         #[command(subcommand)]
         what: Certs,
     },
-    /// Write a commented deck of a usual problem to start from; without a name list them
+    /// Write a commented deck of a usual problem, or list them
     Init {
         /// Which
         name: Option<String>,
         /// The file to write, - for standard output; a file that is there stays [default: <NAME>.toml]
         file: Option<PathBuf>,
     },
-    /// Print a JSON Schema of TOML decks, by which editors complete and check them
+    /// Print a JSON Schema of decks, by which editors complete them
     Schema,
-    /// List every error of a deck, or what a run of it would take and what in it is hardly meant, without running it
+    /// Find errors and doubtful physics of a deck, and what a run takes
     Check {
         /// The deck
         deck: PathBuf,
@@ -149,13 +151,16 @@ pub enum Command {
         #[command(flatten)]
         reading: ReadingArgs,
     },
-    /// Compute a results folder again and name the first cycle and place that differ
+    /// Compute a results folder again and name the first difference
     Verify(VerifyArgs),
-    /// Draw a state of a results folder as a PNG, coloured by a field
+    /// Show results in a browser: bodies, curves, verdict, files
+    Report(ReportArgs),
+    /// Draw a state, a deck before it runs, or an animation
+    #[command(after_help = PICTURE_EXAMPLES)]
     Picture(PictureArgs),
-    /// Write the states of a results folder in another format: one VTKHDF file, or d3plot
+    /// Write the states in another format: one VTKHDF file, or d3plot
     Export(ExportArgs),
-    /// Write an LS-DYNA keyword deck as a TOML deck with its mesh beside it, or a TOML deck to start from for a mesh
+    /// Make a TOML deck of an LS-DYNA keyword deck, or for a mesh
     Convert {
         /// The keyword deck, or a mesh: Gmsh (.msh), Abaqus (.inp), Nastran (.bdf, .nas, .dat, .fem)
         deck: PathBuf,
@@ -168,7 +173,7 @@ pub enum Command {
         #[command(flatten)]
         reading: ReadingArgs,
     },
-    /// List the material library, or print the constants of one material, its source and a block to paste into a deck
+    /// List the materials, or print one: constants, units, source
     Materials(MaterialsArgs),
     /// Show hosts and jobs of a master, updated once a second
     Top {
@@ -220,10 +225,10 @@ pub struct RunArgs {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
     /// A process for each worker, over loopback TCP
-    #[arg(long)]
+    #[arg(long, help_heading = ADVANCED)]
     pub processes: bool,
     /// Use only these processors, as in 0,2-3
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", help_heading = ADVANCED)]
     pub pin: Option<Processors>,
     /// Resume from a checkpoint: this file, or the newest valid one of this results folder, which the run continues to write
     #[arg(long, value_name = "FILE|FOLDER")]
@@ -238,7 +243,7 @@ pub struct RunArgs {
     #[arg(long)]
     pub force: bool,
     /// Write a trace of the last cycles of every worker for Perfetto
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = ADVANCED)]
     pub trace: Option<PathBuf>,
     /// When it is over run this in a shell, with BOLIDE_JOB, BOLIDE_STATE (done, failed or stopped), BOLIDE_FOLDER and BOLIDE_REASON set
     #[arg(long, value_name = "COMMAND")]
@@ -246,6 +251,16 @@ pub struct RunArgs {
     /// Print the summary alone, as JSON, on standard output
     #[arg(long)]
     pub json: bool,
+    /// Run the deck as it is, then again with so many times as many cells along every direction of its blocks, and compare what both
+    /// come to
+    #[arg(long, value_name = "FACTOR", value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_FACTOR)), conflicts_with_all = ["resume", "no_output", "json", "trace"])]
+    pub refine: Option<u32>,
+    /// With --refine: compare this too, as `of` of a study has it: "last(rear:uz)", "residual velocity of rod"; may be repeated
+    #[arg(long, value_name = "FORMULA", requires = "refine")]
+    pub measure: Vec<String>,
+    /// Tell in the summary how it was computed, too
+    #[arg(long, short)]
+    pub verbose: bool,
     /// The rest
     #[command(flatten)]
     pub job: JobOptions,

@@ -99,8 +99,9 @@ async fn open_page(
     let scheme = if secure { "https" } else { "http" };
     println!("page: {scheme}://{}/?token={}", reachable(address), guard.token());
     let board = Arc::new(Board::default());
+    let (notices, board_of_page) = (notices.clone(), Arc::clone(&board));
     let api_state =
-        http::api_state::ApiState { notices: notices.clone(), board: Arc::clone(&board), join, guard };
+        http::api_state::ApiState { notices, board: board_of_page, join, only_shows: false, guard };
     tokio::spawn(http::serve(place, api_state));
     Ok(Some(board))
 }

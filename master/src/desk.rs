@@ -11,11 +11,15 @@ use std::{
     },
 };
 
-use deck::{Bounds, Fault, MAX_ELEMENTS};
+use deck::{
+    Bounds, Fault, MAX_ELEMENTS, Reading,
+    model::Model,
+    physics::{self, Forecast},
+};
 use protocol::options;
 use tokio::sync::Semaphore;
 
-use crate::footprint;
+use crate::{footprint, http::surface, picture::starting_state};
 
 /// Longest name of a deck (bytes).
 const NAME_LIMIT: usize = 4096;
@@ -77,11 +81,55 @@ impl Drop for Waits {
     }
 }
 
+/// What a look at a deck without faults tells.
+pub struct Looked {
+    pub forecast: Forecast,
+    /// What the reader does otherwise than the deck says, a line each.
+    pub warnings: Vec<String>,
+}
+
 /// Reads a deck when its turn has come. Dropped before that, nothing is read; dropped later, nothing more.
 ///
 /// # Errors
 /// Its faults, or why it is not read.
 pub async fn read(name: String, text: String) -> Result<Brought, Error> {
+    in_turn(name, text, |text, reading| {
+        let Model { title, mesh, .. } = reading.model;
+        let (parts, elements, nodes) = (mesh.parts.len(), mesh.n_elements() as u64, mesh.n_nodes());
+        Brought { text, title, parts, elements, nodes }
+    })
+    .await
+}
+
+/// Reads a deck likewise, and says what a run of it would take and what in it is hardly meant.
+///
+/// # Errors
+/// As [`read`].
+pub async fn look(name: String, text: String) -> Result<Looked, Error> {
+    in_turn(name, text, |_, reading| Looked {
+        forecast: physics::forecast(&reading.model),
+        warnings: reading.warnings.iter().map(ToString::to_string).collect(),
+    })
+    .await
+}
+
+/// Reads a deck likewise, and draws its bodies before the first cycle, as [`surface`] packs them.
+///
+/// # Errors
+/// As [`read`].
+pub async fn draw(name: String, text: String) -> Result<Vec<u8>, Error> {
+    in_turn(name, text, |_, reading| {
+        let state = starting_state(&reading.model);
+        surface::Skin::new(&reading.model).pack(&reading.model, &state)
+    })
+    .await
+}
+
+async fn in_turn<T: Send + 'static>(
+    name: String,
+    text: String,
+    then: impl FnOnce(String, Reading) -> T + Send + 'static,
+) -> Result<T, Error> {
     if name.len() > NAME_LIMIT || name.chars().any(char::is_control) {
         return Err(Error::Name(name.len()));
     }
@@ -91,20 +139,17 @@ pub async fn read(name: String, text: String) -> Result<Brought, Error> {
     let work = move || {
         // Until it has been read or given up.
         let _turn = turn;
-        read_until(&given_up, name, text)
+        read_until(&given_up, &name, &text).map(|reading| then(text, reading))
     };
     let read = tokio::task::spawn_blocking(work).await.map_err(|_| Error::Bug)?;
     read.map_err(Error::Faults)
 }
 
 /// Reads a deck as far as nobody gives it up.
-fn read_until(given_up: &AtomicBool, name: String, text: String) -> Result<Brought, Vec<Fault>> {
+fn read_until(given_up: &AtomicBool, name: &str, text: &str) -> Result<Reading, Vec<Fault>> {
     let elements = footprint::most_elements().unwrap_or(MAX_ELEMENTS);
     let is_given_up = || given_up.load(Ordering::Relaxed);
-    let model = deck::read_within(&text, &name, &Bounds { elements, is_given_up: &is_given_up })?;
-    let (parts, elements, nodes) =
-        (model.mesh.parts.len(), model.mesh.n_elements() as u64, model.mesh.n_nodes());
-    Ok(Brought { text, title: model.title, parts, elements, nodes })
+    deck::read_whole_within(text, name, &Bounds { elements, is_given_up: &is_given_up })
 }
 
 #[cfg(test)]
@@ -118,10 +163,10 @@ mod tests {
     #[tokio::test(flavor = "multi_thread")]
     async fn a_caller_who_goes_gives_its_deck_up_and_holds_up_nobody() {
         let given_up = Arc::new(AtomicBool::new(false));
-        let of_block = |given_up: &AtomicBool| read_until(given_up, "block.toml".into(), BLOCK.into());
-        assert_eq!(of_block(&given_up).map(|brought| brought.elements).ok(), Some(8));
+        let of_block = |given_up: &AtomicBool| read_until(given_up, "block.toml", BLOCK);
+        assert_eq!(of_block(&given_up).map(|reading| reading.model.mesh.n_elements()).ok(), Some(8));
         drop(Waits(Arc::clone(&given_up)));
-        let faults = of_block(&given_up).err().expect("nobody waits for it");
+        let faults = of_block(&given_up).expect_err("nobody waits for it");
         assert_eq!(faults[0].read, "a deck that is given up");
 
         // Its turn comes back, whether its caller stays or goes.

@@ -1,4 +1,4 @@
-//! HTTP: the master's page, its JSON API, `/metrics` and `/healthz`, on an address of their own.
+//! HTTP: the page, its JSON API, `/metrics` and `/healthz`, on an address of their own.
 //!
 //! Loopback speaks HTTP; elsewhere it is HTTPS with the cluster's certificate, which a browser believes once `ca.pem` is
 //! given to it. Every request passes the [`guard`], `/healthz` alone without a token. [`api`] asks the scheduler as
@@ -37,9 +37,12 @@ pub mod api;
 pub mod api_state;
 pub mod assets;
 pub mod board;
+pub mod files;
+pub mod folder;
 pub mod guard;
 pub mod metrics;
 pub mod surface;
+pub mod tar;
 
 use api_state::ApiState;
 use guard::Refusal;
@@ -123,6 +126,7 @@ fn router(api_state: ApiState) -> Router {
     page()
         .nest(path.trim_end_matches('/'), page())
         .route(path, axum::routing::get(assets::page))
+        .route(&format!("{path}jobs/{{job}}"), axum::routing::get(assets::page_of_a_job))
         .route("/metrics", axum::routing::get(metrics::text))
         .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
         .layer(middleware::from_fn_with_state(api_state.clone(), check_request))
@@ -175,7 +179,7 @@ fn refuse(refusal: Refusal) -> Response {
 
 fn with_headers(mut answer: Response) -> Response {
     let headers = answer.headers_mut();
-    headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY));
+    headers.entry(header::CONTENT_SECURITY_POLICY).or_insert(HeaderValue::from_static(POLICY));
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));

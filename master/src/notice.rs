@@ -97,6 +97,8 @@ pub enum Error {
     WritesNone(u32),
     /// The job has no results in this state.
     NoResults(u32, State),
+    /// A page of results that are there, which runs nothing.
+    OnlyShows,
     /// The master ends and answers nobody any more.
     Ending,
 }
@@ -111,6 +113,9 @@ impl fmt::Display for Error {
             Self::Results(error) => error.fmt(f),
             Self::WritesNone(job) => write!(f, "job {job} writes no results"),
             Self::NoResults(job, state) => write!(f, "job {job} is {} and has no results", state.name()),
+            Self::OnlyShows => f.write_str(
+                "this page shows results that are there; start `bolide master --http 127.0.0.1:7118` to run decks from a page",
+            ),
             Self::Ending => f.write_str("the master is ending"),
         }
     }

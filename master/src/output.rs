@@ -32,6 +32,10 @@ pub struct Output {
     pub folder: Option<Folder>,
     /// What the run is computed from, as the folder holds it.
     pub input: Option<Input>,
+    /// Name of the deck's file, as it was given.
+    pub deck: String,
+    /// Whether the summary that is printed tells how it was computed, too.
+    pub tells_all: bool,
     /// Where bases go; none where nothing is stored.
     pub keeper: Option<Keeper>,
     history: Option<History>,
@@ -73,6 +77,8 @@ impl Output {
             model,
             folder,
             input: None,
+            deck: String::new(),
+            tells_all: false,
             keeper: None,
             history,
             row_ends,
@@ -86,11 +92,12 @@ impl Output {
         })
     }
 
-    /// Keeps the deck, gathered, with the results, and the end that was asked for beside it.
+    /// Keeps the deck, gathered, with the results, its name, and the end that was asked for beside it.
     ///
     /// # Errors
     /// What the disk refused.
-    pub fn keep_input(&mut self, text: &str, end_time: Option<f64>) -> Result<(), String> {
+    pub fn keep_input(&mut self, name: &str, text: &str, end_time: Option<f64>) -> Result<(), String> {
+        self.deck = name.to_owned();
         let Some(folder) = &self.folder else { return Ok(()) };
         let write = |out: &mut std::io::BufWriter<_>| std::io::Write::write_all(out, text.as_bytes());
         results::write_whole(&folder.file(INPUT), write).map_err(|e| e.to_string())?;
@@ -236,24 +243,39 @@ impl Output {
     }
 }
 
-/// How far a run is, in words and as a share of the whole, `elapsed` seconds after its start.
+/// How far a run is, in words and as a share of the whole, `elapsed` seconds after its start. The time left comes first, up to a comma.
 pub fn progress_line(model: &Model, progress: &Progress, elapsed: f64) -> (String, f64) {
     let control = &model.setup.control;
     let share =
         (progress.time / control.end_time).max(progress.cycle as f64 / control.end_cycle as f64).min(1.0);
-    let grind = elapsed * 1e9 / (progress.cycle.max(1) as f64 * model.mesh.n_elements() as f64);
     let limit = match (progress.limit, progress.element) {
         (Limit::Courant, Some(element)) => format!("element {element}"),
         (limit, _) => format!("{limit:?}").to_lowercase(),
     };
-    let eta =
-        if share > 0.0 { format!("  ETA {:.0} s", elapsed * (1.0 - share) / share) } else { String::new() };
-    let units = results::Units::named(&model.units).time;
+    let left = match share > 0.0 {
+        true => format!("{} left", span(elapsed * (1.0 - share) / share)),
+        false => "starting".to_owned(),
+    };
+    let unit = results::Units::named(&model.units).time;
+    let rate = progress.cycle as f64 / elapsed.max(1e-3);
     let line = format!(
-        "cycle {}  t {:.4e} {units}  dt {:.3e} ({limit})  {grind:.0} ns/element wall{eta}",
-        progress.cycle, progress.time, progress.dt
+        "{left}, {:.1} %, cycle {}, t {:.4e} {unit}, step {:.2e} {unit} by {limit}, {rate:.0} cycles/s",
+        100.0 * share,
+        progress.cycle,
+        progress.time,
+        progress.dt
     );
     (line, share)
+}
+
+/// A time that a person waits for.
+pub fn span(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.1} days", s / 86_400.0),
+    }
 }
 
 impl Sink for Output {

@@ -4,7 +4,7 @@
 
 use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 
-use clap::{CommandFactory, Parser};
+use clap::CommandFactory;
 use protocol::{
     handshake,
     shape::{Shape, Wire},
@@ -21,7 +21,7 @@ use crate::{
     certs::{self, arguments::Certs},
     check, client,
     command::{Bench, Cli, Command, WorkerArgs},
-    convert, daemon, export, init, machine, materials, newcomer, picture, processes, run,
+    convert, daemon, export, init, machine, materials, newcomer, picture, processes, report, run,
     shell::print,
     simulate, study, verify,
 };
@@ -40,7 +40,7 @@ pub fn log<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
 /// Does what the command line says. `compute` is what computes the tasks of a worker.
 pub fn main(compute: Compute) -> ExitCode {
     system::allocator::return_large_arrays();
-    let result = match Cli::parse().command {
+    let result = match Cli::of_process().command {
         Command::Run(args) => run::run_and_tell(&args),
         Command::Study(args) => study::run(&args),
         Command::Simulate(args) => simulate::run(&args),
@@ -74,6 +74,7 @@ pub fn main(compute: Compute) -> ExitCode {
             convert::run(&deck, to.as_deref(), force, &reading.options())
         }
         Command::Verify(args) => verify::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Picture(args) => picture::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Materials(args) => materials::run(&args),

@@ -34,6 +34,7 @@ impl ReadingArgs {
             parameters: self.set.iter().cloned().collect(),
             title: None,
             perturbation: self.perturb,
+            refine: None,
         }
     }
 

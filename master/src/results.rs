@@ -359,6 +359,15 @@ impl Units {
         };
         Self { length, mass, time, energy, stress, force, specific }
     }
+
+    /// By quantity, for programs.
+    pub fn json(&self) -> serde_json::Value {
+        let Self { length, mass, time, energy, stress, force, specific } = self;
+        serde_json::json!({
+            "length": length, "mass": mass, "time": time, "energy": energy, "stress": stress, "force": force,
+            "specific": specific,
+        })
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use std::{
     time::Instant,
 };
 
-use deck::model::Model;
+use deck::{bundle::Options, model::Model};
 use tracing::{info, warn};
 
 use crate::{
@@ -22,8 +22,10 @@ use crate::{
     notify::notify,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
+    picture,
     processes::Processes,
-    results::{self, Folder, Summary, formats, report, trace},
+    refine,
+    results::{self, Folder, Summary, formats, report, summary::Origin, trace},
     shell::quoted,
     snapshot::{
         self, Snapshot,
@@ -57,6 +59,17 @@ pub fn run_and_tell(args: &RunArgs) -> Result<ExitCode, String> {
 /// # Errors
 /// Whatever kept it from its end.
 pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
+    match args.refine {
+        Some(factor) => refine::run(args, factor),
+        None => run_with(args, &args.reading.options()),
+    }
+}
+
+/// Runs a deck as the options of its reading have it.
+///
+/// # Errors
+/// Whatever kept it from its end.
+pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     if let Some(pin) = &args.pin {
         pin.apply()?;
     }
@@ -65,7 +78,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let threads = args.threads.map_or(cores, |t| t as usize);
     // The start takes no more threads than the run; a pool that a process has already stays.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-    let text = gather_deck(&args.deck, &args.reading.options())?;
+    let text = gather_deck(&args.deck, reading)?;
     let mut model = read_gathered(&text, &args.deck.display().to_string())?;
     bring_end_forward(&mut model, asked)?;
     let others: Vec<_> = args.format.iter().filter(|name| !model.output.formats.contains(name)).collect();
@@ -106,7 +119,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let model = Arc::clone(job.model());
     let census = bare.unwrap_or_else(|| SurfaceCensus::of(&job, &model));
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
-    output.keep_input(&text, asked.end_time)?;
+    output.tells_all = args.verbose;
+    output.keep_input(&args.deck.display().to_string(), &text, asked.end_time)?;
     drop(text);
     if let Some(folder) = &output.folder {
         let snapshots = folder.file(store::FOLDER);
@@ -219,13 +233,15 @@ pub fn conclude(
     json: bool,
 ) -> Result<ExitCode, String> {
     let summary = summarise(model, census, outcome, traffic, threads, wall_s);
-    let summary = Summary { input: output.input.clone(), ..summary };
+    let origin = Origin::of(&output.deck);
+    let summary = Summary { input: output.input.clone(), origin, ..summary };
     for warning in &summary.warnings {
         warn!("{warning}");
     }
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
-        report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        let pictures = picture::of_report(folder.path(), &summary);
+        report::write(folder, &summary, &model.units, &pictures).map_err(|e| e.to_string())?;
         for written in formats::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
             info!("{}", export::line(&written));
         }
@@ -234,7 +250,7 @@ pub fn conclude(
     if json {
         println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
     } else {
-        println!("{}", summary.table(&model.units));
+        println!("{}", summary.table(&model.units, output.tells_all));
         if let Some(folder) = &output.folder {
             println!("results in {}", folder.path().display());
         }

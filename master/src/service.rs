@@ -29,8 +29,9 @@ use crate::{
     notice::Notice,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
+    picture,
     queue::Change,
-    results::{self, Folder, Summary, TRACE, formats, report, trace},
+    results::{self, Folder, Summary, TRACE, formats, report, summary::Origin, trace},
     snapshot::{Snapshot, keeper::Keeper, store::Store},
     summarise::{SurfaceCensus, summarise},
 };
@@ -188,7 +189,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     });
     let folder = folder.transpose().map_err(|e| e.to_string())?;
     let mut output = Output::new(Arc::clone(&model), folder, true)?;
-    output.keep_input(&order.text, order.options.end_time)?;
+    output.keep_input(&order.name, &order.text, order.options.end_time)?;
     let results = output.folder.as_ref().map(|folder| folder.path().to_owned());
     output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     output.go_on(&job, states)?;
@@ -198,6 +199,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
         job.rows_before().iter().for_each(|row| job_view.row(row));
         job_view.state(&model, job.start_state());
     }
+    order.status.send_modify(|status| status.time_unit = results::Units::named(&model.units).time.to_owned());
     let census = SurfaceCensus::of(&job, &model);
     let started = Instant::now();
     let mut reporter = Reporter {
@@ -227,13 +229,15 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     }
     let threads = specs.iter().map(|spec| spec.threads).sum();
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
-    let summary = Summary { input: reporter.output.input.clone(), ..summary };
+    let summary =
+        Summary { input: reporter.output.input.clone(), origin: Origin::of(&order.name), ..summary };
     for warning in &summary.warnings {
         warn!(job = order.number, "{warning}");
     }
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
-        report::write(folder, &summary, &model.units).map_err(|e| e.to_string())?;
+        let pictures = picture::of_report(folder.path(), &summary);
+        report::write(folder, &summary, &model.units, &pictures).map_err(|e| e.to_string())?;
         for written in formats::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
             info!(job = order.number, "{}", export::line(&written));
         }
@@ -256,7 +260,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
         failure: outcome.failure,
         digest: Some(outcome.digest).filter(|digest| !digest.is_empty()),
         summary: Some(serde_json::to_string(&summary).map_err(|e| e.to_string())?),
-        table: Some(summary.table(&model.units)),
+        table: Some(summary.table(&model.units, false)),
     };
     Ok((change, ended))
 }

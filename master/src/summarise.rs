@@ -10,10 +10,13 @@ use crate::{
     embedded::Traffic,
     event::Outcome,
     job::Job,
+    quality,
     results::{
         Units,
         history::PartEnergy,
-        summary::{DeadGauge, Energies, NamedBody, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
+        summary::{
+            DeadGauge, Energies, NamedBody, NamedPair, NamedPart, Origin, Summary, WorkUnits, WorkerTimes,
+        },
     },
     run_totals::{Dead, PairSums, RunTotals},
 };
@@ -133,6 +136,10 @@ pub fn summarise(
             .chain(dead.iter().map(|gauge| dead_gauge_warning(gauge, Units::named(&model.units).time)))
             .chain(outcome.differences.iter().map(ToString::to_string))
             .collect(),
+        quality: quality::judge(model, &parts, outcome, &dead),
+        mirrors: model.output.mirrors,
+        units: model.units.clone(),
+        origin: Origin::default(),
         dead_gauges: dead,
         digest: outcome.digest.clone(),
         input: None,

@@ -127,6 +127,9 @@ impl std::fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
+/// Under which heading of the help flags stand that few runs need.
+pub const ADVANCED: &str = "Advanced options";
+
 /// What a user asks of a run beside its deck.
 #[expect(
     unused_qualifications,
@@ -141,16 +144,16 @@ pub struct JobOptions {
     #[arg(long)]
     pub end_time: Option<f64>,
     /// Lane width; the widest of each machine by default
-    #[arg(long, value_parser = lanes())]
+    #[arg(long, help_heading = ADVANCED, value_parser = lanes())]
     pub lanes: Option<String>,
     /// Route of the shared-node forces
-    #[arg(long, value_parser = routes(), default_value = "auto")]
+    #[arg(long, help_heading = ADVANCED, value_parser = routes(), default_value = "auto")]
     pub route: std::option::Option<Route>,
     /// Write no results folder
     #[arg(long)]
     pub no_output: bool,
     /// Write a checkpoint at the start of this cycle, as snapshot.bolide in the results folder
-    #[arg(long, value_name = "CYCLE")]
+    #[arg(long, help_heading = ADVANCED, value_name = "CYCLE")]
     pub snapshot_at: Option<u64>,
     /// Extra sorts every this many cycles, to test that they change nothing
     #[arg(long, hide = true)]
@@ -162,21 +165,21 @@ pub struct JobOptions {
     #[arg(skip)]
     pub min_workers: u32,
     /// Speeds by which work is distributed
-    #[arg(long, value_enum, default_value = "given")]
+    #[arg(long, help_heading = ADVANCED, value_enum, default_value = "given")]
     pub balance: Balance,
     /// Keep a checkpoint in memory every this many seconds, to return to when a worker is lost; 0 for none beside those on disk
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = period, allow_negative_numbers = true)]
+    #[arg(long, help_heading = ADVANCED, value_name = "SECONDS", default_value = "10", value_parser = period, allow_negative_numbers = true)]
     pub keep_every: std::option::Option<f64>,
     /// Compute this part of the work twice, by other workers the second time, from 0 to 1; where both differ a third time decides
-    #[arg(long, value_name = "FRACTION", default_value = "0", value_parser = fraction, allow_negative_numbers = true)]
+    #[arg(long, help_heading = ADVANCED, value_name = "FRACTION", default_value = "0", value_parser = fraction, allow_negative_numbers = true)]
     #[serde(default)]
     pub verify: f64,
     /// Write a checkpoint to disk every this many seconds, for --resume; 0 for never [default: the deck's; else a
     /// master's jobs every 10, `run` only when it is interrupted]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, help_heading = ADVANCED, value_name = "SECONDS", value_parser = seconds)]
     pub snapshot_every: Option<f64>,
     /// The same every this many cycles
-    #[arg(long, value_name = "CYCLES", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, help_heading = ADVANCED, value_name = "CYCLES", value_parser = clap::value_parser!(u64).range(1..))]
     pub snapshot_cycles: Option<u64>,
     /// Jobs of a higher one go first.
     #[arg(skip)]

@@ -141,7 +141,9 @@ pub struct Status {
     /// Time reached (deck's unit).
     #[serde(deserialize_with = "finite")]
     pub time: f64,
-    /// One line for a terminal.
+    /// That unit; empty before it has run.
+    pub time_unit: String,
+    /// One line for a terminal: the time left, a comma, and more.
     pub progress: String,
     /// Which worker computes how many elements.
     pub shares: Vec<Share>,
@@ -159,6 +161,7 @@ impl Status {
             waits_for: None,
             cycle: 0,
             time: 0.0,
+            time_unit: String::new(),
             progress: String::new(),
             shares: Vec::new(),
             ended: None,

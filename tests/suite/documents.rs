@@ -99,6 +99,74 @@ fn every_link_of_a_document_leads_somewhere() {
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
 
+/// The commands `bolide ...` of the code in a document: without prompts, comments, and what stands behind a pipe.
+fn commands(text: &str) -> Vec<String> {
+    let mut commands = Vec::new();
+    let mut fenced = false;
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+            continue;
+        }
+        if !fenced && !line.starts_with("    ") {
+            continue;
+        }
+        let line = line.trim_start();
+        let line =
+            line.split_once("$ ").filter(|(prompt, _)| !prompt.contains(' ')).map_or(line, |(_, rest)| rest);
+        // What may be left out stands in brackets.
+        let end = [" #", " |", " >", " &", ";", " ["].iter().filter_map(|mark| line.find(mark)).min();
+        let line = &line[..end.unwrap_or(line.len())];
+        if let Some(rest) = line.strip_prefix("cargo run --release -- ") {
+            commands.push(format!("bolide {rest}"));
+        } else if line.starts_with("bolide ") && line != "bolide mesh 1" && !line.contains(", ") {
+            commands.push(line.trim_end_matches('\\').to_owned());
+        }
+    }
+    commands
+}
+
+/// The words of a command; what stands in quotes is one.
+fn words(command: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut quote = None;
+    for letter in command.chars() {
+        match (letter, quote) {
+            (' ', None) => words.push(String::new()),
+            ('\'' | '"', None) => quote = Some(letter),
+            (letter, Some(open)) if letter == open => quote = None,
+            _ => words.last_mut().expect("one from the start").push(letter),
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+#[test]
+fn every_command_of_a_document_is_one_that_the_program_has() {
+    use clap::{CommandFactory, error::ErrorKind};
+    use master::command::Cli;
+    let (mut seen, mut wrong) = (0, Vec::new());
+    for document in documents() {
+        let text = fs::read_to_string(&document).expect("a document is readable");
+        for command in commands(&text) {
+            // A transcript may show what it prints below a command; values in capitals stand for others.
+            let Err(error) = Cli::command().try_get_matches_from(words(&command)) else {
+                seen += 1;
+                continue;
+            };
+            match error.kind() {
+                ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand | ErrorKind::ArgumentConflict => {
+                    wrong.push(format!("{}: {command}: {}", document.display(), error.kind()));
+                }
+                _ => seen += 1,
+            }
+        }
+    }
+    assert!(seen > 60, "{seen} commands");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 #[test]
 fn the_deck_of_the_readme_has_no_fault() {
     let readme = fs::read_to_string(repository("README.md")).expect("the README is in the repository");

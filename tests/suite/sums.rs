@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use master::{
     deck_file::read_deck,
-    http::board::Point,
+    http::{board::Point, folder::sheet as folder_sheet},
     results::{
         Folder, HISTORY, REPORT, Summary,
         history::{History, HistoryRow, Table},
@@ -94,7 +94,17 @@ fn energies_add_up_wherever_they_are_shown() {
             adds_up(&parts, point.total, 1e-6, "page");
         }
         assert_momenta(&solved.rows, &path);
-        report::write(&out, &Summary::default(), &solved.model.units).expect("a report");
+        // The page of a results folder has them from the file.
+        let sheet = folder_sheet(scratch.path()).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let points = sheet["energies"].as_array().expect("points");
+        assert_eq!(points.len(), solved.rows.len(), "{}", path.display());
+        for (point, row) in points.iter().zip(&solved.rows) {
+            let number = |name: &str| point[name].as_f64().expect("a number");
+            let parts = ["kinetic", "internal", "hourglass", "contact", "eroded", "wall_loss"].map(number);
+            adds_up(&parts, number("total"), 1e-6, "page of a folder");
+            assert_eq!(number("time").to_bits(), row.time.to_bits(), "{}", path.display());
+        }
+        report::write(&out, &Summary::default(), &solved.model.units, &[]).expect("a report");
         let page = std::fs::read_to_string(scratch.path().join(REPORT)).expect("the report");
         // The wall of one example waits for a load of another case: nothing moves.
         assert_eq!(
@@ -131,7 +141,7 @@ fn assert_momenta(rows: &[HistoryRow], path: &Path) {
 /// The page's script names the shares that the master sends.
 #[test]
 fn the_page_shows_every_share_of_the_sum() {
-    let script = include_str!("../../master/page/main.js");
+    let script = include_str!("../../master/page/energies.js");
     let from = script.find("const SERIES = [").expect("the series");
     let series = &script[from..from + script[from..].find("];").expect("their end")];
     for key in ["kinetic", "internal", "hourglass", "contact", "eroded", "wall_loss", "total"] {

@@ -25,6 +25,7 @@ pub(super) fn make(
     if let Some(on) = surface {
         needs_contact(deck, on.origin, log);
     }
+    let planes = deck.symmetry.as_ref().map_or([false; 3], |symmetry| symmetry.planes);
     let mut output = Output {
         period: given.period,
         history_cycles: given.history_cycles,
@@ -40,8 +41,8 @@ pub(super) fn make(
         joints: joint::names(&deck.joints, log),
         gauges: Vec::new(),
         element_gauges: Vec::new(),
+        mirrors: planes,
     };
-    let planes = deck.symmetry.as_ref().map_or([false; 3], |symmetry| symmetry.planes);
     let finder = Finder { names, assembly, planes, log };
     for gauge in &deck.gauges {
         if let Some(name) = &gauge.name

@@ -92,23 +92,28 @@ fn imbalance(shares: &[Share]) -> Option<f64> {
     (total > 0.0 && speed > 0.0).then(|| most * speed / total)
 }
 
-/// Cells of a job: number, state, cycle, rate, planned imbalance (the page shows the measured one), title, note.
+/// Cells of a job: number, state, time left, cycle, rate, title, note with the planned imbalance (the page shows the measured one).
 fn job_cells(job: &Status, seen: &Seen) -> [String; 7] {
     let failure = job.ended.as_ref().and_then(|ended| ended.failure.clone());
     let digest = job.ended.as_ref().and_then(|ended| ended.digest.clone());
+    let running = job.state == State::Running;
+    let (left, more) = match job.progress.split_once(", ") {
+        Some((left, more)) if running => (left.trim_end_matches(" left"), more),
+        _ => ("-", ""),
+    };
+    let balance = imbalance(&job.shares).filter(|_| running);
+    let balance = balance.map_or_else(String::new, |ratio| format!("; imbalance planned {ratio:.3}"));
     let note = match (&job.waits_for, failure.or(digest)) {
         (Some(what), _) => format!("waits for {what}"),
         (None, Some(words)) => words,
-        (None, None) => job.progress.clone(),
+        (None, None) => format!("{more}{balance}"),
     };
-    let running = job.state == State::Running;
-    let balance = imbalance(&job.shares).filter(|_| running);
     [
         job.job.to_string(),
         job.state.name().to_owned(),
+        left.to_owned(),
         job.cycle.to_string(),
         seen.rates.get(&job.job).map_or_else(|| "-".to_owned(), |rate| format!("{rate:.1}")),
-        balance.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.3}")),
         job.title.chars().take(40).collect(),
         note,
     ]
@@ -129,7 +134,7 @@ fn host_cells(host: &HostRow, seen: &Seen) -> [String; 7] {
     ]
 }
 
-const JOB_TITLES: [&str; 7] = ["job", "state", "cycle", "cycles/s", "planned", "title", "note"];
+const JOB_TITLES: [&str; 7] = ["job", "state", "left", "cycle", "cycles/s", "title", "note"];
 const HOST_TITLES: [&str; 7] = ["host", "state", "speed", "threads", "lanes", "elements", "note"];
 
 fn plain(seen: &Seen) -> String {
@@ -221,7 +226,8 @@ mod tests {
             waits_for: None,
             cycle: 120,
             time: 1.0,
-            progress: "cycle 120".to_owned(),
+            time_unit: "ms".to_owned(),
+            progress: "12 min left, 34.0 %, cycle 120".to_owned(),
             shares: vec![share("a", 1.0, 100), share("b", 2.0, 260)],
             ended: None,
         };
@@ -255,6 +261,25 @@ mod tests {
             assert!(drawn.contains(words), "{words} in\n{drawn}");
         }
     }
+
+    #[test]
+    fn eighty_columns_have_the_time_left_of_a_job_and_its_title() {
+        let mut seen = seen();
+        seen.jobs[0].title = "Sphere of steel on an aluminium plate".to_owned();
+        seen.hosts[0].name = "pc-in-the-room-on-the-left@4711".to_owned();
+        let lines = page(&seen, "m:1", (80, 24));
+        let plain = lines.join("\n").replace("\x1b[36m", "").replace("\x1b[2m", "").replace("\x1b[0m", "");
+        for line in plain.lines() {
+            assert!(line.chars().count() <= 80, "{line}");
+        }
+        let job = plain.lines().find(|line| line.starts_with("3 ")).expect("the job");
+        assert!(
+            job.contains("running") && job.contains("12 min") && job.contains("Sphere of steel on an alu"),
+            "{job}"
+        );
+        assert!(plain.contains("pc-in-the-room"), "{plain}");
+    }
+
     #[test]
     fn a_page_fits_its_terminal_and_obeys_nobody_else() {
         let mut seen = seen();

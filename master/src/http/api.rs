@@ -5,16 +5,21 @@
 //! | `GET /api/overview` | `{version, join, jobs, hosts}`; a job is a status with `brief` once it runs |
 //! | `GET /api/events` | the same as server-sent events, whenever it changes, at most twice a second |
 //! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N`, body the deck | `{job}`; 422 `{faults: [{file, line, column, ...}]}` |
-//! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes}`, or 422 as above |
+//! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes, forecast}`, or 422 as above |
+//! | `POST /api/check/surface?name=NAME`, body the deck | the surface before the first cycle, binary |
 //! | `POST /api/jobs/N/cancel` | `{done}` |
 //! | `GET /api/jobs/N` | the job's status |
 //! | `GET /api/jobs/N/sheet` | energies, imbalance, phases of workers, list of states |
-//! | `GET /api/jobs/N/surface/K` | the surface of state K, binary, as [`surface`](super::surface) says |
+//! | `GET /api/jobs/N/surface/K?cut=AXIS&at=SHARE&side=SIDE&hide=PARTS` | the surface of state K, binary, as [`surface`](super::surface) says; with a cut, of the elements on one side (`beyond` or `below`) of a plane; without the parts of these indices |
+//! | `GET /api/jobs/N/history` | `{columns}` of the history; `?columns=3,7` adds `{values}`, a list for each, thinned |
+//! | `GET /api/jobs/N/files` | `[{name, bytes}]` of its results |
+//! | `GET /api/jobs/N/files/NAME` | the file |
+//! | `GET /api/jobs/N/results.tar` | all of them in a folder |
 //!
 //! What cannot be done is `{error}` with 404 where there is no such thing, 409 where the state of the job forbids it, 422 where what was sent
 //! is wrong, 500 after a bug or damage here, 503 where the queue is full or the master ends, and 507 where the disk refused.
 
-use std::{convert::Infallible, time::Duration};
+use std::{convert::Infallible, path::PathBuf, time::Duration};
 
 use axum::{
     Json, Router,
@@ -32,11 +37,16 @@ use serde_json::json;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::{api_state::ApiState, board};
+use super::{
+    api_state::ApiState,
+    board, files,
+    folder::{self, At, View},
+};
 use crate::{
     client,
     desk::{self, Brought},
     notice::{self, Notice, ask},
+    picture::camera::Slice,
     queue,
 };
 
@@ -56,11 +66,16 @@ pub fn routes() -> Router<ApiState> {
         .route("/jobs/{job}/cancel", post(cancel))
         .route("/jobs/{job}/sheet", get(job_view))
         .route("/jobs/{job}/surface/{index}", get(surface))
+        .route("/jobs/{job}/history", get(files::history))
+        .route("/jobs/{job}/files", get(files::list))
+        .route("/jobs/{job}/files/{name}", get(files::file))
+        .route("/jobs/{job}/results.tar", get(files::archive))
+        .route("/check/surface", post(drawn))
         .layer(DefaultBodyLimit::max(DECK_LIMIT))
 }
 
 /// What cannot be done.
-struct Fault(StatusCode, serde_json::Value);
+pub struct Fault(pub StatusCode, pub serde_json::Value);
 
 impl IntoResponse for Fault {
     fn into_response(self) -> Response {
@@ -70,11 +85,11 @@ impl IntoResponse for Fault {
 
 impl From<notice::Error> for Fault {
     fn from(error: notice::Error) -> Self {
-        use notice::Error::{Deck, Disk, Ending, NoJob, NoResults, Queue, Results, WritesNone};
+        use notice::Error::{Deck, Disk, Ending, NoJob, NoResults, OnlyShows, Queue, Results, WritesNone};
         use queue::Error::{Full, Illegal, NotOver, Unknown};
         let status = match &error {
             NoJob | Queue(Unknown(_)) | WritesNone(_) | NoResults(..) => StatusCode::NOT_FOUND,
-            Queue(NotOver(..) | Illegal(..)) => StatusCode::CONFLICT,
+            Queue(NotOver(..) | Illegal(..)) | OnlyShows => StatusCode::CONFLICT,
             Queue(Full(_)) | Ending => StatusCode::SERVICE_UNAVAILABLE,
             Disk { .. } => StatusCode::INSUFFICIENT_STORAGE,
             Deck(_) | Results(_) => StatusCode::INTERNAL_SERVER_ERROR,
@@ -83,7 +98,7 @@ impl From<notice::Error> for Fault {
     }
 }
 
-fn missing(what: String) -> Fault {
+pub fn missing(what: String) -> Fault {
     Fault(StatusCode::NOT_FOUND, json!({ "error": what }))
 }
 
@@ -109,7 +124,8 @@ async fn all(api_state: &ApiState) -> Result<serde_json::Value, notice::Error> {
         value
     };
     let hosts: Vec<_> = hosts.into_iter().map(host).collect();
-    Ok(json!({ "version": env!("CARGO_PKG_VERSION"), "join": api_state.join, "jobs": jobs, "hosts": hosts }))
+    let (version, join, shows) = (env!("CARGO_PKG_VERSION"), &api_state.join, api_state.only_shows);
+    Ok(json!({ "version": version, "join": join, "jobs": jobs, "hosts": hosts, "only_shows": shows }))
 }
 
 async fn overview(State(api_state): State<ApiState>) -> Result<Json<serde_json::Value>, Fault> {
@@ -188,8 +204,17 @@ fn name_of(asked: &Asked) -> String {
 }
 
 async fn check(Query(asked): Query<Asked>, text: String) -> Result<Json<serde_json::Value>, Fault> {
-    let Brought { title, parts, elements, nodes, .. } = desk::read(name_of(&asked), text).await?;
-    Ok(Json(json!({ "title": title, "parts": parts, "elements": elements, "nodes": nodes })))
+    let looked = desk::look(name_of(&asked), text).await?;
+    let forecast = &looked.forecast;
+    Ok(Json(json!({
+        "title": forecast.title, "parts": forecast.parts.len(), "elements": forecast.elements, "nodes": forecast.nodes,
+        "forecast": forecast, "reading": looked.warnings,
+    })))
+}
+
+async fn drawn(Query(asked): Query<Asked>, text: String) -> Result<impl IntoResponse, Fault> {
+    let bytes = desk::draw(name_of(&asked), text).await?;
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], bytes))
 }
 
 async fn submit(
@@ -232,23 +257,75 @@ async fn job_view(
     State(api_state): State<ApiState>,
     Path(job): Path<u32>,
 ) -> Result<Json<serde_json::Value>, Fault> {
-    let job_view = api_state.board.job_view(job).ok_or_else(|| not_kept(job))?;
-    let value = board::lock(&job_view).json();
-    Ok(Json(value))
+    if let Some(job_view) = api_state.board.job_view(job) {
+        let value = board::lock(&job_view).json();
+        return Ok(Json(value));
+    }
+    let folder = folder_of(&api_state, job).await?;
+    files::blocking(move || folder::sheet(&folder)).await.map(Json)
 }
 
-fn not_kept(job: u32) -> Fault {
-    missing(format!("job {job} has not run since this master started; `bolide results {job}` has its files"))
+/// Where the results of a job are.
+///
+/// # Errors
+/// If it has none.
+pub async fn folder_of(api_state: &ApiState, job: u32) -> Result<PathBuf, Fault> {
+    Ok(ask(&api_state.notices, |answer| Notice::Folder(job, answer)).await??)
+}
+
+/// How a state is to be shown.
+#[derive(Deserialize)]
+struct Shown {
+    cut: Option<String>,
+    at: Option<f64>,
+    side: Option<String>,
+    hide: Option<String>,
+}
+
+impl Shown {
+    fn view(&self) -> Result<View, Fault> {
+        let wrong = |what: String| Fault(StatusCode::UNPROCESSABLE_ENTITY, json!({ "error": what }));
+        let slice = match &self.cut {
+            None => None,
+            Some(axis) => {
+                let axis = ["x", "y", "z"].iter().position(|name| name == axis);
+                let axis = axis.ok_or_else(|| wrong("cut: expected x, y or z".to_owned()))?;
+                let at = self.at.unwrap_or(0.5);
+                if !(0.0..=1.0).contains(&at) {
+                    return Err(wrong(format!("at: expected a share from 0 to 1, found {at}")));
+                }
+                Some(Slice { axis, at, is_beyond: self.side.as_deref() != Some("below") })
+            }
+        };
+        let hidden = self.hide.iter().flat_map(|list| list.split(',')).filter(|part| !part.is_empty());
+        let hidden =
+            hidden.map(|part| part.parse().map_err(|_| wrong(format!("hide: {part:?} is no index"))));
+        Ok(View { slice, hidden: hidden.collect::<Result<_, _>>()? })
+    }
 }
 
 async fn surface(
     State(api_state): State<ApiState>,
     Path((job, index)): Path<(u32, usize)>,
+    Query(shown): Query<Shown>,
 ) -> Result<impl IntoResponse, Fault> {
-    let job_view = api_state.board.job_view(job).ok_or_else(|| not_kept(job))?;
-    let bytes = board::lock(&job_view).surface(index);
-    let bytes = bytes.ok_or_else(|| missing(format!("job {job} has no state {index}")))?;
-    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], bytes.as_ref().clone()))
+    let view = shown.view()?;
+    let content = [(header::CONTENT_TYPE, "application/octet-stream")];
+    let mut at = At::Index(index);
+    if let Some(job_view) = api_state.board.job_view(job) {
+        let job_view = board::lock(&job_view);
+        if view == View::default() {
+            let bytes = job_view.surface(index);
+            let bytes = bytes.ok_or_else(|| missing(format!("job {job} has no state {index}")))?;
+            return Ok((content, bytes.as_ref().clone()));
+        }
+        // Kept surfaces are thinned out, files are not.
+        let time = job_view.time_of(index);
+        at = At::Time(time.ok_or_else(|| missing(format!("job {job} has no state {index}")))?);
+    }
+    let folder = folder_of(&api_state, job).await?;
+    let bytes = files::blocking(move || folder::state(&folder, at, &view).map(|drawn| drawn.pack())).await?;
+    Ok((content, bytes))
 }
 
 #[cfg(test)]
@@ -269,6 +346,7 @@ mod tests {
             (notice::Error::Queue(queue::Error::NotOver(7, JobState::Running)), 409),
             (notice::Error::Queue(queue::Error::Illegal(JobState::Done, Change::Cancel)), 409),
             (notice::Error::Queue(queue::Error::Full(1000)), 503),
+            (notice::Error::OnlyShows, 409),
             (notice::Error::Ending, 503),
             (notice::Error::Disk { asked: "the job is not queued".to_owned(), why: disk() }, 507),
             (notice::Error::Deck(disk()), 500),

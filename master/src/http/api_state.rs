@@ -16,6 +16,8 @@ pub struct ApiState {
     pub board: Arc<Board>,
     /// The line to paste on a new worker.
     pub join: String,
+    /// Whether results are shown and nothing is run.
+    pub only_shows: bool,
     /// Who may ask.
     pub guard: Guard,
 }

@@ -155,6 +155,8 @@ pub struct JobView {
     workers: BTreeMap<String, Worker>,
     balance: Vec<(u64, f64)>,
     skin: Skin,
+    /// Planes of symmetry.
+    mirrors: [bool; 3],
     states: Vec<Kept>,
 }
 
@@ -174,6 +176,7 @@ impl JobView {
             workers: BTreeMap::new(),
             balance: Vec::new(),
             skin: Skin::new(model),
+            mirrors: model.output.mirrors,
             states: Vec::new(),
         }
     }
@@ -207,6 +210,11 @@ impl JobView {
             halve(&mut self.states);
         }
         self.brief.states = self.states.len();
+    }
+
+    /// When a state was (time).
+    pub fn time_of(&self, index: usize) -> Option<f64> {
+        self.states.get(index).map(|kept| kept.time)
     }
 
     /// A state's surface.
@@ -316,21 +324,24 @@ impl JobView {
         let spans = || self.workers.values().filter_map(|w| w.report.as_ref()).flat_map(|r| &r.spans);
         let start = spans().map(|span| span.start_ns).min().unwrap_or(0);
         let workers: Vec<_> = self.workers.iter().map(|(name, worker)| worker.json(name, start)).collect();
-        let states: Vec<_> =
-            self.states.iter().map(|s| serde_json::json!({ "cycle": s.cycle, "time": s.time })).collect();
+        let states: Vec<_> = self
+            .states
+            .iter()
+            .map(|s| serde_json::json!({ "key": s.cycle, "cycle": s.cycle, "time": s.time }))
+            .collect();
         let parts = self.skin.parts();
         serde_json::json!({
             "brief": self.brief,
             "end_time": self.end_time,
-            "units": { "length": self.units.length, "time": self.units.time, "energy": self.units.energy },
+            "units": self.units.json(),
             "elapsed_s": self.started.elapsed().as_secs_f64(),
             "energies": self.points,
             "imbalance": self.balance,
             "phases": Phase::ALL.map(Phase::name),
             "workers": workers,
             "states": states,
-            "fields": super::surface::FIELDS,
             "parts": parts,
+            "mirrors": self.mirrors,
         })
     }
 }
@@ -346,6 +357,13 @@ impl Worker {
             "phase_ns": self.report.as_ref().map(|report| report.ns), "spans": spans,
         })
     }
+}
+
+/// So many entries of a list at most, at even distances, its last among them.
+pub fn thinned<T>(list: Vec<T>, most: usize) -> Vec<T> {
+    let step = list.len().div_ceil(most.max(1)).max(1);
+    let last = list.len().saturating_sub(1);
+    list.into_iter().enumerate().filter(|(i, _)| i % step == 0 || *i == last).map(|(_, one)| one).collect()
 }
 
 /// Drops every second entry but keeps the last.

@@ -65,10 +65,22 @@ impl Guard {
             Some(token) => token,
             None => make(&path)?,
         };
+        Ok(Self::of(token, port, loopback, tls, name))
+    }
+
+    /// With a token that ends with this process, for a page on loopback.
+    ///
+    /// # Errors
+    /// If the system has no random bytes.
+    pub fn passing(port: u16, name: String) -> Result<Self, String> {
+        Ok(Self::of(fresh()?, port, true, false, name))
+    }
+
+    fn of(token: String, port: u16, loopback: bool, tls: bool, name: String) -> Self {
         let scheme = if tls { "https" } else { "http" };
         let hash = blake3::derive_key("bolide 2026 name of the page's path", token.as_bytes());
         let path = format!("/{}/", protocol::token::hex(&hash[..16]));
-        Ok(Self { token, cookie: format!("bolide-{port}"), path, loopback, scheme, name })
+        Self { token, cookie: format!("bolide-{port}"), path, loopback, scheme, name }
     }
 
     pub fn token(&self) -> &str {
@@ -145,18 +157,23 @@ impl Guard {
 
 fn make(path: &Path) -> Result<String, String> {
     use std::io::Write;
-    let mut bytes = [0u8; 16];
-    ring::default_provider()
-        .secure_random
-        .fill(&mut bytes)
-        .map_err(|_| "the system has no random bytes".to_owned())?;
-    let token: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    let token = fresh()?;
     let fault = |e: std::io::Error| format!("{}: {e}", path.display());
     let mut options = std::fs::OpenOptions::new();
     options.write(true).create(true).truncate(true);
     let mut file = system::private::open(&options, path, system::Readers::Owner).map_err(fault)?;
     file.write_all(token.as_bytes()).map_err(fault)?;
     Ok(token)
+}
+
+/// A token that nobody knows.
+fn fresh() -> Result<String, String> {
+    let mut bytes = [0u8; 16];
+    ring::default_provider()
+        .secure_random
+        .fill(&mut bytes)
+        .map_err(|_| "the system has no random bytes".to_owned())?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 #[cfg(test)]

@@ -1,20 +1,75 @@
 //! SURFACE: the outer faces of a state in a compact binary form that a page draws without asking further.
 //!
-//! Little-endian, in this order: `BSF1`; three `u32` counts of nodes, faces, fields; a `u32` of zero; the cycle and the time
-//! as `f64`; the minimum and maximum of each field as two `f32`; positions, three `f32` by node (deck's unit of length);
+//! Little-endian, in this order: `BSF2`; four `u32`, counts of nodes, faces and fields and the bytes of the last entry; the cycle and
+//! the time as `f64`; the minimum and maximum of each field as two `f32`; positions, three `f32` by node (deck's unit of length);
 //! faces, four `u32` node indices each, outward by the right-hand rule; by field, a `u16` for each face between the minimum
-//! (0) and the maximum (65535); the part of each face as `u16`.
+//! (0) and the maximum (65535); the part of each face as `u16`; JSON: name and unit of each field.
 
 use deck::model::Model;
 use mechanics::{
     element::tet10,
     state::{GlobalState, field},
 };
+use serde::Serialize;
 
 use crate::{
     picture::skin::{Cell, outside},
-    results::von_mises::von_mises,
+    results::{Units, field_unit::unit_of, von_mises::von_mises},
 };
+
+/// Name and unit of a field; the unit is empty for plain numbers.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Field {
+    pub name: String,
+    pub unit: String,
+}
+
+/// The faces of one state with what colours them.
+pub struct Drawn {
+    pub cycle: u64,
+    /// Time (time).
+    pub time: f64,
+    /// By node (length).
+    pub positions: Vec<[f32; 3]>,
+    /// Indices into `positions`, outward by the right-hand rule, and the index of the part.
+    pub faces: Vec<([u32; 4], u16)>,
+    /// A number for each face by field.
+    pub columns: Vec<(Field, Vec<f32>)>,
+}
+
+impl Drawn {
+    /// The form that the page reads.
+    pub fn pack(&self) -> Vec<u8> {
+        let Self { cycle, time, positions, faces, columns } = self;
+        let names: Vec<&Field> = columns.iter().map(|(field, _)| field).collect();
+        let names = serde_json::to_vec(&names).unwrap_or_default();
+        let n_fields = columns.len();
+        let mut out = Vec::with_capacity(
+            36 + 8 * n_fields + 12 * positions.len() + faces.len() * (18 + 2 * n_fields) + names.len(),
+        );
+        out.extend_from_slice(b"BSF2");
+        for count in [positions.len(), faces.len(), n_fields, names.len()] {
+            out.extend_from_slice(&(count as u32).to_le_bytes());
+        }
+        // A multiple of four so far; readers take the next two by a view that needs no alignment.
+        out.extend_from_slice(&(*cycle as f64).to_le_bytes());
+        out.extend_from_slice(&time.to_le_bytes());
+        let ranges: Vec<[f32; 2]> = columns.iter().map(|(_, column)| range(column)).collect();
+        ranges.iter().flatten().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
+        positions.iter().flatten().for_each(|c| out.extend_from_slice(&c.to_le_bytes()));
+        faces.iter().flat_map(|(nodes, _)| nodes).for_each(|n| out.extend_from_slice(&n.to_le_bytes()));
+        for ((_, column), [low, high]) in columns.iter().zip(ranges) {
+            let scale = if high > low { 65535.0 / (high - low) } else { 0.0 };
+            for value in column {
+                let step = ((value - low) * scale).round().clamp(0.0, 65535.0) as u16;
+                out.extend_from_slice(&step.to_le_bytes());
+            }
+        }
+        faces.iter().for_each(|(_, part)| out.extend_from_slice(&part.to_le_bytes()));
+        out.extend_from_slice(&names);
+        out
+    }
+}
 
 /// Fields of faces, in their order.
 pub const FIELDS: [&str; 6] = ["pressure", "von_mises", "plastic_strain", "temperature", "damage", "speed"];
@@ -92,7 +147,7 @@ impl Skin {
     }
 
     /// A state of the model: the faces that `bolide picture` draws of it.
-    pub fn pack(&mut self, model: &Model, state: &GlobalState) -> Vec<u8> {
+    pub fn draw(&mut self, model: &Model, state: &GlobalState) -> Drawn {
         debug_assert_eq!(state.x.len(), model.mesh.n_nodes());
         let n_eroded = state.n_eroded();
         let outer = self.outer.take().filter(|outer| outer.n_eroded == n_eroded);
@@ -114,36 +169,24 @@ impl Skin {
                 face.nodes.iter().map(speed).sum::<f64>() / 4.0
             }
         };
-        let columns: Vec<Vec<f32>> = (0..FIELDS.len())
-            .map(|name| faces.iter().map(|face| value(name, face) as f32).collect())
-            .collect();
-        let mut out = Vec::with_capacity(96 + 12 * nodes.len() + faces.len() * (18 + 2 * FIELDS.len()));
-        out.extend_from_slice(b"BSF1");
-        for count in [nodes.len() as u32, faces.len() as u32, FIELDS.len() as u32, 0] {
-            out.extend_from_slice(&count.to_le_bytes());
+        let units = Units::named(&model.units);
+        let column = |(index, name): (usize, &&str)| {
+            let unit = unit_of(if *name == "speed" { "velocity" } else { name }, &units);
+            let field = Field { name: (*name).to_owned(), unit };
+            (field, faces.iter().map(|face| value(index, face) as f32).collect())
+        };
+        Drawn {
+            cycle: state.cycle,
+            time: state.time,
+            positions: nodes.iter().map(|&n| state.x[n as usize].map(|c| c as f32)).collect(),
+            faces: faces.iter().map(|face| (face.nodes, face.part)).collect(),
+            columns: FIELDS.iter().enumerate().map(column).collect(),
         }
-        // A multiple of four so far; readers take the next two by a view that needs no alignment.
-        out.extend_from_slice(&(state.cycle as f64).to_le_bytes());
-        out.extend_from_slice(&state.time.to_le_bytes());
-        let ranges: Vec<[f32; 2]> = columns.iter().map(|column| range(column)).collect();
-        ranges.iter().flatten().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
-        for &n in &*nodes {
-            state.x[n as usize].iter().for_each(|&c| out.extend_from_slice(&(c as f32).to_le_bytes()));
-        }
-        for face in &*faces {
-            face.nodes.iter().for_each(|n| out.extend_from_slice(&n.to_le_bytes()));
-        }
-        for (column, [low, high]) in columns.iter().zip(ranges) {
-            let scale = if high > low { 65535.0 / (high - low) } else { 0.0 };
-            for value in column {
-                let step = ((value - low) * scale).round().clamp(0.0, 65535.0) as u16;
-                out.extend_from_slice(&step.to_le_bytes());
-            }
-        }
-        for face in faces {
-            out.extend_from_slice(&face.part.to_le_bytes());
-        }
-        out
+    }
+
+    /// [`Skin::draw`] in the form that the page reads.
+    pub fn pack(&mut self, model: &Model, state: &GlobalState) -> Vec<u8> {
+        self.draw(model, state).pack()
     }
 }
 
@@ -198,7 +241,11 @@ mod tests {
         assert_eq!(faces, 2 * (24 * 12 + 24 * 8 + 12 * 8) + 2 * (24 * 12 + 24 * 4 + 12 * 4));
         assert_eq!(&bytes[28..36], 2.5f64.to_le_bytes());
         assert_eq!((f32::from_bits(word(36)), f32::from_bits(word(40))), (0.0, 4.0));
-        assert_eq!(bytes.len(), 36 + 6 * 8 + 12 * nodes + faces * (16 + 12 + 2));
+        let names = word(16) as usize;
+        assert_eq!(bytes.len(), 36 + 6 * 8 + 12 * nodes + faces * (16 + 12 + 2) + names);
+        let names: serde_json::Value = serde_json::from_slice(&bytes[bytes.len() - names..]).expect("JSON");
+        assert_eq!(names[0], serde_json::json!({ "name": "pressure", "unit": "Mbar" }));
+        assert_eq!(names[5], serde_json::json!({ "name": "speed", "unit": "cm/us" }));
         assert_eq!(skin.parts(), ["target", "projectile"]);
     }
 

@@ -9,14 +9,24 @@ use super::camera::{Cut, View};
 /// Flags of `bolide picture`.
 #[derive(Args, Debug)]
 pub struct PictureArgs {
-    /// A results folder, or one .vtu or .vtp file
+    /// A results folder, one .vtu or .vtp file, or a deck, whose bodies are drawn as a run would begin
     pub results: PathBuf,
     /// The field that colours it, such as plastic-strain, pressure, velocity, velocity-z; a name that is not there lists all
-    #[arg(long, default_value = "plastic-strain")]
-    pub field: String,
+    /// [default: plastic-strain, of a deck part]
+    #[arg(long)]
+    pub field: Option<String>,
     /// The PNG to write
     #[arg(long, value_name = "FILE", default_value = "picture.png")]
     pub out: PathBuf,
+    /// Write all states as an animation instead: .gif, or .apng, an animated PNG
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "state", "time"])]
+    pub movie: Option<PathBuf>,
+    /// Pictures per second of the animation
+    #[arg(long, value_name = "NUMBER", default_value_t = 10, requires = "movie", value_parser = clap::value_parser!(u16).range(1..=50))]
+    pub rate: u16,
+    /// Add the mirror images at the planes of [symmetry] of the deck
+    #[arg(long)]
+    pub mirror: bool,
     /// Number of the state, from 0 [default: the last]
     #[arg(long, value_name = "N", conflicts_with = "time")]
     pub state: Option<usize>,
@@ -29,9 +39,9 @@ pub struct PictureArgs {
     /// Show the half beyond the middle across this axis (across z the half below it), by whole elements
     #[arg(long, value_name = "AXIS")]
     pub cut: Option<Cut>,
-    /// Draw this part only, by its number in the field `part`; may be repeated
-    #[arg(long, value_name = "NUMBER")]
-    pub part: Vec<u32>,
+    /// Draw this part only, by its name, or its number in the field `part`; may be repeated
+    #[arg(long, value_name = "NAME|NUMBER")]
+    pub part: Vec<String>,
     /// Ends of the colour bar [default: those of what is drawn]
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub range: Option<Span>,

@@ -70,12 +70,30 @@ impl FromStr for Cut {
 }
 
 impl Cut {
-    /// Which cells stay: those beyond the middle across x and y, those below it across z.
-    pub fn keeps(self, start: &[[f64; 3]], cells: &[Vec<u32>]) -> Vec<bool> {
+    /// The half that stays: beyond the middle across x and y, below it across z.
+    pub const fn slice(self) -> Slice {
         let Self(axis) = self;
+        Slice { axis, at: 0.5, is_beyond: axis != 2 }
+    }
+}
+
+/// What stays of the cells on one side of a plane across an axis; of whole elements by where they began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slice {
+    pub axis: usize,
+    /// Where the plane is, from the least (0) to the greatest (1) position along the axis.
+    pub at: f64,
+    /// Whether those beyond the plane stay; else those below it.
+    pub is_beyond: bool,
+}
+
+impl Slice {
+    /// Which cells stay.
+    pub fn keeps(self, start: &[[f64; 3]], cells: &[Vec<u32>]) -> Vec<bool> {
+        let Self { axis, at, is_beyond } = self;
         let used = || cells.iter().flatten().map(|&n| start[n as usize][axis]);
         let (low, high) = used().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-        let middle = 0.5 * (low + high);
+        let plane = at.mul_add(high - low, low);
         // Of an odd number of elements the middle one stays; the tolerance is far below an element.
         let tolerance = 1e-6 * (high - low);
         cells
@@ -83,7 +101,7 @@ impl Cut {
             .map(|cell| {
                 let sum: f64 = cell.iter().map(|&n| start[n as usize][axis]).sum();
                 let centre = sum / cell.len().max(1) as f64;
-                if axis == 2 { centre < middle + tolerance } else { centre > middle - tolerance }
+                if is_beyond { centre > plane - tolerance } else { centre < plane + tolerance }
             })
             .collect()
     }

@@ -1,6 +1,6 @@
 //! Skin: the faces of a state that are seen from outside, and what colours them. Pictures and the page share [`outside`].
 
-use super::camera::Cut;
+use super::camera::{Cut, Slice};
 use crate::results::{
     Error,
     vtu::read::{Heading, Piece},
@@ -46,7 +46,10 @@ pub fn fields(piece: &Piece) -> Vec<String> {
 }
 
 /// One number per tuple of the field of this name, and whether it is by node.
-fn values(piece: &Piece, name: &str) -> Result<(Vec<f64>, bool), Error> {
+///
+/// # Errors
+/// What is wrong with the file, or that it has no such field.
+pub fn values(piece: &Piece, name: &str) -> Result<(Vec<f64>, bool), Error> {
     let fits = |heading: &&Heading| heading.name == name && matches!(heading.components, 1 | 3);
     let whole = |by: &str| piece.headings.iter().filter(|h| h.section == by).find(fits);
     for (section, by_node) in [("CellData", false), ("PointData", true)] {
@@ -76,24 +79,10 @@ impl Skin {
     /// # Errors
     /// What is wrong with the file.
     pub fn new(piece: &Piece, field: &str, cut: Option<Cut>, parts: &[u32]) -> Result<Self, Error> {
-        let points = piece.points()?;
         let (values, by_node) = values(piece, field)?;
-        let section = if piece.find("Polys", "offsets").is_some() { "Polys" } else { "Cells" };
-        let cells = piece.cells(section)?;
-        let part: Vec<u32> = match piece.find("CellData", "part") {
-            Some(heading) => {
-                piece.numbers(heading, piece.n_cells)?.into_iter().map(|part| part as u32).collect()
-            }
-            None => vec![0; cells.len()],
-        };
-        let mut kept = match cut {
-            Some(cut) => cut.keeps(&start(piece, &points)?, &cells),
-            None => vec![true; cells.len()],
-        };
-        kept.iter_mut().zip(&part).for_each(|(kept, part)| *kept &= parts.is_empty() || parts.contains(part));
-        let shapes = cells.iter().zip(&kept).enumerate().filter(|(_, (_, kept))| **kept);
-        let shapes = shapes.filter_map(|(number, (corners, _))| Some((number, Cell::of(corners)?)));
-        let faces: Vec<Face> = outside(points.len(), shapes)
+        let is_shown = |part: u32| parts.is_empty() || parts.contains(&part);
+        let Seen { points, faces, part } = Seen::new(piece, cut.map(Cut::slice), &is_shown)?;
+        let faces: Vec<Face> = faces
             .into_iter()
             .map(|(cell, corners)| Face {
                 corners,
@@ -103,6 +92,33 @@ impl Skin {
             .collect();
         let lines = lines(&points, &faces);
         Ok(Self { points, faces, lines })
+    }
+
+    /// Adds the mirror image at the plane through the origin across an axis. Faces in that plane vanish, for the body goes on behind them.
+    pub fn mirror(&mut self, axis: usize) {
+        let used = || self.faces.iter().flat_map(|face| face.corners).map(|n| self.points[n as usize]);
+        let size = used().flatten().fold(0.0_f64, |most, c| most.max(c.abs()));
+        let is_on = |p: &[f64; 3]| p[axis].abs() <= 1e-6 * size;
+        let n = self.points.len() as u32;
+        // A point on the plane is its own image, so that no seam is seen.
+        let image: Vec<u32> =
+            (0..n).zip(&self.points).map(|(i, p)| if is_on(p) { i } else { n + i }).collect();
+        let points = std::mem::take(&mut self.points);
+        self.faces.retain(|face| !face.corners.iter().all(|&n| is_on(&points[n as usize])));
+        let turned = |face: &Face| {
+            let [a, b, c, d] = face.corners.map(|n| image[n as usize]);
+            let [u, v, w, x] = face.values;
+            Face { corners: [d, c, b, a], values: [x, w, v, u], part: face.part }
+        };
+        let images: Vec<Face> = self.faces.iter().map(turned).collect();
+        self.faces.extend(images);
+        let mirrored = points.iter().map(|p| {
+            let mut p = *p;
+            p[axis] = -p[axis];
+            p
+        });
+        self.points = points.iter().copied().chain(mirrored).collect();
+        self.lines = lines(&self.points, &self.faces);
     }
 
     /// Least and greatest value of what is drawn.
@@ -116,6 +132,43 @@ impl Skin {
     /// Points of faces.
     pub fn points_seen(&self) -> Vec<[f64; 3]> {
         self.faces.iter().flat_map(|face| face.corners.map(|n| self.points[n as usize])).collect()
+    }
+}
+
+/// What is seen of a state or of a contact surface.
+pub struct Seen {
+    /// Positions (length).
+    pub points: Vec<[f64; 3]>,
+    /// Cell and corners of each face, outward by the right-hand rule where they are of solids.
+    pub faces: Vec<(usize, [u32; 4])>,
+    /// Index of the part by cell.
+    pub part: Vec<u32>,
+}
+
+impl Seen {
+    /// Of what a slice leaves of the parts that are shown.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn new(piece: &Piece, slice: Option<Slice>, is_shown: &dyn Fn(u32) -> bool) -> Result<Self, Error> {
+        let points = piece.points()?;
+        let section = if piece.find("Polys", "offsets").is_some() { "Polys" } else { "Cells" };
+        let cells = piece.cells(section)?;
+        let part: Vec<u32> = match piece.find("CellData", "part") {
+            Some(heading) => {
+                piece.numbers(heading, piece.n_cells)?.into_iter().map(|part| part as u32).collect()
+            }
+            None => vec![0; cells.len()],
+        };
+        let mut kept = match slice {
+            Some(slice) => slice.keeps(&start(piece, &points)?, &cells),
+            None => vec![true; cells.len()],
+        };
+        kept.iter_mut().zip(&part).for_each(|(kept, part)| *kept &= is_shown(*part));
+        let shapes = cells.iter().zip(&kept).enumerate().filter(|(_, (_, kept))| **kept);
+        let shapes = shapes.filter_map(|(number, (corners, _))| Some((number, Cell::of(corners)?)));
+        let faces = outside(points.len(), shapes);
+        Ok(Self { points, faces, part })
     }
 }
 
@@ -273,4 +326,43 @@ fn lines(points: &[[f64; 3]], faces: &[Face]) -> Vec<([u32; 2], bool)> {
         _ => true,
     };
     edges.chunk_by(|a, b| a.0 == b.0).map(|same| (same[0].0, outline(same))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A unit cube on the plane x = 0, its faces outward.
+    fn cube() -> Skin {
+        let points: Vec<[f64; 3]> =
+            [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+                .map(|p| p.map(f64::from))
+                .to_vec();
+        let shapes = [(0, Cell::Solid([0, 1, 2, 3, 4, 5, 6, 7]))];
+        let face =
+            |(_, corners): (usize, [u32; 4])| Face { corners, values: corners.map(f64::from), part: 0 };
+        let faces: Vec<Face> = outside(8, shapes.into_iter()).into_iter().map(face).collect();
+        let lines = lines(&points, &faces);
+        Skin { points, faces, lines }
+    }
+
+    #[test]
+    fn a_mirrored_half_is_the_whole_without_a_seam() {
+        let mut skin = cube();
+        skin.mirror(0);
+        assert_eq!(skin.faces.len(), 10, "the face in the plane is gone from both");
+        // All faces look outward from the middle of the whole.
+        for face in &skin.faces {
+            let n = normal(&skin.points, face.corners);
+            let centre: [f64; 3] = std::array::from_fn(|a| {
+                face.corners.iter().map(|&c| skin.points[c as usize][a]).sum::<f64>() / 4.0
+            });
+            let out = [centre[0], centre[1] - 0.5, centre[2] - 0.5];
+            assert!((0..3).map(|a| n[a] * out[a]).sum::<f64>() > 0.0, "{centre:?} looks along {n:?}");
+        }
+        // Edges in the plane lie between faces that go on straight: none of them is an outline.
+        let in_plane = |corners: &[u32; 2]| corners.iter().all(|&n| skin.points[n as usize][0] == 0.0);
+        assert!(skin.lines.iter().filter(|(c, _)| in_plane(c)).all(|(_, outline)| !outline));
+        assert_eq!(skin.lines.iter().filter(|(_, outline)| *outline).count(), 16);
+    }
 }

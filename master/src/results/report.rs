@@ -26,20 +26,34 @@ struct Curve {
     points: Vec<[f64; 2]>,
 }
 
+/// A picture of the report: what is on it, and the PNG.
+pub struct Picture {
+    pub caption: String,
+    pub png: Vec<u8>,
+}
+
 /// Writes the report of a finished run. `units` is the deck's name of them.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Malformed`] if the history is no longer what the run wrote.
-pub fn write(folder: &Folder, summary: &Summary, units: &str) -> Result<(), Error> {
+pub fn write(folder: &Folder, summary: &Summary, units: &str, pictures: &[Picture]) -> Result<(), Error> {
     let history = Table::read(&folder.file(HISTORY))?;
-    let page = page(&history, summary, units);
+    let page = page(&history, summary, units, pictures);
     write_whole(&folder.file(REPORT), |out| std::io::Write::write_all(out, page.as_bytes()))
 }
 
-fn page(history: &Table, summary: &Summary, units: &str) -> String {
+fn page(history: &Table, summary: &Summary, units: &str, pictures: &[Picture]) -> String {
     let Units { time, energy, length, stress, force, .. } = Units::named(units);
     let title = escaped(&summary.title);
-    let mut body = format!("<h1>{title}</h1>\n<pre>{}</pre>\n", lines(&summary.table(units)));
+    let mut body = format!("<h1>{title}</h1>\n<pre>{}</pre>\n", lines(&summary.table(units, true)));
+    for Picture { caption, png } in pictures {
+        let caption = escaped(caption);
+        let _ = writeln!(
+            body,
+            "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{}\"><figcaption>{caption}</figcaption></figure>",
+            base64(png)
+        );
+    }
     let at = history.column("time").unwrap_or_default();
     let curve = |name: &str| -> Option<Curve> {
         let values = history.column(name)?;
@@ -101,6 +115,7 @@ body{font:15px/1.45 system-ui,sans-serif;color:var(--ink);background:var(--paper
 h1{font-size:1.25rem}h2{font-size:1rem;margin:1.6rem 0 .3rem}small{font-weight:normal;opacity:.75}
 pre{white-space:pre-wrap;overflow-wrap:anywhere;font-size:13px;border:1px solid var(--line);border-radius:4px;padding:.7rem}
 pre span{display:block;padding-left:13ch;text-indent:-13ch;min-height:1lh}
+figure{margin:1rem 0}img{width:100%;height:auto;border-radius:4px}figcaption{font-size:13px;opacity:.75}
 svg{width:100%;height:auto;font:12px system-ui,sans-serif}svg text{fill:var(--ink)}
 table{border-collapse:collapse;width:100%;font-size:13px}td,th{text-align:right;padding:.15rem .4rem;border-bottom:1px solid var(--line)}td:first-child,th:first-child{text-align:left}
 .scroll{overflow-x:auto}";
@@ -243,6 +258,20 @@ fn balance(summary: &Summary) -> String {
     html
 }
 
+/// Bytes in the letters of RFC 4648, section 4.
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let word = three.iter().fold(0, |word, &byte| word << 8 | u32::from(byte)) << (8 * (3 - three.len()));
+        for place in 0..4 {
+            let letter = LETTERS[(word >> (18 - 6 * place) & 63) as usize];
+            text.push(if place <= three.len() { char::from(letter) } else { '=' });
+        }
+    }
+    text
+}
+
 pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
@@ -266,6 +295,23 @@ mod tests {
     }
 
     #[test]
+    fn base64_is_that_of_the_rfc() {
+        // RFC 4648, section 10.
+        let pairs = [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("foobar", "Zm9vYmFy"),
+        ];
+        for (bytes, text) in pairs {
+            assert_eq!(base64(bytes.as_bytes()), text);
+        }
+        assert_eq!(base64(&[0xfb, 0xff, 0xfe]), "+//+");
+    }
+
+    #[test]
     fn a_long_curve_keeps_its_ends() {
         let all: Vec<[f64; 2]> = (0..10_007).map(|i| [f64::from(i), 1.0]).collect();
         let points = thinned(all.clone());
@@ -278,8 +324,10 @@ mod tests {
         let columns = ["cycle", "time [s]", "dt [s]", "kinetic [J]", "<b>&\":kinetic [J]"].map(str::to_owned);
         let rows = (0..3).map(|i| vec![f64::from(i), f64::from(i), 0.1, 2.0, 1.0]).collect();
         let summary = Summary { title: "<script>".to_owned(), ..Summary::default() };
-        let page = page(&Table { columns: columns.to_vec(), rows }, &summary, "SI");
+        let pictures = [Picture { caption: "<b>\"".to_owned(), png: b"any".to_vec() }];
+        let page = page(&Table { columns: columns.to_vec(), rows }, &summary, "SI", &pictures);
         assert!(!page.contains("<script") && !page.contains("<b>"), "{page}");
+        assert!(page.contains("alt=\"&lt;b&gt;&quot;\" src=\"data:image/png;base64,YW55\""), "{page}");
         assert!(page.contains("&lt;b&gt;&amp;&quot;") && page.contains("Kinetic energy of parts"));
         assert_eq!(page.matches("<polyline").count(), 3, "energies, time step, the part");
     }

@@ -2,17 +2,20 @@
 //!
 //! Units and formulas of every field are stated in the deck reference.
 
-#![expect(clippy::disallowed_methods, reason = "digits of a table")]
-
-use std::{
-    fmt::{self, Write as _},
-    io::Write as _,
-};
+use std::io::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Error, Folder, SUMMARY, Units, write_whole};
-use crate::incident::{Loss, Rebalance};
+mod table;
+
+pub use table::significant;
+
+use super::{Error, Folder, SUMMARY, write_whole};
+use crate::{
+    incident::{Loss, Rebalance},
+    machine,
+    quality::Quality,
+};
 
 /// A finished run. Shares and relative quantities are fractions of one. All numbers are finite: JSON has no
 /// others.
@@ -95,11 +98,48 @@ pub struct Summary {
     /// Gauges whose last element has eroded.
     #[serde(default)]
     pub dead_gauges: Vec<DeadGauge>,
+    /// How far the numbers can be trusted.
+    #[serde(default)]
+    pub quality: Quality,
+    /// Planes of symmetry through the origin, by the axis across them.
+    #[serde(default)]
+    pub mirrors: [bool; 3],
+    /// Name of the deck's units.
+    #[serde(default)]
+    pub units: String,
+    /// Which program computed it from which deck, when and where.
+    #[serde(default)]
+    pub origin: Origin,
     /// Hash of the final state (hexadecimal).
     pub digest: String,
     /// What it was computed from; none where no folder was written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<Input>,
+}
+
+/// Where results come from.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Release of the program.
+    pub version: String,
+    /// When the run ended, UTC.
+    pub date: String,
+    /// File of the deck, as it was given.
+    pub deck: String,
+    /// The machine of the master, or of a run without one.
+    pub machine: String,
+}
+
+impl Origin {
+    /// Of a run of this deck that has just ended here.
+    pub fn of(deck: &str) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            date: machine::now(),
+            deck: deck.replace(char::is_control, " "),
+            machine: machine::words(),
+        }
+    }
 }
 
 /// What a run was computed from, so that it can be computed again.
@@ -155,9 +195,6 @@ pub struct WorkUnits {
     /// Node-face interactions of all units.
     pub interactions: u64,
 }
-
-/// Parts that the table names of those that eroded.
-const NAMED_PARTS: usize = 4;
 
 /// Energies of one part in the deck's unit of energy, sums over the run but for kinetic and internal.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -257,238 +294,5 @@ impl Summary {
             serde_json::to_writer_pretty(&mut *out, self)?;
             out.write_all(b"\n")
         })
-    }
-
-    /// The summary as an aligned table of a few lines, for a terminal. `units` is the deck's name of them.
-    pub fn table(&self, units: &str) -> String {
-        let mut table = String::new();
-        // Writing into a string cannot fail.
-        let _ = self.print(&mut table, Units::named(units));
-        table
-    }
-
-    fn print(&self, out: &mut String, Units { time, energy, .. }: Units) -> fmt::Result {
-        let Energies { kinetic, internal, hourglass, viscosity, contact, friction, external, error, .. } =
-            self.energies;
-        writeln!(out, "{}", self.title.replace(char::is_control, " "))?;
-        writeln!(out, "  problem    {} elements, {} nodes", grouped(self.elements), grouped(self.nodes))?;
-        writeln!(
-            out,
-            "  surface    {} elements, {} faces, {} nodes",
-            grouped(self.surface_elements),
-            grouped(self.surface_faces),
-            grouped(self.surface_nodes)
-        )?;
-        writeln!(
-            out,
-            "  run        {} cycles to {} {time} in {:.2} s on {} with {}, {} lanes, route {}",
-            grouped(self.cycles),
-            significant(self.end_time),
-            self.wall_s,
-            counted(self.workers, "worker"),
-            counted(self.threads, "thread"),
-            self.lanes,
-            self.route
-        )?;
-        writeln!(
-            out,
-            "  speed      {:.1} ns of thread time per element and cycle, {:.1} % of it in contact; imbalance {:.3}",
-            self.grind_ns,
-            100.0 * self.contact_share,
-            self.imbalance
-        )?;
-        writeln!(
-            out,
-            "  traffic    {} bytes per cycle, {} of them at the master; {} of {} pairs relayed",
-            grouped(self.bytes_per_cycle.round() as u64),
-            grouped(self.master_bytes_per_cycle.round() as u64),
-            grouped(self.relayed_pairs),
-            grouped(self.relayed_pairs + self.linked_pairs)
-        )?;
-        for Rebalance { cycle, imbalance_before, imbalance_after, .. } in &self.rebalances {
-            writeln!(
-                out,
-                "  balance    cycle {}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}",
-                grouped(*cycle)
-            )?;
-        }
-        for Loss { worker, cycle, back_to, .. } in &self.losses {
-            writeln!(
-                out,
-                "  lost       {} in cycle {}, went on from cycle {}",
-                worker.replace(char::is_control, " "),
-                grouped(*cycle),
-                grouped(*back_to)
-            )?;
-        }
-        let WorkUnits {
-            count,
-            nodes_min,
-            nodes_mean,
-            nodes_max,
-            faces_min,
-            faces_mean,
-            faces_max,
-            interactions,
-        } = self.work_units;
-        if count > 0 {
-            writeln!(
-                out,
-                "  contact    {} sorts; {} work units of {nodes_min}-{nodes_max} nodes (mean {nodes_mean:.1}) and \
-                 {faces_min}-{faces_max} faces (mean {faces_mean:.1}), {} interactions",
-                grouped(self.sorts),
-                grouped(count),
-                grouped(interactions)
-            )?;
-            writeln!(
-                out,
-                "             worst penetration {:.3} gap, worst travel in one cycle {:.3} gap",
-                self.worst_penetration, self.worst_gap_travel
-            )?;
-        }
-        writeln!(out, "  time step  at most {:.4} of the Courant limit", self.worst_courant)?;
-        writeln!(out, "  energy     {:<10} {:>14} {energy}", "kinetic", significant(kinetic))?;
-        for (name, value) in [
-            ("internal", internal),
-            ("viscosity*", viscosity),
-            ("hourglass", hourglass),
-            ("contact", contact),
-            ("friction**", friction),
-            ("external", external),
-        ] {
-            writeln!(out, "             {name:<10} {:>14}", significant(value))?;
-        }
-        if self.energies.wall_loss != 0.0 {
-            let lost = significant(self.energies.wall_loss);
-            writeln!(
-                out,
-                "             {:<10} {lost:>14}   lost by nodes that struck walls, and to friction there",
-                "walls"
-            )?;
-        }
-        if self.eroded_elements > 0 {
-            let eroded = self.energies.parts.iter().filter(|part| part.eroded_elements > 0);
-            let parts: Vec<String> = eroded
-                .map(|part| format!("{} of {}", grouped(part.eroded_elements), part.name))
-                .take(NAMED_PARTS + 1)
-                .collect();
-            let parts = match parts.len() {
-                0 => String::new(),
-                n if n > NAMED_PARTS => format!(" ({}, ...)", parts[..NAMED_PARTS].join(", ")),
-                _ => format!(" ({})", parts.join(", ")),
-            };
-            writeln!(
-                out,
-                "             {:<10} {:>14}   {} elements{parts}, mass {}",
-                "eroded",
-                significant(self.eroded_energy),
-                grouped(self.eroded_elements),
-                significant(self.eroded_mass)
-            )?;
-        }
-        if let Some(broken) = self.broken_ties {
-            writeln!(
-                out,
-                "             {:<10} {:>14}   have let go of their faces",
-                "ties",
-                grouped(broken)
-            )?;
-        }
-        writeln!(
-            out,
-            "             {:<10} {:>14}   *part of internal, **of contact",
-            "error",
-            percent(error)
-        )?;
-        if let Some(NamedBody { parts, error, .. }) = &self.energies.worst_body {
-            let mut names = parts[..parts.len().min(NAMED_PARTS)].join(", ");
-            if parts.len() > NAMED_PARTS {
-                names.push_str(", ...");
-            }
-            writeln!(out, "             {:<10} {:>14}   worst body: {names}", "of a body", percent(*error))?;
-        }
-        writeln!(
-            out,
-            "  momentum   {:<10} {:>14}   supports and walls included",
-            "change",
-            percent(self.momentum_error)
-        )?;
-        for warning in &self.warnings {
-            writeln!(out, "  warning    {}", warning.replace(char::is_control, " "))?;
-        }
-        writeln!(out, "  digest     {}", self.digest)
-    }
-}
-
-/// `1 worker`, `4 workers`.
-fn counted(n: u32, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
-}
-
-/// A count with a comma every three digits.
-fn grouped(n: u64) -> String {
-    let digits = n.to_string();
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-/// Six significant digits, with an exponent outside 0.001 to 1,000,000.
-pub(super) fn significant(x: f64) -> String {
-    let magnitude = x.abs();
-    if x == 0.0 {
-        "0".to_owned()
-    } else if (1e-3..1e6).contains(&magnitude) {
-        let decimals = (5.0 - magnitude.log10().floor()).clamp(0.0, 9.0) as usize;
-        format!("{x:.decimals$}")
-    } else {
-        format!("{x:.5e}")
-    }
-}
-
-/// A relative quantity in percent, with an exponent below 0.001 %.
-fn percent(x: f64) -> String {
-    let x = 100.0 * x;
-    if x == 0.0 || x.abs() >= 1e-3 { format!("{x:.3} %") } else { format!("{x:.2e} %") }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_keep_six_digits_at_any_size() {
-        for (number, text) in [
-            (0.0, "0"),
-            (1.0, "1.00000"),
-            (-12.345678, "-12.3457"),
-            (999_999.4, "999999"),
-            (1e6, "1.00000e6"),
-            (0.001234567, "0.00123457"),
-            (-1.5e-12, "-1.50000e-12"),
-            (f64::NAN, "NaN"),
-        ] {
-            assert_eq!(significant(number), text);
-        }
-    }
-
-    #[test]
-    fn warnings_have_lines_of_their_own() {
-        let warnings = vec!["part \"ball\": one\u{1b}".to_owned(), "two".to_owned()];
-        let table = Summary { warnings, ..Summary::default() }.table("SI");
-        assert!(table.contains("\n  warning    part \"ball\": one \n  warning    two\n  digest"), "{table}");
-        assert!(!Summary::default().table("SI").contains("warning"));
-    }
-
-    #[test]
-    fn counts_are_grouped_by_thousands() {
-        for (number, text) in [(0, "0"), (999, "999"), (1000, "1,000"), (1_234_567, "1,234,567")] {
-            assert_eq!(grouped(number), text);
-        }
     }
 }

@@ -111,7 +111,13 @@ pub fn write_vtu(
 }
 
 /// The file of [`write_vtu`] as bytes into any writer.
-fn stream(
+///
+/// # Errors
+/// The writer's.
+///
+/// # Panics
+/// As [`write_vtu`].
+pub fn stream(
     out: &mut impl Write,
     model: &Model,
     state: &GlobalState,

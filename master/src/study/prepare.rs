@@ -79,7 +79,8 @@ pub fn prepare(study: &Study, point: &Point) -> Result<Prepared, Error> {
 
 /// The command that computes a point once more, with states to look at.
 pub fn command(study: &Study, point: &Point, out: &str) -> String {
-    let bundle::Options { units, case, parameters, perturbation, title: _ } = study.options_at(point);
+    let bundle::Options { units, case, parameters, perturbation, title: _, refine: _ } =
+        study.options_at(point);
     let mut words = vec!["bolide".to_owned(), "run".to_owned(), study.deck.display().to_string()];
     let flags = ReadingArgs { units, case, set: parameters.into_iter().collect(), perturb: perturbation };
     words.extend(flags.words());

@@ -4,6 +4,7 @@ mod bad_physics;
 mod epochs;
 mod init;
 mod links;
+mod outcome;
 mod picture;
 mod replay;
 mod results;

@@ -209,3 +209,72 @@ fn states_read_back_to_the_same_bits_compressed_or_not_and_compressed_are_smalle
     }
     assert!(2 * sizes[1] < sizes[0], "{sizes:?} bytes");
 }
+
+#[test]
+fn a_movie_has_a_picture_for_every_state_under_one_range_of_colours() {
+    let (folder, _) = block("movie", true, [5, 3, 2]);
+    let small = ["--field", "pressure", "--width", "320", "--height", "240", "--movie"];
+    let make = |name: &str| {
+        let path = folder.file(name);
+        let mut flags = small.to_vec();
+        let text = path.display().to_string();
+        flags.push(&text);
+        let done = picture(folder.path(), &flags);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let told = String::from_utf8_lossy(&done.stdout).into_owned();
+        assert!(told.contains("2 states, pressure (GPa) from 0 to 2.5"), "{told}");
+        path
+    };
+    let file = |path: &Path| std::io::BufReader::new(fs::File::open(path).expect("written"));
+    let apng = make("all.apng");
+    let reader = png::Decoder::new(file(&apng)).read_info().expect("a PNG");
+    assert_eq!(reader.info().animation_control().expect("an animation").num_frames, 2);
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let mut reader = options.read_info(file(&make("all.gif"))).expect("a GIF");
+    assert_eq!((reader.width(), reader.height()), (320, 240));
+    let mut yellow = Vec::new();
+    while let Some(frame) = reader.read_next_frame().expect("a whole GIF") {
+        // Left of the colour bar.
+        let bright = |(i, p): (usize, &[u8])| i % 320 < 200 && greatest([p[0], p[1], p[2]]);
+        yellow.push(frame.buffer.chunks(4).enumerate().filter(|(i, p)| bright((*i, p))).count());
+    }
+    // At rest nothing has the greatest pressure of all states.
+    assert!(yellow.len() == 2 && yellow[0] == 0 && yellow[1] > 20, "{yellow:?}");
+    let refused = picture(folder.path(), &["--movie", "all.mp4"]);
+    let why = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success() && why.contains("name a .gif or .apng"), "{why}");
+}
+
+#[test]
+fn a_deck_is_drawn_before_it_runs_mirrored_and_by_parts() {
+    let folder = scratch("deck");
+    fs::create_dir_all(&folder).expect("room");
+    let deck = folder.join("quarter.toml");
+    let text = DECK
+        .replace("[[part]]", "[symmetry]\nplanes = [\"x\"]\n[[part]]")
+        .replace("[0, 0, 0], size", "[-30, 0, 0], size")
+        + "[[part]]\nname = \"other\"\nmaterial = \"STEEL_4340\"\nbox = { origin = [0, 0, 40], size = [30, 40, 30], cells = [3, 4, 3] }\n";
+    fs::write(&deck, text).expect("room");
+    let out = folder.join("x.png");
+    let draw = |flags: &[&str]| {
+        let path = out.display().to_string();
+        let done = picture(&deck, &[&["--view", "-y", "--out", &path], flags].concat());
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let told = String::from_utf8_lossy(&done.stdout).into_owned();
+        assert!(told.contains("part from 0 to 1, as a run begins") || !flags.is_empty(), "{told}");
+        let (width, pixels) = pixels(&out);
+        centre(width, &pixels, |pixel| greatest(pixel) || least(pixel))
+    };
+    let (_, _, half) = draw(&[]);
+    let (_, _, whole) = draw(&["--mirror"]);
+    // Twice as wide and as high: both are 60 wide and 70 high, and fill the height.
+    assert!(whole > 1.8 * half && whole < 2.2 * half, "{half} and {whole}");
+    let (_, _, one) = draw(&["--part", "block", "--range", "0,1"]);
+    assert!(one > 0.0);
+    let refused = picture(&deck, &["--part", "nothing"]);
+    let why = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success() && why.contains("no such part; there are block, other"), "{why}");
+    let refused = picture(&deck, &["--state", "3"]);
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("is a deck, which has no states"));
+}

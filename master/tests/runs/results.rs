@@ -556,7 +556,7 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
     assert_eq!(
         keys(&json),
         "bytes_per_cycle contact_share cycles dead_gauges digest elements end_time energies eroded_elements eroded_energy eroded_mass grind_ns imbalance lanes \
-         linked_pairs losses master_bytes_per_cycle momentum_error nodes rebalances relayed_pairs route serial_share sorts surface_elements surface_faces surface_nodes threads title wall_s \
+         linked_pairs losses master_bytes_per_cycle mirrors momentum_error nodes origin quality rebalances relayed_pairs route serial_share sorts surface_elements surface_faces surface_nodes threads title units wall_s \
          warnings work_units worker_times workers worst_courant worst_gap_travel worst_penetration"
     );
     assert_eq!(
@@ -580,7 +580,7 @@ fn summary_has_exactly_its_fields_and_reads_back_to_the_same_bits() {
 #[test]
 fn table_for_people_fits_a_terminal_and_names_units() {
     let mut summary = summary(&plates(2));
-    let table = summary.table("cm-g-us");
+    let table = summary.table("cm-g-us", true);
     for line in table.lines() {
         assert!(line.len() <= 130, "{} columns: {line}", line.len());
     }
@@ -590,5 +590,11 @@ fn table_for_people_fits_a_terminal_and_names_units() {
         assert!(table.contains(text), "{text} is missing in\n{table}");
     }
     summary.work_units = WorkUnits::default();
-    assert!(!summary.table("SI").contains("work units"));
+    assert!(!summary.table("SI", true).contains("work units"));
+    // Unasked it tells results and not how they were computed.
+    let short = summary.table("cm-g-us", false);
+    assert!(
+        short.contains("Mbar*cm3") && !short.contains("0.431 gap") && !short.contains("traffic"),
+        "{short}"
+    );
 }

@@ -62,8 +62,8 @@ fn draw(program: &Path, bolide: &Path, folder: &Path) -> std::io::Result<()> {
     let longer = files.path().join("plates-64k-free-slip.toml");
     std::fs::write(&longer, text.replace("end_time = 100.0 ", "end_time = 1000.0 "))?;
     let mut submitted = submit(&longer, "1600");
-    browser.wait_for("document.querySelectorAll('#jobs button').length === 2");
-    browser.evaluate("document.querySelector('#jobs button').click()");
+    browser.wait_for("document.querySelectorAll('#jobs .job').length === 2");
+    browser.evaluate("document.querySelector('#jobs .job').click()");
     browser.wait_for("document.getElementById('title').innerText.includes('64k')");
     // Some states and some seconds of what hosts do.
     browser.wait_for("Number(document.getElementById('bodies').dataset.cycle) > 300");
@@ -81,7 +81,7 @@ fn draw(program: &Path, bolide: &Path, folder: &Path) -> std::io::Result<()> {
     let png = browser.picture(400, 900, true);
     running(&mut browser, "page-live-400.png", &png)?;
 
-    let mut top = Terminal::start(&format!("{} top --master {address}", bolide.display()), 140, 14);
+    let mut top = Terminal::start(&format!("{} top --master {address}", bolide.display()), 80, 14);
     top.wait_for("running");
     // The rate of cycles comes with the second look.
     std::thread::sleep(Duration::from_secs(3));

@@ -55,7 +55,14 @@ impl Piece {
     /// # Errors
     /// [`Error::Io`]; [`Error::Malformed`] for a file that no run writes.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let bytes = fs::read(path).map_err(Error::io("read", path))?;
+        Self::of(path, fs::read(path).map_err(Error::io("read", path))?)
+    }
+
+    /// Of the bytes of a file, which `path` names in errors.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] for a file that no run writes.
+    pub fn of(path: &Path, bytes: Vec<u8>) -> Result<Self, Error> {
         let malformed = |line: usize, what: String| Error::Malformed { path: path.to_owned(), line, what };
         let end = bytes.windows(MARKER.len()).position(|window| window == MARKER);
         let head = end.and_then(|end| std::str::from_utf8(&bytes[..end]).ok()).map(str::to_owned);

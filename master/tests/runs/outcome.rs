@@ -1,0 +1,105 @@
+//! What a run says when it is over: the verdict on its quality, where it comes from, pictures in its report, and how it changes with the
+//! mesh.
+
+use std::{fs, path::Path, process::Command};
+
+use master::{
+    quality::Grade,
+    results::{REPORT, SUMMARY, Summary},
+};
+
+/// A bar of copper that strikes a wall and loses the elements that it strikes with; a gauge stands there.
+const BAR: &str = "title = \"bar\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = 0.01\n[symmetry]\nplanes = [\"x\", \"y\"]\n\
+    [[part]]\nname = \"bar\"\nmaterial = \"COPPER_TAYLOR_BENCHMARK\"\nvelocity = [0, 0, -227]\nerosion = { plastic_strain = 0.3 }\n\
+    box = { origin = [-2, -2, 0], size = [4, 4, 12], cells = [4, 4, 12] }\n[[wall]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n\
+    [[gauge]]\nname = \"front\"\npoint = [0, 0, 0]\n[[gauge]]\nname = \"rear\"\npoint = [0, 0, 12]\n";
+
+fn run(folder: &Path, deck: &str, flags: &[&str]) -> String {
+    fs::write(folder.join("bar.toml"), deck).expect("room");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bolide"));
+    let done =
+        command.current_dir(folder).args(["run", "bar.toml"]).args(flags).output().expect("bolide runs");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    String::from_utf8_lossy(&done.stdout).into_owned()
+}
+
+fn summary(folder: &Path) -> Summary {
+    let text = fs::read_to_string(folder.join(SUMMARY)).expect("a run writes a summary");
+    serde_json::from_str(&text).expect("JSON")
+}
+
+#[test]
+fn a_run_is_judged_and_says_where_it_comes_from() {
+    let folder = tempfile::tempdir().expect("room");
+    let told = run(folder.path(), BAR, &[]);
+    let results = folder.path().join("results/bar");
+    let eroded = summary(&results);
+    assert!(eroded.eroded_elements > 0, "the deck erodes");
+    let grade = |name: &str| {
+        let found = eroded.quality.measures.iter().find(|measure| measure.name == name);
+        found.unwrap_or_else(|| panic!("{name} in {:?}", eroded.quality)).grade
+    };
+    assert_eq!(grade("gauges that lost their last element"), Grade::Look);
+    assert_eq!(grade("elements across bar"), Grade::Look);
+    assert!(eroded.quality.grade >= Grade::Look);
+    assert_eq!(eroded.mirrors, [true, true, false]);
+    // The verdict stands before the energies, the machinery is not told unasked.
+    let place = |words: &str| told.find(words).unwrap_or_else(|| panic!("{words} in {told}"));
+    assert!(
+        place("quality    ") < place("energy     ")
+            && place("end their curves there: front") < place("energy     ")
+    );
+    assert!(told.contains("origin     bolide 0.1.0, ") && told.contains(", bar.toml, on "), "{told}");
+    assert!(!told.contains("traffic"), "{told}");
+    // The report has the verdict, both states as pictures, and nothing that is fetched.
+    let report = fs::read_to_string(results.join(REPORT)).expect("a run writes a report");
+    assert_eq!(
+        report.matches("<img alt=\"plastic strain, t = ").count()
+            + report.matches("<img alt=\"velocity ").count(),
+        2
+    );
+    assert!(
+        report.contains("quality    ") && report.contains("traffic    ") && !report.contains("src=\"http")
+    );
+
+    let told = run(
+        folder.path(),
+        &BAR.replace("erosion = { plastic_strain = 0.3 }\n", ""),
+        &["--force", "--verbose"],
+    );
+    assert!(told.contains("traffic    "), "{told}");
+    let whole = summary(&results);
+    assert!(
+        whole.quality.measures.iter().all(|measure| !measure.name.starts_with("gauges")),
+        "{:?}",
+        whole.quality
+    );
+}
+
+#[test]
+fn a_refined_run_is_compared_with_the_deck_as_it_is() {
+    let folder = tempfile::tempdir().expect("room");
+    let deck = BAR.replace("erosion = { plastic_strain = 0.3 }\n", "");
+    let told = run(folder.path(), &deck, &["--refine", "2", "--measure", "last(rear:uz)", "--cycles", "400"]);
+    let [coarse, fine] =
+        ["bar", "bar-refined-2"].map(|name| summary(&folder.path().join("results").join(name)));
+    assert_eq!(8 * coarse.elements, fine.elements);
+    let row =
+        told.lines().find(|line| line.starts_with("last(rear:uz)")).expect("the measure that was asked for");
+    let values: Vec<f64> =
+        row.split_whitespace().skip(1).take(2).map(|v| v.parse().expect("a number")).collect();
+    assert!(values[0] < 0.0 && values[1] < 0.0 && values[0] != values[1], "{row}");
+    assert!(told.contains("finer results in results/bar-refined-2"), "{told}");
+    // A folder of results says what it was computed from: the finer one is computed again as it was.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bolide"));
+    let verified = command.current_dir(folder.path()).args(["verify", "results/bar-refined-2"]).output();
+    let verified = verified.expect("bolide runs");
+    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stderr));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bolide"));
+    let wrong = command
+        .current_dir(folder.path())
+        .args(["run", "bar.toml", "--refine", "2", "--measure", "lost(x)"])
+        .output();
+    let wrong = String::from_utf8_lossy(&wrong.expect("bolide runs").stderr).into_owned();
+    assert!(wrong.contains("--measure \"lost(x)\""), "{wrong}");
+}
