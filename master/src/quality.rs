@@ -107,8 +107,10 @@ const NEGLIGIBLE: f64 = 0.01;
 const DEPTH: [f64; 2] = [0.6, 0.85];
 /// Share of the energy that left with eroded elements.
 const ERODED: [f64; 2] = [0.1, 0.3];
-/// Share of internal energy of a part that artificial viscosity put in.
+/// Share of internal energy of a part that artificial viscosity put in, and share of the energy of the run below which that tells nothing: in elastic waves it
+/// is all that heats.
 const VISCOSITY: f64 = 0.5;
+const HEATED: f64 = 0.05;
 /// Share of the elements of a part that are four-node tetrahedra.
 const LOCKS: f64 = 0.1;
 /// Angle by which neighbouring shells have turned against each other (degrees), and the share of edges that may have turned further.
@@ -264,7 +266,7 @@ fn eroded(totals: &RunTotals) -> Option<Measure> {
 
 fn viscosity(totals: &RunTotals, parts: &[NamedPart]) -> Vec<Measure> {
     let tells = |part: &&NamedPart| {
-        part.viscosity > NEGLIGIBLE * totals.scale() && part.viscosity > VISCOSITY * part.internal.max(0.0)
+        part.viscosity > HEATED * totals.scale() && part.viscosity > VISCOSITY * part.internal.max(0.0)
     };
     let measure = |part: &NamedPart| {
         let value = part.viscosity / part.internal.max(f64::MIN_POSITIVE);
