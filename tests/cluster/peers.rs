@@ -9,7 +9,7 @@ use std::{
 use protocol::{
     codec,
     frame::{Frame, HEADER_LEN, Header, Kind, encode_header},
-    handshake::{Hello, Role},
+    handshake::{Hello, Role, VERSION},
 };
 use tests::cluster::{Cluster, make_certificates, said};
 
@@ -46,7 +46,9 @@ fn bad_peers_are_one_line_each_and_the_job_goes_on() {
     cluster.json(&submit);
     cluster.wait_until_running(1);
 
-    let hello = Hello { version: 10, ..Hello::new(Role::Worker, "old", 1.0, 1, "scalar", 1) };
+    let wrong = VERSION + 1;
+    let version = format!("protocol version {wrong}, this side speaks {VERSION}");
+    let hello = Hello { version: wrong, ..Hello::new(Role::Worker, "old", 1.0, 1, "scalar", 1) };
     let old = frame(Header::new(Kind::Hello), codec::encode(&hello).expect("plain"));
     let peer = Hello::new(Role::Peer, "peer", 1.0, 1, "scalar", 1);
     let peer = frame(Header::new(Kind::Hello), codec::encode(&peer).expect("plain"));
@@ -55,7 +57,7 @@ fn bad_peers_are_one_line_each_and_the_job_goes_on() {
     let mut damaged = old.clone();
     damaged[HEADER_LEN + 3] ^= 1;
     for (bytes, words) in [
-        (old.clone(), "protocol version 10, this side speaks 9"),
+        (old.clone(), version.as_str()),
         (vec![0x55; 400], "frame starts with [55, 55, 55, 55]"),
         (oversize.to_vec(), "hello: length 4294967295, limit 4096"),
         (old[..20].to_vec(), "frame header: ended after 20 bytes, needs 52"),
