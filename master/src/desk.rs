@@ -16,10 +16,11 @@ use deck::{
     model::Model,
     physics::{self, Forecast},
 };
+use mechanics::initial;
 use protocol::options;
 use tokio::sync::Semaphore;
 
-use crate::{footprint, http::surface, picture::starting_state};
+use crate::{footprint, http::surface};
 
 /// Longest name of a deck (bytes).
 const NAME_LIMIT: usize = 4096;
@@ -46,6 +47,8 @@ pub enum Error {
     Name(usize),
     /// It has these faults.
     Faults(Vec<Fault>),
+    /// No run of it can start.
+    Start(String),
     /// Reading it had a bug.
     Bug,
     /// The master is ending.
@@ -66,6 +69,7 @@ impl fmt::Display for Error {
                 let faults: Vec<String> = faults.iter().map(Fault::to_string).collect();
                 f.write_str(&faults.join("\n"))
             }
+            Self::Start(why) => f.write_str(why),
             Self::Bug => f.write_str("a bug in the master; its log has the words"),
             Self::Ending => f.write_str("the master is ending"),
         }
@@ -116,13 +120,15 @@ pub async fn look(name: String, text: String) -> Result<Looked, Error> {
 /// Reads a deck likewise, and draws its bodies before the first cycle, as [`surface`] packs them.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read`], or why no run of it can start.
 pub async fn draw(name: String, text: String) -> Result<Vec<u8>, Error> {
     in_turn(name, text, |_, reading| {
-        let state = starting_state(&reading.model);
-        surface::Skin::new(&reading.model).pack(&reading.model, &state)
+        let model = &reading.model;
+        let state = initial::state(&model.mesh, &model.setup, &model.velocity, &model.constraint)?;
+        Ok(surface::Skin::new(model).pack(model, &state))
     })
-    .await
+    .await?
+    .map_err(Error::Start)
 }
 
 async fn in_turn<T: Send + 'static>(

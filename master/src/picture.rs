@@ -14,13 +14,13 @@ use std::{
     process::ExitCode,
 };
 
-use deck::{bundle::Options, model::Model};
-use mechanics::state::{ALIVE, GlobalState, field};
+use deck::bundle::Options;
+use mechanics::initial;
 
 use crate::{
     deck_file::read_deck_with,
     results::{
-        HISTORY, SUMMARY, Summary, Units, contact_name,
+        HISTORY, Summary, Units, contact_name,
         history::Table,
         report::Picture,
         vtu::{
@@ -114,7 +114,8 @@ fn of_deck(args: &PictureArgs) -> Result<ExitCode, String> {
     let model = read_deck_with(path, &Options::default())?;
     let fields = Fields::select(&["velocity", "density"].map(str::to_owned)).map_err(|e| e.to_string())?;
     let mut bytes = Vec::new();
-    vtu::stream(&mut bytes, &model, &starting_state(&model), &fields, None).map_err(|e| e.to_string())?;
+    let state = initial::state(&model.mesh, &model.setup, &model.velocity, &model.constraint)?;
+    vtu::stream(&mut bytes, &model, &state, &fields, None).map_err(|e| e.to_string())?;
     let piece = Piece::of(path, bytes).map_err(|e| e.to_string())?;
     let about = About {
         title: model.title.clone(),
@@ -127,26 +128,6 @@ fn of_deck(args: &PictureArgs) -> Result<ExitCode, String> {
     conclude(args, &about, &skin, &name, "as a run begins".to_owned())
 }
 
-/// The state of a model before its first cycle, as far as pictures show it: positions and velocities, and elements at rest.
-pub fn starting_state(model: &Model) -> GlobalState {
-    let mesh = &model.mesh;
-    let mut state = GlobalState {
-        x: mesh.positions.clone(),
-        v: model.velocity.clone(),
-        mass: vec![0.0; mesh.n_nodes()],
-        elements: std::array::from_fn(|_| vec![0.0; mesh.n_elements()]),
-        eroded: vec![ALIVE; mesh.n_elements()],
-        // As many arrays as elements of any kind have.
-        own: vec![vec![0.0; mesh.n_elements()]; MOST_OWN],
-        ..GlobalState::default()
-    };
-    state.elements[field::RELATIVE_VOLUME].fill(1.0);
-    state
-}
-
-/// Arrays that the writer of states may read of elements of a kind: those of shells with five layers.
-const MOST_OWN: usize = 64;
-
 /// Where states come from.
 pub struct About {
     /// Title of the deck; empty of a run that has not ended.
@@ -158,8 +139,7 @@ pub struct About {
 impl About {
     /// Of a results folder, or a file in one.
     fn of(results: &Path) -> Self {
-        let text = std::fs::read_to_string(folder(results).join(SUMMARY)).unwrap_or_default();
-        let summary = serde_json::from_str::<Summary>(&text).unwrap_or_default();
+        let summary = Summary::read(folder(results)).unwrap_or_default();
         Self { title: summary.title, units: units_of(results), mirrors: summary.mirrors }
     }
 }

@@ -439,7 +439,8 @@ mod tests {
         let deck = "title = \"sheet\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"sheet\"\nmaterial = \"LEAD\"\n\
             shell = { thickness = 0.01 }\nplate = { origin = [0, 0, 0], side_i = [4, 0, 0], side_j = [0, 1, 0], cells = [4, 1] }\n";
         let model = deck::read(deck, "sheet.toml").expect("no fault");
-        let mut state = crate::picture::starting_state(&model);
+        let state = mechanics::initial::state(&model.mesh, &model.setup, &model.velocity, &model.constraint);
+        let mut state = state.expect("volumes above 0");
         assert_eq!(folds(&model, 0, &state), None);
         // The half beyond the middle stands up.
         state.x.iter_mut().filter(|x| x[0] > 2.0).for_each(|x| *x = [2.0, x[1], x[0] - 2.0]);

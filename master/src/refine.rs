@@ -11,7 +11,7 @@ use deck::{bundle::Options, model::Model};
 use crate::{
     command::RunArgs,
     deck_file::{gather_deck, read_gathered},
-    results::{HISTORY, SUMMARY, Summary, Units, history::Table, summary::significant},
+    results::{HISTORY, Summary, Units, history::Table, summary::significant},
     run::{folder_for, run_with},
     study::measure::{Facts, Formula, OF_SUMMARY, of_summary},
 };
@@ -84,11 +84,7 @@ fn compare(
     formulas: &[(String, Formula)],
 ) -> Result<Vec<Compared>, String> {
     let read = |folder: &PathBuf| -> Result<(Summary, Table), String> {
-        let path = folder.join(SUMMARY);
-        let fault = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
-        let text = std::fs::read_to_string(&path).map_err(|e| fault(&e))?;
-        let summary = serde_json::from_str(&text).map_err(|e| fault(&e))?;
-        Ok((summary, Table::read(&folder.join(HISTORY)).map_err(|e| e.to_string())?))
+        Ok((Summary::read(folder)?, Table::read(&folder.join(HISTORY)).map_err(|e| e.to_string())?))
     };
     let runs = [read(folders[0])?, read(folders[1])?];
     let Units { length, time, energy, .. } = Units::named(&model.units);
@@ -190,13 +186,14 @@ fn table(compared: &[Compared], factor: u32, fine: &Path) -> String {
         judged += usize::from(*is_judged);
         unsettled += usize::from(*is_judged && !settles);
     }
+    let limit = 100.0 * SETTLED;
     let verdict = if unsettled == 0 {
         format!(
-            "all {judged} stay within 2 % of the greatest of their kind: the mesh is fine enough for them"
+            "all {judged} stay within {limit:.0} % of the greatest of their kind: the mesh is fine enough for them"
         )
     } else {
         format!(
-            "* {unsettled} of {judged} change by more than 2 % of the greatest of their kind: for them the mesh of the deck is too coarse, \
+            "* {unsettled} of {judged} change by more than {limit:.0} % of the greatest of their kind: for them the mesh of the deck is too coarse, \
              and perhaps the finer one too"
         )
     };

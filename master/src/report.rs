@@ -7,8 +7,7 @@ use std::{
     net::{IpAddr, Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
     process::{Command, ExitCode, Stdio},
-    sync::Arc,
-    sync::atomic::Ordering,
+    sync::{Arc, atomic::Ordering},
     time::Duration,
 };
 
@@ -17,7 +16,7 @@ use protocol::request::{Ended, State, Status};
 use tokio::sync::{mpsc, watch};
 
 use crate::{
-    http::{self, api_state::ApiState, board::Board, folder, guard::Guard},
+    http::{self, api_state::ApiState, board::Board, guard::Guard},
     interrupt::stop_on_interrupt,
     machine::host_name,
     notice::{Error, Notice, WAITING_NOTICES},
@@ -149,7 +148,7 @@ fn status(job: u32, folder: &Path) -> Status {
     let named = folder
         .file_name()
         .map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into_owned());
-    let summary = folder::summary(folder);
+    let summary = Summary::read(folder).ok();
     let last = index(folder).ok().and_then(|states| states.last().map(|(time, _)| *time));
     let (title, cycle, time) = match &summary {
         Some(summary) => (format!("{} ({named})", summary.title), summary.cycles, summary.end_time),

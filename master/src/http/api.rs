@@ -176,9 +176,10 @@ struct Place {
 impl From<desk::Error> for Fault {
     fn from(error: desk::Error) -> Self {
         let status = match &error {
-            desk::Error::Options(_) | desk::Error::Name(_) | desk::Error::Faults(_) => {
-                StatusCode::UNPROCESSABLE_ENTITY
-            }
+            desk::Error::Options(_)
+            | desk::Error::Name(_)
+            | desk::Error::Faults(_)
+            | desk::Error::Start(_) => StatusCode::UNPROCESSABLE_ENTITY,
             desk::Error::Ending => StatusCode::SERVICE_UNAVAILABLE,
             desk::Error::Bug => StatusCode::INTERNAL_SERVER_ERROR,
         };

@@ -15,7 +15,7 @@ use crate::{
         skin::{self, Seen},
     },
     results::{
-        Error, HISTORY, SUMMARY, Summary, Units,
+        Error, HISTORY, Summary, Units,
         history::{HistoryRow, Table},
         vtu::{
             field_data::{PART_NAMES, UNITS},
@@ -99,19 +99,13 @@ pub fn drawn(piece: &Piece, view: &View) -> Result<Drawn, Error> {
     Ok(Drawn { cycle: piece.cycle, time: piece.time, faces: faces.collect(), positions, columns })
 }
 
-/// The summary of a folder; none of a run that has not ended.
-pub fn summary(folder: &Path) -> Option<Summary> {
-    let text = std::fs::read_to_string(folder.join(SUMMARY)).ok()?;
-    serde_json::from_str(&text).ok()
-}
-
 /// The sheet of a folder, as [`JobView::json`](super::board::JobView::json) has it of a running job.
 ///
 /// # Errors
 /// What is wrong with its history or its states.
 pub fn sheet(folder: &Path) -> Result<Value, String> {
     let table = Table::read(&folder.join(HISTORY)).map_err(|e| e.to_string())?;
-    let summary = summary(folder);
+    let summary = Summary::read(folder).ok();
     let states: Vec<(f64, PathBuf)> = index(folder).unwrap_or_default();
     let first = states.first().and_then(|(_, path)| Piece::open(path).ok());
     let words = |name: &str| first.as_ref().map_or_else(Vec::new, |piece| piece.words(name).to_vec());

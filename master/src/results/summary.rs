@@ -2,7 +2,7 @@
 //!
 //! Units and formulas of every field are stated in the deck reference.
 
-use std::io::Write as _;
+use std::{io::Write as _, path::Path};
 
 use serde::{Deserialize, Serialize};
 
@@ -285,6 +285,16 @@ pub struct Energies {
 }
 
 impl Summary {
+    /// Reads the `summary.json` of a results folder; a run that has not ended has none.
+    ///
+    /// # Errors
+    /// The file and what is wrong with it.
+    pub fn read(folder: &Path) -> Result<Self, String> {
+        let path = folder.join(SUMMARY);
+        let text = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        serde_json::from_slice(&text).map_err(|e| format!("{}: {e}", path.display()))
+    }
+
     /// Writes `summary.json` into the results folder.
     ///
     /// # Errors

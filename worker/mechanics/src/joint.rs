@@ -211,6 +211,9 @@ impl Mechanism {
     pub fn hold(&self, joints: &[Joint], moving: &Moving<'_>) -> (Vec<Impulse>, Vec<JointVote>) {
         let mut impulses = vec![Impulse::default(); moving.bodies.len()];
         let mut votes = vec![JointVote::default(); joints.len()];
+        if self.islands.is_empty() {
+            return (impulses, votes);
+        }
         let mut states = moving.states.to_vec();
         for island in &self.islands {
             island.hold(joints, moving, &mut impulses, &mut votes, &mut states);
