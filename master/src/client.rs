@@ -267,7 +267,8 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
         doubt(&reading.model);
     }
     let options = JobOptions {
-        min_workers: args.min_workers,
+        min_workers: args.min_workers.unwrap_or(args.workers[0]),
+        max_workers: args.workers[1],
         priority: args.priority,
         trace: args.trace,
         ..args.job.clone()

@@ -25,6 +25,7 @@ use tracing::info;
 use crate::{
     desk::{self, Brought},
     notice::{self, Notice},
+    queue::Size,
 };
 
 /// Bytes of a request around a deck.
@@ -39,7 +40,7 @@ pub async fn serve(
     notices: &mpsc::Sender<Notice>,
     sender: &Sender,
     receiver: &mut Receiver,
-    (incarnation, caller): (u32, String),
+    (incarnation, caller): (u32, Caller),
 ) -> Error {
     let mut client_requests = ClientRequests {
         notices,
@@ -56,10 +57,23 @@ pub async fn serve(
     }
 }
 
+/// Who asks.
+pub struct Caller {
+    pub address: String,
+    /// The certificate that it showed, in words.
+    pub certificate: Option<String>,
+}
+
+impl Caller {
+    /// Its certificate, else its address.
+    fn name(&self) -> &str {
+        self.certificate.as_ref().unwrap_or(&self.address)
+    }
+}
+
 struct ClientRequests<'a> {
     notices: &'a mpsc::Sender<Notice>,
-    /// Who asks: its certificate, else its address.
-    caller: String,
+    caller: Caller,
     outbox: Outbox,
     inbox: Inbox,
     held: Held,
@@ -157,15 +171,15 @@ impl ClientRequests<'_> {
             Request::Jobs => Reply::Jobs(self.ask(Notice::Jobs).await?),
             Request::Hosts => Reply::Hosts(self.ask(Notice::Hosts).await?),
             Request::Cancel { job } => {
-                info!(job, by = self.caller, "asked to cancel");
+                info!(job, by = self.caller.name(), "asked to cancel");
                 Reply::Done(self.ask(|answer| Notice::Cancel(job, answer)).await??)
             }
             Request::Resume { job } => {
-                info!(job, by = self.caller, "asked to resume");
+                info!(job, by = self.caller.name(), "asked to resume");
                 Reply::Done(self.ask(|answer| Notice::Resume(job, answer)).await??)
             }
             Request::Remove { job } => {
-                info!(job, by = self.caller, "asked to remove");
+                info!(job, by = self.caller.name(), "asked to remove");
                 Reply::Done(self.ask(|answer| Notice::Remove(job, answer)).await??)
             }
             Request::Files { job } => {
@@ -192,16 +206,18 @@ impl ClientRequests<'_> {
         options: JobOptions,
     ) -> std::result::Result<Reply, Refusal> {
         options.check().map_err(desk::Error::Options)?;
-        let Brought { text, title, elements, .. } = match desk::read(name.clone(), text).await {
+        let Brought { text, title, elements, cycles, .. } = match desk::read(name.clone(), text).await {
             Ok(brought) => brought,
             Err(desk::Error::Faults(faults)) => {
                 return Ok(Reply::Faults(faults.iter().map(ToString::to_string).collect()));
             }
             Err(error) => return Err(error.into()),
         };
-        let submit = |answer| Notice::Submit { name, title, text, elements, options, answer };
+        let size = Size { elements, cycles: cycles.min(options.cycles.unwrap_or(u64::MAX)) };
+        let owner = self.caller.certificate.clone().unwrap_or_default();
+        let submit = |answer| Notice::Submit { name, title, text, size, options, owner, answer };
         let job = self.ask(submit).await??;
-        info!(job, by = self.caller, "submitted");
+        info!(job, by = self.caller.name(), "submitted");
         Ok(Reply::Submitted { job })
     }
 

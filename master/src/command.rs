@@ -457,6 +457,29 @@ pub struct ClientArgs {
     pub json: bool,
 }
 
+/// Most workers of a job.
+const MOST_WORKERS: u32 = 10_000;
+
+/// Fewest and most workers of a job, 0 for any number.
+fn workers(text: &str) -> Result<[u32; 2], String> {
+    let number = |text: &str, missing: u32| match text {
+        "" => Ok(missing),
+        text => text
+            .parse()
+            .ok()
+            .filter(|n| (1..=MOST_WORKERS).contains(n))
+            .ok_or_else(|| format!("{text:?}: expected a number from 1 to {MOST_WORKERS}")),
+    };
+    let [least, most] = match text.split_once("..") {
+        Some((least, most)) => [number(least, 1)?, number(most, 0)?],
+        None => [number(text, 1)?; 2],
+    };
+    if most != 0 && most < least {
+        return Err(format!("at most {most} workers and at least {least}: expected the fewest first"));
+    }
+    Ok([least, most])
+}
+
 /// Flags of `submit`.
 #[derive(Args, Clone, Debug)]
 pub struct SubmitArgs {
@@ -465,9 +488,12 @@ pub struct SubmitArgs {
     /// What the deck leaves open
     #[command(flatten)]
     pub reading: ReadingArgs,
-    /// Wait for at least this many workers
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub min_workers: u32,
+    /// Wait for at least MIN workers and take at most MAX: MIN..MAX, MIN.. or ..MAX; a number alone is both
+    #[arg(long, value_name = "MIN..MAX", default_value = "1..", value_parser = workers, conflicts_with = "min_workers")]
+    pub workers: [u32; 2],
+    /// Wait for at least this many workers: the same as --workers N..
+    #[arg(long, hide = true, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub min_workers: Option<u32>,
     /// Jobs of a higher priority start first; among equals, the oldest
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     pub priority: i32,

@@ -34,7 +34,7 @@ use tracing::{info, warn};
 
 use crate::{
     ca_folder::CaFolder,
-    client_requests,
+    client_requests::{self, Caller},
     drive::{Delivery, Input, WorkerLink},
     event::WorkerSpec,
     files, neighbour, newcomer,
@@ -50,13 +50,6 @@ pub const GREETINGS: usize = 256;
 const PLACE_LIMIT: Duration = Duration::from_secs(30);
 /// A worker is suspect after this part of the silence after which it is dead.
 const SUSPECT: f64 = 0.3;
-
-/// Who calls.
-struct Caller {
-    address: String,
-    /// The certificate that it showed, in words.
-    certificate: Option<String>,
-}
 
 /// What every connection needs of the daemon.
 pub struct Acceptor {
@@ -287,7 +280,6 @@ impl Acceptor {
             return served;
         }
         drop(place);
-        let caller = caller.certificate.unwrap_or(caller.address);
         match client_requests::serve(&self.notices, &sender, &mut receiver, (incarnation, caller)).await {
             // A client may go as it likes.
             Error::Closed | Error::Left { .. } | Error::Io { .. } => Ok(()),

@@ -36,6 +36,8 @@ pub struct Brought {
     pub parts: usize,
     pub elements: u64,
     pub nodes: usize,
+    /// To its end, at its first time step; 0 where nothing limits it.
+    pub cycles: u64,
 }
 
 /// Why a deck is not taken.
@@ -98,9 +100,10 @@ pub struct Looked {
 /// Its faults, or why it is not read.
 pub async fn read(name: String, text: String) -> Result<Brought, Error> {
     in_turn(name, text, |text, reading| {
+        let cycles = physics::forecast(&reading.model).cycles.unwrap_or_default();
         let Model { title, mesh, .. } = reading.model;
         let (parts, elements, nodes) = (mesh.parts.len(), mesh.n_elements() as u64, mesh.n_nodes());
-        Brought { text, title, parts, elements, nodes }
+        Brought { text, title, parts, elements, nodes, cycles }
     })
     .await
 }

@@ -3,12 +3,13 @@
 //! The calling thread owns the [`Job`]. What comes from the connections' tasks are its events; its actions are sent
 //! through the links' queues without waiting, or given to the sink. Nothing is decided here.
 
+mod worker_link;
+
 use std::{
     collections::VecDeque,
-    net::SocketAddr,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc,
         atomic::{AtomicBool, Ordering},
     },
     time::{Duration, Instant},
@@ -16,24 +17,24 @@ use std::{
 
 use protocol::{
     frame::Header,
-    link::Sender,
     message::{ToMaster, ToWorker},
-    order::{Outbox, Place},
-    wire,
+    order::Place,
 };
 use system::processors::lowest_priority;
-use tokio::sync::{Notify, mpsc};
+use tokio::sync::mpsc;
 use tracing::warn;
 
 use crate::{
     embedded::{Sink, Traffic, timed_sort},
-    event::{Action, Event, Outcome, WorkerSpec},
+    event::{Action, Event, Outcome},
     footprint::{self, Bearer},
     job::Job,
     pace::{Pace, Waiting},
     peers,
     sort::{Gathered, SortBasis, Sorted},
 };
+use worker_link::Member;
+pub use worker_link::{Delivery, WorkerLink};
 
 /// Messages of one worker that may wait for the job's thread.
 const WAITING_PER_WORKER: usize = 8;
@@ -48,6 +49,8 @@ pub enum Input {
     Sorted(Result<(Box<Sorted>, u64), String>),
     /// A worker has come while the job runs.
     Joined(WorkerLink),
+    /// Another job needs the worker on this connection.
+    Yield(u32),
     /// Look at what is to be stopped.
     Wake,
     /// This process has to leave.
@@ -57,132 +60,6 @@ pub enum Input {
 /// The way to the thread of a job that begins with `n_workers`.
 pub fn channel(n_workers: usize) -> (mpsc::Sender<Input>, mpsc::Receiver<Input>) {
     mpsc::channel(WAITING_PER_WORKER * n_workers + 1)
-}
-
-/// A connected worker, as those see it who send to it.
-#[derive(Clone)]
-pub struct WorkerLink {
-    /// The host.
-    pub spec: WorkerSpec,
-    /// Where it calls from.
-    pub address: String,
-    /// Memory that its process may take (bytes), as it said when it called; 0 if it does not say.
-    pub memory: u64,
-    /// The certificate that it showed, in words.
-    pub certificate: Option<String>,
-    /// Where it takes other workers, if it does.
-    pub peer: Option<SocketAddr>,
-    /// Its connection.
-    pub incarnation: u32,
-    /// The way to it.
-    pub outbox: Arc<Mutex<Outbox>>,
-    /// The way from it.
-    pub delivery: Arc<Delivery>,
-}
-
-impl WorkerLink {
-    /// What it can take of a job.
-    pub(crate) fn bearer(&self) -> Bearer<'_> {
-        Bearer { name: &self.spec.name, speed: self.spec.speed, memory: self.memory }
-    }
-
-    /// Queues a message to it.
-    pub(crate) fn send(&self, place: Place, message: &ToWorker) -> protocol::Result<()> {
-        let packed = wire::pack_to_worker(message)?;
-        self.outbox.lock().unwrap_or_else(PoisonError::into_inner).send(place, packed)
-    }
-
-    /// The link's sending half.
-    pub fn sender(&self) -> Sender {
-        self.outbox.lock().unwrap_or_else(PoisonError::into_inner).sender().clone()
-    }
-
-    fn bytes(&self) -> u64 {
-        let counters = self.sender().counters();
-        counters.bytes_sent + counters.bytes_received
-    }
-}
-
-/// The way from a worker's connection to the job that it computes.
-#[derive(Default)]
-pub struct Delivery {
-    port: Mutex<Port>,
-    /// The job will have no more to do with the worker.
-    dismissed: Notify,
-}
-
-#[derive(Default)]
-struct Port {
-    /// The last job that the worker was given.
-    job: u32,
-    to: Option<(usize, mpsc::Sender<Input>)>,
-    /// Why the connection has ended.
-    gone: Option<String>,
-    /// Why the job will have no more to do with the worker.
-    dismissal: Option<String>,
-}
-
-impl Delivery {
-    fn port(&self) -> std::sync::MutexGuard<'_, Port> {
-        self.port.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The worker failed by itself: its connection is to end with this reason, and it may not come back.
-    fn dismiss(&self, why: String) {
-        let mut port = self.port();
-        port.to = None;
-        port.dismissal = Some(format!("dropped: {why}"));
-        self.dismissed.notify_one();
-    }
-
-    /// Waits until the worker is dismissed. Cancel safe.
-    pub async fn dismissed(&self) {
-        self.dismissed.notified().await;
-    }
-
-    /// Why the worker was dismissed, if it was.
-    pub fn dismissal(&self) -> Option<String> {
-        self.port().dismissal.clone()
-    }
-
-    /// From now on messages of `job` go to `send`.
-    fn open(&self, job: u32, index: usize, send: mpsc::Sender<Input>) -> Result<(), String> {
-        let mut port = self.port();
-        port.job = job;
-        match &port.gone {
-            Some(why) => Err(why.clone()),
-            None => {
-                port.to = Some((index, send));
-                Ok(())
-            }
-        }
-    }
-
-    fn close(&self) {
-        self.port().to = None;
-    }
-
-    /// Where a frame goes: none for what a job that is over still had on its way.
-    ///
-    /// # Errors
-    /// For a frame of a job that the worker was not given.
-    pub fn find(&self, header: &Header) -> protocol::Result<Option<(usize, mpsc::Sender<Input>)>> {
-        let port = self.port();
-        if header.job > port.job || header.job == 0 {
-            return Err(protocol::Error::Message(format!(
-                "{} frame of job {}, the worker was given job {}",
-                header.kind, header.job, port.job
-            )));
-        }
-        Ok(if header.job == port.job { port.to.clone() } else { None })
-    }
-
-    /// The connection has ended; gives where to say so.
-    pub fn lose(&self, why: &str) -> Option<(usize, mpsc::Sender<Input>)> {
-        let mut port = self.port();
-        port.gone = Some(why.to_owned());
-        port.to.take()
-    }
 }
 
 /// Runs job `number` on these workers, and those that join, to its end; `first` are the actions that came with the job,
@@ -204,8 +81,7 @@ pub fn drive(
     let mut driver = Driver {
         place: Place { job: number, epoch: job.epoch(), plan: 0 },
         job,
-        worker_links: Vec::new(),
-        bytes_before: 0,
+        members: Vec::new(),
         send,
         input,
         lost: VecDeque::new(),
@@ -225,14 +101,14 @@ pub fn drive(
     driver.introduce();
     driver.begin_pace();
     let result = driver.run(first, sink, stop);
-    for worker_link in &driver.worker_links {
-        worker_link.delivery.close();
+    for Member { link, .. } in driver.members.iter().filter(|member| !member.is_freed()) {
+        link.delivery.close(number);
         if result.is_err() {
             // A worker that cannot be reached is found lost by its connection's task.
-            let _ = worker_link.send(driver.place, &ToWorker::Release);
+            let _ = link.send(driver.place, &ToWorker::Release);
         }
     }
-    let bytes = driver.worker_links.iter().map(WorkerLink::bytes).sum::<u64>() - driver.bytes_before;
+    let bytes = driver.members.iter().map(Member::bytes).sum::<u64>();
     result.map(|outcome| {
         let peer_bytes = outcome.reports.iter().map(|report| report.peer_bytes).sum();
         (outcome, Traffic { bytes: bytes + peer_bytes, peer_bytes, sort_ns: driver.sort_ns, serial_ns: None })
@@ -243,9 +119,7 @@ struct Driver {
     job: Job,
     place: Place,
     /// In the order they came.
-    worker_links: Vec<WorkerLink>,
-    /// On the links of the links, before they were the job's.
-    bytes_before: u64,
+    members: Vec<Member>,
     send: mpsc::Sender<Input>,
     input: mpsc::Receiver<Input>,
     /// Workers found lost while sending.
@@ -338,19 +212,18 @@ const fn position(message: &ToMaster) -> Option<u64> {
 impl Driver {
     /// Takes a worker in.
     fn worker_link(&mut self, worker_link: WorkerLink) {
-        let index = self.worker_links.len();
-        self.bytes_before += worker_link.bytes();
+        let index = self.members.len();
         if let Err(why) = worker_link.delivery.open(self.place.job, index, self.send.clone()) {
             self.lost.push_back((index, why));
         }
-        self.worker_links.push(worker_link);
+        self.members.push(Member::new(worker_link));
     }
 
     /// Tells the epoch's workers where they find each other, before they are dealt their work.
     fn introduce(&mut self) {
         if self.job.route() == protocol::options::Route::Direct {
             let at_work: Vec<(usize, &WorkerLink)> =
-                self.job.at_work().iter().map(|&index| (index, &self.worker_links[index])).collect();
+                self.job.at_work().iter().map(|&index| (index, &self.members[index].link)).collect();
             self.lost.extend(peers::introduce(&at_work, self.place));
         }
     }
@@ -373,7 +246,7 @@ impl Driver {
         }
         let Some(waiting) = self.pace.waits_for(self.ends, self.now()) else { return Ok(()) };
         let Waiting { worker, silence, longest, late } = waiting;
-        let worker_link = &self.worker_links[worker];
+        let worker_link = &self.members[worker].link;
         let words = format!(
             "the job waits for it for {silence:.1} s, the longest wait before was {longest:.3} s; its link lives, so its computing is stuck"
         );
@@ -388,7 +261,7 @@ impl Driver {
         let why = format!("{} at {}: {words}", worker_link.spec.name, worker_link.address);
         warn!("worker {} is given up: {words}", worker_link.spec.name);
         worker_link.sender().abort(protocol::Error::Message(why.clone()));
-        worker_link.delivery.close();
+        worker_link.delivery.close(self.place.job);
         self.suspect = None;
         self.lose(worker, why, sink)
     }
@@ -404,7 +277,7 @@ impl Driver {
     /// Whether the workers at work have memory for the whole job without one of them. The system would end those that have none.
     fn check_memory(&self, without: usize) -> Result<(), Error> {
         match footprint::shortage(self.job.n_elements() as u64, None, &self.bearers(without)) {
-            Some(needs) => Err(Error::Memory { lost: self.worker_links[without].spec.name.clone(), needs }),
+            Some(needs) => Err(Error::Memory { lost: self.members[without].link.spec.name.clone(), needs }),
             None => Ok(()),
         }
     }
@@ -412,7 +285,7 @@ impl Driver {
     /// The workers at work without one of them.
     fn bearers(&self, without: usize) -> Vec<Bearer<'_>> {
         let left = self.job.at_work().iter().filter(|&&worker| worker != without);
-        left.map(|&worker| self.worker_links[worker].bearer()).collect()
+        left.map(|&worker| self.members[worker].link.bearer()).collect()
     }
 
     /// Takes a worker in that has memory for its share of the job; another one stays idle until the job is over.
@@ -432,6 +305,24 @@ impl Driver {
                 self.apply(Event::Joined(spec), sink)
             }
         }
+    }
+
+    /// Another job needs a worker; one that is not this job's any more is none of its business.
+    fn give_up(&mut self, incarnation: u32, sink: &mut dyn Sink) -> Result<(), Error> {
+        let is_it = |member: &Member| member.link.incarnation == incarnation && !member.is_freed();
+        match self.members.iter().rposition(is_it) {
+            Some(worker) => self.apply(Event::Yield(worker), sink),
+            None => Ok(()),
+        }
+    }
+
+    /// A worker has been released: from here on it can be given to another job.
+    fn free(&mut self, worker: usize, sink: &mut dyn Sink) {
+        let job = self.place.job;
+        let member = &mut self.members[worker];
+        member.free();
+        member.link.delivery.close(job);
+        sink.freed(member.link.incarnation);
     }
 
     fn run(&mut self, first: Vec<Action>, sink: &mut dyn Sink, stop: &AtomicBool) -> Result<Outcome, Error> {
@@ -464,14 +355,14 @@ impl Driver {
                             self.pace.hear(worker, position(&message), self.now());
                             if self.suspect == Some(worker) {
                                 self.suspect = None;
-                                sink.suspect(self.worker_links[worker].incarnation, None);
+                                sink.suspect(self.members[worker].link.incarnation, None);
                             }
-                            sink.heard(&self.worker_links[worker].spec.name, &message);
+                            sink.heard(&self.members[worker].link.spec.name, &message);
                         }
                         self.apply(Event::Message(worker, header.epoch, message), sink)?;
                     }
                     Err(why) => {
-                        let worker_link = &self.worker_links[worker];
+                        let worker_link = &self.members[worker].link;
                         let why = format!("{} at {}: {why}", worker_link.spec.name, worker_link.address);
                         worker_link.sender().abort(protocol::Error::Message(why.clone()));
                         self.lose(worker, why, sink)?;
@@ -485,6 +376,7 @@ impl Driver {
                     self.apply(Event::Sorted(sorted), sink)?;
                 }
                 Input::Joined(worker_link) => self.take_in(worker_link, sink)?,
+                Input::Yield(incarnation) => self.give_up(incarnation, sink)?,
                 Input::Wake => self.look_for_late(sink)?,
                 Input::Suspend => {
                     self.ends = true;
@@ -534,7 +426,7 @@ impl Driver {
         for action in actions {
             match action {
                 Action::Send(worker, message) => {
-                    let worker_link = &self.worker_links[worker];
+                    let worker_link = &self.members[worker].link;
                     if let Err(error) = worker_link.send(self.place, &message) {
                         let why = format!("{} at {}: {error}", worker_link.spec.name, worker_link.address);
                         self.lost.push_back((worker, why));
@@ -548,10 +440,11 @@ impl Driver {
                     self.timer = Some(Instant::now() + Duration::from_secs_f64(seconds))
                 }
                 Action::Dismiss(worker, why) => {
-                    let worker_link = &self.worker_links[worker];
+                    let worker_link = &self.members[worker].link;
                     warn!("worker {} at {} is dropped: {why}", worker_link.spec.name, worker_link.address);
                     worker_link.delivery.dismiss(why);
                 }
+                Action::Freed(worker) => self.free(worker, sink),
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => {
                     if let Action::Progress(progress) = &other {

@@ -42,6 +42,8 @@ pub enum Event {
     Lost(usize, String),
     /// A worker has come; it has the next index.
     Joined(WorkerSpec),
+    /// Another job needs a worker: it is to be freed at the next plan boundary.
+    Yield(usize),
     /// The time that [`Action::Timer`] asked for has passed.
     Timer,
 }
@@ -75,6 +77,8 @@ pub enum Action {
         /// The run stops here.
         last: bool,
     },
+    /// A worker is released from the job, which goes on without it.
+    Freed(usize),
     /// The worker of every element from now on, by global index, where the deck wants states to say it.
     Owners(Arc<[u32]>),
     /// Have no more to do with a worker, and tell it why: it failed by itself, or its numbers are wrong. The job has gone on

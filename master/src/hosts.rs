@@ -141,9 +141,9 @@ impl Hosts {
         }
     }
 
-    /// Those without a job, by number.
-    pub fn idle(&self) -> impl Iterator<Item = &Host> {
-        self.by_number.values().filter(|host| host.state == State::Idle)
+    /// Those that are connected, by number.
+    pub fn connected(&self) -> impl Iterator<Item = &Host> {
+        self.by_number.values().filter(|host| !matches!(host.state, State::Lost(_)))
     }
 
     /// These connections compute a job from now on.
@@ -151,6 +151,15 @@ impl Hosts {
         for host in self.by_number.values_mut() {
             if incarnations.contains(&host.incarnation) && host.state == State::Idle {
                 host.state = State::Busy(job);
+            }
+        }
+    }
+
+    /// A job that goes on has released one.
+    pub fn free(&mut self, incarnation: u32, job: u32) {
+        for host in self.by_number.values_mut() {
+            if host.incarnation == incarnation && host.state == State::Busy(job) {
+                host.state = State::Idle;
             }
         }
     }
@@ -249,12 +258,20 @@ mod tests {
         for (i, name) in ["a", "b", "c"].into_iter().enumerate() {
             hosts.admit(&hello(name, i as u64), "x", i as u32 + 1).expect("new");
         }
+        let idle = |hosts: &Hosts| -> Vec<u32> {
+            hosts.connected().filter(|h| h.state == State::Idle).map(|h| h.incarnation).collect()
+        };
         hosts.occupy(&[1, 2], 7);
         hosts.lose(2, "cable");
-        assert_eq!(hosts.idle().map(|h| h.incarnation).collect::<Vec<_>>(), [3]);
+        assert_eq!(idle(&hosts), [3]);
         hosts.release(7);
-        assert_eq!(hosts.idle().map(|h| h.incarnation).collect::<Vec<_>>(), [1, 3]);
+        assert_eq!(idle(&hosts), [1, 3]);
         assert_eq!(hosts.rows()[1].note, "cable");
+        hosts.occupy(&[1, 3], 8);
+        hosts.free(3, 7);
+        assert_eq!(idle(&hosts), [0_u32; 0], "job 7 has it no more");
+        hosts.free(3, 8);
+        assert_eq!(idle(&hosts), [3]);
     }
 
     #[test]

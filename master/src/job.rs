@@ -57,7 +57,7 @@ use schedule::{Step, allowed, first_share, step_after};
 use tally::Tally;
 use twice::Twice;
 use verdict::{Account, element_fault};
-use workers::Workers;
+use workers::{Goes, Workers};
 
 /// What was asked of the end.
 #[derive(Default)]
@@ -170,6 +170,7 @@ impl Job {
             Event::Sorted(sorted) => return self.sorted(*sorted, actions),
             Event::Lost(index, why) => return self.lost(index, why, actions),
             Event::Joined(spec) => return self.joined(spec, actions),
+            Event::Yield(index) => self.yield_worker(index, actions),
             // An interval that is taken again ends where it did before.
             Event::Timer if self.twice.until().is_some() => {
                 actions.extend(self.options.keep.seconds().map(Action::Timer));
@@ -301,7 +302,7 @@ impl Job {
             ToMaster::Sample { cycle, hash } => self.sampled(worker, cycle, hash, actions),
             ToMaster::Failed { cycle, reason } => self.blame(worker, cycle, &reason, actions),
             ToMaster::Leaving => {
-                self.workers.leave(index);
+                self.workers.leave(index, Goes::Ends);
                 Ok(())
             }
         }

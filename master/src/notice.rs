@@ -9,7 +9,11 @@ use protocol::{
 };
 use tokio::sync::{mpsc, oneshot, watch};
 
-use crate::{drive::WorkerLink, queue, queue::Change, results, spool};
+use crate::{
+    drive::WorkerLink,
+    queue::{self, Change, Size},
+    results, spool,
+};
 
 /// Notices that may wait for the scheduler.
 pub const WAITING_NOTICES: usize = 1024;
@@ -44,16 +48,23 @@ pub enum Notice {
         /// In words, while it is silent.
         note: Option<String>,
     },
+    /// A job that goes on has released a worker.
+    Freed {
+        /// Its connection.
+        incarnation: u32,
+        job: u32,
+    },
     /// A client brings a deck without faults; answered with the job's number.
     Submit {
         /// Name of its file.
         name: String,
         title: String,
         text: String,
-        /// What its mesh has.
-        elements: u64,
+        size: Size,
         /// What is asked beside the deck.
         options: JobOptions,
+        /// Who brings it, by certificate; empty without one.
+        owner: String,
         /// The job's number, or why it is refused.
         answer: oneshot::Sender<Result<u32, Error>>,
     },

@@ -317,6 +317,7 @@ impl Sink for Output {
             | Action::Timer(_)
             | Action::Dealt(_)
             | Action::Dismiss(..)
+            | Action::Freed(..)
             | Action::Over(_) => Ok(()),
         }
     }

@@ -129,8 +129,18 @@ pub struct Entry {
     pub starts: Starts,
     /// A user has taken it back, which it has still to come to.
     pub cancelled: bool,
+    pub size: Size,
+    /// Who submitted it, by certificate; empty without one.
+    pub owner: String,
+}
+
+/// What a job is expected to take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Size {
     /// Of its mesh; 0 where an earlier release queued it.
     pub elements: u64,
+    /// To its end, at its first time step; 0 where nobody knows.
+    pub cycles: u64,
 }
 
 /// All jobs, by number.
@@ -218,8 +228,8 @@ impl Queue {
     pub fn add(
         &mut self,
         name: String,
-        (text, elements): (String, u64),
-        options: JobOptions,
+        (text, size): (String, Size),
+        (options, owner): (JobOptions, String),
         spool: &std::path::Path,
     ) -> Result<u32, Error> {
         let waiting = self.jobs.values().filter(|job| job.state == State::Queued).count();
@@ -232,8 +242,20 @@ impl Queue {
         let text = Arc::new(text);
         let deck_sum = sum_of(&text);
         let (state, before, starts, cancelled) = (State::Queued, None, Starts::default(), false);
-        let entry =
-            Entry { id, name, text, options, state, folder, before, deck_sum, starts, cancelled, elements };
+        let entry = Entry {
+            id,
+            name,
+            text,
+            options,
+            state,
+            folder,
+            before,
+            deck_sum,
+            starts,
+            cancelled,
+            size,
+            owner,
+        };
         self.jobs.insert(id, entry);
         Ok(id)
     }
@@ -345,7 +367,7 @@ mod tests {
     }
 
     fn add(queue: &mut Queue) -> Result<u32, Error> {
-        queue.add("d".into(), ("text".into(), 1), JobOptions::default(), "spool".as_ref())
+        queue.add("d".into(), ("text".into(), Size::default()), Default::default(), "spool".as_ref())
     }
 
     #[test]
@@ -366,7 +388,9 @@ mod tests {
         let mut queue = Queue::new(1);
         for priority in [0, 2, 2, -1, 0] {
             let options = JobOptions { priority, ..JobOptions::default() };
-            queue.add("d".into(), ("text".into(), 1), options, "spool".as_ref()).expect("room");
+            queue
+                .add("d".into(), ("text".into(), Size::default()), (options, String::new()), "spool".as_ref())
+                .expect("room");
         }
         let interrupted =
             Entry { id: 9, before: Some(vec!["a".into()]), ..queue.get(4).expect("added").clone() };

@@ -170,6 +170,7 @@ fn status(job: u32, folder: &Path) -> Status {
         cycle,
         time,
         time_unit: summary.as_ref().map_or_else(String::new, |s| Units::named(&s.units).time.to_owned()),
+        left_s: None,
         progress: String::new(),
         shares: Vec::new(),
         ended,

@@ -1,13 +1,13 @@
 //! The scheduler: one owner of hosts and queue. It hears one [`Notice`] at a time, changes its tables, and starts jobs.
 //!
-//! Each job that runs has workers of its own and a thread of its own ([`service`]). Which job starts when, on which workers,
-//! is [`allotment`]'s to say, which today gives all idle workers to one job at a time; nothing here counts on that.
+//! Each job that runs has workers of its own and a thread of its own ([`service`](crate::service)). Which job has which workers is
+//! [`allotment`]'s to say; [`starting`] does what it says.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::PathBuf,
     sync::{
-        Arc, Mutex,
+        Arc,
         atomic::{AtomicBool, Ordering},
     },
     time::{Duration, Instant},
@@ -24,20 +24,19 @@ use worker::notify;
 
 use crate::{
     connection::Acceptor,
-    drive::{self, Input, WorkerLink},
-    footprint::{self, Bearer},
+    drive::{Input, WorkerLink},
     hosts::Hosts,
     http::board::Board,
     notice::{Error, Notice},
-    queue::{self, Change, Entry, Queue, Starts, is_over},
-    scheduler::retention::Limits,
-    service::{self, Order},
+    queue::{self, Change, Entry, Queue, Size, Starts, is_over},
+    scheduler::{allotment::Call, retention::Limits},
     snapshot::store,
     spool::{self, Left, Record, Spool},
 };
 
-mod allotment;
+pub mod allotment;
 pub mod retention;
+mod starting;
 #[cfg(test)]
 mod tests;
 
@@ -65,6 +64,8 @@ pub struct Scheduler {
     running: BTreeMap<u32, Running>,
     /// What the page shows; none without a page.
     board: Option<Arc<Board>>,
+    /// By connection: workers that are to leave their job for another one.
+    called: BTreeMap<u32, Call>,
     /// Jobs whose records on disk are older than what is here.
     unwritten: BTreeSet<u32>,
     /// Set while this host is short of what a job needs.
@@ -123,6 +124,7 @@ impl Scheduler {
             status: BTreeMap::new(),
             running: BTreeMap::new(),
             board,
+            called: BTreeMap::new(),
             unwritten: BTreeSet::new(),
             pause: None,
             limits: Limits::default(),
@@ -147,7 +149,7 @@ impl Scheduler {
     /// A job of an earlier master; one that was under way goes on.
     fn restore(&mut self, record: Record, text: String) {
         let Record { job, name, title, state, options, at_work, cycle, time, ended, .. } = record.clone();
-        let Record { deck_sum, starts, cancelled, elements, .. } = record;
+        let Record { deck_sum, starts, cancelled, elements, cycles, owner, .. } = record;
         let interrupted = state == State::Running;
         let state = if interrupted { State::Queued } else { state };
         if !is_over(state) {
@@ -171,7 +173,8 @@ impl Scheduler {
             deck_sum,
             starts,
             cancelled,
-            elements,
+            size: Size { elements, cycles },
+            owner,
         };
         self.queue.restore(entry);
         let verdict = if cancelled && matches!(state, State::Queued | State::Held) {
@@ -211,7 +214,9 @@ impl Scheduler {
                 deck_sum: entry.deck_sum.clone(),
                 starts: entry.starts,
                 cancelled: entry.cancelled,
-                elements: entry.elements,
+                elements: entry.size.elements,
+                cycles: entry.size.cycles,
+                owner: entry.owner.clone(),
             }
         };
         // A few kilobytes; the job's own thread does not wait for it.
@@ -227,10 +232,10 @@ impl Scheduler {
             tokio::select! {
                 notice = heard.recv() => if let Some(notice) = notice {
                     self.hear(notice);
-                    self.start_next();
+                    self.arrange();
                 },
                 // An interrupted job waits for its workers for a while.
-                _ = look.tick() => self.start_next(),
+                _ = look.tick() => self.arrange(),
                 _ = wake.tick() => {
                     self.wake();
                     self.write_late();
@@ -312,19 +317,23 @@ impl Scheduler {
                     "worker {} joined",
                     spec.name
                 );
-                self.offer(&worker_link);
                 self.worker_links.insert(worker_link.incarnation, worker_link);
             }
             Notice::Left { incarnation, why, dropped } => {
                 self.worker_links.remove(&incarnation);
+                self.called.remove(&incarnation);
                 match dropped {
                     true => self.hosts.drop_out(incarnation, &why),
                     false => self.hosts.lose(incarnation, &why),
                 }
             }
             Notice::Suspect { incarnation, note } => self.hosts.suspect(incarnation, note),
-            Notice::Submit { name, title, text, elements, options, answer } => {
-                let _ = answer.send(self.submit(name, title, (text, elements), options));
+            Notice::Freed { incarnation, job } => {
+                self.called.remove(&incarnation);
+                self.hosts.free(incarnation, job);
+            }
+            Notice::Submit { name, title, text, size, options, owner, answer } => {
+                let _ = answer.send(self.submit((name, title), (text, size), options, owner));
             }
             Notice::Alive(answer) => {
                 let _ = answer.send(());
@@ -353,6 +362,7 @@ impl Scheduler {
             Notice::Over(job, change, ended) => {
                 self.running.remove(&job);
                 self.hosts.release(job);
+                self.called.retain(|_, call| call.from != job);
                 self.queue.forget_starts(job);
                 match &ended.failure {
                     Some(why) if matches!(change, Change::Suspend) => self.pause(job, why),
@@ -370,17 +380,6 @@ impl Scheduler {
         }
     }
 
-    /// A worker that comes while jobs run is given to one of them.
-    fn offer(&mut self, worker_link: &WorkerLink) {
-        let job = allotment::for_newcomer(self.running.keys().copied());
-        if let Some((job, Running { line, .. })) = job.and_then(|job| self.running.get_key_value(&job)) {
-            self.hosts.occupy(&[worker_link.incarnation], *job);
-            let (line, worker_link) = (line.clone(), worker_link.clone());
-            // A job that is over by then gives all its hosts back.
-            tokio::spawn(async move { line.send(Input::Joined(worker_link)).await.is_ok() });
-        }
-    }
-
     fn admit(&mut self, hello: &Hello, address: &str, incarnation: u32) -> Result<u32, String> {
         hello.proves(&self.proof)?;
         let (number, ghost) = self.hosts.admit(hello, address, incarnation)?;
@@ -392,12 +391,13 @@ impl Scheduler {
 
     fn submit(
         &mut self,
-        name: String,
-        title: String,
-        (text, elements): (String, u64),
+        (name, title): (String, String),
+        (text, size): (String, Size),
         options: JobOptions,
+        owner: String,
     ) -> Result<u32, Error> {
-        let job = self.queue.add(name.clone(), (text, elements), options.clone(), &self.folder)?;
+        let job =
+            self.queue.add(name.clone(), (text, size), (options.clone(), owner.clone()), &self.folder)?;
         let record = Record {
             job,
             name,
@@ -411,7 +411,9 @@ impl Scheduler {
             deck_sum: self.queue.get(job).map(|entry| entry.deck_sum.clone()).unwrap_or_default(),
             starts: Starts::default(),
             cancelled: false,
-            elements,
+            elements: size.elements,
+            cycles: size.cycles,
+            owner,
         };
         let text = self.queue.get(job).map(|entry| Arc::clone(&entry.text)).unwrap_or_default();
         // Who is told that the job is queued finds it in the queue of the next master as well.
@@ -503,85 +505,5 @@ impl Scheduler {
             self.spool.forget(job);
         }
         Ok(())
-    }
-
-    /// Starts the first of the waiting jobs that may start on the workers that are idle, and says what each of the others waits for.
-    fn start_next(&mut self) {
-        let waiting = self.queue.waiting();
-        if waiting.is_empty() {
-            return;
-        }
-        if let Some(pause) = self.pause.as_ref().filter(|pause| Instant::now() < pause.until) {
-            let what = format!("{}; tried again within {} s", pause.why, pause.seconds);
-            return waiting.iter().for_each(|entry| self.wait_for(entry.id, what.clone()));
-        }
-        let idle = self.hosts.idle().filter_map(|host| self.worker_links.get(&host.incarnation));
-        let idle: Vec<&WorkerLink> = idle.collect();
-        let bearers: Vec<Bearer<'_>> = idle.iter().map(|link| link.bearer()).collect();
-        let running: Vec<u32> = self.running.keys().copied().collect();
-        let available = footprint::available();
-        let allotments = allotment::among(&waiting, &running, &bearers, self.started.elapsed(), available);
-        for (job, what) in allotments.waits {
-            self.wait_for(job, what);
-        }
-        if let Some(job) = allotments.starts {
-            let worker_links = idle.into_iter().cloned().collect();
-            self.start(job, worker_links);
-        }
-    }
-
-    /// Starts a job on these workers, on a thread of its own.
-    fn start(&mut self, job: u32, worker_links: Vec<WorkerLink>) {
-        let (Some(entry), Some(status)) = (self.queue.get(job), self.status.get(&job).cloned()) else {
-            return;
-        };
-        let stop = Arc::new(AtomicBool::new(false));
-        let line = drive::channel(worker_links.len());
-        let running = Running { stop: Arc::clone(&stop), line: line.0.clone() };
-        let incarnations: Vec<u32> = worker_links.iter().map(|worker_link| worker_link.incarnation).collect();
-        let at_work = worker_links.iter().map(|worker_link| worker_link.spec.name.clone()).collect();
-        let order = Order {
-            number: job,
-            name: entry.name.clone(),
-            text: Arc::clone(&entry.text),
-            options: entry.options.clone(),
-            folder: entry.folder.clone(),
-            snapshots: self.spool.snapshots(job),
-            at_work_before: entry.before.as_ref().map(Vec::len),
-            worker_links,
-            line: Mutex::new(Some(line)),
-            stop,
-            status,
-            board: self.board.clone(),
-            notices: self.notices.clone(),
-        };
-        self.hosts.occupy(&incarnations, job);
-        self.running.insert(job, running);
-        self.queue.set_at_work(job, at_work, store::newest(&self.spool.snapshots(job)));
-        info!(job, workers = incarnations.len(), "job starts");
-        if let Err(why) = self.change(job, Change::Start, None) {
-            warn!(job, "{why}");
-        }
-        let notices = self.notices.clone();
-        let started = std::thread::Builder::new().name(format!("job-{job}")).spawn(move || {
-            let (change, ended) = service::serve(&order);
-            drop(order);
-            // The scheduler is gone only when the daemon ends.
-            let _ = notices.blocking_send(Notice::Over(job, change, Box::new(ended)));
-        });
-        if let Err(error) = started {
-            let ended = Ended { failure: Some(format!("its thread: {error}")), ..Ended::default() };
-            self.hear(Notice::Over(job, Change::Fail, Box::new(ended)));
-        }
-    }
-
-    fn wait_for(&self, job: u32, what: String) {
-        if let Some(status) = self.status.get(&job) {
-            status.send_if_modified(|status| {
-                let new = status.waits_for.as_ref() != Some(&what);
-                status.waits_for = Some(what);
-                new
-            });
-        }
     }
 }

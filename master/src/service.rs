@@ -56,6 +56,8 @@ pub struct Order {
     /// Of a job that an earlier session has begun: how many workers it had.
     pub at_work_before: Option<usize>,
     pub worker_links: Vec<WorkerLink>,
+    /// Workers that this one's master has, which may come to it later.
+    pub workers_there: usize,
     /// The way to its thread; taken when it is driven.
     pub line: Mutex<Option<(mpsc::Sender<Input>, mpsc::Receiver<Input>)>>,
     /// Set to end it with the results so far.
@@ -159,8 +161,8 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     let all_take_peers = order.worker_links.iter().all(|worker_link| worker_link.peer.is_some());
     let interval = interval_for(&order.options, &model, Some(SNAPSHOT_SECONDS));
     let keep = CheckpointEvery::for_both(order.options.keep_every, interval);
-    // The others will be back.
-    let workers = specs.len().max(order.at_work_before.unwrap_or_default());
+    // Others may come, or will be back.
+    let workers = order.workers_there.max(order.at_work_before.unwrap_or_default());
     let options = SessionOptions::of(&order.options, workers, all_take_peers);
     let options = SessionOptions { waits: true, keep, store: true, replay: true, ..options };
     if let Some(path) = order.folder.as_ref().filter(|path| path.is_symlink()) {
@@ -320,6 +322,11 @@ impl Sink for Reporter<'_> {
         let _ = self.notices.try_send(Notice::Suspect { incarnation, note });
     }
 
+    fn freed(&mut self, incarnation: u32) {
+        // The scheduler lives as long as the daemon.
+        let _ = self.notices.blocking_send(Notice::Freed { incarnation, job: self.number });
+    }
+
     fn take(&mut self, action: Action) -> Result<(), String> {
         self.show(&action);
         let progress = match action {
@@ -340,11 +347,13 @@ impl Sink for Reporter<'_> {
         }
         self.last = Some(now);
         let elapsed = now.duration_since(self.started).as_secs_f64();
-        let (line, _) = progress_line(self.model, &progress, elapsed);
+        let (line, share) = progress_line(self.model, &progress, elapsed);
+        let left = elapsed * (1.0 - share) / share;
         self.status.send_modify(|status| {
             status.cycle = progress.cycle;
             status.time = progress.time;
             status.progress = line;
+            status.left_s = Some(left).filter(|left| left.is_finite());
         });
         Ok(())
     }

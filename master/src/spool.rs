@@ -71,6 +71,12 @@ pub struct Record {
     /// Of its mesh; 0 where an earlier release queued the job.
     #[serde(default)]
     pub elements: u64,
+    /// To its end, as it was expected; 0 where an earlier release queued the job.
+    #[serde(default)]
+    pub cycles: u64,
+    /// Who submitted it, by certificate; empty without one.
+    #[serde(default)]
+    pub owner: String,
 }
 
 /// A record as it stands on disk.
@@ -383,6 +389,8 @@ mod tests {
             starts: Starts { count: 1, snapshot: 3 },
             cancelled: false,
             elements: 8,
+            cycles: 40,
+            owner: "anna".to_owned(),
         }
     }
 

@@ -288,6 +288,8 @@ impl<S: Surroundings> World<S> {
                         self.surroundings.dismiss(host);
                     }
                 }
+                // Hosts of a world have no other job to go to.
+                Action::Freed(_) => {}
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => self.surroundings.take(other)?,
             }

@@ -124,6 +124,21 @@ pub fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result
     Err(serde::de::Error::custom(format_args!("number is {value}, must be finite")))
 }
 
+/// The same of a number that may be missing.
+///
+/// # Errors
+/// Names the number, if there is one and it is not finite.
+pub fn finite_or_none<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> std::result::Result<Option<f64>, D::Error> {
+    match Option::<f64>::deserialize(deserializer)? {
+        Some(value) if !value.is_finite() => {
+            Err(serde::de::Error::custom(format_args!("number is {value}, must be finite")))
+        }
+        value => Ok(value),
+    }
+}
+
 /// A number that is packed as its little-endian bytes; every bit pattern is one.
 trait Packed: bytemuck::Pod {
     fn put(self, out: &mut Vec<u8>);

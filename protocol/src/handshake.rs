@@ -25,7 +25,8 @@ use std::fmt;
 /// memory of workers in [`Hello`]; the strain at which layers of shells break in assignments; the part of a job that is computed twice; cross-sections in assignments
 /// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans;
 /// beams in assignments.
-pub const VERSION: u16 = 10;
+/// 11: the most workers that a job takes, and the seconds to its end.
+pub const VERSION: u16 = 11;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

@@ -164,6 +164,10 @@ pub struct JobOptions {
     /// Wait for at least this many workers.
     #[arg(skip)]
     pub min_workers: u32,
+    /// Take at most this many; 0 for any number.
+    #[arg(skip)]
+    #[serde(default)]
+    pub max_workers: u32,
     /// Speeds by which work is distributed
     #[arg(long, help_heading = ADVANCED, value_enum, default_value = "given")]
     pub balance: Balance,
@@ -207,6 +211,8 @@ impl JobOptions {
         let whole = |n: Option<u64>| n.map(|n| n as f64);
         number("snapshot-cycles", whole(self.snapshot_cycles), |n| n >= 1.0, "1 or more")?;
         number("min-workers", Some(f64::from(self.min_workers)), |n| n <= 10_000.0, "at most 10000")?;
+        let most = Some(f64::from(self.max_workers)).filter(|_| self.max_workers < self.min_workers);
+        number("max-workers", most, |n| n == 0.0, "0 for any number, or at least min-workers")?;
         match &self.lanes {
             Some(name) if name.parse::<Width>().is_err() => Err(Error::Lanes(name.clone())),
             _ => Ok(()),
@@ -284,6 +290,10 @@ mod tests {
             (JobOptions { end_time: Some(0.0), ..good.clone() }, "end time 0: must be a positive number"),
             (JobOptions { snapshot_cycles: Some(0), ..good.clone() }, "snapshot-cycles 0"),
             (JobOptions { min_workers: u32::MAX, ..good.clone() }, "min-workers 4294967295"),
+            (
+                JobOptions { min_workers: 3, max_workers: 2, ..good.clone() },
+                "max-workers 2: must be 0 for any number, or at least min-workers",
+            ),
             (JobOptions { lanes: Some("mmx".into()), ..good.clone() }, "lanes \"mmx\""),
         ] {
             let error = bad.check().expect_err(words).to_string();

@@ -6,7 +6,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{codec::finite, options::JobOptions};
+use crate::{
+    codec::{finite, finite_or_none},
+    options::JobOptions,
+};
 
 /// Most bytes of a deck's text.
 pub const DECK_LIMIT: usize = 256 << 20;
@@ -145,6 +148,9 @@ pub struct Status {
     pub time_unit: String,
     /// One line for a terminal: the time left, a comma, and more.
     pub progress: String,
+    /// Seconds to its end as it goes now; none where nobody knows.
+    #[serde(deserialize_with = "finite_or_none")]
+    pub left_s: Option<f64>,
     /// Which worker computes how many elements.
     pub shares: Vec<Share>,
     /// Set once it is over.
@@ -163,6 +169,7 @@ impl Status {
             time: 0.0,
             time_unit: String::new(),
             progress: String::new(),
+            left_s: None,
             shares: Vec::new(),
             ended: None,
         }

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fs};
 
-use tests::cluster::{Cluster, repository, said};
+use tests::cluster::{Cluster, repository, said, until};
 
 use crate::{BOLIDE, digest_of, reference, run, small};
 
@@ -113,6 +113,28 @@ fn jobs_run_one_after_another_and_one_waits_for_its_workers() {
     let none = cluster.client(&["results", "1"]);
     assert_eq!(none.code, Some(1));
     assert!(none.err.contains("job 1 writes no results"), "{none:?}");
+}
+
+/// A long job on three workers gives one up to a short one, has it back, and neither has other bits than alone. The worker goes from
+/// job to job and back on one connection.
+#[test]
+fn jobs_share_workers_and_have_the_bits_that_they_have_alone() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    for (name, speed) in [("a", "1"), ("b", "1"), ("c", "1")] {
+        cluster.worker(name, speed);
+    }
+    assert_eq!(cluster.json(&["submit", &small(), "--no-output"])["job"], 1);
+    let n_shares = |job| cluster.find_job(job).and_then(|job| Some(job["shares"].as_array()?.len()));
+    until(|| "job 1 on three workers".to_owned(), || (n_shares(1) == Some(3)).then_some(()));
+    let short = ["submit", &small(), "--cycles", "40", "--no-output", "--workers", "1..1", "--wait"];
+    let summary = cluster.json(&short);
+    assert_eq!(cluster.job(1)["state"], "running", "the short job has passed: {}", cluster.master.text());
+    assert_eq!((digest_of(&summary), &summary["workers"]), (reference().to_owned(), &1.into()));
+    cluster.master.wait_for("is called to job 2");
+    cluster.master.wait_for("joins the job");
+    let summary = cluster.json(&["watch", "1"]);
+    assert_eq!((digest_of(&summary), &summary["workers"]), (digest_of(&run(&[])), &3.into()));
+    assert_eq!(summary["losses"].as_array().map(Vec::len), Some(0), "nobody was lost: {summary}");
 }
 
 #[test]

@@ -227,6 +227,7 @@ mod tests {
             cycle: 120,
             time: 1.0,
             time_unit: "ms".to_owned(),
+            left_s: Some(720.0),
             progress: "12 min left, 34.0 %, cycle 120".to_owned(),
             shares: vec![share("a", 1.0, 100), share("b", 2.0, 260)],
             ended: None,

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `GET /api/overview` | `{version, join, jobs, hosts}`; a job is a status with `brief` once it runs |
 //! | `GET /api/events` | the same as server-sent events, whenever it changes, at most twice a second |
-//! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N`, body the deck | `{job}`; 422 `{faults: [{file, line, column, ...}]}` |
+//! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N&max_workers=N`, body the deck | `{job}`; 422 `{faults: [{file, line, column, ...}]}` |
 //! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes, forecast}`, or 422 as above |
 //! | `POST /api/check/surface?name=NAME`, body the deck | the surface before the first cycle, binary |
 //! | `POST /api/jobs/N/cancel` | `{done}` |
@@ -47,7 +47,7 @@ use crate::{
     desk::{self, Brought},
     notice::{self, Notice, ask},
     picture::camera::Slice,
-    queue,
+    queue::{self, Size},
 };
 
 /// The shortest time between two events of the stream.
@@ -159,6 +159,7 @@ struct Asked {
     name: Option<String>,
     cycles: Option<u64>,
     min_workers: Option<u32>,
+    max_workers: Option<u32>,
 }
 
 /// A fault of a deck and its place.
@@ -224,15 +225,18 @@ async fn submit(
     text: String,
 ) -> Result<Json<serde_json::Value>, Fault> {
     let name = name_of(&asked);
-    let Brought { text, title, elements, .. } = desk::read(name.clone(), text).await?;
+    let Brought { text, title, elements, cycles, .. } = desk::read(name.clone(), text).await?;
     let options = JobOptions {
         cycles: asked.cycles,
         min_workers: asked.min_workers.unwrap_or(1).clamp(1, 10_000),
+        max_workers: asked.max_workers.unwrap_or_default(),
         keep_every: Some(10.0),
         ..JobOptions::default()
     };
     options.check().map_err(desk::Error::Options)?;
-    let submit = |answer| Notice::Submit { name, title, text, elements, options, answer };
+    let size = Size { elements, cycles: cycles.min(options.cycles.unwrap_or(u64::MAX)) };
+    let owner = String::new();
+    let submit = |answer| Notice::Submit { name, title, text, size, options, owner, answer };
     let job = ask(&api_state.notices, submit).await??;
     Ok(Json(json!({ "job": job })))
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mechanics::{state::GlobalState, vote::Vote};
 use protocol::message::ToWorker;
 
-use super::{Job, checkpoints::Checkpoint, error::Error, samples::Stopped};
+use super::{Job, checkpoints::Checkpoint, error::Error, samples::Stopped, workers::Goes};
 use crate::{
     event::{Action, WorkerSpec},
     incident::Loss,
@@ -32,6 +32,15 @@ impl Job {
     pub(super) fn joined(&mut self, spec: WorkerSpec, actions: &mut Vec<Action>) -> Result<(), Error> {
         self.workers.join(spec);
         if self.epoch.at_work.is_empty() { self.next_epoch(actions) } else { Ok(()) }
+    }
+
+    /// Another job needs a worker: it goes at the next plan boundary, or at once if it was not dealt work yet.
+    pub(super) fn yield_worker(&mut self, index: usize, actions: &mut Vec<Action>) {
+        if self.workers.release_idle(index, &self.epoch.at_work) {
+            actions.push(Action::Freed(index));
+        } else {
+            self.workers.leave(index, Goes::Needed);
+        }
     }
 
     /// A worker cannot go on, or its numbers are none. Others may: it is dismissed by name, and the run goes back.
@@ -171,8 +180,11 @@ impl Job {
             self.workers.set_speeds(at_work, &rebalance.speeds_after);
             self.tally.rebalances.push(rebalance);
         }
-        for index in self.workers.release(at_work) {
+        for (index, why) in self.workers.release(at_work) {
             actions.push(Action::Send(index, ToWorker::Release));
+            if why == Goes::Needed {
+                actions.push(Action::Freed(index));
+            }
         }
         self.next_epoch(actions)
     }

@@ -13,8 +13,17 @@ struct Worker {
     spec: WorkerSpec,
     /// Not lost.
     alive: bool,
-    /// It wants to go, at the next plan boundary.
-    leaves: bool,
+    /// Why it goes at the next plan boundary, if it does.
+    goes: Option<Goes>,
+}
+
+/// Why a worker goes at the next plan boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Goes {
+    /// Its process is to end.
+    Ends,
+    /// Another job needs it.
+    Needed,
 }
 
 /// All workers of a job, by index.
@@ -39,7 +48,7 @@ impl Workers {
 
     /// One has come.
     pub(super) fn join(&mut self, spec: WorkerSpec) {
-        self.all.push(Worker { spec, alive: true, leaves: false });
+        self.all.push(Worker { spec, alive: true, goes: None });
     }
 
     /// As it came.
@@ -71,27 +80,43 @@ impl Workers {
         Ok(std::mem::replace(&mut lost.alive, false))
     }
 
-    /// One wants to go, at the next plan boundary.
-    pub(super) fn leave(&mut self, index: usize) {
-        self.all[index].leaves = true;
+    /// One is to go, at the next plan boundary. A process that is to end does, whoever needs it.
+    pub(super) fn leave(&mut self, index: usize, why: Goes) {
+        if let Some(worker) = self.all.get_mut(index)
+            && worker.goes != Some(Goes::Ends)
+        {
+            worker.goes = Some(why);
+        }
     }
 
     /// Whether somebody waits to be taken into the workers.
     pub(super) fn has_newcomers(&self, at_work: &[usize]) -> bool {
-        self.all.iter().filter(|worker| worker.alive && !worker.leaves).count()
-            > at_work.iter().filter(|&&index| !self.all[index].leaves).count()
+        self.all.iter().filter(|worker| worker.alive && worker.goes.is_none()).count()
+            > at_work.iter().filter(|&&index| self.all[index].goes.is_none()).count()
     }
 
-    /// Whether somebody of the workers wants to go.
+    /// Whether somebody of the workers is to go.
     pub(super) fn has_leavers(&self, at_work: &[usize]) -> bool {
-        at_work.iter().any(|&index| self.all[index].leaves)
+        at_work.iter().any(|&index| self.all[index].goes.is_some())
     }
 
-    /// Lets those of the workers go that want to; gives their indices.
-    pub(super) fn release(&mut self, at_work: &[usize]) -> Vec<usize> {
-        let leavers: Vec<usize> = at_work.iter().copied().filter(|&index| self.all[index].leaves).collect();
-        leavers.iter().for_each(|&index| self.all[index].alive = false);
-        leavers
+    /// Lets those of the workers go that are to; gives their indices, and why they go.
+    pub(super) fn release(&mut self, at_work: &[usize]) -> Vec<(usize, Goes)> {
+        let goes = |&index: &usize| self.all[index].goes.map(|why| (index, why));
+        let released: Vec<(usize, Goes)> = at_work.iter().filter_map(goes).collect();
+        released.iter().for_each(|&(index, _)| self.all[index].alive = false);
+        released
+    }
+
+    /// Lets one go at once that is there and not at work; gives whether it went.
+    pub(super) fn release_idle(&mut self, index: usize, at_work: &[usize]) -> bool {
+        match self.all.get_mut(index) {
+            Some(worker) if worker.alive && !at_work.contains(&index) => {
+                worker.alive = false;
+                true
+            }
+            _ => false,
+        }
     }
 
     /// The workers is dealt work by other speeds from now on.
@@ -139,13 +164,21 @@ mod tests {
     }
 
     #[test]
-    fn newcomers_are_those_beyond_the_crew_and_leavers_are_let_go_once() {
+    fn newcomers_are_those_beyond_the_workers_at_work_and_leavers_are_let_go_once() {
         let mut workers = three();
         assert!(!workers.has_newcomers(&[0, 1, 2]) && workers.has_newcomers(&[0, 1]));
-        workers.leave(1);
+        workers.leave(1, Goes::Needed);
         assert!(workers.has_leavers(&[0, 1, 2]) && !workers.has_newcomers(&[0, 1, 2]));
-        assert_eq!(workers.release(&[0, 1, 2]), [1]);
+        assert_eq!(workers.release(&[0, 1, 2]), [(1, Goes::Needed)]);
         assert_eq!(workers.alive(), [0, 2]);
+        workers.leave(2, Goes::Ends);
+        workers.leave(2, Goes::Needed);
+        assert_eq!(workers.release(&[0, 2]), [(2, Goes::Ends)], "a process that ends goes to no other job");
+        workers.leave(7, Goes::Needed);
+        assert!(
+            !workers.release_idle(0, &[0]) && workers.release_idle(0, &[]) && !workers.release_idle(7, &[])
+        );
+        assert_eq!(workers.alive(), [0_usize; 0]);
     }
 
     #[test]

@@ -1,203 +1,523 @@
-//! Which job may start, and which one a worker is given to that comes while jobs run. It decides and changes nothing.
+//! Which job has which workers: who starts on which, who is given more, who gives some up, and what each of the others waits for.
+//!
+//! [`arrange`] is a pure function of jobs and workers. It keeps nothing, so it is asked again whenever something has changed.
+//! Its rules:
+//!
+//! - Each job has a *part* of the speeds: as much as it uses well ([`USED_WELL`]), else as much as the others. Owners
+//!   have equal parts, whatever they submit; a job of higher priority has its part before the others.
+//! - Jobs start in their order as long as each that runs keeps as many workers as it needs. One that starts takes what is idle, and
+//!   calls workers of jobs that have more than their part; these go at the next plan boundary of their job.
+//! - A job for which there are workers enough, but not beside those that run, has a *reservation*: jobs behind it start before it only if
+//!   they end before it could begin, or leave it enough workers.
+//! - What is idle after that is given to those that have least of their part, as far as it helps them at all ([`HELPS`]).
+//! - Work is dealt out anew where workers change, so a job whose end is near keeps those that it has.
 
-use std::time::Duration;
+use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
 
 use crate::{
     footprint::{self, Bearer},
-    queue::Entry,
+    output::span,
 };
 
-/// Most jobs that run at a time. A job takes all idle workers, so a second one would find only those that come later.
-const JOBS_AT_ONCE: usize = 1;
+mod calls;
+mod idle;
+mod parts;
+#[cfg(test)]
+mod tests;
+
+/// Elements for each thread that a job uses well: 2,000 take some 120 us of a cycle, and a vote and its answer on an office network as long.
+pub const USED_WELL: u64 = 2_000;
+/// Elements for each thread that makes a job faster at all, where nobody else wants it.
+pub const HELPS: u64 = 500;
 /// How long an interrupted job waits for all of its workers before it goes on with those that are back; later ones are taken
 /// in at plan boundaries.
 const RETURN_LIMIT: Duration = Duration::from_secs(2);
+/// Seconds for which dealing a job out anew holds it, by element: its state travels to the master and to the workers, some 600 bytes, at 1 Gb/s.
+const DEAL: f64 = 5e-6;
+/// Seconds for which it holds any job.
+const DEAL_ANY: f64 = 0.2;
+/// A job is given workers of another one when it has less than this of its part.
+const SHORT_OF_ITS_PART: f64 = 0.5;
+/// By how much a job may have more than its part for want of a worker that fits.
+const SLACK: f64 = 1.1;
+/// By how much faster a worker is for which a job gives another one up.
+const FASTER: f64 = 1.5;
 
-/// What becomes of the jobs that wait.
-#[derive(Debug, Default, PartialEq, Eq)]
-pub(super) struct Allotments {
-    /// The one that starts, on all idle workers.
-    pub(super) starts: Option<u32>,
-    /// What each of the others waits for.
-    pub(super) waits: Vec<(u32, String)>,
+/// A worker that is connected.
+#[derive(Clone, Copy, Debug)]
+pub struct Worker<'a> {
+    pub incarnation: u32,
+    pub bearer: Bearer<'a>,
+    pub threads: u32,
+    pub stands: Stands,
 }
 
-/// What becomes of the jobs that wait, in the order in which they are to start. One that wants more workers than there are lets those
-/// behind it pass; one that was interrupted does not at first, for its workers come back within moments.
-pub(super) fn among(
-    waiting: &[&Entry],
-    running: &[u32],
-    idle: &[Bearer<'_>],
+/// What a worker does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stands {
+    Idle,
+    /// It computes a job.
+    At(u32),
+    /// It computes the first job until a plan boundary, and is then for the second, or for whoever needs it.
+    Called {
+        from: u32,
+        to: Option<u32>,
+    },
+}
+
+/// A job that runs or waits.
+#[derive(Clone, Debug)]
+pub struct Claim<'a> {
+    pub job: u32,
+    pub elements: u64,
+    /// Fewest and most workers.
+    pub workers: [usize; 2],
+    pub priority: i32,
+    /// Who submitted it.
+    pub owner: &'a str,
+    pub runs: bool,
+    /// Seconds to its end: of one that runs, with its workers; of one that waits, on one thread; none where nobody knows.
+    pub left_s: Option<f64>,
+    /// Of one that was interrupted: the workers that it had.
+    pub before: Option<&'a [String]>,
+}
+
+impl Claim<'_> {
+    /// Workers that it needs by its options: what was begun with enough goes on with any.
+    fn needs(&self) -> usize {
+        if self.runs || self.before.is_some() { 1 } else { self.workers[0].max(1) }
+    }
+}
+
+/// What is to be done.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Arrangement {
+    /// Jobs that start, and the workers that each starts on.
+    pub starts: Vec<(u32, Vec<u32>)>,
+    /// Workers that are given to jobs that run.
+    pub joins: Vec<(u32, u32)>,
+    pub calls: Vec<Call>,
+    /// What each of the others waits for.
+    pub waits: Vec<(u32, String)>,
+    /// The job for which there are workers enough, but not beside those that run, and when it could begin (s) if jobs end as they say.
+    pub reserved: Option<(u32, f64)>,
+}
+
+/// A worker that is to leave a job for another one, or because the job has a faster one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Call {
+    pub worker: u32,
+    pub from: u32,
+    pub to: Option<u32>,
+}
+
+/// What is to be done with these jobs, waiting ones in the order in which they came, and these workers, so long after the master's
+/// start and with so much memory `available` to the master.
+pub fn arrange(
+    claims: &[Claim<'_>],
+    workers: &[Worker<'_>],
     since_start: Duration,
     available: Option<u64>,
-) -> Allotments {
-    let mut allotments = Allotments::default();
-    let mut returns = None;
-    for (ahead, entry) in waiting.iter().enumerate() {
-        let what = match (of(entry, running, idle, since_start, available), allotments.starts, returns) {
-            (Allotment::Start, None, None) => {
-                allotments.starts = Some(entry.id);
+) -> Arrangement {
+    let mut table = Table::new(claims, workers, available);
+    let returns = table.take_back(since_start);
+    table.admit(returns);
+    table.share();
+    table.start();
+    table.fill();
+    table.give_idle();
+    table.even_out();
+    table.tell(returns);
+    table.done
+}
+
+/// A job in the making of an arrangement.
+struct Row<'a> {
+    claim: &'a Claim<'a>,
+    /// Indices of the workers that it has and keeps, of those that are called to it, and of those that it is given now.
+    has: Vec<usize>,
+    coming: Vec<usize>,
+    given: Vec<usize>,
+    /// Workers that it needs, by its options and by memory.
+    needs: usize,
+    /// Runs, or may start now.
+    is_in: bool,
+    /// Its part of the speeds.
+    part: f64,
+    /// The speed with which it would take the time that it says it does.
+    told_with: f64,
+    /// What it waits for.
+    waits: Option<String>,
+}
+
+impl Row<'_> {
+    fn all(&self) -> impl Iterator<Item = usize> + '_ {
+        self.has.iter().chain(&self.coming).chain(&self.given).copied()
+    }
+
+    fn n(&self) -> usize {
+        self.has.len() + self.coming.len() + self.given.len()
+    }
+
+    /// Whether it ends before other workers could be worth the time in which work is dealt out anew.
+    fn ends_soon(&self) -> bool {
+        self.claim.runs && self.claim.left_s.is_some_and(|left| left < 2.0 * self.deals())
+    }
+
+    /// Whether it lasts so long that having its part is worth dealing out two jobs anew.
+    fn is_worth_changing(&self) -> bool {
+        self.claim.left_s.is_none_or(|left| left > 20.0 * self.deals())
+    }
+
+    /// Seconds for which dealing the job out anew holds it.
+    fn deals(&self) -> f64 {
+        DEAL_ANY + DEAL * self.claim.elements as f64
+    }
+
+    /// Workers that nobody may take from it.
+    fn floor(&self) -> usize {
+        let keeps = self.claim.workers[0].min(self.has.len());
+        if self.claim.runs { keeps.max(1) } else { self.needs }
+    }
+}
+
+struct Table<'a> {
+    /// Those that run, then those that wait, in the order in which they are to start.
+    rows: Vec<Row<'a>>,
+    workers: &'a [Worker<'a>],
+    /// Indices of workers that are idle and not given away, the fastest first.
+    idle: Vec<usize>,
+    available: Option<u64>,
+    done: Arrangement,
+}
+
+impl<'a> Table<'a> {
+    fn new(claims: &'a [Claim<'a>], workers: &'a [Worker<'a>], available: Option<u64>) -> Self {
+        let of = |job: u32, stands: &dyn Fn(Stands) -> Option<u32>| -> Vec<usize> {
+            (0..workers.len()).filter(|&w| stands(workers[w].stands) == Some(job)).collect()
+        };
+        let row = |claim: &'a Claim<'a>| Row {
+            claim,
+            has: of(claim.job, &|stands| if let Stands::At(job) = stands { Some(job) } else { None }),
+            coming: of(claim.job, &|stands| {
+                if let Stands::Called { to, .. } = stands { to } else { None }
+            }),
+            given: Vec::new(),
+            needs: claim.needs(),
+            is_in: claim.runs,
+            part: 0.0,
+            told_with: 1.0,
+            waits: None,
+        };
+        let mut idle: Vec<usize> =
+            (0..workers.len()).filter(|&w| workers[w].stands == Stands::Idle).collect();
+        idle.sort_by(|&a, &b| workers[b].bearer.speed.total_cmp(&workers[a].bearer.speed));
+        let mut rows: Vec<Row<'_>> = in_order(claims).into_iter().map(row).collect();
+        for row in rows.iter_mut().filter(|row| row.claim.runs) {
+            let leaves = |w: &usize| matches!(workers[*w].stands, Stands::Called { from, .. } if from == row.claim.job);
+            let leave = (0..workers.len()).filter(leaves);
+            row.told_with = row.has.iter().copied().chain(leave).map(|w| workers[w].bearer.speed).sum();
+        }
+        Self { rows, workers, idle, available, done: Arrangement::default() }
+    }
+
+    fn speed(&self, worker: usize) -> f64 {
+        self.workers[worker].bearer.speed
+    }
+
+    fn speed_of(&self, row: usize) -> f64 {
+        self.rows[row].all().map(|worker| self.speed(worker)).sum()
+    }
+
+    /// What a job would lack with these workers, in words.
+    fn shortage(&self, claim: &Claim<'_>, workers: impl Iterator<Item = usize>) -> Option<String> {
+        let bearers: Vec<Bearer<'_>> = workers.map(|worker| self.workers[worker].bearer).collect();
+        // One that runs has its master's memory already.
+        let available = self.available.filter(|_| !claim.runs);
+        footprint::shortage(claim.elements, available, &bearers)
+    }
+
+    /// Starts interrupted jobs on the workers that they had; gives the first that still waits for some.
+    fn take_back(&mut self, since_start: Duration) -> Option<u32> {
+        let mut returns = None;
+        if since_start >= RETURN_LIMIT {
+            return returns;
+        }
+        for row in 0..self.rows.len() {
+            let Some(names) = self.rows[row].claim.before.filter(|names| !names.is_empty()) else { continue };
+            let is_its = |&worker: &usize| names.iter().any(|name| name == self.workers[worker].bearer.name);
+            let back: Vec<usize> = self.idle.iter().copied().filter(is_its).collect();
+            let claim = self.rows[row].claim;
+            if back.len() < names.len() {
+                self.rows[row].waits =
+                    Some(format!("its workers: {} of {} are back", back.len(), names.len()));
+                // What it had is kept for it.
+                self.idle.retain(|worker| !back.contains(worker));
+                returns = returns.or(Some(claim.job));
+            } else if self.shortage(claim, back.iter().copied()).is_none() {
+                self.idle.retain(|worker| !back.contains(worker));
+                self.rows[row].given = back;
+                self.rows[row].is_in = true;
+            }
+        }
+        returns
+    }
+
+    /// Workers that all of the jobs that are in need.
+    fn pinned(&self) -> usize {
+        self.rows.iter().filter(|row| row.is_in).map(Row::floor).sum()
+    }
+
+    /// Says which of the waiting jobs may start beside those that run.
+    fn admit(&mut self, returns: Option<u32>) {
+        let n = self.workers.len();
+        // Of the reservation: when it could begin (s), and how many workers are left over then.
+        let mut window: Option<(f64, usize)> = None;
+        for row in 0..self.rows.len() {
+            if self.rows[row].is_in || self.rows[row].waits.is_some() {
                 continue;
             }
-            (Allotment::Start, Some(job), _) | (Allotment::Start, None, Some(job)) => format!("job {job}"),
-            (Allotment::Wait(what), ..) if running.is_empty() => what,
-            (Allotment::Wait(what), ..) => match ahead {
-                0 => what,
-                1 => format!("{what}, then 1 job before it"),
-                ahead => format!("{what}, then {ahead} jobs before it"),
-            },
-        };
-        if entry.before.is_some() && since_start < RETURN_LIMIT {
-            returns = returns.or(Some(entry.id));
-        }
-        allotments.waits.push((entry.id, what));
-    }
-    allotments
-}
-
-/// What becomes of one job.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Allotment {
-    /// It starts on all idle workers.
-    Start,
-    /// It waits, for this.
-    Wait(String),
-}
-
-/// What becomes of a job beside those that are `running`, with these workers `idle`, so long after the master's
-/// start, with so much memory `available`.
-fn of(
-    entry: &Entry,
-    running: &[u32],
-    idle: &[Bearer<'_>],
-    since_start: Duration,
-    available: Option<u64>,
-) -> Allotment {
-    if running.len() >= JOBS_AT_ONCE {
-        let jobs: Vec<String> = running.iter().map(|job| format!("job {job}")).collect();
-        return Allotment::Wait(jobs.join(", "));
-    }
-    let needed = entry.options.min_workers.max(1) as usize;
-    match &entry.before {
-        // Any worker will do for what was begun with enough of them.
-        Some(at_work) => {
-            let all = at_work.len();
-            let back = at_work.iter().filter(|name| idle.iter().any(|worker| worker.name == **name)).count();
-            if idle.is_empty() || back < all && since_start < RETURN_LIMIT {
-                return Allotment::Wait(format!("its workers: {back} of {all} are back"));
+            if let Some(job) = returns {
+                self.rows[row].waits = Some(format!("job {job}"));
+                continue;
+            }
+            let claim = self.rows[row].claim;
+            let needs = match self.needs(claim) {
+                Ok(needs) => needs,
+                Err(words) => {
+                    self.rows[row].waits = Some(words);
+                    continue;
+                }
+            };
+            self.rows[row].needs = needs;
+            let fits = self.pinned() + needs <= n;
+            match &mut window {
+                None if fits => self.rows[row].is_in = true,
+                None => {
+                    let (begins, over) = self.window(needs);
+                    window = Some((begins, over));
+                    self.done.reserved = Some((claim.job, begins));
+                }
+                Some((begins, over)) if fits => {
+                    let least = self.workers.iter().map(|worker| worker.threads.max(1)).min().unwrap_or(1);
+                    let takes = claim.left_s.map_or(f64::INFINITY, |left| left / f64::from(least));
+                    if takes <= *begins {
+                        self.rows[row].is_in = true;
+                    } else if needs <= *over {
+                        *over -= needs;
+                        self.rows[row].is_in = true;
+                    }
+                }
+                Some(_) => {}
             }
         }
-        None if idle.len() < needed => {
-            let workers = if needed == 1 { "worker" } else { "workers" };
-            return Allotment::Wait(format!("{needed} {workers}, {} are idle", idle.len()));
-        }
-        None => {}
     }
-    footprint::shortage(entry.elements, available, idle).map_or(Allotment::Start, Allotment::Wait)
+
+    /// Workers that a job needs, by its options and by memory.
+    ///
+    /// # Errors
+    /// What it waits for, if all workers together are not enough.
+    fn needs(&self, claim: &Claim<'_>) -> Result<usize, String> {
+        let n = self.workers.len();
+        let needs = claim.needs();
+        if needs > n {
+            if let Some(names) = claim.before.filter(|names| !names.is_empty()) {
+                return Err(format!("its workers: 0 of {} are back", names.len()));
+            }
+            let workers = if needs == 1 { "worker" } else { "workers" };
+            return Err(format!("{needs} {workers}, {} are idle", self.idle.len()));
+        }
+        let mut fastest: Vec<usize> = (0..n).collect();
+        fastest.sort_by(|&a, &b| self.speed(b).total_cmp(&self.speed(a)));
+        let enough = (needs..=n).find(|&n| self.shortage(claim, fastest[..n].iter().copied()).is_none());
+        enough.ok_or_else(|| self.shortage(claim, fastest.into_iter()).unwrap_or_default())
+    }
+
+    /// When a job that needs so many workers could begin (s), if jobs end as they say, and how many are left over then.
+    fn window(&self, needs: usize) -> (f64, usize) {
+        let mut running: Vec<&Row<'_>> = self.rows.iter().filter(|row| row.is_in).collect();
+        let left = |row: &Row<'_>| row.claim.left_s.filter(|_| row.claim.runs).unwrap_or(f64::INFINITY);
+        running.sort_by(|a, b| left(a).total_cmp(&left(b)));
+        let mut free = self.workers.len() - self.pinned();
+        for row in running {
+            free += row.floor();
+            if free >= needs {
+                return (left(row), free - needs);
+            }
+        }
+        (f64::INFINITY, 0)
+    }
+
+    /// Says which part of the speeds each job has that is in.
+    fn share(&mut self) {
+        let n = self.workers.len().max(1) as f64;
+        let total: f64 = (0..self.workers.len()).map(|worker| self.speed(worker)).sum();
+        let threads: u32 = self.workers.iter().map(|worker| worker.threads.max(1)).sum();
+        let (of_worker, of_thread) = (total / n, total / f64::from(threads.max(1)));
+        let inside: Vec<usize> = (0..self.rows.len()).filter(|&row| self.rows[row].is_in).collect();
+        let wants = inside.iter().map(|&row| {
+            let Row { claim, needs, .. } = &self.rows[row];
+            let used_well = claim.elements.div_ceil(USED_WELL).max(1) as f64 * of_thread;
+            let least = *needs as f64 * of_worker;
+            let most = used_well.max(least).min(claim.workers[1] as f64 * of_worker);
+            parts::Want { priority: claim.priority, owner: claim.owner, least, most }
+        });
+        let wants: Vec<parts::Want<'_>> = wants.collect();
+        for (row, part) in inside.into_iter().zip(parts::of(&wants, total)) {
+            self.rows[row].part = part;
+        }
+    }
+
+    /// Gives jobs that are in and have no workers what is idle, and calls what they lack.
+    fn start(&mut self) {
+        for row in 0..self.rows.len() {
+            let claim = self.rows[row].claim;
+            // One that runs has lost its workers.
+            if !self.rows[row].is_in || (claim.runs && self.rows[row].n() > 0) {
+                continue;
+            }
+            if self.rows[row].given.is_empty() {
+                let coming: f64 = self.rows[row].coming.iter().map(|&worker| self.speed(worker)).sum();
+                self.rows[row].given = self.pick(row, self.rows[row].part - coming);
+            }
+            let given = self.rows[row].given.clone();
+            let enough = given.len() >= self.rows[row].needs;
+            if enough && self.shortage(claim, given.iter().copied()).is_none() {
+                continue;
+            }
+            self.call(row);
+        }
+    }
+
+    /// Takes idle workers for a job: those that fit into `part`, the fastest first, then as many as it needs.
+    fn pick(&mut self, row: usize, part: f64) -> Vec<usize> {
+        let Row { claim, needs, .. } = &self.rows[row];
+        let (claim, needs, most) = (*claim, *needs, claim.workers[1]);
+        let is_its = |worker: usize| {
+            claim
+                .before
+                .is_some_and(|names| names.iter().any(|name| name == self.workers[worker].bearer.name))
+        };
+        let mut left = self.idle.clone();
+        left.sort_by_key(|&worker| !is_its(worker));
+        let (mut picked, mut speed) = (Vec::new(), 0.0);
+        left.retain(|&worker| {
+            let fits = picked.len() < most && speed + self.speed(worker) <= SLACK * part;
+            if fits {
+                picked.push(worker);
+                speed += self.speed(worker);
+            }
+            !fits
+        });
+        let lacks =
+            |picked: &[usize]| picked.len() < needs || self.shortage(claim, picked.iter().copied()).is_some();
+        while lacks(&picked) && picked.len() < most {
+            let Some(slowest) = left.pop() else { break };
+            picked.push(slowest);
+        }
+        self.idle.retain(|worker| !picked.contains(worker));
+        picked
+    }
+
+    /// Puts down who starts, who joins, and what each of the others waits for.
+    fn tell(&mut self, returns: Option<u32>) {
+        let incarnations = |workers: &[usize]| -> Vec<u32> {
+            workers.iter().map(|&worker| self.workers[worker].incarnation).collect()
+        };
+        let idle = self.workers.iter().filter(|worker| worker.stands == Stands::Idle).count();
+        let soonest = self.rows.iter().filter(|row| row.claim.runs);
+        let soonest = soonest.filter_map(|row| row.claim.left_s.map(|left| (left, row.claim.job)));
+        let soonest = soonest.min_by(|a, b| a.0.total_cmp(&b.0));
+        let mut ahead = 0;
+        for row in &self.rows {
+            let claim = row.claim;
+            if claim.runs {
+                self.done
+                    .joins
+                    .extend(incarnations(&row.given).into_iter().map(|worker| (worker, claim.job)));
+                continue;
+            }
+            let lacks =
+                || row.given.len() < row.needs || self.shortage(claim, row.given.iter().copied()).is_some();
+            if row.is_in && !lacks() {
+                self.done.starts.push((claim.job, incarnations(&row.given)));
+                continue;
+            }
+            let words = match &row.waits {
+                Some(words) => words.clone(),
+                None if row.is_in => {
+                    let mut from: Vec<u32> =
+                        row.coming.iter().filter_map(|&worker| self.comes_from(worker)).collect();
+                    from.sort_unstable();
+                    from.dedup();
+                    match &from[..] {
+                        [] => ends(soonest),
+                        jobs => format!("workers of {} at the next plan boundary", named(jobs)),
+                    }
+                }
+                None => match self.done.reserved {
+                    Some((job, begins)) if job == claim.job => {
+                        let noun = if row.needs == 1 { "worker" } else { "workers" };
+                        let when = match begins.is_finite() {
+                            true => format!("expected to start in about {}", span(begins.max(1.0))),
+                            false => ends(soonest),
+                        };
+                        format!("{} {noun}, {idle} are idle; {when}", row.needs)
+                    }
+                    Some((job, _)) => format!("job {job}"),
+                    None => ends(soonest),
+                },
+            };
+            let words = match ahead {
+                0 => words,
+                _ if returns.is_some() || row.waits.is_some() => words,
+                1 => format!("{words}, then 1 job before it"),
+                ahead => format!("{words}, then {ahead} jobs before it"),
+            };
+            ahead += 1;
+            self.done.waits.push((claim.job, words));
+        }
+    }
+
+    /// The job that a worker leaves.
+    fn comes_from(&self, worker: usize) -> Option<u32> {
+        match self.workers[worker].stands {
+            Stands::Idle => None,
+            Stands::At(job) | Stands::Called { from: job, .. } => Some(job),
+        }
+    }
 }
 
-/// The job that is given a worker which has just come: of those that run the first; none without any.
-pub(super) fn for_newcomer(mut running: impl Iterator<Item = u32>) -> Option<u32> {
-    running.next()
+/// Those that run, then those that wait in the order in which they are to start: those that were interrupted, then by priority, then the
+/// jobs of owners in turn, then the first come.
+fn in_order<'a>(claims: &'a [Claim<'a>]) -> Vec<&'a Claim<'a>> {
+    let (mut order, mut waiting): (Vec<&Claim<'_>>, Vec<_>) = claims.iter().partition(|claim| claim.runs);
+    let mut of_owner: BTreeMap<&str, usize> = BTreeMap::new();
+    order.iter().for_each(|claim| *of_owner.entry(claim.owner).or_default() += 1);
+    let urgency = |claim: &Claim<'_>| (claim.before.is_none(), Reverse(claim.priority));
+    waiting.sort_by_key(|claim| (urgency(claim), claim.job));
+    let turn = |claim: &'a Claim<'a>| {
+        let turn = of_owner.entry(claim.owner).or_default();
+        *turn += 1;
+        (*turn, claim)
+    };
+    let mut turns: Vec<(usize, &Claim<'_>)> = waiting.into_iter().map(turn).collect();
+    turns.sort_by_key(|(turn, claim)| (urgency(claim), *turn, claim.job));
+    order.extend(turns.into_iter().map(|(_, claim)| claim));
+    order
 }
 
-#[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use protocol::{options::JobOptions, request::State};
-
-    use super::*;
-
-    fn job(min_workers: u32, before: Option<&[&str]>) -> Entry {
-        Entry {
-            id: 7,
-            name: "deck.toml".to_owned(),
-            text: Arc::new(String::new()),
-            options: JobOptions { min_workers, ..JobOptions::default() },
-            state: State::Queued,
-            folder: None,
-            before: before.map(|names| names.iter().map(|name| (*name).to_owned()).collect()),
-            deck_sum: String::new(),
-            starts: crate::queue::Starts::default(),
-            cancelled: false,
-            elements: 0,
-        }
+/// Which job ends first, and when.
+fn ends(soonest: Option<(f64, u32)>) -> String {
+    match soonest {
+        Some((left, job)) => format!("job {job} ends in about {}", span(left.max(1.0))),
+        None => "a job that ends".to_owned(),
     }
+}
 
-    fn named<'a>(names: &[&'a str]) -> Vec<Bearer<'a>> {
-        names.iter().map(|name| Bearer { name, speed: 1.0, memory: 0 }).collect()
-    }
-
-    fn waits_for(what: &str) -> Allotment {
-        Allotment::Wait(what.to_owned())
-    }
-
-    #[test]
-    fn a_job_starts_once_enough_workers_are_idle_and_no_other_runs() {
-        let (entry, late) = (job(2, None), Duration::from_secs(60));
-        assert_eq!(of(&entry, &[], &named(&["a"]), late, None), waits_for("2 workers, 1 are idle"));
-        assert_eq!(of(&entry, &[], &named(&["a", "b"]), Duration::ZERO, None), Allotment::Start);
-        assert_eq!(of(&entry, &[3], &named(&["a", "b"]), late, None), waits_for("job 3"));
-        assert_eq!(of(&job(0, None), &[], &[], late, None), waits_for("1 worker, 0 are idle"));
-    }
-
-    #[test]
-    fn an_interrupted_job_waits_for_its_workers_a_while_and_then_takes_any() {
-        let (entry, soon) = (job(5, Some(&["a", "b"])), Duration::from_secs(1));
-        assert_eq!(
-            of(&entry, &[], &named(&["a", "x"]), soon, None),
-            waits_for("its workers: 1 of 2 are back")
-        );
-        assert_eq!(of(&entry, &[], &named(&["b", "a"]), soon, None), Allotment::Start);
-        assert_eq!(of(&entry, &[], &named(&["x"]), RETURN_LIMIT, None), Allotment::Start);
-        assert_eq!(of(&entry, &[], &[], RETURN_LIMIT, None), waits_for("its workers: 0 of 2 are back"));
-    }
-
-    #[test]
-    fn a_job_that_wants_more_workers_than_there_are_lets_the_next_one_pass() {
-        let late = Duration::from_secs(60);
-        let of = |id, min_workers, before| Entry { id, ..job(min_workers, before) };
-        let (large, small, smaller) = (of(1, 2, None), of(2, 1, None), of(3, 1, None));
-        let waiting = [&large, &small, &smaller];
-        let said = |pairs: &[(u32, &str)]| pairs.iter().map(|&(id, what)| (id, what.to_owned())).collect();
-        assert_eq!(
-            among(&waiting, &[], &named(&["a"]), late, None),
-            Allotments { starts: Some(2), waits: said(&[(1, "2 workers, 1 are idle"), (3, "job 2")]) }
-        );
-        assert_eq!(
-            among(&waiting, &[], &named(&["a", "b"]), late, None).starts,
-            Some(1),
-            "it has its turn with two"
-        );
-        let huge = Entry { elements: 10_000_000, ..of(5, 1, None) };
-        let short = among(&[&huge, &small], &[], &named(&["a"]), late, Some(1_000_000_000));
-        assert_eq!(short.starts, Some(2));
-        assert!(short.waits[0].1.starts_with("memory: 11.1 GB on the master"), "{short:?}");
-        let little = Bearer { memory: 1_000_000_000, ..named(&["a"])[0] };
-        let short = among(&[&huge, &small], &[], &[little], late, None);
-        assert!(
-            short.starts == Some(2) && short.waits[0].1.starts_with("memory: 6.0 GB on worker a"),
-            "{short:?}"
-        );
-        assert_eq!(
-            among(&waiting, &[7], &[], late, None).waits,
-            said(&[(1, "job 7"), (2, "job 7, then 1 job before it"), (3, "job 7, then 2 jobs before it")]),
-        );
-        let interrupted = of(4, 1, Some(&["a", "b"]));
-        assert_eq!(
-            among(&[&interrupted, &small], &[], &named(&["a"]), Duration::ZERO, None),
-            Allotments { starts: None, waits: said(&[(4, "its workers: 1 of 2 are back"), (2, "job 4")]) },
-        );
-        assert_eq!(among(&[&interrupted, &small], &[], &named(&["a"]), late, None).starts, Some(4));
-        let huge = Entry { elements: 10_000_000, ..of(4, 1, Some(&["a"])) };
-        let short = among(&[&huge, &small], &[], &named(&["a"]), late, Some(1_000_000_000));
-        assert_eq!(short.starts, Some(2), "one that waits for memory blocks none");
-    }
-
-    #[test]
-    fn a_newcomer_is_given_to_a_job_that_runs() {
-        assert_eq!(for_newcomer([4, 9].into_iter()), Some(4));
-        assert_eq!(for_newcomer([].into_iter()), None);
-    }
+/// Jobs as a sentence names them.
+fn named(jobs: &[u32]) -> String {
+    let numbers: Vec<String> = jobs.iter().map(u32::to_string).collect();
+    let noun = if jobs.len() == 1 { "job" } else { "jobs" };
+    format!("{noun} {}", numbers.join(", "))
 }

@@ -26,6 +26,8 @@ fn queued(cancelled: bool) -> Record {
         starts: Starts::default(),
         cancelled,
         elements: 1,
+        cycles: 0,
+        owner: String::new(),
     }
 }
 

@@ -64,6 +64,7 @@ class Cluster:
         *,
         wait: bool = True,
         min_workers: int = 1,
+        max_workers: int | None = None,
         priority: int = 0,
         cycles: int | None = None,
         out: str | Path | None = None,
@@ -76,6 +77,7 @@ class Cluster:
             deck: a :class:`Deck` or the path of a deck; files that it names are sent along.
             wait: whether to wait for its end and give its :class:`Result`; else its :class:`Job` is given at once.
             min_workers: wait for at least so many workers.
+            max_workers: take at most so many.
             priority: jobs of a higher priority start first.
             cycles: stop after so many.
             out: folder for the results; by default `results/NAME` by the title, whose earlier results are replaced.
@@ -92,7 +94,8 @@ class Cluster:
         else:
             path = Path(deck)
         forecast = check(path)
-        arguments = ["submit", str(path), "--min-workers", str(min_workers), "--priority", str(priority)]
+        workers = f"{min_workers}..{max_workers or ''}"
+        arguments = ["submit", str(path), "--workers", workers, "--priority", str(priority)]
         arguments += [] if cycles is None else ["--cycles", str(cycles)]
         number = int(self._ask(*arguments)["job"])
         end = None if cycles is not None else forecast.end_time

@@ -1,0 +1,218 @@
+use super::*;
+
+const LATE: Duration = Duration::from_secs(60);
+
+/// A job of so many elements that waits.
+fn job(job: u32, elements: u64) -> Claim<'static> {
+    let workers = [1, usize::MAX];
+    Claim { job, elements, workers, priority: 0, owner: "", runs: false, left_s: None, before: None }
+}
+
+/// One that runs, with so many seconds left.
+fn running(number: u32, elements: u64, left_s: f64) -> Claim<'static> {
+    Claim { runs: true, left_s: Some(left_s), ..job(number, elements) }
+}
+
+const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "f", "g", "h"];
+
+/// Workers 1, 2, ... named a, b, ..., each with one thread.
+fn workers(speeds: &[f64], stands: &[Stands]) -> Vec<Worker<'static>> {
+    let of = |i: usize| Worker {
+        incarnation: i as u32 + 1,
+        bearer: Bearer { name: NAMES[i], speed: speeds[i], memory: 0 },
+        threads: 1,
+        stands: stands.get(i).copied().unwrap_or(Stands::Idle),
+    };
+    (0..speeds.len()).map(of).collect()
+}
+
+fn arranged(claims: &[Claim<'_>], workers: &[Worker<'_>]) -> Arrangement {
+    arrange(claims, workers, LATE, None)
+}
+
+fn said(pairs: &[(u32, &str)]) -> Vec<(u32, String)> {
+    pairs.iter().map(|&(job, words)| (job, words.to_owned())).collect()
+}
+
+#[test]
+fn a_job_that_is_alone_has_all_workers_that_make_it_faster() {
+    let four = workers(&[1.0, 2.0, 1.0, 4.0], &[]);
+    assert_eq!(arranged(&[job(1, 1_501)], &four).starts, [(1, vec![2, 4, 1, 3])]);
+    assert_eq!(
+        arranged(&[job(1, 27)], &four).starts,
+        [(1, vec![2])],
+        "one that fits its part, the mean of a thread"
+    );
+    let grown = workers(&[1.0; 4], &[Stands::At(1), Stands::At(1)]);
+    assert_eq!(arranged(&[running(1, 1_501, 60.0)], &grown).joins, [(3, 1), (4, 1)]);
+    assert_eq!(arranged(&[], &four), Arrangement::default());
+    let soon = arranged(&[running(1, 1_501, 0.3)], &grown).joins;
+    assert!(soon.is_empty(), "nobody joins a job that is about to end: {soon:?}");
+}
+
+#[test]
+fn a_job_moves_from_a_slow_worker_to_a_faster_one_that_is_idle() {
+    let two = workers(&[1.0, 2.0, 1.2], &[Stands::At(1)]);
+    let moved = arranged(&[running(1, 400, 60.0)], &two);
+    assert_eq!((moved.joins, moved.calls), (vec![(2, 1)], vec![Call { worker: 1, from: 1, to: None }]));
+    let stands = [Stands::Called { from: 1, to: None }, Stands::At(1)];
+    let after = arranged(&[running(1, 400, 60.0)], &workers(&[1.0, 2.0, 1.2], &stands));
+    assert_eq!(after, Arrangement::default(), "once");
+    assert_eq!(arranged(&[running(1, 400, 0.3)], &two), Arrangement::default(), "not shortly before its end");
+}
+
+#[test]
+fn jobs_share_by_what_they_can_use_and_then_equally() {
+    let five = workers(&[1.0; 5], &[]);
+    let both = arranged(&[job(1, 1_000_000), job(2, 1_000)], &five);
+    assert_eq!(both.starts, [(1, vec![1, 2, 3, 4]), (2, vec![5])]);
+    let both = arranged(&[job(1, 1_000_000), job(2, 1_000_000)], &five);
+    let counts: Vec<usize> = both.starts.iter().map(|(_, workers)| workers.len()).collect();
+    assert_eq!(counts, [3, 2], "none is left over: {both:?}");
+    let small = arranged(&[job(1, 500), job(2, 1_000)], &five);
+    assert_eq!(small.starts, [(1, vec![1]), (2, vec![2, 3])], "what neither can use stays idle");
+    let most = Claim { workers: [1, 2], ..job(1, 1_000_000) };
+    assert_eq!(arranged(&[most], &five).starts, [(1, vec![1, 2])]);
+}
+
+#[test]
+fn one_that_comes_later_calls_workers_of_the_one_that_has_more_than_its_part() {
+    let at_one = workers(&[1.0; 4], &[Stands::At(1); 4]);
+    let claims = [running(1, 1_000_000, 600.0), job(2, 1_000_000)];
+    let first = arranged(&claims, &at_one);
+    let calls: Vec<(u32, Option<u32>)> = first.calls.iter().map(|call| (call.from, call.to)).collect();
+    assert_eq!(calls, [(1, Some(2)), (1, Some(2))]);
+    assert_eq!(first.waits, said(&[(2, "workers of job 1 at the next plan boundary")]));
+    // Asked again before the boundary it calls no more, and starts with the first that comes.
+    let mut stands = [Stands::At(1); 4];
+    for call in &first.calls {
+        stands[call.worker as usize - 1] = Stands::Called { from: 1, to: Some(2) };
+    }
+    let called = workers(&[1.0; 4], &stands);
+    assert!(arranged(&claims, &called).calls.is_empty());
+    let free = first.calls[0].worker;
+    stands[free as usize - 1] = Stands::Idle;
+    let freed = arranged(&claims, &workers(&[1.0; 4], &stands));
+    assert_eq!(freed.starts, [(2, vec![free])]);
+    assert!(freed.joins.is_empty(), "it does not go back: {freed:?}");
+}
+
+#[test]
+fn a_small_job_calls_the_worker_that_fits_it_and_none_of_a_job_that_ends_soon() {
+    let stands = [Stands::At(1); 3];
+    let unequal = workers(&[4.0, 2.0, 0.5], &stands);
+    let claims = [running(1, 1_000_000, 600.0), job(2, 500)];
+    let calls = arranged(&claims, &unequal).calls;
+    assert_eq!(calls, [Call { worker: 2, from: 1, to: Some(2) }], "its part is the mean of a thread, 2.2");
+    let ends = arranged(&[running(1, 1_000_000, 1.5), job(2, 500)], &unequal);
+    assert!(ends.calls.is_empty());
+    assert_eq!(ends.waits, said(&[(2, "job 1 ends in about 2 s")]));
+}
+
+#[test]
+fn a_job_that_wants_more_workers_than_there_are_lets_the_next_ones_pass() {
+    let large = Claim { workers: [3, usize::MAX], ..job(1, 1_000_000) };
+    let two = workers(&[1.0; 2], &[]);
+    let passed = arranged(&[large.clone(), job(2, 100), job(3, 100)], &two);
+    assert_eq!(passed.starts, [(2, vec![1]), (3, vec![2])]);
+    assert_eq!(passed.waits, said(&[(1, "3 workers, 2 are idle")]));
+    assert_eq!(arranged(&[job(1, 10)], &[]).waits, said(&[(1, "1 worker, 0 are idle")]));
+    let alone = arranged(&[large, running(2, 10_000, 60.0)], &workers(&[1.0; 2], &[Stands::At(2)]));
+    assert_eq!(alone.joins, [(2, 2)], "who can never start has no part");
+}
+
+#[test]
+fn a_large_job_has_a_reservation_that_only_shorter_jobs_may_use() {
+    // Six workers; four jobs on one each; a large job needs four.
+    let stands: Vec<Stands> = (1..=4).map(Stands::At).collect();
+    let six = workers(&[1.0; 6], &stands);
+    let ran: Vec<Claim<'_>> = (1..=4).map(|i| running(i, 1_000, 100.0 * f64::from(i))).collect();
+    let large = Claim { workers: [4, usize::MAX], ..job(5, 1_000_000) };
+    let with = |later: &[Claim<'static>]| {
+        let mut claims = ran.clone();
+        claims.push(large.clone());
+        claims.extend(later.iter().cloned());
+        arranged(&claims, &six)
+    };
+    // Two jobs must end: the large one begins after 200 s, with none left over.
+    let long = Claim { left_s: Some(300.0), ..job(6, 1_000) };
+    let told = with(std::slice::from_ref(&long));
+    assert!(told.starts.is_empty(), "{told:?}");
+    assert_eq!(told.waits[0].1, "4 workers, 2 are idle; expected to start in about 3 min");
+    assert_eq!(told.waits[1].1, "job 5, then 1 job before it");
+    let short = Claim { left_s: Some(150.0), ..job(6, 1_000) };
+    assert_eq!(with(&[short]).starts, [(6, vec![5])]);
+    let unknown = Claim { left_s: None, ..long.clone() };
+    assert!(with(&[unknown]).starts.is_empty(), "nobody knows how long it takes");
+    // After 200 s one is left over for a job that takes longer.
+    let less = Claim { workers: [3, usize::MAX], ..large.clone() };
+    let claims: Vec<Claim<'_>> =
+        ran.iter().cloned().chain([less, long.clone(), Claim { job: 7, ..long }]).collect();
+    let beside = arranged(&claims, &six);
+    assert!(beside.starts.is_empty(), "three are free after 100 s, none left over: {beside:?}");
+}
+
+#[test]
+fn an_interrupted_job_waits_for_its_workers_a_while_and_then_takes_any() {
+    let names = ["a".to_owned(), "b".to_owned()];
+    let interrupted = Claim { before: Some(&names), workers: [5, usize::MAX], ..job(4, 100) };
+    let soon = Duration::from_secs(1);
+    let at = |n: usize, since| {
+        arrange(&[interrupted.clone(), job(5, 10)], &workers(&[1.0; 3][..n], &[]), since, None)
+    };
+    let early = at(1, soon);
+    assert_eq!(early.waits, said(&[(4, "its workers: 1 of 2 are back"), (5, "job 4")]));
+    assert!(early.starts.is_empty());
+    assert_eq!(at(2, soon).starts, [(4, vec![1, 2])]);
+    let late = at(1, LATE);
+    assert_eq!(late.starts, [(4, vec![1])], "any will do: {late:?}");
+    assert_eq!(at(0, LATE).waits[0].1, "its workers: 0 of 2 are back");
+    // Two that were interrupted have each its own.
+    let other_names = ["c".to_owned()];
+    let other = Claim { before: Some(&other_names), ..job(6, 100) };
+    let both = arrange(&[other, interrupted.clone()], &workers(&[1.0; 3], &[]), soon, None);
+    assert_eq!(both.starts, [(4, vec![1, 2]), (6, vec![3])]);
+}
+
+#[test]
+fn memory_counts_on_the_master_and_on_each_worker() {
+    let short = arrange(&[job(1, 10_000_000), job(2, 10)], &workers(&[1.0], &[]), LATE, Some(1_000_000_000));
+    assert_eq!(short.starts, [(2, vec![1])], "one that waits for memory blocks none");
+    assert!(short.waits[0].1.starts_with("memory: 11.1 GB on the master"), "{short:?}");
+    // 4,000,000 elements take 2.4 GB of one worker, 1.2 of each of two.
+    let mut small = workers(&[1.0; 3], &[]);
+    small.iter_mut().for_each(|worker| worker.bearer.memory = 1_300_000_000);
+    assert_eq!(arranged(&[job(1, 4_000_000)], &small[..2]).starts.len(), 1);
+    let alone = arranged(&[job(1, 4_000_000)], &small[..1]);
+    assert!(alone.waits[0].1.starts_with("memory: 2.4 GB on worker a"), "{alone:?}");
+    // A running job gives up no worker that it needs for its memory.
+    small[0].stands = Stands::At(1);
+    small[1].stands = Stands::At(1);
+    small[2].stands = Stands::At(3);
+    let pinned = arranged(&[running(1, 4_000_000, 100.0), running(3, 10, 50.0), job(2, 10)], &small);
+    assert!(pinned.calls.is_empty() && pinned.starts.is_empty(), "{pinned:?}");
+}
+
+#[test]
+fn owners_take_turns_and_a_higher_priority_goes_first() {
+    let of = |number, owner| Claim { owner, ..job(number, 1_000) };
+    let claims = [of(1, "anna"), of(2, "anna"), of(3, "anna"), of(4, "ben")];
+    let two = arranged(&claims, &workers(&[1.0; 2], &[]));
+    assert_eq!(two.starts, [(1, vec![1]), (4, vec![2])]);
+    let urgent = Claim { priority: 3, ..of(9, "anna") };
+    let claims = [of(1, "ben"), urgent.clone()];
+    assert_eq!(arranged(&claims, &workers(&[1.0], &[])).starts, [(9, vec![1])]);
+    // It calls from a job of lower priority all but the one that this needs; not the other way round.
+    let three = workers(&[1.0; 3], &[Stands::At(1); 3]);
+    let wide = Claim { workers: [2, usize::MAX], elements: 1_000_000, ..urgent };
+    let called = arranged(&[running(1, 1_000_000, 100.0), wide], &three);
+    assert_eq!(called.calls.len(), 2, "{called:?}");
+}
+
+#[test]
+fn a_job_that_lost_its_workers_is_given_the_first_that_is_idle() {
+    let three = workers(&[1.0; 3], &[Stands::At(1), Stands::At(1), Stands::Idle]);
+    let claims = [running(1, 1_000_000, 100.0), running(2, 500, 100.0), job(3, 500)];
+    let told = arranged(&claims, &three);
+    assert_eq!(told.joins, [(3, 2)], "{told:?}");
+}
