@@ -275,8 +275,8 @@ pub struct RunArgs {
 pub struct SimulateArgs {
     /// The deck (TOML)
     #[arg(
-        required_unless_present_any = ["table", "decomposition"],
-        conflicts_with_all = ["table", "decomposition"]
+        required_unless_present_any = ["table", "decomposition", "queue"],
+        conflicts_with_all = ["table", "decomposition", "queue"]
     )]
     pub deck: Option<PathBuf>,
     /// The cluster file (TOML)
@@ -297,7 +297,10 @@ pub struct SimulateArgs {
     /// Print how near hosts of random speeds come to their bound, contact included, instead of one run
     #[arg(long, conflicts_with = "table")]
     pub decomposition: bool,
-    /// How many sets of random speeds
+    /// Print what the queue makes of mixes of many jobs on these hosts, instead of one run
+    #[arg(long, conflicts_with_all = ["table", "decomposition", "measure_costs"])]
+    pub queue: bool,
+    /// How many sets of random speeds, or mixes of jobs
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
     /// Use only so many hosts, the first of the file

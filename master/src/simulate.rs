@@ -3,7 +3,7 @@
 //! [`cluster`] reads the cluster file. [`virtual_clock`] drives the real sessions on emulated hosts ([`machines`],
 //! [`processor`]) and wires ([`network`]); [`timeline`] says what came of it. [`tape`] lets a run be driven again under other costs without computing. [`calibrate`] turns the
 //! seconds of a cluster file into costs of work. [`table`] prints the tables of the paper ([`mod@paper`]) beside
-//! modelled ones, [`figure`] draws them. All figures are modelled, and say so.
+//! modelled ones, [`figure`] draws them. [`queue`] plays many jobs at once. All figures are modelled, and say so.
 
 use std::{path::Path, process::ExitCode, sync::Arc};
 
@@ -21,6 +21,7 @@ pub mod mixed;
 pub mod network;
 pub mod paper;
 pub mod processor;
+pub mod queue;
 pub mod sweep;
 pub mod table;
 pub mod tape;
@@ -46,6 +47,7 @@ pub fn run(args: &SimulateArgs) -> Result<ExitCode, String> {
     let cluster = cluster::read_file(&args.cluster)?;
     match &args.deck {
         None if args.decomposition => decomposition(args, &cluster),
+        None if args.queue => queued(args, &first_hosts(args, cluster)?),
         Some(deck) if args.measure_costs => measured(args, &cluster, deck),
         Some(deck) => one(args, &first_hosts(args, cluster)?, deck),
         None => tables(args, &cluster),
@@ -85,6 +87,15 @@ fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, Str
         return print_rows(&rows);
     }
     print!("{}", mixed::print(&rows, cluster.pair));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn queued(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
+    let rows = queue::run(cluster, args.seeds)?;
+    if args.json {
+        return print_rows(&rows);
+    }
+    print!("{}", queue::print(&cluster.title, &rows));
     Ok(ExitCode::SUCCESS)
 }
 
