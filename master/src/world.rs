@@ -129,6 +129,9 @@ pub trait Surroundings {
     /// The master has no more to do with a host.
     fn dismiss(&mut self, host: usize);
 
+    /// The job has released a host for another job.
+    fn freed(&mut self, _host: usize) {}
+
     /// A host drops what it computes on.
     fn forget(&mut self, host: usize);
 
@@ -288,8 +291,7 @@ impl<S: Surroundings> World<S> {
                         self.surroundings.dismiss(host);
                     }
                 }
-                // Hosts of a world have no other job to go to.
-                Action::Freed(_) => {}
+                Action::Freed(member) => self.surroundings.freed(self.sessions.members[member]),
                 Action::Over(outcome) => self.outcome = Some(*outcome),
                 other => self.surroundings.take(other)?,
             }

@@ -2,7 +2,7 @@
 //!
 //! Real sessions, real computation, packed messages, in a [`World`]; time, links, crashes and the disk are of this file. Frames of cycles
 //! overtake long control messages, links delay each message by what they like, hosts are slow, crash and come back, pairs
-//! of workers lose their links, masters restart from the last snapshot or leave and are followed by another, processors err
+//! of workers lose their links, other jobs borrow workers, masters restart from the last snapshot or leave and are followed by another, processors err
 //! by one unit in the last place, bits flip in memory ([`flips`]), in stored files and in frames, tasks never end, clocks jump, the
 //! [`disk`] is full or loses power, descriptors run out, and machines have no [`memory`] for what is dealt to them.
 //! Whatever happens, the run must come to its end with the rows, energies and digest of the undisturbed one. A seed that
@@ -96,6 +96,8 @@ enum What {
     Missed(usize, &'static str),
     /// A process starts.
     Comes,
+    /// A host that the job released for another one is given to it again.
+    Returns(usize),
     MasterReturns,
 }
 
@@ -188,6 +190,8 @@ struct Weather {
     starved: u64,
     /// Bits that have flipped, by host.
     flipped: Vec<(usize, Target)>,
+    /// Workers that went to other jobs.
+    lent: u64,
 }
 
 impl Weather {
@@ -274,6 +278,12 @@ impl Surroundings for Weather {
         self.hosts[host].alive = false;
     }
 
+    fn freed(&mut self, host: usize) {
+        self.lent += 1;
+        let back = self.now + 20 * self.draws.delay();
+        self.put(back, What::Returns(host));
+    }
+
     fn forget(&mut self, host: usize) {
         self.hosts[host].machine.forget();
     }
@@ -304,6 +314,8 @@ pub struct Played {
     pub count: u64,
     /// Bits that flipped: in whose memory, and what.
     pub flipped: Vec<(usize, Target)>,
+    /// How often the job released a worker for another one.
+    pub lent: u64,
 }
 
 /// Plays a problem to its end through a plot; `seed` draws all delays.
@@ -323,6 +335,7 @@ pub fn play(model: &Arc<Model>, options: &SessionOptions, seed: u64, plot: Plot)
         small: None,
         starved: 0,
         flipped: Vec::new(),
+        lent: 0,
     };
     let mut play = Play {
         world: World::new(0, weather),
@@ -395,9 +408,9 @@ impl Play {
             return Err(failure);
         }
         let state = outcome.state.clone().ok_or("a run without a final state")?;
-        let Weather { disk: Disk { rows, states, .. }, flipped, .. } = self.world.surroundings;
+        let Weather { disk: Disk { rows, states, .. }, flipped, lent, .. } = self.world.surroundings;
         let solved = Solved { model: self.model, state, rows, states, snapshot: None, outcome };
-        Ok(Played { solved, count: self.count, flipped })
+        Ok(Played { solved, count: self.count, flipped, lent })
     }
 
     /// A job that has ended ends the play, unless its process only leaves.
@@ -446,6 +459,12 @@ impl Play {
                     if !self.lacks_memory(None, Some(host)) {
                         self.world.join(host, spec(host))?;
                     }
+                }
+            }
+            What::Returns(host) => {
+                let goes_on = self.world.sessions.job.as_ref().is_some_and(|job| !job.is_over());
+                if goes_on && self.world.surroundings.is_alive(host) {
+                    self.world.join(host, spec(host))?;
                 }
             }
             What::MasterReturns if self.world.sessions.job.is_none() => {

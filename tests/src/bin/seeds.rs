@@ -36,12 +36,13 @@ fn main() -> ExitCode {
     pool.install(|| {
         let started = Instant::now();
         let stage = Stage::new();
-        let (mut wrong, mut happened, mut lost) = (0_u64, 0, 0);
+        let (mut wrong, mut happened, mut lost, mut lent) = (0_u64, 0, 0, 0);
         for seed in first..first + count {
             match stage.play(seed, bug) {
                 Ok(played) => {
                     happened += played.count;
                     lost += played.solved.outcome.losses.len();
+                    lent += played.lent;
                 }
                 Err(why) => {
                     wrong += 1;
@@ -50,7 +51,7 @@ fn main() -> ExitCode {
             }
         }
         println!(
-            "{count} seeds from {first}: {wrong} wrong; {happened} happenings, {lost} losses in the last lives of masters, {:.1} s",
+            "{count} seeds from {first}: {wrong} wrong; {happened} happenings, {lost} losses in the last lives of masters, {lent} workers lent to other jobs, {:.1} s",
             started.elapsed().as_secs_f64()
         );
         // A planted bug that nobody finds is the failure.

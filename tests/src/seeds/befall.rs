@@ -113,6 +113,11 @@ impl Play {
                     weather.put(at, what);
                 }
             }
+            Fault::Yield { host } => {
+                if let Some(member) = pick(host).and_then(|host| sessions.hosts[host].member) {
+                    self.world.apply(Event::Yield(member))?;
+                }
+            }
             Fault::Join => weather.put(now, What::Comes),
             Fault::Master => self.without_master(),
             Fault::Leave => self.world.apply(Event::Suspend)?,

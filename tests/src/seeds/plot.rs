@@ -64,6 +64,8 @@ pub enum Fault {
     Clock { ahead: bool },
     /// A worker comes.
     Join,
+    /// Another job needs a host for a while.
+    Yield { host: u64 },
     /// The master is gone, and starts anew from the disk.
     Master,
     /// The master is told to leave: it stores the run, and another one goes on with it.
@@ -256,7 +258,8 @@ impl Stage {
                     9 | 10 => Fault::PairCut { host, other },
                     11 => Fault::Slow { host, factor: 2 + draws.below(30) },
                     12 => Fault::Spoil { host },
-                    13 | 14 => Fault::Join,
+                    13 => Fault::Join,
+                    14 => Fault::Yield { host },
                     15 | 16 => Fault::Flip(Flip::draw(&mut draws)),
                     17 if host < 32 => Fault::Master,
                     17 => Fault::Leave,
