@@ -62,7 +62,7 @@ root=$work/$name
 mkdir -p "$root/completions"
 install -m 755 "$shipped" "$root/bolide"
 strip --strip-unneeded --remove-section=.comment "$root/bolide"
-cp README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$root/"
+cp README.md CHANGELOG.md CITATION.cff LICENSE-MIT LICENSE-APACHE "$root/"
 cp -r "$work/book/html" "$root/book"
 cp -r deck/examples "$root/examples"
 cp -r deck/studies "$root/studies"

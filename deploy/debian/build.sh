@@ -44,7 +44,7 @@ echo /etc/default/bolide >"$root/DEBIAN/conffiles"
 cp -r deck/examples "$doc/examples/decks"
 cp -r deploy/clusters deploy/hosts deploy/kubernetes deploy/slurm "$doc/examples/"
 cp deck/README.md "$doc/decks.md"
-cp README.md "$doc/"
+cp README.md CITATION.cff "$doc/"
 gzip -9n <CHANGELOG.md >"$doc/changelog.gz"
 {
     echo "Bolide is licensed under MIT or Apache-2.0, as you like."

@@ -188,6 +188,12 @@ fn the_overviews_stay_short() {
     }
 }
 
+#[test]
+fn the_citation_is_of_this_version() {
+    let citation = fs::read_to_string(repository("CITATION.cff")).expect("the citation is in the repository");
+    assert!(citation.contains(&format!("\nversion: {}\n", env!("CARGO_PKG_VERSION"))), "{citation}");
+}
+
 /// The last two cells of the row of a Markdown table that begins with this one.
 fn last_cells(text: &str, first: &str) -> [String; 2] {
     let head = format!("| {first} |");
