@@ -27,6 +27,32 @@ fn set(browser: &mut Browser, id: &str, value: &str) {
     ));
 }
 
+/// A number that a canvas tells about what it shows.
+fn shown(browser: &mut Browser, id: &str, what: &str) -> f64 {
+    browser
+        .evaluate(&format!("Number(document.getElementById('{id}').dataset.{what})"))
+        .as_f64()
+        .expect("a number")
+}
+
+/// Gives a canvas the focus and presses a key.
+fn press(browser: &mut Browser, id: &str, key: &str) {
+    browser.evaluate(&format!("document.getElementById('{id}').focus()"));
+    for kind in ["keyDown", "keyUp"] {
+        browser.call("Input.dispatchKeyEvent", serde_json::json!({ "type": kind, "key": key, "code": key }));
+    }
+}
+
+/// The share of a canvas that bodies cover: what has another colour than its corner.
+fn covered(id: &str) -> String {
+    format!(
+        "(() => {{ const c = document.getElementById('{id}'), d = document.createElement('canvas'); \
+         d.width = c.width; d.height = c.height; const t = d.getContext('2d'); t.drawImage(c, 0, 0); \
+         const p = new Uint32Array(t.getImageData(0, 0, d.width, d.height).data.buffer); \
+         return p.reduce((n, one) => n + (one !== p[0]), 0) / p.length }})()"
+    )
+}
+
 /// What a drop of files does, by their names and texts.
 fn drop_files(files: &[(&str, &str)]) -> String {
     let files = serde_json::json!(files);
@@ -123,14 +149,9 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
 
     // The model is drawn, and turns by the keyboard.
     browser.wait_for("document.getElementById('bodies').dataset.cycle === '40'");
-    let around = browser.evaluate("document.getElementById('bodies').dataset.around");
-    browser.evaluate("document.getElementById('bodies').focus()");
-    for kind in ["keyDown", "keyUp"] {
-        let key = serde_json::json!({ "type": kind, "key": "ArrowRight", "code": "ArrowRight" });
-        browser.call("Input.dispatchKeyEvent", key);
-    }
-    let turned = browser.evaluate("document.getElementById('bodies').dataset.around");
-    assert_ne!(turned, around, "an arrow key turns");
+    let around = shown(&mut browser, "bodies", "around");
+    press(&mut browser, "bodies", "ArrowRight");
+    assert_ne!(shown(&mut browser, "bodies", "around"), around, "an arrow key turns");
     let colours = "(() => { const c = document.getElementById('bodies'), d = document.createElement('canvas'); \
          d.width = c.width; d.height = c.height; const t = d.getContext('2d'); t.drawImage(c, 0, 0); \
          return new Set(new Uint32Array(t.getImageData(0, 0, d.width, d.height).data.buffer)).size })()";
@@ -228,6 +249,8 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     );
     browser.wait_for("document.getElementById('measured').innerText.includes('differs')");
     browser.wait_for("document.getElementById('history-legend').innerText.includes('job 1')");
+    // Runs of one size have one scale.
+    assert_eq!(shown(&mut browser, "bodies", "radius"), shown(&mut browser, "other", "radius"));
 
     // The keyword deck with its mesh is one problem, and has the digest of its files.
     browser.evaluate(&drop_files(&[("block-on-plate-mesh.k", &mesh), ("block-on-plate.k", &block)]));
@@ -286,6 +309,19 @@ fn a_report_shows_results_without_a_master_mirrored_and_beside_each_other() {
     set(&mut browser, "beside", "1");
     browser.wait_for("document.getElementById('measured').innerText.includes('differs')");
     browser.wait_for("Number(document.getElementById('other').dataset.faces) > 100");
+    // The bar is longer than twice the quarter: each fills its picture, which the page says, and both turn together.
+    let radii = ["bodies", "other"].map(|id| shown(&mut browser, id, "radius"));
+    assert!(2.0 * radii[0] < radii[1], "{radii:?}");
+    assert_eq!(browser.evaluate("document.getElementById('scales').hidden"), false);
+    // The quarter would cover 0.03 of its picture in the frame of the bar, which is slender itself.
+    for (id, least) in [("bodies", 0.05), ("other", 0.04)] {
+        let covered = browser.evaluate(&covered(id)).as_f64().expect("a number");
+        assert!(covered > least, "{id} covers {covered} of its picture");
+    }
+    let before = shown(&mut browser, "other", "around");
+    press(&mut browser, "bodies", "ArrowRight");
+    assert_ne!(shown(&mut browser, "other", "around"), before);
+    assert_eq!(shown(&mut browser, "other", "around"), shown(&mut browser, "bodies", "around"));
     let refused = browser.evaluate(
         "fetch('../api/jobs?name=x.toml', { method: 'POST', body: '[control]' }).then(answer => answer.status)",
     );

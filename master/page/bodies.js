@@ -58,10 +58,11 @@ export function box(surface, mirrors) {
 
 /// A canvas with bodies on it.
 export class Bodies {
-  /// `camera` may be that of other canvases; `changed` is called when the user turns it.
+  /// `camera` may be that of other canvases, `frame` (see camera.js) is its own; `changed` is called when the user turns it.
   constructor(canvas, camera, changed) {
     this.canvas = canvas;
     this.camera = camera;
+    this.frame = null;
     this.changed = changed;
     this.edges = true;
     this.mirrors = [false, false, false];
@@ -142,7 +143,7 @@ export class Bodies {
   }
 
   draw() {
-    if (!this.gl || !this.surface || !this.camera.centre) return;
+    if (!this.gl || !this.surface || !this.frame) return;
     const { gl, canvas, camera } = this, ratio = devicePixelRatio || 1;
     const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
     if (!width || !height) return;
@@ -151,7 +152,7 @@ export class Bodies {
     const back = getComputedStyle(canvas).backgroundColor.match(/[\d.]+/g).map(Number);
     gl.clearColor(back[0] / 255, back[1] / 255, back[2] / 255, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const { matrix, light } = camera.look(width / height);
+    const { matrix, light } = camera.look(width / height, this.frame);
     gl.useProgram(this.program);
     gl.uniformMatrix4fv(this.at.view, false, matrix);
     gl.uniform3fv(this.at.eye, light);
@@ -170,6 +171,7 @@ export class Bodies {
       gl.drawArrays(gl.TRIANGLES, 0, 6 * this.surface.faces);
     }
     canvas.dataset.around = camera.around.toFixed(3);
+    canvas.dataset.radius = this.frame.radius;
     canvas.dataset.cycle = this.surface.cycle;
     canvas.dataset.faces = this.surface.faces;
     canvas.dataset.images = images.length;

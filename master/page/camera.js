@@ -1,4 +1,5 @@
-// From where the bodies are seen: two angles, a zoom and a shift, and the matrix of a parallel projection. z of the deck points up.
+// From where the bodies are seen: two angles, a zoom and a shift, which several pictures may share, and the matrix of a parallel projection
+// for a frame, which each picture may have for itself. z of the deck points up.
 
 function multiply(a, b) {
   const out = new Float32Array(16);
@@ -9,10 +10,24 @@ function multiply(a, b) {
 /// Seen from the front left and above.
 const START = { around: -0.7, up: 0.45 };
 
+/// How many times the smaller radius a common frame may have.
+const ALIKE = 2;
+
+/// The frame of a box (its least and greatest corner): centre and radius of what a picture takes in before it is zoomed.
+export function frame([low, high]) {
+  return { centre: low.map((l, k) => (l + high[k]) / 2), radius: Math.hypot(...low.map((l, k) => high[k] - l)) / 2 || 1 };
+}
+
+/// Frames of pictures that stand beside each other: one for all, so that they have one scale, unless a body would be small in it.
+export function frames(boxes) {
+  const own = boxes.map(frame);
+  const all = frame([0, 1].map(end => boxes[0][end].map((_, k) => (end ? Math.max : Math.min)(...boxes.map(box => box[end][k])))));
+  return all.radius <= ALIKE * Math.min(...own.map(one => one.radius)) ? own.map(() => all) : own;
+}
+
 export class Camera {
   constructor() {
     this.fit();
-    this.box = null;
   }
 
   fit() {
@@ -38,18 +53,12 @@ export class Camera {
     this.zoom = Math.min(50, Math.max(0.2, this.zoom * by));
   }
 
-  /// Takes in a box: its least and greatest corner.
-  take(low, high) {
-    this.centre = low.map((l, k) => (l + high[k]) / 2);
-    this.radius = Math.hypot(...low.map((l, k) => high[k] - l)) / 2 || 1;
-  }
-
-  /// The matrix for a picture of this width over height, and from where light falls.
-  look(aspect) {
+  /// The matrix for a picture of this width over height and this frame, and from where light falls.
+  look(aspect, { centre, radius: r }) {
     const [ca, sa, cu, su] = [Math.cos(this.around), Math.sin(this.around), Math.cos(this.up), Math.sin(this.up)];
     const right = [ca, -sa, 0], eye = [-sa * cu, -ca * cu, su];
     const up = [eye[1] * right[2] - eye[2] * right[1], eye[2] * right[0] - eye[0] * right[2], eye[0] * right[1] - eye[1] * right[0]];
-    const [x, y, z] = this.centre, r = this.radius;
+    const [x, y, z] = centre;
     const dot = a => -(a[0] * x + a[1] * y + a[2] * z);
     const turn = new Float32Array([right[0], up[0], eye[0], 0, right[1], up[1], eye[1], 0, right[2], up[2], eye[2], 0, dot(right), dot(up), dot(eye), 1]);
     const s = this.zoom / (r * 1.02);

@@ -2,7 +2,7 @@
 
 import { ask, json } from './ask.js';
 import { Bodies, box, unpack } from './bodies.js';
-import { Camera } from './camera.js';
+import { Camera, frame } from './camera.js';
 import * as files from './files.js';
 import * as lists from './lists.js';
 
@@ -85,7 +85,7 @@ async function drawn(elements) {
     const surface = unpack(await answer.arrayBuffer());
     if (mine !== deck) return;
     canvas.camera.fit();
-    canvas.camera.take(...box(surface, [false, false, false]));
+    canvas.frame = frame(box(surface, [false, false, false]));
     canvas.show(surface, -1, [0, 1]);
   } catch {
     // The deck has been looked at: without a picture it runs all the same.

@@ -2,7 +2,7 @@
 
 import { ask } from './ask.js';
 import { Bodies, box, unpack } from './bodies.js';
-import { Camera } from './camera.js';
+import { Camera, frames } from './camera.js';
 import { MAPS, PARTS, ramp } from './colours.js';
 import * as lists from './lists.js';
 
@@ -17,7 +17,8 @@ const canvases = [$('bodies'), $('other')].map(canvas => new Bodies(canvas, came
 /// What is shown: the chosen run and the one beside it, each `{ job, sheet, surface }`.
 let runs = [];
 let follow = true;
-let fitted = false;
+/// Which runs the frames of the canvases take in, by their numbers; none if they are to be fitted again.
+let fitted = '';
 /// Drawings that have been overtaken by later ones are dropped.
 let turn = 0;
 const surfaces = new Map();
@@ -28,7 +29,7 @@ const seen = new Map();
 export function open() {
   runs = [];
   follow = true;
-  fitted = false;
+  fitted = '';
   surfaces.clear();
   seen.clear();
   $('parts').replaceChildren($('parts').firstElementChild);
@@ -40,7 +41,7 @@ export function open() {
 export async function update(chosen, beside) {
   const first = !runs.length;
   runs = [chosen, beside].filter(Boolean).map(run => ({ ...run, surface: runs.find(old => old.job === run.job)?.surface }));
-  const { states, parts, mirrors } = chosen.sheet, slider = $('state');
+  const { states, parts } = chosen.sheet, slider = $('state');
   slider.max = String(Math.max(0, states.length - 1));
   slider.disabled = $('play').disabled = states.length < 2;
   if (follow) slider.value = slider.max;
@@ -54,8 +55,9 @@ export async function update(chosen, beside) {
     };
     $('parts').replaceChildren($('parts').firstElementChild, ...parts.map(box));
   }
-  if (first) $('mirror').checked = mirrors.some(Boolean);
-  $('mirror-box').hidden = !mirrors.some(Boolean);
+  const symmetric = runs.some(run => run.sheet.mirrors.some(Boolean));
+  if (first || $('mirror-box').hidden) $('mirror').checked = symmetric;
+  $('mirror-box').hidden = !symmetric;
   $('other').hidden = runs.length < 2;
   await draw();
 }
@@ -145,12 +147,11 @@ function paint() {
   }
   if ($('from').value !== '') range = [Number($('from').value), range[1]];
   if ($('to').value !== '') range = [range[0], Number($('to').value)];
-  const mirrors = $('mirror').checked ? runs[0].sheet.mirrors : [false, false, false];
-  if (!fitted) fit();
+  if (fitted !== shown.map(run => run.job).join()) fit();
   canvases.forEach((canvas, i) => {
     const run = runs[i];
     if (!run?.surface) return;
-    Object.assign(canvas, { mirrors, edges: $('edges').checked });
+    Object.assign(canvas, { mirrors: mirrorsOf(run), edges: $('edges').checked });
     if (canvas.map !== $('map').value) canvas.colours($('map').value);
     canvas.show(run.surface, index(run), range);
   });
@@ -162,12 +163,17 @@ function paint() {
   $('ramp').hidden = byPart;
 }
 
+/// The axes across which a run is shown mirrored: its own planes of symmetry.
+const mirrorsOf = run => run.sheet.mirrors.map(on => on && $('mirror').checked);
+
 /// Takes in what is shown.
 function fit() {
-  const surface = runs[0]?.surface;
-  if (!surface?.faces) return;
-  camera.take(...box(surface, $('mirror').checked ? runs[0].sheet.mirrors : [false, false, false]));
-  fitted = true;
+  const shown = runs.filter(run => run.surface), full = shown.filter(run => run.surface.faces);
+  if (!full.length) return;
+  const fits = frames(full.map(run => box(run.surface, mirrorsOf(run))));
+  runs.forEach((run, i) => { canvases[i].frame = fits[full.indexOf(run)] ?? canvases[i].frame; });
+  $('scales').hidden = fits.every(one => one === fits[0]);
+  fitted = shown.map(run => run.job).join();
 }
 
 function bar() {
@@ -189,7 +195,7 @@ function soon() {
 function cut() {
   if ($('cut').value) camera.face('xyz'.indexOf($('cut').value), beyond());
   // What is left fills the picture.
-  fitted = false;
+  fitted = '';
   draw();
 }
 
