@@ -18,7 +18,7 @@ pub struct PictureArgs {
     /// The PNG to write
     #[arg(long, value_name = "FILE", default_value = "picture.png")]
     pub out: PathBuf,
-    /// Write all states as an animation instead: .gif, or .apng, an animated PNG
+    /// Write all states as an animation instead: .gif, or .apng, an animated PNG, of which ffmpeg makes an .mp4
     #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "state", "time"])]
     pub movie: Option<PathBuf>,
     /// Pictures per second of the animation

@@ -33,10 +33,16 @@ impl Format {
         match ending.to_ascii_lowercase().as_str() {
             "png" | "apng" => Ok(Self::Apng),
             "gif" => Ok(Self::Gif),
-            other => Err(format!(
-                "--movie {}: {other:?} is no format of animations here; name a .gif or .apng, of which ffmpeg -i makes a video",
-                path.display()
-            )),
+            other => {
+                let [apng, mp4] = ["apng", "mp4"].map(|ending| path.with_extension(ending));
+                Err(format!(
+                    "--movie {}: {other:?} is no format of animations here; name a .gif or .apng. ffmpeg makes a video of it: \
+                     ffmpeg -i {} -pix_fmt yuv420p {}",
+                    path.display(),
+                    apng.display(),
+                    mp4.display()
+                ))
+            }
         }
     }
 }

@@ -244,6 +244,7 @@ fn a_movie_has_a_picture_for_every_state_under_one_range_of_colours() {
     let refused = picture(folder.path(), &["--movie", "all.mp4"]);
     let why = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(!refused.status.success() && why.contains("name a .gif or .apng"), "{why}");
+    assert!(why.contains("ffmpeg -i all.apng -pix_fmt yuv420p all.mp4"), "{why}");
 }
 
 #[test]
