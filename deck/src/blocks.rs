@@ -165,9 +165,11 @@ impl Shape {
                 block.place(*axis, *base);
                 block
             }
-            Self::Plate { origin, sides, cells, section } => sheet::plate(*origin, *sides, *cells, *section),
+            Self::Plate { origin, sides, cells, section } => {
+                sheet::plate(*origin, *sides, *cells, section.clone())
+            }
             Self::Prism { axis, base, radius, length, sides, cells, section } => {
-                let mut block = sheet::prism(*radius, *length, *sides, *cells, *section);
+                let mut block = sheet::prism(*radius, *length, *sides, *cells, section.clone());
                 block.place(*axis, *base);
                 block
             }

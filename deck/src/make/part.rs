@@ -6,7 +6,7 @@ use mechanics::{
     element::{hex8::eight_points, hourglass::Hourglass, tet10},
     erosion::{Criteria, GEOMETRIC_STRAIN},
     material::{Failure, Material, Strength},
-    mesh::Topology,
+    mesh::{Laminate, Topology},
 };
 
 use super::material::Materials;
@@ -71,7 +71,7 @@ pub(super) fn make(
         first.entry(&part.name).or_insert(part.at);
         let material = materials.resolve(part);
         let of_material = material.map(|m| &materials.list[m as usize]);
-        let erosion = part.erosion.as_ref().map(|given| criteria(given, part.kind, of_material, log));
+        let erosion = part.erosion.as_ref().map(|given| criteria(given, &part.kind, of_material, log));
         let eight_points = has_eight_points(part, of_material, log);
         let hourglass = hourglass_of(part, of_material, hourglass, log);
         let (mut block, numbers) = mesh_of(part, meshes, &mut budget, log);
@@ -94,6 +94,9 @@ pub(super) fn make(
         let (name, at, velocity) = (part.name.clone(), part.at, part.velocity);
         if let Some(Topology::Shells { section, .. }) = block.as_mut().map(|block| &mut block.topology) {
             section.breaks = erosion.and_then(|criteria| criteria.plastic_strain);
+            if section.laminate.is_none() && of_material.is_some_and(|m| m.strength.layers().is_some()) {
+                section.laminate = Some(Laminate::PLAIN);
+            }
         }
         if let Some(Topology::Beams { section, .. }) = block.as_mut().map(|block| &mut block.topology) {
             section.breaks = erosion.and_then(|criteria| criteria.plastic_strain);
@@ -161,9 +164,10 @@ fn hourglass_of(part: &Part, material: Option<&Material>, of_deck: Hourglass, lo
 }
 
 /// The criteria of a part, whose material is `material` if that could be read.
-fn criteria(given: &Erosion, kind: Kind, material: Option<&Material>, log: &Log<'_>) -> Criteria {
+fn criteria(given: &Erosion, kind: &Kind, material: Option<&Material>, log: &Log<'_>) -> Criteria {
     match kind {
         Kind::Solids => {}
+        Kind::Shells(_) if material.is_some_and(|m| m.strength.layers().is_some()) => check_plies(given, log),
         Kind::Shells(_) | Kind::Beams { .. } => check_layers(given, log),
         Kind::Trusses { .. } => log.fault_of(
             given.origin,
@@ -214,6 +218,18 @@ fn criteria(given: &Erosion, kind: Kind, material: Option<&Material>, log: &Log<
         criteria.geometric_strain = Some(GEOMETRIC_STRAIN);
     }
     criteria
+}
+
+/// Shells of composites erode when all their layers have failed, and by nothing else.
+fn check_plies(given: &Erosion, log: &Log<'_>) {
+    let mut origins: Vec<Origin> = given.limits.iter().map(|(_, limit)| limit.origin).collect();
+    if !given.failure.as_ref().is_some_and(|on| on.value) {
+        origins.push(given.failure.as_ref().map_or(given.origin, |on| on.origin));
+    }
+    for origin in origins {
+        let expected = "failure = true: shells of composites erode when all their layers have failed";
+        log.fault_of(origin, expected, log.say("give failure = true alone", "leave it blank"));
+    }
 }
 
 /// Shells erode by the plastic strain of their layers and beams by that of their fibres, which is to be given, and by nothing else.

@@ -3,7 +3,7 @@
 use mechanics::{
     contact::Settings,
     element::{beam2, tet10, truss2},
-    material::{Failure, Material},
+    material::{Failure, Material, Strength},
     mesh::Topology,
 };
 use rayon::prelude::*;
@@ -48,6 +48,18 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
     for (part, draft) in assembly.mesh.parts.iter().zip(parts) {
         let material = draft.material.and_then(|index| materials.get(index as usize));
         let Some(material) = material else { continue };
+        if matches!(material.strength, Strength::ChangChang(_)) && part.section().is_none() {
+            log.fault(
+                draft.at,
+                format!("part \"{}\" of \"{}\", whose strength is chang_chang", part.name, material.name),
+                "shells: it is the law of their layers",
+                log.say(
+                    "take orthotropic, or give the part a shell",
+                    "take *MAT_COMPOSITE_DAMAGE, or shells",
+                ),
+            );
+            continue;
+        }
         let (kind, checked) = match &part.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => continue,
             Topology::Tetrahedra { .. } => {

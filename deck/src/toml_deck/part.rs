@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::{element::shell4::Rule, mesh::Section};
+use mechanics::{
+    element::shell4::Rule,
+    mesh::{Axis, Laminate, MAX_LAYERS, Plies, Ply, Section},
+};
 
 use super::{
     beam,
@@ -75,7 +78,7 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
         let hourglass = table
             .get("hourglass")
             .and_then(|v| hourglass::read(v, &format!("\"{name}\"")).map(|control| v.placed(control)));
-        let mesh = read_mesh(&table, &name, given, (kind, planes));
+        let mesh = read_mesh(&table, &name, given, (kind.clone(), planes));
         let kind = kind.unwrap_or(Kind::Solids);
         let rotate = table.get("rotate").and_then(|v| read_rotation(v, &table));
         let translate = table.get("translate").and_then(|v| v.vector().map(|by| v.placed(by)));
@@ -140,17 +143,90 @@ fn read_erosion(value: Value<'_>, part: &str) -> Option<Erosion> {
     Some(Erosion { origin: value.origin(), limits, failure })
 }
 
-/// `shell = { thickness, points, rule, thinning }`.
+/// `shell = { thickness, points, rule, thinning }`, and of composites `angles` or `plies`, and `axes` or `across`.
 fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
     let table = value.table(format!("shell of \"{name}\""))?;
-    let thickness = table.number("thickness", Range::Positive);
+    let plies = match table.get("plies") {
+        None => Some(None),
+        Some(value) => read_plies(value).map(Some),
+    };
+    let stacked = table.has("plies");
+    let thickness = match &plies {
+        Some(Some(plies)) => Some(plies.iter().map(|ply| ply.share).sum()),
+        _ if stacked => None,
+        _ => table.number("thickness", Range::Positive),
+    };
+    if let Some(value) = table.get("thickness").filter(|_| stacked) {
+        value.fault("no thickness beside plies, which have their own", "remove it");
+    }
+    let angles = match table.get("angles") {
+        Some(value) if stacked => {
+            value.fault("angles or plies", "remove one of them");
+            None
+        }
+        Some(value) => read_angles(value).map(Some),
+        None => Some(None),
+    };
+    let axes = table.get("axes").map(|value| value.one_of(&["material", "element"]));
+    let across = table.get("across").map(|value| (value, value.vector()));
+    if let (Some(_), Some((value, _))) = (axes, across) {
+        value.fault("axes or across", "remove one of them");
+    }
+    let axis = match (axes, across) {
+        (_, Some((_, across))) => across.map(|across| Some(Axis::Across(across))),
+        (Some(word), None) => word.map(|word| Some([Axis::Material, Axis::Side][word])),
+        (None, None) => Some(None),
+    };
     let rule = table.get("rule").map_or(Some(0), |v| v.one_of(&["gauss", "lobatto"]));
-    let (least, default) = if rule == Some(1) { (3, 5) } else { (1, 3) };
+    let (least, default) = match (rule, stacked) {
+        (Some(1), _) => (3, 5),
+        (_, true) => (1, 2),
+        _ => (1, 3),
+    };
     let points = table.integer_or("points", default, least, 5) as u32;
     let thins = table.get("thinning").map_or(Some(true), |v| v.boolean());
     table.finish();
     let rule = if rule? == 1 { Rule::Lobatto(points) } else { Rule::Gauss(points) };
-    Some(Section { thickness: thickness?, rule, thins: thins?, breaks: None })
+    let (plies, angles, axis) = (plies?, angles?, axis?);
+    let is_composite = plies.is_some() || angles.is_some() || axis.is_some();
+    let laminate = is_composite.then(|| Laminate {
+        axis: axis.unwrap_or(Axis::Material),
+        plies: plies.map_or_else(|| Plies::AtPoints(angles.unwrap_or_default()), Plies::Stacked),
+    });
+    Some(Section { thickness: thickness?, rule, thins: thins?, breaks: None, laminate })
+}
+
+/// What an angle is (degrees).
+const ANGLE: Range = Range::Within(-360.0, 360.0, "an angle above -360 and at most 360 degrees");
+
+fn read_angles(value: Value<'_>) -> Option<Vec<f64>> {
+    let angles: Vec<f64> = value.items()?.iter().map(|v| v.number(ANGLE)).collect::<Option<_>>()?;
+    if angles.is_empty() {
+        value.fault("an angle for each point through the thickness", "give the angles, or remove it");
+        return None;
+    }
+    Some(angles)
+}
+
+/// `plies = [{ angle, thickness }, ...]`, from the lower side up.
+fn read_plies(value: Value<'_>) -> Option<Vec<Ply>> {
+    let items = value.items()?;
+    if items.is_empty() || items.len() > MAX_LAYERS {
+        value.fault(&format!("1 to {MAX_LAYERS} plies"), "give the plies from the lower side up");
+        return None;
+    }
+    let mut plies = Vec::with_capacity(items.len());
+    for (n, item) in (1..).zip(items) {
+        let table = item.table(format!("ply {n}"))?;
+        if let Some(material) = table.get("material") {
+            material
+                .fault("the material of the part in all plies", "remove it; make parts of other materials");
+        }
+        let (angle, thickness) = (table.number("angle", ANGLE), table.number("thickness", Range::Positive));
+        table.finish();
+        plies.push(angle.zip(thickness).map(|(angle, share)| Ply { angle, share }));
+    }
+    plies.into_iter().collect()
 }
 
 /// The key that says the kind of elements.

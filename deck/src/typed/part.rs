@@ -32,7 +32,7 @@ pub(crate) enum Choice {
 }
 
 /// The kind of the elements of a part, with what the part says of all of them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Kind {
     Solids,
     Shells(Section),
@@ -49,7 +49,7 @@ pub(crate) enum Kind {
 
 impl Kind {
     /// What a message calls such elements.
-    pub(crate) fn elements(self) -> &'static str {
+    pub(crate) fn elements(&self) -> &'static str {
         match self {
             Self::Solids => "solids",
             Self::Shells(_) => "shells",
@@ -59,7 +59,7 @@ impl Kind {
     }
 
     /// The word of bodies of mesh files with such elements ([`Body::kind`](crate::mesh_file::Body::kind)).
-    pub(crate) fn of_body(self) -> &'static str {
+    pub(crate) fn of_body(&self) -> &'static str {
         match self {
             Self::Beams { .. } => "trusses",
             _ => self.elements(),
@@ -67,7 +67,7 @@ impl Kind {
     }
 
     /// Nodes that an element names.
-    pub(crate) fn n_corners(self) -> usize {
+    pub(crate) fn n_corners(&self) -> usize {
         match self {
             Self::Solids => 8,
             Self::Shells(_) => 4,
@@ -76,7 +76,7 @@ impl Kind {
     }
 
     /// Numbers of different nodes that an element of a mesh may have, and how a message says that.
-    pub(crate) fn distinct(self) -> (&'static [usize], &'static str) {
+    pub(crate) fn distinct(&self) -> (&'static [usize], &'static str) {
         match self {
             Self::Solids => {
                 (&[4, 5, 6, 8], "eight, or six, five or four of a wedge, a pyramid or a tetrahedron")
@@ -87,17 +87,17 @@ impl Kind {
     }
 
     /// Elements of this kind by the local indices of their nodes, [`Kind::n_corners`] each.
-    pub(crate) fn topology<'a>(self, elements: impl Iterator<Item = &'a [u32]>) -> Topology {
+    pub(crate) fn topology<'a>(&self, elements: impl Iterator<Item = &'a [u32]>) -> Topology {
         fn fixed<'a, const N: usize>(elements: impl Iterator<Item = &'a [u32]>) -> Vec<[u32; N]> {
             elements.map(|nodes| std::array::from_fn(|i| nodes[i])).collect()
         }
         match self {
             Self::Solids => Topology::Explicit { hexahedra: fixed(elements) },
-            Self::Shells(section) => Topology::Shells { quads: fixed(elements), section },
-            Self::Trusses { area } => Topology::Trusses { bars: fixed(elements), area },
+            Self::Shells(section) => Topology::Shells { quads: fixed(elements), section: section.clone() },
+            Self::Trusses { area } => Topology::Trusses { bars: fixed(elements), area: *area },
             Self::Beams { section, across } => {
                 let bars: Vec<[u32; 2]> = fixed(elements);
-                Topology::Beams { across: vec![across; bars.len()], bars, section }
+                Topology::Beams { across: vec![*across; bars.len()], bars, section: *section }
             }
         }
     }

@@ -7,7 +7,7 @@ use mechanics::{
         shell4::Rule,
     },
     material::Material,
-    mesh::{Section, Topology},
+    mesh::{Axis, Plies, Ply, Section, Topology},
 };
 
 use super::value::{Text, list, numbers, quoted, table, vector};
@@ -94,16 +94,35 @@ fn write_part(text: &mut Text, part: &Part) {
     if let Kind::Trusses { area } = part.kind {
         text.key("truss", table(&[("area", format!("{area:?}"))]));
     }
-    if let Kind::Shells(Section { thickness, rule, thins, .. }) = part.kind {
+    if let Kind::Shells(Section { thickness, rule, thins, laminate, .. }) = &part.kind {
         let (rule, points) = match rule {
             Rule::Gauss(points) => ("gauss", points),
             Rule::Lobatto(points) => ("lobatto", points),
         };
-        let mut keys = vec![
-            ("thickness", format!("{thickness:?}")),
-            ("points", points.to_string()),
-            ("rule", quoted(rule)),
-        ];
+        let mut keys = vec![("points", points.to_string()), ("rule", quoted(rule))];
+        match laminate.as_ref().map(|laminate| &laminate.plies) {
+            Some(Plies::Stacked(plies)) => {
+                let whole: f64 = plies.iter().map(|ply| ply.share).sum();
+                let ply = |ply: &Ply| {
+                    let share = if whole == *thickness { ply.share } else { ply.share / whole * thickness };
+                    table(&[("angle", format!("{:?}", ply.angle)), ("thickness", format!("{share:?}"))])
+                };
+                keys.push(("plies", list(plies.iter().map(ply))));
+            }
+            plies => {
+                keys.insert(0, ("thickness", format!("{thickness:?}")));
+                if let Some(Plies::AtPoints(angles)) = plies
+                    && !angles.is_empty()
+                {
+                    keys.push(("angles", list(angles.iter().map(|angle| format!("{angle:?}")))));
+                }
+            }
+        }
+        match laminate.as_ref().map(|laminate| laminate.axis) {
+            Some(Axis::Side) => keys.push(("axes", quoted("element"))),
+            Some(Axis::Across(across)) => keys.push(("across", vector(across))),
+            Some(Axis::Material) | None => {}
+        }
         keys.extend((!thins).then(|| ("thinning", "false".to_owned())));
         text.key("shell", table(&keys));
     }

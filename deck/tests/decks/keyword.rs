@@ -114,7 +114,7 @@ fn ball_on_shell_has_clamped_shells_of_five_points_that_solids_meet() {
     assert_eq!((sheet.name.as_str(), sheet.n_elements(), ball.n_elements()), ("sheet", 144, 64));
     assert_eq!(
         sheet.section(),
-        Some(Section { thickness: 1.0, rule: Rule::Gauss(5), thins: true, breaks: None })
+        Some(Section { thickness: 1.0, rule: Rule::Gauss(5), thins: true, breaks: None, laminate: None })
     );
     // Both kinds are numbered from 1.
     assert_eq!((sheet.element_ids[0], ball.element_ids[0]), (1, 1));
@@ -142,7 +142,7 @@ fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
     let part = &reading.model.mesh.parts[0];
     assert_eq!(
         part.section(),
-        Some(Section { thickness: 2.0, rule: Rule::Lobatto(5), thins: false, breaks: None })
+        Some(Section { thickness: 2.0, rule: Rule::Lobatto(5), thins: false, breaks: None, laminate: None })
     );
     assert_eq!(part.corners(1)[..4], [3, 2, 4, 4]);
     assert_eq!((reading.model.spin[2], reading.model.velocity[2]), ([0.0, 0.0, 3.0], [-30.0, 30.0, 0.0]));
@@ -160,7 +160,7 @@ fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
     let model = read(&own).unwrap_or_else(|f| panic!("{}", lines(&f)));
     assert_eq!(
         model.mesh.parts[0].section(),
-        Some(Section { thickness: 2.0, rule: Rule::Gauss(2), thins: false, breaks: None })
+        Some(Section { thickness: 2.0, rule: Rule::Gauss(2), thins: false, breaks: None, laminate: None })
     );
 }
 

@@ -1,7 +1,7 @@
 //! Units of the arrays in states and contact surfaces, by the name of the array.
 
 use deck::model::Model;
-use mechanics::law::Unit;
+use mechanics::{law::Unit, mesh::Part};
 
 use super::Units;
 
@@ -44,7 +44,8 @@ pub fn unit_of_variable(unit: Unit, units: &Units) -> String {
 /// The unit of an array in the states of a model, history variables included.
 pub fn unit_in(model: &Model, field: &str) -> String {
     let units = Units::named(&model.units);
-    let mut variables = model.setup.materials.iter().flat_map(|material| material.history());
+    let of_part = |part: &Part| part.columns(&model.setup.materials[part.material as usize]);
+    let mut variables = model.mesh.parts.iter().flat_map(of_part);
     match variables.find(|variable| variable.name == field) {
         Some(variable) => unit_of_variable(variable.unit, &units),
         None => unit_of(field, &units),

@@ -15,7 +15,7 @@ use deck::model::Model;
 use mechanics::{
     contact::PairVote,
     cross_section::SectionVote,
-    material::Material,
+    mesh::Part,
     state::{N_FIELDS, field},
 };
 use serde::{Deserialize, Serialize};
@@ -198,7 +198,7 @@ impl History {
                 .output
                 .element_gauges
                 .iter()
-                .map(|g| material(model, g.element).density)
+                .map(|g| model.setup.materials[part(model, g.element).material as usize].density)
                 .collect(),
             n_contacts: model.output.contact_forces.len() as u32,
             sections: model.output.sections.iter().map(|section| section.cut.origin).collect(),
@@ -392,10 +392,10 @@ fn holders(model: &Model) -> Vec<Holder> {
     walls.chain(supports).collect()
 }
 
-/// The material of an element.
-fn material(model: &Model, element: u32) -> &Material {
+/// The part of an element.
+fn part(model: &Model, element: u32) -> &Part {
     let part = model.mesh.element_offsets().partition_point(|&first| first <= element as usize) - 1;
-    &model.setup.materials[model.mesh.parts[part].material as usize]
+    &model.mesh.parts[part]
 }
 
 /// The header row, with its line end.
@@ -439,7 +439,9 @@ pub fn columns(model: &Model) -> Vec<String> {
             "" => format!("{}:{what}", gauge.name),
             unit => format!("{}:{what} [{unit}]", gauge.name),
         }));
-        columns.extend(material(model, gauge.element).history().iter().map(|variable| {
+        let part = part(model, gauge.element);
+        let of_part = part.columns(&model.setup.materials[part.material as usize]);
+        columns.extend(of_part.iter().map(|variable| {
             let name = format!("{}:{}", gauge.name, variable.name);
             match unit_of_variable(variable.unit, &of_deck) {
                 unit if unit.is_empty() => name,

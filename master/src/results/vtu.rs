@@ -15,7 +15,7 @@ pub mod read;
 use deck::model::Model;
 use mechanics::{
     element::{beam2, shell4, tet10},
-    mesh::{Nodes, Topology},
+    mesh::{Column, Nodes, Part, Topology},
     state::{GlobalState, PartHistory, field},
 };
 
@@ -137,9 +137,10 @@ pub fn stream(
 
     let elements = Elements { model, offsets: model.mesh.element_offsets() };
     let variables = variables(model);
-    let [point, cell] = data_arrays(&elements, state, worker).map(|mut arrays: Vec<Array>| {
+    let names = names_of(&variables);
+    let [point, cell] = data_arrays(&elements, &variables, state, worker).map(|mut arrays: Vec<Array>| {
         arrays.retain(|array| {
-            ALWAYS.contains(&array.name) || variables.contains(&array.name) || fields.contains(array.name)
+            ALWAYS.contains(&array.name) || names.contains(&array.name) || fields.contains(array.name)
         });
         arrays
     });
@@ -231,14 +232,21 @@ pub(super) fn write_piece(
     writeln!(out, "\n  </AppendedData>\n</VTKFile>")
 }
 
-/// Names of the history variables of all materials.
-fn variables(model: &Model) -> BTreeSet<&'static str> {
-    model.setup.materials.iter().flat_map(|material| material.history()).map(|v| v.name).collect()
+/// The history variables of each part, in their order.
+fn variables(model: &Model) -> Vec<Vec<Column>> {
+    let of_part = |part: &Part| part.columns(&model.setup.materials[part.material as usize]);
+    model.mesh.parts.iter().map(of_part).collect()
+}
+
+/// Names of the history variables of all parts.
+fn names_of(variables: &[Vec<Column>]) -> BTreeSet<&str> {
+    variables.iter().flatten().map(|column| column.name.as_str()).collect()
 }
 
 /// All node fields and all element fields.
 fn data_arrays<'a>(
     elements: &'a Elements,
+    variables: &'a [Vec<Column>],
     state: &'a GlobalState,
     worker: Option<&'a [u32]>,
 ) -> [Vec<Array<'a>>; 2] {
@@ -298,6 +306,11 @@ fn data_arrays<'a>(
             if elements.n_corners(e) != 4 {
                 return [von_mises(deviator(e))];
             }
+            let (part, _) = elements.locate(e);
+            if mesh.parts[part].section().is_some_and(|section| section.laminate.is_some()) {
+                // What layers of a composite bear is told by their stresses.
+                return [von_mises(deviator(e))];
+            }
             let layers = state.own[shell4::ELEMENT..].chunks_exact(shell4::LAYER);
             let largest = |layer: &[Vec<f64>]| plane_von_mises([0, 1, 2, 3, 4].map(|i| layer[i][e]));
             [layers.map(largest).fold(0.0, f64::max)]
@@ -324,17 +337,11 @@ fn data_arrays<'a>(
                 .map_or([0.0; 3], |(_, [_, torque, ya, yb, za, zb])| [torque, larger(ya, yb), larger(za, zb)])
         }));
     }
-    for name in variables(elements.model) {
-        // By part: its column, zero where the material has none of this name.
+    for name in names_of(variables) {
+        // By part: its column, zero where the part has none of this name.
         let columns: Vec<Option<&PartHistory>> = (0..mesh.parts.len()).map(|p| state.history_of(p)).collect();
-        let places: Vec<Option<usize>> = mesh
-            .parts
-            .iter()
-            .map(|part| {
-                let material = &elements.model.setup.materials[part.material as usize];
-                material.history().iter().position(|variable| variable.name == name)
-            })
-            .collect();
+        let places: Vec<Option<usize>> =
+            variables.iter().map(|of_part| of_part.iter().position(|column| column.name == name)).collect();
         cell.push(Array::f64(name, n_elements, move |e| {
             let (part, local) = elements.locate(e);
             [columns[part].zip(places[part]).map_or(0.0, |(history, place)| history.columns[place][local])]

@@ -238,10 +238,10 @@ impl Block {
         self.group.element(element, &self.x)
     }
 
-    /// The state of a local element, and behind it one number per entry of [`Material::history`].
+    /// The state of a local element, and behind it its history variables, see [`Part::columns`](crate::mesh::Part::columns).
     pub fn reading(&self, element: usize) -> Vec<f64> {
         let slot = self.slot(element);
-        self.element(element).into_iter().chain(self.group.history().iter().map(|c| c[slot])).collect()
+        self.element(element).into_iter().chain(self.group.variables(slot)).collect()
     }
 
     /// The lane set of a local element.

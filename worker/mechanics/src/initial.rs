@@ -11,7 +11,7 @@ use crate::{
     exact::{Quanta, Quantum},
     load::{Drive, SurfaceKind},
     material::Material,
-    mesh::{FACES, Mesh, Part, Topology},
+    mesh::{FACES, Mesh, Part, Topology, laminate},
     rigid::Body,
     setup::Setup,
     state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field, write_changed},
@@ -56,10 +56,11 @@ pub fn state(
         let material = &setup.materials[part.material as usize];
         let body = setup.bodies.iter().find(|body| body.parts.binary_search(&p).is_ok());
         let density = material.density * body.map_or(1.0, |body| body.nodal_scale);
-        let variables = material.history();
+        let variables = part.columns(material);
         if !variables.is_empty() {
-            let columns =
+            let mut columns: Vec<Vec<f64>> =
                 variables.iter().map(|variable| vec![variable.initial; part.n_elements()]).collect();
+            lay_axes(part, material, &mesh.positions, &mut columns)?;
             state.history.push(PartHistory { part: p, first: state.initial_volume.len() as u32, columns });
         }
         let first = state.initial_volume.len();
@@ -132,6 +133,33 @@ pub fn spin(state: &mut GlobalState, constraints: &[Constraint], given: &[[f64; 
             *spin = std::array::from_fn(|axis| if clamped >> axis & 1 == 1 { 0.0 } else { given[axis] });
         }
     }
+}
+
+/// Gives the elements of a laminate the direction of angle 0, its first history variables.
+///
+/// # Errors
+/// Where the axis has no part in the plane of an element.
+fn lay_axes(
+    part: &Part,
+    material: &Material,
+    positions: &[[f64; 3]],
+    columns: &mut [Vec<f64>],
+) -> Result<(), String> {
+    let Some(laminate) = part.section().and_then(|section| section.laminate.as_ref()) else { return Ok(()) };
+    for e in 0..part.n_elements() {
+        let [a, b, c, d, ..] = part.corners(e);
+        let x = [a, b, c, d].map(|n| positions[n as usize]);
+        let along = laminate::direction(laminate.axis, material, &x).ok_or_else(|| {
+            format!(
+                "element {} of part `{}`: the axis of its plies is normal to it; take another axis",
+                part.element_ids[e], part.name
+            )
+        })?;
+        for (column, along) in columns.iter_mut().zip(along) {
+            column[e] = along;
+        }
+    }
+    Ok(())
 }
 
 /// The state of shells and beams at time zero. A node has the rotational inertia of a quarter of each of its elements, about any axis:

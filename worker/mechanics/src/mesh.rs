@@ -3,8 +3,10 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+pub(crate) mod laminate;
 mod sides;
 
+pub use laminate::{Axis, Column, Laminate, LaminateError, MAX_LAYERS, Plies, Ply};
 pub(crate) use sides::spread;
 pub use sides::{CORNERS, FACES, MAX_NODES, Nodes, Spacing, UPPER, quad_area, twice};
 
@@ -93,7 +95,7 @@ pub enum Topology {
 }
 
 /// Thickness of shells and the points through it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Section {
     /// Initial thickness (length).
     pub thickness: f64,
@@ -103,12 +105,17 @@ pub struct Section {
     pub thins: bool,
     /// Plastic strain at which a layer breaks: it carries no stress from then on.
     pub breaks: Option<f64>,
+    /// Plies and axes of a composite; none of a material that is the same in all directions.
+    pub laminate: Option<Laminate>,
 }
 
 impl Section {
-    /// Number of arrays that such shells have of their own ([`crate::piece::Piece::own`]).
+    /// Number of arrays that such shells have of their own ([`crate::piece::Piece::own`]). The layers of a laminate have history variables instead.
     pub fn n_fields(&self) -> usize {
-        shell4::ELEMENT + shell4::LAYER * self.rule.points().map_or(0, |points| points.len())
+        match self.laminate {
+            Some(_) => shell4::ELEMENT,
+            None => shell4::ELEMENT + shell4::LAYER * self.rule.points().map_or(0, |points| points.len()),
+        }
     }
 }
 
@@ -205,9 +212,9 @@ impl Part {
     }
 
     /// The section of its shells; none of solids.
-    pub fn section(&self) -> Option<Section> {
+    pub fn section(&self) -> Option<&Section> {
         match &self.topology {
-            Topology::Shells { section, .. } => Some(*section),
+            Topology::Shells { section, .. } => Some(section),
             _ => None,
         }
     }

@@ -47,12 +47,12 @@ pub struct Piece {
     pub shells: ShellState,
     /// What elements of this kind have beside [`Piece::fields`], one array per number: of shells six hourglass forces, thickness,
     /// internal energy, energy of hourglass control, then for each point through the thickness, from below, stress xx, yy,
-    /// xy, yz, zx in the frame of the element, plastic strain, temperature; of solids with elastic hourglass control its
+    /// xy, yz, zx in the frame of the element, plastic strain, temperature (a laminate has history variables instead); of solids with elastic hourglass control its
     /// forces, x, y, z of each mode; of beams see [`beam2`](crate::element::beam2); of other solids nothing.
     pub own: Vec<Vec<f64>>,
     /// Hourglass control of solids.
     pub hourglass: Hourglass,
-    /// One array per entry of [`Material::history`].
+    /// One array per entry of [`Part::columns`](crate::mesh::Part::columns).
     pub history: Vec<Vec<f64>>,
 }
 
@@ -182,7 +182,7 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         }
         (Topology::Shells { quads, section }, Region::List(list)) => {
             let (quads, nodes) = by_first_use(quads, list);
-            (Topology::Shells { quads, section: *section }, nodes, list.clone())
+            (Topology::Shells { quads, section: section.clone() }, nodes, list.clone())
         }
         (Topology::Trusses { bars, area }, Region::List(list)) => {
             let (bars, nodes) = by_first_use(bars, list);

@@ -107,7 +107,7 @@ pub struct GlobalState {
     pub shells: ShellState,
     /// What elements have beside [`GlobalState::elements`], see [`crate::piece::Piece::own`]: as many arrays as the kind that has most.
     pub own: Vec<Vec<f64>>,
-    /// History variables, for each part whose material has some, in the order of parts.
+    /// History variables, for each part that has some, in the order of parts.
     pub history: Vec<PartHistory>,
 }
 
@@ -118,7 +118,7 @@ pub struct PartHistory {
     pub part: u32,
     /// Global index of its first element.
     pub first: u32,
-    /// One array per entry of [`crate::material::Material::history`], by element of the part.
+    /// One array per entry of [`Part::columns`](crate::mesh::Part::columns), by element of the part.
     pub columns: Vec<Vec<f64>>,
 }
 

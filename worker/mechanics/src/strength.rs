@@ -15,6 +15,7 @@ use crate::{
 
 pub(crate) mod any;
 pub(crate) mod apart;
+pub(crate) mod chang_chang;
 pub(crate) mod cowper_symonds;
 pub(crate) mod crushable_foam;
 pub(crate) mod curve;
@@ -46,6 +47,7 @@ pub(crate) mod voce;
 pub(crate) mod von_mises;
 pub(crate) mod zerilli_armstrong;
 
+pub use chang_chang::ChangChang;
 pub use cowper_symonds::CowperSymonds;
 pub use crushable_foam::CrushableFoam;
 pub use curve::{Hardening, MAX_HARDENING};
@@ -403,6 +405,8 @@ pub enum Strength {
     RiedelHiermaierThoma(RiedelHiermaierThoma),
     /// Composites: orthotropic, with failure of fibres, matrix and layers.
     Orthotropic(Orthotropic),
+    /// Layers of composite shells: orthotropic, with four modes of failure.
+    ChangChang(ChangChang),
     /// Rubber by the invariants of its stretch.
     MooneyRivlin(MooneyRivlin),
     /// Rubber by its principal stretches.
@@ -479,7 +483,7 @@ macro_rules! declared_laws {
 }
 
 declared_laws!(
-    Voce, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, RiedelHiermaierThoma, Orthotropic, MooneyRivlin, Ogden, Viscoelastic;
+    Voce, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, RiedelHiermaierThoma, Orthotropic, ChangChang, MooneyRivlin, Ogden, Viscoelastic;
     CrushableFoam, LowDensityFoam, SoilFoam, Honeycomb,
 );
 
@@ -506,7 +510,8 @@ impl Strength {
     /// Whether the law damages its elements itself.
     pub fn damages(&self) -> bool {
         use Strength::{
-            HolmquistJohnsonCook, JohnsonHolmquist, Orthotropic, RiedelHiermaierThoma, SegmentedCeramic,
+            ChangChang, HolmquistJohnsonCook, JohnsonHolmquist, Orthotropic, RiedelHiermaierThoma,
+            SegmentedCeramic,
         };
         matches!(
             self,
@@ -515,6 +520,7 @@ impl Strength {
                 | HolmquistJohnsonCook(_)
                 | RiedelHiermaierThoma(_)
                 | Orthotropic(_)
+                | ChangChang(_)
         )
     }
 
@@ -531,7 +537,17 @@ impl Strength {
             Strength::Viscoelastic(law) => law.fault(),
             Strength::SoilFoam(law, curve) => law.fault(curve),
             Strength::Orthotropic(law) => law.fault(),
+            Strength::ChangChang(law) => law.fault(),
             Strength::Honeycomb(law, _) => law.fault(),
+            _ => None,
+        }
+    }
+
+    /// The layers of shells that are laminates of it; none of laws that are no composites.
+    pub fn layers(&self) -> Option<ChangChang> {
+        match self {
+            Strength::ChangChang(law) => Some(*law),
+            Strength::Orthotropic(law) => Some(law.in_layers()),
             _ => None,
         }
     }
@@ -545,6 +561,7 @@ impl Strength {
             Strength::LowDensityFoam(law, _) => Some(law.bulk()),
             Strength::SoilFoam(law, _) => Some(law.unloading),
             Strength::Orthotropic(law) => Some(law.bulk()),
+            Strength::ChangChang(law) => Some(law.bulk()),
             Strength::Honeycomb(law, _) => Some(law.bulk()),
             _ => None,
         }

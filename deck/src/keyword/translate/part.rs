@@ -71,6 +71,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
                     rule,
                     thins: problem.control.shells_thin,
                     breaks: None,
+                    laminate: None,
                 })
             }
             (None, Some((_, Section::Truss(area)))) => {

@@ -7,7 +7,7 @@ type Put<'a> = Box<dyn Fn(usize, &mut Vec<u8>) + 'a>;
 
 /// One array of the file: its description and where its numbers come from.
 pub(in crate::results) struct Array<'a> {
-    pub(super) name: &'static str,
+    pub(super) name: &'a str,
     /// VTK's name of the type.
     pub(super) kind: &'static str,
     /// Bytes per component.
@@ -22,7 +22,7 @@ pub(in crate::results) struct Array<'a> {
 
 impl<'a> Array<'a> {
     pub(in crate::results) fn f64<const N: usize>(
-        name: &'static str,
+        name: &'a str,
         tuples: usize,
         of: impl Fn(usize) -> [f64; N] + 'a,
     ) -> Self {
@@ -33,7 +33,7 @@ impl<'a> Array<'a> {
 
     /// A list of indices, `N` per tuple; VTK refuses grouped ones.
     pub(in crate::results) fn i64<const N: usize>(
-        name: &'static str,
+        name: &'a str,
         tuples: usize,
         of: impl Fn(usize) -> [i64; N] + 'a,
     ) -> Self {
@@ -42,7 +42,7 @@ impl<'a> Array<'a> {
         Self { name, kind: "Int64", width: 8, components: N, tuples, grouped: false, put }
     }
 
-    pub(in crate::results) fn u32(name: &'static str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
+    pub(in crate::results) fn u32(name: &'a str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
         let put: Put = Box::new(move |i, out| out.extend_from_slice(&of(i).to_le_bytes()));
         Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
     }

@@ -37,7 +37,7 @@ pub(crate) struct ElementArrays {
     pub fields: [Vec<f64>; N_FIELDS],
     /// State of this kind alone.
     pub own: Vec<Vec<f64>>,
-    /// One array per entry of [`Material::history`].
+    /// One array per entry of [`Part::columns`](crate::mesh::Part::columns).
     pub history: Vec<Vec<f64>>,
 }
 
@@ -107,9 +107,9 @@ pub(crate) trait Group: Send + Sync {
     /// What an element says of itself, one number per entry of [`crate::state::FIELDS`], with its nodes at `x`.
     fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS];
 
-    /// One array per entry of [`Material::history`], by slot; none of a kind whose layers keep their own.
-    fn history(&self) -> &[Vec<f64>] {
-        &[]
+    /// The history variables of the element of a slot, one per entry of [`Part::columns`](crate::mesh::Part::columns).
+    fn variables(&self, _slot: usize) -> Vec<f64> {
+        Vec::new()
     }
 
     /// The arrays of the image, with the nodes at `x`.

@@ -22,7 +22,8 @@ pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, 
         Topology::Tetrahedra { .. } => (Box::new(Tetrahedra::of(piece)), None),
         Topology::Shells { quads, section } => {
             let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);
-            let fields = std::mem::take(&mut piece.own);
+            let mut fields = std::mem::take(&mut piece.own);
+            fields.append(&mut piece.history);
             let material = materials.get(piece.material as usize).expect("shells need their material");
             let volume = &piece.initial_volume;
             let core = Core::new(quads, n_nodes, &piece.elements, volume, &fields, section, material);

@@ -12,19 +12,32 @@
 //! to rigid motion and to constant strain, curvature and twist. A small viscous part (`DAMPING` in `kernel`) keeps a shaken sheet
 //! from gaining energy.
 //!
+//! The layers of a composite are plies with axes of their own (`laminate`), which turn with that frame.
+//!
 //! The elements stand in `block::Core`, which a block of a cycle holds as its group; [`Shells`] is a core with nodes of its own.
 
 pub mod block;
 mod geometry;
 mod kernel;
+mod laminate;
 mod layers;
 
 use serde::{Deserialize, Serialize};
+
+use geometry::Geometry;
+
+use crate::{element::vector::Vector, lanes::scalar::Scalar};
 
 pub(crate) use block::Core;
 pub use block::{SectionError, ShellStep, Shells};
 pub use kernel::{ELEMENT, THICKNESS};
 pub use layers::LAYER;
+
+/// Axes of the frame of an element with its corners at `x`.
+pub(crate) fn frame(x: &[[f64; 3]; 4]) -> [[f64; 3]; 3] {
+    let corners = x.map(|[x, y, z]| Vector { x: Scalar(x), y: Scalar(y), z: Scalar(z) });
+    Geometry::of(&corners).e.map(|axis| [axis.x.0, axis.y.0, axis.z.0])
+}
 
 /// Points through the thickness: heights by half the thickness and weights that add up to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -91,6 +91,7 @@ impl AnyStrength {
             Strength::SoilFoam(law, _) => Self::Elastic(Elastic { shear: law.shear }),
             Strength::Honeycomb(law, _) => Self::Elastic(Elastic { shear: law.shear() }),
             Strength::Orthotropic(law) => Self::Elastic(Elastic { shear: law.shear() }),
+            Strength::ChangChang(law) => Self::Elastic(Elastic { shear: law.shear() }),
         }
     }
 }

@@ -16,7 +16,7 @@
 //! isotropic material with its fastest wave.
 
 use super::{
-    Around, Deviator, History, Memory, StrengthLaw,
+    Around, ChangChang, Deviator, History, Memory, StrengthLaw,
     material_axes::{self, Axes, COLUMNS},
 };
 use crate::{
@@ -119,6 +119,34 @@ impl Orthotropic {
             let midway = 0.25 * (c[i][i] + c[j][j] + 2.0 * c[i][j] + 4.0 * g);
             f64::max(most, c[i][i]).max(c[j][j]).max(midway).max(g)
         })
+    }
+
+    /// The same in the layers of a shell, which leaves out what is across them.
+    pub(crate) fn in_layers(&self) -> ChangChang {
+        ChangChang {
+            young_a: self.young_a,
+            young_b: self.young_b,
+            poisson_ba: self.poisson_ba,
+            modulus_ab: self.modulus_ab,
+            modulus_bc: self.modulus_bc,
+            modulus_ca: self.modulus_ca,
+            ax: self.ax,
+            ay: self.ay,
+            az: self.az,
+            tension_a: self.tension_a,
+            compression_a: self.compression_a,
+            tension_b: self.tension_b,
+            compression_b: self.compression_b,
+            shear_ab: self.shear_ab,
+            shear_share: 1.0,
+            crushed_tension: 1.0,
+            crushed_compression: 1.0,
+            strain_tension_a: 1e30,
+            strain_compression_a: 1e30,
+            strain_b: 1e30,
+            strain_ab: 1e30,
+            strain_effective: 1e30,
+        }
     }
 
     /// What constants must be beside their bounds.

@@ -62,7 +62,7 @@ impl PlaneLaw {
         if material.is_gas() {
             return Err("a gas");
         }
-        if material.remembers() {
+        if material.remembers() || material.strength.layers().is_some() {
             return Err(material
                 .strength
                 .declared()

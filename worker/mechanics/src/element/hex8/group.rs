@@ -156,6 +156,11 @@ impl Solids {
             }
         }
     }
+
+    /// Number of its history variables.
+    pub(in crate::element) fn n_columns(&self) -> usize {
+        self.history.len()
+    }
 }
 
 impl Group for Solids {
@@ -229,8 +234,8 @@ impl Group for Solids {
         self.fields.each_ref().map(|values| values[slot])
     }
 
-    fn history(&self) -> &[Vec<f64>] {
-        &self.history
+    fn variables(&self, slot: usize) -> Vec<f64> {
+        self.history.iter().map(|column| column[slot]).collect()
     }
 
     fn image(&self, _x: &[Vec<f64>; 3]) -> ElementArrays {

@@ -3,8 +3,8 @@
 use std::{fmt, ops::Range};
 
 use super::{
-    Rule, kernel,
-    layers::{LAYER, PLASTIC_STRAIN, TEMPERATURE},
+    Rule, kernel, laminate,
+    layers::{LAYER, Layers, PLASTIC_STRAIN, TEMPERATURE},
 };
 use crate::{
     element::{
@@ -17,7 +17,7 @@ use crate::{
     flip::Target,
     lanes::{SET, Width},
     material::Material,
-    mesh::{Section, quad_area, twice},
+    mesh::{LaminateError, MAX_LAYERS, Section, laminate::direction, quad_area, twice},
     spin::Turning,
     state::{N_FIELDS, field},
     strength::plane_stress::PlaneLaw,
@@ -55,6 +55,15 @@ pub enum SectionError {
         material: String,
         law: &'static str,
     },
+    /// Plies of a material that is the same in all directions.
+    Plies {
+        /// Its name.
+        material: String,
+    },
+    /// The plies make no laminate.
+    Laminate(LaminateError),
+    /// The axis of the plies has no part in the plane of an element.
+    Axis { element: usize },
 }
 
 impl fmt::Display for SectionError {
@@ -72,8 +81,28 @@ impl fmt::Display for SectionError {
             SectionError::Law { material, law } => write!(
                 f,
                 "shells of {material:?}: {law} has no plane-stress form; take elastic, von Mises, tabulated or \
-                 Johnson-Cook strength"
+                 Johnson-Cook strength, or chang_chang or orthotropic of composites"
             ),
+            SectionError::Plies { material } => write!(
+                f,
+                "plies of {material:?}, which is the same in all directions; take chang_chang or orthotropic strength, or \
+                 remove the plies"
+            ),
+            SectionError::Axis { element } => {
+                write!(f, "an axis of plies that is normal to element {element}; take another axis")
+            }
+            SectionError::Laminate(LaminateError::Angles { angles, points }) => {
+                write!(
+                    f,
+                    "{angles} angles for {points} points through the thickness; give one for each point"
+                )
+            }
+            SectionError::Laminate(LaminateError::Layers { layers }) => {
+                write!(f, "{layers} layers of plies, expected 1 to {MAX_LAYERS}; take fewer points in a ply")
+            }
+            SectionError::Laminate(LaminateError::Ply { ply }) => {
+                write!(f, "a ply with angle {} and thickness {}; correct it", ply.angle, ply.share)
+            }
         }
     }
 }
@@ -96,7 +125,13 @@ pub(crate) struct Core {
     thinning: f64,
     /// Plastic strain at which a layer breaks.
     breaks: Option<f64>,
-    law: PlaneLaw,
+    law: Law,
+}
+
+/// What the layers are made of.
+enum Law {
+    Plain(PlaneLaw),
+    Laminate(laminate::Stacked),
 }
 
 /// Numbers of the elements by slot. What a lane set has lies together, field after field: a cycle goes through memory once.
@@ -135,21 +170,33 @@ impl State {
     }
 }
 
-/// The first field of a layer.
+/// The first field of a layer of a laminate.
+fn ply_field(point: usize) -> usize {
+    kernel::ELEMENT + laminate::SHARED + point * laminate::BY_LAYER
+}
+
+/// The first field of any other layer.
 fn layer_field(point: usize) -> usize {
     kernel::ELEMENT + point * LAYER
 }
 
 /// Whether shells can be built of this: the points through the thickness and the law of the layers.
-fn section_of(section: &Section, material: &Material) -> Result<(Vec<(f64, f64)>, PlaneLaw), SectionError> {
+fn section_of(section: &Section, material: &Material) -> Result<(Vec<(f64, f64)>, Law), SectionError> {
     let Section { thickness, rule, .. } = *section;
     if !(thickness.is_finite() && thickness > 0.0) {
         return Err(SectionError::Thickness { thickness });
     }
     let points = rule.points().ok_or(SectionError::Points { rule })?;
+    if let Some(laminate) = &section.laminate {
+        let law = material.strength.layers().filter(|_| !material.is_gas());
+        let law = law.ok_or_else(|| SectionError::Plies { material: material.name.clone() })?;
+        let (stacked, points) =
+            laminate::Stacked::of(laminate, law, &points).map_err(SectionError::Laminate)?;
+        return Ok((points, Law::Laminate(stacked)));
+    }
     let law =
         PlaneLaw::of(material).map_err(|law| SectionError::Law { material: material.name.clone(), law })?;
-    Ok((points, law))
+    Ok((points, Law::Plain(law)))
 }
 
 impl Section {
@@ -164,7 +211,8 @@ impl Section {
 
 impl Core {
     /// Lays out the state of `quads.len()` elements in slots, eight to a set. `elements` are their global indices,
-    /// `volume` their area times thickness at the start, `fields` their state, see [`crate::piece::Piece::own`].
+    /// `volume` their area times thickness at the start, `fields` their state, see [`crate::piece::Piece::own`], and of a laminate its
+    /// history variables behind it.
     ///
     /// # Errors
     /// [`SectionError`].
@@ -184,7 +232,11 @@ impl Core {
         assert!(!quads.is_empty(), "a block without elements");
         let n_elements = quads.len();
         assert!(quads.iter().flatten().all(|&n| (n as usize) < n_nodes), "corners beyond {n_nodes} nodes");
-        assert!(fields.len() == section.n_fields(), "{} fields of shells", fields.len());
+        let n_fields = match law {
+            Law::Plain(_) => layer_field(points.len()),
+            Law::Laminate(_) => ply_field(points.len()),
+        };
+        assert!(fields.len() == n_fields, "{} fields of shells", fields.len());
         assert!(elements.len() == n_elements && volume.len() == n_elements, "{n_elements} elements");
         assert!(fields.iter().all(|f| f.len() == n_elements), "fields of {n_elements} elements");
         let n_slots = n_elements.next_multiple_of(SET);
@@ -203,7 +255,8 @@ impl Core {
                 .collect(),
             elements: (0..n_slots).map(|slot| elements.get(slot).copied().unwrap_or(u32::MAX)).collect(),
             points,
-            thinning: f64::from(section.thins),
+            // Plies keep their thickness.
+            thinning: f64::from(section.thins && section.laminate.is_none()),
             breaks: section.breaks,
             law,
         })
@@ -215,21 +268,55 @@ impl Core {
         let corners = self.corners.each_ref().map(|of_slot| of_slot[element] as usize);
         let area = quad_area(&corners.map(|n| std::array::from_fn(|axis| x[axis][n])));
         let volume = self.initial_volume[element];
-        let layer = |point: usize, i: usize| self.state.at(layer_field(point) + i, element);
-        let mean = |i: usize| (0..self.points.len()).map(|p| self.points[p].1 * layer(p, i)).sum::<f64>();
-        let most = |i: usize| (0..self.points.len()).map(|p| layer(p, i)).fold(f64::MIN, f64::max);
-        let (xx, yy) = (mean(0), mean(1));
-        let pressure = -(xx + yy) / 3.0;
         let mut fields = [0.0; N_FIELDS];
+        let n_points = self.points.len();
+        let mean_of =
+            |of: &dyn Fn(usize) -> f64| (0..n_points).map(|p| self.points[p].1 * of(p)).sum::<f64>();
+        let mean: [f64; 5] = match &self.law {
+            Law::Plain(_) => {
+                let layer = |point: usize, i: usize| self.state.at(layer_field(point) + i, element);
+                let most = |i: usize| (0..n_points).map(|p| layer(p, i)).fold(f64::MIN, f64::max);
+                fields[field::PLASTIC_STRAIN] = most(PLASTIC_STRAIN);
+                fields[field::TEMPERATURE] = most(TEMPERATURE);
+                std::array::from_fn(|i| mean_of(&|point| layer(point, i)))
+            }
+            Law::Laminate(stacked) => {
+                fields[field::DAMAGE] = mean_of(&|point| self.ply(point, laminate::IS_GONE, element));
+                let stresses: Vec<[f64; 5]> = (0..n_points)
+                    .map(|point| {
+                        stacked.stress(point, self.direction(element), |i| self.ply(point, i, element))
+                    })
+                    .collect();
+                std::array::from_fn(|i| mean_of(&|point| stresses[point][i]))
+            }
+        };
+        let (xx, yy) = (mean[0], mean[1]);
+        let pressure = -(xx + yy) / 3.0;
         fields[field::SXX] = xx + pressure;
         fields[field::SYY] = yy + pressure;
-        (fields[field::SXY], fields[field::SYZ], fields[field::SZX]) = (mean(2), mean(3), mean(4));
+        (fields[field::SXY], fields[field::SYZ], fields[field::SZX]) = (mean[2], mean[3], mean[4]);
         fields[field::PRESSURE] = pressure;
         fields[field::ENERGY] = self.state.at(kernel::INTERNAL, element) / volume;
-        fields[field::PLASTIC_STRAIN] = most(PLASTIC_STRAIN);
-        fields[field::TEMPERATURE] = most(TEMPERATURE);
         fields[field::RELATIVE_VOLUME] = area * self.state.at(kernel::THICKNESS, element) / volume;
         fields
+    }
+
+    /// A number of a layer of a laminate.
+    fn ply(&self, point: usize, i: usize, element: usize) -> f64 {
+        self.state.at(ply_field(point) + i, element)
+    }
+
+    /// The direction of angle 0 of a laminate in the frame of an element.
+    fn direction(&self, element: usize) -> [f64; 2] {
+        [0, 1].map(|i| self.state.at(kernel::ELEMENT + i, element))
+    }
+
+    /// Number of arrays among those of the state that are no history variables.
+    fn n_own(&self) -> usize {
+        match self.law {
+            Law::Plain(_) => self.state.n_fields,
+            Law::Laminate(_) => kernel::ELEMENT,
+        }
     }
 
     /// Adds forces and moments of the elements of `sets`, brings their state from `n-1` to `n` and adds their votes. The result does
@@ -254,18 +341,6 @@ impl Core {
         assert!(shortest >= n_nodes, "node arrays of {shortest}, not of {n_nodes}");
         let n_sets = self.alive.len() as u32;
         assert!(sets.iter().all(|r| r.end <= n_sets), "sets {sets:?} of a block of {n_sets}");
-        let constants = kernel::Constants {
-            law: self.law,
-            points: &self.points,
-            thinning: self.thinning,
-            breaks: self.breaks,
-            second_moment: self.points.iter().map(|(height, weight)| 0.25 * weight * height * height).sum(),
-            dt: step.dt,
-            force_magic: step.force_quantum.magic(),
-            moment_magic: step.moment_quantum.magic(),
-            inverse_arm: step.force_quantum.value() / step.moment_quantum.value(),
-            energy_magic: step.energy_quantum.magic(),
-        };
         let view = kernel::View {
             corners: &self.corners,
             x: nodes.x,
@@ -278,10 +353,42 @@ impl Core {
             alive: &self.alive,
             elements: &self.elements,
         };
-        // SAFETY: node arrays and sets were checked just now, corners when they were taken in, and arrays by slot were built
-        // in whole sets.
-        let pass = unsafe { kernel::Pass::new(view, &constants, sets, vote) };
-        width.run(pass);
+        let (law, points) = (&self.law, self.points.as_slice());
+        let (thinning, breaks) = (self.thinning, self.breaks);
+        match law {
+            Law::Plain(law) => {
+                let c = constants(*law, points, (thinning, breaks), step);
+                // SAFETY: node arrays and sets were checked just now, corners when they were taken in, and arrays by slot were built
+                // in whole sets.
+                width.run(unsafe { kernel::Pass::new(view, &c, sets, vote) });
+            }
+            Law::Laminate(stacked) => {
+                let c = constants(stacked.stack(), points, (thinning, breaks), step);
+                // SAFETY: likewise.
+                width.run(unsafe { kernel::Pass::new(view, &c, sets, vote) });
+            }
+        }
+    }
+}
+
+/// What the kernel is told of a section of this law and these points.
+fn constants<'a, W: Layers>(
+    law: W,
+    points: &'a [(f64, f64)],
+    (thinning, breaks): (f64, Option<f64>),
+    step: &ShellStep,
+) -> kernel::Constants<'a, W> {
+    kernel::Constants {
+        law,
+        points,
+        thinning,
+        breaks,
+        second_moment: points.iter().map(|(height, weight)| 0.25 * weight * height * height).sum(),
+        dt: step.dt,
+        force_magic: step.force_quantum.magic(),
+        moment_magic: step.moment_quantum.magic(),
+        inverse_arm: step.force_quantum.value() / step.moment_quantum.value(),
+        energy_magic: step.energy_quantum.magic(),
     }
 }
 
@@ -335,15 +442,18 @@ impl Group for Core {
         self.summary(element, x)
     }
 
+    fn variables(&self, slot: usize) -> Vec<f64> {
+        (self.n_own()..self.state.n_fields).map(|field| self.state.at(field, slot)).collect()
+    }
+
     fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays {
         let all: Vec<_> = (0..self.n_elements).map(|e| self.summary(e, x)).collect();
+        let of_field = |field| (0..self.n_elements).map(|e| self.state.at(field, e)).collect();
         ElementArrays {
             initial_volume: self.initial_volume.clone(),
             fields: std::array::from_fn(|field| all.iter().map(|summary| summary[field]).collect()),
-            own: (0..self.state.n_fields)
-                .map(|field| (0..self.n_elements).map(|e| self.state.at(field, e)).collect())
-                .collect(),
-            history: Vec::new(),
+            own: (0..self.n_own()).map(of_field).collect(),
+            history: (self.n_own()..self.state.n_fields).map(of_field).collect(),
         }
     }
 
@@ -358,6 +468,15 @@ impl Group for Core {
     }
 
     fn met(&self, criteria: &Criteria, sets: &[Range<u32>]) -> Vec<u32> {
+        if let Law::Laminate(_) = self.law {
+            let is_gone = |&slot: &usize| {
+                (0..self.points.len()).all(|point| self.ply(point, laminate::IS_GONE, slot) >= 1.0)
+            };
+            return match criteria.failure {
+                true => living(&self.alive, sets).filter(is_gone).map(|slot| slot as u32).collect(),
+                false => Vec::new(),
+            };
+        }
         // What the layers break by; without that none has.
         let Some(limit) = self.breaks.filter(|_| criteria.plastic_strain.is_some()) else {
             return Vec::new();
@@ -419,8 +538,25 @@ impl Shells {
         rule: Rule,
         material: &Material,
     ) -> Result<Shells, SectionError> {
-        let section = Section { thickness, rule, thins: true, breaks: None };
+        let section = Section { thickness, rule, thins: true, breaks: None, laminate: None };
+        Self::of(x, corners, &section, material)
+    }
+
+    /// The same of any section.
+    ///
+    /// # Errors
+    /// [`SectionError`], also where the axis of a laminate has no part in the plane of an element.
+    ///
+    /// # Panics
+    /// As [`Shells::new`].
+    pub fn of(
+        x: &[[f64; 3]],
+        corners: &[[u32; 4]],
+        section: &Section,
+        material: &Material,
+    ) -> Result<Shells, SectionError> {
         section.check(material)?;
+        let thickness = section.thickness;
         let (n_nodes, n_elements) = (x.len(), corners.len());
         let n_padded = n_nodes.next_multiple_of(SET);
         let mut inertia = vec![0.0; n_nodes];
@@ -428,6 +564,17 @@ impl Shells {
         fields[kernel::THICKNESS].fill(thickness);
         for layer in fields[kernel::ELEMENT..].chunks_mut(LAYER) {
             layer[TEMPERATURE].fill(material.initial_temperature());
+        }
+        if let Some(laminate) = &section.laminate {
+            fields.resize(ply_field(section.n_layers()), vec![0.0; n_elements]);
+            for (e, corners) in corners.iter().enumerate() {
+                let x = corners.map(|n| x[n as usize]);
+                let direction =
+                    direction(laminate.axis, material, &x).ok_or(SectionError::Axis { element: e })?;
+                for (field, along) in fields[kernel::ELEMENT..].iter_mut().zip(direction) {
+                    field[e] = along;
+                }
+            }
         }
         let mut masses = vec![0.0; n_padded];
         masses[n_nodes..].fill(1.0);
@@ -453,7 +600,7 @@ impl Shells {
             f: zeros(),
             mass: masses,
             turning: Turning::new(&vec![[0.0; 3]; n_nodes], inertia),
-            core: Core::new(corners, n_nodes, &elements, &volumes, &fields, &section, material)?,
+            core: Core::new(corners, n_nodes, &elements, &volumes, &fields, section, material)?,
         })
     }
 
@@ -473,7 +620,18 @@ impl Shells {
 
     /// Stress of a layer in the frame of its element, xx, yy, xy, yz, zx, counted from below.
     pub fn stress(&self, element: usize, layer: usize) -> [f64; 5] {
-        std::array::from_fn(|i| self.core.state.at(layer_field(layer) + i, element))
+        let core = &self.core;
+        match &core.law {
+            Law::Plain(_) => std::array::from_fn(|i| core.state.at(layer_field(layer) + i, element)),
+            Law::Laminate(stacked) => {
+                stacked.stress(layer, core.direction(element), |i| core.ply(layer, i, element))
+            }
+        }
+    }
+
+    /// The history variables of an element of a laminate: the direction of angle 0, then those of each layer.
+    pub fn variables(&self, element: usize) -> Vec<f64> {
+        self.core.variables(element)
     }
 
     /// Effective plastic strain of a layer.

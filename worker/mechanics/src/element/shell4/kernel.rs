@@ -4,13 +4,12 @@ use std::ops::Range;
 
 use super::{
     geometry::{Geometry, Opposed, dot},
-    layers::{self, LAYER, Resultants, Strains, hooke, scaled, sum},
+    layers::{Layers, Resultants, Strains, hooke, scaled, sum},
 };
 use crate::{
     element::{ElementVote, Fault, vector::Vector},
     exact,
     lanes::{Lane, SET, dispatch::Task},
-    strength::plane_stress::PlaneLaw,
 };
 
 /// State of an element beside its layers: hourglass forces of membrane x and y, bending about x and y, deflection and
@@ -22,7 +21,7 @@ pub(crate) const INTERNAL: usize = 7;
 pub(crate) const HOURGLASS: usize = 8;
 
 /// Shear correction of a homogeneous plate.
-const SHEAR: f64 = 5.0 / 6.0;
+pub(super) const SHEAR: f64 = 5.0 / 6.0;
 /// Share of the hourglass stiffness left where all layers yield. More of it carries load: benches/TRIED.md has a tube of three meshes.
 const SOFT: f64 = 0.02;
 /// The section and hourglass control resist rates of strain: by what an elastic section gains in stress within this part of a step. A
@@ -39,7 +38,7 @@ pub(super) struct View<'a> {
     pub w: [&'a [f64]; 3],
     pub f: [&'a mut [f64]; 3],
     pub m: [&'a mut [f64]; 3],
-    /// By lane set: `ELEMENT` fields, then `LAYER` for each point.
+    /// By lane set: `ELEMENT` fields, then those of the layers.
     pub state: &'a mut [f64],
     pub mass: &'a [f64],
     pub alive: &'a [u8],
@@ -48,8 +47,8 @@ pub(super) struct View<'a> {
 
 /// What does not change from element to element.
 #[derive(Clone, Copy)]
-pub(super) struct Constants<'a> {
-    pub law: PlaneLaw,
+pub(super) struct Constants<'a, W> {
+    pub law: W,
     pub points: &'a [(f64, f64)],
     /// Share of the strain across the thickness that the thickness follows.
     pub thinning: f64,
@@ -66,19 +65,19 @@ pub(super) struct Constants<'a> {
 }
 
 /// The elements of some sets.
-pub(super) struct Pass<'a> {
+pub(super) struct Pass<'a, W> {
     view: View<'a>,
-    constants: &'a Constants<'a>,
+    constants: &'a Constants<'a, W>,
     sets: &'a [Range<u32>],
     vote: &'a mut ElementVote,
 }
 
-impl<'a> Pass<'a> {
+impl<'a, W: Layers> Pass<'a, W> {
     /// # Safety
     /// As [`compute`].
     pub unsafe fn new(
         view: View<'a>,
-        constants: &'a Constants<'a>,
+        constants: &'a Constants<'a, W>,
         sets: &'a [Range<u32>],
         vote: &'a mut ElementVote,
     ) -> Self {
@@ -86,7 +85,7 @@ impl<'a> Pass<'a> {
     }
 }
 
-impl Task for Pass<'_> {
+impl<W: Layers> Task for Pass<'_, W> {
     type Output = ();
 
     #[inline(always)]
@@ -95,7 +94,7 @@ impl Task for Pass<'_> {
         let Self { mut view, constants, sets, vote } = self;
         let (constants, mut own) = (*constants, *vote);
         // SAFETY: whoever made the pass has promised it.
-        unsafe { compute::<L>(&mut view, &constants, sets, &mut own) }
+        unsafe { compute::<L, W>(&mut view, &constants, sets, &mut own) }
         *vote = own;
     }
 }
@@ -105,9 +104,9 @@ impl Task for Pass<'_> {
 /// # Safety
 /// Every array by slot holds all sets of the ranges, and every corner is inside the node arrays.
 #[inline(always)]
-unsafe fn compute<L: Lane>(
+unsafe fn compute<L: Lane, W: Layers>(
     view: &mut View<'_>,
-    c: &Constants<'_>,
+    c: &Constants<'_, W>,
     sets: &[Range<u32>],
     vote: &mut ElementVote,
 ) {
@@ -115,7 +114,7 @@ unsafe fn compute<L: Lane>(
         let mut slot = range.start as usize * SET;
         while slot < range.end as usize * SET {
             // SAFETY: handed on from the caller.
-            unsafe { slots::<L>(view, c, slot, vote) };
+            unsafe { slots::<L, W>(view, c, slot, vote) };
             slot += L::N;
         }
     }
@@ -146,7 +145,12 @@ unsafe fn gather<L: Lane>(view: &View<'_>, from: &[&[f64]; 3], slot: usize) -> [
 /// # Safety
 /// As [`compute`].
 #[inline(always)]
-unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vote: &mut ElementVote) {
+unsafe fn slots<L: Lane, W: Layers>(
+    view: &mut View<'_>,
+    c: &Constants<'_, W>,
+    slot: usize,
+    vote: &mut ElementVote,
+) {
     let (zero, one, half, quarter) = (L::splat(0.0), L::splat(1.0), L::splat(0.5), L::splat(0.25));
     let minus = L::splat(-1.0);
     let dt = L::splat(c.dt);
@@ -161,7 +165,7 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
     };
     let alive = L::mask(u32::from(view.alive[slot / SET]) >> (slot % SET));
     let lane = slot % SET;
-    let n_numbers = (ELEMENT + c.points.len() * LAYER) * SET;
+    let n_numbers = (ELEMENT + W::SHARED + c.points.len() * W::BY_LAYER) * SET;
     let (own, of_layers) = view.state[slot / SET * n_numbers..][..n_numbers].split_at_mut(ELEMENT * SET);
     let mut state = [zero; ELEMENT];
     let mut i = 0;
@@ -221,7 +225,7 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
     ];
 
     // 2. Stress of the layers, thinning, energy.
-    let (young, poisson, g_modulus) = (c.law.young, c.law.poisson, c.law.shear());
+    let [young, poisson, g_modulus] = c.law.moduli();
     let plate = young / (1.0 - poisson * poisson);
     let (stiff, coupled) = (L::splat(plate), L::splat(plate * poisson));
     let (shear, transverse) = (L::splat(g_modulus), L::splat(SHEAR * g_modulus));
@@ -232,7 +236,7 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         shear: [transverse * shear_y, transverse * shear_x],
     };
     // SAFETY: slots are inside.
-    let (before, after, elastic) = unsafe { layers::update(of_layers, c, lane, alive, h, &strains, &growth) };
+    let (before, after, elastic) = unsafe { W::update(of_layers, c, lane, alive, h, &strains, &growth) };
     let power = half * before.plus(&after).power(&strains);
     // Strain across the thickness: its elastic part by Hooke, its plastic part keeps the volume.
     let rise = (after.n[0] - before.n[0]) + (after.n[1] - before.n[1]);
@@ -390,7 +394,7 @@ unsafe fn slots<L: Lane>(view: &mut View<'_>, c: &Constants<'_>, slot: usize, vo
         i += 1;
     }
     // The membrane wave with the mass that the element has: c^2 = plate stiffness * volume / mass.
-    let courant = (mass / (L::splat(plate) * volume * largest)).sqrt().to_array();
+    let courant = (mass / (L::splat(c.law.wave()) * volume * largest)).sqrt().to_array();
     let energy_magic = L::splat(c.energy_magic);
     let internal = L::select(computed, state[INTERNAL], zero);
     let internal = exact::rounded(internal, energy_magic).to_array();

@@ -3,7 +3,7 @@
 use super::kernel::Constants;
 use crate::{
     lanes::{Lane, SET},
-    strength::plane_stress::{Layer, Plane},
+    strength::plane_stress::{Layer, Plane, PlaneLaw},
 };
 
 /// State of a layer: stress xx, yy, xy, yz, zx, plastic strain, temperature.
@@ -12,6 +12,64 @@ pub const LAYER: usize = 7;
 pub(super) const PLASTIC_STRAIN: usize = 5;
 /// Index of its temperature.
 pub(super) const TEMPERATURE: usize = 6;
+
+/// What the layers of a kind of sections are made of: the kernel has a copy for each kind.
+pub(super) trait Layers: Copy + Sync {
+    /// Numbers that the layers of an element share, in front of their own.
+    const SHARED: usize;
+    /// Numbers of each layer.
+    const BY_LAYER: usize;
+
+    /// Young's modulus, Poisson's ratio and shear modulus of the section as a whole, by which hourglass control and damping go.
+    fn moduli(&self) -> [f64; 3];
+
+    /// Stiffness of the fastest wave in the plane (stress).
+    fn wave(&self) -> f64;
+
+    /// Brings the layers from `n-1` to `n`; `elastic` is how fast stress grows by [`Layers::moduli`]. Gives the sums of the stress before and
+    /// after, and the share of the thickness that is elastic.
+    ///
+    /// # Safety
+    /// `state` holds the numbers of a set of all points, and the lanes from `lane` on are inside the set.
+    unsafe fn update<L: Lane>(
+        state: &mut [f64],
+        c: &Constants<'_, Self>,
+        lane: usize,
+        alive: L::Mask,
+        h: L,
+        rates: &Strains<L>,
+        elastic: &Strains<L>,
+    ) -> (Resultants<L>, Resultants<L>, L);
+}
+
+impl Layers for PlaneLaw {
+    const SHARED: usize = 0;
+    const BY_LAYER: usize = LAYER;
+
+    #[inline(always)]
+    fn moduli(&self) -> [f64; 3] {
+        [self.young, self.poisson, self.shear()]
+    }
+
+    #[inline(always)]
+    fn wave(&self) -> f64 {
+        self.young / (1.0 - self.poisson * self.poisson)
+    }
+
+    #[inline(always)]
+    unsafe fn update<L: Lane>(
+        state: &mut [f64],
+        c: &Constants<'_, Self>,
+        lane: usize,
+        alive: L::Mask,
+        h: L,
+        rates: &Strains<L>,
+        elastic: &Strains<L>,
+    ) -> (Resultants<L>, Resultants<L>, L) {
+        // SAFETY: handed on from the caller.
+        unsafe { update(state, c, lane, alive, h, rates, elastic) }
+    }
+}
 
 /// What happens to the section of an element: rates of strain xx, yy, xy of the middle surface, the same by height above it, and rates of
 /// transverse shear yz, zx.
@@ -32,14 +90,14 @@ pub(super) struct Resultants<L> {
 
 impl<L: Lane> Resultants<L> {
     #[inline(always)]
-    fn none() -> Self {
+    pub fn none() -> Self {
         let zero = L::splat(0.0);
         Self { n: [zero; 3], m: [zero; 3], q: [zero; 2] }
     }
 
     /// Adds the stress of a layer by its weight and that times its height.
     #[inline(always)]
-    fn add(&mut self, weight: L, moment: L, stress: &Plane<L>) {
+    pub fn add(&mut self, weight: L, moment: L, stress: &Plane<L>) {
         let in_plane = [stress.xx, stress.yy, stress.xy];
         let mut i = 0;
         while i < 3 {
@@ -84,9 +142,9 @@ pub(super) fn hooke<L: Lane>(stiff: L, coupled: L, shear: L, strain: &[L; 3]) ->
 /// # Safety
 /// `state` holds [`LAYER`] fields of a set for each point, and the lanes from `lane` on are inside the set.
 #[inline(always)]
-pub(super) unsafe fn update<L: Lane>(
+unsafe fn update<L: Lane>(
     state: &mut [f64],
-    c: &Constants<'_>,
+    c: &Constants<'_, PlaneLaw>,
     lane: usize,
     alive: L::Mask,
     h: L,

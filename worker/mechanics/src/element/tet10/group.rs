@@ -228,7 +228,7 @@ impl Group for Tetrahedra {
         let (density, eos) = (material.density, AnyEos::of(material));
         let hourglass = Resistance::of_points(material);
         if let Some(strength) = AnyRemembering::of(material) {
-            let (n_columns, n_variables) = (self.solids.history().len(), material.history().len());
+            let (n_columns, n_variables) = (self.solids.n_columns(), material.history().len());
             assert!(n_columns == n_variables, "{n_columns} columns for {n_variables} history variables");
             self.shown.iter_mut().flatten().for_each(|values| values.resize(n_sets * SET, 0.0));
             let laws = Laws { density, eos, strength: Apart(strength), failure: Unfailing, hourglass };
@@ -242,8 +242,8 @@ impl Group for Tetrahedra {
         self.solids.element(element, x)
     }
 
-    fn history(&self) -> &[Vec<f64>] {
-        self.solids.history()
+    fn variables(&self, slot: usize) -> Vec<f64> {
+        self.solids.variables(slot)
     }
 
     fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays {
