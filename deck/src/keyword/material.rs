@@ -6,6 +6,8 @@ mod foam;
 mod metal;
 mod rubber;
 
+pub(super) use composite::Fibres;
+
 use mechanics::material::{Eos, Failure, Strength};
 
 use super::{
@@ -29,6 +31,8 @@ pub(super) struct MaterialCard {
     pub(super) law: Law,
     /// When elements leave by its own card.
     pub(super) erosion: Limits,
+    /// Where angle 0 is in shells of a composite.
+    pub(super) fibres: Option<Fibres>,
 }
 
 #[expect(clippy::large_enum_variant, reason = "one for a material of the deck")]
@@ -110,7 +114,7 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 23] = [
+const NUMBERS: [(&str, &str); 24] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_002", "MAT_ORTHOTROPIC_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
@@ -124,6 +128,7 @@ const NUMBERS: [(&str, &str); 23] = [
     ("MAT_024", "MAT_PIECEWISE_LINEAR_PLASTICITY"),
     ("MAT_026", "MAT_HONEYCOMB"),
     ("MAT_027", "MAT_MOONEY-RIVLIN_RUBBER"),
+    ("MAT_054", "MAT_ENHANCED_COMPOSITE_DAMAGE"),
     ("MAT_057", "MAT_LOW_DENSITY_FOAM"),
     ("MAT_063", "MAT_CRUSHABLE_FOAM"),
     ("MAT_065", "MAT_MODIFIED_ZERILLI_ARMSTRONG"),
@@ -163,6 +168,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
         (c > 0.0 && p > 0.0).then_some([c, p])
     };
     let mut needs_moduli = true;
+    let mut fibres = None;
     let (elastic, law) = match word {
         "MAT_ELASTIC" => {
             for i in [4, 5].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
@@ -280,7 +286,15 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
         }
         "MAT_ORTHOTROPIC_ELASTIC" | "MAT_COMPOSITE_DAMAGE" => {
             needs_moduli = false;
-            (None, composite::orthotropic(&f, word == "MAT_COMPOSITE_DAMAGE"))
+            let (law, axes) = composite::orthotropic(&f, word == "MAT_COMPOSITE_DAMAGE");
+            fibres = Some(axes);
+            (None, law)
+        }
+        "MAT_ENHANCED_COMPOSITE_DAMAGE" => {
+            needs_moduli = false;
+            let (law, axes) = composite::enhanced(&f, &mut limits);
+            fibres = Some(axes);
+            (None, law)
         }
         "MAT_HONEYCOMB" => {
             needs_moduli = false;
@@ -349,7 +363,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
     if elastic.is_none() && needs_moduli {
         return None;
     }
-    Some(MaterialCard { at: cards[0].at, density: density?, elastic, law: law?, erosion: limits })
+    Some(MaterialCard { at: cards[0].at, density: density?, elastic, law: law?, erosion: limits, fibres })
 }
 
 /// Five cards of `*MAT_JOHNSON_COOK`.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use mechanics::element::beam2::BeamSection;
+use mechanics::{element::beam2::BeamSection, mesh::Ply};
 
 use super::{
     blast::Blasts,
@@ -71,7 +71,7 @@ pub(super) struct PartCard {
 }
 
 /// `*SECTION_`.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) enum Section {
     Solid {
         eight_points: bool,
@@ -83,7 +83,7 @@ pub(super) enum Section {
 }
 
 /// `*SECTION_SHELL`.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct ShellSection {
     /// Mean of its corners; 0 where elements give theirs.
     pub(super) thickness: f64,
@@ -91,6 +91,10 @@ pub(super) struct ShellSection {
     pub(super) points: u32,
     /// Whether they are Lobatto's, else Gauss's.
     pub(super) lobatto: bool,
+    /// Of a composite the angle at each point (degrees).
+    pub(super) angles: Vec<f64>,
+    /// Of a composite its plies from below, by angle and thickness.
+    pub(super) plies: Vec<Ply>,
 }
 
 /// `*HOURGLASS`.

@@ -1,5 +1,7 @@
 //! `*PART`, `*SECTION_` of solids and shells, and `*HOURGLASS`.
 
+use mechanics::mesh::{MAX_LAYERS, Ply};
+
 use super::{
     cards::{Block, Card},
     fields::{Context, Fields, TENS},
@@ -52,6 +54,81 @@ pub(super) fn read_part(problem: &mut Problem, heading: &Card<'_>, f: &Fields<'_
     }
 }
 
+/// `*PART_COMPOSITE`: a heading, a card of the shells, and plies from the lower side up, two on a card. Each has one point.
+pub(super) fn read_composite(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
+    let [heading, card, plies @ ..] = block.cards.as_slice() else {
+        context.log.fault(
+            block.at,
+            "*PART_COMPOSITE",
+            "a heading and a card of the shells",
+            "complete the part",
+        );
+        return;
+    };
+    let f = context.fields(card, block.width, &TENS);
+    match f.integer(1) {
+        0 | 2 => {}
+        form @ (-16 | 1 | 3 | 4 | 6..=8 | 10 | 11 | 16..=18 | 20 | 21 | 25..=27) => context.log.warn(
+            card.at,
+            format!("ELFORM {form}: shells are computed with one point and hourglass control, as ELFORM 2 with warping"),
+        ),
+        _ => f.fault(1, "ELFORM 2", "take the shell of Belytschko, Lin and Tsay"),
+    }
+    for (i, expected) in [
+        (3, "no NLOC: nodes in the middle of the thickness"),
+        (4, "no MAREA: mass that is not structural"),
+        (6, "no adaptive mesh"),
+        (7, "no THSHEL"),
+    ] {
+        if f.real(i, 0.0) != 0.0 {
+            f.fault(i, expected, "leave it blank");
+        }
+    }
+    let mut layers = Vec::new();
+    let mut material = None;
+    for card in plies {
+        let g = context.fields(card, block.width, &TENS);
+        for first in [0, 4].into_iter().filter(|first| g.integer(*first) != 0) {
+            let own = g.reference(first, "MID");
+            let number = own.value;
+            let common = material.get_or_insert(own).value;
+            if number != common {
+                let expected = format!("material {common} in all plies");
+                g.fault(first, expected, "make parts of the other materials");
+            }
+            if g.integer(first + 3) != 0 {
+                g.fault(first + 3, "no thermal material of a ply", "leave TMID blank");
+            }
+            match g.positive(first + 1, "a thickness") {
+                Some(share) => layers.push(Ply { angle: g.real(first + 2, 0.0), share }),
+                None => return,
+            }
+        }
+    }
+    let Some(material) = material else {
+        f.fault(0, "plies by MID, THICK and B", "give the plies from the lower side up");
+        return;
+    };
+    let id = f.id(0);
+    // A section of its own, by a number that no card can give.
+    let section = u32::MAX - id;
+    let thickness = layers.iter().map(|ply: &Ply| ply.share).sum();
+    let shell = ShellSection { thickness, points: 1, lobatto: false, angles: Vec::new(), plies: layers };
+    problem.sections.insert(section, (card.at, Section::Shell(shell)));
+    let part = PartCard {
+        at: card.at,
+        title: heading.text.trim().to_string(),
+        section: f.placed(0, "PID", section),
+        material,
+        eos: f.placed(0, "PID", 0),
+        hourglass: f.id(5),
+    };
+    if let Some(first) = problem.parts.insert(id, part) {
+        let other = context.log.line(first.at, f.at);
+        f.fault(0, format!("a part number other than {id}, which {other} has"), "renumber one");
+    }
+}
+
 pub(super) fn read_solid_sections(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
         let f = context.fields(card, block.width, &TENS);
@@ -100,11 +177,12 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
         }
         let asked = if points == 0 { 2 } else { points };
         let points = asked.clamp(if lobatto { 3 } else { 1 }, 5);
-        if points != asked {
+        if points != asked && f.integer(6) != 1 {
             context.log.warn(card.at, format!("NIP {asked}: {points} points through the thickness"));
         }
-        if f.integer(6) != 0 {
-            f.fault(6, "one material through the thickness", "leave ICOMP blank");
+        let is_composite = f.integer(6) == 1;
+        if !matches!(f.integer(6), 0 | 1) {
+            f.fault(6, "ICOMP 0 or 1", "give 1 of a composite with the angles of its layers");
         }
         let second = cards.next();
         let thickness = second.map_or(0.0, |second| {
@@ -116,7 +194,28 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
             let all = corners[1..].iter().all(|t| *t > 0.0);
             if all { corners.iter().sum::<f64>() / 4.0 } else { corners[0] }
         });
-        let section = ShellSection { thickness, points: points as u32, lobatto };
+        let mut angles = Vec::new();
+        let mut left = if is_composite { asked.clamp(0, MAX_LAYERS as i64) as usize } else { 0 };
+        while let Some(card) = Some(()).filter(|()| left > 0).and_then(|()| cards.next()) {
+            let g = context.fields(card, block.width, &TENS);
+            angles.extend((0..left.min(8)).map(|i| g.real(i, 0.0)));
+            left -= left.min(8);
+        }
+        if is_composite && (left > 0 || asked as usize > MAX_LAYERS) {
+            let expected =
+                format!("an angle for each of the NIP points, of which there are 1 to {MAX_LAYERS}");
+            f.fault(3, expected, "give the angles B1 and so on behind the thickness");
+        }
+        let mut plies = Vec::new();
+        if is_composite && points != asked {
+            context.log.warn(
+                card.at,
+                format!("NIP {asked} of a composite: the layers are plies of equal thickness, with a point in each"),
+            );
+            plies = angles.drain(..).map(|angle| Ply { angle, share: 1.0 }).collect();
+        }
+        let (points, lobatto) = if plies.is_empty() { (points as u32, lobatto) } else { (1, false) };
+        let section = ShellSection { thickness, points, lobatto, angles, plies };
         problem.sections.insert(f.id(0), (card.at, Section::Shell(section)));
     }
 }

@@ -143,6 +143,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "ELEMENT_SHELL_THICKNESS" => mesh::read_shells(problem, block, context, true),
         "PART" => property::read_parts(problem, block, context, false),
         "PART_CONTACT" => property::read_parts(problem, block, context, true),
+        "PART_COMPOSITE" => property::read_composite(problem, block, context),
         "PART_INERTIA" => inertia::read(problem, block, context),
         "SECTION_SOLID" => property::read_solid_sections(problem, block, context),
         "SECTION_SHELL" => property::read_shell_sections(problem, block, context),

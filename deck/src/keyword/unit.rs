@@ -191,6 +191,7 @@ mod tests {
             elastic: Some((young, 0.3)),
             law: Law::Elastic,
             erosion: Limits::default(),
+            fibres: None,
         };
         let name = choose(asked, None, std::iter::once(&steel), &log);
         let (faults, warnings) = log.into_lists();

@@ -2,12 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mechanics::{element::shell4::Rule, mesh};
+use mechanics::{
+    element::shell4::Rule,
+    mesh::{self, Axis, Laminate, Plies, Ply},
+};
 
 use super::{material::material_name, rigid, state::Translation};
 use crate::{
     geometry::{cross, sub},
-    keyword::{material::Law, problem::Section},
+    keyword::{
+        material::{Fibres, Law},
+        problem::{Section, ShellSection},
+    },
     place::{Origin, Place},
     table::MAX_NAME,
     typed::{
@@ -66,12 +72,13 @@ pub(super) fn write(t: &mut Translation<'_>) {
                 let rule =
                     if shell.lobatto { Rule::Lobatto(shell.points) } else { Rule::Gauss(shell.points) };
                 let thickness = t.number(at, "a thickness of", *thickness);
+                let fibres = problem.materials.get(&part.material.value).and_then(|card| card.fibres);
                 Kind::Shells(mesh::Section {
                     thickness,
                     rule,
                     thins: problem.control.shells_thin,
                     breaks: None,
-                    laminate: None,
+                    laminate: laminate(shell, fibres),
                 })
             }
             (None, Some((_, Section::Truss(area)))) => {
@@ -80,6 +87,12 @@ pub(super) fn write(t: &mut Translation<'_>) {
             (None, Some((_, Section::Beam(section)))) => Kind::Beams { section: *section, across: [0.0; 3] },
             _ => Kind::Solids,
         };
+        let fibres = problem.materials.get(&part.material.value).and_then(|card| card.fibres);
+        if let Some(fibres) = fibres.filter(|fibres| kind == Kind::Solids && fibres.axis != Axis::Material) {
+            let expected = "AOPT 2: axes by the vectors A and D, the same for each solid";
+            let advice = "give AOPT 2, A1 to A3 and D1 to D3, and a part for each direction";
+            t.log.fault_of(fibres.origin, expected, advice);
+        }
         let source = Source::Body {
             mesh: made(t.mesh_name.to_string(), at),
             body: Some(made(format!("part {id}"), at)),
@@ -114,6 +127,23 @@ pub(super) fn write(t: &mut Translation<'_>) {
     // Nodes of several parts get theirs from the mesh wherever one part would give them another.
     t.mesh.velocities = apart.iter().map(|node| (*node, of(node))).collect();
     t.mesh.spins = turning.iter().map(|node| (*node, spin[node])).collect();
+}
+
+/// How shells of a composite are laid up; none where neither the material nor the section says anything of it.
+fn laminate(shell: &ShellSection, fibres: Option<Fibres>) -> Option<Laminate> {
+    if fibres.is_none() && shell.angles.is_empty() && shell.plies.is_empty() {
+        return None;
+    }
+    let (axis, turn) = fibres.map_or((Axis::Material, 0.0), |fibres| (fibres.axis, fibres.turn));
+    let plies = if !shell.plies.is_empty() {
+        let turned = |ply: &Ply| Ply { angle: ply.angle + turn, ..*ply };
+        Plies::Stacked(shell.plies.iter().map(turned).collect())
+    } else if shell.angles.is_empty() && turn != 0.0 {
+        Plies::AtPoints(vec![turn; shell.points as usize])
+    } else {
+        Plies::AtPoints(shell.angles.iter().map(|angle| angle + turn).collect())
+    };
+    Some(Laminate { axis, plies })
 }
 
 /// Initial velocities by node, and rotation rates that are not zero; later ones replace earlier ones.

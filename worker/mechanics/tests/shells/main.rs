@@ -2,6 +2,8 @@
 
 #![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
 
+mod laminate;
+
 use mechanics::{
     element::{
         ElementVote,
