@@ -123,3 +123,47 @@ fn a_worker_of_a_sheet_that_tears_is_lost_and_changes_no_bit() {
         losing_a_worker_changes_no_bit(&sheet(retain_inertia));
     }
 }
+
+/// A ball that breaks the plies of a panel one by one, and elements with them.
+fn panel() -> Model {
+    model(
+        r#"
+        title = "a ball goes through plies"
+        units = "mm-ms-kg"
+        [control]
+        end_time = 1
+        end_cycle = 700
+        [[part]]
+        name = "ball"
+        material = "STEEL_4340"
+        velocity = [0, 5, -150]
+        sphere = { centre = [0, 0, 5.6], radius = 5, sector = "full", cells = [2, 1] }
+        [[part]]
+        name = "panel"
+        material = "KEVLAR_49_EPOXY"
+        shell = { plies = [{ angle = 0, thickness = 0.3 }, { angle = 60, thickness = 0.2 }, { angle = -60, thickness = 0.3 }], points = 2 }
+        plate = { origin = [-10, -10, 0], side_i = [20, 0, 0], side_j = [0, 20, 0], cells = [16, 16] }
+        clamp = "edges"
+        erosion = { failure = true }
+        [contact]
+        gap_length = 0.3
+        friction = 0.1
+        [output]
+        history_cycles = 1
+        "#,
+    )
+}
+
+#[test]
+fn plies_that_break_have_the_same_bits_on_any_workers_and_over_a_loss_and_close_their_energy() {
+    let model = panel();
+    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
+    let gone = alone.outcome.run_totals.eroded_elements;
+    println!("{gone} eroded");
+    assert!(gone > 3, "{gone} eroded");
+    let error = alone.rows.iter().map(|row| row.error.abs()).fold(0.0, f64::max);
+    assert!(error < 0.01, "energy error {error}");
+    same_bits(&model);
+    same_bits_on_route_direct(&model, &Fingerprint::of(&alone));
+    losing_a_worker_changes_no_bit(&model);
+}

@@ -223,7 +223,7 @@ fn criteria(given: &Erosion, kind: &Kind, material: Option<&Material>, log: &Log
 /// Shells of composites erode when all their layers have failed, and by nothing else.
 fn check_plies(given: &Erosion, log: &Log<'_>) {
     let mut origins: Vec<Origin> = given.limits.iter().map(|(_, limit)| limit.origin).collect();
-    if !given.failure.as_ref().is_some_and(|on| on.value) {
+    if origins.is_empty() && !given.failure.as_ref().is_some_and(|on| on.value) {
         origins.push(given.failure.as_ref().map_or(given.origin, |on| on.origin));
     }
     for origin in origins {

@@ -4,7 +4,7 @@ use mechanics::{
     contact::Settings,
     element::{beam2, tet10, truss2},
     material::{Failure, Material, Strength},
-    mesh::Topology,
+    mesh::{self, Topology},
 };
 use rayon::prelude::*;
 
@@ -48,10 +48,13 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
     for (part, draft) in assembly.mesh.parts.iter().zip(parts) {
         let material = draft.material.and_then(|index| materials.get(index as usize));
         let Some(material) = material else { continue };
-        if matches!(material.strength, Strength::ChangChang(_)) && part.section().is_none() {
+        if matches!(material.strength, Strength::ChangChang(_))
+            && part.section().is_none()
+            && part.n_elements() > 0
+        {
             log.fault(
                 draft.at,
-                format!("part \"{}\" of \"{}\", whose strength is chang_chang", part.name, material.name),
+                format!("part \"{}\" of \"{}\", whose strength is chang-chang", part.name, material.name),
                 "shells: it is the law of their layers",
                 log.say(
                     "take orthotropic, or give the part a shell",
@@ -77,7 +80,33 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
                 continue;
             }
             Topology::Shells { section, .. } => {
-                ("shells", section.check(material).map_err(|e| e.to_string()))
+                let checked = section.check(material);
+                let unlaid = || mesh::first_without_direction(part, material, &assembly.mesh.positions);
+                match checked {
+                    Err(error) if !error.is_of_law() => {
+                        let expected = "a section that can be laid up";
+                        let advice = log.say("correct its shell", "correct its section");
+                        log.fault(draft.at, format!("part \"{}\": {error}", part.name), expected, advice);
+                        continue;
+                    }
+                    Ok(()) if let Some(e) = unlaid() => {
+                        log.fault(
+                            draft.at,
+                            format!(
+                                "part \"{}\": the direction of angle 0 of its plies is normal to element {}",
+                                part.name, part.element_ids[e]
+                            ),
+                            "a direction with a part in the plane of each element",
+                            log.say(
+                                "take another axis, or across = [x, y, z]",
+                                "take another AOPT or vector",
+                            ),
+                        );
+                        continue;
+                    }
+                    _ => {}
+                }
+                ("shells", checked.map_err(|e| e.to_string()))
             }
             Topology::Beams { bars, section, across } => {
                 let e = (0..bars.len()).find(|&e| is_unturned(part, e, across[e], section, assembly));
@@ -123,7 +152,7 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
 
 /// Whether a beam whose section has a wide and a narrow side is not told how it stands.
 fn is_unturned(
-    part: &mechanics::mesh::Part,
+    part: &mesh::Part,
     e: usize,
     across: [f64; 3],
     section: &beam2::BeamSection,

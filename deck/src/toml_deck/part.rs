@@ -218,10 +218,6 @@ fn read_plies(value: Value<'_>) -> Option<Vec<Ply>> {
     let mut plies = Vec::with_capacity(items.len());
     for (n, item) in (1..).zip(items) {
         let table = item.table(format!("ply {n}"))?;
-        if let Some(material) = table.get("material") {
-            material
-                .fault("the material of the part in all plies", "remove it; make parts of other materials");
-        }
         let (angle, thickness) = (table.number("angle", ANGLE), table.number("thickness", Range::Positive));
         table.finish();
         plies.push(angle.zip(thickness).map(|(angle, share)| Ply { angle, share }));

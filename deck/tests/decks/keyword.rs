@@ -7,6 +7,7 @@ mod contact;
 mod faults;
 mod hourglass;
 mod joints;
+mod laminates;
 mod laws;
 mod mutations;
 mod records;
@@ -114,7 +115,7 @@ fn ball_on_shell_has_clamped_shells_of_five_points_that_solids_meet() {
     assert_eq!((sheet.name.as_str(), sheet.n_elements(), ball.n_elements()), ("sheet", 144, 64));
     assert_eq!(
         sheet.section(),
-        Some(Section { thickness: 1.0, rule: Rule::Gauss(5), thins: true, breaks: None, laminate: None })
+        Some(&Section { thickness: 1.0, rule: Rule::Gauss(5), thins: true, breaks: None, laminate: None })
     );
     // Both kinds are numbered from 1.
     assert_eq!((sheet.element_ids[0], ball.element_ids[0]), (1, 1));
@@ -142,7 +143,7 @@ fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
     let part = &reading.model.mesh.parts[0];
     assert_eq!(
         part.section(),
-        Some(Section { thickness: 2.0, rule: Rule::Lobatto(5), thins: false, breaks: None, laminate: None })
+        Some(&Section { thickness: 2.0, rule: Rule::Lobatto(5), thins: false, breaks: None, laminate: None })
     );
     assert_eq!(part.corners(1)[..4], [3, 2, 4, 4]);
     assert_eq!((reading.model.spin[2], reading.model.velocity[2]), ([0.0, 0.0, 3.0], [-30.0, 30.0, 0.0]));
@@ -160,7 +161,7 @@ fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
     let model = read(&own).unwrap_or_else(|f| panic!("{}", lines(&f)));
     assert_eq!(
         model.mesh.parts[0].section(),
-        Some(Section { thickness: 2.0, rule: Rule::Gauss(2), thins: false, breaks: None, laminate: None })
+        Some(&Section { thickness: 2.0, rule: Rule::Gauss(2), thins: false, breaks: None, laminate: None })
     );
 }
 
@@ -172,7 +173,7 @@ fn shells_that_cannot_be_computed_are_refused_at_their_line() {
     for (section, more, expected) in [
         ("*SECTION_SHELL\n1,5\n2\n", "", "a.k:8:"),
         ("*SECTION_SHELL\n1,2\n", "", "shell 1 without a thickness"),
-        ("*SECTION_SHELL\n1,2,,,,,1\n2\n", "", "one material through the thickness"),
+        ("*SECTION_SHELL\n1,2,,,,,1\n2\n", "", "an angle for each of the NIP points"),
         ("*SECTION_SHELL\n1,2\n2,2,2,2,1\n", "", "nodes in the middle of the thickness"),
         ("*SECTION_SOLID\n1,1\n", "", "part 1 with shells and the section at line 8"),
         (sound, "*ELEMENT_SHELL\n2,1,1,2,3,4\n", "a number other than 2"),

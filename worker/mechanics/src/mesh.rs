@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) mod laminate;
 mod sides;
 
-pub use laminate::{Axis, Column, Laminate, LaminateError, MAX_LAYERS, Plies, Ply};
+pub use laminate::{Axis, Column, Laminate, LaminateError, MAX_LAYERS, Plies, Ply, first_without_direction};
 pub(crate) use sides::spread;
 pub use sides::{CORNERS, FACES, MAX_NODES, Nodes, Spacing, UPPER, quad_area, twice};
 

@@ -188,6 +188,9 @@ fn enhanced_law(f: &[Fields<'_>; 8], limits: &mut Limits, global: bool) -> Optio
     if !matches!(f[4].real(2, 0.0), 0.0 | 1.0) {
         f[4].fault(2, "SOFT 1: strengths that do not depend on neighbours", "leave SOFT blank");
     }
+    if !matches!(f[6].real(0, 0.0), 0.0 | 100.0) {
+        f[6].fault(0, "PEL 100: elements leave when all their layers have failed", "leave PEL blank");
+    }
     if !matches!(f[5].real(5, 0.0), 0.0 | 54.0) {
         f[5].fault(5, "CRIT 54: the criterion of Chang and Chang", "give CRIT 54");
     }

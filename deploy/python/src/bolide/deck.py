@@ -312,16 +312,27 @@ class Deck:
         material: str | Mapping[str, Any],
         *,
         size: Vector,
-        thickness: Number,
+        thickness: Number | None = None,
+        plies: Sequence[Sequence[Number]] | None = None,
         cell: Number | None = None,
         cells: Sequence[int] | None = None,
-        points: int = 5,
+        points: int | None = None,
         **keys: Any,
     ) -> Part:
         """A sheet of shells, `size` = length, width, about the z axis with its middle surface in z = 0.
 
-        Shells erode by plastic strain: `erode` is that limit.
+        A composite has `plies` instead of a `thickness`: angle (degrees) and thickness of each, from the lower side up. `points` are those
+        through the thickness (5), or through each ply (2).
+
+        Shells erode by plastic strain: `erode` is that limit. Those of composites erode when all their layers have failed: `erode={"failure": True}`.
         """
+        if (thickness is None) == (plies is None):
+            raise ValueError(f"sheet {name}: has a thickness or plies; give one of them")
+        shell: dict[str, Any] = {"points": points or (5 if plies is None else 2)}
+        if plies is None:
+            shell["thickness"] = thickness
+        else:
+            shell["plies"] = [{"angle": angle, "thickness": ply} for angle, ply in plies]
         length, width = _vector(size, f"size of {name}", 2)
         if keys.get("erode") is not None and not isinstance(keys["erode"], Mapping):
             keys["erode"] = {"plastic_strain": keys["erode"]}
@@ -331,7 +342,7 @@ class Deck:
             "side_j": [0.0, width, 0.0],
             **self._mesh(cell, cells, min(length, width, key=float)),
         }
-        return self.part(name, material, shell={"thickness": thickness, "points": points}, plate=plate, **keys)
+        return self.part(name, material, shell=shell, plate=plate, **keys)
 
     def sphere(
         self,

@@ -21,6 +21,7 @@ mod geometry;
 mod kernel;
 mod laminate;
 mod layers;
+mod section_error;
 
 use serde::{Deserialize, Serialize};
 
@@ -29,9 +30,10 @@ use geometry::Geometry;
 use crate::{element::vector::Vector, lanes::scalar::Scalar};
 
 pub(crate) use block::Core;
-pub use block::{SectionError, ShellStep, Shells};
+pub use block::{ShellStep, Shells};
 pub use kernel::{ELEMENT, THICKNESS};
 pub use layers::LAYER;
+pub use section_error::SectionError;
 
 /// Axes of the frame of an element with its corners at `x`.
 pub(crate) fn frame(x: &[[f64; 3]; 4]) -> [[f64; 3]; 3] {

@@ -162,6 +162,15 @@ impl Part {
     }
 }
 
+/// The first shell of a part to whose plane the direction of angle 0 has no part, if there is one.
+pub fn first_without_direction(part: &Part, material: &Material, positions: &[[f64; 3]]) -> Option<usize> {
+    let laminate = part.section()?.laminate.as_ref()?;
+    (0..part.n_elements()).find(|&e| {
+        let [a, b, c, d, ..] = part.corners(e);
+        direction(laminate.axis, material, &[a, b, c, d].map(|n| positions[n as usize])).is_none()
+    })
+}
+
 /// The direction of angle 0 of an element with its corners at `x`, in its frame; none where the axis has no part in its plane.
 pub(crate) fn direction(axis: Axis, material: &Material, x: &[[f64; 3]; 4]) -> Option<[f64; 2]> {
     let [e1, e2, e3] = shell4::frame(x);

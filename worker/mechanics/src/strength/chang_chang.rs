@@ -24,7 +24,7 @@ use crate::{
 
 declared! {
     /// Constants of the law, for shells.
-    pub struct ChangChang = "chang_chang" {
+    pub struct ChangChang = "chang-chang" {
         /// Young's modulus along the fibres and across them (stress).
         young_a: STRESS, Positive;
         young_b: STRESS, Positive;
@@ -176,8 +176,8 @@ impl Ply {
         Self { law: *law, normal: law.normal().unwrap_or_default(), transverse, holds: law.holds() }
     }
 
-    /// Brings a layer to the end of a step with these strains along its axes: aa, bb, and ab, bc, ca of shear as engineers have it. Gives the lanes where it is
-    /// not elastic.
+    /// Brings a layer to the end of a step with these strains along its axes: aa, bb, and ab, bc, ca of shear as engineers have it. Gives the lanes
+    /// whose fibres do not hold: what the others carry along their fibres the one point of an element does not see, so hourglass control stays whole.
     #[inline(always)]
     pub fn update<L: Lane>(&self, layer: &mut [L; N_VARIABLES], strain: &[L; N_STRESSES]) -> L::Mask {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
@@ -244,7 +244,6 @@ impl Ply {
             let scale =
                 L::select(fails, (L::splat(2.0) / root.max(L::splat(f64::MIN_POSITIVE))).min(one), one);
             (s_b, s_ab) = (s_b * scale, s_ab * scale);
-            strained = L::either(strained, fails);
         }
         let mark = |fails: L::Mask, so_far: L| L::select(fails, one, so_far);
         layer[FIBRE_TENSION] = mark(breaks, layer[FIBRE_TENSION]);
@@ -271,7 +270,7 @@ impl Ply {
             let matrix = L::either(is_one(layer[MATRIX_TENSION]), is_one(layer[MATRIX_COMPRESSION]));
             let both = L::both(is_one(layer[FIBRE_COMPRESSION]), matrix);
             ends = L::either(ends, L::either(is_one(layer[FIBRE_TENSION]), both));
-            strained = L::either(no_a, no_b);
+            strained = no_a;
         }
         layer[GONE] = mark(ends, layer[GONE]);
         L::either(strained, gone)
