@@ -50,10 +50,10 @@ function overview() {
     return;
   }
   $('submit-box').hidden = $('hosts-box').hidden = shows;
-  const count = state => hosts.filter(host => host.state === state).length;
-  const lost = count('lost'), here = hosts.length - lost;
+  const count = (rows, state) => rows.filter(row => row.state === state).length;
+  const lost = count(hosts, 'lost'), here = hosts.length - lost;
   $('counts').textContent = shows ? `${jobs.length} ${jobs.length === 1 ? 'run' : 'runs'}`
-    : `${here} ${here === 1 ? 'host' : 'hosts'}${lost ? `, ${lost} lost` : ''}, ${jobs.filter(j => j.state === 'queued').length} queued`;
+    : `${here} ${here === 1 ? 'host' : 'hosts'}${lost ? `, ${lost} lost` : ''}, ${count(jobs, 'running')} running, ${count(jobs, 'queued')} queued`;
   lists.jobs($('jobs'), jobs, page.chosen, choose, addressOf);
   $('no-jobs').hidden = jobs.length > 0;
   lists.hosts($('hosts'), hosts);

@@ -468,11 +468,15 @@ impl<'a> Table<'a> {
                     None => ends(soonest),
                 },
             };
+            // Which is the one before it.
+            let waits_for_reserved =
+                !row.is_in && self.done.reserved.is_some_and(|(job, _)| job != claim.job);
             let words = match ahead {
                 0 => words,
                 _ if returns.is_some() || row.waits.is_some() => words,
-                1 => format!("{words}, then 1 job before it"),
-                ahead => format!("{words}, then {ahead} jobs before it"),
+                1 if waits_for_reserved => words,
+                1 => format!("{words}; 1 job is before it"),
+                ahead => format!("{words}; {ahead} jobs are before it"),
             };
             ahead += 1;
             self.done.waits.push((claim.job, words));

@@ -139,7 +139,9 @@ fn a_large_job_has_a_reservation_that_only_shorter_jobs_may_use() {
     let told = with(std::slice::from_ref(&long));
     assert!(told.starts.is_empty(), "{told:?}");
     assert_eq!(told.waits[0].1, "4 workers, 2 are idle; expected to start in about 3 min");
-    assert_eq!(told.waits[1].1, "job 5, then 1 job before it");
+    assert_eq!(told.waits[1].1, "job 5");
+    let third = with(&[long.clone(), Claim { job: 7, ..long.clone() }]);
+    assert_eq!(third.waits[2].1, "job 5; 2 jobs are before it");
     let short = Claim { left_s: Some(150.0), ..job(6, 1_000) };
     assert_eq!(with(&[short]).starts, [(6, vec![5])]);
     let unknown = Claim { left_s: None, ..long.clone() };
