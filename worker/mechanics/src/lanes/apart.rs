@@ -31,6 +31,7 @@ pub trait Apart: Sized {
     #[target_feature(enable = "avx2,fma")]
     #[inline(never)]
     unsafe fn run_on_avx2(self) {
+        super::dispatch::align_stack();
         self.run();
     }
 
