@@ -27,7 +27,7 @@ pub(super) trait Layers: Copy + Sync {
     fn wave(&self) -> f64;
 
     /// Brings the layers from `n-1` to `n`; `elastic` is how fast stress grows by [`Layers::moduli`]. Gives the sums of the stress before and
-    /// after, and the share of the thickness that is elastic.
+    /// after, and the share of the thickness that is elastic, or of plies that whose fibres hold.
     ///
     /// # Safety
     /// `state` holds the numbers of a set of all points, and the lanes from `lane` on are inside the set.
@@ -66,8 +66,78 @@ impl Layers for PlaneLaw {
         rates: &Strains<L>,
         elastic: &Strains<L>,
     ) -> (Resultants<L>, Resultants<L>, L) {
-        // SAFETY: handed on from the caller.
-        unsafe { update(state, c, lane, alive, h, rates, elastic) }
+        let (zero, one, dt) = (L::splat(0.0), L::splat(1.0), L::splat(c.dt));
+        let rise = Strains {
+            membrane: scaled(dt, &elastic.membrane),
+            curvature: scaled(dt, &elastic.curvature),
+            shear: [dt * elastic.shear[0], dt * elastic.shear[1]],
+        };
+        let (mut before, mut after) = (Resultants::none(), Resultants::none());
+        let mut whole = zero;
+        let mut point = 0;
+        while point < c.points.len() {
+            let (height, weight) = c.points[point];
+            let z = L::splat(0.5 * height) * h;
+            let weight = L::splat(weight);
+            let moment = weight * z;
+            let first = point * LAYER * SET + lane;
+            let mut old = [zero; LAYER];
+            let mut i = 0;
+            while i < LAYER {
+                // SAFETY: the caller's promise.
+                old[i] = unsafe { L::load(state, first + i * SET) };
+                i += 1;
+            }
+            let [xx, yy, xy, yz, zx, plastic_strain, temperature] = old;
+            before.add(weight, moment, &Plane { xx, yy, xy, yz, zx });
+            let stress = Plane {
+                xx: z.mul_add(rise.curvature[0], xx + rise.membrane[0]),
+                yy: z.mul_add(rise.curvature[1], yy + rise.membrane[1]),
+                xy: z.mul_add(rise.curvature[2], xy + rise.membrane[2]),
+                yz: yz + rise.shear[0],
+                zx: zx + rise.shear[1],
+            };
+            let mut layer = Layer { stress, plastic_strain, temperature };
+            let strained = [
+                z.mul_add(rates.curvature[0], rates.membrane[0]),
+                z.mul_add(rates.curvature[1], rates.membrane[1]),
+                z.mul_add(rates.curvature[2], rates.membrane[2]),
+            ];
+            let yields = c.law.update(&mut layer, &strained);
+            let (mut soft, mut s) = (yields, layer.stress);
+            if let Some(limit) = c.breaks {
+                let broken = L::splat(limit).less_equal(layer.plastic_strain);
+                soft = L::either(yields, broken);
+                let left = L::select(broken, zero, one);
+                s = Plane {
+                    xx: s.xx * left,
+                    yy: s.yy * left,
+                    xy: s.xy * left,
+                    yz: s.yz * left,
+                    zx: s.zx * left,
+                };
+            }
+            whole = whole + L::select(soft, zero, weight);
+            after.add(weight, moment, &s);
+            let stress = [s.xx, s.yy, s.xy, s.yz, s.zx];
+            let mut i = 0;
+            while i < PLASTIC_STRAIN {
+                // SAFETY: the caller's promise.
+                unsafe { L::select(alive, stress[i], old[i]).store(state, first + i * SET) };
+                i += 1;
+            }
+            // Plastic strain and temperature stand where nothing yields.
+            if L::any(yields) {
+                // SAFETY: as above.
+                unsafe {
+                    let kept = L::select(alive, layer.plastic_strain, plastic_strain);
+                    kept.store(state, first + PLASTIC_STRAIN * SET);
+                    L::select(alive, layer.temperature, temperature).store(state, first + TEMPERATURE * SET);
+                }
+            }
+            point += 1;
+        }
+        (before, after, whole)
     }
 }
 
@@ -134,89 +204,6 @@ impl<L: Lane> Resultants<L> {
 pub(super) fn hooke<L: Lane>(stiff: L, coupled: L, shear: L, strain: &[L; 3]) -> [L; 3] {
     let [xx, yy, xy] = *strain;
     [stiff.mul_add(xx, coupled * yy), stiff.mul_add(yy, coupled * xx), shear * xy]
-}
-
-/// Brings the layers from `n-1` to `n`; `elastic` is how fast stress grows while nothing yields. Gives the sums of the stress before and
-/// after, and the share of the thickness that did not yield.
-///
-/// # Safety
-/// `state` holds [`LAYER`] fields of a set for each point, and the lanes from `lane` on are inside the set.
-#[inline(always)]
-unsafe fn update<L: Lane>(
-    state: &mut [f64],
-    c: &Constants<'_, PlaneLaw>,
-    lane: usize,
-    alive: L::Mask,
-    h: L,
-    rates: &Strains<L>,
-    elastic: &Strains<L>,
-) -> (Resultants<L>, Resultants<L>, L) {
-    let (zero, one, dt) = (L::splat(0.0), L::splat(1.0), L::splat(c.dt));
-    let rise = Strains {
-        membrane: scaled(dt, &elastic.membrane),
-        curvature: scaled(dt, &elastic.curvature),
-        shear: [dt * elastic.shear[0], dt * elastic.shear[1]],
-    };
-    let (mut before, mut after) = (Resultants::none(), Resultants::none());
-    let mut whole = zero;
-    let mut point = 0;
-    while point < c.points.len() {
-        let (height, weight) = c.points[point];
-        let z = L::splat(0.5 * height) * h;
-        let weight = L::splat(weight);
-        let moment = weight * z;
-        let first = point * LAYER * SET + lane;
-        let mut old = [zero; LAYER];
-        let mut i = 0;
-        while i < LAYER {
-            // SAFETY: the caller's promise.
-            old[i] = unsafe { L::load(state, first + i * SET) };
-            i += 1;
-        }
-        let [xx, yy, xy, yz, zx, plastic_strain, temperature] = old;
-        before.add(weight, moment, &Plane { xx, yy, xy, yz, zx });
-        let stress = Plane {
-            xx: z.mul_add(rise.curvature[0], xx + rise.membrane[0]),
-            yy: z.mul_add(rise.curvature[1], yy + rise.membrane[1]),
-            xy: z.mul_add(rise.curvature[2], xy + rise.membrane[2]),
-            yz: yz + rise.shear[0],
-            zx: zx + rise.shear[1],
-        };
-        let mut layer = Layer { stress, plastic_strain, temperature };
-        let strained = [
-            z.mul_add(rates.curvature[0], rates.membrane[0]),
-            z.mul_add(rates.curvature[1], rates.membrane[1]),
-            z.mul_add(rates.curvature[2], rates.membrane[2]),
-        ];
-        let yields = c.law.update(&mut layer, &strained);
-        let (mut soft, mut s) = (yields, layer.stress);
-        if let Some(limit) = c.breaks {
-            let broken = L::splat(limit).less_equal(layer.plastic_strain);
-            soft = L::either(yields, broken);
-            let left = L::select(broken, zero, one);
-            s = Plane { xx: s.xx * left, yy: s.yy * left, xy: s.xy * left, yz: s.yz * left, zx: s.zx * left };
-        }
-        whole = whole + L::select(soft, zero, weight);
-        after.add(weight, moment, &s);
-        let stress = [s.xx, s.yy, s.xy, s.yz, s.zx];
-        let mut i = 0;
-        while i < PLASTIC_STRAIN {
-            // SAFETY: the caller's promise.
-            unsafe { L::select(alive, stress[i], old[i]).store(state, first + i * SET) };
-            i += 1;
-        }
-        // Plastic strain and temperature stand where nothing yields.
-        if L::any(yields) {
-            // SAFETY: as above.
-            unsafe {
-                let kept = L::select(alive, layer.plastic_strain, plastic_strain);
-                kept.store(state, first + PLASTIC_STRAIN * SET);
-                L::select(alive, layer.temperature, temperature).store(state, first + TEMPERATURE * SET);
-            }
-        }
-        point += 1;
-    }
-    (before, after, whole)
 }
 
 /// Three numbers times a factor.
