@@ -25,7 +25,6 @@ use tracing::info;
 use crate::{
     desk::{self, Brought},
     notice::{self, Notice},
-    queue::Size,
 };
 
 /// Bytes of a request around a deck.
@@ -206,14 +205,15 @@ impl ClientRequests<'_> {
         options: JobOptions,
     ) -> std::result::Result<Reply, Refusal> {
         options.check().map_err(desk::Error::Options)?;
-        let Brought { text, title, elements, cycles, .. } = match desk::read(name.clone(), text).await {
+        let brought = match desk::read(name.clone(), text).await {
             Ok(brought) => brought,
             Err(desk::Error::Faults(faults)) => {
                 return Ok(Reply::Faults(faults.iter().map(ToString::to_string).collect()));
             }
             Err(error) => return Err(error.into()),
         };
-        let size = Size { elements, cycles: cycles.min(options.cycles.unwrap_or(u64::MAX)) };
+        let size = brought.size(&options);
+        let Brought { text, title, .. } = brought;
         let owner = self.caller.certificate.clone().unwrap_or_default();
         let submit = |answer| Notice::Submit { name, title, text, size, options, owner, answer };
         let job = self.ask(submit).await??;

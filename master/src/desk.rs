@@ -17,10 +17,10 @@ use deck::{
     physics::{self, Forecast},
 };
 use mechanics::initial;
-use protocol::options;
+use protocol::options::{self, JobOptions};
 use tokio::sync::Semaphore;
 
-use crate::{footprint, http::surface};
+use crate::{footprint, http::surface, queue::Size};
 
 /// Longest name of a deck (bytes).
 const NAME_LIMIT: usize = 4096;
@@ -36,8 +36,16 @@ pub struct Brought {
     pub parts: usize,
     pub elements: u64,
     pub nodes: usize,
-    /// To its end, at its first time step; 0 where nothing limits it.
-    pub cycles: u64,
+    /// To its end, at its first time step; none where nothing limits it.
+    pub cycles: Option<u64>,
+}
+
+impl Brought {
+    /// What a job of it is expected to take with these options.
+    pub fn size(&self, options: &JobOptions) -> Size {
+        let cycles = [self.cycles, options.cycles].into_iter().flatten().min();
+        Size { elements: self.elements, cycles: cycles.unwrap_or_default() }
+    }
 }
 
 /// Why a deck is not taken.
@@ -100,7 +108,7 @@ pub struct Looked {
 /// Its faults, or why it is not read.
 pub async fn read(name: String, text: String) -> Result<Brought, Error> {
     in_turn(name, text, |text, reading| {
-        let cycles = physics::forecast(&reading.model).cycles.unwrap_or_default();
+        let cycles = physics::forecast(&reading.model).cycles;
         let Model { title, mesh, .. } = reading.model;
         let (parts, elements, nodes) = (mesh.parts.len(), mesh.n_elements() as u64, mesh.n_nodes());
         Brought { text, title, parts, elements, nodes, cycles }

@@ -47,7 +47,7 @@ use crate::{
     desk::{self, Brought},
     notice::{self, Notice, ask},
     picture::camera::Slice,
-    queue::{self, Size},
+    queue,
 };
 
 /// The shortest time between two events of the stream.
@@ -225,7 +225,7 @@ async fn submit(
     text: String,
 ) -> Result<Json<serde_json::Value>, Fault> {
     let name = name_of(&asked);
-    let Brought { text, title, elements, cycles, .. } = desk::read(name.clone(), text).await?;
+    let brought = desk::read(name.clone(), text).await?;
     let options = JobOptions {
         cycles: asked.cycles,
         min_workers: asked.min_workers.unwrap_or(1).clamp(1, 10_000),
@@ -234,7 +234,8 @@ async fn submit(
         ..JobOptions::default()
     };
     options.check().map_err(desk::Error::Options)?;
-    let size = Size { elements, cycles: cycles.min(options.cycles.unwrap_or(u64::MAX)) };
+    let size = brought.size(&options);
+    let Brought { text, title, .. } = brought;
     let owner = String::new();
     let submit = |answer| Notice::Submit { name, title, text, size, options, owner, answer };
     let job = ask(&api_state.notices, submit).await??;
