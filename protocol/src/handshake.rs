@@ -25,7 +25,7 @@ use std::fmt;
 /// memory of workers in [`Hello`]; the strain at which layers of shells break in assignments; the part of a job that is computed twice; cross-sections in assignments
 /// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans;
 /// beams in assignments.
-/// 11: the most workers that a job takes, and the seconds to its end.
+/// 11: the most workers that a job takes, and the seconds to its end; plies of shells in assignments.
 pub const VERSION: u16 = 11;
 
 /// Most characters of a host's name.

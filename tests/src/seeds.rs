@@ -13,6 +13,7 @@ mod disk;
 pub mod flips;
 mod memory;
 mod plot;
+mod seen;
 
 use std::{
     cmp::Reverse,
@@ -29,7 +30,7 @@ use master::{
     sort::{Gathered, SortBasis, Sorted},
     world::{End, Error, Letter, Parcel, PeerFrame, Sessions, Surroundings, World},
 };
-use mechanics::{digest::digest, flip::Target, state::GlobalState};
+use mechanics::flip::Target;
 use protocol::message::{ToMaster, ToPeer, ToWorker};
 use worker::{
     compute::Machine,
@@ -41,8 +42,9 @@ use disk::Disk;
 pub use flips::Flip;
 use memory::Small;
 pub use plot::{Bug, Fault, Plot, Stage};
+pub use seen::Seen;
 
-use crate::{bits::Fingerprint, solve::Solved};
+use crate::solve::Solved;
 
 /// A small generator.
 pub struct Draws {
@@ -575,37 +577,5 @@ impl Play {
             Heard::Double => Ok(()),
             Heard::Differs => Err(format!("host {host}: two different frames of cycle {}", message.cycle)),
         }
-    }
-}
-
-/// What must be equal to the bit whatever happens: fingerprint, all sums over cycles, and the states that were written.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
-    fingerprint: Fingerprint,
-    /// As a snapshot stores them.
-    run_totals: Vec<u8>,
-    /// Digest of each, and the bits of what contact keeps of its nodes.
-    states: Vec<(String, Vec<u64>)>,
-}
-
-impl Seen {
-    /// Of a run that came to its end.
-    ///
-    /// # Panics
-    /// If the sums cannot be encoded.
-    pub fn of(solved: &Solved) -> Self {
-        let mut run_totals = Vec::new();
-        protocol::codec::encode_into(&solved.outcome.run_totals, &mut run_totals).expect("sums are numbers");
-        let of_state = |state: &GlobalState| {
-            let kept = state.contact.iter().flatten().map(|number| (number + 0.0).to_bits()).collect();
-            (digest(state), kept)
-        };
-        let states = solved.states.iter().map(of_state).collect();
-        Self { fingerprint: Fingerprint::of(solved), run_totals, states }
-    }
-
-    /// Digest of the final state.
-    pub fn digest(&self) -> &str {
-        &self.fingerprint.digest
     }
 }
