@@ -44,6 +44,11 @@ impl Default for Constraint {
 }
 
 impl Constraint {
+    /// Whether walls are all that may act on the node's velocity.
+    pub(crate) fn is_of_walls(&self) -> bool {
+        self.forces == 0 && self.velocity.iter().all(Option::is_none) && self.circle.is_none()
+    }
+
     /// The axes about which a node of shells does not turn at a time.
     pub fn clamped_at(&self, time: f64) -> u8 {
         if self.clamp_span.holds(time) { self.clamped } else { 0 }

@@ -2,7 +2,7 @@
 //! what is booked and voted.
 //!
 //! Every holder of a node runs this with the same mass, constraint, walls and total force, and so gets the
-//! same bits. Only the owner's copy is booked. Nodes go in sets of eight on lanes; those that something holds are
+//! same bits. Only the owner's copy is booked. Nodes go in sets of eight on lanes; those that something moves are
 //! corrected one by one, and a set without any pays nothing for it.
 
 mod hold;
@@ -246,6 +246,7 @@ impl Advance<'_> {
             change.z = loss.neg_mul_add(old.z, L::splat(gain[2]));
             new = Vector { x: new.x + change.x, y: new.y + change.y, z: new.z + change.z };
         }
+        let set = NodeSet { held: self.not_clear(nodes, set.held, at, &x, &new), ..set };
         if set.held != 0 {
             let mut held = arrays(&new);
             tally.external.merge(self.hold(nodes, set, at, &mut held));

@@ -8,7 +8,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    element::vector::Vector,
     exact::Quantum,
+    lanes::Lane,
     load::{Curve, Drive},
     work::Work,
 };
@@ -190,6 +192,37 @@ pub fn advance(walls: &[RigidWall], votes: &[WallVote], dt: f64, free: &mut [Pos
 }
 
 impl RigidWall {
+    /// The nodes that [`RigidWall::stop`] would leave alone, for many nodes at once; it rounds as `stop` does.
+    #[inline(always)]
+    pub(crate) fn clear<L: Lane>(&self, pose: &Pose, x: &Vector<L>, v: &Vector<L>, dt: f64) -> L::Mask {
+        let each = |[x, y, z]: [f64; 3]| Vector { x: L::splat(x), y: L::splat(y), z: L::splat(z) };
+        let less = |a: &Vector<L>, b: &Vector<L>| Vector { x: a.x - b.x, y: a.y - b.y, z: a.z - b.z };
+        let sum = |a: &Vector<L>, b: &Vector<L>| a.x * b.x + a.y * b.y + a.z * b.z;
+        let (zero, step) = (L::splat(0.0), L::splat(dt));
+        let [moved, speed] = *pose;
+        let (x, v) = (less(x, &each(moved)), less(v, &each(speed)));
+        let end = || Vector { x: x.x + v.x * step, y: x.y + v.y * step, z: x.z + v.z * step };
+        let outside = |from: &Vector<L>, radius: f64| sum(from, from).sqrt() - L::splat(radius);
+        let height = match self.shape {
+            Shape::Plane { point, normal } => {
+                let normal = each(normal);
+                sum(&less(&x, &each(point)), &normal) + sum(&v, &normal) * step
+            }
+            Shape::Cylinder { point, axis, radius } => {
+                let (from, axis) = (less(&end(), &each(point)), each(axis));
+                let along = sum(&from, &axis);
+                let across = Vector {
+                    x: along.neg_mul_add(axis.x, from.x),
+                    y: along.neg_mul_add(axis.y, from.y),
+                    z: along.neg_mul_add(axis.z, from.z),
+                };
+                outside(&across, radius)
+            }
+            Shape::Sphere { centre, radius } => outside(&less(&end(), &each(centre)), radius),
+        };
+        zero.less_equal(height)
+    }
+
     /// Keeps a node that would end inside the wall on its surface; friction takes `mu` times the normal impulse. True
     /// if it touched.
     pub fn stop(&self, pose: &Pose, x: [f64; 3], v: &mut [f64; 3], dt: f64) -> bool {
@@ -242,6 +275,7 @@ impl RigidWall {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::{SET, Width, dispatch::Task};
 
     fn wall(shape: Shape, motion: Motion, friction: f64) -> RigidWall {
         RigidWall { shape, motion, friction, parts: vec![true] }
@@ -264,6 +298,74 @@ mod tests {
             assert!((dot(got, n) - dot(got, got).sqrt()).abs() < 1e-12);
             let mut away = [0.0, 0.0, 40.0];
             assert!(!wall.stop(&[[0.0; 3]; 2], x, &mut away, dt));
+        }
+    }
+
+    /// Nodes that end a step within a rounding of the wall: for each the answer of eight at once is that of one alone.
+    struct Grazing<'a>(&'a RigidWall);
+
+    impl Task for Grazing<'_> {
+        type Output = ();
+
+        fn run<L: Lane>(self) {
+            let (pose, dt) = ([[0.3, -0.2, 0.1], [2.0, 1.0, -4.0]], 1e-3);
+            let mut n_clear = 0;
+            for start in 0..200 {
+                let node = |lane: usize| {
+                    let angle = (start * L::N + lane) as f64 * 0.37;
+                    let v = [30.0 * angle.cos(), -20.0, -40.0 * angle.sin()];
+                    // Along its way out of the middle the node is moved until it ends on the surface.
+                    let out = [angle.sin().powi(2), 0.5, angle.cos().powi(2)];
+                    let end = |t: f64| -> [f64; 3] { std::array::from_fn(|a| out[a] * t - 0.7) };
+                    let (mut inside, mut outside): (f64, f64) = (0.0, 8.0);
+                    for _halving in 0..60 {
+                        let middle = 0.5 * (inside + outside);
+                        if self.0.shape.height(end(middle)).0 < 0.0 {
+                            inside = middle
+                        } else {
+                            outside = middle
+                        }
+                    }
+                    let at = if (lane + start).is_multiple_of(2) { inside } else { outside };
+                    let x: [f64; 3] =
+                        std::array::from_fn(|a| end(at)[a] - (v[a] - pose[1][a]) * dt + pose[0][a]);
+                    (x, v)
+                };
+                let lanes = |component: &dyn Fn(usize) -> f64| {
+                    let numbers: [f64; SET] = std::array::from_fn(component);
+                    // SAFETY: a set has room for all lanes.
+                    unsafe { L::load(&numbers, 0) }
+                };
+                let each = |of: &dyn Fn(usize) -> [f64; 3]| Vector {
+                    x: lanes(&|i| of(i)[0]),
+                    y: lanes(&|i| of(i)[1]),
+                    z: lanes(&|i| of(i)[2]),
+                };
+                let (x, v) = (each(&|i| node(i).0), each(&|i| node(i).1));
+                let clear = L::bits(self.0.clear(&pose, &x, &v, dt));
+                for lane in 0..L::N {
+                    let (x, mut v) = node(lane);
+                    let is_clear = !self.0.stop(&pose, x, &mut v, dt);
+                    assert_eq!(clear >> lane & 1 == 1, is_clear, "{:?}: {x:?} {v:?}", self.0.shape);
+                    n_clear += usize::from(is_clear);
+                }
+            }
+            assert!((20..200 * L::N - 20).contains(&n_clear), "{n_clear} are clear of {:?}", self.0.shape);
+        }
+    }
+
+    #[test]
+    fn eight_nodes_at_once_are_clear_of_a_wall_as_each_alone_is() {
+        let slanted = [0.6, 0.0, 0.8];
+        for shape in [
+            Shape::Plane { point: [0.1, 0.2, 0.3], normal: slanted },
+            Shape::Cylinder { point: [-0.8, 0.0, -0.6], axis: slanted, radius: 1.3 },
+            Shape::Sphere { centre: [-0.7, -0.6, -0.8], radius: 1.1 },
+        ] {
+            let wall = wall(shape, Motion::Fixed, 0.1);
+            for width in Width::ALL.into_iter().filter(|width| width.available()) {
+                width.run(Grazing(&wall));
+            }
         }
     }
 

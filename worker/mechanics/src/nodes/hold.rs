@@ -2,12 +2,47 @@
 
 use super::{Advance, NodeSet, Nodes};
 use crate::{
-    lanes::SET,
+    element::vector::Vector,
+    lanes::{Lane, SET},
     wall::{Motion, Pose, WallVote, touched_quantum},
     work::Work,
 };
 
 impl Advance<'_> {
+    /// Those of the held nodes from `at` on that [`Advance::hold`] must see: not those that feel only walls and are clear
+    /// of them in this step, which most are. `v` are the free velocities.
+    #[inline(always)]
+    pub(super) fn not_clear<L: Lane>(
+        &self,
+        nodes: &Nodes<'_>,
+        held: u8,
+        at: usize,
+        x: &Vector<L>,
+        v: &Vector<L>,
+    ) -> u8 {
+        let (mut left, mut kept, mut walls) = (held, 0, 0);
+        while left != 0 {
+            let lane = left.trailing_zeros();
+            let constraint = &self.constraints[usize::from(nodes.constraint[at + lane as usize])];
+            if constraint.is_of_walls() {
+                walls |= constraint.walls;
+            } else {
+                kept |= 1 << lane;
+            }
+            left &= left - 1;
+        }
+        if kept == held {
+            return held;
+        }
+        let mut clear = L::mask(u32::MAX);
+        while walls != 0 {
+            let w = walls.trailing_zeros() as usize;
+            clear = L::both(clear, self.walls[w].clear(&self.poses[w], x, v, self.dt));
+            walls &= walls - 1;
+        }
+        kept | held & !(L::bits(clear) as u8)
+    }
+
     /// Corrects the free velocities of held nodes from `at` on; gives the work of what holds the booked ones.
     pub(super) fn hold(
         &self,
