@@ -16,31 +16,33 @@ fn whatever_goes_wrong_in_200_worlds_the_bits_are_those_of_a_quiet_one() {
     assert!(lent > 5, "other jobs had {lent} workers");
 }
 
+/// What the first seed that shows a planted bug says. The search begins a little before the seed that showed it first when
+/// this was written (`cargo run --release -p tests --bin seeds -- 1000 0 BUG`); all seeds before it would only cost time.
+fn found(bug: Bug, first: u64) -> String {
+    let stage = Stage::new();
+    let found = (first..first + 200).find_map(|seed| stage.play(seed, Some(bug)).err());
+    found.unwrap_or_else(|| panic!("no seed of 200 from {first} shows {bug:?}"))
+}
+
 #[test]
 fn a_master_that_compares_only_a_part_of_what_is_computed_twice_is_found() {
-    let stage = Stage::new();
-    let found = (0..1000)
-        .find_map(|seed| stage.play(seed, Some(Bug::Narrow)).err())
-        .expect("one seed of 1000 shows it");
+    let found = found(Bug::Narrow, 420);
     assert!(found.contains("another result than undisturbed"), "{found}");
 }
 
 #[test]
-fn a_master_that_hears_messages_of_epochs_that_are_over_is_found() {
-    let stage = Stage::new();
-    let found = (0..200)
-        .find_map(|seed| stage.play(seed, Some(Bug::Unfenced)).err())
-        .expect("one seed of 200 shows it");
-    assert!(found.starts_with("seed "), "{found}");
-}
-
-#[test]
-fn each_planted_bug_of_disks_frames_stuck_tasks_and_shortages_is_found() {
-    let stage = Stage::new();
-    for bug in [Bug::Trusting, Bug::Unsynced, Bug::Careless, Bug::Deaf, Bug::Patient, Bug::Hasty, Bug::Greedy]
-    {
-        let found = (0..400).find_map(|seed| stage.play(seed, Some(bug)).err());
-        let found = found.unwrap_or_else(|| panic!("no seed of 400 shows {bug:?}"));
+fn each_other_planted_bug_is_found() {
+    for (bug, first) in [
+        (Bug::Unfenced, 0),
+        (Bug::Trusting, 20),
+        (Bug::Unsynced, 30),
+        (Bug::Careless, 0),
+        (Bug::Deaf, 150),
+        (Bug::Patient, 0),
+        (Bug::Hasty, 10),
+        (Bug::Greedy, 10),
+    ] {
+        let found = found(bug, first);
         assert!(found.starts_with("seed "), "{found}");
     }
 }
