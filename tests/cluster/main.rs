@@ -39,6 +39,15 @@ fn reference() -> &'static str {
     DIGEST.get_or_init(|| digest_of(&run(&["--cycles", "40"])))
 }
 
+/// Cycles of a job that goes on while something is done to its cluster: some four seconds of one core.
+const LONG: &str = "20000";
+
+/// The digest after [`LONG`] cycles.
+fn long_reference() -> &'static str {
+    static DIGEST: OnceLock<String> = OnceLock::new();
+    DIGEST.get_or_init(|| digest_of(&run(&["--cycles", LONG])))
+}
+
 fn digest_of(summary: &serde_json::Value) -> String {
     let digest = summary["digest"].as_str().expect("a digest");
     assert_eq!(digest.len(), 32, "{digest}");

@@ -13,10 +13,7 @@ use protocol::{
 };
 use tests::cluster::{Cluster, make_certificates, said};
 
-use crate::{BOLIDE, digest_of, run, small};
-
-/// Cycles of the job that is under way: some four seconds of one core.
-const CYCLES: &str = "20000";
+use crate::{BOLIDE, LONG, digest_of, long_reference, small};
 
 fn frame(header: Header, payload: Vec<u8>) -> Vec<u8> {
     let mut frame = Frame::new(header, payload);
@@ -42,7 +39,7 @@ fn bad_peers_are_one_line_each_and_the_job_goes_on() {
     let mut cluster = Cluster::start(BOLIDE, false);
     cluster.worker("a", "1");
     cluster.worker("b", "1");
-    let submit = ["submit", &small(), "--cycles", CYCLES, "--no-output", "--min-workers", "2"];
+    let submit = ["submit", &small(), "--cycles", LONG, "--no-output", "--min-workers", "2"];
     cluster.json(&submit);
     cluster.wait_until_running(1);
 
@@ -73,8 +70,7 @@ fn bad_peers_are_one_line_each_and_the_job_goes_on() {
         assert_eq!(cluster.master.count(&address), 1, "{}", cluster.master.text());
     }
 
-    let expected = digest_of(&run(&["--cycles", CYCLES]));
-    assert_eq!(digest_of(&cluster.json(&["watch", "1"])), expected);
+    assert_eq!(digest_of(&cluster.json(&["watch", "1"])), long_reference());
     assert!(cluster.master.is_alive());
 }
 
@@ -84,7 +80,7 @@ fn wrong_certificates_are_one_line_each_and_the_job_goes_on() {
     cluster.worker("a", "1");
     let other = cluster.folder().join("other");
     make_certificates(Path::new(BOLIDE), &other);
-    cluster.json(&["submit", &small(), "--cycles", CYCLES, "--no-output"]);
+    cluster.json(&["submit", &small(), "--cycles", LONG, "--no-output"]);
     cluster.wait_until_running(1);
 
     let dial = |certs: &Path| {
@@ -114,8 +110,7 @@ fn wrong_certificates_are_one_line_each_and_the_job_goes_on() {
     ]));
     assert_eq!(plain.code, Some(1), "{plain:?}");
 
-    let expected = digest_of(&run(&["--cycles", CYCLES]));
-    assert_eq!(digest_of(&cluster.json(&["watch", "1"])), expected);
+    assert_eq!(digest_of(&cluster.json(&["watch", "1"])), long_reference());
     for words in [
         "role worker, the certificate is for a client",
         "the peer does not accept this host's certificate: it is from another CA",

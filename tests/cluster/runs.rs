@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fs};
 
 use tests::cluster::{Cluster, repository, said, until};
 
-use crate::{BOLIDE, digest_of, reference, run, small};
+use crate::{BOLIDE, LONG, digest_of, long_reference, reference, run, small};
 
 /// A job on workers of speeds 1, 2 and 0.5, through every client command.
 fn three_workers_give_the_digest_of_run(tls: bool) {
@@ -123,7 +123,7 @@ fn jobs_share_workers_and_have_the_bits_that_they_have_alone() {
     for (name, speed) in [("a", "1"), ("b", "1"), ("c", "1")] {
         cluster.worker(name, speed);
     }
-    assert_eq!(cluster.json(&["submit", &small(), "--no-output"])["job"], 1);
+    assert_eq!(cluster.json(&["submit", &small(), "--cycles", LONG, "--no-output"])["job"], 1);
     let n_shares = |job| cluster.find_job(job).and_then(|job| Some(job["shares"].as_array()?.len()));
     until(|| "job 1 on three workers".to_owned(), || (n_shares(1) == Some(3)).then_some(()));
     let short = ["submit", &small(), "--cycles", "40", "--no-output", "--workers", "1..1", "--wait"];
@@ -133,7 +133,7 @@ fn jobs_share_workers_and_have_the_bits_that_they_have_alone() {
     cluster.master.wait_for("is called to job 2");
     cluster.master.wait_for("joins the job");
     let summary = cluster.json(&["watch", "1"]);
-    assert_eq!((digest_of(&summary), &summary["workers"]), (digest_of(&run(&[])), &3.into()));
+    assert_eq!((digest_of(&summary), &summary["workers"]), (long_reference().to_owned(), &3.into()));
     assert_eq!(summary["losses"].as_array().map(Vec::len), Some(0), "nobody was lost: {summary}");
 }
 
