@@ -49,6 +49,8 @@ fn draw(program: &Path, bolide: &Path, folder: &Path) -> std::io::Result<()> {
     };
     let _workers = [worker("pc-1", "1"), worker("pc-2", "1"), worker("old-pc", "0.5")];
     let mut browser = Browser::start(program, &files.path().join("profile"));
+    // A page that opens on a wide screen shows all its boxes.
+    browser.picture(1280, 900, false);
     browser.call("Page.navigate", json!({ "url": page }));
     browser.wait_for("document.getElementById('link')?.textContent === 'live'");
     let submit = |deck: &Path, cycles: &str| {
@@ -60,8 +62,8 @@ fn draw(program: &Path, bolide: &Path, folder: &Path) -> std::io::Result<()> {
     // Longer than the benchmark, so that it still runs when the last picture is taken.
     let text = std::fs::read_to_string(repository("deck/examples/plates-64k-free-slip.toml"))?;
     let longer = files.path().join("plates-64k-free-slip.toml");
-    std::fs::write(&longer, text.replace("end_time = 100.0 ", "end_time = 1000.0 "))?;
-    let mut submitted = submit(&longer, "1600");
+    std::fs::write(&longer, text.replace("end_time = 100.0 ", "end_time = 2000.0 "))?;
+    let mut submitted = submit(&longer, "4000");
     browser.wait_for("document.querySelectorAll('#jobs .job').length === 2");
     browser.evaluate("document.querySelector('#jobs .job').click()");
     browser.wait_for("document.getElementById('title').innerText.includes('64k')");
@@ -82,7 +84,8 @@ fn draw(program: &Path, bolide: &Path, folder: &Path) -> std::io::Result<()> {
     running(&mut browser, "page-live-400.png", &png)?;
 
     let mut top = Terminal::start(&format!("{} top --master {address}", bolide.display()), 80, 14);
-    top.wait_for("running");
+    // In the row of the job, not in the first line.
+    top.wait_for("running  ");
     // The rate of cycles comes with the second look.
     std::thread::sleep(Duration::from_secs(3));
     let svg = files.path().join("top.svg");
@@ -93,11 +96,12 @@ fn draw(program: &Path, bolide: &Path, folder: &Path) -> std::io::Result<()> {
     // Workers say once a second what they did, each in its own second; at the end all speak of the same cycles.
     submitted.wait();
     browser.wait_for("document.querySelector('#facts .digest')?.textContent");
-    browser.picture(1000, 900, false);
+    // So narrow that the diagram has a row of its own.
+    browser.picture(840, 900, false);
     let png = browser.picture_of("section:has(> #phases)");
     write(folder, "space-time.png", &png)?;
     browser.call("Page.navigate", json!({ "url": format!("file://{}", svg.display()) }));
-    let png = browser.picture(1200, 290, false);
+    let png = browser.picture(696, 290, false);
     write(folder, "top.png", &png)?;
     let report = files.path().join("spool/job-2/report.html");
     browser.call("Page.navigate", json!({ "url": format!("file://{}", report.display()) }));
