@@ -209,7 +209,7 @@ fn top_shows_hosts_and_jobs_on_a_terminal_and_q_leaves() {
     assert_eq!(cluster.json(&["submit", &small(), "--cycles", "40", "--wait"])["workers"], 2);
     let mut top = Terminal::start(&format!("{BOLIDE} top --master {}", cluster.address), 120, 20);
     let screen = top.wait_for(reference());
-    for words in ["2 hosts, 0 jobs running", "pc-1", "pc-2", "done", "q leaves"] {
+    for words in ["hosts 2, running 0, queued 0", "pc-1", "pc-2", "done", "q leaves"] {
         assert!(screen.text().contains(words), "{words} in\n{}", screen.text());
     }
     top.press("q");

@@ -198,7 +198,7 @@ fn table(
 fn page(seen: &Seen, master: &str, (width, height): (usize, usize)) -> Vec<String> {
     let count = |state| seen.jobs.iter().filter(|job| job.state == state).count();
     let summary = format!(
-        "bolide at {master}: {} hosts, {} jobs running, {} queued",
+        "bolide at {master}: hosts {}, running {}, queued {}",
         seen.hosts.iter().filter(|host| host.state != "lost").count(),
         count(State::Running),
         count(State::Queued)
