@@ -51,9 +51,9 @@ function overview() {
   }
   $('submit-box').hidden = $('hosts-box').hidden = shows;
   const count = (rows, state) => rows.filter(row => row.state === state).length;
-  const lost = count(hosts, 'lost'), here = hosts.length - lost;
+  const lost = count(hosts, 'lost'), left = count(hosts, 'left'), here = hosts.length - lost - left;
   $('counts').textContent = shows ? `${jobs.length} ${jobs.length === 1 ? 'run' : 'runs'}`
-    : `${here} ${here === 1 ? 'host' : 'hosts'}${lost ? `, ${lost} lost` : ''}, ${count(jobs, 'running')} running, ${count(jobs, 'queued')} queued`;
+    : `${here} ${here === 1 ? 'host' : 'hosts'}${lost ? `, ${lost} lost` : ''}${left ? `, ${left} left` : ''}, ${count(jobs, 'running')} running, ${count(jobs, 'queued')} queued`;
   lists.jobs($('jobs'), jobs, page.chosen, choose, addressOf);
   $('no-jobs').hidden = jobs.length > 0;
   lists.hosts($('hosts'), hosts);

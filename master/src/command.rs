@@ -14,7 +14,7 @@ use protocol::{
     options::{self, ADVANCED, Balance, JobOptions, Route},
     shape::Rate,
 };
-use worker::processors::Processors;
+use worker::{owner::hours::Hours, processors::Processors};
 
 mod help;
 
@@ -359,7 +359,7 @@ pub struct MasterArgs {
     pub share: bool,
 }
 
-/// A number of days or gigabytes.
+/// A number of days, gigabytes, seconds or processors.
 pub fn amount(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(amount) if (0.0..=1e6).contains(&amount) => Ok(amount),
@@ -422,6 +422,27 @@ pub struct WorkerArgs {
     /// Make no connections to other workers: everything passes through the master
     #[arg(long, conflicts_with_all = ["peer_port", "peer_announce"])]
     pub no_peers: bool,
+    /// Its owner comes first: while somebody types or logs in, other programs take processors, or the PC is hot or on battery, work
+    /// only this part of the time; 0 leaves the job to others [default: 0 if the flag is given]
+    #[arg(long, value_name = "SHARE", num_args = 0..=1, require_equals = true, default_missing_value = "0", value_parser = share)]
+    pub yield_to_owner: Option<f64>,
+    /// Its owner counts as at work when other programs, but for those of raised nice value, keep more processors busy
+    #[arg(long, value_name = "PROCESSORS", default_value_t = 0.5, value_parser = amount, requires = "yield_to_owner")]
+    pub owner_load: f64,
+    /// Come back when the owner has not needed the PC for so many seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 300.0, value_parser = amount, requires = "yield_to_owner")]
+    pub owner_quiet: f64,
+    /// Work only then, at the time of day where this host stands: "Mon-Fri 18:00-08:00, Sat-Sun"
+    #[arg(long, value_name = "HOURS")]
+    pub hours: Option<Hours>,
+}
+
+/// A part of the time.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if (0.0..1.0).contains(&share) => Ok(share),
+        _ => Err("expected a number from 0 to below 1".to_owned()),
+    }
 }
 
 /// Flags of `add`.

@@ -38,7 +38,7 @@ use crate::{
     drive::{Delivery, Input, WorkerLink},
     event::WorkerSpec,
     files, neighbour, newcomer,
-    notice::Notice,
+    notice::{End, Notice},
     places::{Place, Places},
 };
 
@@ -333,8 +333,11 @@ impl Acceptor {
                 self.listen(&mut receiver, hello, incarnation, &delivery).await
             }
         };
-        let dropped = delivery.dismissal();
-        let words = dropped.clone().unwrap_or_else(|| error.to_string());
+        let (end, words) = match (delivery.dismissal(), &error) {
+            (Some(words), _) => (End::Dropped, words),
+            (None, Error::Left { reason }) => (End::Left, reason.clone()),
+            (None, error) => (End::Lost, error.to_string()),
+        };
         if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
             leave(&sender, &words).await;
         }
@@ -344,8 +347,7 @@ impl Acceptor {
             // The job may be over by now.
             let _ = send.send(Input::Lost(index, why)).await;
         }
-        let dropped = dropped.is_some();
-        let _ = self.notices.send(Notice::Left { incarnation, why: words, dropped }).await;
+        let _ = self.notices.send(Notice::Left { incarnation, why: words, end }).await;
         Err(error)
     }
 

@@ -6,7 +6,9 @@ use std::collections::{BTreeMap, VecDeque};
 
 use protocol::{handshake::Hello, request::HostRow};
 
-/// Most lost hosts that are remembered.
+use crate::notice::End;
+
+/// Most hosts that are gone and remembered.
 pub const LOST_LIMIT: usize = 1000;
 
 /// What a host is doing.
@@ -16,8 +18,17 @@ pub enum State {
     Idle,
     /// Computing this job.
     Busy(u32),
-    /// Not connected any more, and why.
+    /// Not connected any more, and why: its connection broke, or its job dropped it.
     Lost(String),
+    /// It said good-bye, and why.
+    Left(String),
+}
+
+impl State {
+    /// Whether it is not connected.
+    const fn is_gone(&self) -> bool {
+        matches!(self, Self::Lost(_) | Self::Left(_))
+    }
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -75,7 +86,7 @@ impl Hosts {
         let mut ended = None;
         let number = match known {
             Some(host) => {
-                if !matches!(host.state, State::Lost(_)) {
+                if !host.state.is_gone() {
                     if host.nonce != hello.nonce {
                         return Err(format!(
                             "a worker named {:?} is connected from {}; start this one with another --name",
@@ -87,7 +98,7 @@ impl Hosts {
                 host.number
             }
             None => {
-                self.forget_the_oldest_lost();
+                self.forget_the_oldest_gone();
                 self.next += 1;
                 self.next - 1
             }
@@ -115,23 +126,23 @@ impl Hosts {
         self.by_number.values().find(|host| host.incarnation == incarnation)
     }
 
-    /// A connection has ended; what an older connection of a returned host says is not heard.
-    pub fn lose(&mut self, incarnation: u32, why: &str) {
-        if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
-            host.state = State::Lost(why.to_owned());
-            host.suspect = None;
+    /// A connection has ended; what an older connection of a returned host says is not heard. Of a worker that its job
+    /// dropped neither the name nor the process is taken in again.
+    pub fn gone(&mut self, incarnation: u32, why: &str, end: End) {
+        let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) else {
+            return;
+        };
+        host.suspect = None;
+        host.state = match end {
+            End::Left => State::Left(why.to_owned()),
+            End::Lost | End::Dropped => State::Lost(why.to_owned()),
+        };
+        if end == End::Dropped {
+            if self.barred.len() >= LOST_LIMIT {
+                self.barred.pop_front();
+            }
+            self.barred.push_back((host.name.clone(), host.nonce, why.to_owned()));
         }
-    }
-
-    /// The connection has ended because a job dropped its worker: neither its name nor its process is taken in again.
-    pub fn drop_out(&mut self, incarnation: u32, why: &str) {
-        let Some(host) = self.on(incarnation) else { return };
-        let entry = (host.name.clone(), host.nonce, why.to_owned());
-        if self.barred.len() >= LOST_LIMIT {
-            self.barred.pop_front();
-        }
-        self.barred.push_back(entry);
-        self.lose(incarnation, why);
     }
 
     /// A host is silent, in words, or is heard again.
@@ -143,7 +154,7 @@ impl Hosts {
 
     /// Those that are connected, by number.
     pub fn connected(&self) -> impl Iterator<Item = &Host> {
-        self.by_number.values().filter(|host| !matches!(host.state, State::Lost(_)))
+        self.by_number.values().filter(|host| !host.state.is_gone())
     }
 
     /// These connections compute a job from now on.
@@ -180,6 +191,7 @@ impl Hosts {
                 State::Idle => ("idle", String::new()),
                 State::Busy(job) => ("busy", format!("job {job}")),
                 State::Lost(why) => ("lost", why.clone()),
+                State::Left(why) => ("left", why.clone()),
             };
             let note = match &host.suspect {
                 Some(suspect) if note.is_empty() => suspect.clone(),
@@ -201,14 +213,12 @@ impl Hosts {
         self.by_number.values().map(row).collect()
     }
 
-    fn forget_the_oldest_lost(&mut self) {
-        let lost = |host: &&Host| matches!(host.state, State::Lost(_));
-        if self.by_number.values().filter(lost).count() < LOST_LIMIT {
+    fn forget_the_oldest_gone(&mut self) {
+        let gone = || self.by_number.values().filter(|host| host.state.is_gone());
+        if gone().count() < LOST_LIMIT {
             return;
         }
-        if let Some(oldest) =
-            self.by_number.values().filter(lost).min_by_key(|host| host.incarnation).map(|h| h.number)
-        {
+        if let Some(oldest) = gone().min_by_key(|host| host.incarnation).map(|host| host.number) {
             self.by_number.remove(&oldest);
         }
     }
@@ -231,9 +241,9 @@ mod tests {
         let refused = hosts.admit(&hello("a", 9), "z", 3).expect_err("a is there");
         assert!(refused.contains("\"a\" is connected from x"), "{refused}");
         assert_eq!(hosts.admit(&hello("a", 1), "x2", 4), Ok((0, Some(1))));
-        hosts.lose(1, "the ghost's end");
+        hosts.gone(1, "the ghost's end", End::Lost);
         assert_eq!(hosts.on(4).map(|h| &h.state), Some(&State::Idle));
-        hosts.lose(4, "gone");
+        hosts.gone(4, "gone", End::Lost);
         assert_eq!(hosts.admit(&hello("a", 9), "z", 5), Ok((0, None)), "the place is free again");
     }
 
@@ -243,7 +253,7 @@ mod tests {
         hosts.admit(&hello("a", 1), "x", 1).expect("new");
         hosts.suspect(1, Some("suspect: silent".to_owned()));
         assert_eq!(hosts.rows()[0].note, "suspect: silent");
-        hosts.drop_out(1, "dropped: block 2 came to other numbers");
+        hosts.gone(1, "dropped: block 2 came to other numbers", End::Dropped);
         assert_eq!(hosts.rows()[0].note, "dropped: block 2 came to other numbers");
         for returned in [hello("a", 1), hello("a", 7), hello("b", 1)] {
             let refused = hosts.admit(&returned, "x", 2).expect_err("dropped");
@@ -262,7 +272,7 @@ mod tests {
             hosts.connected().filter(|h| h.state == State::Idle).map(|h| h.incarnation).collect()
         };
         hosts.occupy(&[1, 2], 7);
-        hosts.lose(2, "cable");
+        hosts.gone(2, "cable", End::Lost);
         assert_eq!(idle(&hosts), [3]);
         hosts.release(7);
         assert_eq!(idle(&hosts), [1, 3]);
@@ -279,7 +289,7 @@ mod tests {
         let mut hosts = Hosts::default();
         for i in 0..LOST_LIMIT as u32 + 5 {
             hosts.admit(&hello(&format!("pc-{i}"), u64::from(i)), "x", i + 1).expect("new");
-            hosts.lose(i + 1, "gone");
+            hosts.gone(i + 1, "gone", End::Lost);
         }
         assert_eq!(hosts.rows().len(), LOST_LIMIT);
         assert_eq!(hosts.rows()[0].name, "pc-5");

@@ -18,6 +18,17 @@ use crate::{
 /// Notices that may wait for the scheduler.
 pub const WAITING_NOTICES: usize = 1024;
 
+/// How a worker's connection ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// It broke.
+    Lost,
+    /// The worker said good-bye.
+    Left,
+    /// Its job dropped the worker, which may not come back.
+    Dropped,
+}
+
 /// What the scheduler, which owns hosts and queue, hears from connections, pages and the threads of jobs.
 pub enum Notice {
     /// A worker wants to be taken in; answered with its number.
@@ -38,8 +49,7 @@ pub enum Notice {
         /// The connection.
         incarnation: u32,
         why: String,
-        /// Its job dropped the worker: it may not come back.
-        dropped: bool,
+        end: End,
     },
     /// A worker has been silent for long, or is heard again.
     Suspect {

@@ -12,7 +12,7 @@ use protocol::{
 };
 use tracing::{Subscriber, level_filters::LevelFilter};
 use tracing_subscriber::{Layer, filter::Targets, registry::LookupSpan};
-use worker::{daemon::Listen, runner::Compute};
+use worker::{daemon::Listen, owner::Rules, runner::Compute};
 
 use crate::{
     add, bench,
@@ -96,6 +96,9 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
     if let Some(pin) = &args.pin {
         pin.apply()?;
     }
+    if args.yield_to_owner.is_some() {
+        system::processors::lowest_priority_of_process();
+    }
     let cores = worker::processors::cores() as u32;
     let speed = match args.speed {
         Speed::Given(speed) => speed,
@@ -125,6 +128,12 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
             Listen::Port { port: args.peer_port, announce: args.peer_announce }
         },
         compute,
+        rules: Rules {
+            share: args.yield_to_owner,
+            load: args.owner_load,
+            quiet: Duration::from_secs_f64(args.owner_quiet),
+            hours: args.hours,
+        },
     };
     worker::daemon::run(&options).map(|()| ExitCode::SUCCESS)
 }

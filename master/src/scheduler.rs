@@ -319,13 +319,10 @@ impl Scheduler {
                 );
                 self.worker_links.insert(worker_link.incarnation, worker_link);
             }
-            Notice::Left { incarnation, why, dropped } => {
+            Notice::Left { incarnation, why, end } => {
                 self.worker_links.remove(&incarnation);
                 self.called.remove(&incarnation);
-                match dropped {
-                    true => self.hosts.drop_out(incarnation, &why),
-                    false => self.hosts.lose(incarnation, &why),
-                }
+                self.hosts.gone(incarnation, &why, end);
             }
             Notice::Suspect { incarnation, note } => self.hosts.suspect(incarnation, note),
             Notice::Freed { incarnation, job } => {

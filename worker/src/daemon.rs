@@ -30,8 +30,9 @@ use tracing::{info, warn};
 use crate::{
     input::Input,
     notify,
+    owner::{self, Rules, Share},
     peers::{Peers, links::Links},
-    runner::{Compute, GOODBYE, Runner},
+    runner::{Compute, Runner},
 };
 
 /// Messages that may wait for the compute thread: a master sends at most a few ahead, a neighbour two.
@@ -43,6 +44,11 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
 /// The longest that a worker which is to end waits to be released.
 const LEAVE_LIMIT: Duration = Duration::from_secs(60);
+
+/// The longest that a worker which steps back waits to be released; others have to take over from the last checkpoint then.
+const STEP_BACK_LIMIT: Duration = Duration::from_secs(3);
+/// What a worker says that was told to end.
+const GOODBYE: &str = "the worker was told to end";
 
 /// How a worker process runs.
 #[derive(Clone, Debug)]
@@ -70,6 +76,8 @@ pub struct Options {
     pub peers: Listen,
     /// What computes its tasks.
     pub compute: Compute,
+    /// When it steps back for the people whose PC it is on.
+    pub rules: Rules,
 }
 
 /// Whether and where a worker takes other workers, for links of their own.
@@ -94,6 +102,26 @@ pub struct Service {
     pub peers: Option<Arc<Peers>>,
     /// What computes a task.
     pub compute: Compute,
+    /// The part of its time that it may.
+    pub share: Share,
+}
+
+/// What a worker is told to do beside what its master says.
+#[derive(Clone)]
+struct Told {
+    /// To end.
+    end: watch::Receiver<Option<()>>,
+    /// To stay away from the master, and why.
+    away: watch::Receiver<Option<String>>,
+}
+
+/// Waits until something is said; for ever if nobody is there to say it.
+async fn is_told<T: Clone>(said: &mut watch::Receiver<Option<T>>) -> T {
+    let said = said.wait_for(Option::is_some).await.ok().and_then(|said| said.clone());
+    match said {
+        Some(said) => said,
+        None => std::future::pending().await,
+    }
 }
 
 /// Computes for a master until a signal, a refusal, or until the master has been away for too long.
@@ -111,12 +139,15 @@ pub fn run(options: &Options) -> std::result::Result<(), String> {
         .map_err(|e| format!("threads of the link: {e}"))?;
     let hello = greeting(options);
     let result = runtime.block_on(async {
-        let (told, leaving) = watch::channel(false);
+        let (told, end) = watch::channel(None);
+        let share = Share::default();
+        let away = owner::watch(&options.rules, &share);
+        let service = Service { pool, peers: None, compute: options.compute, share };
         tokio::spawn(notify::live());
         // A master that is away is no fault of this service.
         notify::say(&format!("READY=1\nSTATUS=dialling {}", options.master));
         tokio::select! {
-            result = stay(options, certificates.as_ref(), &hello, &pool, leaving) => result,
+            result = stay(options, certificates.as_ref(), &hello, service, Told { end, away }) => result,
             () = leave_by_and_by(&told) => Ok(()),
         }
     });
@@ -154,13 +185,13 @@ fn greeting(options: &Options) -> Hello {
     hello
 }
 
-/// At Ctrl-C, or another request to end, asks to leave at the next plan boundary; ends at the second one, or when the master takes too long.
-async fn leave_by_and_by(told: &watch::Sender<bool>) {
+/// At Ctrl-C, or another request to end, asks to leave at the next plan boundary; ends at the second one, or when leaving takes too long.
+async fn leave_by_and_by(told: &watch::Sender<Option<()>>) {
     let Ok(mut interrupts) = Interrupts::listen() else { return std::future::pending().await };
     interrupts.next().await;
     warn!("leaving at the next plan boundary; once more to leave at once");
     notify::say("STOPPING=1\nSTATUS=leaving at the next plan boundary");
-    told.send_replace(true);
+    told.send_replace(Some(()));
     tokio::select! {
         () = interrupts.next() => {}
         () = tokio::time::sleep(LEAVE_LIMIT) => {
@@ -174,15 +205,23 @@ async fn stay(
     options: &Options,
     certificates: Option<&Arc<ClientConfig>>,
     hello: &Hello,
-    pool: &Arc<ThreadPool>,
-    mut leaving: watch::Receiver<bool>,
+    mut service: Service,
+    mut told: Told,
 ) -> std::result::Result<(), String> {
-    let mut service = Service { pool: Arc::clone(pool), peers: None, compute: options.compute };
     let mut hello = hello.clone();
     let mut listening = None;
     let mut alone_since = Instant::now();
     let mut pause = FIRST_PAUSE;
     loop {
+        let away = told.away.borrow().clone();
+        if let Some(why) = away {
+            notify::say(&format!("STATUS=staying away from {}: {why}", options.master));
+            tokio::select! {
+                _ = told.away.wait_for(Option::is_none) => {}
+                () = is_told(&mut told.end) => return Ok(()),
+            }
+            (alone_since, pause) = (Instant::now(), FIRST_PAUSE);
+        }
         let error = match join(options, certificates, &mut hello, &mut listening, &mut service).await {
             Ok(call) => {
                 info!(
@@ -192,11 +231,16 @@ async fn stay(
                     options.master
                 );
                 notify::say(&format!("STATUS=joined {} as host {}", options.master, call.welcome.host));
-                let error = serve_until(call, service.clone(), leaving.clone()).await;
-                if options.once || *leaving.borrow() {
+                let error = serve_until(call, service.clone(), told.clone()).await;
+                let is_away = told.away.borrow().is_some();
+                if told.end.borrow().is_some() || (options.once && !is_away) {
                     return Ok(());
                 }
                 (alone_since, pause) = (Instant::now(), FIRST_PAUSE);
+                if is_away {
+                    info!("left {}", options.master);
+                    continue;
+                }
                 warn!("link to {} ended: {error}; dialling again", options.master);
                 notify::say(&format!("STATUS=dialling {} again", options.master));
                 error
@@ -210,7 +254,7 @@ async fn stay(
         }
         tokio::select! {
             () = tokio::time::sleep(pause) => {}
-            Ok(_) = leaving.wait_for(|leaving| *leaving) => return Ok(()),
+            () = is_told(&mut told.end) => return Ok(()),
         }
         pause = (2 * pause).min(LONGEST_PAUSE);
     }
@@ -268,52 +312,55 @@ fn is_of_clocks(why: &str) -> bool {
 
 /// Computes for the master at the other end until the connection ends; gives the reason.
 pub async fn serve(call: Call, service: Service) -> Error {
-    let (_told, leaving) = watch::channel(false);
-    serve_until(call, service, leaving).await
+    let (_end, end) = watch::channel(None);
+    let (_away, away) = watch::channel(None);
+    serve_until(call, service, Told { end, away }).await
 }
 
 /// [`serve`] until this process is told to leave and the master has released it.
-async fn serve_until(
-    call: Call,
-    Service { pool, peers, compute }: Service,
-    mut leaving: watch::Receiver<bool>,
-) -> Error {
+async fn serve_until(call: Call, Service { pool, peers, compute, share }: Service, mut told: Told) -> Error {
     let Call { sender, mut receiver, welcome } = call;
     let (send, messages) = mpsc::channel(WAITING_MESSAGES);
     let (fail, mut failed) = oneshot::channel();
     let outbox = Outbox::new(sender.clone(), welcome.incarnation);
     let links = Links::new(peers.as_deref(), send.downgrade());
     let computing = std::thread::Builder::new().name("session".to_owned()).spawn(move || {
-        let runner = Runner::new(compute, outbox, links);
+        let runner = Runner::new(compute, share, outbox, links);
         if let Err(error) = pool.install(|| runner.run(messages)) {
             // The receiver is gone when the connection has ended already.
             let _ = fail.send(error);
         }
     });
     let asking = send.clone();
-    let ask = async move {
-        if leaving.wait_for(|leaving| *leaving).await.is_ok() {
-            // The compute thread ends only with this function.
-            let _ = asking.send(Input::Leave).await;
-        }
-        std::future::pending().await
+    let leave = async move {
+        let (reason, limit) = tokio::select! {
+            () = is_told(&mut told.end) => (GOODBYE.to_owned(), LEAVE_LIMIT),
+            why = is_told(&mut told.away) => (format!("stepped back: {why}"), STEP_BACK_LIMIT),
+        };
+        // The compute thread ends only with this function.
+        let _ = asking.send(Input::Leave(reason.clone())).await;
+        tokio::time::sleep(limit).await;
+        Error::Left { reason }
     };
-    let mut released = false;
+    let mut left = false;
     let error = match &computing {
         Err(error) => Error::io("starting the compute thread", error),
         Ok(_) => tokio::select! {
             error = listen(&mut receiver, &send) => error,
             Ok(error) = &mut failed => {
-                released = matches!(&error, Error::Message(words) if words == GOODBYE);
+                left = matches!(&error, Error::Left { .. });
                 error
             }
-            error = ask => error,
+            error = leave => {
+                left = true;
+                error
+            }
         },
     };
-    if released {
-        dial::leave(&sender, GOODBYE).await;
-    } else if !matches!(error, Error::Closed | Error::Left { .. } | Error::Io { .. }) {
-        dial::leave(&sender, &error.to_string()).await;
+    match &error {
+        Error::Left { reason } if left => dial::leave(&sender, reason).await,
+        Error::Closed | Error::Left { .. } | Error::Io { .. } => {}
+        error => dial::leave(&sender, &error.to_string()).await,
     }
     drop((receiver, send));
     if let Ok(thread) = computing {

@@ -13,8 +13,8 @@ pub enum Input {
     Master(Header, ToWorker),
     /// Of a link to another worker.
     Peer(News),
-    /// This process is to end: the master is asked to release it.
-    Leave,
+    /// This process is to end or to step back, for this reason: the master is asked to release it.
+    Leave(String),
 }
 
 /// The job and its epoch that links belong to.

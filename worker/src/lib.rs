@@ -3,7 +3,8 @@
 //! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics; [`daemon`]
 //! carries bytes between a master and the compute thread of [`runner`]; [`peers`] between that and other workers.
 //! [`stopwatch`] tells where the time goes, [`notify`] a service manager how this process does;
-//! [`processors`] confines it to some of this machine's, [`memory`] says what there is of that.
+//! [`owner`] steps back where the people whose PC it is on need it;
+//! [`processors`] confines it to some of this machine's.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 
@@ -11,6 +12,7 @@ pub mod compute;
 pub mod daemon;
 pub mod input;
 pub mod notify;
+pub mod owner;
 pub mod peers;
 pub mod processors;
 pub mod runner;

@@ -22,6 +22,7 @@ use tokio::sync::mpsc;
 use crate::{
     compute::Machine,
     input::{Input, Key},
+    owner::Share,
     peers::links::{Links, Step},
     session::{Action, Event, Outcome, Session, Task},
     stopwatch::{Lap, Stopwatch},
@@ -29,8 +30,6 @@ use crate::{
 
 /// How often the master hears between cycles how the time goes.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
-/// What a worker says that was asked to end and holds nothing any more.
-pub const GOODBYE: &str = "the worker was told to end";
 
 /// Computes a task of a cycle: [`Machine::run`], or in tests of real processes one that a fault befalls.
 pub type Compute = fn(&mut Machine, Task, u64) -> Outcome;
@@ -50,12 +49,15 @@ pub struct Runner {
     ready: Option<ToMaster>,
     /// When the last report left.
     reported: Instant,
-    leaving: bool,
+    /// Why it is to leave, if it is.
+    leaving: Option<String>,
+    /// The part of its time that it may work.
+    share: Share,
 }
 
 impl Runner {
     /// Without a job.
-    pub fn new(compute: Compute, outbox: Outbox, links: Links) -> Self {
+    pub fn new(compute: Compute, share: Share, outbox: Outbox, links: Links) -> Self {
         Self {
             compute,
             outbox,
@@ -67,14 +69,15 @@ impl Runner {
             busy: Duration::ZERO,
             ready: None,
             reported: Instant::now(),
-            leaving: false,
+            leaving: None,
+            share,
         }
     }
 
     /// Takes one input after another until there can be no more.
     ///
     /// # Errors
-    /// Why the connection to the master must end.
+    /// Why the connection to the master must end: [`Error::Left`] if it was asked to leave and holds nothing any more.
     pub fn run(mut self, mut inputs: mpsc::Receiver<Input>) -> Result<()> {
         while let Some(input) = inputs.blocking_recv() {
             match input {
@@ -83,15 +86,15 @@ impl Runner {
                     let step = self.links.hear(news, &self.session);
                     self.step(step)?;
                 }
-                Input::Leave => {
-                    self.leaving = true;
+                Input::Leave(why) => {
+                    self.leaving = Some(why);
                     if !self.session.is_idle() {
                         self.send(&ToMaster::Leaving)?;
                     }
                 }
             }
-            if self.leaving && self.session.is_idle() {
-                return Err(Error::Message(GOODBYE.to_owned()));
+            if let Some(reason) = self.leaving.take_if(|_| self.session.is_idle()) {
+                return Err(Error::Left { reason });
             }
             if !self.links.are_dialling()
                 && let Some(ready) = self.ready.take()
@@ -193,6 +196,8 @@ impl Runner {
                         let (machine, compute, started) = (&mut self.machine, self.compute, Instant::now());
                         let cycle = self.session.cycle();
                         let outcome = catch_unwind(AssertUnwindSafe(|| compute(machine, task, cycle)));
+                        // Others see the pause as slowness, and take over.
+                        std::thread::sleep(self.share.pause(started.elapsed()));
                         self.busy += started.elapsed();
                         for lap in self.machine.take_laps() {
                             self.stopwatch.book(self.session.cycle(), lap);

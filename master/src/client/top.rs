@@ -199,7 +199,7 @@ fn page(seen: &Seen, master: &str, (width, height): (usize, usize)) -> Vec<Strin
     let count = |state| seen.jobs.iter().filter(|job| job.state == state).count();
     let summary = format!(
         "bolide at {master}: hosts {}, running {}, queued {}",
-        seen.hosts.iter().filter(|host| host.state != "lost").count(),
+        seen.hosts.iter().filter(|host| !matches!(host.state.as_str(), "lost" | "left")).count(),
         count(State::Running),
         count(State::Queued)
     );

@@ -31,7 +31,7 @@ fn render(api_state: &ApiState, jobs: &[Status], hosts: &[HostRow]) -> String {
         sample(&mut out, "bolide_jobs", &[("state", state.name())], count as f64);
     }
     family(&mut out, "bolide_hosts", "gauge", "Hosts by state.");
-    for state in ["idle", "busy", "lost"] {
+    for state in ["idle", "busy", "lost", "left"] {
         let count = hosts.iter().filter(|host| host.state == state).count();
         sample(&mut out, "bolide_hosts", &[("state", state)], count as f64);
     }

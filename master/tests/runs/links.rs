@@ -29,6 +29,7 @@ use tokio::{
 };
 use worker::{
     daemon::{Service, compute_pool},
+    owner::Share,
     peers::Peers,
 };
 
@@ -109,7 +110,12 @@ where
             let pool = compute_pool(1).expect("threads");
             worker::daemon::serve(
                 call,
-                Service { pool, peers, compute: |machine, task, _| machine.run(task) },
+                Service {
+                    pool,
+                    peers,
+                    compute: |machine, task, _| machine.run(task),
+                    share: Share::default(),
+                },
             )
             .await
         });

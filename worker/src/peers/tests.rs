@@ -61,7 +61,7 @@ impl Side {
     async fn next(&mut self) -> News {
         match timeout(DEADLINE, self.news.recv()).await.expect("in time").expect("it stands") {
             Input::Peer(news) => news,
-            Input::Master(..) | Input::Leave => panic!("no master is here"),
+            Input::Master(..) | Input::Leave(_) => panic!("no master is here"),
         }
     }
 

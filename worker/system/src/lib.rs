@@ -6,13 +6,14 @@
 //! | [`allocator`] | memory of large arrays goes back to the system |
 //! | [`callers`] | whose process is at the other end of a loopback connection |
 //! | [`children`] | processes that this one starts, and its own end |
-//! | [`clock`] | processor time of a thread |
+//! | [`clock`] | processor time of a thread; the time of day where this machine stands |
 //! | [`files`] | how many files may be open; errors by which the system says that it has none left of something |
 //! | [`folders`] | names that outlive a loss of power; a folder that one process has |
 //! | [`host`] | the name of this machine |
 //! | [`interrupts`] | Ctrl-C and the like |
 //! | [`memory`] | how much memory there is |
 //! | [`notice`] | what a service manager is told |
+//! | [`owner`] | whether the people whose machine this is need it |
 //! | [`private`] | files that are their owner's alone |
 //! | [`processors`] | which processors threads may use, and how urgent a thread is |
 //! | [`terminal`] | keys one by one, and the size of the screen |
@@ -21,7 +22,7 @@
 mod unix;
 #[cfg(unix)]
 pub use unix::{
-    allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, private,
+    allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, owner, private,
     processors, terminal,
 };
 
@@ -29,7 +30,7 @@ pub use unix::{
 mod windows;
 #[cfg(windows)]
 pub use windows::{
-    allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, private,
+    allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, owner, private,
     processors, terminal,
 };
 
@@ -55,4 +56,19 @@ pub enum Caller {
     Unlisted,
     /// This system has no list of connections.
     NoList,
+}
+
+/// What shows, since the last look, that the people whose machine this is need it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Signs {
+    /// Processors that other programs kept busy, those left out that ask for no more than what is idle.
+    pub others: f64,
+    /// Somebody used a keyboard, or on Windows a mouse.
+    pub typed: bool,
+    /// Somebody logged in.
+    pub logged_in: bool,
+    /// The machine lives on its battery.
+    pub on_battery: bool,
+    /// Its temperature (degrees Celsius), where that is so high that the system acts against it.
+    pub hot: Option<f64>,
 }

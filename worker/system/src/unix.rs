@@ -10,6 +10,7 @@ pub mod host;
 pub mod interrupts;
 pub mod memory;
 pub mod notice;
+pub mod owner;
 pub mod private;
 pub mod processors;
 pub mod terminal;

@@ -11,6 +11,7 @@ mod identity;
 pub mod interrupts;
 pub mod memory;
 pub mod notice;
+pub mod owner;
 pub mod private;
 pub mod processors;
 pub mod terminal;

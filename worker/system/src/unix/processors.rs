@@ -13,6 +13,15 @@ pub fn lowest_priority() {
     let _ = rustix::process::setpriority_process(Some(gettid()), LOWEST);
 }
 
+/// Does the same for this process, before it starts threads.
+pub fn lowest_priority_of_process() {
+    lowest_priority();
+    // Linux may share processors out among sessions before it looks at priorities. A session that has other programs is left as it is.
+    if rustix::process::getsid(None).is_ok_and(|leader| leader == rustix::process::getpid()) {
+        let _ = fs::write("/proc/self/autogroup", LOWEST.to_string());
+    }
+}
+
 /// Confines the calling thread, and all that it starts from now on, to processors of this machine.
 ///
 /// # Errors

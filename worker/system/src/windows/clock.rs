@@ -1,4 +1,4 @@
-//! Processor time of a thread.
+//! Processor time of a thread; the time of day where this machine stands.
 //!
 //! Times of threads come in steps of 15.6 ms here; only their processor cycles are exact. How long a cycle takes is measured once.
 
@@ -8,8 +8,9 @@ use std::{
 };
 
 use windows_sys::Win32::{
-    Foundation::FILETIME,
+    Foundation::{FILETIME, SYSTEMTIME},
     System::{
+        SystemInformation::GetLocalTime,
         Threading::{GetCurrentThread, GetThreadTimes},
         WindowsProgramming::QueryThreadCycleTime,
     },
@@ -58,6 +59,14 @@ fn in_steps() -> u64 {
     ns(kernel) + ns(user)
 }
 
+/// Minutes since Monday began, where this machine stands.
+pub fn minute_of_week() -> u32 {
+    let mut local = SYSTEMTIME::default();
+    // SAFETY: the structure is ours.
+    unsafe { GetLocalTime(&raw mut local) };
+    (u32::from(local.wDayOfWeek) + 6) % 7 * 24 * 60 + u32::from(local.wHour) * 60 + u32::from(local.wMinute)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -71,5 +80,10 @@ mod tests {
             assert!(now >= last, "{now} after {last}");
             last = now;
         }
+    }
+
+    #[test]
+    fn a_week_has_so_many_minutes() {
+        assert!(minute_of_week() < 7 * 24 * 60);
     }
 }

@@ -7,8 +7,8 @@ use windows_sys::Win32::System::{
         GetLogicalProcessorInformationEx, RelationProcessorCore, SYSTEM_LOGICAL_PROCESSOR_INFORMATION_EX,
     },
     Threading::{
-        GetCurrentProcess, GetCurrentThread, GetProcessAffinityMask, SetProcessAffinityMask,
-        SetThreadPriority, THREAD_PRIORITY_LOWEST,
+        GetCurrentProcess, GetCurrentThread, GetProcessAffinityMask, IDLE_PRIORITY_CLASS, SetPriorityClass,
+        SetProcessAffinityMask, SetThreadPriority, THREAD_PRIORITY_LOWEST,
     },
 };
 
@@ -18,6 +18,14 @@ pub fn lowest_priority() {
     // SAFETY: the handle of the calling thread is always good.
     unsafe {
         SetThreadPriority(GetCurrentThread(), THREAD_PRIORITY_LOWEST);
+    }
+}
+
+/// Does the same for this process.
+pub fn lowest_priority_of_process() {
+    // SAFETY: the handle of this process is always good.
+    unsafe {
+        SetPriorityClass(GetCurrentProcess(), IDLE_PRIORITY_CLASS);
     }
 }
 
