@@ -377,7 +377,7 @@ impl Job {
                 && match self.twice.until() {
                     Some(until) => after >= until,
                     None => {
-                        (self.is_boundary(after) && self.wants_next_epoch(after))
+                        self.wants_next_epoch(after)
                             || (self.twice.is_chosen() && self.checkpoint_due(after, actions))
                     }
                 };
@@ -416,13 +416,15 @@ impl Job {
         cycle.is_multiple_of(u64::from(interval)) || self.epoch.sorts.change_plan_at(cycle)
     }
 
-    /// Whether the epoch is to end at a boundary.
-    fn wants_next_epoch(&mut self, boundary: u64) -> bool {
+    /// Whether the epoch is to end at a cycle: at once for processes that are to end, at a boundary for all others.
+    fn wants_next_epoch(&mut self, cycle: u64) -> bool {
         let at_work = &self.epoch.at_work;
-        boundary > self.epoch.schedule.first_cycle()
-            && (self.workers.has_newcomers(at_work)
-                || self.workers.has_leavers(at_work)
-                || self.wants_other_speeds(boundary))
+        cycle > self.epoch.schedule.first_cycle()
+            && (self.workers.has_leavers(at_work, Goes::Ends)
+                || (self.is_boundary(cycle)
+                    && (self.workers.has_newcomers(at_work)
+                        || self.workers.has_leavers(at_work, Goes::Needed)
+                        || self.wants_other_speeds(cycle))))
     }
 
     /// Whether the epoch is to end for other speeds.

@@ -97,7 +97,7 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
         pin.apply()?;
     }
     if args.yield_to_owner.is_some() {
-        system::processors::lowest_priority_of_process();
+        system::processors::low_priority_of_process();
     }
     let cores = worker::processors::cores() as u32;
     let speed = match args.speed {

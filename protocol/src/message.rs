@@ -235,7 +235,7 @@ pub enum ToMaster {
         /// Why: a sentence for the user.
         reason: String,
     },
-    /// The worker wants to go: it computes on until it is released, at the next plan boundary.
+    /// The worker wants to go: it computes on until it is released, a few cycles later.
     Leaving,
 }
 

@@ -185,17 +185,17 @@ fn greeting(options: &Options) -> Hello {
     hello
 }
 
-/// At Ctrl-C, or another request to end, asks to leave at the next plan boundary; ends at the second one, or when leaving takes too long.
+/// At Ctrl-C, or another request to end, asks to be released from its job; ends at the second one, or when leaving takes too long.
 async fn leave_by_and_by(told: &watch::Sender<Option<()>>) {
     let Ok(mut interrupts) = Interrupts::listen() else { return std::future::pending().await };
     interrupts.next().await;
-    warn!("leaving at the next plan boundary; once more to leave at once");
-    notify::say("STOPPING=1\nSTATUS=leaving at the next plan boundary");
+    warn!("leaving once the job can stop; once more to leave at once");
+    notify::say("STOPPING=1\nSTATUS=leaving once the job can stop");
     told.send_replace(Some(()));
     tokio::select! {
         () = interrupts.next() => {}
         () = tokio::time::sleep(LEAVE_LIMIT) => {
-            warn!("no plan boundary within {} s; leaving", LEAVE_LIMIT.as_secs());
+            warn!("not released within {} s; leaving", LEAVE_LIMIT.as_secs());
         }
     }
 }

@@ -144,9 +144,6 @@ impl Share {
     }
 }
 
-/// The part of its time that a worker computes which is to leave, until it has left.
-const LEAVING: f64 = 0.2;
-
 /// Looks at the machine from now on; tells why the worker is to stay away, where it is, and sets its share.
 pub(crate) fn watch(rules: &Rules, share: &Share) -> watch::Receiver<Option<String>> {
     let (tell, told) = watch::channel(None);
@@ -163,7 +160,8 @@ pub(crate) fn watch(rules: &Rules, share: &Share) -> watch::Receiver<Option<Stri
         let (part, away) = match &standing {
             Standing::Free => (1.0, None),
             Standing::Slow(_) => (slow, None),
-            Standing::Away(why) => (LEAVING, Some(why.clone())),
+            // Until it has left, the others wait for it.
+            Standing::Away(why) => (1.0, Some(why.clone())),
         };
         match &standing {
             Standing::Free => info!("nobody else needs this host any more"),

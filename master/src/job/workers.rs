@@ -13,16 +13,16 @@ struct Worker {
     spec: WorkerSpec,
     /// Not lost.
     alive: bool,
-    /// Why it goes at the next plan boundary, if it does.
+    /// Why it goes, if it does.
     goes: Option<Goes>,
 }
 
-/// Why a worker goes at the next plan boundary.
+/// Why a worker goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Goes {
-    /// Its process is to end.
+    /// Its process is to end, or to step back: it goes as soon as all can stop at a cycle.
     Ends,
-    /// Another job needs it.
+    /// Another job needs it: it goes at the next plan boundary.
     Needed,
 }
 
@@ -80,7 +80,7 @@ impl Workers {
         Ok(std::mem::replace(&mut lost.alive, false))
     }
 
-    /// One is to go, at the next plan boundary. A process that is to end does, whoever needs it.
+    /// One is to go. A process that is to end does, whoever needs it.
     pub(super) fn leave(&mut self, index: usize, why: Goes) {
         if let Some(worker) = self.all.get_mut(index)
             && worker.goes != Some(Goes::Ends)
@@ -95,9 +95,9 @@ impl Workers {
             > at_work.iter().filter(|&&index| self.all[index].goes.is_none()).count()
     }
 
-    /// Whether somebody of the workers is to go.
-    pub(super) fn has_leavers(&self, at_work: &[usize]) -> bool {
-        at_work.iter().any(|&index| self.all[index].goes.is_some())
+    /// Whether somebody of the workers is to go for this reason.
+    pub(super) fn has_leavers(&self, at_work: &[usize], reason: Goes) -> bool {
+        at_work.iter().any(|&index| self.all[index].goes == Some(reason))
     }
 
     /// Lets those of the workers go that are to; gives their indices, and why they go.
@@ -168,7 +168,7 @@ mod tests {
         let mut workers = three();
         assert!(!workers.has_newcomers(&[0, 1, 2]) && workers.has_newcomers(&[0, 1]));
         workers.leave(1, Goes::Needed);
-        assert!(workers.has_leavers(&[0, 1, 2]) && !workers.has_newcomers(&[0, 1, 2]));
+        assert!(workers.has_leavers(&[0, 1, 2], Goes::Needed) && !workers.has_newcomers(&[0, 1, 2]));
         assert_eq!(workers.release(&[0, 1, 2]), [(1, Goes::Needed)]);
         assert_eq!(workers.alive(), [0, 2]);
         workers.leave(2, Goes::Ends);

@@ -6,6 +6,8 @@ use rustix::thread::{CpuSet, gettid, sched_getaffinity, sched_setaffinity};
 
 /// The highest nice value of Linux.
 const LOWEST: i32 = 19;
+/// The one of a program that steps back for others.
+const LOW: i32 = 10;
 
 /// Gives the calling thread the lowest priority of the machine's ordinary ones, for good: it runs on what others leave
 /// idle. A machine that refuses leaves it as it was.
@@ -13,12 +15,16 @@ pub fn lowest_priority() {
     let _ = rustix::process::setpriority_process(Some(gettid()), LOWEST);
 }
 
-/// Does the same for this process, before it starts threads.
-pub fn lowest_priority_of_process() {
-    lowest_priority();
+/// Gives this process, before it starts threads, a priority at which it gets a tenth of a processor that another program wants, and all of one that
+/// none does.
+pub fn low_priority_of_process() {
+    let now = rustix::process::getpriority_process(None).unwrap_or(0);
+    if now < LOW {
+        let _ = rustix::process::setpriority_process(None, LOW);
+    }
     // Linux may share processors out among sessions before it looks at priorities. A session that has other programs is left as it is.
     if rustix::process::getsid(None).is_ok_and(|leader| leader == rustix::process::getpid()) {
-        let _ = fs::write("/proc/self/autogroup", LOWEST.to_string());
+        let _ = fs::write("/proc/self/autogroup", LOW.to_string());
     }
 }
 

@@ -7,8 +7,8 @@ use windows_sys::Win32::System::{
         GetLogicalProcessorInformationEx, RelationProcessorCore, SYSTEM_LOGICAL_PROCESSOR_INFORMATION_EX,
     },
     Threading::{
-        GetCurrentProcess, GetCurrentThread, GetProcessAffinityMask, IDLE_PRIORITY_CLASS, SetPriorityClass,
-        SetProcessAffinityMask, SetThreadPriority, THREAD_PRIORITY_LOWEST,
+        BELOW_NORMAL_PRIORITY_CLASS, GetCurrentProcess, GetCurrentThread, GetProcessAffinityMask,
+        SetPriorityClass, SetProcessAffinityMask, SetThreadPriority, THREAD_PRIORITY_LOWEST,
     },
 };
 
@@ -21,11 +21,11 @@ pub fn lowest_priority() {
     }
 }
 
-/// Does the same for this process.
-pub fn lowest_priority_of_process() {
+/// Gives this process a priority at which it gets little of a processor that another program wants, and all of one that none does.
+pub fn low_priority_of_process() {
     // SAFETY: the handle of this process is always good.
     unsafe {
-        SetPriorityClass(GetCurrentProcess(), IDLE_PRIORITY_CLASS);
+        SetPriorityClass(GetCurrentProcess(), BELOW_NORMAL_PRIORITY_CLASS);
     }
 }
 
