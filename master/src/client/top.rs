@@ -258,7 +258,7 @@ mod tests {
         assert!(text.contains("50.0") && text.contains("1.083"), "{text}");
         let lines = page(&seen, "m:1", (100, 20));
         let drawn = lines.join("\n");
-        for words in ["bolide at m:1: 1 hosts", "Hosts", "Jobs", "plates", "50.0", "\x1b[36mbusy\x1b[0m"] {
+        for words in ["bolide at m:1: hosts 1, ", "Hosts", "Jobs", "plates", "50.0", "\x1b[36mbusy\x1b[0m"] {
             assert!(drawn.contains(words), "{words} in\n{drawn}");
         }
     }
