@@ -18,10 +18,14 @@ export function frame([low, high]) {
   return { centre: low.map((l, k) => (l + high[k]) / 2), radius: Math.hypot(...low.map((l, k) => high[k] - l)) / 2 || 1 };
 }
 
+/// The box around boxes.
+export const around = boxes =>
+  [0, 1].map(end => boxes[0][end].map((_, k) => (end ? Math.max : Math.min)(...boxes.map(box => box[end][k]))));
+
 /// Frames of pictures that stand beside each other: one for all, so that they have one scale, unless a body would be small in it.
 export function frames(boxes) {
   const own = boxes.map(frame);
-  const all = frame([0, 1].map(end => boxes[0][end].map((_, k) => (end ? Math.max : Math.min)(...boxes.map(box => box[end][k])))));
+  const all = frame(around(boxes));
   return all.radius <= ALIKE * Math.min(...own.map(one => one.radius)) ? own.map(() => all) : own;
 }
 
@@ -32,6 +36,11 @@ export class Camera {
 
   fit() {
     Object.assign(this, START, { zoom: 1, shift: [0, 0] });
+  }
+
+  /// Whether the user has looked nearer, or elsewhere.
+  isNear() {
+    return this.zoom !== 1 || this.shift.some(Boolean);
   }
 
   /// Looks at a side that was cut open across an axis (0 to 2), of which those beyond the plane are left, or those below it.

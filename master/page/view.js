@@ -2,7 +2,7 @@
 
 import { ask } from './ask.js';
 import { Bodies, box, unpack } from './bodies.js';
-import { Camera, frames } from './camera.js';
+import { Camera, around, frames } from './camera.js';
 import { MAPS, PARTS, ramp } from './colours.js';
 import * as lists from './lists.js';
 
@@ -19,6 +19,8 @@ let runs = [];
 let follow = true;
 /// Which runs the frames of the canvases take in, by their numbers; none if they are to be fitted again.
 let fitted = '';
+/// The boxes that they take in, by run.
+const taken = new Map();
 /// Drawings that have been overtaken by later ones are dropped.
 let turn = 0;
 const surfaces = new Map();
@@ -148,6 +150,8 @@ function paint() {
   if ($('from').value !== '') range = [Number($('from').value), range[1]];
   if ($('to').value !== '') range = [range[0], Number($('to').value)];
   if (fitted !== shown.map(run => run.job).join()) fit();
+  // Bodies that fly out of the picture are followed, unless the user looks at a detail.
+  else if (!camera.isNear()) takeIn();
   canvases.forEach((canvas, i) => {
     const run = runs[i];
     if (!run?.surface) return;
@@ -166,11 +170,21 @@ function paint() {
 /// The axes across which a run is shown mirrored: its own planes of symmetry.
 const mirrorsOf = run => run.sheet.mirrors.map(on => on && $('mirror').checked);
 
-/// Takes in what is shown.
+/// Takes in what is shown, and nothing else.
 function fit() {
+  taken.clear();
+  takeIn();
+}
+
+/// Takes in what is shown beside what was.
+function takeIn() {
   const shown = runs.filter(run => run.surface), full = shown.filter(run => run.surface.faces);
   if (!full.length) return;
-  const fits = frames(full.map(run => box(run.surface, mirrorsOf(run))));
+  const fits = frames(full.map(run => {
+    const now = box(run.surface, mirrorsOf(run));
+    taken.set(run.job, taken.has(run.job) ? around([taken.get(run.job), now]) : now);
+    return taken.get(run.job);
+  }));
   runs.forEach((run, i) => { canvases[i].frame = fits[full.indexOf(run)] ?? canvases[i].frame; });
   $('scales').hidden = fits.every(one => one === fits[0]);
   fitted = shown.map(run => run.job).join();
