@@ -208,9 +208,9 @@ mod tests {
         let busy = away("its owner's programs are at work");
         assert_eq!(looks(&mut owner, 0.0, 0.3, 4), vec![Standing::Free; 4], "the background");
         assert_eq!(looks(&mut owner, 1.0, 2.0, 3), [Standing::Free, busy.clone(), busy.clone()]);
-        assert_eq!(looks(&mut owner, 200.0, 0.0, 1), vec![busy.clone(); 1]);
+        assert_eq!(looks(&mut owner, 200.0, 0.0, 1), std::slice::from_ref(&busy));
         // A single busy look begins the quiet time anew.
-        assert_eq!(looks(&mut owner, 300.0, 1.0, 1), vec![busy.clone(); 1]);
+        assert_eq!(looks(&mut owner, 300.0, 1.0, 1), std::slice::from_ref(&busy));
         assert_eq!(looks(&mut owner, 599.5, 0.0, 4), [busy.clone(), busy, Standing::Free, Standing::Free]);
         // A short load is no owner.
         assert_eq!(looks(&mut owner, 700.0, 2.0, 1), [Standing::Free]);

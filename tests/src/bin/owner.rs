@@ -128,7 +128,7 @@ impl Owner {
         self.tell.write_all(b"come\n").expect("it listens");
     }
 
-    /// Ends it; gives how long it took until it had its processor, for good (s).
+    /// Ends it; gives how long it took until a second began in which it had its processor (s).
     fn go(mut self) -> f64 {
         self.tell.write_all(b"go\n").expect("it listens");
         drop(self.tell);
