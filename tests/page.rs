@@ -138,6 +138,13 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     assert_eq!(browser.evaluate("document.getElementById('cancel').textContent"), "End this job?");
     browser.evaluate("document.getElementById('cancel').dispatchEvent(new Event('blur'))");
     assert_eq!(browser.evaluate("document.getElementById('cancel').textContent"), "Cancel");
+    // Held, it waits for its user; resumed, for workers again.
+    browser.evaluate("document.getElementById('hold').click()");
+    browser.wait_for("document.getElementById('facts').innerText.includes('held, waits for')");
+    assert_eq!(browser.evaluate("document.getElementById('hold').hidden"), true);
+    browser.evaluate("document.getElementById('resume').click()");
+    browser.wait_for("document.getElementById('facts').innerText.includes('queued')");
+    assert_eq!(browser.evaluate("document.getElementById('resume').hidden"), true);
     let mut workers = Vec::new();
     for name in ["pc-1", "pc-2"] {
         let mut command = Command::new(BOLIDE);

@@ -213,12 +213,18 @@ function cancels() {
       return;
     }
     calm();
-    try {
-      await ask(`api/jobs/${page.chosen}/cancel`, { method: 'POST' });
-    } catch (error) {
-      lists.say($('faults'), error.message);
-    }
+    await act('cancel');
   });
+  for (const name of ['hold', 'resume']) $(name).addEventListener('click', () => act(name));
+}
+
+/// Asks the master for a change of the chosen job.
+async function act(name) {
+  try {
+    await ask(`api/jobs/${page.chosen}/${name}`, { method: 'POST' });
+  } catch (error) {
+    lists.say($('faults'), error.message);
+  }
 }
 
 function copies() {

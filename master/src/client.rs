@@ -1,4 +1,4 @@
-//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel`, `resume` and `results`, the other end of the [`client_requests`](crate::client_requests).
+//! CLIENT: `submit`, `watch`, `jobs`, `hosts`, `cancel`, `hold`, `resume` and `results`, the other end of the [`client_requests`](crate::client_requests).
 
 use std::{
     io::{IsTerminal, Write},
@@ -249,6 +249,7 @@ fn line_of(status: &Status) -> String {
     match (state, waits_for) {
         (State::Queued, Some(what)) => format!("job {job} queued, waits for {what}"),
         (State::Running, Some(what)) => format!("job {job} running, waits for {what}"),
+        (State::Held, Some(what)) => format!("job {job} held, waits for {what}"),
         (State::Running, None) => format!("job {job} running  {progress}"),
         _ => format!("job {job} {}", state.name()),
     }
@@ -446,37 +447,17 @@ pub fn hosts(at: &ClientArgs) -> Result<ExitCode, String> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// `bolide cancel`.
+/// `bolide cancel`, `hold`, `resume` and `rm`: asks for a change of a job and prints what comes of it.
 ///
 /// # Errors
-/// If there is no such job or it is over, or whatever went wrong on the way.
-pub fn cancel(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
-    let Reply::Done(what) = Client::new(at)?.ask(&Request::Cancel { job })? else { return Err(surprise()) };
+/// If there is no such job, its state does not allow that, or whatever went wrong on the way.
+pub fn act(request: &Request, at: &ClientArgs) -> Result<ExitCode, String> {
+    let Reply::Done(what) = Client::new(at)?.ask(request)? else { return Err(surprise()) };
     if at.json {
         println!("{}", serde_json::json!({ "done": what }));
     } else {
         println!("{what}");
     }
-    Ok(ExitCode::SUCCESS)
-}
-
-/// `bolide resume`.
-///
-/// # Errors
-/// If there is no such job or it has not failed, or whatever went wrong on the way.
-pub fn resume(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
-    let Reply::Done(what) = Client::new(at)?.ask(&Request::Resume { job })? else { return Err(surprise()) };
-    println!("{what}");
-    Ok(ExitCode::SUCCESS)
-}
-
-/// `bolide rm`.
-///
-/// # Errors
-/// If there is no such job or it is not over, or whatever went wrong on the way.
-pub fn remove(job: u32, at: &ClientArgs) -> Result<ExitCode, String> {
-    let Reply::Done(what) = Client::new(at)?.ask(&Request::Remove { job })? else { return Err(surprise()) };
-    println!("{what}");
     Ok(ExitCode::SUCCESS)
 }
 

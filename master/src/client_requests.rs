@@ -25,6 +25,7 @@ use tracing::info;
 use crate::{
     desk::{self, Brought},
     notice::{self, Notice},
+    queue::Wish,
 };
 
 /// Bytes of a request around a deck.
@@ -171,7 +172,11 @@ impl ClientRequests<'_> {
             Request::Hosts => Reply::Hosts(self.ask(Notice::Hosts).await?),
             Request::Cancel { job } => {
                 info!(job, by = self.caller.name(), "asked to cancel");
-                Reply::Done(self.ask(|answer| Notice::Cancel(job, answer)).await??)
+                Reply::Done(self.ask(|answer| Notice::Wish(job, Wish::Cancel, answer)).await??)
+            }
+            Request::Hold { job } => {
+                info!(job, by = self.caller.name(), "asked to hold");
+                Reply::Done(self.ask(|answer| Notice::Wish(job, Wish::Hold, answer)).await??)
             }
             Request::Resume { job } => {
                 info!(job, by = self.caller.name(), "asked to resume");

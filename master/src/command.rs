@@ -85,7 +85,15 @@ pub enum Command {
         #[command(flatten)]
         at: ClientArgs,
     },
-    /// Put a failed job back into the queue, at its last checkpoint
+    /// Keep a job back until it is resumed; one that runs is stored first
+    Hold {
+        /// The job
+        job: u32,
+        /// The master
+        #[command(flatten)]
+        at: ClientArgs,
+    },
+    /// Put a failed or held job back, at its last checkpoint
     Resume {
         /// The job
         job: u32,

@@ -11,7 +11,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
     drive::WorkerLink,
-    queue::{self, Change, Size},
+    queue::{self, Change, Size, Wish},
     results, spool,
 };
 
@@ -86,9 +86,9 @@ pub enum Notice {
     Hosts(oneshot::Sender<Vec<HostRow>>),
     /// A client follows a job; the newest without a number.
     Watch(Option<u32>, oneshot::Sender<Result<watch::Receiver<Status>, Error>>),
-    /// A client takes a job back.
-    Cancel(u32, oneshot::Sender<Result<String, Error>>),
-    /// A client wants a job that failed to go on.
+    /// A client takes a job back or keeps it back.
+    Wish(u32, Wish, oneshot::Sender<Result<String, Error>>),
+    /// A client wants a job that failed or is held to go on.
     Resume(u32, oneshot::Sender<Result<String, Error>>),
     /// A client removes a job that is over.
     Remove(u32, oneshot::Sender<Result<String, Error>>),

@@ -7,6 +7,7 @@ use std::{io::IsTerminal, path::Path, process::ExitCode, time::Duration};
 use clap::CommandFactory;
 use protocol::{
     handshake,
+    request::Request,
     shape::{Shape, Wire},
     tls,
 };
@@ -51,9 +52,10 @@ pub fn main(compute: Compute) -> ExitCode {
         Command::Watch { job, until, at } => client::watch(job, until, &at),
         Command::Jobs { at } => client::jobs(&at),
         Command::Hosts { at } => client::hosts(&at),
-        Command::Cancel { job, at } => client::cancel(job, &at),
-        Command::Resume { job, at } => client::resume(job, &at),
-        Command::Rm { job, at } => client::remove(job, &at),
+        Command::Cancel { job, at } => client::act(&Request::Cancel { job }, &at),
+        Command::Hold { job, at } => client::act(&Request::Hold { job }, &at),
+        Command::Resume { job, at } => client::act(&Request::Resume { job }, &at),
+        Command::Rm { job, at } => client::act(&Request::Remove { job }, &at),
         Command::Results { job, out, force, at } => client::results(job, out, force, &at),
         Command::Bench { what: Some(Bench::Messages(args)), .. } => bench::messages::run(&args),
         Command::Bench { what: None, grind } => bench::grind::run(&grind),

@@ -57,8 +57,27 @@ pub enum Change {
     Suspend,
     /// A user wants what failed or was held to be gone on with.
     Resume,
-    /// Master or workers die of it again and again: the next one goes on.
+    /// A user keeps it back, or master or workers die of it again and again: the next one goes on.
     Hold,
+}
+
+/// What a user wants of a job that it has still to come to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wish {
+    /// It is taken back.
+    Cancel,
+    /// It is kept back, stored where it is.
+    Hold,
+}
+
+impl Wish {
+    /// The change that brings it about in a job that waits, or whose run was stored.
+    pub const fn change(self) -> Change {
+        match self {
+            Self::Cancel => Change::Cancel,
+            Self::Hold => Change::Hold,
+        }
+    }
 }
 
 /// Starts of a job that ended neither with it nor in good order, since it last came further.
@@ -127,8 +146,8 @@ pub struct Entry {
     /// BLAKE3 of the deck, hexadecimal; empty where an earlier release queued it.
     pub deck_sum: String,
     pub starts: Starts,
-    /// A user has taken it back, which it has still to come to.
-    pub cancelled: bool,
+    /// What a user wants of it, until it is over.
+    pub wish: Option<Wish>,
     pub size: Size,
     /// Who submitted it, by certificate; empty without one.
     pub owner: String,
@@ -167,16 +186,15 @@ impl Queue {
         self.jobs.remove(&id);
     }
 
-    /// Puts a job that failed back, with its deck.
+    /// Puts a job that failed or was held back, with its deck. One that had begun goes before the others, on any workers.
     ///
     /// # Errors
     /// As for [`Queue::apply`].
-    pub fn resume(&mut self, id: u32, text: String) -> Result<State, Error> {
+    pub fn resume(&mut self, id: u32, text: String, had_begun: bool) -> Result<State, Error> {
         let (state, _) = self.apply(id, Change::Resume)?;
         if let Some(job) = self.jobs.get_mut(&id) {
             job.text = Arc::new(text);
-            // Any workers will do.
-            job.before = Some(Vec::new());
+            job.before = had_begun.then(Vec::new);
             job.starts = Starts::default();
         }
         Ok(state)
@@ -214,10 +232,10 @@ impl Queue {
         self.jobs.values().filter(|job| is_over(job.state))
     }
 
-    /// A user takes back a job under way.
-    pub fn set_cancelled(&mut self, id: u32, cancelled: bool) {
+    /// What a user wants of a job.
+    pub fn set_wish(&mut self, id: u32, wish: Option<Wish>) {
         if let Some(job) = self.jobs.get_mut(&id) {
-            job.cancelled = cancelled;
+            job.wish = wish;
         }
     }
 
@@ -241,21 +259,9 @@ impl Queue {
         let folder = (!options.no_output).then(|| spool.join(format!("job-{id}")));
         let text = Arc::new(text);
         let deck_sum = sum_of(&text);
-        let (state, before, starts, cancelled) = (State::Queued, None, Starts::default(), false);
-        let entry = Entry {
-            id,
-            name,
-            text,
-            options,
-            state,
-            folder,
-            before,
-            deck_sum,
-            starts,
-            cancelled,
-            size,
-            owner,
-        };
+        let (state, before, starts, wish) = (State::Queued, None, Starts::default(), None);
+        let entry =
+            Entry { id, name, text, options, state, folder, before, deck_sum, starts, wish, size, owner };
         self.jobs.insert(id, entry);
         Ok(id)
     }
@@ -287,7 +293,7 @@ impl Queue {
         job.state = after(job.state, change)?;
         let state = job.state;
         if is_over(state) {
-            job.text = Arc::default();
+            (job.text, job.wish) = (Arc::default(), None);
         }
         // A held job waits for its user, and what has just ended is to be seen.
         let ends = |job: &&Entry| is_over(job.state) && job.state != State::Held && job.id != id;

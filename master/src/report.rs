@@ -134,7 +134,7 @@ async fn serve(folders: Vec<PathBuf>, mut heard: mpsc::Receiver<Notice>) {
             Notice::Submit { answer, .. } => {
                 let _ = answer.send(Err(Error::OnlyShows));
             }
-            Notice::Cancel(_, answer) | Notice::Resume(_, answer) | Notice::Remove(_, answer) => {
+            Notice::Wish(_, _, answer) | Notice::Resume(_, answer) | Notice::Remove(_, answer) => {
                 let _ = answer.send(Err(Error::OnlyShows));
             }
             // Workers have no way here.

@@ -28,7 +28,7 @@ use crate::{
     hosts::Hosts,
     http::board::Board,
     notice::{Error, Notice},
-    queue::{self, Change, Entry, Queue, Size, Starts, is_over},
+    queue::{self, Change, Entry, Queue, Size, Starts, Wish, is_over},
     scheduler::{allotment::Call, retention::Limits},
     snapshot::store,
     spool::{self, Left, Record, Spool},
@@ -101,6 +101,13 @@ impl Running {
             let _ = line.try_send(Input::Wake);
         }
     }
+
+    /// Has it stored at its next cycle.
+    fn suspend(&self) {
+        let line = self.line.clone();
+        // Beside what the scheduler hears meanwhile: the line may be full.
+        tokio::spawn(async move { line.send(Input::Suspend).await.is_ok() });
+    }
 }
 
 impl Scheduler {
@@ -149,7 +156,8 @@ impl Scheduler {
     /// A job of an earlier master; one that was under way goes on.
     fn restore(&mut self, record: Record, text: String) {
         let Record { job, name, title, state, options, at_work, cycle, time, ended, .. } = record.clone();
-        let Record { deck_sum, starts, cancelled, elements, cycles, owner, .. } = record;
+        let Record { deck_sum, starts, cancelled, held, elements, cycles, owner, .. } = record;
+        let wish = if cancelled { Some(Wish::Cancel) } else { held.then_some(Wish::Hold) };
         let interrupted = state == State::Running;
         let state = if interrupted { State::Queued } else { state };
         if !is_over(state) {
@@ -157,10 +165,17 @@ impl Scheduler {
         }
         self.status.insert(
             job,
-            watch::Sender::new(Status { state, cycle, time, ended, ..Status::queued(job, title) }),
+            watch::Sender::new(Status {
+                state,
+                cycle,
+                time,
+                waits_for: waits_for_user(job, state, ended.as_ref()),
+                ended,
+                ..Status::queued(job, title)
+            }),
         );
         let folder = (!options.no_output).then(|| self.spool.results(job));
-        let before = interrupted.then_some(at_work);
+        let before = (interrupted || !at_work.is_empty()).then_some(at_work);
         let text = Arc::new(text);
         let entry = Entry {
             id: job,
@@ -172,13 +187,14 @@ impl Scheduler {
             before,
             deck_sum,
             starts,
-            cancelled,
+            wish,
             size: Size { elements, cycles },
             owner,
         };
         self.queue.restore(entry);
-        let verdict = if cancelled && matches!(state, State::Queued | State::Held) {
-            Some((Change::Cancel, Ended::default()))
+        let wished = wish.map(Wish::change).filter(|&change| queue::after(state, change).is_ok());
+        let verdict = if let Some(change) = wished {
+            Some((change, Ended::default()))
         } else if interrupted && starts.are_too_many(store::newest(&self.spool.snapshots(job))) {
             let failure = Some(format!(
                 "held: {} masters ended while they ran it, and none of them stored it anew; look at the memory of this host, then `bolide resume {job}`",
@@ -189,7 +205,7 @@ impl Scheduler {
             None
         };
         let Some((change, ended)) = verdict else { return };
-        warn!(job, "{}", ended.failure.as_deref().unwrap_or("it was cancelled before the master ended"));
+        warn!(job, "{}", ended.failure.as_deref().unwrap_or("its user wanted so before the master ended"));
         if let Err(why) = self.change(job, change, Some(ended)) {
             warn!(job, "{why}");
         }
@@ -213,7 +229,8 @@ impl Scheduler {
                 ended,
                 deck_sum: entry.deck_sum.clone(),
                 starts: entry.starts,
-                cancelled: entry.cancelled,
+                cancelled: entry.wish == Some(Wish::Cancel),
+                held: entry.wish == Some(Wish::Hold),
                 elements: entry.size.elements,
                 cycles: entry.size.cycles,
                 owner: entry.owner.clone(),
@@ -256,11 +273,7 @@ impl Scheduler {
 
     /// Lets the jobs under way be stored, and says good-bye.
     async fn end(&mut self, heard: &mut mpsc::Receiver<Notice>, acceptor: &Acceptor) {
-        for running in self.running.values() {
-            let line = running.line.clone();
-            // Beside what is heard below: the line may be full.
-            tokio::spawn(async move { line.send(Input::Suspend).await.is_ok() });
-        }
+        self.running.values().for_each(Running::suspend);
         let _ = tokio::time::timeout(END_LIMIT, async {
             let mut wake = tokio::time::interval(WAKE_EVERY);
             while !self.running.is_empty() {
@@ -344,8 +357,8 @@ impl Scheduler {
             Notice::Watch(job, answer) => {
                 let _ = answer.send(self.watch(job));
             }
-            Notice::Cancel(job, answer) => {
-                let _ = answer.send(self.cancel(job));
+            Notice::Wish(job, wish, answer) => {
+                let _ = answer.send(self.wish(job, wish));
             }
             Notice::Resume(job, answer) => {
                 let _ = answer.send(self.resume(job));
@@ -361,9 +374,13 @@ impl Scheduler {
                 self.hosts.release(job);
                 self.called.retain(|_, call| call.from != job);
                 self.queue.forget_starts(job);
+                let wish = self.queue.get(job).and_then(|entry| entry.wish);
+                // What is stored, for whatever reason, is where its user wanted it.
+                let change = wish.filter(|_| change == Change::Suspend).map_or(change, Wish::change);
                 match &ended.failure {
                     Some(why) if matches!(change, Change::Suspend) => self.pause(job, why),
                     _ if matches!(change, Change::Suspend) => {}
+                    None if matches!(change, Change::Hold) => info!(job, "job is stored and held"),
                     Some(why) => warn!(job, "job failed: {why}"),
                     None => {
                         info!(job, digest = ended.digest, "job over");
@@ -408,6 +425,7 @@ impl Scheduler {
             deck_sum: self.queue.get(job).map(|entry| entry.deck_sum.clone()).unwrap_or_default(),
             starts: Starts::default(),
             cancelled: false,
+            held: false,
             elements: size.elements,
             cycles: size.cycles,
             owner,
@@ -429,21 +447,33 @@ impl Scheduler {
         Ok(status.subscribe())
     }
 
-    fn cancel(&mut self, job: u32) -> Result<String, Error> {
-        queue::after(self.queue.get(job).ok_or(queue::Error::Unknown(job))?.state, Change::Cancel)?;
-        // Who is told so finds it cancelled after a death of this master as well.
-        self.queue.set_cancelled(job, true);
+    /// Takes a job back, or keeps it back.
+    fn wish(&mut self, job: u32, wish: Wish) -> Result<String, Error> {
+        let entry = self.queue.get(job).ok_or(queue::Error::Unknown(job))?;
+        let (state, before) = (entry.state, entry.wish);
+        // One that is to end is as good as over.
+        let ends = wish == Wish::Hold && before == Some(Wish::Cancel);
+        queue::after(if ends { State::Cancelled } else { state }, wish.change())?;
+        // Who is told so finds it done after a death of this master as well.
+        self.queue.set_wish(job, Some(wish));
+        let (what, verb) = match wish {
+            Wish::Cancel => ("cancelled", "ends"),
+            Wish::Hold => ("held", "is stored"),
+        };
         if let Err(why) = self.record(job, self.ended(job)) {
-            self.queue.set_cancelled(job, false);
+            self.queue.set_wish(job, before);
             self.unwritten.insert(job);
-            return Err(Error::Disk { asked: format!("job {job} is not cancelled"), why });
+            return Err(Error::Disk { asked: format!("job {job} is not {what}"), why });
         }
-        if let Some(stop) = self.running.get(&job).map(Running::stopper) {
-            stop();
-            return Ok(format!("job {job} ends after its present cycle"));
+        if let Some(running) = self.running.get(&job) {
+            match wish {
+                Wish::Cancel => running.stopper()(),
+                Wish::Hold => running.suspend(),
+            }
+            return Ok(format!("job {job} {verb} after its present cycle"));
         }
-        self.change(job, Change::Cancel, Some(Ended::default()))?;
-        Ok(format!("job {job} is cancelled"))
+        self.change(job, wish.change(), Some(Ended::default()))?;
+        Ok(format!("job {job} is {what}"))
     }
 
     /// How a job ended that is over.
@@ -463,15 +493,22 @@ impl Scheduler {
     fn resume(&mut self, job: u32) -> Result<String, Error> {
         let state = self.queue.get(job).ok_or(queue::Error::Unknown(job))?.state;
         queue::after(state, Change::Resume)?;
-        let sum = self.queue.get(job).map(|entry| entry.deck_sum.clone()).unwrap_or_default();
-        let text = tokio::task::block_in_place(|| self.spool.text(job, &sum)).map_err(Error::Deck)?;
-        let state = self.queue.resume(job, text)?;
+        let entry = self.queue.get(job).ok_or(queue::Error::Unknown(job))?;
+        let had_begun = entry.before.is_some() || entry.folder.as_ref().is_some_and(|folder| folder.exists());
+        let text =
+            tokio::task::block_in_place(|| self.spool.text(job, &entry.deck_sum)).map_err(Error::Deck)?;
+        let state = self.queue.resume(job, text, had_begun)?;
         self.record(job, None)
             .map_err(|why| Error::Disk { asked: format!("that job {job} goes on is not on disk"), why })?;
         if let Some(status) = self.status.get(&job) {
-            status.send_modify(|status| (status.state, status.ended) = (state, None));
+            status.send_modify(|status| {
+                (status.state, status.ended, status.waits_for) = (state, None, None);
+            });
         }
-        Ok(format!("job {job} goes on where it was stored"))
+        Ok(format!(
+            "job {job} {}",
+            if had_begun { "goes on where it was stored" } else { "waits for workers" }
+        ))
     }
 
     fn folder(&self, job: u32) -> Result<PathBuf, Error> {
@@ -485,7 +522,9 @@ impl Scheduler {
 
     fn change(&mut self, job: u32, change: Change, ended: Option<Ended>) -> Result<(), queue::Error> {
         let (state, forgotten) = self.queue.apply(job, change)?;
-        let ended = ended.filter(|_| is_over(state));
+        // One that its user holds has not ended: it is watched until it has.
+        let has_ended = |ended: &Ended| is_over(state) && (state != State::Held || ended.failure.is_some());
+        let ended = ended.filter(has_ended);
         if let Err(why) = self.record(job, ended.clone()) {
             warn!(job, "its record is not on disk yet: {why}");
             self.unwritten.insert(job);
@@ -493,7 +532,7 @@ impl Scheduler {
         if let Some(status) = self.status.get(&job) {
             status.send_modify(|status| {
                 status.state = state;
-                status.waits_for = None;
+                status.waits_for = waits_for_user(job, state, ended.as_ref());
                 status.ended = ended;
             });
         }
@@ -503,4 +542,9 @@ impl Scheduler {
         }
         Ok(())
     }
+}
+
+/// What a job waits for that its user holds; one that is held because masters or workers died of it has a failure that says so.
+fn waits_for_user(job: u32, state: State, ended: Option<&Ended>) -> Option<String> {
+    (state == State::Held && ended.is_none()).then(|| format!("`bolide resume {job}`"))
 }

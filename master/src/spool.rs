@@ -68,6 +68,9 @@ pub struct Record {
     /// A user has taken it back, which it has still to come to.
     #[serde(default)]
     pub cancelled: bool,
+    /// A user keeps it back, which it has still to come to. Not written where it is false, so that the checksums of older records hold.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub held: bool,
     /// Of its mesh; 0 where an earlier release queued the job.
     #[serde(default)]
     pub elements: u64,
@@ -388,6 +391,7 @@ mod tests {
             deck_sum: sum_of("a deck"),
             starts: Starts { count: 1, snapshot: 3 },
             cancelled: false,
+            held: false,
             elements: 8,
             cycles: 40,
             owner: "anna".to_owned(),

@@ -26,7 +26,7 @@ use std::fmt;
 /// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans;
 /// beams in assignments.
 /// 11: the most workers that a job takes, and the seconds to its end; plies of shells in assignments.
-pub const VERSION: u16 = 11;
+pub const VERSION: u16 = 12;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

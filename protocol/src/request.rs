@@ -47,10 +47,12 @@ pub enum Request {
         /// Where to start (bytes).
         offset: u64,
     },
-    /// Put a failed job back into the queue, to resume from its last checkpoint. Answered by [`Reply::Done`].
+    /// Put a job that failed or is held back into the queue, to resume from its last checkpoint. Answered by [`Reply::Done`].
     Resume { job: u32 },
     /// Remove a job that is over, with its results. Answered by [`Reply::Done`].
     Remove { job: u32 },
+    /// Keep a job out of the queue, or store it after its present cycle, until it is resumed. Answered by [`Reply::Done`].
+    Hold { job: u32 },
 }
 
 /// Most bytes of [`Joining`] and [`Joined`] as they travel.
@@ -108,7 +110,7 @@ pub enum State {
     Done,
     /// Something went wrong.
     Failed,
-    /// It was interrupted by deaths of master or workers again and again; a user may resume it.
+    /// A user keeps it back, or deaths of master or workers interrupted it again and again; a user may resume it.
     Held,
     /// A user took it back; what it had computed is kept.
     Cancelled,

@@ -138,6 +138,34 @@ fn jobs_share_workers_and_have_the_bits_that_they_have_alone() {
 }
 
 #[test]
+fn a_job_that_is_held_gives_its_workers_away_and_goes_on_where_it_was_stored() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker("a", "1");
+    assert_eq!(cluster.json(&["submit", &small(), "--cycles", LONG, "--no-output"])["job"], 1);
+    let job_once = |is: &dyn Fn(&serde_json::Value) -> bool| cluster.find_job(1).filter(|job| is(job));
+    until(|| "job 1 under way".to_owned(), || job_once(&|job| job["cycle"].as_u64() > Some(20)));
+    let held = cluster.json(&["hold", "1"]);
+    assert_eq!(held["done"], "job 1 is stored after its present cycle");
+    let job = until(|| "job 1 held".to_owned(), || job_once(&|job| job["state"] == "held"));
+    assert_eq!((&job["waits_for"], &job["ended"]), (&"`bolide resume 1`".into(), &serde_json::Value::Null));
+    let until_done = cluster.client(&["watch", "1", "--until", "done"]);
+    assert!(until_done.code == Some(1) && until_done.err.contains("job 1 is held"), "{until_done:?}");
+    let twice = cluster.client(&["hold", "1"]);
+    assert!(twice.code == Some(1) && twice.err.contains("a job that is held cannot hold"), "{twice:?}");
+
+    // Its worker computes another one, and a new master knows that it is held.
+    let short = cluster.json(&["submit", &small(), "--cycles", "40", "--no-output", "--wait"]);
+    assert_eq!(digest_of(&short), reference());
+    cluster.master.kill();
+    cluster.restart_master();
+    assert_eq!(cluster.job(1)["state"], "held");
+    assert_eq!(cluster.client(&["resume", "1"]).out.trim(), "job 1 goes on where it was stored");
+    let summary = cluster.json(&["watch", "1"]);
+    assert_eq!(digest_of(&summary), long_reference());
+    cluster.master.wait_for("the job goes on job=1 cycle=");
+}
+
+#[test]
 fn a_keyword_deck_is_submitted_with_what_it_includes() {
     let deck = repository("deck/examples/block-on-plate.k").display().to_string();
     let mut command = std::process::Command::new(BOLIDE);

@@ -19,7 +19,10 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Look at results", &["report", "picture", "export"]),
     (
         "Use a cluster",
-        &["master", "worker", "submit", "watch", "jobs", "hosts", "top", "results", "cancel", "resume", "rm"],
+        &[
+            "master", "worker", "submit", "watch", "jobs", "hosts", "top", "results", "cancel", "hold",
+            "resume", "rm",
+        ],
     ),
     ("Set up and measure", &["add", "certs", "bench", "simulate", "completions", "man"]),
 ];

@@ -7,7 +7,7 @@
 //! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N&max_workers=N`, body the deck | `{job}`; 422 `{faults: [{file, line, column, ...}]}` |
 //! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes, forecast}`, or 422 as above |
 //! | `POST /api/check/surface?name=NAME`, body the deck | the surface before the first cycle, binary |
-//! | `POST /api/jobs/N/cancel` | `{done}` |
+//! | `POST /api/jobs/N/cancel`, `hold` or `resume` | `{done}` |
 //! | `GET /api/jobs/N` | the job's status |
 //! | `GET /api/jobs/N/sheet` | energies, imbalance, phases of workers, list of states |
 //! | `GET /api/jobs/N/surface/K?cut=AXIS&at=SHARE&side=SIDE&hide=PARTS` | the surface of state K, binary, as [`surface`](super::surface) says; with a cut, of the elements on one side (`beyond` or `below`) of a plane; without the parts of these indices |
@@ -34,7 +34,7 @@ use protocol::{
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::{
@@ -47,7 +47,7 @@ use crate::{
     desk::{self, Brought},
     notice::{self, Notice, ask},
     picture::camera::Slice,
-    queue,
+    queue::{self, Wish},
 };
 
 /// The shortest time between two events of the stream.
@@ -64,6 +64,8 @@ pub fn routes() -> Router<ApiState> {
         .route("/jobs", post(submit))
         .route("/jobs/{job}", get(job))
         .route("/jobs/{job}/cancel", post(cancel))
+        .route("/jobs/{job}/hold", post(hold))
+        .route("/jobs/{job}/resume", post(resume))
         .route("/jobs/{job}/sheet", get(job_view))
         .route("/jobs/{job}/surface/{index}", get(surface))
         .route("/jobs/{job}/history", get(files::history))
@@ -251,12 +253,26 @@ async fn job(
     Ok(Json(client::as_json(&status)))
 }
 
-async fn cancel(
-    State(api_state): State<ApiState>,
-    Path(job): Path<u32>,
-) -> Result<Json<serde_json::Value>, Fault> {
-    let done = ask(&api_state.notices, |answer| Notice::Cancel(job, answer)).await??;
-    Ok(Json(json!({ "done": done })))
+/// What came of a change of a job.
+type Done = Result<Json<serde_json::Value>, Fault>;
+
+async fn cancel(State(api_state): State<ApiState>, Path(job): Path<u32>) -> Done {
+    act(&api_state, |answer| Notice::Wish(job, Wish::Cancel, answer)).await
+}
+
+async fn hold(State(api_state): State<ApiState>, Path(job): Path<u32>) -> Done {
+    act(&api_state, |answer| Notice::Wish(job, Wish::Hold, answer)).await
+}
+
+async fn resume(State(api_state): State<ApiState>, Path(job): Path<u32>) -> Done {
+    act(&api_state, |answer| Notice::Resume(job, answer)).await
+}
+
+async fn act(
+    api_state: &ApiState,
+    change: impl FnOnce(oneshot::Sender<Result<String, notice::Error>>) -> Notice,
+) -> Done {
+    Ok(Json(json!({ "done": ask(&api_state.notices, change).await?? })))
 }
 
 async fn job_view(

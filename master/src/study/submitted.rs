@@ -1,7 +1,8 @@
 //! Runs of a study as jobs of a master: several in its queue at once.
 //!
 //! The title of a job ends in the identity of its run, so a study that was killed finds its jobs again, whatever numbers they have and whoever put
-//! them there. The master may go and come back; a job that was cancelled is put into the queue again, one that is held is resumed.
+//! them there. The master may go and come back; a job that was cancelled is put into the queue again, one that is held because
+//! masters or workers died of it is resumed. One that its user holds is waited for.
 
 use std::{
     collections::BTreeMap,
@@ -144,8 +145,14 @@ impl<'a> Submitted<'a> {
         let state = status.map(|status| status.state);
         let Some(Tracked { task, tries }) = self.jobs.remove(&job) else { return Ok(None) };
         let again = tries < MOST_TRIES;
+        // A failure says why a job is held, unless its user holds it.
+        let user_holds = state == Some(State::Held) && status.is_some_and(|status| status.ended.is_none());
         match state {
             Some(State::Queued | State::Running) => {
+                self.jobs.insert(job, Tracked { task, tries });
+                Ok(None)
+            }
+            Some(State::Held) if user_holds => {
                 self.jobs.insert(job, Tracked { task, tries });
                 Ok(None)
             }

@@ -239,6 +239,14 @@ class Job:
         """Takes it out of the queue, or ends it with the results so far."""
         self.cluster._ask("cancel", str(self.number))
 
+    def hold(self) -> None:
+        """Keeps it back until it is resumed; one that runs is stored first."""
+        self.cluster._ask("hold", str(self.number))
+
+    def resume(self) -> None:
+        """Puts it back into the queue after it failed or was held, at its last checkpoint."""
+        self.cluster._ask("resume", str(self.number))
+
 
 def _bar(shown: Progress) -> progress.Bar:
     return progress.Bar(shown)
