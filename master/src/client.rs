@@ -20,8 +20,9 @@ use protocol::{
     wire::Packed,
 };
 
+use arguments::{ClientArgs, MASTER, SubmitArgs};
+
 use crate::{
-    command::{ClientArgs, MASTER, SubmitArgs},
     deck_file::{self, doubt, gather_deck, warn},
     machine::host_name,
     notify::notify,
@@ -30,6 +31,7 @@ use crate::{
     shell::quoted,
 };
 
+pub mod arguments;
 pub mod screen;
 pub mod top;
 /// How long a master that has gone is dialled again while one of its jobs is followed.
@@ -133,7 +135,7 @@ impl Client {
         if text.len() > DECK_LIMIT {
             return Err(format!("{name}: {} bytes, at most {DECK_LIMIT} can be sent", text.len()));
         }
-        match self.ask(&Request::Submit { name, text, options })? {
+        match self.ask(&Request::Submit { name, text, options: Box::new(options) })? {
             Reply::Submitted { job } => Ok(job),
             Reply::Faults(lines) => Err(deck_file::Error::Faults(lines).into()),
             _ => Err(surprise()),
@@ -270,6 +272,8 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     let options = JobOptions {
         min_workers: args.min_workers.unwrap_or(args.workers[0]),
         max_workers: args.workers[1],
+        min_speed: args.min_speed,
+        min_memory: args.min_memory,
         priority: args.priority,
         trace: args.trace,
         ..args.job.clone()

@@ -167,7 +167,7 @@ impl ClientRequests<'_> {
 
     async fn answer(&self, request: Request) -> std::result::Result<Reply, Refusal> {
         Ok(match request {
-            Request::Submit { name, text, options } => self.submit(name, text, options).await?,
+            Request::Submit { name, text, options } => self.submit(name, text, *options).await?,
             Request::Jobs => Reply::Jobs(self.ask(Notice::Jobs).await?),
             Request::Hosts => Reply::Hosts(self.ask(Notice::Hosts).await?),
             Request::Cancel { job } => {

@@ -72,7 +72,7 @@ fn shortage_of_worker(elements: u64, workers: &[Bearer<'_>]) -> Option<String> {
     })
 }
 
-fn gigabytes(bytes: u64) -> f64 {
+pub fn gigabytes(bytes: u64) -> f64 {
     bytes as f64 / 1e9
 }
 

@@ -42,7 +42,9 @@ use plan::Study;
 use submitted::Submitted;
 use table::{Outcome, Outcomes};
 
-use crate::{command::ClientArgs, interrupt::stop_on_interrupt, notify::notify, results::write_whole};
+use crate::{
+    client::arguments::ClientArgs, interrupt::stop_on_interrupt, notify::notify, results::write_whole,
+};
 
 /// Name of the list of commands that repeat the points.
 const COMMANDS: &str = "commands.txt";

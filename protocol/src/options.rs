@@ -168,6 +168,14 @@ pub struct JobOptions {
     #[arg(skip)]
     #[serde(default)]
     pub max_workers: u32,
+    /// Wait for workers whose speeds are together at least this; 0 for any.
+    #[arg(skip)]
+    #[serde(default)]
+    pub min_speed: f64,
+    /// Wait for workers that may together take at least this (GB); 0 for any.
+    #[arg(skip)]
+    #[serde(default)]
+    pub min_memory: f64,
     /// Speeds by which work is distributed
     #[arg(long, help_heading = ADVANCED, value_enum, default_value = "given")]
     pub balance: Balance,
@@ -213,6 +221,8 @@ impl JobOptions {
         number("min-workers", Some(f64::from(self.min_workers)), |n| n <= 10_000.0, "at most 10000")?;
         let most = Some(f64::from(self.max_workers)).filter(|_| self.max_workers < self.min_workers);
         number("max-workers", most, |n| n == 0.0, "0 for any number, or at least min-workers")?;
+        number("min-speed", Some(self.min_speed), |speed| (0.0..=1e9).contains(&speed), "from 0 to 1e9")?;
+        number("min-memory", Some(self.min_memory), |gb| (0.0..=1e9).contains(&gb), "GB from 0 to 1e9")?;
         match &self.lanes {
             Some(name) if name.parse::<Width>().is_err() => Err(Error::Lanes(name.clone())),
             _ => Ok(()),
@@ -294,6 +304,8 @@ mod tests {
                 JobOptions { min_workers: 3, max_workers: 2, ..good.clone() },
                 "max-workers 2: must be 0 for any number, or at least min-workers",
             ),
+            (JobOptions { min_speed: f64::NAN, ..good.clone() }, "min-speed NaN: must be from 0 to 1e9"),
+            (JobOptions { min_memory: -1.0, ..good.clone() }, "min-memory -1: must be GB from 0 to 1e9"),
             (JobOptions { lanes: Some("mmx".into()), ..good.clone() }, "lanes \"mmx\""),
         ] {
             let error = bad.check().expect_err(words).to_string();

@@ -27,7 +27,7 @@ pub enum Request {
         name: String,
         text: String,
         /// What is asked of the run beside the deck.
-        options: JobOptions,
+        options: Box<JobOptions>,
     },
     /// Answered by [`Reply::Jobs`].
     Jobs,

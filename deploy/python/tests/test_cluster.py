@@ -39,6 +39,22 @@ def test_a_job_on_unequal_workers_has_the_bits_of_a_run(result: bo.Result) -> No
             lab.submit(wrong)
 
 
+def test_a_job_waits_for_a_speed_and_is_held_and_resumed() -> None:
+    with bo.LocalCluster(speeds=[1, 2]) as lab:
+        job = lab.submit(ball_on_plate(), wait=False, min_speed=4)
+        while job.status()["waits_for"] is None:
+            pass
+        assert "a speed of 4 together" in job.status()["waits_for"]
+        job.hold()
+        assert job.state == "held"
+        with pytest.raises(bo.RunError, match="bolide resume 1"):
+            job.wait(progress=False)
+        job.resume()
+        assert job.state == "queued"
+        job.cancel()
+        assert job.state == "cancelled"
+
+
 def test_a_master_that_is_not_there_is_told() -> None:
     with pytest.raises(bo.ClusterError, match=r"127\.0\.0\.1:1"):
         bo.Cluster("127.0.0.1:1").jobs()

@@ -11,12 +11,12 @@ use std::{
 
 use protocol::request::{HostRow, Reply, Request, Share, State, Status};
 
+use super::arguments::ClientArgs;
 use super::{
     Client,
     screen::{Key, Screen, Tint},
     surprise,
 };
-use crate::command::ClientArgs;
 
 /// Between two looks.
 const LOOK_EVERY: Duration = Duration::from_secs(1);

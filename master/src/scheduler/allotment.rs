@@ -72,6 +72,9 @@ pub struct Claim<'a> {
     pub elements: u64,
     /// Fewest and most workers.
     pub workers: [usize; 2],
+    /// The least speed and the least memory (bytes) of its workers together; 0 for any.
+    pub speed: f64,
+    pub memory: u64,
     pub priority: i32,
     /// Who submitted it.
     pub owner: &'a str,
@@ -86,6 +89,28 @@ impl Claim<'_> {
     /// Workers that it needs by its options: what was begun with enough goes on with any.
     fn needs(&self) -> usize {
         if self.runs || self.before.is_some() { 1 } else { self.workers[0].max(1) }
+    }
+
+    /// What these workers lack of the speed and the memory that its options ask for, in words.
+    fn lack<'b>(&self, workers: impl Iterator<Item = &'b Bearer<'b>>) -> Option<String> {
+        if self.before.is_some() {
+            return None;
+        }
+        let (speed, memory) =
+            workers.fold((0.0, 0), |(speed, memory), worker| (speed + worker.speed, memory + worker.memory));
+        if speed < self.speed {
+            return Some(format!(
+                "workers of a speed of {} together, those that it can have come to {speed}",
+                self.speed
+            ));
+        }
+        (memory < self.memory).then(|| {
+            format!(
+                "workers with {:.1} GB for it together, those that it can have come to {:.1} GB",
+                footprint::gigabytes(self.memory),
+                footprint::gigabytes(memory)
+            )
+        })
     }
 }
 
@@ -151,7 +176,7 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    fn all(&self) -> impl Iterator<Item = usize> + '_ {
+    fn all(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         self.has.iter().chain(&self.coming).chain(&self.given).copied()
     }
 
@@ -235,6 +260,13 @@ impl<'a> Table<'a> {
         // One that runs has its master's memory already.
         let available = self.available.filter(|_| !claim.runs);
         footprint::shortage(claim.elements, available, &bearers)
+    }
+
+    /// The same, or what they lack of what the job's options ask for.
+    fn lack(&self, claim: &Claim<'_>, workers: impl Iterator<Item = usize> + Clone) -> Option<String> {
+        claim
+            .lack(workers.clone().map(|worker| &self.workers[worker].bearer))
+            .or_else(|| self.shortage(claim, workers))
     }
 
     /// Starts interrupted jobs on the workers that they had; gives the first that still waits for some.
@@ -329,8 +361,8 @@ impl<'a> Table<'a> {
         }
         let mut fastest: Vec<usize> = (0..n).collect();
         fastest.sort_by(|&a, &b| self.speed(b).total_cmp(&self.speed(a)));
-        let enough = (needs..=n).find(|&n| self.shortage(claim, fastest[..n].iter().copied()).is_none());
-        enough.ok_or_else(|| self.shortage(claim, fastest.into_iter()).unwrap_or_default())
+        let enough = (needs..=n).find(|&n| self.lack(claim, fastest[..n].iter().copied()).is_none());
+        enough.ok_or_else(|| self.lack(claim, fastest.into_iter()).unwrap_or_default())
     }
 
     /// When a job that needs so many workers could begin (s), if jobs end as they say, and how many are left over then.
@@ -358,7 +390,7 @@ impl<'a> Table<'a> {
         let wants = inside.iter().map(|&row| {
             let Row { claim, needs, .. } = &self.rows[row];
             let used_well = claim.elements.div_ceil(USED_WELL).max(1) as f64 * of_thread;
-            let least = *needs as f64 * of_worker;
+            let least = (*needs as f64 * of_worker).max(claim.speed);
             let most = used_well.max(least).min(claim.workers[1] as f64 * of_worker);
             parts::Want { priority: claim.priority, owner: claim.owner, least, most }
         });
@@ -382,7 +414,7 @@ impl<'a> Table<'a> {
             }
             let given = self.rows[row].given.clone();
             let enough = given.len() >= self.rows[row].needs;
-            if enough && self.shortage(claim, given.iter().copied()).is_none() {
+            if enough && self.lack(claim, given.iter().copied()).is_none() {
                 continue;
             }
             self.call(row);
@@ -410,7 +442,7 @@ impl<'a> Table<'a> {
             !fits
         });
         let lacks =
-            |picked: &[usize]| picked.len() < needs || self.shortage(claim, picked.iter().copied()).is_some();
+            |picked: &[usize]| picked.len() < needs || self.lack(claim, picked.iter().copied()).is_some();
         while lacks(&picked) && picked.len() < most {
             let Some(slowest) = left.pop() else { break };
             picked.push(slowest);
@@ -438,7 +470,7 @@ impl<'a> Table<'a> {
                 continue;
             }
             let lacks =
-                || row.given.len() < row.needs || self.shortage(claim, row.given.iter().copied()).is_some();
+                || row.given.len() < row.needs || self.lack(claim, row.given.iter().copied()).is_some();
             if row.is_in && !lacks() {
                 self.done.starts.push((claim.job, incarnations(&row.given)));
                 continue;

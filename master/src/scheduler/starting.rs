@@ -70,6 +70,8 @@ impl Scheduler {
             job: entry.id,
             elements: entry.size.elements,
             workers: [options.min_workers.max(1) as usize, most],
+            speed: options.min_speed,
+            memory: (1e9 * options.min_memory) as u64,
             priority: options.priority,
             owner: &entry.owner,
             runs,

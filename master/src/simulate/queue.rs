@@ -244,6 +244,8 @@ impl Course<'_> {
             .enumerate()
             .filter(|(_, job)| job.arrives <= self.now && job.ended.is_none())
             .map(|(index, job)| Claim {
+                speed: 0.0,
+                memory: 0,
                 job: index as u32 + 1,
                 elements: job.elements as u64,
                 workers: [job.least, usize::MAX],

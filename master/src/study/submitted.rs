@@ -22,7 +22,11 @@ use super::{
     place::{Finished, Place, RunError, Task},
     plan::Study,
 };
-use crate::{client::Client, command::ClientArgs, deck_file, results::Summary};
+use crate::{
+    client::{Client, arguments::ClientArgs},
+    deck_file,
+    results::Summary,
+};
 
 /// How long a master that has gone is dialled.
 const PATIENCE: Duration = Duration::from_secs(300);

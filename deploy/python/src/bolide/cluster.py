@@ -65,6 +65,8 @@ class Cluster:
         wait: bool = True,
         min_workers: int = 1,
         max_workers: int | None = None,
+        min_speed: float = 0,
+        min_memory: float = 0,
         priority: int = 0,
         cycles: int | None = None,
         out: str | Path | None = None,
@@ -78,6 +80,8 @@ class Cluster:
             wait: whether to wait for its end and give its :class:`Result`; else its :class:`Job` is given at once.
             min_workers: wait for at least so many workers.
             max_workers: take at most so many.
+            min_speed: wait for workers of this speed together.
+            min_memory: wait for workers with so many GB together.
             priority: jobs of a higher priority start first.
             cycles: stop after so many.
             out: folder for the results; by default `results/NAME` by the title, whose earlier results are replaced.
@@ -96,6 +100,7 @@ class Cluster:
         forecast = check(path)
         workers = f"{min_workers}..{max_workers or ''}"
         arguments = ["submit", str(path), "--workers", workers, "--priority", str(priority)]
+        arguments += ["--min-speed", str(min_speed), "--min-memory", str(min_memory)]
         arguments += [] if cycles is None else ["--cycles", str(cycles)]
         number = int(self._ask(*arguments)["job"])
         end = None if cycles is not None else forecast.end_time

@@ -9,7 +9,7 @@ impl Table<'_> {
             let Row { claim, needs, part, .. } = &self.rows[row];
             let short = part - self.speed_of(row);
             let must = self.rows[row].n() < *needs
-                || (!claim.runs && self.shortage(claim, self.rows[row].all()).is_some());
+                || (!claim.runs && self.lack(claim, self.rows[row].all()).is_some());
             if !must && (short <= 0.25 * part || self.rows[row].n() >= claim.workers[1]) {
                 return;
             }
@@ -46,7 +46,7 @@ impl Table<'_> {
         from.sort_by(|&a, &b| above(b).total_cmp(&above(a)));
         let goes_on = |row: usize, without: usize| {
             let others = self.rows[row].has.iter().copied().filter(|&worker| worker != without);
-            self.shortage(self.rows[row].claim, others).is_none()
+            self.lack(self.rows[row].claim, others).is_none()
         };
         let of = |fits: &dyn Fn(usize, f64) -> bool, fastest: bool| {
             from.iter().find_map(|&row| {

@@ -5,7 +5,18 @@ const LATE: Duration = Duration::from_secs(60);
 /// A job of so many elements that waits.
 fn job(job: u32, elements: u64) -> Claim<'static> {
     let workers = [1, usize::MAX];
-    Claim { job, elements, workers, priority: 0, owner: "", runs: false, left_s: None, before: None }
+    Claim {
+        job,
+        elements,
+        workers,
+        speed: 0.0,
+        memory: 0,
+        priority: 0,
+        owner: "",
+        runs: false,
+        left_s: None,
+        before: None,
+    }
 }
 
 /// One that runs, with so many seconds left.
@@ -217,4 +228,41 @@ fn a_job_that_lost_its_workers_is_given_the_first_that_is_idle() {
     let claims = [running(1, 1_000_000, 100.0), running(2, 500, 100.0), job(3, 500)];
     let told = arranged(&claims, &three);
     assert_eq!(told.joins, [(3, 2)], "{told:?}");
+}
+
+#[test]
+fn a_job_that_needs_a_speed_waits_for_it_takes_it_and_keeps_it() {
+    let fast = Claim { speed: 3.0, ..job(1, 100) };
+    let slow = workers(&[1.0, 1.0], &[]);
+    let waits = arranged(&[fast.clone(), job(2, 100)], &slow);
+    assert_eq!(waits.starts, [(2, vec![1])], "the next one passes");
+    let words = "workers of a speed of 3 together, those that it can have come to 2";
+    assert_eq!(waits.waits, said(&[(1, words)]));
+    assert_eq!(
+        arranged(std::slice::from_ref(&fast), &workers(&[1.0, 2.0, 1.0], &[])).starts,
+        [(1, vec![2, 1])]
+    );
+    // It calls what it lacks of a job that goes on without.
+    let stands = [Stands::At(2), Stands::At(2), Stands::At(2)];
+    let calls = arranged(&[running(2, 1_000_000, 600.0), fast], &workers(&[1.0, 2.0, 2.0], &stands)).calls;
+    let called: f64 = calls.iter().map(|call| [1.0, 2.0, 2.0][call.worker as usize - 1]).sum();
+    assert!(called >= 3.0 && calls.len() == 2, "{calls:?}");
+    // Nobody takes it from one that runs.
+    let keeps = Claim { speed: 3.0, ..running(1, 1_000_000, 600.0) };
+    let taken = arranged(&[keeps, job(2, 1_000_000)], &workers(&[1.0, 2.0], &[Stands::At(1); 2]));
+    assert!(taken.calls.is_empty(), "{taken:?}");
+}
+
+#[test]
+fn a_job_that_needs_memory_waits_for_workers_that_have_it_together() {
+    let large = Claim { memory: 6_000_000_000, ..job(1, 100) };
+    let with = |gigabytes: &[u64]| -> Vec<Worker<'static>> {
+        let mut workers = workers(&vec![1.0; gigabytes.len()], &[]);
+        workers.iter_mut().zip(gigabytes).for_each(|(worker, gb)| worker.bearer.memory = gb * 1_000_000_000);
+        workers
+    };
+    let waits = arranged(std::slice::from_ref(&large), &with(&[4, 1])).waits;
+    let words = "workers with 6.0 GB for it together, those that it can have come to 5.0 GB";
+    assert_eq!(waits, said(&[(1, words)]));
+    assert_eq!(arranged(&[large], &with(&[4, 2])).starts, [(1, vec![1, 2])]);
 }
