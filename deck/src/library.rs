@@ -392,7 +392,7 @@ const FAILURES: [&str; 5] =
 fn read_failure(value: Value<'_>, table: Table<'_>, strength: Option<&Strength>) -> Option<Failure> {
     let words = FAILURES.join(", ");
     let kind = table.require("type", &format!("one of {words}"))?.one_of(&FAILURES)?;
-    let by_slip = ["plastic-strain", "cockcroft-latham"].contains(&FAILURES[kind]);
+    let by_slip = ["plastic-strain", "cockcroft-latham", "johnson-cook"].contains(&FAILURES[kind]);
     if by_slip && matches!(strength, Some(Strength::Hydro | Strength::Elastic { .. })) {
         value.fault("a strength that yields beside it", "choose another failure or strength");
     }
@@ -414,16 +414,17 @@ fn read_failure(value: Value<'_>, table: Table<'_>, strength: Option<&Strength>)
                 .map(|(tension, heals)| Failure::Hydrostatic { tension, heals })
         }
         _ => {
-            if strength.is_some_and(|s| !matches!(s, Strength::JohnsonCook { .. })) {
+            let d1 = table.number("d1", Range::Any);
+            let [d2, d3, d4, d5] = ["d2", "d3", "d4", "d5"].map(|key| table.number_or(key, 0.0, Range::Any));
+            if (d4 != 0.0 || d5 != 0.0)
+                && strength.is_some_and(|s| !matches!(s, Strength::JohnsonCook { .. }))
+            {
                 value.fault(
-                    "a johnson-cook strength beside it, whose rate0, t_room and t_melt it shares",
-                    "choose another failure or strength",
+                    "a johnson-cook strength beside d4 and d5, whose rate0, t_room and t_melt they share",
+                    "leave d4 and d5 out, or choose another strength",
                 );
             }
-            let d = ["d1", "d2", "d3", "d4", "d5"].map(|key| table.number(key, Range::Any));
-            d.iter()
-                .all(Option::is_some)
-                .then(|| Failure::JohnsonCook { d: d.map(Option::unwrap_or_default) })
+            d1.map(|d1| Failure::JohnsonCook { d: [d1, d2, d3, d4, d5] })
         }
     };
     table.finish();

@@ -85,6 +85,8 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let erosion = erosion::make(deck, (&parts, &assembly), (&rigid, &bodies), log);
     let output = output::make(deck, &names, &assembly, &bodies, log);
     let detonations = burn::make(deck, &materials, &parts, log);
+    let axes = parts.iter().filter_map(|part| part.axes).collect();
+    let scatter = parts.iter().filter_map(|part| part.scatter).collect();
     let faces = contact.as_ref().map(|contact| (&contact.settings, contact.faces.as_slice()));
     log.wanted()?;
     spans::check(&parts, &assembly, faces, &materials, log);
@@ -125,6 +127,8 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         mesh: assembly.mesh,
         velocity,
         spin: assembly.spin,
+        axes,
+        scatter,
         constraint: conditions.constraint,
         join_energy: assembly.join_energy,
         setup: Setup {

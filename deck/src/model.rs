@@ -1,6 +1,11 @@
 //! Model: what a run needs, free of any file format.
 
-use mechanics::{cross_section::CrossSection, mesh::Mesh, setup::Setup};
+use mechanics::{
+    cross_section::CrossSection,
+    failure::scatter::Scatter,
+    mesh::{Mesh, SolidAxes},
+    setup::Setup,
+};
 use serde::{Deserialize, Serialize};
 
 /// Names that [`Output::formats`] may hold: formats of results beside VTU.
@@ -46,6 +51,10 @@ pub struct Model {
     pub velocity: Vec<[f64; 3]>,
     /// Initial rotation rate by global node index (1/time), of nodes of shells; empty where all are zero.
     pub spin: Vec<[f64; 3]>,
+    /// Axes of the material by element, of the parts of solids that have them.
+    pub axes: Vec<SolidAxes>,
+    /// How the strength of elements scatters, of the parts in which it does.
+    pub scatter: Vec<Scatter>,
     /// Index into `setup.constraints` by global node index; 0 is free.
     pub constraint: Vec<u16>,
     /// Kinetic energy lost where joined nodes of different velocity merged.

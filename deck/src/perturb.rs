@@ -4,6 +4,8 @@
 //! box around all nodes. The numbers come from the seed and the node's place in the mesh alone, so they are equal on all machines.
 //! Coordinates whose velocity is prescribed stay, so nodes on symmetry planes and supports stay on them.
 
+use mechanics::draw;
+
 use crate::model::Model;
 
 /// Greatest amplitude: at more than this elements would be deformed visibly.
@@ -46,19 +48,10 @@ pub(crate) fn perturb(model: &mut Model, Perturbation { nodes, seed }: Perturbat
     }
 }
 
-/// A number from -1 to 1 of a seed and a place: the 53 upper bits of two rounds of splitmix64.
+/// A number from -1 to 1 of a seed and a place.
 fn part(seed: u64, place: u64) -> f64 {
     const HALF: f64 = 4_503_599_627_370_496.0;
-    let bits = mixed(mixed(seed).wrapping_add(place)) >> 11;
-    bits as f64 / HALF - 1.0
-}
-
-/// One step of splitmix64 (Steele, Lea and Flood 2014).
-pub fn mixed(x: u64) -> u64 {
-    let mut x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
+    draw::of_place(seed, place) as f64 / HALF - 1.0
 }
 
 #[cfg(test)]
@@ -90,7 +83,6 @@ mod tests {
 
     #[test]
     fn the_numbers_are_those_of_the_seed() {
-        assert_eq!(mixed(0), 0xe220_a839_7b1d_cdaf);
         assert_eq!(perturbed(1e-9, 1), perturbed(1e-9, 1));
         assert_ne!(perturbed(1e-9, 1).mesh.positions, perturbed(1e-9, 2).mesh.positions);
         assert_eq!(part(1, 2).to_bits(), 0x3fde_6ced_da4b_3980, "{:#x}", part(1, 2).to_bits());

@@ -248,7 +248,7 @@ fn two_hundred_runs_have_the_same_table_though_all_are_killed_at_random() {
     while studying.is_alive() {
         assert!(began.elapsed() < Duration::from_secs(3600), "{}", studying.text());
         std::thread::sleep(Duration::from_millis(2_500));
-        random = deck::perturb::mixed(random);
+        random = mechanics::draw::mixed(random);
         match random % 8 {
             0 => {
                 cluster.master.kill();

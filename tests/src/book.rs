@@ -24,6 +24,7 @@ mod load;
 mod modes;
 mod order;
 mod rigid;
+mod ring;
 mod shell;
 mod soft;
 mod solid;
@@ -146,6 +147,8 @@ macro_rules! each_case_of_the_book {
             erosion: an_element_that_leaves_a_block_uncovers_its_neighbours quick;
             erosion: a_rod_goes_through_a_plate_and_energies_add_up long;
             erosion: a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked quick;
+            ring: a_ring_breaks_into_as_many_pieces_as_mott_says quick;
+            ring: a_wound_ring_breathes_by_the_modulus_round_it quick;
             exposed: a_ball_goes_through_a_plate_at_any_speed_and_gap long;
             soft: a_steel_block_thrown_on_foam_rubber_and_water_stays_outside quick;
             friction: a_block_on_an_incline_rests_or_slides_after_coulomb long;

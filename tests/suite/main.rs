@@ -44,6 +44,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/girder.rs"),
         include_str!("../src/book/load.rs"),
         include_str!("../src/book/rigid.rs"),
+        include_str!("../src/book/ring.rs"),
         include_str!("../src/book/joint.rs"),
         include_str!("../src/book/contact.rs"),
         include_str!("../src/book/erosion.rs"),

@@ -298,7 +298,9 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
         }
         "MAT_HONEYCOMB" => {
             needs_moduli = false;
-            (None, composite::honeycomb(&f, log))
+            let (law, axes) = composite::honeycomb(&f, log);
+            fibres = Some(axes);
+            (None, law)
         }
         "MAT_VISCOELASTIC" => {
             needs_moduli = false;

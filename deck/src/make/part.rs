@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use mechanics::{
     element::{hex8::eight_points, hourglass::Hourglass, tet10},
     erosion::{Criteria, GEOMETRIC_STRAIN},
+    failure::scatter::Scatter,
     material::{Failure, Material, Strength},
-    mesh::{Laminate, Topology},
+    mesh::{Laminate, SolidAxes, Topology},
 };
 
 use super::material::Materials;
@@ -34,6 +35,10 @@ pub(super) struct PartDraft {
     pub(super) eight_points: bool,
     /// Hourglass control of solids.
     pub(super) hourglass: Hourglass,
+    /// The axes of the material of its solids, by element.
+    pub(super) axes: Option<SolidAxes>,
+    /// How the strength of its elements scatters.
+    pub(super) scatter: Option<Scatter>,
     /// When its elements erode; none if they do not.
     pub(super) erosion: Option<Criteria>,
     /// None after a fault.
@@ -71,6 +76,8 @@ pub(super) fn make(
         first.entry(&part.name).or_insert(part.at);
         let material = materials.resolve(part);
         let of_material = material.map(|m| &materials.list[m as usize]);
+        let axes = axes_of(part, of_material, log);
+        let scatter = scatter_of(part, of_material, log);
         let erosion = part.erosion.as_ref().map(|given| criteria(given, &part.kind, of_material, log));
         let eight_points = has_eight_points(part, of_material, log);
         let hourglass = hourglass_of(part, of_material, hourglass, log);
@@ -112,6 +119,8 @@ pub(super) fn make(
             velocity,
             eight_points,
             hourglass,
+            axes,
+            scatter,
             erosion,
             block,
             numbers,
@@ -138,6 +147,44 @@ fn has_eight_points(part: &Part, material: Option<&Material>, log: &Log<'_>) -> 
         _ => log.fault_of(origin, unfit.to_string(), "remove it, or choose another material"),
     }
     false
+}
+
+/// The axes of the material of a part by element, which needs solids whose law has axes.
+fn axes_of(part: &Part, material: Option<&Material>, log: &Log<'_>) -> Option<SolidAxes> {
+    let &Placed { value, origin } = part.axes.as_ref()?;
+    if part.kind != Kind::Solids {
+        let expected =
+            format!("solids: {} have the axes of their plies in their section", part.kind.elements());
+        log.fault_of(origin, expected, "remove it");
+    } else if material.is_some_and(|m| m.strength.axes().is_none() && m.strength.layers().is_none()) {
+        // A law of shells alone is told so itself.
+        let expected = "a strength with axes: orthotropic or honeycomb";
+        log.fault_of(origin, expected, "remove it, or choose another material");
+    }
+    Some(value)
+}
+
+/// How the strength of a part scatters, which needs solids whose failure law can have it.
+fn scatter_of(part: &Part, material: Option<&Material>, log: &Log<'_>) -> Option<Scatter> {
+    let &Placed { value, origin } = part.scatter.as_ref()?;
+    if part.kind != Kind::Solids {
+        let expected = format!("solids: the strength of {} does not scatter", part.kind.elements());
+        log.fault_of(origin, expected, "remove it");
+    } else if let Some(material) = material
+        && !Scatter::fits(&material.failure)
+    {
+        let advice = match material.failure {
+            Failure::PlasticStrain { .. } => {
+                "write the limit as failure = { type = \"johnson-cook\", d1 = LIMIT }"
+            }
+            Failure::Hydrostatic { .. } => "write failure = { type = \"principal-stress\", ... }",
+            _ => {
+                "give the material such a failure, or say fracture = true for one of the library that has constants"
+            }
+        };
+        log.fault_of(origin, "a failure of type johnson-cook, cockcroft-latham or principal-stress", advice);
+    }
+    Some(value)
 }
 
 /// The hourglass control of a part: its own or that of the deck, and viscous where the material cannot have elastic forces.

@@ -63,6 +63,15 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
             );
             continue;
         }
+        if let Some(e) = draft.axes.and_then(|axes| axes.first_without(part, &assembly.mesh.positions)) {
+            log.fault(
+                draft.at,
+                format!("part \"{}\": its axes give element {} none", part.name, part.element_ids[e]),
+                "a vector that is not normal to an element, or a line on which none is centred",
+                log.say("take other axes", "take another AOPT or vector"),
+            );
+            continue;
+        }
         let (kind, checked) = match &part.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => continue,
             Topology::Tetrahedra { .. } => {

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use mechanics::{
     element::shell4::Rule,
-    mesh::{Axis, Laminate, MAX_LAYERS, Plies, Ply, Section},
+    failure::scatter::Scatter,
+    mesh::{Axis, Guide, Laminate, MAX_LAYERS, Plies, Ply, Section, SolidAxes},
 };
 
 use super::{
@@ -17,7 +18,7 @@ use crate::{
     geometry::norm,
     library,
     limits::{MAX_ENTRIES, MAX_ID, MAX_PARTS},
-    place::{Origin, Place},
+    place::{Origin, Place, Placed},
     table::{Range, Table, Value},
     typed::{
         mesh::{Explicit, Numbers, PartMesh, Places, Source},
@@ -54,6 +55,8 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
         let at = value.map_or(table.place(), |v| Place::text(v.at));
         let name = given.unwrap_or_else(|| format!("part {}", n + 1));
         let fracture = table.get("fracture").filter(|v| v.boolean() == Some(true)).map(|v| v.origin());
+        let axes = table.get("axes").and_then(|v| read_axes(v, (n, &name)));
+        let scatter = table.get("scatter").and_then(|v| read_scatter(v, (n, &name)));
         let material = table
             .require("material", "a material by name or as an inline table")
             .and_then(|v| read_choice(v, &name));
@@ -91,6 +94,8 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
             named,
             material,
             fracture,
+            axes,
+            scatter,
             velocity,
             kind,
             eight_points,
@@ -239,6 +244,52 @@ fn read_truss(value: Value<'_>, name: &str) -> Option<Kind> {
     let area = table.number("area", Range::Positive);
     table.finish();
     area.map(|area| Kind::Trusses { area })
+}
+
+/// The axes of the material by element: `"element"`, or a table with what they follow and the angle that turns them.
+fn read_axes(value: Value<'_>, (part, name): (usize, &str)) -> Option<Placed<SolidAxes>> {
+    let axes = |by, angle| Some(value.placed(SolidAxes { part: part as u32, by, angle }));
+    if !value.is_table() {
+        if text(value)?.value == "element" {
+            return axes(Guide::Element, 0.0);
+        }
+        value.fault("\"element\", or a table with across or around", "write one of these");
+        return None;
+    }
+    let table = value.table(format!("axes of \"{name}\""))?;
+    let angle = table.number_or("angle", 0.0, Range::Any);
+    let (across, around) = (table.get("across"), table.get("around"));
+    let vector = |v: Value<'_>| {
+        let vector = v.vector()?;
+        if norm(vector) > 0.0 {
+            return Some(vector);
+        }
+        v.fault("a vector of some length", "give it a direction");
+        None
+    };
+    let by = match (across, around) {
+        (None, None) => Some(Guide::Element),
+        (Some(across), None) => vector(across).map(Guide::Across),
+        (None, Some(along)) => {
+            let point = table.get("point").map_or(Some([0.0; 3]), |v| v.vector());
+            vector(along).zip(point).map(|(along, point)| Guide::Around { point, along })
+        }
+        (Some(_), Some(around)) => {
+            around.fault("across or around", "remove one of them");
+            None
+        }
+    };
+    table.finish();
+    axes(by?, angle)
+}
+
+fn read_scatter(value: Value<'_>, (part, name): (usize, &str)) -> Option<Placed<Scatter>> {
+    let table = value.table(format!("scatter of \"{name}\""))?;
+    let modulus = table.number("modulus", Range::Positive);
+    let volume = table.get("volume").and_then(|v| v.number(Range::Positive));
+    let seed = table.integer_or("seed", 0, 0, u64::from(u32::MAX));
+    table.finish();
+    Some(value.placed(Scatter { part: part as u32, modulus: modulus?, volume, seed }))
 }
 
 /// The mesh of a part: exactly one of the blocks, or `mesh`.

@@ -3,8 +3,9 @@
 use mechanics::{
     element::{beam2::BeamSection, hourglass::Hourglass},
     erosion::Criteria,
+    failure::scatter::Scatter,
     material::Material,
-    mesh::{Section, Topology},
+    mesh::{Section, SolidAxes, Topology},
 };
 
 use super::mesh::PartMesh;
@@ -112,6 +113,10 @@ pub(crate) struct Part {
     pub(crate) material: Option<Choice>,
     /// Where the user asks for the fracture constants of the library.
     pub(crate) fracture: Option<Origin>,
+    /// The axes of the material of its solids, by element.
+    pub(crate) axes: Option<Placed<SolidAxes>>,
+    /// How the strength of its elements scatters.
+    pub(crate) scatter: Option<Placed<Scatter>>,
     /// Initial velocity.
     pub(crate) velocity: [f64; 3],
     pub(crate) kind: Kind,

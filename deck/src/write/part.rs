@@ -7,13 +7,14 @@ use mechanics::{
         shell4::Rule,
     },
     material::Material,
-    mesh::{Axis, Plies, Ply, Section, Topology},
+    mesh::{Axis, Guide, Plies, Ply, Section, Topology},
 };
 
 use super::value::{Text, list, numbers, quoted, table, vector};
 use crate::{
     blocks::{Sector, Shape},
     library::constants::{Written, of_eos, of_failure, of_strength},
+    place::Placed,
     typed::{
         Deck,
         mesh::{Explicit, PartMesh, Source},
@@ -85,6 +86,21 @@ fn write_part(text: &mut Text, part: &Part) {
         Some(Choice::Inline(material)) => text.key("material", table(&material_keys(material))),
     }
     text.some("fracture", part.fracture.map(|_| true));
+    if let Some(Placed { value: axes, .. }) = &part.axes {
+        let mut keys = match axes.by {
+            Guide::Element => Vec::new(),
+            Guide::Across(across) => vec![("across", vector(across))],
+            Guide::Around { point, along } => vec![("around", vector(along)), ("point", vector(point))],
+        };
+        keys.push(("angle", format!("{:?}", axes.angle)));
+        text.key("axes", table(&keys));
+    }
+    if let Some(Placed { value: scatter, .. }) = &part.scatter {
+        let mut keys =
+            vec![("modulus", format!("{:?}", scatter.modulus)), ("seed", scatter.seed.to_string())];
+        keys.extend(scatter.volume.map(|volume| ("volume", format!("{volume:?}"))));
+        text.key("scatter", table(&keys));
+    }
     if part.velocity != [0.0; 3] {
         text.key("velocity", vector(part.velocity));
     }

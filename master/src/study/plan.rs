@@ -2,11 +2,8 @@
 
 use std::{cmp::Ordering, path::PathBuf, sync::OnceLock};
 
-use deck::{
-    bundle::Options,
-    parameters::Parameters,
-    perturb::{Perturbation, mixed},
-};
+use deck::{bundle::Options, parameters::Parameters, perturb::Perturbation};
+use mechanics::draw::mixed;
 
 use super::{
     measure::{Formula, Measure},

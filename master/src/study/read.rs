@@ -520,7 +520,7 @@ mod tests {
         assert!(read(text, path).is_ok());
         for at in 0..text.len() {
             let mut bytes = text.as_bytes().to_vec();
-            random = deck::perturb::mixed(random);
+            random = mechanics::draw::mixed(random);
             bytes[at] = b"()[]{}<>=\"#.,e-0 \n$~"[random as usize % 20];
             for piece in [&bytes[..], &bytes[..at]] {
                 let text = std::str::from_utf8(piece).expect("letters of ASCII");

@@ -4,7 +4,7 @@
 //! of Joe and Kuo (2008, new-joe-kuo-6), shifted by a mask of the seed, which keeps their nets. Longer sequences begin with the shorter
 //! ones, so a study that asks for more points later repeats none. The points of a Latin hypercube depend on their number.
 
-use deck::perturb::mixed;
+use mechanics::draw::mixed;
 
 /// Most parameters that are sampled together.
 pub const MAX_DIMENSIONS: usize = 16;

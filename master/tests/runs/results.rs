@@ -100,6 +100,8 @@ fn plates(cells: u32) -> Model {
         mesh,
         velocity: vec![[0.0; 3]; n_nodes],
         spin: Vec::new(),
+        axes: Vec::new(),
+        scatter: Vec::new(),
         constraint: vec![0; n_nodes],
         join_energy: 0.0,
         setup: Setup {

@@ -16,6 +16,7 @@ pub(crate) mod hydrostatic;
 pub(crate) mod johnson_cook;
 pub(crate) mod plastic_strain;
 pub(crate) mod principal_stress;
+pub mod scatter;
 
 /// The state at the end of a cycle, for the damage it does.
 #[derive(Clone, Copy)]

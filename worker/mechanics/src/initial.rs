@@ -9,9 +9,10 @@ use crate::{
     contact::{Extent, Settings},
     element::{beam2, hex8::points, shell4, tet10},
     exact::{Quanta, Quantum},
+    failure::scatter::Scatter,
     load::{Drive, SurfaceKind},
     material::Material,
-    mesh::{FACES, Mesh, Part, Topology, laminate},
+    mesh::{FACES, Mesh, Part, SolidAxes, Topology, axes::turn, laminate},
     rigid::Body,
     setup::Setup,
     state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field, write_changed},
@@ -122,6 +123,65 @@ pub fn state(
     }
     shells(mesh, setup, &mut state);
     Ok(state)
+}
+
+/// Gives elements the axes of their material.
+///
+/// # Errors
+/// Names the first element that its guide gives none.
+pub fn axes(
+    state: &mut GlobalState,
+    mesh: &Mesh,
+    materials: &[Material],
+    given: &[SolidAxes],
+) -> Result<(), String> {
+    for axes in given {
+        let part = &mesh.parts[axes.part as usize];
+        let Some(of_law) = materials[part.material as usize].strength.axes() else { continue };
+        let Some(history) = state.history.iter_mut().find(|history| history.part == axes.part) else {
+            continue;
+        };
+        for e in 0..part.n_elements() {
+            let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+            let own = axes.of(&x).ok_or_else(|| {
+                format!(
+                    "element {} of part `{}` has no axes: it is flat, normal to the vector or on the line; choose other `axes`",
+                    part.element_ids[e], part.name
+                )
+            })?;
+            let turn = turn(&of_law, &own);
+            for (column, turn) in history.columns.iter_mut().zip(turn) {
+                column[e] = turn;
+            }
+            if let Topology::Tetrahedra { .. } = part.topology {
+                for (k, turn) in turn.into_iter().enumerate() {
+                    let of_points = &mut state.own[tet10::history(k)];
+                    of_points.iter_mut().for_each(|of_point| of_point[history.first as usize + e] = turn);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Gives elements the damage by which their strength scatters.
+pub fn scatter(state: &mut GlobalState, mesh: &Mesh, given: &[Scatter]) {
+    let mut first = 0;
+    for (p, part) in (0..).zip(&mesh.parts) {
+        for scatter in given.iter().filter(|scatter| scatter.part == p) {
+            for (index, &number) in (first..).zip(&part.element_ids) {
+                let damage = scatter.damage(number, state.initial_volume[index]);
+                state.elements[field::DAMAGE][index] = damage;
+                let of_points = match part.topology {
+                    Topology::EightPoint { .. } => points::DAMAGES,
+                    Topology::Tetrahedra { .. } => tet10::DAMAGES,
+                    _ => 0..0,
+                };
+                state.own[of_points].iter_mut().for_each(|of_point| of_point[index] = damage);
+            }
+        }
+        first += part.n_elements();
+    }
 }
 
 /// Gives nodes of shells and beams their rotation rates at the start, about the axes about which they may turn; `given` is by node,

@@ -28,11 +28,12 @@ mod copy_index;
 pub mod cross_section;
 pub mod cycle;
 pub mod digest;
+pub mod draw;
 pub mod element;
 mod eos;
 pub mod erosion;
 pub mod exact;
-mod failure;
+pub mod failure;
 #[doc(hidden)]
 pub mod flip;
 mod fused;

@@ -3,9 +3,11 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+pub(crate) mod axes;
 pub(crate) mod laminate;
 mod sides;
 
+pub use axes::{Guide, SolidAxes};
 pub use laminate::{Axis, Column, Laminate, LaminateError, MAX_LAYERS, Plies, Ply, first_without_direction};
 pub(crate) use sides::spread;
 pub use sides::{CORNERS, FACES, MAX_NODES, Nodes, Spacing, UPPER, quad_area, twice};

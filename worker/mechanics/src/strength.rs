@@ -552,6 +552,15 @@ impl Strength {
         }
     }
 
+    /// The axes a, b and c at the start of a law of solids that has some among its constants.
+    pub fn axes(&self) -> Option<[[f64; 3]; 3]> {
+        match self {
+            Strength::Orthotropic(law) => law.axes(),
+            Strength::Honeycomb(law, _) => law.axes(),
+            _ => None,
+        }
+    }
+
     /// The bulk modulus of a law that makes the pressure itself: the equation of state beside it has this one.
     pub fn bulk(&self) -> Option<f64> {
         match self {

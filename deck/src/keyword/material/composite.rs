@@ -67,15 +67,10 @@ fn refuse(f: &Fields<'_>, i: usize, expected: &str, advice: &str) {
     }
 }
 
-/// The vectors a and d, from the fields of AOPT, A1 and D1.
-fn axes(f: &[Fields<'_>; 8], option: (usize, usize), a: (usize, usize), d: (usize, usize)) -> [[f64; 3]; 2] {
-    if f[option.0].real(option.1, 0.0) != GLOBAL {
-        let expected = "AOPT 2: axes by the vectors A and D, the same for each element";
-        f[option.0].fault(
-            option.1,
-            expected,
-            "give AOPT 2, A1 to A3 and D1 to D3, and a part for each direction",
-        );
+/// The vectors a and d of the law, from the fields of A1 and D1; those of axes by the elements are turned from any.
+fn axes(f: &[Fields<'_>; 8], global: bool, a: (usize, usize), d: (usize, usize)) -> [[f64; 3]; 2] {
+    if !global {
+        return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     }
     [a, d].map(|(card, first)| [0, 1, 2].map(|k| f[card].real(first + k, 0.0)))
 }
@@ -107,11 +102,7 @@ fn orthotropic_law(f: &[Fields<'_>; 8], fails: bool, global: bool) -> Option<Law
         [(2, "EA"), (3, "EB"), (4, "EC")].map(|(i, what)| f[0].positive(i, what));
     let [modulus_ab, modulus_bc, modulus_ca] =
         [(0, "GAB"), (1, "GBC"), (2, "GCA")].map(|(i, what)| f[1].positive(i, what));
-    let option = if fails { 4 } else { 3 };
-    let [[ax, ay, az], [dx, dy, dz]] = match global {
-        true => axes(f, (1, option), (2, 3), (3, 3)),
-        false => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-    };
+    let [[ax, ay, az], [dx, dy, dz]] = axes(f, global, (2, 3), (3, 3));
     let macf = if fails { f[1].real(5, 0.0) } else { f[2].real(6, 0.0) };
     if !matches!(macf, 0.0 | 1.0) {
         let (card, i) = if fails { (1, 5) } else { (2, 6) };
@@ -253,7 +244,20 @@ fn enhanced_law(f: &[Fields<'_>; 8], limits: &mut Limits, global: bool) -> Optio
 }
 
 /// Five cards of `*MAT_HONEYCOMB`.
-pub(super) fn honeycomb(f: &[Fields<'_>; 8], log: &Log<'_>) -> Option<Law> {
+pub(super) fn honeycomb(f: &[Fields<'_>; 8], log: &Log<'_>) -> (Option<Law>, Fibres) {
+    let axis = match f[2].real(6, 0.0) {
+        ELEMENT => Axis::Side,
+        GLOBAL => Axis::Material,
+        _ => {
+            f[2].fault(6, "AOPT 0 or 2: axes by the element, or the vectors A and D", "give one of them");
+            Axis::Material
+        }
+    };
+    let fibres = Fibres { origin: f[2].origin(6, "AOPT"), axis, turn: 0.0 };
+    (honeycomb_law(f, axis == Axis::Material, log), fibres)
+}
+
+fn honeycomb_law(f: &[Fields<'_>; 8], global: bool, log: &Log<'_>) -> Option<Law> {
     for (i, name) in [(6, "MU"), (7, "BULK")] {
         if f[0].real(i, 0.0) != 0.0 {
             log.warn(f[0].origin(i, name).at, format!("{name}: the viscosity is that of the deck here"));
@@ -278,7 +282,7 @@ pub(super) fn honeycomb(f: &[Fields<'_>; 8], log: &Log<'_>) -> Option<Law> {
     let [young_a, young_b, young_c, modulus_ab, modulus_bc, modulus_ca] =
         [(0, "EAAU"), (1, "EBBU"), (2, "ECCU"), (3, "GABU"), (4, "GBCU"), (5, "GCAU")]
             .map(|(i, what)| f[2].positive(i, what));
-    let [[ax, ay, az], [dx, dy, dz]] = axes(f, (2, 6), (3, 3), (4, 0));
+    let [[ax, ay, az], [dx, dy, dz]] = axes(f, global, (3, 3), (4, 0));
     let law = Honeycomb {
         young: young?,
         poisson,

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mechanics::{
     element::shell4::Rule,
-    mesh::{self, Axis, Laminate, Plies, Ply},
+    mesh::{self, Axis, Guide, Laminate, Plies, Ply, SolidAxes},
 };
 
 use super::{material::material_name, rigid, state::Translation};
@@ -14,7 +14,7 @@ use crate::{
         material::{Fibres, Law},
         problem::{Section, ShellSection},
     },
-    place::{Origin, Place},
+    place::{Origin, Place, Placed},
     table::MAX_NAME,
     typed::{
         condition::made,
@@ -88,11 +88,15 @@ pub(super) fn write(t: &mut Translation<'_>) {
             _ => Kind::Solids,
         };
         let fibres = problem.materials.get(&part.material.value).and_then(|card| card.fibres);
-        if let Some(fibres) = fibres.filter(|fibres| kind == Kind::Solids && fibres.axis != Axis::Material) {
-            let expected = "AOPT 2: axes by the vectors A and D, the same for each solid";
-            let advice = "give AOPT 2, A1 to A3 and D1 to D3, and a part for each direction";
-            t.log.fault_of(fibres.origin, expected, advice);
-        }
+        let axes = fibres.filter(|_| kind == Kind::Solids).and_then(|fibres| {
+            let (by, angle) = match fibres.axis {
+                Axis::Material => return None,
+                // BETA turns the axes of shells alone then.
+                Axis::Side => (Guide::Element, 0.0),
+                Axis::Across(vector) => (Guide::Across(vector), fibres.turn),
+            };
+            Some(Placed::new(SolidAxes { part: t.deck.parts.len() as u32, by, angle }, fibres.origin))
+        });
         let source = Source::Body {
             mesh: made(t.mesh_name.to_string(), at),
             body: Some(made(format!("part {id}"), at)),
@@ -108,6 +112,8 @@ pub(super) fn write(t: &mut Translation<'_>) {
             named: None,
             material: known.then(|| Choice::Named(name_of())),
             fracture: None,
+            axes,
+            scatter: None,
             velocity: t.vector(at, "a velocity of", common),
             kind,
             eight_points: match problem.sections.get(&part.section.value) {

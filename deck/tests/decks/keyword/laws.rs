@@ -3,6 +3,7 @@
 use deck::{Model, bundle};
 use mechanics::{
     material::{Eos, Failure, Material, Strength},
+    mesh::{Guide, SolidAxes},
     strength::{
         CrushableFoam, HolmquistJohnsonCook, Honeycomb, LowDensityFoam, ModifiedJohnsonCook, MooneyRivlin,
         Ogden, Orthotropic, RiedelHiermaierThoma, SoilFoam, SteinbergGuinan, Viscoelastic, ZerilliArmstrong,
@@ -330,7 +331,14 @@ fn an_orthotropic_material_has_its_moduli_and_axes() {
     assert_eq!(found.strength, Strength::Orthotropic(LAMINATE));
     assert_eq!(Some(found.eos), found.strength.bulk().map(|bulk| Eos::Linear { bulk }));
     assert_eq!(material(&card("2", "").replace("ORTHOTROPIC_ELASTIC", "002")), found);
-    assert!(fault(&card("0", "")).contains("AOPT 2"));
+    // By the sides of each element, and by a vector and their normals with an angle.
+    let by = |card: &str| read(&cube(card, "")).axes;
+    assert_eq!(by(&card("2", "")), []);
+    assert_eq!(by(&card("0", "")), [SolidAxes { part: 0, by: Guide::Element, angle: 0.0 }]);
+    let across = card("3", "").replace("\n,,,0,1,0\n", "\n0,2,0,0,1,0,30\n");
+    assert_eq!(by(&across), [SolidAxes { part: 0, by: Guide::Across([0.0, 2.0, 0.0]), angle: 30.0 }]);
+    assert!(fault(&card("4", "")).contains("AOPT 0, 2 or 3"));
+    assert!(fault(&across.replace("\n0,2,0,", "\n0,0,2,")).contains("its axes give element 1 none"));
     assert!(fault(&card("2", ",0.1,0.1")).contains("no frequency damping"));
     assert!(fault(&card("2", "").replace("0.02", "0.9")).contains("no strain gives energy away"));
     assert!(fault(&card("2", "").replace(",,,0,1,0", ",,,2,2,0")).contains("not parallel"));
@@ -368,6 +376,8 @@ fn a_honeycomb_has_one_curve_for_all_stresses() {
              1000,300,200,400,100,200,2\n,,,1,0,0\n0,1,0{more}\n"
         )
     };
+    let by_element = read(&cube(&card("9", "").replace(",200,2\n", ",200,0\n"), "")).axes;
+    assert_eq!(by_element, [SolidAxes { part: 0, by: Guide::Element, angle: 0.0 }]);
     let found = material(&card("9", ""));
     let Strength::Honeycomb(law, curve) = found.strength else { panic!("{found:?}") };
     let wanted = Honeycomb {

@@ -21,7 +21,7 @@
 //! small tetrahedra give their corners, the mean of the edge nodes its share to each of these: inside a mesh nodes at corners and on edges carry
 //! nearly the same.
 
-use std::fmt;
+use std::{fmt, ops::Range};
 
 mod geometry;
 pub(crate) mod group;
@@ -94,11 +94,20 @@ pub(crate) const SHOWN: [usize; 3] = [ENERGY, PRESSURE, RELATIVE_VOLUME];
 /// What a point keeps: [`OF_POINT`], the stress by its own rate of volume (tension positive), and the history variables of its law.
 pub(crate) const BY_POINT: usize = OF_POINT.len() + 1 + MAX_HISTORY;
 
+/// The arrays of the damage of the points.
+pub(crate) const DAMAGES: Range<usize> = 7 * POINTS..8 * POINTS;
+
 /// The place of that stress among them.
 pub(crate) const SWELLING: usize = OF_POINT.len();
 
 /// Number of arrays that such elements have of their own ([`crate::piece::Piece::own`]): number by number, those of the points.
 pub(crate) const N_OWN: usize = BY_POINT * POINTS;
+
+/// The arrays of a history variable of the law at the points.
+pub(crate) const fn history(variable: usize) -> Range<usize> {
+    let first = (SWELLING + 1 + variable) * POINTS;
+    first..first + POINTS
+}
 
 /// What the points of an element of a material start with, one number per array of its own.
 pub(crate) fn at_start(material: &Material) -> [f64; N_OWN] {

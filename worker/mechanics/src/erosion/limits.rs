@@ -44,7 +44,7 @@ impl Stress {
             | L::bits(L::splat(self.tension).less_equal(-pressure))
             | L::bits(L::splat(self.square).less_equal(s.contract(s)));
         if let Some(limit) = self.principal {
-            bits |= !L::bits(principal_stress::below(s, pressure, limit));
+            bits |= !L::bits(principal_stress::below(s, pressure, L::splat(limit)));
         }
         bits
     }

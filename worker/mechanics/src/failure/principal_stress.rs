@@ -1,16 +1,16 @@
 //! Failure when the largest principal stress comes to a limit in tension.
 //!
 //! `limit I - sigma` is positive definite as long as every principal stress is below the limit, which its leading
-//! minors tell (Sylvester's criterion) without a root of the cubic. There is no damage before failure.
+//! minors tell (Sylvester's criterion) without a root of the cubic. Damage before failure is that of [`super::scatter`] alone.
 
 use super::{FailureLaw, Loading};
 use crate::{lanes::Lane, strength::Deviator};
 
 /// Lanes in which every principal stress of the deviator `s` and the pressure is below `limit`.
 #[inline(always)]
-pub(crate) fn below<L: Lane>(s: &Deviator<L>, pressure: L, limit: f64) -> L::Mask {
+pub(crate) fn below<L: Lane>(s: &Deviator<L>, pressure: L, limit: L) -> L::Mask {
     let zero = L::splat(0.0);
-    let left = L::splat(limit) + pressure;
+    let left = limit + pressure;
     let (xx, yy, zz) = (left - s.xx, left - s.yy, left - s.zz);
     let minor = s.xy.neg_mul_add(s.xy, xx * yy);
     // Along the last row; the off-diagonal entries are -xy, -yz and -zx.
@@ -30,7 +30,9 @@ pub(crate) struct PrincipalStress {
 impl FailureLaw for PrincipalStress {
     #[inline(always)]
     fn damage<L: Lane>(&self, damage: L, loading: &Loading<L>) -> L {
-        let whole = below(&loading.stress, loading.pressure, self.tension);
+        // Where strength scatters, what an element starts with as damage is how much weaker it is.
+        let limit = L::splat(self.tension) * (L::splat(1.0) - damage);
+        let whole = below(&loading.stress, loading.pressure, limit);
         L::select(whole, damage, L::splat(1.0))
     }
 }

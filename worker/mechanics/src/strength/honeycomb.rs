@@ -71,7 +71,7 @@ impl Honeycomb {
         0.5 * self.young / (1.0 + self.poisson)
     }
 
-    fn axes(&self) -> Option<[[f64; 3]; 3]> {
+    pub(crate) fn axes(&self) -> Option<[[f64; 3]; 3]> {
         material_axes::at_start([self.ax, self.ay, self.az], [self.dx, self.dy, self.dz])
     }
 

@@ -82,7 +82,7 @@ impl Orthotropic {
         Variable { name: "delamination", unit: Unit::NONE, initial: 0.0 },
     ];
 
-    fn axes(&self) -> Option<[[f64; 3]; 3]> {
+    pub(crate) fn axes(&self) -> Option<[[f64; 3]; 3]> {
         material_axes::at_start([self.ax, self.ay, self.az], [self.dx, self.dy, self.dz])
     }
 

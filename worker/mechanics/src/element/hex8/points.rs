@@ -18,3 +18,6 @@ pub(crate) const N_OWN: usize = OF_POINT.len() * POINTS;
 
 /// The arrays among them of the temperatures.
 pub(crate) const TEMPERATURES: Range<usize> = 6 * POINTS..7 * POINTS;
+
+/// Those of the damage.
+pub(crate) const DAMAGES: Range<usize> = 7 * POINTS..8 * POINTS;
