@@ -82,6 +82,9 @@ impl ContactCard {
         let mut extra = usize::from(block.take("_ID") || block.take("_TITLE"));
         extra += usize::from(block.take("_MPP"));
         extra += usize::from(extra == 0 && (block.take("_ID") || block.take("_TITLE")));
+        if block.take("_MORTAR") {
+            log.warn(block.at, format!("*{}: our own penalty, on nodes and faces", log.quote(&whole)));
+        }
         let word = block.keyword["CONTACT_".len()..].to_string();
         let single = match word.as_str() {
             "AUTOMATIC_SINGLE_SURFACE"

@@ -43,6 +43,18 @@ fn tied_contact_ties_the_nodes_of_the_first_side_to_faces_of_the_second() {
 }
 
 #[test]
+fn mortar_contact_is_our_own_with_a_warning() {
+    let text = deck_of(1.0, "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_MORTAR_ID\n1,both\n1,2,3,3\n0.2,0.2\n\n");
+    let reading = deck::read_whole(&text, "a.k").unwrap_or_else(|faults| panic!("{faults:?}"));
+    assert!(reading.model.setup.contact.is_some_and(|settings| settings.interacts.contains(&true)));
+    let warnings: Vec<String> = reading.warnings.iter().map(ToString::to_string).collect();
+    assert!(
+        warnings.iter().any(|words| words.contains("our own penalty, on nodes and faces")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
 fn tiebreak_contact_ties_until_its_strength_and_meets_then() {
     // Corners of a face of 5 by 5.
     let quarter = 25.0 / 4.0;
