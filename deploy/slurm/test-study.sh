@@ -1,12 +1,12 @@
 #!/bin/sh
 # Computes a small study here and once more through the Slurm of this site, and compares the tables. Run it in a folder that all nodes see:
-#   BOLIDE=/shared/bolide deploy/slurm/test-study.sh FOLDER
-# With CANCEL=1 two tasks of the array are cancelled meanwhile.
+#   BOLIDE=/shared/bolide deploy/slurm/test-study.sh FOLDER [STUDY]
+# With CANCEL=1 two tasks of the array are cancelled meanwhile. Without STUDY it is tests/decks/study/grid.toml.
 set -eu
 here=$(cd "$(dirname "$0")/../.." && pwd)
 folder=${1:?a folder that all nodes see}
 bolide=${BOLIDE:-bolide}
-study=$here/tests/decks/study/grid.toml
+study=$(realpath "${2:-$here/tests/decks/study/grid.toml}")
 mkdir -p "$folder"
 cd "$folder"
 "$bolide" study "$study" --out here --cache cache-here

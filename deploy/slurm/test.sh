@@ -1,13 +1,15 @@
 #!/bin/bash
 # Runs the job scripts of this folder on a real Slurm: one machine, four virtual nodes of two speeds, a munge and daemons of
 # its own in a temporary folder. Every job must give the digest of `bolide run`: an undisturbed one, one whose worker is
-# killed, a heterogeneous one, one that is preempted and one that is told to leave before its time limit, which both go on.
+# killed, a heterogeneous one, one that is preempted and one that is told to leave before its time limit, which both go on. `study`
+# computes a study in arrays, of which two tasks are cancelled: its table must be that of one process.
 #
-# usage: deploy/slurm/test.sh [undisturbed] [killed] [heterogeneous] [preempted] [signalled]    (all without names)
+# usage: deploy/slurm/test.sh [undisturbed] [killed] [heterogeneous] [preempted] [signalled] [study]    (the first five without names)
 #        Debian: slurmctld slurmd slurm-client munge
 #
 # environment: BOLIDE  the executable [default: target/release/bolide]
 #              CYCLES  length of the jobs [default: 6000]
+#              STUDY   the study [default: tests/decks/study/many.toml, 200 runs]
 #              KEEP    any text keeps the folder
 #
 # exit code: 0 all digests agree; 1 one does not, or something failed; 3 this machine has no Slurm.
@@ -17,6 +19,8 @@ export BOLIDE
 BOLIDE=$(realpath "${BOLIDE:-target/release/bolide}")
 CYCLES=${CYCLES:-6000}
 DECK=$PWD/tests/decks/plates-small.toml
+STUDY=$(realpath "${STUDY:-tests/decks/study/many.toml}")
+STUDY_TEST=$PWD/deploy/slurm/test-study.sh
 cases=("$@")
 [ $# -gt 0 ] || cases=(undisturbed killed heterogeneous preempted signalled)
 
@@ -200,6 +204,11 @@ for case in "${cases[@]}"; do
             check signalled "$job"
             grep -hE 'told to leave|back to the queue|start 2' "$T/jobs/slurm-$job.out" || fail "it did not come back"
             grep -ohE 'the job goes on.*' "$(spool_of "$job")/log/master.log" || fail "it did not go on where it was"
+            ;;
+        study)
+            CANCEL=1 "$STUDY_TEST" "$T/study" "$STUDY" >"$T/jobs/slurm-study.out" 2>&1 || fail "the tables differ"
+            rows=$(($(wc -l <"$T/study/slurm/table.csv") - 1))
+            echo "study: the table of $rows runs in arrays of four nodes, two tasks cancelled, is that of one process"
             ;;
         *) fail "no case $case" ;;
     esac
