@@ -6,7 +6,7 @@
 mod worker_link;
 
 use std::{
-    collections::VecDeque,
+    collections::{BTreeMap, VecDeque},
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc,
@@ -92,6 +92,7 @@ pub fn drive(
         began: Instant::now(),
         pace: Pace::new(n_elements),
         suspect: None,
+        slow: BTreeMap::new(),
         ends: false,
         deaths: Deaths::default(),
     };
@@ -134,6 +135,8 @@ struct Driver {
     pace: Pace,
     /// The worker that the others were told is suspect.
     suspect: Option<usize>,
+    /// Workers that compute a part of their time only, in words.
+    slow: BTreeMap<usize, String>,
     /// Somebody waits for the end of the job.
     ends: bool,
     deaths: Deaths,
@@ -316,6 +319,18 @@ impl Driver {
         }
     }
 
+    /// Tells whether a worker computes a part of its time only, when that has changed.
+    fn hear_slow(&mut self, worker: usize, slow: Option<&String>, sink: &mut dyn Sink) {
+        if self.slow.get(&worker) == slow {
+            return;
+        }
+        sink.slow(self.members[worker].link.incarnation, slow.cloned());
+        match slow {
+            Some(words) => self.slow.insert(worker, words.clone()),
+            None => self.slow.remove(&worker),
+        };
+    }
+
     /// A worker has been released: from here on it can be given to another job.
     fn free(&mut self, worker: usize, sink: &mut dyn Sink) {
         let job = self.place.job;
@@ -358,6 +373,9 @@ impl Driver {
                                 sink.suspect(self.members[worker].link.incarnation, None);
                             }
                             sink.heard(&self.members[worker].link.spec.name, &message);
+                            if let ToMaster::Report(report) = &message {
+                                self.hear_slow(worker, report.slow.as_ref(), sink);
+                            }
                         }
                         self.apply(Event::Message(worker, header.epoch, message), sink)?;
                     }

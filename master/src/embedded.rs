@@ -48,6 +48,9 @@ pub trait Sink {
     /// A worker, by its connection, is waited for, in words; or it is heard again.
     fn suspect(&mut self, _incarnation: u32, _note: Option<String>) {}
 
+    /// A worker, by its connection, computes a part of its time only, in words; or all of it again.
+    fn slow(&mut self, _incarnation: u32, _note: Option<String>) {}
+
     /// A worker, by its connection, has been released while the job goes on.
     fn freed(&mut self, _incarnation: u32) {}
 }

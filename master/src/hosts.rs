@@ -52,6 +52,8 @@ pub struct Host {
     pub state: State,
     /// Silent for so long that it may be dead: in words.
     pub suspect: Option<String>,
+    /// Of one that computes only a part of its time for a job: in words.
+    pub slow: Option<String>,
 }
 
 /// Every host that is or was connected.
@@ -116,6 +118,7 @@ impl Hosts {
                 incarnation,
                 state: State::Idle,
                 suspect: None,
+                slow: None,
             },
         );
         Ok((number, ended))
@@ -132,7 +135,7 @@ impl Hosts {
         let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) else {
             return;
         };
-        host.suspect = None;
+        (host.suspect, host.slow) = (None, None);
         host.state = match end {
             End::Left => State::Left(why.to_owned()),
             End::Lost | End::Dropped => State::Lost(why.to_owned()),
@@ -149,6 +152,13 @@ impl Hosts {
     pub fn suspect(&mut self, incarnation: u32, note: Option<String>) {
         if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
             host.suspect = note;
+        }
+    }
+
+    /// A host computes a part of its time only, in words, or all of it again.
+    pub fn slow(&mut self, incarnation: u32, note: Option<String>) {
+        if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
+            host.slow = note;
         }
     }
 
@@ -170,7 +180,7 @@ impl Hosts {
     pub fn free(&mut self, incarnation: u32, job: u32) {
         for host in self.by_number.values_mut() {
             if host.incarnation == incarnation && host.state == State::Busy(job) {
-                host.state = State::Idle;
+                (host.state, host.slow) = (State::Idle, None);
             }
         }
     }
@@ -179,7 +189,7 @@ impl Hosts {
     pub fn release(&mut self, job: u32) {
         for host in self.by_number.values_mut() {
             if host.state == State::Busy(job) {
-                host.state = State::Idle;
+                (host.state, host.slow) = (State::Idle, None);
             }
         }
     }
@@ -193,11 +203,9 @@ impl Hosts {
                 State::Lost(why) => ("lost", why.clone()),
                 State::Left(why) => ("left", why.clone()),
             };
-            let note = match &host.suspect {
-                Some(suspect) if note.is_empty() => suspect.clone(),
-                Some(suspect) => format!("{note}, {suspect}"),
-                None => note,
-            };
+            let words = [Some(note), host.slow.clone(), host.suspect.clone()];
+            let words: Vec<String> = words.into_iter().flatten().filter(|words| !words.is_empty()).collect();
+            let note = words.join(", ");
             HostRow {
                 host: host.number,
                 name: host.name.clone(),
@@ -272,11 +280,13 @@ mod tests {
             hosts.connected().filter(|h| h.state == State::Idle).map(|h| h.incarnation).collect()
         };
         hosts.occupy(&[1, 2], 7);
+        hosts.slow(1, Some("works 25 % of the time: its owner types".to_owned()));
+        assert_eq!(hosts.rows()[0].note, "job 7, works 25 % of the time: its owner types");
         hosts.gone(2, "cable", End::Lost);
         assert_eq!(idle(&hosts), [3]);
         hosts.release(7);
         assert_eq!(idle(&hosts), [1, 3]);
-        assert_eq!(hosts.rows()[1].note, "cable");
+        assert_eq!((hosts.rows()[0].note.as_str(), hosts.rows()[1].note.as_str()), ("", "cable"));
         hosts.occupy(&[1, 3], 8);
         hosts.free(3, 7);
         assert_eq!(idle(&hosts), [0_u32; 0], "job 7 has it no more");

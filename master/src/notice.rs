@@ -58,6 +58,13 @@ pub enum Notice {
         /// In words, while it is silent.
         note: Option<String>,
     },
+    /// A worker computes a part of its time only, or all of it again.
+    Slow {
+        /// Its connection.
+        incarnation: u32,
+        /// In words, while it does.
+        note: Option<String>,
+    },
     /// A job that goes on has released a worker.
     Freed {
         /// Its connection.

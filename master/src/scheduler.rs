@@ -338,6 +338,7 @@ impl Scheduler {
                 self.hosts.gone(incarnation, &why, end);
             }
             Notice::Suspect { incarnation, note } => self.hosts.suspect(incarnation, note),
+            Notice::Slow { incarnation, note } => self.hosts.slow(incarnation, note),
             Notice::Freed { incarnation, job } => {
                 self.called.remove(&incarnation);
                 self.hosts.free(incarnation, job);

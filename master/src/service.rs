@@ -322,6 +322,10 @@ impl Sink for Reporter<'_> {
         let _ = self.notices.try_send(Notice::Suspect { incarnation, note });
     }
 
+    fn slow(&mut self, incarnation: u32, note: Option<String>) {
+        let _ = self.notices.blocking_send(Notice::Slow { incarnation, note });
+    }
+
     fn freed(&mut self, incarnation: u32) {
         // The scheduler lives as long as the daemon.
         let _ = self.notices.blocking_send(Notice::Freed { incarnation, job: self.number });

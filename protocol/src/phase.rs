@@ -72,7 +72,12 @@ pub struct Report {
     pub linked: Vec<u32>,
     /// Workers that the master relayed to or from, at the start, since their link broke, or always.
     pub relayed: Vec<u32>,
+    /// Where it computes only a part of its time, because the people whose PC it is on come first: how large a part, and why.
+    pub slow: Option<String>,
 }
+
+/// Most bytes of [`Report::slow`].
+const WORDS_LIMIT: usize = 200;
 
 impl Report {
     /// Time in one phase (s).
@@ -89,6 +94,7 @@ impl Report {
             ("spans of a report", self.spans.len(), SPANS_LIMIT),
             ("links of a report", self.linked.len(), workers),
             ("relayed pairs of a report", self.relayed.len(), workers),
+            ("words of a report", self.slow.as_ref().map_or(0, String::len), WORDS_LIMIT),
         ] {
             if length > limit {
                 return Err(Error::TooLong { what, length: length as u64, limit: limit as u64 });

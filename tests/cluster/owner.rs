@@ -61,6 +61,24 @@ fn a_worker_leaves_its_job_when_somebody_types_and_comes_back_later() {
     let summary = cluster.json(&["watch", "1"]);
     assert_eq!(digest_of(&summary), long_reference());
     assert_eq!(summary["workers"], 1, "{summary}");
+
+    // With a share it stays in its job, and `hosts` says so while it lasts.
+    cluster.kill_worker("rack");
+    let flags = ["--yield-to-owner=0.25", "--owner-load", "1000", "--owner-quiet", "1"];
+    cluster.worker_with("sofa", "1", &flags);
+    cluster.json(&["submit", "--cycles", LONG, "--no-output", &small()]);
+    cluster.wait_until_running(2);
+    wait_for_end_of_step();
+    let note = || standing(&cluster, "sofa").1;
+    until(
+        || format!("a part of the time; {}", note()),
+        || {
+            terminal.press("x\n");
+            (note() == "job 2, works 25 % of the time: its owner types").then_some(())
+        },
+    );
+    until(|| format!("all of the time; {}", note()), || (note() == "job 2").then_some(()));
+    assert_eq!(cluster.client(&["cancel", "2"]).code, Some(0));
 }
 
 #[test]

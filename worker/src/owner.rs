@@ -5,7 +5,7 @@
 
 use std::{
     sync::{
-        Arc,
+        Arc, Mutex, PoisonError,
         atomic::{AtomicU32, Ordering},
     },
     time::{Duration, Instant},
@@ -114,11 +114,11 @@ fn need(signs: &Signs, busy: bool) -> Option<String> {
 
 /// The part of its time that a compute thread may work, which changes at any moment.
 #[derive(Clone, Debug)]
-pub struct Share(Arc<AtomicU32>);
+pub struct Share(Arc<(AtomicU32, Mutex<Option<String>>)>);
 
 impl Default for Share {
     fn default() -> Self {
-        Self(Arc::new(AtomicU32::new(Self::WHOLE)))
+        Self(Arc::new((AtomicU32::new(Self::WHOLE), Mutex::new(None))))
     }
 }
 
@@ -128,13 +128,20 @@ impl Share {
     /// The longest pause: a message of the master must not wait long.
     const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
-    fn set(&self, share: f64) {
-        self.0.store((share * f64::from(Self::WHOLE)) as u32, Ordering::Relaxed);
+    fn set(&self, share: f64, why: Option<&str>) {
+        self.0.0.store((share * f64::from(Self::WHOLE)) as u32, Ordering::Relaxed);
+        let words = why.map(|why| format!("works {:.0} % of the time: {why}", 100.0 * share));
+        *self.0.1.lock().unwrap_or_else(PoisonError::into_inner) = words;
+    }
+
+    /// How large a part it is, and why, where it is not all of it.
+    pub fn words(&self) -> Option<String> {
+        self.0.1.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// How long to pause after so much work.
     pub fn pause(&self, worked: Duration) -> Duration {
-        match self.0.load(Ordering::Relaxed) {
+        match self.0.0.load(Ordering::Relaxed) {
             Self::WHOLE.. => Duration::ZERO,
             share => {
                 let share = f64::from(share.max(1)) / f64::from(Self::WHOLE);
@@ -157,18 +164,18 @@ pub(crate) fn watch(rules: &Rules, share: &Share) -> watch::Receiver<Option<Stri
         if standing == last {
             return;
         }
-        let (part, away) = match &standing {
-            Standing::Free => (1.0, None),
-            Standing::Slow(_) => (slow, None),
+        let (part, words, away) = match &standing {
+            Standing::Free => (1.0, None, None),
+            Standing::Slow(why) => (slow, Some(why.as_str()), None),
             // Until it has left, the others wait for it.
-            Standing::Away(why) => (1.0, Some(why.clone())),
+            Standing::Away(why) => (1.0, None, Some(why.clone())),
         };
         match &standing {
             Standing::Free => info!("nobody else needs this host any more"),
             Standing::Slow(why) => info!("{why}: working {:.0} % of the time", 100.0 * slow),
             Standing::Away(why) => info!("{why}: staying away"),
         }
-        share.set(part);
+        share.set(part, words);
         tell.send_replace(away);
         last = standing;
     };
@@ -245,11 +252,12 @@ mod tests {
     fn a_share_is_kept_by_pauses() {
         let (share, work) = (Share::default(), Duration::from_millis(100));
         assert_eq!(share.pause(work), Duration::ZERO);
-        share.set(0.25);
+        share.set(0.25, Some("its owner types"));
+        assert_eq!(share.words().as_deref(), Some("works 25 % of the time: its owner types"));
         assert_eq!(share.pause(work), Duration::from_millis(300));
-        share.set(0.0);
+        share.set(0.0, None);
         assert_eq!(share.pause(work), Share::LONGEST_PAUSE);
-        share.set(1.0);
+        share.set(1.0, None);
         assert_eq!(share.pause(work), Duration::ZERO);
     }
 }

@@ -186,6 +186,7 @@ impl Runner {
                             runner.reported = Instant::now();
                             let mut report = runner.stopwatch.report();
                             runner.links.report(&mut report);
+                            report.slow = runner.share.words();
                             runner.send(&ToMaster::Report(Box::new(report)))?;
                         }
                         let worked = share(runner.busy, runner.machine.work());
