@@ -146,7 +146,8 @@ cd "$T/jobs" || exit 1
 put() { job=$(sbatch --parsable --output="$T/jobs/slurm-%j.out" "$@") || fail "sbatch refused $*"; }
 flags=("$DECK" --cycles "$CYCLES" --snapshot-every 2 --keep-every 1)
 spool_of() { echo "$T/jobs/bolide-$1"; }
-runs() { grep -qE 'job 1 running +cycle [1-9]' "$T/jobs/slurm-$1.out" 2>/dev/null && ! is_over "$1"; }
+# Its first checkpoint is there.
+runs() { compgen -G "$(spool_of "$1")/spool/queue/job-1.snapshots/*.bolide" >/dev/null && ! is_over "$1"; }
 is_over() { scontrol show job "$1" 2>/dev/null | grep -qE 'JobState=(COMPLETED|FAILED|CANCELLED|TIMEOUT|NODE_FAIL)'; }
 check() {
     local found
