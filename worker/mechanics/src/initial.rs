@@ -282,7 +282,8 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
 /// more than its pressure at the start, that of an explosive (`rho D^2`) more than the pressure of detonation. Energy:
 /// the initial kinetic energy plus, over the whole volume, a thousandth of the bulk modulus or the internal energy at
 /// the start, 46 bits. Momentum: all mass at the greatest initial or prescribed speed, of walls too, a thousandth of the fastest
-/// sound, or the speed to which its internal energy at the start could bring a material, 50 bits.
+/// sound, or the speed to which its internal energy at the start could bring a material, 50 bits; where loads act, which bring bodies at rest
+/// to speeds that no number of the deck has, a twentieth of the fastest sound. It must not depend on the end of the run: that may be another when it goes on.
 pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     let speed2 = state.v.iter().map(|v| v.iter().map(|c| c * c).sum::<f64>()).fold(0.0, f64::max);
     let curves = &setup.loads.curves;
@@ -372,10 +373,11 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         state.v.iter().zip(&state.mass).map(|(v, m)| 0.5 * m * v.iter().map(|c| c * c).sum::<f64>()).sum();
     let spinning: f64 = setup.bodies.iter().map(|body| 0.5 * dot(body.start.spin, body.start.momentum)).sum();
     let total_mass: f64 = state.mass.iter().sum();
+    let least = if setup.loads.are_any() { 0.05 } else { 1e-3 } * sound;
     Quanta {
         force: Quantum::for_reference(force, 42),
         energy: Quantum::for_reference(kinetic + spinning + stored, 46),
-        momentum: Quantum::for_reference(total_mass * top_speed2.max(driven2).sqrt().max(1e-3 * sound), 50),
+        momentum: Quantum::for_reference(total_mass * top_speed2.max(driven2).sqrt().max(least), 50),
         arm: if arm > 0.0 { Quantum::for_reference(arm, 0).value() } else { 1.0 },
     }
 }

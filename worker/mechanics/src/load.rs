@@ -162,6 +162,14 @@ pub struct Loads {
     pub relaxation: Option<Relaxation>,
 }
 
+impl Loads {
+    /// Whether anything pushes: forces, gravity, pressure or blast.
+    pub(crate) fn are_any(&self) -> bool {
+        let pushes = |surface: &SurfaceLoad| !matches!(surface.kind, SurfaceKind::Transmit);
+        !self.forces.is_empty() || self.gravity.is_some() || self.surfaces.iter().any(pushes)
+    }
+}
+
 /// Most nodal forces in a run: one bit each in [`crate::constraint::Constraint::forces`].
 pub const MAX_FORCES: usize = 32;
 
