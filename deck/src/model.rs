@@ -65,6 +65,26 @@ pub struct Model {
     pub output: Output,
 }
 
+impl Model {
+    /// All that a problem is but its setup and what it writes, for the sums that stand for it. A new field of the model has to be named here.
+    pub fn without_setup(&self) -> impl Serialize + use<'_> {
+        let Self {
+            title,
+            units,
+            mesh,
+            velocity,
+            spin,
+            axes,
+            scatter,
+            constraint,
+            join_energy,
+            setup: _,
+            output: _,
+        } = self;
+        (title, units, mesh, velocity, spin, axes, scatter, constraint, join_energy)
+    }
+}
+
 /// What to write and when. Times in the deck's unit of time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Output {

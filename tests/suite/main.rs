@@ -19,6 +19,7 @@ mod pairs;
 mod sections;
 mod seeds;
 mod spans;
+mod starts;
 mod sums;
 mod tearing;
 mod tetrahedra;

@@ -58,26 +58,13 @@ impl Problem {
 /// The sum that binds a snapshot to its problem. A run may be gone on with to another end, with other results on the way, and with
 /// other sorts, which change no bit.
 fn sum_of(model: &Model) -> Result<[u8; 32], Error> {
-    let Model {
-        title,
-        units,
-        mesh,
-        velocity,
-        spin,
-        axes,
-        scatter,
-        constraint,
-        join_energy,
-        setup,
-        output: _,
-    } = model;
-    let mut setup = setup.clone();
+    let mut setup = model.setup.clone();
     let control = &mut setup.control;
     (control.end_time, control.end_cycle, control.sort_lag, control.plan_interval) = (0.0, 0, 0, 0);
     // The hash takes many blocks at once, and single numbers slowly.
     let mut hasher = BufWriter::with_capacity(1 << 16, blake3::Hasher::new());
     let release = env!("CARGO_PKG_VERSION");
-    let whole = (release, title, units, mesh, velocity, spin, axes, scatter, constraint, join_energy, setup);
+    let whole = (release, model.without_setup(), setup);
     protocol::codec::encode_into(&whole, &mut hasher).map_err(|e| Error::Unencoded(e.to_string()))?;
     let hasher = hasher.into_inner().map_err(|e| Error::Unencoded(e.to_string()))?;
     Ok(*hasher.finalize().as_bytes())

@@ -78,24 +78,9 @@ pub fn identity_of(model: &Model) -> Result<String, Error> {
         element_gauges: model.output.element_gauges.clone(),
         ..deck::model::Output::default()
     };
-    let Model {
-        title,
-        units,
-        mesh,
-        velocity,
-        spin,
-        axes,
-        scatter,
-        constraint,
-        join_energy,
-        setup,
-        output: _,
-    } = model;
     let release = (env!("CARGO_PKG_VERSION"), physics());
     let mut hasher = blake3::Hasher::new();
-    protocol::codec::encode_into(&(release, title, units, mesh, velocity), &mut hasher)
-        .map_err(Error::Identity)?;
-    protocol::codec::encode_into(&(spin, axes, scatter, constraint, join_energy, setup, output), &mut hasher)
+    protocol::codec::encode_into(&(release, model.without_setup(), &model.setup, output), &mut hasher)
         .map_err(Error::Identity)?;
     Ok(hasher.finalize().to_hex()[..DIGITS].to_owned())
 }

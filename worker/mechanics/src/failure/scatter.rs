@@ -16,7 +16,7 @@ use crate::{draw, material::Failure};
 pub struct Scatter {
     /// Index of the part.
     pub part: u32,
-    /// Weibull's modulus m: the greater, the more alike are the elements. Some 10 for ceramics, 20 to 60 for metals.
+    /// Weibull's modulus m: the greater, the more alike are the elements.
     pub modulus: f64,
     /// The volume V0 of whose elements half are weaker than the law says (volume); none for the volume of each element.
     pub volume: Option<f64>,

@@ -6,7 +6,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Part, laminate::cosine_and_sine};
-use crate::vectors::{cross, dot};
+use crate::{
+    strength::material_axes::{LEAST_SINE, at_start, direction},
+    vectors::{cross, dot},
+};
 
 /// How the axes of the elements of a part lie at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,22 +39,22 @@ impl SolidAxes {
         let between = |from: [f64; 3], to: [f64; 3]| std::array::from_fn::<f64, 3, _>(|i| to[i] - from[i]);
         let [a, c] = match self.by {
             Guide::Element => {
-                let (a, d) = (unit(between(x[0], x[1]), 0.0)?, unit(between(x[0], x[3]), 0.0)?);
-                [a, unit(cross(a, d), LEAST)?]
+                let [a, _, c] = at_start(between(x[0], x[1]), between(x[0], x[3]))?;
+                [a, c]
             }
             Guide::Across(vector) => {
                 let middle = |i: usize| std::array::from_fn(|k| 0.5 * (x[i][k] + x[i + 4][k]));
-                let c = unit(cross(between(middle(0), middle(2)), between(middle(1), middle(3))), 0.0)?;
-                [unit(cross(unit(vector, 0.0)?, c), LEAST)?, c]
+                let c = direction(cross(between(middle(0), middle(2)), between(middle(1), middle(3))), 0.0)?;
+                [direction(cross(direction(vector, 0.0)?, c), LEAST_SINE)?, c]
             }
             Guide::Around { point, along } => {
                 let centre = std::array::from_fn(|i| x.iter().map(|x| x[i]).sum::<f64>() * 0.125);
-                let (b, from) = (unit(along, 0.0)?, between(point, centre));
+                let (b, from) = (direction(along, 0.0)?, between(point, centre));
                 let on = dot(from, b);
                 let out = std::array::from_fn(|i| from[i] - on * b[i]);
                 // Nearer to the line than a part of the element's size, out is its rounding.
                 let size = dot(between(x[0], x[6]), between(x[0], x[6])).sqrt();
-                let c = unit(out, LEAST * size)?;
+                let c = direction(out, LEAST_SINE * size)?;
                 [cross(b, c), c]
             }
         };
@@ -65,14 +68,6 @@ impl SolidAxes {
     pub fn first_without(&self, part: &Part, positions: &[[f64; 3]]) -> Option<usize> {
         (0..part.n_elements()).find(|&e| self.of(&part.corners(e).map(|n| positions[n as usize])).is_none())
     }
-}
-
-/// Sines below which two directions count as one.
-const LEAST: f64 = 1e-6;
-
-fn unit(v: [f64; 3], least: f64) -> Option<[f64; 3]> {
-    let length = dot(v, v).sqrt();
-    (length > least && length.is_finite()).then(|| v.map(|x| x / length))
 }
 
 /// The turn from one set of axes to another, as a unit quaternion w, x, y, z (Shepperd, J. Guid. Control 1 (1978) 223).

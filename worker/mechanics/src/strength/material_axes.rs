@@ -20,15 +20,19 @@ const fn column(name: &'static str, initial: f64) -> Variable {
     Variable { name, unit: Unit::NONE, initial }
 }
 
+/// The sine below which two directions count as one: a plane of such would be that of their rounding.
+pub(crate) const LEAST_SINE: f64 = 1e-6;
+
+/// The direction of a vector; none where it is no longer than `least`.
+pub(crate) fn direction(v: [f64; 3], least: f64) -> Option<[f64; 3]> {
+    let length = dot(v, v).sqrt();
+    (length > least && length.is_finite()).then(|| v.map(|x| x / length))
+}
+
 /// The axes at the start by the vectors a and d; none where they span no plane.
-pub(super) fn at_start(a: [f64; 3], d: [f64; 3]) -> Option<[[f64; 3]; 3]> {
-    let unit = |v: [f64; 3], least: f64| {
-        let length = dot(v, v).sqrt();
-        (length > least && length.is_finite()).then(|| v.map(|x| x / length))
-    };
-    let a = unit(a, 0.0)?;
-    // A plane of vectors that are nearly parallel would be that of their rounding.
-    let c = unit(cross(a, unit(d, 0.0)?), 1e-6)?;
+pub(crate) fn at_start(a: [f64; 3], d: [f64; 3]) -> Option<[[f64; 3]; 3]> {
+    let a = direction(a, 0.0)?;
+    let c = direction(cross(a, direction(d, 0.0)?), LEAST_SINE)?;
     Some([a, cross(c, a), c])
 }
 
