@@ -8,7 +8,7 @@
 #        Debian: slurmctld slurmd slurm-client munge
 #
 # environment: BOLIDE  the executable [default: target/release/bolide]
-#              CYCLES  length of the jobs [default: 6000]
+#              CYCLES  length of the jobs [default: 20000, which outlast what is done to them]
 #              STUDY   the study [default: tests/decks/study/many.toml, 200 runs]
 #              KEEP    any text keeps the folder
 #
@@ -17,7 +17,7 @@ set -u
 cd "$(dirname "$0")/../.." || exit 1
 export BOLIDE
 BOLIDE=$(realpath "${BOLIDE:-target/release/bolide}")
-CYCLES=${CYCLES:-6000}
+CYCLES=${CYCLES:-20000}
 DECK=$PWD/tests/decks/plates-small.toml
 STUDY=$(realpath "${STUDY:-tests/decks/study/many.toml}")
 STUDY_TEST=$PWD/deploy/slurm/test-study.sh
@@ -144,7 +144,7 @@ export BOLIDE_JOB=$PWD/deploy/slurm/bolide.sbatch
 cd "$T/jobs" || exit 1
 # Puts a job into the queue, and its number into $job.
 put() { job=$(sbatch --parsable --output="$T/jobs/slurm-%j.out" "$@") || fail "sbatch refused $*"; }
-flags=("$DECK" --cycles "$CYCLES" --snapshot-every 2 --keep-every 1)
+flags=("$DECK" --cycles "$CYCLES" --snapshot-every 1 --keep-every 1)
 spool_of() { echo "$T/jobs/bolide-$1"; }
 # Its first checkpoint is there.
 runs() { compgen -G "$(spool_of "$1")/spool/queue/job-1.snapshots/*.bolide" >/dev/null && ! is_over "$1"; }
