@@ -51,9 +51,12 @@ function overview() {
   }
   $('submit-box').hidden = $('hosts-box').hidden = shows;
   const count = (rows, state) => rows.filter(row => row.state === state).length;
-  const lost = count(hosts, 'lost'), left = count(hosts, 'left'), here = hosts.length - lost - left;
+  // Of states that are rare only those that some are in.
+  const rare = (rows, ...states) => states.filter(state => count(rows, state)).map(state => `, ${count(rows, state)} ${state}`).join('');
+  const here = hosts.length - count(hosts, 'lost') - count(hosts, 'left');
   $('counts').textContent = shows ? `${jobs.length} ${jobs.length === 1 ? 'run' : 'runs'}`
-    : `${here} ${here === 1 ? 'host' : 'hosts'}${lost ? `, ${lost} lost` : ''}${left ? `, ${left} left` : ''}, ${count(jobs, 'running')} running, ${count(jobs, 'queued')} queued`;
+    : `${here} ${here === 1 ? 'host' : 'hosts'}${rare(hosts, 'lost', 'left')}, ${count(jobs, 'running')} running, `
+      + `${count(jobs, 'queued')} queued${rare(jobs, 'held')}`;
   lists.jobs($('jobs'), jobs, page.chosen, choose, addressOf);
   $('no-jobs').hidden = jobs.length > 0;
   lists.hosts($('hosts'), hosts);
