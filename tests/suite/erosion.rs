@@ -161,8 +161,15 @@ fn a_worker_of_eroding_parts_that_is_lost_changes_no_bit() {
     losing_a_worker_changes_no_bit(&punch(false));
 }
 
+/// The strength of what strikes and is struck.
+const VON_MISES: &str =
+    r#"strength = { type = "von-mises", shear = 0.8, yield_stress = 0.012, hardening = 0.01 }"#;
+
+/// One that heats.
+const JOHNSON_COOK: &str = r#"strength = { type = "johnson-cook", shear = 0.8, a = 0.012, b = 0.01, n = 1, c = 0, m = 1, t_melt = 1800, t_room = 300, specific_heat = 4.5e-6, rate0 = 1e-6 }"#;
+
 /// A small block that strikes a plate, whose elements erode by `criterion`.
-fn struck(criterion: &str, material: &str) -> Model {
+fn struck(criterion: &str, laws: &str) -> Model {
     model(&format!(
         r#"
         title = "a block strikes a plate"
@@ -174,8 +181,7 @@ fn struck(criterion: &str, material: &str) -> Model {
         name = "steel"
         density = 7.9
         eos = {{ type = "shock", c0 = 0.46, s = 1.5, gamma = 2.0 }}
-        strength = {{ type = "von-mises", shear = 0.8, yield_stress = 0.012, hardening = 0.01 }}
-        {material}
+        {laws}
         [[part]]
         name = "block"
         material = "steel"
@@ -259,6 +265,7 @@ fn measured(criterion: &str, model: &Model, state: &GlobalState, element: usize)
             (1.5 * square).sqrt()
         }
         "failure" => field(field::DAMAGE),
+        "temperature" => field(field::TEMPERATURE),
         other => panic!("{other}"),
     }
 }
@@ -283,28 +290,30 @@ fn lone_faces(model: &Model, stands: impl Fn(usize) -> bool) -> usize {
 
 #[test]
 fn each_criterion_takes_out_the_elements_that_meet_it_and_the_surface_is_that_of_the_rest() {
-    for (criterion, limit, material) in [
-        ("geometric_strain", 0.25, ""),
-        ("shear_strain", 0.2, ""),
-        ("principal_strain", 0.1, ""),
-        ("compressive_strain", 0.25, ""),
-        ("plastic_strain", 0.2, ""),
-        ("expansion", 0.004, ""),
-        ("compaction", 0.03, ""),
-        ("pressure", 0.06, ""),
-        ("tension", 0.01, ""),
-        ("principal_stress", 0.015, ""),
-        ("von_mises", 0.0135, ""),
-        ("failure", 1.0, "failure = { type = \"plastic-strain\", limit = 0.3 }"),
-        ("incremental_strain", 0.3, ""),
-        ("time_step", 0.24, ""),
+    let breaks = format!("{VON_MISES}\nfailure = {{ type = \"plastic-strain\", limit = 0.3 }}");
+    for (criterion, limit, laws) in [
+        ("geometric_strain", 0.25, VON_MISES),
+        ("shear_strain", 0.2, VON_MISES),
+        ("principal_strain", 0.1, VON_MISES),
+        ("compressive_strain", 0.25, VON_MISES),
+        ("plastic_strain", 0.2, VON_MISES),
+        ("expansion", 0.004, VON_MISES),
+        ("compaction", 0.03, VON_MISES),
+        ("pressure", 0.06, VON_MISES),
+        ("tension", 0.01, VON_MISES),
+        ("principal_stress", 0.015, VON_MISES),
+        ("von_mises", 0.0135, VON_MISES),
+        ("failure", 1.0, &breaks),
+        ("temperature", 360.0, JOHNSON_COOK),
+        ("incremental_strain", 0.3, VON_MISES),
+        ("time_step", 0.24, VON_MISES),
     ] {
         let words = if criterion == "failure" {
             "failure = true".to_owned()
         } else {
             format!("{criterion} = {limit}")
         };
-        let mut model = struck(&words, material);
+        let mut model = struck(&words, laws);
         let whole = solved(&model, Workers::default());
         let cycles = cycles_of_erosion(&whole.state);
         let last = *cycles.last().unwrap_or_else(|| panic!("nothing erodes by {criterion}"));
@@ -350,7 +359,7 @@ fn each_criterion_takes_out_the_elements_that_meet_it_and_the_surface_is_that_of
 
 /// A block whose elements all leave as soon as they are strained flies at a plate that does not erode.
 fn sacrificed(retain_inertia: bool) -> Model {
-    let mut model = struck("plastic_strain = 100", "");
+    let mut model = struck("plastic_strain = 100", VON_MISES);
     let criteria = model.setup.erosion.parts[1].take().expect("the plate has criteria");
     model.setup.erosion.parts[0] =
         Some(mechanics::erosion::Criteria { plastic_strain: Some(0.05), ..criteria });

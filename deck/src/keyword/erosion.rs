@@ -83,6 +83,15 @@ impl Limits {
         }
     }
 
+    /// Reads a field that holds the temperature (K) at which elements leave: one that `melts` at it or below has no strength left there, so it is
+    /// none, as 0 is.
+    pub(super) fn read_temperature(&mut self, f: &Fields<'_>, i: usize, name: &'static str, melts: f64) {
+        let temperature = f.real(i, 0.0);
+        if temperature != 0.0 && temperature < melts {
+            self.read(f, i, name, Criterion::Temperature);
+        }
+    }
+
     /// Reads a field that holds the least time step of an element: 0 for none.
     pub(super) fn read_time_step(&mut self, f: &Fields<'_>, i: usize, name: &'static str) {
         let step = f.real(i, 0.0);

@@ -247,6 +247,19 @@ fn criteria(given: &Erosion, kind: &Kind, material: Option<&Material>, log: &Log
                         "take a *MAT with a strength, or erode by MXPRES or MNPRES",
                     ),
                 ),
+                Criterion::Temperature if material.initial_temperature() == 0.0 => log.fault_of(
+                    limit.origin,
+                    "a material whose strength law knows the temperature",
+                    log.say(
+                        "give the material such a strength, johnson-cook for one, or erode by plastic_strain",
+                        "leave it blank, or give the constants of heating",
+                    ),
+                ),
+                Criterion::Temperature if limit.value <= material.initial_temperature() => log.fault_of(
+                    limit.origin,
+                    format!("a temperature above that of the start, {} K", material.initial_temperature()),
+                    "raise it",
+                ),
                 _ => {}
             }
         }

@@ -227,6 +227,7 @@ pub(crate) enum Criterion {
     Tension,
     PrincipalStress,
     VonMises,
+    Temperature,
     TimeStep,
 }
 
@@ -234,7 +235,7 @@ pub(crate) enum Criterion {
 const STRAIN: Range = Range::Within(0.0, 100.0, "a strain above 0 and at most 100");
 
 impl Criterion {
-    pub(crate) const ALL: [Self; 13] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::GeometricStrain,
         Self::IncrementalStrain,
         Self::PlasticStrain,
@@ -247,6 +248,7 @@ impl Criterion {
         Self::Tension,
         Self::PrincipalStress,
         Self::VonMises,
+        Self::Temperature,
         Self::TimeStep,
     ];
 
@@ -265,6 +267,7 @@ impl Criterion {
             Self::Tension => "tension",
             Self::PrincipalStress => "principal_stress",
             Self::VonMises => "von_mises",
+            Self::Temperature => "temperature",
             Self::TimeStep => "time_step",
         }
     }
@@ -272,9 +275,12 @@ impl Criterion {
     /// The limits that it takes.
     pub(crate) fn range(self) -> Range {
         match self {
-            Self::Pressure | Self::Tension | Self::PrincipalStress | Self::VonMises | Self::TimeStep => {
-                Range::Positive
-            }
+            Self::Pressure
+            | Self::Tension
+            | Self::PrincipalStress
+            | Self::VonMises
+            | Self::Temperature
+            | Self::TimeStep => Range::Positive,
             _ => STRAIN,
         }
     }
@@ -294,6 +300,7 @@ impl Criterion {
             Self::Tension => &mut criteria.tension,
             Self::PrincipalStress => &mut criteria.principal_stress,
             Self::VonMises => &mut criteria.von_mises,
+            Self::Temperature => &mut criteria.temperature,
             Self::TimeStep => &mut criteria.time_step,
         }
     }

@@ -192,8 +192,12 @@ impl Eroding {
             x: block.x.each_ref().map(Vec::as_slice),
             v: block.v.each_ref().map(Vec::as_slice),
             alive,
-            plastic: criteria.plastic_strain.map(|limit| (fields[field::PLASTIC_STRAIN], limit)),
-            damage: criteria.failure.then(|| fields[field::DAMAGE]),
+            fields: [
+                (field::PLASTIC_STRAIN, criteria.plastic_strain),
+                (field::DAMAGE, criteria.failure.then_some(1.0)),
+                (field::TEMPERATURE, criteria.temperature),
+            ]
+            .map(|(field, limit)| limit.map(|limit| (fields[field], limit))),
             stress: Stress::of(criteria).map(|limits| {
                 let stress = [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX, field::PRESSURE];
                 (stress.map(|field| fields[field]), limits)

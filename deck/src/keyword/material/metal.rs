@@ -47,11 +47,10 @@ pub(super) fn modified_johnson_cook(
     if start != 0.0 && start != t_room {
         f[1].fault(3, "room temperature at the start", "give T0 as TR");
     }
-    // Temperatures and stresses that no element comes to stand for none.
-    let critical = f[5].real(0, 0.0);
-    if is_warmed && critical != 0.0 && critical < t_melt {
-        f[5].fault(0, "no temperature at which elements leave", "leave TC blank, or give TM or more");
+    if is_warmed {
+        limits.read_temperature(&f[5], 0, "TC", t_melt);
     }
+    // A stress that no element comes to stands for none.
     if let (Some(a), shear) = (a, f[5].real(1, 0.0))
         && shear != 0.0
         && shear < 100.0 * a

@@ -2,6 +2,7 @@
 
 use deck::{Model, bundle};
 use mechanics::{
+    erosion::Criteria,
     material::{Eos, Failure, Material, Strength},
     mesh::{Guide, SolidAxes},
     strength::{
@@ -176,8 +177,15 @@ fn modified_johnson_cook_breaks_by_the_work_of_cockcroft_and_latham() {
     assert_eq!(steel.failure, Failure::CockcroftLatham { work: 1516.0 });
     let Eos::Linear { bulk } = steel.eos else { panic!("{steel:?}") };
     assert!((bulk / (2.0e5 / 1.5) - 1.0).abs() < 1e-12, "{bulk}");
-    // Broken elements leave.
-    assert_eq!(read(&cube(&weldox, "")).setup.erosion.parts[0].map(|limits| limits.failure), Some(true));
+    // Broken elements leave, and those that are hot where that is below the melting temperature.
+    let criteria = |card: &str| read(&cube(card, "")).setup.erosion.parts.first().copied().flatten();
+    let broken = Criteria { failure: true, ..Criteria::default() };
+    assert_eq!(criteria(&weldox), Some(broken));
+    assert_eq!(
+        criteria(&card(",,0.9,4.52e8", ",293,0,1", "1,1516", "1620")),
+        Some(Criteria { temperature: Some(1620.0), ..broken })
+    );
+    assert_eq!(criteria(&card("", "", "", "1620")), None, "nothing heats");
     assert_eq!(material(&weldox.replace("MAT_MODIFIED_JOHNSON_COOK", "MAT_107")), steel);
     let cold = material(&card("", "", "", ""));
     assert_eq!(cold.failure, Failure::None);
@@ -189,7 +197,6 @@ fn modified_johnson_cook_breaks_by_the_work_of_cockcroft_and_latham() {
         (card("", ",400", "", ""), "room temperature at the start"),
         (card("", "", "1,0,0.07,1.7", ""), "the fracture criterion of Cockcroft and Latham"),
         (card("", ",,,1", "1,0", ""), "WC"),
-        (card(",,0.9,4.52e8", "", "", "1620"), "no temperature at which elements leave"),
         (card("", "", "", ",900"), "no shear stress at which elements leave"),
         (card(",,0.9,4.52e8", "", "", "").replace("293,1800", "293,200"), "a melting temperature above"),
     ] {

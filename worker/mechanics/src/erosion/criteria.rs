@@ -34,6 +34,8 @@ pub struct Criteria {
     pub principal_stress: Option<f64>,
     /// Von Mises stress (stress).
     pub von_mises: Option<f64>,
+    /// Temperature (K), of a material that has one.
+    pub temperature: Option<f64>,
     /// The time step that the element allows, by the wave speed of its material at rest and with the safety factor, is below
     /// this (time).
     pub time_step: Option<f64>,

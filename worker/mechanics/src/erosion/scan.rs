@@ -25,10 +25,8 @@ pub(super) struct Scan<'a> {
     pub v: [&'a [f64]; 3],
     /// Bits of the slots of each set whose elements are alive.
     pub alive: &'a [u8],
-    /// Plastic strain and its limit.
-    pub plastic: Option<(&'a [f64], f64)>,
-    /// Damage, if failed elements erode.
-    pub damage: Option<&'a [f64]>,
+    /// State fields that are compared as they are: plastic strain, damage, temperature, each with its limit.
+    pub fields: [Option<(&'a [f64], f64)>; 3],
     /// Deviatoric stress xx, yy, xy, yz, zx and pressure, and their limits.
     pub stress: Option<([&'a [f64]; 6], Stress)>,
     /// Volume over initial volume, and its limits.
@@ -53,10 +51,9 @@ pub(super) fn run(scan: &mut Scan<'_>, sets: &[Range<u32>], reach: usize, width:
     assert!(sets.iter().all(|range| range.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
     assert!(scan.x.iter().chain(&scan.v).all(|a| a.len() >= reach), "node arrays shrunk below {reach}");
     assert!(
-        scan.plastic.is_none_or(|(values, _)| values.len() >= n_slots),
-        "plastic strain of {n_slots} slots"
+        scan.fields.iter().flatten().all(|(values, _)| values.len() >= n_slots),
+        "state fields of {n_slots} slots"
     );
-    assert!(scan.damage.is_none_or(|values| values.len() >= n_slots), "damage of {n_slots} slots");
     assert!(
         scan.stress.is_none_or(|(fields, _)| fields.iter().all(|values| values.len() >= n_slots)),
         "stress of {n_slots} slots"
@@ -126,13 +123,9 @@ unsafe fn all<L: Lane>(scan: &mut Scan<'_>, sets: &[Range<u32>], found: &mut Vec
 #[inline(always)]
 unsafe fn slots<L: Lane>(scan: &mut Scan<'_>, slot: usize, alive: L::Mask) -> u32 {
     let mut bits = 0;
-    if let Some((plastic, limit)) = scan.plastic {
+    for (values, limit) in scan.fields.into_iter().flatten() {
         // SAFETY: the slot is inside the state arrays.
-        bits |= L::bits(L::splat(limit).less_equal(unsafe { L::load(plastic, slot) }));
-    }
-    if let Some(damage) = scan.damage {
-        // SAFETY: as above.
-        bits |= L::bits(L::splat(1.0).less_equal(unsafe { L::load(damage, slot) }));
+        bits |= L::bits(L::splat(limit).less_equal(unsafe { L::load(values, slot) }));
     }
     if let Some((fields, limits)) = &scan.stress {
         // SAFETY: as above.

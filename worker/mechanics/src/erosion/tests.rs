@@ -64,6 +64,7 @@ fn bent(structured: bool) -> (Piece, PieceErosion) {
         }
         fields[field::ENERGY][e] = 1e7 * (1.0 + draw());
         fields[field::PLASTIC_STRAIN][e] = 0.5 + draw();
+        fields[field::TEMPERATURE][e] = 1000.0 + 800.0 * draw();
         fields[field::DAMAGE][e] = (3.0 * draw()).clamp(0.0, 1.0);
         fields[field::RELATIVE_VOLUME][e] = 1.0 + 0.1 * draw();
     }
@@ -102,6 +103,7 @@ fn criteria() -> Vec<Criteria> {
         Criteria { incremental_strain: Some(0.3), ..none },
         Criteria { plastic_strain: Some(0.6), ..none },
         Criteria { failure: true, ..none },
+        Criteria { temperature: Some(1200.0), ..none },
         Criteria { shear_strain: Some(0.2), ..none },
         Criteria { principal_strain: Some(0.2), ..none },
         Criteria { compressive_strain: Some(0.2), ..none },
