@@ -141,8 +141,10 @@ pub struct Entry {
     pub state: State,
     /// Where its results go; none with `no_output`.
     pub folder: Option<PathBuf>,
-    /// Of a job that was under way before: the workers it had. It goes on before all others.
+    /// Of a job that was under way before: the workers it had. It goes on before all others, unless it stands aside.
     pub before: Option<Vec<String>>,
+    /// Whether it is stored, or about to be, for a job that came before it.
+    pub aside: bool,
     /// BLAKE3 of the deck, hexadecimal; empty where an earlier release queued it.
     pub deck_sum: String,
     pub starts: Starts,
@@ -204,8 +206,14 @@ impl Queue {
     pub fn set_at_work(&mut self, id: u32, at_work: Vec<String>, snapshot: u64) {
         if let Some(job) = self.jobs.get_mut(&id) {
             job.before = Some(at_work);
+            job.aside = false;
             job.starts.start(snapshot);
         }
+    }
+
+    /// A job is to be stored for one that came before it; false if that is known.
+    pub fn set_aside(&mut self, id: u32) -> bool {
+        self.jobs.get_mut(&id).is_some_and(|job| !std::mem::replace(&mut job.aside, true))
     }
 
     /// The session of a job ended in good order, whatever came of the job.
@@ -260,8 +268,21 @@ impl Queue {
         let text = Arc::new(text);
         let deck_sum = sum_of(&text);
         let (state, before, starts, wish) = (State::Queued, None, Starts::default(), None);
-        let entry =
-            Entry { id, name, text, options, state, folder, before, deck_sum, starts, wish, size, owner };
+        let entry = Entry {
+            id,
+            name,
+            text,
+            options,
+            state,
+            folder,
+            before,
+            aside: false,
+            deck_sum,
+            starts,
+            wish,
+            size,
+            owner,
+        };
         self.jobs.insert(id, entry);
         Ok(id)
     }
@@ -270,7 +291,7 @@ impl Queue {
     /// first.
     pub fn waiting(&self) -> Vec<&Entry> {
         let mut waiting: Vec<&Entry> = self.jobs.values().filter(|job| job.state == State::Queued).collect();
-        waiting.sort_by_key(|job| (job.before.is_none(), Reverse(job.options.priority), job.id));
+        waiting.sort_by_key(|job| (job.before.is_none() || job.aside, Reverse(job.options.priority), job.id));
         waiting
     }
 

@@ -185,6 +185,7 @@ impl Scheduler {
             state,
             folder,
             before,
+            aside: false,
             deck_sum,
             starts,
             wish,

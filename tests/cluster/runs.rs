@@ -137,6 +137,36 @@ fn jobs_share_workers_and_have_the_bits_that_they_have_alone() {
     assert_eq!(summary["losses"].as_array().map(Vec::len), Some(0), "nobody was lost: {summary}");
 }
 
+/// A job that wants both workers is next; a shorter one passes it, and is stored for it when the job before it ends too soon.
+#[test]
+fn a_job_that_passed_a_reservation_is_stored_for_it_and_goes_on_behind_it() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    cluster.worker("a", "1");
+    cluster.worker("b", "1");
+    let submit = |flags: &[&str]| {
+        let deck = small();
+        let always = ["submit", deck.as_str(), "--no-output"];
+        cluster.json(&always.iter().chain(flags).copied().collect::<Vec<_>>())
+    };
+    let is = |job, state| (cluster.job(job)["state"] == state).then_some(());
+    submit(&["--cycles", "400000", "--workers", "1..1"]);
+    until(
+        || "job 1 with a forecast".to_owned(),
+        || cluster.find_job(1).filter(|job| job["left_s"].as_f64().is_some_and(|left| left > 10.0)),
+    );
+    submit(&["--cycles", "40", "--min-workers", "2"]);
+    submit(&["--cycles", LONG]);
+    until(|| "job 3 under way".to_owned(), || is(3, "running"));
+    assert_eq!(cluster.job(2)["state"], "queued");
+    cluster.json(&["cancel", "1"]);
+    let summary = cluster.json(&["watch", "2"]);
+    assert_eq!((digest_of(&summary), &summary["workers"]), (reference().to_owned(), &2.into()));
+    cluster.master.wait_for("the job is stored for one that came before it job=3");
+    let summary = cluster.json(&["watch", "3"]);
+    assert_eq!(digest_of(&summary), long_reference());
+    assert_eq!(summary["losses"].as_array().map(Vec::len), Some(0), "nobody was lost: {summary}");
+}
+
 #[test]
 fn a_job_that_is_held_gives_its_workers_away_and_goes_on_where_it_was_stored() {
     let mut cluster = Cluster::start(BOLIDE, false);

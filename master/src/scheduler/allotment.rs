@@ -8,7 +8,8 @@
 //! - Jobs start in their order as long as each that runs keeps as many workers as it needs. One that starts takes what is idle, and
 //!   calls workers of jobs that have more than their part; these go at the next plan boundary of their job.
 //! - A job for which there are workers enough, but not beside those that run, has a *reservation*: jobs behind it start before it only if
-//!   they end before it could begin, or leave it enough workers.
+//!   they end before it could begin, or leave it enough workers. Where jobs that came after it are all that keeps it from beginning, as many of
+//!   them are stored and wait behind it.
 //! - What is idle after that is given to those that have least of their part, as far as it helps them at all ([`HELPS`]).
 //! - Work is dealt out anew where workers change, so a job whose end is near keeps those that it has.
 
@@ -19,6 +20,7 @@ use crate::{
     output::span,
 };
 
+mod aside;
 mod calls;
 mod idle;
 mod parts;
@@ -83,6 +85,8 @@ pub struct Claim<'a> {
     pub left_s: Option<f64>,
     /// Of one that was interrupted: the workers that it had.
     pub before: Option<&'a [String]>,
+    /// Whether it was stored for one before it, and keeps its place behind that.
+    pub aside: bool,
 }
 
 impl Claim<'_> {
@@ -122,9 +126,12 @@ pub struct Arrangement {
     /// Workers that are given to jobs that run.
     pub joins: Vec<(u32, u32)>,
     pub calls: Vec<Call>,
+    /// Jobs that are stored at their next cycle, for one that came before them.
+    pub stores: Vec<u32>,
     /// What each of the others waits for.
     pub waits: Vec<(u32, String)>,
-    /// The job for which there are workers enough, but not beside those that run, and when it could begin (s) if jobs end as they say.
+    /// The job for which there are workers enough, but not beside those that run, and when it could begin (s) if jobs end as they say;
+    /// infinite where that is not known yet.
     pub reserved: Option<(u32, f64)>,
 }
 
@@ -167,6 +174,8 @@ struct Row<'a> {
     needs: usize,
     /// Runs, or may start now.
     is_in: bool,
+    /// It has passed the one with the reservation, or runs and came after it.
+    passes: bool,
     /// Its part of the speeds.
     part: f64,
     /// The speed with which it would take the time that it says it does.
@@ -230,6 +239,7 @@ impl<'a> Table<'a> {
             given: Vec::new(),
             needs: claim.needs(),
             is_in: claim.runs,
+            passes: false,
             part: 0.0,
             told_with: 1.0,
             waits: None,
@@ -326,19 +336,23 @@ impl<'a> Table<'a> {
             match &mut window {
                 None if fits => self.rows[row].is_in = true,
                 None => {
-                    let (begins, over) = self.window(needs);
+                    let (begins, over) = if self.set_aside(row) { (0.0, 0) } else { self.window(needs) };
                     window = Some((begins, over));
-                    self.done.reserved = Some((claim.job, begins));
+                    self.done.reserved =
+                        Some((claim.job, if self.is_settled() { begins } else { f64::INFINITY }));
+                    for other in self.behind(row) {
+                        self.rows[other].passes = true;
+                    }
                 }
                 Some((begins, over)) if fits => {
                     let least = self.workers.iter().map(|worker| worker.threads.max(1)).min().unwrap_or(1);
                     let takes = claim.left_s.map_or(f64::INFINITY, |left| left / f64::from(least));
-                    if takes <= *begins {
-                        self.rows[row].is_in = true;
-                    } else if needs <= *over {
+                    let leaves_enough = takes > *begins && needs <= *over;
+                    if leaves_enough {
                         *over -= needs;
-                        self.rows[row].is_in = true;
                     }
+                    let passes = takes <= *begins || leaves_enough;
+                    (self.rows[row].is_in, self.rows[row].passes) = (passes, passes);
                 }
                 Some(_) => {}
             }
@@ -378,6 +392,12 @@ impl<'a> Table<'a> {
             }
         }
         (f64::INFINITY, 0)
+    }
+
+    /// Whether each job that is in has its workers for now. While some are on their way nobody knows how long those take that they leave.
+    fn is_settled(&self) -> bool {
+        self.rows.iter().all(|row| !row.is_in || row.claim.runs)
+            && self.workers.iter().all(|worker| !matches!(worker.stands, Stands::Called { .. }))
     }
 
     /// Says which part of the speeds each job has that is in.
@@ -530,7 +550,7 @@ fn in_order<'a>(claims: &'a [Claim<'a>]) -> Vec<&'a Claim<'a>> {
     let (mut order, mut waiting): (Vec<&Claim<'_>>, Vec<_>) = claims.iter().partition(|claim| claim.runs);
     let mut of_owner: BTreeMap<&str, usize> = BTreeMap::new();
     order.iter().for_each(|claim| *of_owner.entry(claim.owner).or_default() += 1);
-    let urgency = |claim: &Claim<'_>| (claim.before.is_none(), Reverse(claim.priority));
+    let urgency = |claim: &Claim<'_>| (claim.before.is_none() || claim.aside, Reverse(claim.priority));
     waiting.sort_by_key(|claim| (urgency(claim), claim.job));
     let turn = |claim: &'a Claim<'a>| {
         let turn = of_owner.entry(claim.owner).or_default();

@@ -39,10 +39,13 @@ impl Scheduler {
             .collect();
         let workers: Vec<Worker<'_>> = self.hosts.connected().filter_map(|host| self.worker(host)).collect();
         let available = footprint::available();
-        let Arrangement { starts, joins, calls, waits, .. } =
+        let Arrangement { starts, joins, calls, stores, waits, .. } =
             allotment::arrange(&claims, &workers, self.started.elapsed(), available);
         for (job, what) in waits {
             self.wait_for(job, what);
+        }
+        for job in stores {
+            self.set_aside(job);
         }
         for call in calls {
             self.call(call);
@@ -63,7 +66,8 @@ impl Scheduler {
         let left_s = if runs {
             self.status.get(&entry.id).and_then(|status| status.borrow().left_s)
         } else {
-            let work = entry.size.elements as f64 * entry.size.cycles as f64;
+            let done = self.status.get(&entry.id).map_or(0, |status| status.borrow().cycle);
+            let work = entry.size.elements as f64 * entry.size.cycles.saturating_sub(done) as f64;
             Some(1e-9 * GRIND_NS * work).filter(|seconds| *seconds > 0.0)
         };
         Claim {
@@ -77,6 +81,7 @@ impl Scheduler {
             runs,
             left_s,
             before: entry.before.as_deref().filter(|_| !runs),
+            aside: entry.aside,
         }
     }
 
@@ -94,6 +99,16 @@ impl Scheduler {
             threads: link.spec.threads,
             stands,
         })
+    }
+
+    /// Has a job stored, for one that came before it.
+    fn set_aside(&mut self, job: u32) {
+        if let Some(running) = self.running.get(&job)
+            && self.queue.set_aside(job)
+        {
+            info!(job, "the job is stored for one that came before it");
+            running.suspend();
+        }
     }
 
     /// Has a job give a worker up at its next plan boundary.

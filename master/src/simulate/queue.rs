@@ -47,6 +47,8 @@ struct Job {
     done: f64,
     has: Vec<usize>,
     started: Option<f64>,
+    /// It was stored for one before it.
+    aside: bool,
     ended: Option<f64>,
     /// Work is being dealt out until then.
     deals_until: f64,
@@ -54,6 +56,12 @@ struct Job {
     joining: Vec<usize>,
     /// When it was promised to start at the latest, while it had the reservation.
     promised: Option<f64>,
+}
+
+impl Job {
+    fn runs(&self) -> bool {
+        !self.has.is_empty() && self.ended.is_none()
+    }
 }
 
 /// Who decides.
@@ -162,6 +170,7 @@ fn mix(seed: u64, costs: &Costs<'_>) -> Vec<Job> {
             done: 0.0,
             has: Vec::new(),
             started: None,
+            aside: false,
             ended: None,
             deals_until: 0.0,
             joining: Vec::new(),
@@ -205,7 +214,7 @@ impl Course<'_> {
 
     /// Time passes.
     fn pass(&mut self, until: f64) {
-        for job in self.jobs.iter_mut().filter(|job| job.started.is_some() && job.ended.is_none()) {
+        for job in self.jobs.iter_mut().filter(|job| job.runs()) {
             let computes = until - self.now.max(job.deals_until);
             if computes > 0.0 {
                 job.done += computes / self.costs.cycle(job.elements, &job.has);
@@ -219,10 +228,9 @@ impl Course<'_> {
         let number = index as u32 + 1;
         let now = self.now;
         let job = &mut self.jobs[index];
-        let is_its = |stands: &Stands| matches!(stands, Stands::At(job) | Stands::Called { from: job, .. } if *job == number);
         if job.cycles - job.done < 1e-6 * job.cycles {
             job.ended = Some(now);
-            self.stands.iter_mut().filter(|stands| is_its(stands)).for_each(|stands| *stands = Stands::Idle);
+            self.free(number);
             return;
         }
         job.done = (job.done / PLAN_INTERVAL).round() * PLAN_INTERVAL;
@@ -236,8 +244,27 @@ impl Course<'_> {
         job.deals_until = now + self.costs.deal(job.elements);
     }
 
-    /// Lets the policy change what it will.
-    fn arrange(&mut self, policy: Policy) {
+    /// The workers of a job are idle.
+    fn free(&mut self, number: u32) {
+        for stands in &mut self.stands {
+            if matches!(stands, Stands::At(job) | Stands::Called { from: job, .. } if *job == number) {
+                *stands = Stands::Idle;
+            }
+        }
+    }
+
+    /// A job is stored where it is.
+    fn store(&mut self, number: u32) {
+        let job = &mut self.jobs[number as usize - 1];
+        job.done = job.done.floor();
+        job.has.clear();
+        job.joining.clear();
+        job.aside = true;
+        self.free(number);
+    }
+
+    /// Lets the policy change what it will; true if it is to be asked again, for jobs were stored.
+    fn arrange(&mut self, policy: Policy) -> bool {
         let claims: Vec<Claim<'_>> = self
             .jobs
             .iter()
@@ -251,12 +278,13 @@ impl Course<'_> {
                 workers: [job.least, usize::MAX],
                 priority: 0,
                 owner: "",
-                runs: job.started.is_some(),
-                left_s: Some(match job.started {
-                    Some(_) => (job.cycles - job.done) * self.costs.cycle(job.elements, &job.has),
-                    None => job.cycles * job.elements * ELEMENT_SECONDS * job.estimate,
+                runs: job.runs(),
+                left_s: Some(match job.runs() {
+                    true => (job.cycles - job.done) * self.costs.cycle(job.elements, &job.has),
+                    false => (job.cycles - job.done) * job.elements * ELEMENT_SECONDS * job.estimate,
                 }),
-                before: None,
+                before: job.aside.then_some(&[]),
+                aside: job.aside,
             })
             .collect();
         let worker = |(index, &stands): (usize, &Stands)| Worker {
@@ -266,9 +294,9 @@ impl Course<'_> {
             stands,
         };
         let workers: Vec<Worker<'_>> = self.stands.iter().enumerate().map(worker).collect();
-        let Arrangement { starts, joins, calls, reserved, .. } = policy(&claims, &workers);
+        let Arrangement { starts, joins, calls, stores, reserved, .. } = policy(&claims, &workers);
         drop(claims);
-        if let Some((job, begins)) = reserved {
+        if let Some((job, begins)) = reserved.filter(|(_, begins)| begins.is_finite()) {
             self.jobs[job as usize - 1].promised.get_or_insert(self.now + begins);
         }
         for call in calls {
@@ -283,17 +311,18 @@ impl Course<'_> {
             let deal = self.costs.deal(self.jobs[job as usize - 1].elements);
             let started = &mut self.jobs[job as usize - 1];
             started.has = workers.into_iter().map(|worker| worker as usize).collect();
-            (started.started, started.deals_until) = (Some(self.now), self.now + deal);
+            started.started.get_or_insert(self.now);
+            (started.aside, started.deals_until) = (false, self.now + deal);
         }
+        stores.iter().for_each(|&job| self.store(job));
+        !stores.is_empty()
     }
 
     /// Plays the mix to its end.
     fn play(mut self, policy: Policy) -> Result<Vec<Job>, String> {
         while self.jobs.iter().any(|job| job.ended.is_none()) {
-            self.arrange(policy);
-            let runs =
-                |&index: &usize| self.jobs[index].started.is_some() && self.jobs[index].ended.is_none();
-            let running = (0..self.jobs.len()).filter(runs);
+            while self.arrange(policy) {}
+            let running = (0..self.jobs.len()).filter(|&index| self.jobs[index].runs());
             let next = running.map(|index| (self.next_of(index), Some(index)));
             let arrivals =
                 self.jobs.iter().filter(|job| job.arrives > self.now).map(|job| (job.arrives, None));

@@ -16,6 +16,7 @@ fn job(job: u32, elements: u64) -> Claim<'static> {
         runs: false,
         left_s: None,
         before: None,
+        aside: false,
     }
 }
 
@@ -265,4 +266,69 @@ fn a_job_that_needs_memory_waits_for_workers_that_have_it_together() {
     let words = "workers with 6.0 GB for it together, those that it can have come to 5.0 GB";
     assert_eq!(waits, said(&[(1, words)]));
     assert_eq!(arranged(&[large], &with(&[4, 2])).starts, [(1, vec![1, 2])]);
+}
+
+#[test]
+fn jobs_that_passed_a_reservation_and_take_too_long_are_stored_for_it() {
+    // Two jobs that came before the large one on a worker each, two that passed it; it needs four of six.
+    let stands: Vec<Stands> = [2, 3, 6, 7].into_iter().map(Stands::At).collect();
+    let six = workers(&[1.0; 6], &stands);
+    let large = Claim { workers: [4, usize::MAX], ..job(5, 1_000_000) };
+    let with = |left: [f64; 4]| {
+        let mut claims: Vec<Claim<'_>> =
+            [2, 3, 6, 7].into_iter().zip(left).map(|(number, left)| running(number, 1_000, left)).collect();
+        claims.push(large.clone());
+        claims
+    };
+    let told = arranged(&with([500.0, 500.0, 60.0, 60.0]), &six);
+    assert_eq!(told.stores, [7, 6], "two of them, the last come first");
+    assert_eq!(told.reserved, Some((5, 0.0)));
+    assert_eq!(told.waits, said(&[(5, "4 workers, 2 are idle; expected to start in about 1 s")]));
+    let soon = arranged(&with([500.0, 500.0, 0.3, 60.0]), &six);
+    assert_eq!(soon.stores, [7], "one of them ends by itself");
+    assert!(arranged(&with([0.3, 500.0, 60.0, 0.3]), &six).stores.is_empty(), "so do enough others");
+
+    // Of jobs that were there before it none is stored for it, nor for one that needs more than the others leave.
+    let first = Claim { job: 1, ..large.clone() };
+    let mut claims = with([500.0, 500.0, 60.0, 60.0]);
+    claims[4] = first;
+    assert_eq!(arranged(&claims, &six).stores, [7, 6, 3, 2][..2], "all of these came later");
+    claims[4] = Claim { job: 8, ..large.clone() };
+    assert!(arranged(&claims, &six).stores.is_empty());
+    claims[4] = Claim { workers: [5, usize::MAX], ..large.clone() };
+    assert!(arranged(&claims, &six).stores.is_empty(), "jobs 2 and 3 keep it from beginning, too");
+
+    // A job whose owner has less keeps its turn, and so does one of higher priority.
+    let mut claims = with([500.0, 500.0, 60.0, 60.0]);
+    claims[3].owner = "b";
+    assert!(arranged(&claims, &six).stores.is_empty());
+    claims[3].owner = "";
+    claims[2].priority = 1;
+    assert!(arranged(&claims, &six).stores.is_empty());
+
+    // Stored, it waits behind it, and any worker will do.
+    let stored = Claim { before: Some(&[]), aside: true, workers: [2, usize::MAX], ..job(6, 1_000) };
+    let free = workers(&[1.0; 5], &[Stands::At(2)]);
+    let both = arranged(&[running(2, 1_000, 500.0), stored, large], &free);
+    let starts: Vec<u32> = both.starts.iter().map(|(job, _)| *job).collect();
+    assert_eq!(starts, [5], "{both:?}");
+}
+
+#[test]
+fn jobs_that_pass_a_reservation_call_no_workers_of_those_that_it_waits_for() {
+    // Job 1 has one of three workers and job 2 two; the large job needs all.
+    let large = Claim { workers: [3, usize::MAX], ..job(3, 1_000_000) };
+    let short = Claim { left_s: Some(10.0), ..job(4, 1_000_000) };
+    let claims = [running(1, 1_000, 500.0), running(2, 1_000_000, 600.0), large, short];
+    let stands = [Stands::At(1), Stands::At(2), Stands::At(2)];
+    let told = arranged(&claims, &workers(&[1.0; 3], &stands));
+    assert_eq!((told.calls, told.reserved), (vec![], Some((3, 600.0))));
+    let without = [claims[0].clone(), claims[1].clone(), claims[3].clone()];
+    assert_eq!(arranged(&without, &workers(&[1.0; 3], &stands)).calls.len(), 1, "else it would");
+
+    // While workers are on their way nobody knows when it begins.
+    let called = Stands::Called { from: 2, to: None };
+    let told = arranged(&claims, &workers(&[1.0; 3], &[Stands::At(1), Stands::At(2), called]));
+    assert_eq!(told.reserved, Some((3, f64::INFINITY)));
+    assert_eq!(told.waits[0].1, "3 workers, 0 are idle; job 1 ends in about 8 min");
 }
