@@ -43,6 +43,32 @@ fn press(browser: &mut Browser, id: &str, key: &str) {
     }
 }
 
+/// Presses a key where the focus is, as a user does: what a browser makes of it follows.
+fn strike(browser: &mut Browser, key: &str) {
+    let (number, text) = match key {
+        "Tab" => (9, ""),
+        "Enter" => (13, "\r"),
+        other => panic!("the number of {other}"),
+    };
+    let event = |kind| serde_json::json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": number, "text": text });
+    browser.call("Input.dispatchKeyEvent", event("keyDown"));
+    browser.call(
+        "Input.dispatchKeyEvent",
+        serde_json::json!({ "type": "keyUp", "key": key, "code": key, "windowsVirtualKeyCode": number }),
+    );
+}
+
+/// Goes from control to control until one has the focus of which `is` holds, an expression about `e`.
+fn tab_to(browser: &mut Browser, is: &str) {
+    for _ in 0..100 {
+        strike(browser, "Tab");
+        if browser.evaluate(&format!("(e => Boolean({is}))(document.activeElement)")) == true {
+            return;
+        }
+    }
+    panic!("no control comes to: {is}");
+}
+
 /// The share of a canvas that bodies cover: what has another colour than its corner.
 fn covered(id: &str) -> String {
     format!(
@@ -271,7 +297,33 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     let summary: serde_json::Value = serde_json::from_str(&run.out).expect("a summary");
     assert_eq!(both, summary["digest"]);
 
+    // With twelve jobs, by the keyboard alone: choose one, hold it, resume it, cancel it.
     let deck = path.display().to_string();
+    for _ in 4..=12 {
+        let mut command = Command::new(BOLIDE);
+        command.args(["submit", &deck, "--master", &address, "--min-workers", "3", "--no-output"]);
+        assert!(command.status().expect("bolide runs").success());
+    }
+    browser.call("Page.navigate", serde_json::json!({ "url": address_of_job.replace("/jobs/1", "/jobs/2") }));
+    browser.wait_for("document.querySelectorAll('#jobs li').length === 12");
+    browser.wait_for("document.getElementById('title').textContent.startsWith('job 2:')");
+    tab_to(&mut browser, "e.closest('#jobs') && e.textContent.startsWith('job 9')");
+    strike(&mut browser, "Enter");
+    browser.wait_for("document.getElementById('title').textContent.startsWith('job 9:')");
+    tab_to(&mut browser, "e.id === 'hold'");
+    strike(&mut browser, "Enter");
+    browser.wait_for("document.getElementById('facts').innerText.includes('held, waits for')");
+    browser.wait_for("document.getElementById('counts').textContent.endsWith('8 queued, 1 held')");
+    tab_to(&mut browser, "e.id === 'resume'");
+    strike(&mut browser, "Enter");
+    browser.wait_for("document.getElementById('facts').innerText.includes('queued')");
+    tab_to(&mut browser, "e.id === 'cancel'");
+    strike(&mut browser, "Enter");
+    strike(&mut browser, "Enter");
+    browser.wait_for("document.getElementById('facts').innerText.includes('cancelled')");
+    let twice = "(ids => ids.filter((id, i) => ids.indexOf(id) !== i))([...document.querySelectorAll('[id]')].map(e => e.id))";
+    assert_eq!(browser.evaluate(twice), serde_json::json!([]), "each control has a name of its own");
+
     let run = said(Command::new(BOLIDE).args(["run", &deck, "--cycles", "40", "--no-output", "--json"]));
     let summary: serde_json::Value = serde_json::from_str(&run.out).expect("a summary");
     assert_eq!(digest, summary["digest"]);

@@ -140,7 +140,7 @@ function paint() {
   else {
     const before = seen.get(name) ?? range;
     seen.set(name, [Math.min(before[0], range[0]), Math.max(before[1], range[1])]);
-    if ($('hold').checked) range = seen.get(name);
+    if ($('one-range').checked) range = seen.get(name);
   }
   if ($('map').value === 'cool to warm') {
     // Zero is in the middle of this map, where the values have two signs.
@@ -235,7 +235,7 @@ export function start() {
   $('map').append(...Object.keys(MAPS).map(name => new Option(name, name)));
   bar();
   $('map').addEventListener('change', () => { bar(); paint(); });
-  for (const id of ['field', 'edges', 'from', 'to', 'hold']) $(id).addEventListener('change', paint);
+  for (const id of ['field', 'edges', 'from', 'to', 'one-range']) $(id).addEventListener('change', paint);
   $('mirror').addEventListener('change', () => { fit(); paint(); });
   $('cut').addEventListener('change', cut);
   $('cut-side').addEventListener('change', cut);
