@@ -1,7 +1,11 @@
-//! What elements start with: strength that scatters, and axes of their own. Same bits on any workers, over a loss, on both routes.
+//! What a run starts with: strength that scatters, axes of elements, nodes that a study has shaken.
 
-use deck::Model;
-use tests::solve::{Workers, example, model};
+use deck::{
+    Model,
+    bundle::{self, Options},
+    perturb::Perturbation,
+};
+use tests::solve::{Workers, example, model, run};
 
 use crate::bits::{fingerprint, losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
 
@@ -48,4 +52,34 @@ fn a_wound_tube_has_the_same_bits_on_any_workers() {
     );
     same_bits(&tube);
     losing_a_worker_changes_no_bit(&tube);
+}
+
+#[test]
+fn bodies_one_gap_apart_begin_when_a_study_has_shaken_their_nodes() {
+    let deck = r#"
+        title = "two blocks"
+        units = "SI"
+        [control]
+        end_cycle = 2
+        [[part]]
+        name = "low"
+        material = "STEEL_1006"
+        box = { origin = [0, 0, 0], size = [4, 4, 1], cells = [4, 4, 1] }
+        [[part]]
+        name = "high"
+        material = "STEEL_1006"
+        velocity = [0, 0, 1]
+        box = { origin = [0, 0, 1.2], size = [4, 4, 1], cells = [4, 4, 1] }
+        [contact]
+        gap_length = 0.2
+    "#;
+    for seed in 0..4 {
+        let options =
+            Options { perturbation: Some(Perturbation { nodes: 1e-9, seed }), ..Options::default() };
+        let text = bundle::gather("blocks.toml", deck.to_owned(), &options, &mut |_| None).expect("one file");
+        let shaken = run(model(&text));
+        assert_eq!(shaken.outcome.cycles_run, 2, "seed {seed}");
+        let energies = shaken.rows.last().map(|row| row.contact / row.kinetic);
+        assert!(energies.is_some_and(|share| share < 1e-6), "{energies:?}");
+    }
 }

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use mechanics::contact::Settings;
+use mechanics::contact::{ROUNDING, Settings};
 
 use super::{assembly::Assembly, part::PartDraft, surface::Face};
 use crate::{
@@ -15,9 +15,6 @@ use crate::{
     geometry::{add, norm, scaled, triangle_distance},
     log::Log,
 };
-
-/// A gap that the deck rounded is still a gap.
-const ROUNDING: f64 = 1e-6;
 
 /// The least distance found for a pair, and whether a node is inside.
 #[derive(Clone, Copy)]

@@ -54,7 +54,7 @@ pub use cycle::Contact;
 pub use edges::{BatchEdge, BatchEdges, Edge, initial_edges};
 pub use force::ContactVote;
 pub use history::History;
-pub use initial_pairs::initial_pairs;
+pub use initial_pairs::{ROUNDING, initial_pairs};
 pub use kinds::sort;
 pub use map::Map;
 pub use pair::Kind;

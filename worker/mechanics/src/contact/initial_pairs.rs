@@ -2,9 +2,9 @@
 
 use super::{Exclusions, Settings, search::Bounds, sort, surface::Surface, zone::Frame};
 
-/// A pair at exactly one gap is outside the zone, rounding or not: only nearer ones by this fraction are
-/// inside it at time zero.
-const INSIDE: f64 = 1e-9;
+/// Bodies may start nearer than the gap by this fraction of it, for decks round their numbers and studies shake nodes. The springs of
+/// such a start hold 4e-8 of what they hold half a gap deep.
+pub const ROUNDING: f64 = 1e-4;
 
 /// Pairs that interact and are inside the zone already: surface node, surface face, distance, by node then
 /// face. `x` by surface node. Pairs of one part are to be excluded ([`Exclusions`]); between parts the deck is
@@ -23,7 +23,7 @@ pub fn initial_pairs(surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> 
                     && !face.own.contains(&n)
                 {
                     let distance = Frame::new(&corners).nearest(p).distance2.sqrt();
-                    if distance < settings.gap * (1.0 - INSIDE) {
+                    if distance < settings.gap * (1.0 - ROUNDING) {
                         pairs.push((n, f, distance));
                     }
                 }

@@ -6,12 +6,12 @@
 //! touch; a pair belongs to the one cube that holds the lowest corner of what both boxes share.
 
 use super::{
-    super::{Settings, pair::Kind, search::Exclusions, surface::Surface, work_unit::WorkUnit},
+    super::{
+        Settings, initial_pairs::ROUNDING, pair::Kind, search::Exclusions, surface::Surface,
+        work_unit::WorkUnit,
+    },
     Edge, zone,
 };
-
-/// A pair at exactly one gap is outside, rounding or not: as for nodes.
-const INSIDE: f64 = 1e-9;
 
 /// Greatest cube index along an axis: three of them fit one key.
 const MAX_CUBE: f64 = 2_097_000.0;
@@ -65,7 +65,7 @@ pub fn initial_edges(surface: &Surface, x: &[[f64; 3]], settings: &Settings) -> 
         let Some(closest) = zone::closest(&[a_nodes[0], a_nodes[1], b_nodes[0], b_nodes[1]]) else { return };
         let distance = closest.distance2.sqrt();
         if closest.crosses
-            && distance < settings.gap * (1.0 - INSIDE)
+            && distance < settings.gap * (1.0 - ROUNDING)
             && closest.weight(settings.gap).value > 0.0
         {
             pairs.push(([a, b], distance));
