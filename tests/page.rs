@@ -35,27 +35,24 @@ fn shown(browser: &mut Browser, id: &str, what: &str) -> f64 {
         .expect("a number")
 }
 
-/// Gives a canvas the focus and presses a key.
-fn press(browser: &mut Browser, id: &str, key: &str) {
-    browser.evaluate(&format!("document.getElementById('{id}').focus()"));
-    for kind in ["keyDown", "keyUp"] {
-        browser.call("Input.dispatchKeyEvent", serde_json::json!({ "type": kind, "key": key, "code": key }));
-    }
-}
-
 /// Presses a key where the focus is, as a user does: what a browser makes of it follows.
 fn strike(browser: &mut Browser, key: &str) {
+    // By these a browser knows a key that does something of its own.
     let (number, text) = match key {
         "Tab" => (9, ""),
         "Enter" => (13, "\r"),
-        other => panic!("the number of {other}"),
+        _ => (0, ""),
     };
-    let event = |kind| serde_json::json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": number, "text": text });
-    browser.call("Input.dispatchKeyEvent", event("keyDown"));
-    browser.call(
-        "Input.dispatchKeyEvent",
-        serde_json::json!({ "type": "keyUp", "key": key, "code": key, "windowsVirtualKeyCode": number }),
-    );
+    for (kind, text) in [("keyDown", text), ("keyUp", "")] {
+        let event = serde_json::json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": number, "text": text });
+        browser.call("Input.dispatchKeyEvent", event);
+    }
+}
+
+/// Gives a canvas the focus and presses a key.
+fn press(browser: &mut Browser, id: &str, key: &str) {
+    browser.evaluate(&format!("document.getElementById('{id}').focus()"));
+    strike(browser, key);
 }
 
 /// Goes from control to control until one has the focus of which `is` holds, an expression about `e`.

@@ -6,7 +6,10 @@ impl Table<'_> {
     /// Calls workers of jobs that have more than their part, until a job has its own and as many as it needs.
     pub(super) fn call(&mut self, row: usize) {
         // What the job with the reservation waits for is not to take longer.
-        while !self.rows[row].passes {
+        if self.rows[row].passes {
+            return;
+        }
+        loop {
             let Row { claim, needs, part, .. } = &self.rows[row];
             let short = part - self.speed_of(row);
             let must = self.rows[row].n() < *needs
